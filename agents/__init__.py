@@ -1,0 +1,1 @@
+"""The reference agents of mazebench, imported as `mazebench_agents`."""

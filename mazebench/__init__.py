@@ -1,0 +1,57 @@
+"""mazebench: zero-shot navigation in unseen 3-D mazes from abstract top-down maps, on MuJoCo.
+
+`load` gives a dm_control environment, `make_vec` many environments on all cores; after `pip install`, Gymnasium knows
+`mazebench/Local-13-v1` and the others by itself.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mazebench.envs.registration import make_vec
+    from mazebench.errors import InputError
+    from mazebench.maps.files import read_maze, read_mazes
+    from mazebench.maps.generators import generate
+    from mazebench.maps.maze import Maze, MazeError
+    from mazebench.tasks.episode import Episode
+    from mazebench.tasks.registry import load, make_spec
+    from mazebench.tasks.spec import TaskSpec
+
+__version__ = "0.1.0"
+
+# Imported when first used: MuJoCo and dm_control take over a second to load.
+_HOMES = {
+    "Episode": "mazebench.tasks.episode",
+    "InputError": "mazebench.errors",
+    "Maze": "mazebench.maps.maze",
+    "MazeError": "mazebench.maps.maze",
+    "TaskSpec": "mazebench.tasks.spec",
+    "generate": "mazebench.maps.generators",
+    "load": "mazebench.tasks.registry",
+    "make_spec": "mazebench.tasks.registry",
+    "make_vec": "mazebench.envs.registration",
+    "read_maze": "mazebench.maps.files",
+    "read_mazes": "mazebench.maps.files",
+}
+
+__all__ = [
+    "Episode",
+    "InputError",
+    "Maze",
+    "MazeError",
+    "TaskSpec",
+    "generate",
+    "load",
+    "make_spec",
+    "make_vec",
+    "read_maze",
+    "read_mazes",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'mazebench' has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOMES[name]), name)

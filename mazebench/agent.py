@@ -1,0 +1,121 @@
+"""What an agent is, and how agents are found: its protocol, and the entry points `mazebench.agents`.
+
+`B` is the number of environments an agent acts in at once, `M` the side of the context's planes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import pathlib
+import sys
+from importlib import metadata
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from mazebench.errors import InputError, unknown
+
+ENTRY_POINT_GROUP = "mazebench.agents"
+
+Observation = dict[str, np.ndarray]  # "state" [B, 12] float32, "context" [B, 4, M, M] float32
+
+
+@dataclasses.dataclass(frozen=True)
+class Interface:
+    """What an agent is told of the environments it will act in, before it is built."""
+
+    task: str  # "local" or "hierarchical"
+    size: int  # N, the cells a side of the mazes
+    context_size: int  # M
+    num_actions: int = 6
+
+
+@runtime_checkable
+class Agent(Protocol):
+    """Acts in `B` environments at once.
+
+    A class named by an entry point is built by `build(interface, seed=..., checkpoint=...)`. Two more methods are
+    called where they exist: the class's `context_size(size) -> int`, for an agent that needs another M than
+    min(N, 21), and `seed_episodes(seeds, mask)`, for one that draws random numbers: `seeds` `[B]` int and `mask` `[B]`
+    bool say where an episode begins, before `act` is called with its first observation, so that the draws belong to
+    the episode and not to the slot it happens to run in.
+    """
+
+    @classmethod
+    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Agent:
+        """A new agent; `checkpoint` is for those that learn, None stands for the trained one that ships."""
+
+    def initial_state(self, batch_size: int) -> Any:
+        """Whatever the agent carries from step to step in `batch_size` environments."""
+
+    def act(
+        self, observation: Observation, is_first: np.ndarray, state: Any, explore: bool = False
+    ) -> tuple[np.ndarray, Any]:
+        """Actions `[B]` int and the next state.
+
+        Args:
+          observation: "state" `[B, 12]` and "context" `[B, 4, M, M]` float32, owned by the caller.
+          is_first: `[B]` bool, where the context is new: an episode or the leg to the next landmark begins.
+          state: what the last call returned, or `initial_state`.
+          explore: whether to act as in training; evaluation never does.
+        """
+
+
+def agent_names() -> list[str]:
+    """The names of all installed agents."""
+    return sorted(_entry_points())
+
+
+def load_agent_class(name: str) -> type[Agent]:
+    """The class of an installed agent, or of `module:Class` for a module at hand (the working directory included).
+
+    Raises:
+      InputError: if there is no such agent, or it can't be imported; the message says what to install.
+    """
+    if ":" in name:
+        return _class_at_hand(name)
+    entry_points = _entry_points()
+    if name not in entry_points:
+        raise unknown("agent", name, entry_points)
+    try:
+        return _checked(name, entry_points[name].load())
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"agent {name!r} needs the module {error.name!r}, which is not installed; "
+            "try: pip install 'mazebench-mujoco[agents]'"
+        ) from error
+
+
+def _class_at_hand(name: str) -> type[Agent]:
+    module_name, _, class_name = name.partition(":")
+    if "" not in sys.path and "." not in sys.path:
+        sys.path.insert(0, "")
+    try:
+        return _checked(name, getattr(importlib.import_module(module_name), class_name))
+    except (ImportError, AttributeError, ValueError) as error:
+        raise InputError(f"agent {name!r}: expected module:Class that can be imported, found: {error}") from error
+
+
+def _checked(name: str, loaded: Any) -> type[Agent]:
+    missing = [method for method in ("build", "initial_state", "act") if not callable(getattr(loaded, method, None))]
+    if missing:
+        raise InputError(f"agent {name!r}: expected a class with build, initial_state and act, found no {missing[0]}")
+    return loaded
+
+
+def _entry_points() -> dict[str, metadata.EntryPoint]:
+    """By name; two distributions that claim one name are refused."""
+    found: dict[str, metadata.EntryPoint] = {}
+    for entry_point in metadata.entry_points(group=ENTRY_POINT_GROUP):
+        known = found.setdefault(entry_point.name, entry_point)
+        if known.value != entry_point.value:
+            raise InputError(
+                f"two agents are called {entry_point.name!r}: {known.value} of {_distribution(known)} "
+                f"and {entry_point.value} of {_distribution(entry_point)}; uninstall one"
+            )
+    return found
+
+
+def _distribution(entry_point: metadata.EntryPoint) -> str:
+    return entry_point.dist.name if entry_point.dist else "an unknown distribution"

@@ -1,0 +1,340 @@
+"""The command line: parses and calls. What a command does stands in the module that it imports when it runs."""
+
+from __future__ import annotations
+
+import datetime
+import enum
+import json
+import os
+import pathlib
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any
+
+import typer
+
+from mazebench import __version__
+from mazebench.errors import InputError
+
+# The parser's own error, which typer exports by its children only.
+_UsageError: type[Exception] = typer.BadParameter.__mro__[2]
+
+app = typer.Typer(
+    help="Zero-shot navigation in unseen 3-D mazes from abstract top-down maps, on MuJoCo.",
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+
+
+class TaskName(enum.StrEnum):
+    """Tasks, for the parser's choice."""
+
+    local = "local"
+    hierarchical = "hierarchical"
+
+
+class Split(enum.StrEnum):
+    """Splits, for the parser's choice."""
+
+    train = "train"
+    eval = "eval"
+
+
+def main() -> None:
+    """Runs a command: exit status 0 done, 1 a run failed, 2 bad input, which gets one line and no traceback."""
+    try:
+        sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0)
+    except _UsageError as error:
+        _fail(error.format_message(), 2)  # type: ignore[attr-defined]
+    except InputError as error:
+        _fail(str(error), 2)
+    except OSError as error:
+        _fail(f"{error.filename or 'file'}: {error.strerror or error}", 2)
+    except RuntimeError as error:
+        _fail(str(error), 1)
+    except (KeyboardInterrupt, typer.Abort):
+        _fail("interrupted; what was written is kept, and eval goes on with --resume", 130)
+
+
+def _fail(message: str, status: int) -> None:
+    print(f"mazebench: {' '.join(message.split())}", file=sys.stderr)
+    sys.exit(status)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        print(__version__)
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+def generate(
+    size: Annotated[
+        int | None,
+        typer.Option(help="Cells a side, 5 to 255; 13 if not given. With --from-image, what the picture shows."),
+    ] = None,
+    count: Annotated[int, typer.Option(min=1, help="How many mazes.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same mazes.")] = 0,
+    style: Annotated[str, typer.Option(help="dfs, rooms or obstacles.")] = "dfs",
+    out: Annotated[pathlib.Path, typer.Option(help="Folder to fill with NAME.txt, NAME.xml, ...")] = pathlib.Path(
+        "mazes"
+    ),
+    formats: Annotated[
+        str, typer.Option("--format", help="Of mjcf, txt, png, glb, obj, stl; separated by commas.")
+    ] = "txt,mjcf,png,glb",
+    from_image: Annotated[
+        pathlib.Path | None, typer.Option(help="Read the maze off a picture of a floor plan instead.")
+    ] = None,
+) -> None:
+    """Make mazes: MJCF for MuJoCo, text, picture, mesh."""
+    from mazebench import making
+
+    mazes = making.make_mazes(size, count, seed, style, from_image)
+    chosen = making.parse_formats(formats)
+    for index, maze in enumerate(mazes):
+        for path in making.write_maze(maze, out, chosen):
+            print(path)
+        if index == 0:
+            _preview(maze)
+
+
+def _preview(maze: Any) -> None:
+    """Draws a maze that fits the terminal; where nobody looks, in the text form of maps."""
+    from rich.console import Console
+    from rich.text import Text
+
+    from mazebench.maps.text import format_maze
+
+    console = Console()
+    if console.width < 2 * maze.size:
+        return
+    if not console.is_terminal:
+        print(format_maze(maze), end="")
+        return
+    for row in maze.walls:
+        line = Text()
+        for wall in row:
+            line.append("  ", style="on grey27" if wall else "on grey93")
+        console.print(line)
+
+
+@app.command("eval")
+def evaluate(
+    agent: Annotated[str, typer.Option(help="An installed agent (see `mazebench list`), or module:Class.")],
+    task: Annotated[TaskName, typer.Option(help="Kind of navigation.")] = TaskName.local,
+    size: Annotated[
+        int | None, typer.Option(help="Of the benchmark's mazes: 13 (if not given), 15, 17, 19 or 21.")
+    ] = None,
+    split: Annotated[Split, typer.Option(help="The benchmark's unseen mazes, or its training mazes.")] = Split.eval,
+    maps: Annotated[
+        pathlib.Path | None, typer.Option(help="Mazes of your own: a text or image file, or a folder of them.")
+    ] = None,
+    distances: Annotated[str, typer.Option(help="From start to goal in cells, as 1-5,8,10 (local task).")] = "1-15",
+    episodes_per_distance: Annotated[int, typer.Option(min=1, help="For each maze and distance (local task).")] = 5,
+    landmark_distance: Annotated[int, typer.Option(min=1, help="Cells between landmarks (hierarchical task).")] = 5,
+    map_flip: Annotated[float, typer.Option(help="Probability of each cell of the shown map to be flipped.")] = 0.0,
+    map_warp: Annotated[
+        float, typer.Option(help="Largest shift of the shown map's corners, in shares of its side.")
+    ] = 0.0,
+    position_noise: Annotated[float, typer.Option(help="Standard deviation of the noise on x and y, in metres.")] = 0.0,
+    checkpoint: Annotated[
+        pathlib.Path | None, typer.Option(help="Of a learned agent; the shipped one if not given.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the agent's draws, and of episodes that are not frozen.")] = 0,
+    out: Annotated[
+        pathlib.Path | None, typer.Option(help="Folder for the results; a new one in results/ if not given.")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in --out.")] = False,
+    num_envs: Annotated[int, typer.Option(min=1, help="Environments side by side in each process.")] = 256,
+    workers: Annotated[int, typer.Option(min=0, help="Processes; 0 runs in this one.")] = 0,
+) -> None:
+    """Evaluate an agent on unseen mazes: success rate and SPL with 95 % intervals."""
+    from mazebench.evaluation import harness, table
+    from mazebench.evaluation.records import SUMMARY, read_json
+
+    options = harness.EvalOptions(
+        agent=agent,
+        task=task.value,
+        size=size,
+        split=split.value,
+        maps=None if maps is None else str(maps),
+        distances=parse_distances(distances),
+        episodes_per_distance=episodes_per_distance,
+        landmark_distance=landmark_distance,
+        map_flip=map_flip,
+        map_warp=map_warp,
+        position_noise=position_noise,
+        checkpoint=None if checkpoint is None else str(checkpoint),
+        seed=seed,
+    )
+    if resume and out is None:
+        raise InputError("--resume needs --out, the folder of the run to go on with")
+    folder = out or _new_folder(options)
+    if resume and harness.is_finished(folder):
+        harness.check_same_run(options, folder)
+        print(f"{folder}: the run is finished")
+        table.print_summary(read_json(folder / SUMMARY))
+        return
+    if resume and folder.exists() and any(folder.iterdir()):
+        print(f"resuming {folder}")
+    with _progress(f"{agent}, {task.value}") as advance:
+        summary = harness.evaluate(options, folder, resume=resume, num_envs=num_envs, workers=workers, progress=advance)
+    table.print_summary(summary)
+    print(f"results in {folder}")
+
+
+def _new_folder(options: Any) -> pathlib.Path:
+    """A folder in results/ that no run has."""
+    now = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
+    name = f"{options.agent.replace(':', '-')}-{options.task}-{now}"
+    for number in range(1000):
+        folder = pathlib.Path("results") / (f"{name}-{number}" if number else name)
+        if not folder.exists():
+            return folder
+    raise InputError(f"results/{name}: exists a thousand times over; give --out")
+
+
+@app.command()
+def render(
+    out: Annotated[
+        pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its start or of its map and path.")
+    ],
+    agent: Annotated[str, typer.Option(help="Who drives.")] = "planner-closed-loop",
+    task: Annotated[TaskName, typer.Option(help="Kind of navigation.")] = TaskName.local,
+    size: Annotated[int | None, typer.Option(help="Of the benchmark's mazes; 13 if not given.")] = None,
+    split: Annotated[Split, typer.Option(help="The benchmark's unseen or training mazes.")] = Split.eval,
+    maps: Annotated[pathlib.Path | None, typer.Option(help="Mazes of your own.")] = None,
+    distances: Annotated[str, typer.Option(help="From start to goal in cells (local task).")] = "10",
+    view: Annotated[
+        str, typer.Option(help="top, egocentric, chase, map (shown map and driven path), or all four side by side.")
+    ] = "all",
+    position_noise: Annotated[float, typer.Option(help="Standard deviation of the noise on x and y, in metres.")] = 0.0,
+    checkpoint: Annotated[pathlib.Path | None, typer.Option(help="Of a learned agent.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the episode.")] = 0,
+    pixels: Annotated[int, typer.Option(min=64, max=1280, help="Side of a view.")] = 360,
+) -> None:
+    """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
+    _choose_rendering_backend()
+    from mazebench.evaluation import film, harness
+
+    options = harness.EvalOptions(
+        agent=agent,
+        task=task.value,
+        size=size,
+        split=split.value,
+        maps=None if maps is None else str(maps),
+        distances=parse_distances(distances),
+        position_noise=position_noise,
+        checkpoint=None if checkpoint is None else str(checkpoint),
+        seed=seed,
+    )
+    outcome = film.film_episode(options, out, view, pixels)
+    print(f"{out}: {outcome}")
+
+
+def _choose_rendering_backend() -> None:
+    """Lets this process render without a display, unless the user chose a backend; before MuJoCo is imported."""
+    if sys.platform == "linux" and not os.environ.get("DISPLAY") and not os.environ.get("WAYLAND_DISPLAY"):
+        os.environ.setdefault("MUJOCO_GL", "egl")
+
+
+@app.command()
+def bench(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Shorter runs, noisier figures.")] = False,
+) -> None:
+    """Measure speed on this machine, as ratios to the bare simulation taken in the same run."""
+    from mazebench import bench as benchmark
+
+    results = benchmark.run(quick=quick, say=lambda line: print(line, file=sys.stderr))
+    if as_json:
+        print(json.dumps(results, indent=1))
+    else:
+        benchmark.print_tables(results)
+
+
+@app.command("list")
+def list_() -> None:
+    """List tasks, agents, sizes, maze styles and Gymnasium ids."""
+    from mazebench.agent import agent_names
+    from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS, VERSION
+    from mazebench.maps.generators import STYLES
+
+    print("agents:     ", ", ".join(agent_names()))
+    print("tasks:      ", ", ".join(task.value for task in TaskName))
+    print(
+        "sizes:      ",
+        ", ".join(map(str, SIZES)),
+        f"(benchmark {VERSION}, {MAZES_PER_SPLIT} mazes in each of {', '.join(SPLITS)})",
+    )
+    print("styles:     ", ", ".join(sorted(STYLES)))
+    print(
+        "Gymnasium:  ",
+        ", ".join(f"mazebench/{kind}-{SIZES[0]}-v1" for kind in ("Local", "Hierarchical")),
+        "and the other sizes",
+    )
+
+
+def parse_distances(text: str) -> tuple[int, ...]:
+    """Sorted distances from ranges and commas: "1-5,8,10".
+
+    Raises:
+      InputError: if `text` is anything else.
+    """
+    distances: set[int] = set()
+    for part in text.split(","):
+        low, dash, high = part.strip().partition("-")
+        if not low.isdecimal() or (dash and not high.isdecimal()) or len(low) > 5 or len(high) > 5:
+            raise InputError(f"expected distances like 1-5,8,10, found {text!r}")
+        distances.update(range(int(low), int(high or low) + 1))
+    if not distances or min(distances) < 1:
+        raise InputError(f"expected distances of 1 cell or more, found {text!r}")
+    return tuple(sorted(distances))
+
+
+@contextmanager
+def _progress(title: str) -> Iterator[Any]:
+    """Yields a function (done, of) that moves a bar on a terminal, and elsewhere prints a line at every tenth."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        tenths_seen = [-1]
+
+        def say(done: int, of: int) -> None:
+            tenth = 10 * done // max(of, 1)
+            if tenth > tenths_seen[0]:
+                tenths_seen[0] = tenth
+                print(f"{title}: {done} of {of} episodes", file=sys.stderr, flush=True)
+
+        yield say
+        return
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task(title, total=None)
+        yield lambda done, of: bar.update(task, completed=done, total=of)

@@ -1,0 +1,88 @@
+"""A navigation task as a Gymnasium environment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import dm_env
+import gymnasium
+import numpy as np
+
+from mazebench.envs import spaces
+from mazebench.tasks.episode import Episode
+from mazebench.tasks.navigation import Environment
+from mazebench.tasks.spec import TaskSpec
+from mazebench.world.rendering import Renderer
+
+
+class MazeEnv(gymnasium.Env):
+    """One environment; observations, rewards and endings are those of `mazebench.tasks.navigation.Navigation`.
+
+    `info` has `is_first` (the context is new: an episode or the leg to the next landmark began), `success`, `steps`,
+    `path_length` (m), `maze` (index among the task's mazes) and `landmark` (legs done).
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 6.25}  # noqa: RUF012
+
+    def __init__(
+        self, task_spec: TaskSpec, seed: int | None = None, render_mode: str | None = None, camera: str = "top"
+    ):
+        self.task_spec = task_spec
+        self.render_mode = render_mode
+        self.observation_space = spaces.observation_space(task_spec)
+        self.action_space = spaces.action_space()
+        self.environment = Environment(task_spec, seed)
+        self._camera = camera
+        self._renderer: Renderer | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """Starts an episode, the same for the same `seed`; `options={"episode": Episode(...)}` names the one to play."""
+        super().reset(seed=seed)
+        episode = (options or {}).get("episode")
+        if episode is not None and not isinstance(episode, Episode):
+            raise ValueError(f"expected options['episode'] to be an Episode, found {type(episode).__name__}")
+        time_step = self.environment.reset(seed, episode)
+        return self._observation(time_step), self._info()
+
+    def step(self, action: int) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
+        """Takes one agent step of 0.16 s.
+
+        Raises:
+          gymnasium.error.ResetNeeded: before the first reset and after the end of an episode.
+        """
+        if self.environment.needs_reset:
+            raise gymnasium.error.ResetNeeded("expected a call to reset() before this step()")
+        time_step = self.environment.step(action)
+        ended = time_step.last()
+        terminated = ended and time_step.discount == 0.0
+        return self._observation(time_step), time_step.reward, terminated, ended and not terminated, self._info()
+
+    def render(self) -> np.ndarray | None:
+        """`[480, 480, 3]` uint8 of the current state, if `render_mode` is "rgb_array"."""
+        if self.render_mode is None:
+            return None
+        physics = self.environment.physics
+        if self._renderer is None:
+            self._renderer = Renderer(physics.model.ptr)
+        return self._renderer.render(physics.data.ptr, self._camera)
+
+    def close(self) -> None:
+        if self._renderer is not None:
+            self._renderer.__exit__()
+            self._renderer = None
+
+    def _observation(self, time_step: dm_env.TimeStep) -> dict[str, np.ndarray]:
+        return {"state": time_step.observation["state"], "context": time_step.observation["context"]}
+
+    def _info(self) -> dict[str, Any]:
+        task = self.environment.task
+        return {
+            "is_first": task.is_first,
+            "success": task.success,
+            "steps": task.steps,
+            "path_length": task.path_length,
+            "maze": task.episode.maze,
+            "landmark": task.route.leg,
+        }

@@ -1,0 +1,53 @@
+"""Gymnasium ids, `mazebench/Local-13-v1` and so on; Gymnasium finds this module by its plugin entry point."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+
+from mazebench.maps.benchmark import SIZES
+
+_VERSION = 1
+_TASKS = {"Local": "local", "Hierarchical": "hierarchical"}
+
+
+def register_environments() -> None:
+    """Registers every task and size, without the namespace, which Gymnasium puts in front.
+
+    No `max_episode_steps`: its wrapper would call a step truncated that reached the goal on the limit.
+    """
+    for title, task in _TASKS.items():
+        for size in SIZES:
+            gymnasium.register(
+                id=f"{title}-{size}-v{_VERSION}",
+                entry_point="mazebench.envs.registration:make_env",
+                vector_entry_point="mazebench.envs.registration:make_vec",
+                kwargs={"task": task, "size": size},
+            )
+
+
+def make_env(
+    task: str = "local", *, seed: int | None = None, render_mode: str | None = None, camera: str = "top", **options: Any
+):
+    """A `MazeEnv`; `options` are those of `mazebench.make_spec`."""
+    from mazebench.envs.gym import MazeEnv
+    from mazebench.tasks.registry import make_spec
+
+    return MazeEnv(make_spec(task, **options), seed, render_mode, camera)
+
+
+def make_vec(
+    task: str = "local",
+    num_envs: int = 1,
+    *,
+    seed: int | None = None,
+    num_threads: int = 0,
+    render_mode: str | None = None,
+    **options: Any,
+):
+    """`num_envs` environments side by side on `num_threads` threads (0: all cores); `options` as of `make_spec`."""
+    from mazebench.envs.vector import MazeVectorEnv
+    from mazebench.tasks.registry import make_spec
+
+    return MazeVectorEnv(make_spec(task, **options), num_envs, seed, num_threads, render_mode)

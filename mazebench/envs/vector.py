@@ -1,0 +1,272 @@
+"""Many environments side by side on MuJoCo's native thread pool, each in a maze of its own.
+
+`B` is the number of environments, `M` the side of the context.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import gymnasium
+import mujoco
+import mujoco.batch
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+
+from mazebench.envs import spaces
+from mazebench.maps.maze import cell_to_point, point_to_cell
+from mazebench.tasks.context import NUM_PLANES
+from mazebench.tasks.episode import Episode, Event, Route, ShownMap
+from mazebench.tasks.spec import TaskSpec
+from mazebench.world.mjcf import ACTIONS, STEPS_PER_ACTION, action_controls
+from mazebench.world.physics import states_from_sensors
+from mazebench.world.rendering import render
+
+# Gives environment i its next episode, or None to let it rest: it is not stepped any more.
+EpisodeSource = Callable[[int], Episode | None]
+
+_VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)  # makes the sensors current at the new state
+
+
+class MazeVectorEnv(gymnasium.vector.VectorEnv):
+    """B environments of one task; the same seed gives the same episode as in the dm_env and Gymnasium environments.
+
+    Autoreset is SAME_STEP: where an episode ends, the observation returned is the next one's first, and
+    `info["final_obs"]`, `info["final_info"]` hold the ended one's last. `info` has, as arrays `[B]`: `is_first` (the
+    context is new: an episode or the leg to the next landmark began), `success`, `steps`, `path_length` (m), `maze`
+    (index among the task's mazes), `landmark` (legs done).
+    """
+
+    metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": ["rgb_array"], "render_fps": 6.25}  # noqa: RUF012
+
+    def __init__(
+        self,
+        task_spec: TaskSpec,
+        num_envs: int,
+        seed: int | None = None,
+        num_threads: int = 0,
+        render_mode: str | None = None,
+        episode_source: EpisodeSource | None = None,
+    ):
+        """`num_threads` 0 uses all cores; without `episode_source`, each environment draws from a stream of its own."""
+        if num_envs < 1:
+            raise ValueError(f"expected at least one environment, found num_envs={num_envs}")
+        self.task_spec = task_spec
+        self.num_envs = num_envs
+        self.render_mode = render_mode
+        self.single_observation_space = spaces.observation_space(task_spec)
+        self.single_action_space = spaces.action_space()
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._episode_source = episode_source or self._draw_episode
+        self._rngs = _streams(seed, num_envs)
+        self._allocate()
+        self._models = [task_spec.models[0]] * num_envs
+        self._batch = mujoco.batch.Batch(task_spec.models[0], num_envs, num_threads)
+        self._sensors = self._batch.bind("sensordata")
+        self._qpos = self._batch.bind("qpos")
+        self._ctrl = self._batch.bind("ctrl")
+        self._marker = self._batch.bind("mocap_pos")
+        self._controls = action_controls()
+
+    def _allocate(self) -> None:
+        num_envs, size = self.num_envs, self.task_spec.context_size
+        self.episodes: list[Episode | None] = [None] * num_envs
+        self._routes: list[Route | None] = [None] * num_envs
+        self._shown: list[ShownMap | None] = [None] * num_envs
+        self._noise: list[np.random.Generator | None] = [None] * num_envs
+        self._context = np.zeros((num_envs, NUM_PLANES, size, size), dtype=np.float32)
+        self._positions = np.zeros((num_envs, 2))
+        self._path_length = np.zeros(num_envs)
+        self._steps = np.zeros(num_envs, dtype=np.int64)
+        # Cells as row * N + column, and the step at which the current leg times out: what a step is checked against.
+        self._target = np.zeros(num_envs, dtype=np.int64)
+        self._goal = np.zeros(num_envs, dtype=np.int64)
+        self._deadline = np.zeros(num_envs, dtype=np.int64)
+        self._landmark = np.zeros(num_envs, dtype=np.int64)
+        self._maze = np.zeros(num_envs, dtype=np.int64)
+        self._active = np.zeros(num_envs, dtype=bool)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """Starts an episode everywhere.
+
+        Args:
+          seed: a list verbatim, an integer s as s, s + 1, ...; None goes on with the environments' streams.
+          options: none are known.
+        """
+        if seed is not None:
+            fresh = _streams(seed, self.num_envs)
+            keep = isinstance(seed, Sequence)
+            self._rngs = [
+                old if keep and seed[i] is None else new  # type: ignore[index]
+                for i, (old, new) in enumerate(zip(self._rngs, fresh, strict=True))
+            ]
+        self._active[:] = True
+        self._begin_episodes(range(self.num_envs))
+        is_first = np.ones(self.num_envs, dtype=bool)
+        return self._observations(self._noisy_states()), self._infos(is_first, np.zeros(self.num_envs, dtype=bool))
+
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Takes one agent step (0.16 s) in each environment; `actions` is `[B]` int."""
+        self._ctrl[:] = self._controls[self._check_actions(actions)]
+        resting = not self._active.all()
+        ids = np.flatnonzero(self._active) if resting else None
+        self._batch.step(ids, nstep=STEPS_PER_ACTION, stage=_VELOCITY_STAGE)
+        moved = self._qpos[:, :2] - self._positions
+        self._positions += moved
+        self._path_length += np.sqrt(moved[:, 0] * moved[:, 0] + moved[:, 1] * moved[:, 1])
+        self._steps += self._active
+        is_first, terminated, truncated = self._advance()
+        rewards = np.where(terminated, 0.0, -1.0)
+        if resting:
+            rewards[~self._active] = 0.0
+        infos = self._infos(is_first, terminated)
+        states = self._noisy_states()
+        ended = np.flatnonzero(terminated | truncated)
+        if len(ended):
+            infos = self._autoreset(ended, states, infos)
+        return self._observations(states), rewards, terminated, truncated, infos
+
+    def _check_actions(self, actions: np.ndarray) -> np.ndarray:
+        actions = np.asarray(actions)
+        if actions.shape != (self.num_envs,) or actions.min() < 0 or actions.max() >= len(ACTIONS):
+            raise ValueError(
+                f"expected {self.num_envs} actions from 0 to {len(ACTIONS) - 1}, "
+                f"found shape {actions.shape}, values {actions}"
+            )
+        return actions.astype(np.int64, copy=False)
+
+    def _advance(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where a new leg began, where the goal was reached, where the time ran out: three `[B]` bool."""
+        size = self.task_spec.size
+        is_first, terminated, truncated = np.zeros((3, self.num_envs), dtype=bool)
+        cells = point_to_cell(self._positions, size) @ (size, 1)
+        # Nothing else can happen to a route than these three; its own rules then say which it is.
+        due = (cells == self._target) | (cells == self._goal) | (self._steps >= self._deadline)
+        for i in np.flatnonzero(due & self._active).tolist():
+            event = self._route(i).advance(divmod(int(cells[i]), size), int(self._steps[i]))
+            if event is Event.LANDMARK:
+                self._begin_leg(i)
+                is_first[i] = True
+            terminated[i] = event is Event.REACHED
+            truncated[i] = event is Event.TIMEOUT
+        return is_first, terminated, truncated
+
+    def _autoreset(self, ended: np.ndarray, states: np.ndarray, infos: dict[str, Any]) -> dict[str, Any]:
+        """Begins the next episodes, writes their states into `states`, returns the infos with the ended ones'."""
+        final_obs = np.full(self.num_envs, None, dtype=object)
+        mask = np.zeros(self.num_envs, dtype=bool)
+        mask[ended] = True
+        for i in ended:
+            final_obs[i] = {"state": states[i].copy(), "context": self._context[i].copy()}
+        final_info = {key: value if key.startswith("_") else value.copy() for key, value in infos.items()}
+        final_info.update({key: mask for key in infos if key.startswith("_")})
+        began = self._begin_episodes(ended)
+        states[began] = self._noisy_states(began)
+        is_first = infos["is_first"]
+        is_first[began] = True
+        infos = self._infos(is_first, infos["success"] & ~mask)
+        return infos | {"final_obs": final_obs, "_final_obs": mask, "final_info": final_info, "_final_info": mask}
+
+    def _begin_episodes(self, indices: Sequence[int] | np.ndarray | range) -> np.ndarray:
+        """Gives the environments `indices` their next episodes; returns those that got one, the others rest."""
+        for i in indices:
+            self.episodes[i] = self._episode_source(int(i))
+            self._active[i] = self.episodes[i] is not None
+        began = np.array([i for i in indices if self._active[i]], dtype=np.int64)
+        if not len(began):
+            return began
+        spec = self.task_spec
+        for i in began:
+            self._models[i] = spec.models[self._episode(i).maze]
+        self._batch.set_models(self._models)
+        self._batch.reset(began, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
+        for i in began:
+            self._begin_episode(i)
+        self._batch.forward(began, stage=_VELOCITY_STAGE)
+        return began
+
+    def _begin_episode(self, i: int) -> None:
+        spec, episode = self.task_spec, self._episode(i)
+        shown = spec.show(episode)
+        self._shown[i] = shown
+        self._routes[i] = spec.route(episode, shown)
+        self._noise[i] = episode.streams()[2] if spec.perturbation.position_noise else None
+        self._positions[i] = cell_to_point(episode.start, spec.size)
+        self._qpos[i] = (*self._positions[i], episode.yaw)
+        self._marker[i, 0] = (*cell_to_point(episode.goal, spec.size), 0.0)
+        self._path_length[i], self._steps[i], self._maze[i] = 0.0, 0, episode.maze
+        self._goal[i] = episode.goal[0] * spec.size + episode.goal[1]
+        self._begin_leg(i)
+
+    def _begin_leg(self, i: int) -> None:
+        route, shown = self._route(i), self._shown[i]
+        assert shown is not None
+        self._context[i] = self.task_spec.context(shown, route.start, route.target)
+        self._target[i] = route.target[0] * self.task_spec.size + route.target[1]
+        self._deadline[i], self._landmark[i] = route.deadline, route.leg
+
+    def _noisy_states(self, indices: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """`[K, 12]` float32: the states of the environments `indices`, as their agents observe them."""
+        states = states_from_sensors(self._sensors[indices])
+        scale = self.task_spec.perturbation.position_noise
+        if scale:
+            for state, i in zip(states, np.arange(self.num_envs)[indices], strict=True):
+                noise = self._noise[i]
+                assert noise is not None
+                if self._active[i]:
+                    state[:2] += noise.normal(0.0, scale, size=2)
+        return states.astype(np.float32)
+
+    def _observations(self, states: np.ndarray) -> dict[str, np.ndarray]:
+        return {"state": states, "context": self._context.copy()}
+
+    def _infos(self, is_first: np.ndarray, success: np.ndarray) -> dict[str, Any]:
+        infos = {
+            "is_first": is_first,
+            "success": success.copy(),
+            "steps": self._steps.copy(),
+            "path_length": self._path_length.copy(),
+            "maze": self._maze.copy(),
+            "landmark": self._landmark.copy(),
+        }
+        everywhere = np.ones(self.num_envs, dtype=bool)
+        return infos | {f"_{key}": everywhere for key in infos}
+
+    def _draw_episode(self, i: int) -> Episode:
+        return self.task_spec.sample_episode(self._rngs[i])
+
+    def _episode(self, i: int) -> Episode:
+        episode = self.episodes[i]
+        assert episode is not None
+        return episode
+
+    def _route(self, i: int) -> Route:
+        route = self._routes[i]
+        assert route is not None
+        return route
+
+    def positions(self) -> np.ndarray:
+        """`[B, 2]` float: the bodies' true centres (x, y) in metres, for records and pictures; not for agents."""
+        return self._positions.copy()
+
+    def render(self) -> tuple[np.ndarray, ...]:
+        """One top-down picture `[H, W, 3]` uint8 an environment."""
+        data = [self._batch.get_data(i) for i in range(self.num_envs)]
+        for model, values in zip(self._models, data, strict=True):
+            mujoco.mj_kinematics(model, values)
+        return tuple(render(model, values, "top") for model, values in zip(self._models, data, strict=True))
+
+
+def _streams(seed: int | Sequence[int | None] | None, num_envs: int) -> list[np.random.Generator]:
+    if seed is None or isinstance(seed, (int, np.integer)):
+        seed = [None if seed is None else int(seed) + i for i in range(num_envs)]
+    if len(seed) != num_envs:
+        raise ValueError(f"expected {num_envs} seeds, found {len(seed)}")
+    return [np.random.default_rng(value) for value in seed]

@@ -1,0 +1,152 @@
+"""An episode as a film or a picture: from above, through the agent's eyes, and on the map it was shown."""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+
+from mazebench.agent import load_agent_class
+from mazebench.errors import InputError, unknown
+from mazebench.evaluation.harness import EvalOptions, build_agent, make_task_spec
+from mazebench.evaluation.protocol import select_trials
+from mazebench.maps.image import draw_maze, write_image
+from mazebench.tasks.navigation import Environment
+from mazebench.tasks.spec import TaskSpec
+from mazebench.world.rendering import Renderer
+
+CAMERAS = ("top", "chase", "egocentric")
+MAP = "map"
+_FRAMES_PER_SECOND = 1 / 0.16  # one an agent step: the film runs in real time
+
+
+def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int) -> str:
+    """Runs one episode of the protocol, the one that `options.seed` counts to, and writes it to `out`.
+
+    Args:
+      options: who drives where, as for an evaluation.
+      out: an .mp4 or .gif of the episode, or a .png: of the map with the driven path, or a camera's first view.
+      view: a camera, "map", or "all" for all of them side by side.
+      pixels: side of a view.
+
+    Returns:
+      What came of the episode, in words.
+
+    Raises:
+      InputError: if a name is unknown or `out` can't be written.
+      RenderingError: if this machine can't render.
+    """
+    views = (MAP, *CAMERAS) if view == "all" else (view,)
+    if views[0] not in (MAP, *CAMERAS):
+        raise unknown("view", view, (MAP, *CAMERAS, "all"))
+    if out.suffix not in _WRITERS:
+        raise unknown("suffix", out.suffix, _WRITERS)
+    frames, outcome = _run(options, views, pixels)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        _WRITERS[out.suffix](frames, out)
+    except OSError as error:
+        raise InputError(f"{out}: can't write: {error.strerror}") from error
+    return outcome
+
+
+def _run(options: EvalOptions, views: tuple[str, ...], pixels: int) -> tuple[list[np.ndarray], str]:
+    agent_class = load_agent_class(options.agent)
+    task_spec = make_task_spec(options, agent_class)
+    frozen = options.maps is None and options.split == "eval"
+    trials = select_trials(options.task, task_spec.mazes, frozen, options.distances)
+    trial = trials[options.seed % len(trials)]
+    agent = build_agent(options, agent_class, task_spec)
+    environment = Environment(task_spec)
+    time_step = environment.reset(episode=trial.episode)
+    state = agent.initial_state(1)
+    if hasattr(agent, "seed_episodes"):
+        agent.seed_episodes(np.array([trial.episode.seed]), np.ones(1, dtype=bool))
+    scene = _Scene(environment, task_spec, views, pixels)
+    try:
+        frames = [scene.draw()]
+        while not time_step.last():
+            observation = {key: time_step.observation[key][None] for key in ("state", "context")}
+            actions, state = agent.act(observation, np.array([environment.task.is_first]), state)
+            time_step = environment.step(int(actions[0]))
+            frames.append(scene.draw())
+    finally:
+        scene.close()
+    task = environment.task
+    ending = "reached the goal" if task.success else "ran out of time"
+    maze = task_spec.mazes[trial.episode.maze].name
+    return frames, (
+        f"{options.agent} {ending} after {task.steps} steps and {task.path_length:.2f} m "
+        f"(shortest {trial.shortest_path:.2f} m) in maze {maze}, from {trial.episode.start} to {trial.episode.goal}"
+    )
+
+
+@dataclasses.dataclass
+class _Scene:
+    """The views of a running episode, side by side in one picture."""
+
+    environment: Environment
+    task_spec: TaskSpec
+    views: tuple[str, ...]
+    pixels: int
+
+    def __post_init__(self):
+        self._path: list[np.ndarray] = []
+        cameras = [view for view in self.views if view != MAP]
+        self._renderer = Renderer(self.environment.physics.model.ptr, self.pixels, self.pixels) if cameras else None
+
+    def draw(self) -> np.ndarray:
+        """`[H, W, 3]` uint8 of the state now; the map shows the path driven up to now."""
+        self._path.append(self.environment.physics.position())
+        return np.concatenate([self._view(view) for view in self.views], axis=1)
+
+    def close(self) -> None:
+        if self._renderer is not None:
+            self._renderer.__exit__()
+
+    def _view(self, view: str) -> np.ndarray:
+        if view != MAP:
+            assert self._renderer is not None
+            return self._renderer.render(self.environment.physics.data.ptr, view)
+        task = self.environment.task
+        maze = self.task_spec.mazes[task.episode.maze]
+        path = np.array(self._path) if len(self._path) > 1 else None
+        picture = draw_maze(maze, 2 * self.pixels // maze.size + 1, task.episode.start, task.episode.goal, path)
+        return cv2.resize(picture, (self.pixels, self.pixels), interpolation=cv2.INTER_AREA)
+
+
+def _write_png(frames: list[np.ndarray], out: pathlib.Path) -> None:
+    # A map tells most with the whole path on it; cameras are given side by side with it, at the same moment.
+    write_image(frames[-1], out)
+
+
+def _write_gif(frames: list[np.ndarray], out: pathlib.Path) -> None:
+    animation = cv2.Animation()
+    animation.frames = [cv2.cvtColor(frame, cv2.COLOR_RGB2BGRA) for frame in frames]
+    animation.durations = [round(1000 / _FRAMES_PER_SECOND)] * len(frames)
+    done, content = cv2.imencodeanimation(".gif", animation)
+    if not done:
+        raise InputError(f"{out}: this OpenCV can't write GIF")
+    out.write_bytes(content.tobytes())
+
+
+def _write_mp4(frames: list[np.ndarray], out: pathlib.Path) -> None:
+    with open(out, "wb"):  # OpenCV says nothing of a file that it can't write
+        pass
+    height, width = frames[0].shape[:2]
+    writer = cv2.VideoWriter(str(out), cv2.VideoWriter.fourcc(*"mp4v"), _FRAMES_PER_SECOND, (width, height))
+    if not writer.isOpened():
+        raise InputError(f"{out}: this OpenCV can't write MP4")
+    for frame in frames:
+        writer.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
+    writer.release()
+
+
+_WRITERS: dict[str, Callable[[list[np.ndarray], pathlib.Path], None]] = {
+    ".png": _write_png,
+    ".gif": _write_gif,
+    ".mp4": _write_mp4,
+}

@@ -1,0 +1,76 @@
+"""Makes benchmark v1: `python -m mazebench.evaluation.freeze DIR` writes its files byte for byte as they ship."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import pathlib
+import sys
+
+import numpy as np
+
+from mazebench.evaluation.protocol import COLUMNS, Trial, benchmark_task_sizes, episodes_file, select_trials
+from mazebench.maps.benchmark import MANIFEST, MAZES_PER_SPLIT, SIZES, SPLITS, VERSION, mazes_file
+from mazebench.maps.generators import DFS_OPENINGS, dfs_walls
+from mazebench.maps.maze import Maze, canonical_bytes
+from mazebench.maps.text import format_maze
+
+_MAZE_SEED = 1  # of version v1; with the size it seeds the stream that all its mazes are drawn from
+_EPISODE_SEED = 0
+
+
+def freeze(folder: pathlib.Path) -> None:
+    """Writes mazes, eval episodes and their manifest into `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    files = {}
+    mazes = {size: draw_mazes(size) for size in SIZES}
+    for size in SIZES:
+        for index, split in enumerate(SPLITS):
+            chosen = mazes[size][index * MAZES_PER_SPLIT : (index + 1) * MAZES_PER_SPLIT]
+            files[mazes_file(size, split)] = "\n".join(map(format_maze, chosen))
+    for task, size, _ in benchmark_task_sizes():
+        trials = select_trials(task, mazes[size][MAZES_PER_SPLIT:], frozen=False, seed=_EPISODE_SEED)
+        files[episodes_file(task, size)] = _to_csv(trials)
+    files[MANIFEST] = _manifest(files)
+    for name, text in files.items():
+        folder.joinpath(name).write_bytes(text.encode("ascii"))
+
+
+def draw_mazes(size: int) -> list[Maze]:
+    """The train mazes, then the eval mazes of one size, no two of them alike under rotations and mirror images."""
+    rng = np.random.default_rng([_MAZE_SEED, size])
+    unique: dict[bytes, np.ndarray] = {}
+    while len(unique) < len(SPLITS) * MAZES_PER_SPLIT:
+        walls = dfs_walls(size, rng)
+        unique.setdefault(canonical_bytes(walls), walls)
+    return [Maze(walls, f"{size}-{index}") for index, walls in enumerate(unique.values())]
+
+
+def _to_csv(trials: list[Trial]) -> str:
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for trial in trials:
+        episode = trial.episode
+        shortest = f"{trial.shortest_path:.9f}"  # nanometres: the same on every machine
+        writer.writerow(
+            [episode.maze, *episode.start, *episode.goal, trial.distance, repr(episode.yaw), episode.seed, shortest]
+        )
+    return text.getvalue()
+
+
+def _manifest(files: dict[str, str]) -> str:
+    content = {
+        "version": VERSION,
+        "generator": {"style": "dfs", "openings": DFS_OPENINGS, "seed": _MAZE_SEED, "episode_seed": _EPISODE_SEED},
+        "files": {name: hashlib.sha256(text.encode("ascii")).hexdigest() for name, text in sorted(files.items())},
+    }
+    return json.dumps(content, indent=1) + "\n"
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit("usage: python -m mazebench.evaluation.freeze DIR")
+    freeze(pathlib.Path(sys.argv[1]))

@@ -1,0 +1,139 @@
+"""The episodes of an evaluation: the frozen ones of benchmark v1, or ones drawn in the same way."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import functools
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, read_asset
+from mazebench.maps.generators import corner_cells
+from mazebench.maps.geodesic import DiscPaths
+from mazebench.maps.maze import Cell, Maze, cell_to_point
+from mazebench.tasks.episode import Episode
+from mazebench.tasks.spec import EVAL_DISTANCES, sample_pair
+from mazebench.world.mjcf import BODY_RADIUS
+
+EPISODES_PER_DISTANCE = 5
+COLUMNS = ("maze", "start_row", "start_column", "goal_row", "goal_column", "distance", "yaw", "seed", "shortest_path")
+
+_MAX_DRAWS = 100  # for a pair not drawn before
+_SEEDS = 2**31
+
+
+@dataclasses.dataclass(frozen=True)
+class Trial:
+    """One episode of an evaluation, with what its metrics need."""
+
+    episode: Episode
+    distance: int  # cells, of start and goal on the true map
+    shortest_path: float  # m, of the body as a disc from the start point to the goal cell
+
+
+def episodes_file(task: str, size: int) -> str:
+    """The name of the file with the frozen eval episodes of one task and size."""
+    return f"episodes-{task}-{size}-eval.csv"
+
+
+def frozen_trials(task: str, size: int) -> tuple[Trial, ...]:
+    """The eval episodes of benchmark v1: 1,500 a size of the local task, 20 of the hierarchical one."""
+    rows = csv.DictReader(read_asset(episodes_file(task, size)).splitlines())
+    return tuple(
+        Trial(
+            Episode(
+                int(row["maze"]),
+                (int(row["start_row"]), int(row["start_column"])),
+                (int(row["goal_row"]), int(row["goal_column"])),
+                float(row["yaw"]),
+                int(row["seed"]),
+            ),
+            int(row["distance"]),
+            float(row["shortest_path"]),
+        )
+        for row in rows
+    )
+
+
+def select_trials(
+    task: str,
+    mazes: Sequence[Maze],
+    frozen: bool,
+    distances: Iterable[int] = EVAL_DISTANCES,
+    episodes_per_distance: int = EPISODES_PER_DISTANCE,
+    seed: int = 0,
+) -> list[Trial]:
+    """The episodes to evaluate, by maze and then by distance.
+
+    Args:
+      task: "local" or "hierarchical".
+      mazes: all the task's mazes.
+      frozen: whether `mazes` are benchmark v1's eval mazes, whose frozen episodes are then taken as far as they go.
+      distances: of the local task's pairs, cells.
+      episodes_per_distance: for each maze and distance.
+      seed: of what is drawn.
+
+    Raises:
+      InputError: if no two cells of a maze are a wanted distance apart.
+    """
+    distances = sorted(set(distances))
+    if task == "hierarchical":
+        if frozen:
+            return list(frozen_trials(task, mazes[0].size))
+        return [_hierarchical_trial(maze, index, seed) for index, maze in enumerate(mazes)]
+    if frozen and set(distances) <= set(EVAL_DISTANCES) and episodes_per_distance <= EPISODES_PER_DISTANCE:
+        kept = np.arange(EPISODES_PER_DISTANCE) < episodes_per_distance
+        trials = frozen_trials(task, mazes[0].size)
+        return [
+            trial
+            for trial, keep in zip(trials, np.resize(kept, len(trials)), strict=True)
+            if keep and trial.distance in distances
+        ]
+    return [
+        trial
+        for index, maze in enumerate(mazes)
+        for distance in distances
+        for trial in _local_trials(maze, index, distance, episodes_per_distance, seed)
+    ]
+
+
+def _local_trials(maze: Maze, index: int, distance: int, count: int, seed: int) -> list[Trial]:
+    """`count` episodes of different pairs, as far as there are so many; the first ones do not depend on `count`."""
+    rng = np.random.default_rng([seed, maze.size, index, distance])
+    seen: set[tuple[Cell, Cell]] = set()
+    trials = []
+    for _ in range(count):
+        pair = sample_pair(maze, distance, rng)
+        for _ in range(_MAX_DRAWS):
+            if pair not in seen:
+                break
+            pair = sample_pair(maze, distance, rng)
+        seen.add(pair)
+        trials.append(_trial(maze, index, pair, rng))
+    return trials
+
+
+def _hierarchical_trial(maze: Maze, index: int, seed: int) -> Trial:
+    return _trial(maze, index, corner_cells(maze), np.random.default_rng([seed, maze.size, index]))
+
+
+def _trial(maze: Maze, index: int, pair: tuple[Cell, Cell], rng: np.random.Generator) -> Trial:
+    start, goal = pair
+    episode = Episode(index, start, goal, float(rng.uniform(-np.pi, np.pi)), int(rng.integers(_SEEDS)))
+    shortest = _disc_paths(maze).length(cell_to_point(start, maze.size), goal)
+    return Trial(episode, maze.distance(start, goal), shortest)
+
+
+@functools.lru_cache(maxsize=2)
+def _disc_paths(maze: Maze) -> DiscPaths:
+    return DiscPaths(maze, BODY_RADIUS)
+
+
+def benchmark_task_sizes() -> list[tuple[str, int, int]]:
+    """(task, size, number of frozen episodes) of everything in benchmark v1."""
+    local = MAZES_PER_SPLIT * len(EVAL_DISTANCES) * EPISODES_PER_DISTANCE
+    return [
+        (task, size, count) for size in SIZES for task, count in (("local", local), ("hierarchical", MAZES_PER_SPLIT))
+    ]

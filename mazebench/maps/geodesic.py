@@ -1,0 +1,363 @@
+"""Exact any-angle shortest paths of a disc in a maze: the `l` of SPL (Anderson et al. 2018).
+
+A taut path is made of straight pieces and of arcs of the disc's radius about corners of walls that stick out into free
+space: it is a path in the tangent graph (Liu and Arimoto 1992). Such a corner has one wall among its four cells: with
+two in a row the wall is flat there, with two on the diagonal or three the free cells see only concave angles. It
+carries a circle that a path can touch only in the quadrant opposite to the wall. The disc can be everywhere on that
+quadrant, for all other walls are a cell away.
+
+Lattice points are (x, y) in metres, with walls indexed `[x, y]` here. `K` is the number of circles, `P` of straight
+pieces and `S` of segments tested together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from mazebench.errors import InputError
+from mazebench.maps.maze import Cell, Maze
+
+# Metres (and, as a component of a unit vector, radians) by which a contact may miss; rounding stays below 1e-12.
+_TOLERANCE = 1e-9
+# What is tested together; it keeps temporary arrays to some ten megabytes.
+_PAIRS_AT_ONCE = 2**18
+_LINES_AT_ONCE = 16
+
+
+class _Circles(NamedTuple):
+    """Circles that a path may touch from outside; a point is one of radius 0."""
+
+    centre: np.ndarray  # [K, 2] float, metres
+    quadrant: np.ndarray  # [K, 2] float, signs (x, y) of the exposed normals; (0, 0) allows every normal
+    radius: np.ndarray  # [K] float, metres
+
+
+class _Pieces(NamedTuple):
+    """Straight pieces of paths, each between two contacts."""
+
+    circle: np.ndarray  # [P, 2] int, the circles that the two ends touch
+    offset: np.ndarray  # [P, 2] float, metres along each circle, anticlockwise from the middle of its quadrant
+    end: np.ndarray  # [P, 2, 2] float, the two ends (x, y) in metres
+
+
+_Table = TypeVar("_Table", _Circles, _Pieces)
+
+
+class DiscPaths:
+    """Shortest paths of a disc of one radius in one maze.
+
+    A path is a curve of the disc's centre that stays at least `radius` away from every wall and ends as soon as it is
+    in the closed goal cell. The pieces between the maze's own corners are found once, here; each query adds those that
+    touch the start or the goal. Building takes time in the square of the number of corners, memory in the number of
+    pairs of them that see each other.
+
+    Args:
+      radius: metres, above 0 and below 0.5.
+
+    Raises:
+      InputError: if `radius` is out of range.
+    """
+
+    def __init__(self, maze: Maze, radius: float):
+        if not 0 < radius < 0.5:
+            raise InputError(f"expected a radius above 0 and below 0.5 m, found {radius}")
+        self._maze = maze
+        self._radius = float(radius)
+        self._space = _FreeSpace(maze.walls, self._radius)
+        self._corners = _exposed_corners(self._space.walls, self._radius)
+        batches = (
+            self._clear(_tangents(self._corners, first, second, side))
+            for side in (1, -1)
+            for first, second in _candidate_pairs(self._corners, side)
+        )
+        self._pieces = _concatenate(list(batches))
+
+    def length(self, start: np.ndarray, goal: Cell) -> float:
+        """Metres from `start` (`[2]`, the disc's centre) to the goal cell; 0 if `start` is in it.
+
+        Raises:
+          InputError: if `start` is not at least the radius away from every wall, or `goal` is not a free cell.
+        """
+        start, corner = self._check(start, goal)
+        return 0.0 if _is_in_cell(start, corner) else self._search(start, corner)[1]
+
+    def path(self, start: np.ndarray, goal: Cell, arc_step: float = 0.05) -> np.ndarray:
+        """`[L, 2]` points (x, y) along a shortest path, from `start` on, on arcs at most `arc_step` metres apart.
+
+        Raises:
+          InputError: as `length` does, or if `arc_step` is not above 0.
+        """
+        if not arc_step > 0:
+            raise InputError(f"expected an arc_step above 0 m, found {arc_step}")
+        start, corner = self._check(start, goal)
+        if _is_in_cell(start, corner):
+            return start[None]
+        pieces, _, nodes = self._search(start, corner)
+        circle, offset = pieces.circle.ravel()[nodes], pieces.offset.ravel()[nodes]
+        points = [start[None]]
+        for i in range(1, len(nodes)):
+            if circle[i] != circle[i - 1]:
+                points.append(pieces.end.reshape(-1, 2)[nodes[i]][None])
+            elif offset[i] != offset[i - 1]:
+                points.append(self._arc(circle[i], offset[i - 1], offset[i], arc_step))
+        return np.concatenate(points)
+
+    def _check(self, start: np.ndarray, goal: Cell) -> tuple[np.ndarray, np.ndarray]:
+        """`start` as an array and the goal cell's lower left corner (`[2]` int), if both are legal."""
+        point = np.asarray(start, dtype=np.float64)
+        if point.shape != (2,) or not self._space.holds(point):
+            raise InputError(
+                f"{self._maze.name}: expected a start (x, y) at least {self._radius} m from every wall, "
+                f"found {point.tolist()}"
+            )
+        row, column = self._maze.require_free(goal)
+        return point, np.array([column, self._maze.size - 1 - row])
+
+    def _clear(self, pieces: _Pieces) -> _Pieces:
+        keep = self._space.is_clear(pieces.end[:, 0], pieces.end[:, 1])
+        return _Pieces(*(array[keep] for array in pieces))
+
+    def _search(self, start: np.ndarray, corner: np.ndarray) -> tuple[_Pieces, float, np.ndarray]:
+        """All pieces of the query, the shortest length and the ends that such a path passes, as indices into `2 P`.
+
+        The corners' circles come first, then the start; all beyond are points where a path may end.
+        """
+        pieces = _concatenate([self._pieces, self._clear(self._query_pieces(start, corner))])
+        circle, source = pieces.circle.ravel(), len(self._corners.radius)
+        first = int(np.argmax(circle == source))
+        distances, previous = csgraph.dijkstra(_graph(pieces), indices=first, return_predecessors=True)
+        nodes = [int(np.argmin(np.where(circle > source, distances, np.inf)))]
+        while previous[nodes[-1]] >= 0:
+            nodes.append(int(previous[nodes[-1]]))
+        return pieces, float(distances[nodes[0]]), np.array(nodes[::-1])
+
+    def _query_pieces(self, start: np.ndarray, corner: np.ndarray) -> _Pieces:
+        """Straight pieces from the start to the circles and from both to the goal, not tested for walls.
+
+        The last piece meets a side of the goal cell at a right angle, or at a corner that is in the open: near a corner
+        of a wall, the disc can be on the side up to where the wall's circle meets it, and it does so at a right angle.
+        """
+        source = len(self._corners.radius)
+        circles = _concatenate([self._corners, _points(start[None]), _points(self._space.open_corners(corner))])
+        to_side = _concatenate([_perpendiculars(circles, source + 1, *side) for side in self._space.sides(corner)])
+        # Each ends at a point of its own.
+        to_side.circle[:, 1] += np.arange(len(to_side.circle))
+        corners = np.arange(source)
+        from_start = _tangents(circles, np.full_like(corners, source), corners, side=1)
+        first, last = np.meshgrid(np.arange(source + 1), np.arange(source + 1, len(circles.radius)))
+        to_corner = _tangents(circles, first.ravel(), last.ravel(), side=1)
+        return _concatenate([from_start, to_corner, to_side])
+
+    def _arc(self, circle: int, first: float, last: float, arc_step: float) -> np.ndarray:
+        """`[K, 2]` points of an arc after its first point, the last included."""
+        num_steps = int(np.ceil(abs(last - first) / arc_step))
+        offset = np.linspace(first, last, num_steps + 1)[1:]
+        quadrant = self._corners.quadrant[circle]
+        angle = np.arctan2(quadrant[1], quadrant[0]) + offset / self._radius
+        return self._corners.centre[circle] + self._radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+class _FreeSpace:
+    """The points at least `radius` away from every wall."""
+
+    def __init__(self, walls: np.ndarray, radius: float):
+        self.walls = walls[::-1].T  # [x, y]
+        self._radius = radius
+        self._clearance = radius - min(_TOLERANCE, radius / 2)
+        self._side = len(walls) + 1
+        padded = np.pad(self.walls, 1, constant_values=True)
+        left_or_right = padded[:-1] | padded[1:]
+        # [x, y]: whether a cell at the lattice point is a wall.
+        self._corner = left_or_right[:, :-1] | left_or_right[:, 1:]
+        # Flattened [2, x, y], for flat and, with the axes exchanged, for steep segments: the corners, and whether a
+        # wall is left or right of the line from lattice point (x, y) to (x, y + 1).
+        upper_or_lower = padded[:, :-1] | padded[:, 1:]
+        self._corner_table = np.stack([self._corner, self._corner.T]).ravel()
+        self._edge_table = np.stack([left_or_right[:, 1:], upper_or_lower[1:].T]).ravel()
+
+    def holds(self, point: np.ndarray) -> bool:
+        """Whether `point` (`[2]`) lies here."""
+        size = len(self.walls)
+        if not np.all((point >= 0) & (point < size)):
+            return False
+        cell = point.astype(int)
+        cells = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2) + cell
+        walls = cells[self.walls[tuple(np.clip(cells, 0, size - 1).T)]]
+        outside = np.maximum(np.maximum(walls - point, point - walls - 1), 0)
+        return bool(np.all(np.hypot(*outside.T) >= self._clearance))
+
+    def open_corners(self, corner: np.ndarray) -> np.ndarray:
+        """`[0 to 4, 2]`: the corners that a cell (lower left corner `[2]`) shares with no wall."""
+        corners = corner + np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
+        return corners[~self._corner[tuple(corners.T)]]
+
+    def sides(self, corner: np.ndarray) -> Iterator[tuple[int, float, float, float]]:
+        """The parts of a cell's sides that lie here, as (axis, level, low, high).
+
+        Such a part has x = `level` and y from `low` to `high` if `axis` is 0, or the other way round if it is 1.
+        """
+        for axis, step in np.ndindex(2, 2):
+            across, along = np.eye(2, dtype=np.int64)[[axis, 1 - axis]]
+            first = corner + step * across
+            if self.walls[tuple(corner + (2 * step - 1) * across)]:
+                continue
+            margins = [self._radius * self._corner[tuple(point)] for point in (first, first + along)]
+            yield axis, first[axis], first[1 - axis] + margins[0], first[1 - axis] + 1 - margins[1]
+
+    def is_clear(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """`[S]` bool: whether the segments between points here (`[S, 2]` each) stay here.
+
+        They do unless a corner of a wall is too near or they enter a wall. Both show on the lattice's lines across a
+        segment's longer axis: the two lattice points about a crossing are the only ones on that line within 0.5 m, and
+        between two lines the segment changes cells at most once.
+        """
+        steep = np.abs(end - start)[:, 1] > np.abs(end - start)[:, 0]
+        forward = np.where(steep, end[:, 1] > start[:, 1], end[:, 0] > start[:, 0])[:, None]
+        start, end = np.where(forward, start, end), np.where(forward, end, start)
+        start, end = (np.where(steep[:, None], point[:, ::-1], point) for point in (start, end))
+        extent, rise = (end - start).T
+        slope = rise / np.where(extent == 0, 1.0, extent)
+        first = np.ceil(start[:, 0] - self._radius).astype(np.int64)
+        last = np.floor(end[:, 0] + self._radius).astype(np.int64)
+        table = steep * self._side**2
+        clear = np.ones(len(start), dtype=bool)
+        active = np.arange(len(start))
+        done, batch = 0, 1
+        # Most segments of a maze meet a wall soon, so the lines are walked in batches of growing size.
+        while len(active):
+            line = np.minimum(first[active, None] + np.arange(done, done + batch), last[active, None])
+            blocked = self._is_blocked(line, start[active], extent[active], slope[active], table[active])
+            clear[active[blocked]] = False
+            done, batch = done + batch, min(2 * batch, _LINES_AT_ONCE)
+            active = active[~blocked & (first[active] + done <= last[active])]
+        return clear
+
+    def _is_blocked(
+        self, line: np.ndarray, start: np.ndarray, extent: np.ndarray, slope: np.ndarray, table: np.ndarray
+    ) -> np.ndarray:
+        """`[S]` bool: whether a wall shows on any of the lines at x = `line` (`[S, L]` int) of flat segments."""
+        squared_cosine = 1 / (1 + slope * slope)
+        along = line - start[:, :1]
+        height = start[:, 1:] + slope[:, None] * along
+        below = np.floor(height).astype(np.int64)
+        gap = height - below
+        index = table[:, None] + line * self._side + below
+        extent = extent[:, None]
+        blocked = self._edge_table[index] & (along >= 0) & (along <= extent)
+        reach = (self._clearance / np.sqrt(squared_cosine))[:, None]
+        shift = (slope * squared_cosine)[:, None]
+        for rise in (0, 1):
+            to_corner = gap - rise
+            foot = along - to_corner * shift
+            near = (np.abs(to_corner) < reach) & (foot > 0) & (foot < extent)
+            blocked |= near & self._corner_table[index + rise]
+        return blocked.any(axis=1)
+
+
+def _exposed_corners(walls: np.ndarray, radius: float) -> _Circles:
+    """The circles about all lattice points that touch exactly one wall (`walls` is `[x, y]`)."""
+    below, above = walls[:, :-1].astype(np.int64), walls[:, 1:].astype(np.int64)
+    left, right = below[:-1] + above[:-1], below[1:] + above[1:]
+    below, above = below[:-1] + below[1:], above[:-1] + above[1:]
+    exposed = left + right == 1
+    away_from_wall = np.stack([left - right, below - above], axis=-1)
+    centre = np.argwhere(exposed) + 1.0
+    return _Circles(centre, away_from_wall[exposed].astype(np.float64), np.full(len(centre), radius))
+
+
+def _points(points: np.ndarray) -> _Circles:
+    return _Circles(points, np.zeros_like(points, dtype=np.float64), np.zeros(len(points)))
+
+
+def _candidate_pairs(corners: _Circles, side: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Batches of pairs `first < second` (`[P]` int each) whose quadrants share a normal, opposite ones if `side` is -1.
+
+    Two quadrants that share only an axis share a tangent only if it is at a right angle to that axis.
+    """
+    num_corners = len(corners.radius)
+    rows = max(1, _PAIRS_AT_ONCE // max(1, num_corners))
+    centre, quadrant = corners.centre.astype(np.int16), corners.quadrant.astype(np.int8)
+    for begin in range(0, max(1, num_corners), rows):
+        mine, others = slice(begin, begin + rows), slice(begin, None)
+        agreement = quadrant[mine, None, 0] * quadrant[others, 0] + quadrant[mine, None, 1] * quadrant[others, 1]
+        fits = agreement == 2 * side
+        if side == 1:
+            in_line = (centre[mine, None, 0] == centre[others, 0]) | (centre[mine, None, 1] == centre[others, 1])
+            fits |= (agreement == 0) & in_line
+        first, second = np.nonzero(np.triu(fits, k=1))
+        yield first + begin, second + begin
+
+
+def _tangents(circles: _Circles, first: np.ndarray, second: np.ndarray, side: int) -> _Pieces:
+    """The common tangents of pairs of circles that touch both in their exposed quadrants, not tested for walls.
+
+    `side` is 1 for tangents that have both circles on one side, -1 for those that pass between them. With normal n at
+    the first circle and side * n at the second, D . n = r1 - side * r2, where D joins the centres.
+    """
+    joint = circles.centre[second] - circles.centre[first]
+    distance = np.hypot(joint[:, 0], joint[:, 1])
+    unit = joint / distance[:, None]
+    along = ((circles.radius[first] - side * circles.radius[second]) / distance)[:, None]
+    across = np.sqrt(np.maximum(1 - along * along, 0))
+    left = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+    found = []
+    for turn in (1, -1):
+        normal = along * unit + turn * across * left
+        fits = np.all(normal * circles.quadrant[first] >= -_TOLERANCE, axis=1)
+        fits &= np.all(side * normal * circles.quadrant[second] >= -_TOLERANCE, axis=1)
+        circle = np.stack([first[fits], second[fits]], axis=1)
+        normals = np.stack([normal[fits], side * normal[fits]], axis=1)
+        end = circles.centre[circle] + circles.radius[circle][..., None] * normals
+        found.append(_Pieces(circle, _offset(circles, circle, normals), end))
+    return _concatenate(found)
+
+
+def _perpendiculars(circles: _Circles, num_sources: int, axis: int, level: float, low: float, high: float) -> _Pieces:
+    """Tangents of the first `num_sources` circles that meet a part of a side (see `sides`) at a right angle.
+
+    Where an arc itself ends on the side, its piece has length 0.
+    """
+    normal = (circles.quadrant * np.eye(2)[1 - axis])[:num_sources]
+    contact = circles.centre[:num_sources] + circles.radius[:num_sources, None] * normal
+    height = contact[:, 1 - axis]
+    source = np.flatnonzero((height >= low - _TOLERANCE) & (height <= high + _TOLERANCE))
+    end = contact[source, None].repeat(2, axis=1)
+    end[:, 1, axis] = level
+    offset = np.stack([_offset(circles, source, normal[source]), np.zeros(len(source))], axis=1)
+    return _Pieces(np.stack([source, np.full_like(source, len(circles.radius))], axis=1), offset, end)
+
+
+def _offset(circles: _Circles, index: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """`[...]` metres along circles `[...]` from the middles of their quadrants to where the normals are `[..., 2]`."""
+    x, y = np.moveaxis(circles.quadrant[index], -1, 0)
+    angle = np.arctan2(x * normal[..., 1] - y * normal[..., 0], x * normal[..., 0] + y * normal[..., 1])
+    return circles.radius[index] * angle
+
+
+def _graph(pieces: _Pieces) -> sparse.csr_array:
+    """`[2 P, 2 P]`: the ends of all pieces, joined along the pieces and, on each circle, to the next end either way."""
+    circle, offset = pieces.circle.ravel(), pieces.offset.ravel()
+    num_nodes = len(circle)
+    # An offset is at most pi / 4 * 0.5 m, so the sum sorts by circle first.
+    order = np.argsort(circle + offset)
+    joined = circle[order[1:]] == circle[order[:-1]]
+    before, after = order[:-1][joined], order[1:][joined]
+    arc = np.abs(offset[after] - offset[before])
+    nodes = np.arange(num_nodes)
+    straight = np.hypot(*(pieces.end[:, 1] - pieces.end[:, 0]).T).repeat(2)
+    row = np.concatenate([nodes, before, after])
+    column = np.concatenate([nodes ^ 1, after, before])
+    return sparse.csr_array((np.concatenate([straight, arc, arc]), (row, column)), shape=(num_nodes, num_nodes))
+
+
+def _concatenate(parts: list[_Table]) -> _Table:
+    return type(parts[0])(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def _is_in_cell(point: np.ndarray, corner: np.ndarray) -> bool:
+    return bool(np.all((point >= corner) & (point <= corner + 1)))

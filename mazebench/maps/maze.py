@@ -1,0 +1,230 @@
+"""The Maze value: a legal grid of walls, its cells, points and shortest paths.
+
+`N` is the number of rows and of columns of a maze, `F` the number of its free cells. A cell is `(row, column)` with
+row 0 on top; a point is `(x, y)` in metres with x to the right and y up. One cell is one metre.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+from scipy import ndimage, sparse
+from scipy.sparse import csgraph
+
+from mazebench.errors import InputError
+
+Cell = tuple[int, int]
+
+MIN_SIZE = 5
+MAX_SIZE = 255
+WALL_HEIGHT = 1.0  # metres; DeepMind Lab's 100 units
+UNREACHABLE = -1
+
+# In the order in which a shortest path prefers them.
+_NEIGHBOURS = ((-1, 0), (0, -1), (1, 0), (0, 1))
+# All-pairs distances are kept (F * F int16) up to this F, which every maze of up to 45 x 45 cells is below.
+_MAX_ALL_PAIRS = 2048
+_WALL_COST = 1000  # cells; what a path planned through walls pays for each
+
+
+class MazeError(InputError):
+    """A grid is not a legal maze."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Maze:
+    """A square, closed grid with one 4-connected free component.
+
+    Raises:
+      MazeError: if `walls` is anything else; the message names the offending cell.
+    """
+
+    walls: np.ndarray  # [N, N] bool, True is wall; copied and made read-only
+    name: str = "maze"
+
+    def __post_init__(self):
+        walls = np.array(self.walls)
+        if walls.dtype != bool:
+            raise MazeError(f"{self.name}: expected walls of dtype bool, found {walls.dtype}")
+        _check(walls, self.name)
+        walls.flags.writeable = False
+        object.__setattr__(self, "walls", walls)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Maze) and np.array_equal(self.walls, other.walls)
+
+    def __hash__(self) -> int:
+        return hash(self.walls.tobytes())
+
+    @property
+    def size(self) -> int:
+        """N, the number of rows and of columns."""
+        return self.walls.shape[0]
+
+    @functools.cached_property
+    def free_cells(self) -> np.ndarray:
+        """`[F, 2]` int: the free cells in reading order."""
+        return np.argwhere(~self.walls)
+
+    def is_free(self, cell: Cell) -> bool:
+        """Whether `cell` lies in the maze and is not a wall."""
+        row, column = cell
+        return 0 <= row < self.size and 0 <= column < self.size and not self.walls[row, column]
+
+    def require_free(self, cell: Cell) -> Cell:
+        """`cell` itself if it is free.
+
+        Raises:
+          MazeError: if it is a wall or outside.
+        """
+        if not self.is_free(cell):
+            raise MazeError(f"{self.name}: expected a free cell, found {tuple(cell)}, a wall or outside")
+        return (int(cell[0]), int(cell[1]))
+
+    def distances(self, source: Cell) -> np.ndarray:
+        """`[N, N]` int: length in cells of a shortest 4-connected path from `source`; -1 at walls."""
+        self.require_free(source)
+        result = np.full((self.size, self.size), UNREACHABLE, dtype=np.int32)
+        result[~self.walls] = self._distance_row(int(self._index[tuple(source)]))
+        return result
+
+    def distance(self, start: Cell, goal: Cell) -> int:
+        """Length in cells of a shortest 4-connected path between two free cells."""
+        self.require_free(start)
+        self.require_free(goal)
+        return int(self._distance_row(int(self._index[tuple(start)]))[self._index[tuple(goal)]])
+
+    def cells_at(self, source: Cell, distance: int) -> np.ndarray:
+        """`[K, 2]` int: the free cells at exactly `distance` from `source`, in reading order."""
+        self.require_free(source)
+        return self.free_cells[self._distance_row(int(self._index[tuple(source)])) == distance]
+
+    def shortest_path(self, start: Cell, goal: Cell) -> list[Cell]:
+        """A shortest 4-connected path, both ends included; of equals, the first in the order up, left, down, right."""
+        return _descend(self.distances(goal), self.require_free(start))
+
+    @functools.cached_property
+    def diameter(self) -> int:
+        """The largest distance of two free cells; with over 2,048 of them a lower bound that a double sweep finds."""
+        if len(self.free_cells) <= _MAX_ALL_PAIRS:
+            return int(self._all_pairs.max())
+        return int(self._distance_row(int(np.argmax(self._distance_row(0)))).max())
+
+    @functools.cached_property
+    def _index(self) -> np.ndarray:  # [N, N] int: the index of a free cell among `free_cells`, -1 at walls
+        index = np.full(self.walls.shape, -1, dtype=np.int64)
+        index[~self.walls] = np.arange(len(self.free_cells))
+        return index
+
+    @functools.cached_property
+    def _graph(self) -> sparse.csr_array:
+        return grid_graph(self._index)
+
+    @functools.cached_property
+    def _all_pairs(self) -> np.ndarray:  # [F, F] int16
+        return csgraph.dijkstra(self._graph, unweighted=True).astype(np.int16)
+
+    def _distance_row(self, source: int) -> np.ndarray:  # [F] int: from free cell `source` to each free cell
+        if len(self.free_cells) <= _MAX_ALL_PAIRS:
+            return self._all_pairs[source]
+        return csgraph.dijkstra(self._graph, unweighted=True, indices=source).astype(np.int32)
+
+
+def grid_graph(index: np.ndarray) -> sparse.csr_array:
+    """The 4-connected graph of the cells whose `index` (`[N, N]` int, consecutive from 0) is not negative."""
+    right = (index[:, :-1].ravel(), index[:, 1:].ravel())
+    down = (index[:-1].ravel(), index[1:].ravel())
+    a, b = np.concatenate([right, down], axis=1)
+    linked = (a >= 0) & (b >= 0)
+    a, b = a[linked], b[linked]
+    num_nodes = int(index.max()) + 1
+    ones = np.ones(2 * len(a), dtype=np.int32)
+    return sparse.csr_array((ones, (np.r_[a, b], np.r_[b, a])), shape=(num_nodes, num_nodes))
+
+
+def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]:
+    """A cheapest 4-connected path on any grid (`[N, N]` bool): where no free path is left, a wall costs 1000 cells.
+
+    The landmark oracle plans so on maps whose cells were flipped (the paper's appendix on perturbed planning).
+    """
+    index = np.where(walls, -1, np.cumsum(~walls).reshape(walls.shape) - 1)
+    distances = np.full(walls.shape, np.inf)
+    distances[~walls] = csgraph.dijkstra(grid_graph(index), unweighted=True, indices=index[goal])
+    if not np.isfinite(distances[start]):
+        every_cell = np.arange(walls.size).reshape(walls.shape)
+        graph = grid_graph(every_cell).astype(np.float64).tocoo()
+        # Searched backwards from the goal: edge u -> v stands for the step from v into u, and pays for entering u.
+        cost = np.where(walls.ravel()[graph.row], _WALL_COST, 1.0)
+        weighted = sparse.csr_array((cost, (graph.row, graph.col)), shape=graph.shape)
+        distances = csgraph.dijkstra(weighted, indices=every_cell[goal]).reshape(walls.shape)
+        return _descend(distances, start, np.where(walls, _WALL_COST, 1.0))
+    distances[walls] = UNREACHABLE
+    return _descend(distances, start)
+
+
+def _descend(distances: np.ndarray, start: Cell, step_cost: np.ndarray | None = None) -> list[Cell]:
+    """Follows `distances` to the goal (negative at walls) down to 0; a step into a cell pays its `step_cost`."""
+    size = len(distances)
+    path = [start]
+    while distances[path[-1]] > 0:
+        row, column = path[-1]
+        for down, right in _NEIGHBOURS:
+            cell = (row + down, column + right)
+            if not (0 <= cell[0] < size and 0 <= cell[1] < size) or distances[cell] < 0:
+                continue
+            if distances[row, column] - distances[cell] == (1.0 if step_cost is None else step_cost[cell]):
+                path.append(cell)
+                break
+        else:
+            raise AssertionError("distances do not descend to 0")
+    return path
+
+
+def cell_to_point(cells: np.ndarray | Cell, size: int) -> np.ndarray:
+    """`[..., 2]` float: the centres (x, y) in metres of `[..., 2]` cells of a maze of `size` cells a side."""
+    cells = np.asarray(cells, dtype=np.float64)
+    return np.stack([cells[..., 1] + 0.5, size - cells[..., 0] - 0.5], axis=-1)
+
+
+def point_to_cell(points: np.ndarray, size: int) -> np.ndarray:
+    """`[..., 2]` int: the cells that hold `[..., 2]` points (x, y); a point on a line is in the right or upper one."""
+    points = np.floor(np.asarray(points)).astype(np.int64)
+    return np.stack([size - 1 - points[..., 1], points[..., 0]], axis=-1)
+
+
+def symmetries(walls: np.ndarray) -> list[np.ndarray]:
+    """The 8 rotations and mirror images of a grid."""
+    return [np.rot90(grid, turns) for grid in (walls, walls.T) for turns in range(4)]
+
+
+def canonical_bytes(walls: np.ndarray) -> bytes:
+    """Equal for two grids exactly if one is a rotation or mirror image of the other."""
+    return min(np.ascontiguousarray(grid).tobytes() for grid in symmetries(walls))
+
+
+def _check(walls: np.ndarray, name: str) -> None:
+    if walls.ndim != 2 or walls.shape[0] != walls.shape[1]:
+        raise MazeError(f"{name}: expected a square grid, found shape {walls.shape}")
+    size = len(walls)
+    if not MIN_SIZE <= size <= MAX_SIZE:
+        raise MazeError(f"{name}: expected {MIN_SIZE} to {MAX_SIZE} cells a side, found {size}")
+    border = np.ones_like(walls)
+    border[1:-1, 1:-1] = False
+    open_border = np.argwhere(border & ~walls)
+    if len(open_border):
+        raise MazeError(f"{name}: expected a closed border, found cell {_show(open_border[0])} free")
+    components, num_components = ndimage.label(~walls)
+    if num_components == 0:
+        raise MazeError(f"{name}: expected a free cell, found only walls")
+    if num_components > 1:
+        cut_off = np.argwhere(components == 2)[0]
+        raise MazeError(
+            f"{name}: expected one connected free area, found {num_components}; "
+            f"cell {_show(cut_off)} cannot be reached from {_show(np.argwhere(components == 1)[0])}"
+        )
+
+
+def _show(cell: np.ndarray) -> str:
+    return f"({cell[0]}, {cell[1]})"

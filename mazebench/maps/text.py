@@ -1,0 +1,77 @@
+"""Mazes as text: `#` wall, `.` free, one row a line; DeepMind Lab and labmaze text levels are read too."""
+
+from __future__ import annotations
+
+import pathlib
+
+import numpy as np
+
+from mazebench.errors import InputError
+from mazebench.maps.maze import MAX_SIZE, Maze, MazeError
+
+_WALL = "#*1"
+_FREE = ". 0PG"
+# The largest legal text has MAX_SIZE rows of MAX_SIZE cells and a two-byte line end.
+_MAX_BYTES = MAX_SIZE * (MAX_SIZE + 2)
+
+
+def format_maze(maze: Maze) -> str:
+    """`maze` as text, one row a line, with a line end after the last."""
+    return "".join("".join("#" if wall else "." for wall in row) + "\n" for row in maze.walls)
+
+
+def parse_maze(text: str, name: str = "maze") -> Maze:
+    """The maze that `text` draws.
+
+    Raises:
+      MazeError: if a character is unknown, the rows differ in length, or the grid is not a legal maze.
+    """
+    if len(text) > _MAX_BYTES:
+        raise MazeError(
+            f"{name}: expected a map of at most {MAX_SIZE} x {MAX_SIZE} cells, found {len(text)} characters"
+        )
+    # Only line feeds end a line: splitlines() would also split at characters that a text map must refuse.
+    rows = text.replace("\r\n", "\n").strip("\n").split("\n")
+    for row, line in enumerate(rows):
+        if len(line) != len(rows[0]):
+            raise MazeError(
+                f"{name}: expected rows of {len(rows[0])} cells like the first, found {len(line)} in row {row}"
+            )
+        for column, character in enumerate(line):
+            if character not in _WALL + _FREE:
+                raise MazeError(
+                    f"{name}: expected one of {_WALL!r} (wall) or {_FREE!r} (free), "
+                    f"found {character!r} at ({row}, {column})"
+                )
+    return Maze(np.array([[character in _WALL for character in line] for line in rows], dtype=bool), name)
+
+
+def read_text_maze(path: str | pathlib.Path) -> Maze:
+    """The maze in a text file, named after the file.
+
+    Raises:
+      InputError: if the file can't be read.
+      MazeError: if it is too large, not text or not a legal maze.
+    """
+    path = pathlib.Path(path)
+    try:
+        with path.open("rb") as file:
+            content = file.read(_MAX_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"{path}: can't read the map: {error.strerror}") from error
+    if len(content) > _MAX_BYTES:
+        raise MazeError(
+            f"{path}: expected a map of at most {_MAX_BYTES} bytes ({MAX_SIZE} x {MAX_SIZE} cells), found more"
+        )
+    try:
+        text = content.decode("ascii")
+    except UnicodeDecodeError as error:
+        raise MazeError(
+            f"{path}: expected a text map, found byte 0x{content[error.start]:02x} at {error.start}"
+        ) from error
+    return parse_maze(text, path.stem)
+
+
+def write_text_maze(maze: Maze, path: str | pathlib.Path) -> None:
+    """Writes `maze` as text."""
+    pathlib.Path(path).write_text(format_maze(maze), encoding="ascii")

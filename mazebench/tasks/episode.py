@@ -1,0 +1,79 @@
+"""An episode: where it plays, what the agent is told of it, and how far along its route it is."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+
+import numpy as np
+
+from mazebench.maps.maze import Cell
+
+# What the agent's step brought about.
+Event = enum.Enum("Event", ["NONE", "LANDMARK", "REACHED", "TIMEOUT"])
+
+
+@dataclasses.dataclass(frozen=True)
+class Episode:
+    """What determines an episode, given the task it belongs to."""
+
+    maze: int  # index among the task's mazes
+    start: Cell
+    goal: Cell
+    yaw: float  # rad, of the body at the start
+    seed: int  # of everything else drawn in the episode: flips, warp, noise
+
+    def streams(self) -> list[np.random.Generator]:
+        """Three independent streams: of the flipped cells, of the warp, of the position noise."""
+        return [np.random.default_rng(child) for child in np.random.SeedSequence(self.seed).spawn(3)]
+
+
+@dataclasses.dataclass(frozen=True)
+class ShownMap:
+    """The map as the agent gets it: the true one, or flipped, or seen through a perspective transform."""
+
+    walls: np.ndarray  # [N, N] bool
+    homography: np.ndarray | None = None  # [3, 3], from true cells to shown ones; None if they are the same
+
+
+class Route:
+    """The cells an agent is sent to, one after the other, and the rules of when the next one comes and when it ends.
+
+    `cells` are the start, the landmarks (none in a local episode) and the goal. Leg i goes from cell i to cell i + 1.
+    """
+
+    def __init__(self, cells: list[Cell], time_limit: int):
+        self.cells = cells
+        self.leg = 0
+        self.deadline = time_limit  # the episode's step after which the current leg has timed out
+        self._time_limit = time_limit
+
+    @property
+    def start(self) -> Cell:
+        """Where the current leg starts."""
+        return self.cells[self.leg]
+
+    @property
+    def target(self) -> Cell:
+        """Where the current leg leads."""
+        return self.cells[self.leg + 1]
+
+    @property
+    def goal(self) -> Cell:
+        """Where the episode leads."""
+        return self.cells[-1]
+
+    def advance(self, cell: Cell, step: int) -> Event:
+        """Judges the state after agent step `step` (counted from 1), the body's centre in `cell`.
+
+        Reaching the goal wins over a time limit met on the same step. After LANDMARK the leg is the next one.
+        """
+        if cell == self.goal:
+            return Event.REACHED
+        if cell != self.target and step < self.deadline:
+            return Event.NONE
+        if self.target == self.goal:
+            return Event.TIMEOUT
+        self.leg += 1
+        self.deadline = step + self._time_limit
+        return Event.LANDMARK

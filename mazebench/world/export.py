@@ -1,0 +1,68 @@
+"""A maze for other tools: standalone MJCF, and its walls as one watertight mesh."""
+
+from __future__ import annotations
+
+import pathlib
+
+import numpy as np
+import trimesh
+
+from mazebench.maps.covering import cover
+from mazebench.maps.maze import WALL_HEIGHT, Maze
+from mazebench.world.mjcf import maze_spec
+
+MESH_FORMATS = ("glb", "obj", "stl")
+
+_WALL_COLOUR = (92, 120, 153, 255)
+# Side of the pillars that join walls which touch only at a corner: without, an edge would have four faces, and readers
+# that merge vertices (OBJ, STL) would not find the mesh watertight.
+_PILLAR = 0.02
+_PROUD = 0.001  # by which they stand out above and below: flush ones would leave the walls' corners in the mesh
+# glTF has y up, we have z up.
+_TO_GLTF = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+
+
+def write_mjcf(maze: Maze, path: pathlib.Path) -> None:
+    """Writes a model that plain MuJoCo and its viewer open, without any other file."""
+    spec = maze_spec(maze)
+    spec.compile()
+    path.write_text(spec.to_xml(), encoding="utf-8")
+
+
+def wall_mesh(maze: Maze) -> trimesh.Trimesh:
+    """The walls as one watertight mesh in metres, x to the right, y up the map, z up.
+
+    Walls that touch only at a corner are joined there by a pillar of 2 cm, which no body can pass anyway.
+    """
+    boxes = [_box(left, maze.size - bottom, right, maze.size - top) for top, left, bottom, right in cover(maze.walls)]
+    half = _PILLAR / 2
+    boxes += [_box(x - half, y - half, x + half, y + half, _PROUD) for x, y in _diagonal_corners(maze)]
+    mesh = trimesh.boolean.union(boxes, engine="manifold", check_volume=False)
+    mesh.visual.face_colors = _WALL_COLOUR
+    return mesh
+
+
+def _box(left: float, low: float, right: float, high: float, proud: float = 0.0) -> trimesh.Trimesh:
+    return trimesh.creation.box(bounds=[[left, low, -proud], [right, high, WALL_HEIGHT + proud]])
+
+
+def _diagonal_corners(maze: Maze) -> np.ndarray:
+    """`[K, 2]` points (x, y) where two walls touch at a corner only."""
+    walls = maze.walls
+    top_left, top_right, bottom_left, bottom_right = walls[:-1, :-1], walls[:-1, 1:], walls[1:, :-1], walls[1:, 1:]
+    touching = (top_left == bottom_right) & (top_right == bottom_left) & (top_left != top_right)
+    rows, columns = np.nonzero(touching)
+    return np.stack([columns + 1, maze.size - 1 - rows], axis=-1)
+
+
+def write_mesh(maze: Maze, path: pathlib.Path) -> None:
+    """Writes the wall mesh as GLB (y up, as glTF has it), OBJ or STL (z up), by the suffix of `path`."""
+    mesh = wall_mesh(maze)
+    if path.suffix == ".glb":
+        mesh.apply_transform(_TO_GLTF)
+    path.write_bytes(_encoded(mesh, path.suffix[1:]))
+
+
+def _encoded(mesh: trimesh.Trimesh, file_type: str) -> bytes:
+    content = mesh.export(file_type=file_type)
+    return content.encode("utf-8") if isinstance(content, str) else bytes(content)

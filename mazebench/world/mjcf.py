@@ -1,0 +1,224 @@
+"""A maze as a MuJoCo model: merged wall boxes, floor, lights, cameras, and a body that moves like DeepMind Lab's.
+
+Lengths are metres, one cell is 1 m and stands for DeepMind Lab's 100 game units. The body slides along x and y and
+yaws; height, roll and pitch are fixed. DESIGN section 4 has the measurements that the constants below were fitted to.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from mazebench.maps.covering import Rectangle, cover
+from mazebench.maps.maze import WALL_HEIGHT, Maze, cell_to_point
+
+BODY_RADIUS = 0.15  # DeepMind Lab's box is 30 x 30 x 56 units
+BODY_HEIGHT = 0.56
+TOP_SPEED = 3.2  # m/s
+TURN_RATE = np.deg2rad(2.112) / 0.016  # rad/s: 20 pixels of 0.1056 degrees a frame of 16 ms
+PHYSICS_TIMESTEP = 0.008  # s; at 16 ms a body at top speed sinks 5 cm into a wall
+STEPS_PER_ACTION = 20  # an action repeat of 10 frames, two physics steps each
+
+ACTIONS = ("forward", "backward", "strafe_left", "strafe_right", "look_left", "look_right")
+
+# The drives: force K (v* - v) while on, on top of linear damping, so that the cruising speed is TOP_SPEED.
+_DAMPING = 8.0
+_DRIVE_GAIN = 60.0
+_DRIVE_SPEED = TOP_SPEED * (1 + _DAMPING / _DRIVE_GAIN)
+_DRIVE_FORCE = 34.0  # caps the acceleration from rest
+_YAW_GAIN = 20.0  # with _YAW_INERTIA a time constant of 1 ms: the turn rate stands within a frame
+_YAW_INERTIA = 0.02
+_EYE_HEIGHT = 0.45
+_PARKED_DEPTH = 10.0  # metres below the floor
+
+# The sensors, in this order in `sensordata`: position (3), yaw (1), linear velocity (3), angular velocity (3).
+NUM_SENSORS = 10
+
+
+def maze_spec(maze: Maze) -> mujoco.MjSpec:
+    """The standalone model of one maze, without padding: what `mazebench generate` writes."""
+    boxes = cover(maze.walls)
+    return build_spec(maze, boxes, len(boxes))
+
+
+def build_spec(maze: Maze, boxes: list[Rectangle], num_boxes: int) -> mujoco.MjSpec:
+    """The model of `maze` with walls as `boxes`, padded to `num_boxes` with boxes parked below the floor."""
+    spec = mujoco.MjSpec()
+    spec.modelname = maze.name
+    spec.option.timestep = PHYSICS_TIMESTEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.gravity = [0, 0, 0]
+    # Set here, not computed, so that models of one size share camera and shadow ranges.
+    spec.stat.center = [maze.size / 2, maze.size / 2, WALL_HEIGHT / 2]
+    spec.stat.extent = maze.size
+    spec.stat.meansize = 0.5
+    spec.visual.map.znear = 0.05 / maze.size
+    # `global` is a word of Python's.
+    getattr(spec.visual, "global").offwidth = 1280
+    getattr(spec.visual, "global").offheight = 1280
+    spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
+    spec.visual.headlight.diffuse = [0.25, 0.25, 0.25]
+    spec.visual.headlight.specular = [0, 0, 0]
+    _add_materials(spec)
+    _add_room(spec, maze.size)
+    _add_walls(spec, maze.size, boxes, num_boxes)
+    _add_goal(spec)
+    _add_body(spec, maze)
+    return spec
+
+
+def _add_materials(spec: mujoco.MjSpec) -> None:
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.62, 0.76, 0.90],
+        rgb2=[0.93, 0.96, 0.98],
+        width=64,
+        height=64,
+    )
+    spec.add_texture(
+        name="tiles",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=[0.80, 0.78, 0.73],
+        rgb2=[0.72, 0.70, 0.65],
+        width=64,
+        height=64,
+    )
+    textures = [""] * mujoco.mjtTextureRole.mjNTEXROLE
+    textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "tiles"
+    # Two squares of the checker a repetition: one square a cell.
+    spec.add_material(name="floor", textures=textures, texrepeat=[0.5, 0.5], texuniform=True, reflectance=0.05)
+    spec.add_material(name="wall", rgba=[0.36, 0.47, 0.60, 1])
+    spec.add_material(name="agent", rgba=[0.90, 0.45, 0.13, 1])
+    spec.add_material(name="nose", rgba=[0.15, 0.15, 0.18, 1])
+    spec.add_material(name="goal", rgba=[0.20, 0.70, 0.35, 0.6], emission=0.3)
+
+
+def _add_room(spec: mujoco.MjSpec, size: int) -> None:
+    middle = size / 2
+    world = spec.worldbody
+    # For looks only: the body's height is fixed, so the floor needs no contact.
+    world.add_geom(
+        name="floor",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        pos=[middle, middle, 0],
+        size=[middle, middle, 0.1],
+        material="floor",
+        contype=0,
+        conaffinity=0,
+    )
+    world.add_light(
+        name="sun",
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        pos=[middle, middle, 2 * size],
+        dir=[0.3, 0.4, -1],
+        diffuse=[0.55, 0.55, 0.55],
+        castshadow=True,
+    )
+    # High and narrow: 1.1 * size metres fill the view, and walls lean outwards little.
+    height = 4.0 * size
+    fovy = np.rad2deg(2 * np.arctan(0.52 * size / (height - WALL_HEIGHT)))
+    world.add_camera(name="top", pos=[middle, middle, height], quat=[1, 0, 0, 0], fovy=fovy)
+
+
+def _add_walls(spec: mujoco.MjSpec, size: int, boxes: list[Rectangle], num_boxes: int) -> None:
+    for index in range(num_boxes):
+        if index < len(boxes):
+            top, left, bottom, right = boxes[index]
+            pos = [(left + right) / 2, size - (top + bottom) / 2, WALL_HEIGHT / 2]
+            half = [(right - left) / 2, (bottom - top) / 2, WALL_HEIGHT / 2]
+        else:
+            # Collidable, each at a place of its own: geoms without contacts would change the layout of MjData.
+            pos, half = [index + 0.5, 0.5, -_PARKED_DEPTH], [0.1, 0.1, 0.1]
+        spec.worldbody.add_geom(
+            name=f"wall_{index}",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=pos,
+            size=half,
+            material="wall",
+            condim=1,
+            margin=0.03,
+            solref=[2 * PHYSICS_TIMESTEP, 1],
+        )
+
+
+def _add_goal(spec: mujoco.MjSpec) -> None:
+    """A marker for people; the task moves it to the goal cell by its mocap pose, and nothing collides with it."""
+    marker = spec.worldbody.add_body(name="goal", mocap=True, pos=[0, 0, -_PARKED_DEPTH])
+    marker.add_site(
+        name="goal", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[0.3, 0.02, 0], pos=[0, 0, 0.02], material="goal"
+    )
+
+
+def _add_body(spec: mujoco.MjSpec, maze: Maze) -> None:
+    x, y = cell_to_point(maze.free_cells[0], maze.size)
+    # The joints measure from the world's origin, so qpos is (x, y, yaw); keyframe 0 stands in the first free cell.
+    body = spec.worldbody.add_body(name="agent", pos=[0, 0, BODY_HEIGHT / 2])
+    body.add_joint(name="x", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0], damping=[_DAMPING, 0, 0])
+    body.add_joint(name="y", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 1, 0], damping=[_DAMPING, 0, 0])
+    body.add_joint(name="yaw", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
+    body.mass, body.inertia, body.ipos, body.explicitinertial = 1.0, [_YAW_INERTIA] * 3, [0, 0, 0], True
+    body.add_geom(
+        name="agent",
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+        size=[BODY_RADIUS, BODY_HEIGHT / 2 - BODY_RADIUS, 0],
+        material="agent",
+        condim=1,
+        margin=0.03,
+        solref=[2 * PHYSICS_TIMESTEP, 1],
+    )
+    body.add_site(
+        name="nose", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0.11, 0, 0.14], size=[0.06, 0.08, 0.035], material="nose"
+    )
+    body.add_site(name="agent", pos=[0, 0, 0], size=[0.01, 0.01, 0.01], group=4)
+    eye = _EYE_HEIGHT - BODY_HEIGHT / 2
+    # Looks along the body's x axis: the camera's right is -y, its up is z.
+    body.add_camera(name="egocentric", pos=[0, 0, eye], xyaxes=[0, -1, 0, 0, 0, 1], fovy=75)
+    body.add_camera(name="chase", pos=[-1.6, 0, 2.2], xyaxes=[0, -1, 0, 0.75, 0, 0.66], fovy=60)
+    _add_actuators(spec)
+    _add_sensors(spec)
+    spec.add_key(name="start", qpos=[x, y, 0], mpos=[0, 0, -_PARKED_DEPTH], mquat=[1, 0, 0, 0])
+
+
+def _add_actuators(spec: mujoco.MjSpec) -> None:
+    directions = ([1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0])
+    for name, direction in zip(ACTIONS[:4], directions, strict=True):
+        spec.add_actuator(
+            name=name,
+            trntype=mujoco.mjtTrn.mjTRN_SITE,
+            target="agent",
+            refsite="",
+            gear=[*direction, 0, 0, 0],
+            gaintype=mujoco.mjtGain.mjGAIN_AFFINE,
+            gainprm=[_DRIVE_GAIN * _DRIVE_SPEED, 0, -_DRIVE_GAIN] + [0] * 7,
+            ctrllimited=True,
+            ctrlrange=[0, 1],
+            forcelimited=True,
+            forcerange=[0, _DRIVE_FORCE],
+        )
+    turn = spec.add_actuator(
+        name="turn",
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        target="yaw",
+        ctrllimited=True,
+        ctrlrange=[-TURN_RATE, TURN_RATE],
+    )
+    turn.set_to_velocity(kv=_YAW_GAIN)
+
+
+def _add_sensors(spec: mujoco.MjSpec) -> None:
+    site = mujoco.mjtObj.mjOBJ_SITE
+    spec.add_sensor(name="position", type=mujoco.mjtSensor.mjSENS_FRAMEPOS, objtype=site, objname="agent")
+    spec.add_sensor(name="yaw", type=mujoco.mjtSensor.mjSENS_JOINTPOS, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname="yaw")
+    spec.add_sensor(name="velocity", type=mujoco.mjtSensor.mjSENS_VELOCIMETER, objtype=site, objname="agent")
+    spec.add_sensor(name="angular_velocity", type=mujoco.mjtSensor.mjSENS_GYRO, objtype=site, objname="agent")
+
+
+def action_controls() -> np.ndarray:
+    """`[6, 5]` float: the controls of the four drives and the turn for each of `ACTIONS`."""
+    controls = np.zeros((len(ACTIONS), 5))
+    controls[np.arange(4), np.arange(4)] = 1.0
+    controls[4, 4], controls[5, 4] = TURN_RATE, -TURN_RATE
+    return controls

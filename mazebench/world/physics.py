@@ -1,0 +1,89 @@
+"""The dm_control Physics of a maze: named measurements of the agent's body, and mazes changed in place."""
+
+from __future__ import annotations
+
+import copy
+import warnings
+
+import mujoco
+import numpy as np
+
+with warnings.catch_warnings():
+    # dm_control tries every rendering backend when imported; GLFW warns of a missing display even where nobody renders.
+    warnings.filterwarnings("ignore", message=".*GLFWError.*|.*DISPLAY.*")
+    from dm_control.mujoco import engine, wrapper
+
+from mazebench.maps.maze import Cell, cell_to_point
+from mazebench.world.mjcf import NUM_SENSORS, action_controls
+from mazebench.world.models import copy_maze
+
+STATE_SIZE = 12
+
+
+class Physics(engine.Physics):
+    """One maze and the body in it; `load_maze` swaps the maze without a new MjData or a new rendering context."""
+
+    @classmethod
+    def of_maze(cls, model: mujoco.MjModel) -> Physics:
+        """A simulation of its own copy of `model`, the body in the maze's first free cell."""
+        physics = cls.from_model(wrapper.MjModel(copy.copy(model)))
+        with physics.reset_context():
+            physics.data.qpos[:] = physics.model.key_qpos[0]
+        return physics
+
+    def load_maze(self, model: mujoco.MjModel) -> None:
+        """Puts the maze of `model`, which must come from the same `MazeModels`, in the place of this one."""
+        copy_maze(model, self.model.ptr)
+
+    def place_agent(self, position: np.ndarray, yaw: float) -> None:
+        """Stands the body at `position` `[2]` m, turned by `yaw` rad; call it within `reset_context()`."""
+        self.data.qpos[:] = (*position, yaw)
+
+    def place_goal(self, cell: Cell, size: int) -> None:
+        """Moves the goal marker, which touches nothing, to a cell of a maze of `size` cells a side."""
+        self.data.mocap_pos[0] = (*cell_to_point(cell, size), 0.0)
+
+    def set_action(self, action: int) -> None:
+        """Sets the controls of one of `mjcf.ACTIONS`."""
+        self.data.ctrl[:] = _CONTROLS[action]
+
+    def position(self) -> np.ndarray:
+        """`[2]` float: the body's centre (x, y) in metres."""
+        return self.data.qpos[:2].copy()
+
+    def yaw(self) -> float:
+        """The body's heading in [-pi, pi) rad, counter-clockwise from +x."""
+        return float(wrap_angle(self.data.qpos[2]))
+
+    def speed(self) -> float:
+        """m/s in the plane."""
+        return float(np.hypot(self.data.qvel[0], self.data.qvel[1]))
+
+    def turn_rate(self) -> float:
+        """rad/s, counter-clockwise."""
+        return float(self.data.qvel[2])
+
+    def state(self) -> np.ndarray:
+        """`[12]` float64: see `states_from_sensors`."""
+        return states_from_sensors(self.data.sensordata)
+
+
+def wrap_angle(angle: np.ndarray | float) -> np.ndarray:
+    """The same angle in [-pi, pi)."""
+    return np.mod(np.asarray(angle) + np.pi, 2 * np.pi) - np.pi
+
+
+def states_from_sensors(sensors: np.ndarray) -> np.ndarray:
+    """`[..., 12]` float64 states from `[..., 10]` sensor values.
+
+    In this order: position x, y, z (m); orientation roll, pitch, yaw (rad, yaw in [-pi, pi)); linear velocity forward,
+    left, up in the body's frame (m/s); angular velocity about the body's x, y, z (rad/s).
+    """
+    states = np.zeros((*sensors.shape[:-1], STATE_SIZE))
+    states[..., :3] = sensors[..., :3]
+    states[..., 5] = wrap_angle(sensors[..., 3])
+    states[..., 6:] = sensors[..., 4:NUM_SENSORS]
+    return states
+
+
+_CONTROLS = action_controls()
