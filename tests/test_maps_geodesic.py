@@ -72,9 +72,15 @@ def random_walls(rng: np.random.Generator, size: int) -> np.ndarray:
 
 
 def random_start(maze: Maze, radius: float, rng: np.random.Generator) -> np.ndarray:
-    """The centre of a free cell or, as often, any point the disc can be at in one."""
-    centre = cell_to_point(maze.free_cells[rng.integers(len(maze.free_cells))], maze.size)
-    return centre + rng.integers(2) * rng.uniform(radius - 0.5, 0.5 - radius, size=2)
+    """As often the centre of a free cell, any point the disc can be at, or such a point close to a corner of a cell."""
+    kind = rng.integers(3)
+    while True:
+        centre = cell_to_point(random_cell(maze, rng), maze.size)
+        angle = rng.uniform(0, 2 * np.pi)
+        near_corner = centre - 0.5 + rng.uniform(1, 1.5) * radius * np.array([np.cos(angle), np.sin(angle)])
+        point = (centre, centre + rng.uniform(-0.5, 0.5, size=2), near_corner)[kind]
+        if clearance(maze, point[None], point[None])[0] >= radius:
+            return point
 
 
 def random_cell(maze: Maze, rng: np.random.Generator) -> tuple[int, int]:
@@ -134,6 +140,15 @@ class TestWorkedExamples:
         assert length(ROOM, (3, 1), (1, 5)) == pytest.approx(np.hypot(3.5, 1.5), abs=1e-12)
         near_wall = DiscPaths(parse(ROOM), RADIUS).length(np.array([1.15, 5.85]), (1, 5))
         assert near_wall == pytest.approx(5 - 1.15, abs=1e-12)
+
+    def test_length_when_start_is_too_low_for_the_goal(self):
+        # Straight ahead the disc would meet the pillar under the goal: it ends above the pillar's corner (3, 4).
+        paths = DiscPaths(parse(PILLAR), RADIUS)
+        distance = np.hypot(1.5, 0.05)
+        heading = np.arcsin(RADIUS / distance) - np.arctan2(0.05, 1.5)
+        expected = np.sqrt(distance**2 - RADIUS**2) + RADIUS * heading
+        assert paths.length(np.array([1.5, 4.05]), (2, 3)) == pytest.approx(expected, abs=1e-12)
+        np.testing.assert_allclose(paths.path(np.array([1.5, 4.05]), (2, 3))[-1], [3, 4 + RADIUS])
 
     def test_length_when_start_touches_a_corner(self):
         paths = DiscPaths(parse(L_TURN), RADIUS)
@@ -245,9 +260,9 @@ class VisibilityGraph:
         centre = cell_to_point(goal, self._maze.size)
         if np.all(np.abs(start - centre) <= 0.5):
             return 0.0
-        sides = np.concatenate(
-            [np.stack([self._side_samples, 0 * self._side_samples + x], axis=1) for x in (-0.5, 0.5)]
-        )
+        # A start may be so near the goal that only the nearest point of its side will do.
+        samples = np.append(self._side_samples, np.clip(start - centre, -0.5, 0.5))
+        sides = np.concatenate([np.stack([samples, np.full_like(samples, x)], axis=1) for x in (-0.5, 0.5)])
         ends = self._feasible(centre + np.concatenate([sides, sides[:, ::-1]]))
         first, last = self._visible(start[None], self._vertices), self._visible(self._vertices, ends)
         direct = self._visible(start[None], ends)

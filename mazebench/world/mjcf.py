@@ -52,14 +52,14 @@ def build_spec(maze: Maze, boxes: list[Rectangle], num_boxes: int) -> mujoco.MjS
     spec.stat.center = [maze.size / 2, maze.size / 2, WALL_HEIGHT / 2]
     spec.stat.extent = maze.size
     spec.stat.meansize = 0.5
-    spec.visual.map.znear = 0.05 / maze.size
+    spec.visual.map.znear = 0.02 / maze.size
     # `global` is a word of Python's.
     getattr(spec.visual, "global").offwidth = 1280
     getattr(spec.visual, "global").offheight = 1280
     spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
     spec.visual.headlight.diffuse = [0.25, 0.25, 0.25]
     spec.visual.headlight.specular = [0, 0, 0]
-    _add_materials(spec)
+    _add_materials(spec, maze.size)
     _add_room(spec, maze.size)
     _add_walls(spec, maze.size, boxes, num_boxes)
     _add_goal(spec)
@@ -67,7 +67,7 @@ def build_spec(maze: Maze, boxes: list[Rectangle], num_boxes: int) -> mujoco.MjS
     return spec
 
 
-def _add_materials(spec: mujoco.MjSpec) -> None:
+def _add_materials(spec: mujoco.MjSpec, size: int) -> None:
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
@@ -77,23 +77,27 @@ def _add_materials(spec: mujoco.MjSpec) -> None:
         width=64,
         height=64,
     )
+    # A texture's middle comes to lie on the floor's middle: the middle of a cell if their number is odd, else a corner.
+    lines = mujoco.mjtMark.mjMARK_EDGE if size % 2 else mujoco.mjtMark.mjMARK_CROSS
     spec.add_texture(
-        name="tiles",
+        name="cells",
         type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=[0.80, 0.78, 0.73],
-        rgb2=[0.72, 0.70, 0.65],
-        width=64,
-        height=64,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
+        mark=lines,
+        rgb1=[0.86, 0.84, 0.80],
+        rgb2=[0.86, 0.84, 0.80],
+        markrgb=[0.70, 0.68, 0.64],
+        width=128,
+        height=128,
     )
     textures = [""] * mujoco.mjtTextureRole.mjNTEXROLE
-    textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "tiles"
-    # Two squares of the checker a repetition: one square a cell.
-    spec.add_material(name="floor", textures=textures, texrepeat=[0.5, 0.5], texuniform=True, reflectance=0.05)
+    textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "cells"
+    # With texuniform, a repetition of 1 spans two metres.
+    spec.add_material(name="floor", textures=textures, texrepeat=[2, 2], texuniform=True)
     spec.add_material(name="wall", rgba=[0.36, 0.47, 0.60, 1])
     spec.add_material(name="agent", rgba=[0.90, 0.45, 0.13, 1])
     spec.add_material(name="nose", rgba=[0.15, 0.15, 0.18, 1])
-    spec.add_material(name="goal", rgba=[0.20, 0.70, 0.35, 0.6], emission=0.3)
+    spec.add_material(name="goal", rgba=[0.20, 0.70, 0.35, 0.6], emission=0.1)
 
 
 def _add_room(spec: mujoco.MjSpec, size: int) -> None:
@@ -115,7 +119,7 @@ def _add_room(spec: mujoco.MjSpec, size: int) -> None:
         pos=[middle, middle, 2 * size],
         dir=[0.3, 0.4, -1],
         diffuse=[0.55, 0.55, 0.55],
-        castshadow=True,
+        castshadow=False,  # its shadow map is too coarse for large mazes
     )
     # High and narrow: 1.1 * size metres fill the view, and walls lean outwards little.
     height = 4.0 * size
@@ -170,12 +174,12 @@ def _add_body(spec: mujoco.MjSpec, maze: Maze) -> None:
         solref=[2 * PHYSICS_TIMESTEP, 1],
     )
     body.add_site(
-        name="nose", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0.11, 0, 0.14], size=[0.06, 0.08, 0.035], material="nose"
+        name="nose", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0.11, 0, 0.02], size=[0.06, 0.09, 0.05], material="nose"
     )
     body.add_site(name="agent", pos=[0, 0, 0], size=[0.01, 0.01, 0.01], group=4)
     eye = _EYE_HEIGHT - BODY_HEIGHT / 2
-    # Looks along the body's x axis: the camera's right is -y, its up is z.
-    body.add_camera(name="egocentric", pos=[0, 0, eye], xyaxes=[0, -1, 0, 0, 0, 1], fovy=75)
+    # Looks along the body's x axis: the camera's right is -y, its up is z. It sits above the nose, which it must not see.
+    body.add_camera(name="egocentric", pos=[0.12, 0, eye], xyaxes=[0, -1, 0, 0, 0, 1], fovy=75)
     body.add_camera(name="chase", pos=[-1.6, 0, 2.2], xyaxes=[0, -1, 0, 0.75, 0, 0.66], fovy=60)
     _add_actuators(spec)
     _add_sensors(spec)

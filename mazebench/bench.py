@@ -1,0 +1,243 @@
+"""Speed on this machine, as ratios taken in one run: what an environment costs beside the bare simulation in it.
+
+Each ratio is the median over rounds in which the two sides take turns, so that a machine whose speed drifts slows both.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import mujoco
+import mujoco.batch
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from mazebench.envs.gym import MazeEnv
+from mazebench.envs.vector import MazeVectorEnv
+from mazebench.maps.benchmark import load_mazes
+from mazebench.maps.generators import generate
+from mazebench.maps.maze import Maze
+from mazebench.tasks.navigation import Environment
+from mazebench.tasks.spec import TaskSpec
+from mazebench.world.mjcf import ACTIONS, PHYSICS_TIMESTEP, STEPS_PER_ACTION, action_controls
+
+_SIZES = (13, 21, 51, 101)
+_NUM_ENVS = (1, 16, 256, 1024, 4096)
+_MAZES_PER_SIZE = 8
+_SECONDS, _ROUNDS = 0.5, 7  # of each side of a ratio
+_QUICK_SECONDS, _QUICK_ROUNDS = 0.1, 3
+
+# Takes an action number of a round and does one agent step in all its environments.
+Step = Callable[[int], Any]
+
+
+def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, Any]:
+    """Measures everything and returns it as plain values.
+
+    Args:
+      quick: shorter rounds, fewer of them.
+      say: told what is being measured.
+    """
+    seconds, rounds = (_QUICK_SECONDS, _QUICK_ROUNDS) if quick else (_SECONDS, _ROUNDS)
+    results: dict[str, Any] = {"machine": {"cores": os.cpu_count(), "mujoco": mujoco.__version__}}
+    spec = TaskSpec("local", load_mazes(13, "train"))
+    say("environments beside the bare simulation")
+    results["environments"] = [
+        _ratio("vector, 256 environments, all threads", 256, *_vector_pair(spec, 256, 0), seconds, rounds),
+        _ratio("vector, 256 environments, 1 thread", 256, *_vector_pair(spec, 256, 1), seconds, rounds),
+        _ratio("dm_env, 1 environment", 1, *_dm_env_pair(spec), seconds, rounds),
+        _ratio("Gymnasium, 1 environment", 1, *_gym_pair(spec), seconds, rounds),
+    ]
+    say("dm_control's own random maze")
+    results["environments"].append(_random_maze_row(spec, seconds, rounds))
+    say("resets")
+    results["resets"] = _resets(spec, 20 if quick else 200)
+    say("cost against size")
+    results["sizes"] = [_size_row(size, seconds, rounds) for size in _SIZES]
+    say("cost against the number of environments")
+    results["num_envs"] = [_num_envs_row(spec, num_envs, seconds, rounds) for num_envs in _NUM_ENVS]
+    return results
+
+
+def print_tables(results: dict[str, Any]) -> None:
+    """Prints what `run` returned, for people."""
+    console = Console(markup=False)
+    print(f"{results['machine']['cores']} cores, MuJoCo {results['machine']['mujoco']}")
+    for name in ("environments", "resets", "sizes", "num_envs"):
+        rows = results[name]
+        table = Table(box=box.SIMPLE, title=name.replace("_", " "), title_justify="left")
+        for column in rows[0]:
+            table.add_column(column, justify="left" if column == "what" else "right")
+        for row in rows:
+            table.add_row(*(f"{value:,.2f}" if isinstance(value, float) else str(value) for value in row.values()))
+        console.print(table)
+
+
+def _ratio(what: str, num_envs: int, step: Step, bare: Step, seconds: float, rounds: int) -> dict[str, Any]:
+    """Agent steps a second of `step` and of `bare`, and their ratio."""
+    pairs = [(_rate(step, num_envs, seconds), _rate(bare, num_envs, seconds)) for _ in range(rounds)]
+    return {
+        "what": what,
+        "steps/s": round(statistics.median(rate for rate, _ in pairs)),
+        "bare steps/s": round(statistics.median(rate for _, rate in pairs)),
+        "ratio": statistics.median(rate / bare_rate for rate, bare_rate in pairs),
+    }
+
+
+def _rate(step: Step, num_envs: int, seconds: float) -> float:
+    count, begin = 0, time.perf_counter()
+    while (elapsed := time.perf_counter() - begin) < seconds:
+        step(count)
+        count += 1
+    return count * num_envs / elapsed
+
+
+def _random_actions(num_envs: int, num_steps: int = 512) -> np.ndarray:
+    return np.random.default_rng(0).integers(len(ACTIONS), size=(num_steps, num_envs))
+
+
+def _vector_pair(spec: TaskSpec, num_envs: int, num_threads: int) -> tuple[Step, Step]:
+    """The vector environment, resets in other mazes included, and a batch of the same models that only steps."""
+    actions, controls = _random_actions(num_envs), action_controls()
+    env = MazeVectorEnv(spec, num_envs, seed=0, num_threads=num_threads)
+    env.reset()
+    batch = mujoco.batch.Batch(spec.models[0], num_envs, num_threads)
+    batch.set_models([spec.models[i % len(spec.mazes)] for i in range(num_envs)])
+    batch.reset(keyframe=0)
+    ctrl = batch.bind("ctrl")
+
+    def bare(count: int) -> None:
+        ctrl[:] = controls[actions[count % len(actions)]]
+        batch.step(nstep=STEPS_PER_ACTION)
+
+    return lambda count: env.step(actions[count % len(actions)]), bare
+
+
+def _bare_loop(spec: TaskSpec, actions: list[int]) -> Step:
+    """mj_step in one maze, and nothing else."""
+    model = spec.models[0]
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    controls = action_controls()
+
+    def step(count: int) -> None:
+        data.ctrl[:] = controls[actions[count % len(actions)]]
+        mujoco.mj_step(model, data, STEPS_PER_ACTION)
+
+    return step
+
+
+def _dm_env_pair(spec: TaskSpec) -> tuple[Step, Step]:
+    actions = _random_actions(1)[:, 0].tolist()
+    environment = Environment(spec, 0)
+    environment.reset()
+    return lambda count: environment.step(actions[count % len(actions)]), _bare_loop(spec, actions)
+
+
+def _gym_pair(spec: TaskSpec) -> tuple[Step, Step]:
+    actions = _random_actions(1)[:, 0].tolist()
+    env = MazeEnv(spec, 0)
+    env.reset()
+
+    def step(count: int) -> None:
+        *_, terminated, truncated, _ = env.step(actions[count % len(actions)])
+        if terminated or truncated:
+            env.reset()
+
+    return step, _bare_loop(spec, actions)
+
+
+def _random_maze_row(spec: TaskSpec, seconds: float, rounds: int) -> dict[str, Any]:
+    """dm_control's RandomMazeWithTargets with a rolling ball, as many physics steps an action as here."""
+    from dm_control import composer
+    from dm_control.locomotion.arenas import mazes
+    from dm_control.locomotion.tasks import random_goal_maze
+    from dm_control.locomotion.walkers import jumping_ball
+
+    arena = mazes.RandomMazeWithTargets(
+        x_cells=13, y_cells=13, xy_scale=1.0, z_height=1.0, max_rooms=4, room_max_size=5, spawns_per_room=1
+    )
+    walker = jumping_ball.RollingBallWithHead()
+    task = random_goal_maze.NullGoalMaze(
+        walker=walker,
+        maze_arena=arena,
+        physics_timestep=PHYSICS_TIMESTEP,
+        control_timestep=PHYSICS_TIMESTEP * STEPS_PER_ACTION,
+    )
+    # Without its camera: rendering would be nearly all of its time.
+    walker.observables.egocentric_camera.enabled = False
+    environment = composer.Environment(task, time_limit=1e9, random_state=0)
+    environment.reset()
+    low, high = environment.action_spec().minimum, environment.action_spec().maximum
+    forces = np.random.default_rng(0).uniform(low, high, size=(512, len(low)))
+    bare = _bare_loop(spec, _random_actions(1)[:, 0].tolist())
+    what = "dm_control RandomMazeWithTargets, rolling ball"
+    return _ratio(what, 1, lambda count: environment.step(forces[count % 512]), bare, seconds, rounds)
+
+
+def _resets(spec: TaskSpec, count: int) -> list[dict[str, Any]]:
+    """Milliseconds a reset; models are compiled before, as after the first episodes of a run."""
+    for index in range(len(spec.mazes)):
+        spec.models[index]
+    environment = Environment(spec, 0)
+    one_maze = Environment(TaskSpec("local", spec.mazes[:1]), 0)
+    env = MazeVectorEnv(spec, 256, seed=0)
+    rows = [
+        ("dm_env, another maze", _milliseconds(lambda: environment.reset(), count)),
+        ("dm_env, the same maze", _milliseconds(lambda: one_maze.reset(), count)),
+        ("vector of 256, an environment, another maze", _milliseconds(lambda: env.reset(), max(3, count // 20)) / 256),
+    ]
+    return [{"what": what, "ms": value} for what, value in rows]
+
+
+def _milliseconds(call: Callable[[], Any], count: int) -> float:
+    call()
+    times = []
+    for _ in range(count):
+        begin = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - begin)
+    return 1e3 * statistics.median(times)
+
+
+def _size_row(size: int, seconds: float, rounds: int) -> dict[str, Any]:
+    """The vector environment in mazes of `size` cells a side; its context keeps the default size."""
+    mazes = [generate("dfs", size, np.random.default_rng([size, index])) for index in range(_MAZES_PER_SIZE)]
+    spec = TaskSpec("local", tuple(mazes))
+    begin = time.perf_counter()
+    for index in range(len(mazes)):
+        spec.models[index]
+    compiled = (time.perf_counter() - begin) / len(mazes)
+    row = _ratio(f"{size} x {size}, 256 environments", 256, *_vector_pair(spec, 256, 0), seconds, rounds)
+    return {**row, "compile ms": 1e3 * compiled, "walls": _num_boxes(spec, mazes)}
+
+
+def _num_boxes(spec: TaskSpec, mazes: list[Maze]) -> int:
+    """Wall boxes in each model, padding included; floor and body are the two other geoms."""
+    return spec.models[0].ngeom - 2
+
+
+def _num_envs_row(spec: TaskSpec, num_envs: int, seconds: float, rounds: int) -> dict[str, Any]:
+    with _memory_growth() as grown:
+        env = MazeVectorEnv(spec, num_envs, seed=0)
+        env.reset()
+    del env
+    row = _ratio(f"{num_envs} environments", num_envs, *_vector_pair(spec, num_envs, 0), seconds, rounds)
+    return {**row, "KiB an environment": grown[0] / num_envs}
+
+
+@contextmanager
+def _memory_growth() -> Iterator[list[float]]:
+    """Yields a list whose only element becomes the growth, in KiB, of the process's largest memory: a lower bound."""
+    grown = [0.0]
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    yield grown
+    grown[0] = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
