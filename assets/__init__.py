@@ -1,0 +1,1 @@
+"""Files that ship with mazebench, imported as `mazebench_assets`."""

@@ -9,12 +9,17 @@ import dataclasses
 import importlib
 import pathlib
 import sys
+from collections.abc import Mapping, Sequence
 from importlib import metadata
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from mazebench.errors import InputError, unknown
+from mazebench.maps.maze import Maze
+
+if TYPE_CHECKING:
+    from mazebench.training.experience import Experience
 
 ENTRY_POINT_GROUP = "mazebench.agents"
 
@@ -60,6 +65,55 @@ class Agent(Protocol):
           state: what the last call returned, or `initial_state`.
           explore: whether to act as in training; evaluation never does.
         """
+
+
+@runtime_checkable
+class ExploringAgent(Agent, Protocol):
+    """An agent as it collects experience to learn from, in this process or on another machine."""
+
+    def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
+        """Explores from now on as the environments `first_env` to `first_env + num_envs` of all, by a new stream."""
+
+    def parameters(self) -> dict[str, np.ndarray]:
+        """What it has learned, to be given to another by `set_parameters`."""
+
+    def set_parameters(self, parameters: dict[str, np.ndarray]) -> None:
+        """Takes over what another has learned."""
+
+
+@runtime_checkable
+class LearningAgent(Protocol):
+    """What the training loop needs beside acting. A class that has `build_learner` can be trained."""
+
+    num_envs: int  # B, environments to collect in
+    actor: ExploringAgent  # acts with what is learned so far
+
+    @classmethod
+    def build_learner(
+        cls, interface: Interface, mazes: Sequence[Maze], *, seed: int = 0, overrides: Mapping[str, str] | None = None
+    ) -> LearningAgent:
+        """A new learner; `overrides` are config values as text, by name, and an unknown one is an `InputError`."""
+
+    def config(self) -> dict[str, Any]:
+        """All values that the learner was built with, as plain data."""
+
+    def task_options(self) -> dict[str, Any]:
+        """The options of `make_spec` that it wants to collect with."""
+
+    def observe(self, experience: Experience, first_env: int = 0) -> None:
+        """Remembers one step in the environments from `first_env` on."""
+
+    def num_updates_due(self, env_steps: int) -> int:
+        """How many updates should have been made after `env_steps` agent steps: the replay ratio is fixed."""
+
+    def update(self) -> dict[str, float]:
+        """Learns from one batch; returns losses and other scalars by name."""
+
+    def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:
+        """Writes all it needs to go on exactly as it would have, and `agent.safetensors`, what acting alone needs."""
+
+    def load(self, folder: pathlib.Path) -> None:
+        """Goes on from what `save` wrote; without the replay, which may be gone, it must first be filled again."""
 
 
 def agent_names() -> list[str]:

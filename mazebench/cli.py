@@ -161,7 +161,7 @@ def evaluate(
 ) -> None:
     """Evaluate an agent on unseen mazes: success rate and SPL with 95 % intervals."""
     from mazebench.evaluation import harness, table
-    from mazebench.evaluation.records import SUMMARY, read_json
+    from mazebench.records import SUMMARY, read_json
 
     options = harness.EvalOptions(
         agent=agent,
@@ -203,6 +203,76 @@ def _new_folder(options: Any) -> pathlib.Path:
         if not folder.exists():
             return folder
     raise InputError(f"results/{name}: exists a thousand times over; give --out")
+
+
+@app.command()
+def train(
+    agent: Annotated[str, typer.Option(help="A learning agent: mah or dqn, or module:Class.")],
+    size: Annotated[int, typer.Option(help="Of the benchmark's training mazes: 13, 15, 17, 19 or 21.")] = 13,
+    pairs: Annotated[str, typer.Option(help="random, or fixed: one start-goal pair a maze.")] = "random",
+    minutes: Annotated[float | None, typer.Option(min=0, help="How long this sitting lasts.")] = None,
+    env_steps: Annotated[int | None, typer.Option(min=1, help="Agent steps of the run, all sittings together.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn.")] = 0,
+    out: Annotated[pathlib.Path | None, typer.Option(help="The run folder; runs/AGENT-SIZE-SEED if not given.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint in --out.")] = False,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="A value of the agent's config; repeatable."),
+    ] = None,
+    checkpoint_steps: Annotated[
+        int, typer.Option(min=1, help="Agent steps between checkpoints, each with an evaluation.")
+    ] = 200_000,
+    workers: Annotated[int, typer.Option(min=0, help="Ray actors that collect; 0 collects in this process.")] = 0,
+    ray: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Of a Ray cluster for the workers; local if not given.")
+    ] = None,
+) -> None:
+    """Train an agent on the benchmark's training mazes; evaluated now and then on held-out mazes of the same kind."""
+    from mazebench.training import loop
+
+    options = loop.TrainOptions(
+        agent=agent,
+        size=size,
+        pairs=pairs,
+        seed=seed,
+        overrides=tuple(_parse_override(text) for text in overrides or []),
+        minutes=minutes,
+        env_steps=env_steps,
+        checkpoint_steps=checkpoint_steps,
+        workers=workers,
+        ray_address=ray,
+    )
+    folder = out or pathlib.Path("runs") / f"{agent.replace(':', '-')}-{size}-{seed}"
+    with _training_progress() as report:
+        loop.train(options, folder, resume, report)
+    print(f"run in {folder}")
+
+
+def _parse_override(text: str) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not equals or not key:
+        raise InputError(f"expected --set KEY=VALUE, found {text!r}")
+    return key.strip(), value.strip()
+
+
+@contextmanager
+def _training_progress() -> Iterator[Any]:
+    """Yields a function (share, line) that prints the line, on a terminal above a bar of the share."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TimeElapsedColumn
+
+    console = Console()
+    if not console.is_terminal:
+        yield lambda share, line: print(line, flush=True)
+        return
+    with Progress(BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), console=console) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def report(share: float, line: str) -> None:
+            bar.update(task, completed=share)
+            console.print(line, markup=False, highlight=False)
+
+        yield report
 
 
 @app.command()

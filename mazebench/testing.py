@@ -1,4 +1,4 @@
-"""Conformance checks for other people's agents and environments: call them in your tests; they raise `ConformanceError`."""
+"""Conformance checks for other people's agents and environments, to call in their tests."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class ConformanceError(AssertionError):
 def check_agent(agent_class: type[Agent], interface: Interface | None = None, checkpoint: Any = None) -> None:
     """Builds an agent and lets it act on made-up observations of a batch of three environments.
 
-    Checks that `build` gives an agent; that `act` returns actions `[B]` of an integer type in range, and a state; that it
-    leaves its observation as it was; and that an agent built anew with the same seed acts the same.
+    Checks that `build` gives an agent; that `act` returns actions `[B]` of an integer type in range, and a state; that
+    it leaves its observation as it was; and that an agent built anew with the same seed acts the same.
 
     Args:
       agent_class: the class that an entry point of `mazebench.agents` names.
@@ -53,7 +53,10 @@ def _act_a_while(agent_class: type[Agent], interface: Interface, checkpoint: Any
         observation = {"state": _made_up_states(interface, rng), "context": context.copy()}
         before = {key: value.copy() for key, value in observation.items()}
         result = agent.act(observation, is_first, state)
-        _require(isinstance(result, tuple) and len(result) == 2, f"expected act() to return (actions, state), found {result!r}")
+        _require(
+            isinstance(result, tuple) and len(result) == 2,
+            f"expected act() to return (actions, state), found {result!r}",
+        )
         actions, state = np.asarray(result[0]), result[1]
         _check_actions(actions, interface)
         for key, value in before.items():
@@ -91,8 +94,8 @@ def _made_up_states(interface: Interface, rng: np.random.Generator) -> np.ndarra
 def check_environment(environment: Any, num_episodes: int = 2, max_steps: int = 2000) -> None:
     """Plays random episodes of a dm_env environment and checks that it keeps the navigation task's contract.
 
-    Checks observations (`state` `[12]`, `context` `[4, M, M]` float32, constant between `is_first`), rewards (-1, and 0 only
-    at the goal), discounts (0 at the goal, else 1) and that every episode ends.
+    Checks observations (`state` `[12]`, `context` `[4, M, M]` float32, constant between `is_first`), rewards (-1, and 0
+    only at the goal), discounts (0 at the goal, else 1) and that every episode ends.
 
     Raises:
       ConformanceError: at the first thing that is wrong.

@@ -150,6 +150,19 @@ class TestWorkedExamples:
         assert paths.length(np.array([1.5, 4.05]), (2, 3)) == pytest.approx(expected, abs=1e-12)
         np.testing.assert_allclose(paths.path(np.array([1.5, 4.05]), (2, 3))[-1], [3, 4 + RADIUS])
 
+    @pytest.mark.parametrize("mirrored", [False, True])
+    def test_length_when_start_is_above_a_corner_beside_the_way(self, mirrored):
+        # The corner (3, 5) is left of the start, but too near the straight way to the goal's corner (6, 3).
+        walls = np.pad(np.zeros((7, 7), dtype=bool), 1, constant_values=True)
+        walls[4, 2] = True
+        distance = np.hypot(0.02, 0.16)
+        first = np.arctan2(0.16, 0.02) - np.arccos(RADIUS / distance)
+        last = np.arctan2(-2, 3) + np.arccos(RADIUS / np.sqrt(13))
+        expected = np.sqrt(distance**2 - RADIUS**2) + RADIUS * (first - last) + np.sqrt(13 - RADIUS**2)
+        maze = Maze(walls[:, ::-1] if mirrored else walls)
+        start, goal = ((9 - 3.02, 5.16), (6, 2)) if mirrored else ((3.02, 5.16), (6, 6))
+        assert DiscPaths(maze, RADIUS).length(np.array(start), goal) == pytest.approx(expected, abs=1e-12)
+
     def test_length_when_start_touches_a_corner(self):
         paths = DiscPaths(parse(L_TURN), RADIUS)
         start = np.array([3, 3]) + RADIUS * np.array([np.cos(0.5), np.sin(0.5)])
@@ -193,8 +206,9 @@ class TestLaws:
     @hypothesis.given(queries())
     def test_length_when_compared_with_bounds(self, query):
         maze, radius, _, goal = query
+        paths = DiscPaths(maze, radius)
         for start in maze.free_cells[:: max(1, len(maze.free_cells) // 5)]:
-            found = DiscPaths(maze, radius).length(cell_to_point(start, maze.size), goal)
+            found = paths.length(cell_to_point(start, maze.size), goal)
             nearest = np.maximum(np.abs(cell_to_point(start, maze.size) - cell_to_point(goal, maze.size)) - 0.5, 0)
             assert found >= np.hypot(*nearest) - 1e-9
             assert found <= max(maze.distance(tuple(start), goal) - 0.5, 0) + 1e-9
@@ -253,7 +267,9 @@ class VisibilityGraph:
         angle = 2 * np.pi * (np.arange(num_sides) + 0.5) / num_sides
         polygon = radius / np.cos(np.pi / num_sides) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         lattice = np.argwhere(np.ones((maze.size - 1, maze.size - 1))) + 1
-        self._vertices = self._feasible((lattice[:, None] + polygon).reshape(-1, 2))
+        vertices = self._feasible((lattice[:, None] + polygon).reshape(-1, 2))
+        # Those about lattice points in the open would change no path.
+        self._vertices = vertices[clearance(maze, vertices, vertices) <= radius / np.cos(np.pi / num_sides) + 1e-9]
         self._edges = self._visible(self._vertices, self._vertices)
 
     def length(self, start: np.ndarray, goal: tuple[int, int]) -> float:

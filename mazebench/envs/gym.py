@@ -19,7 +19,8 @@ class MazeEnv(gymnasium.Env):
     """One environment; observations, rewards and endings are those of `mazebench.tasks.navigation.Navigation`.
 
     `info` has `is_first` (the context is new: an episode or the leg to the next landmark began), `success`, `steps`,
-    `path_length` (m), `maze` (index among the task's mazes) and `landmark` (legs done).
+    `path_length` (m), `position` (`[2]` m, the true one, for records and hindsight, not to act on), `maze` (index among
+    the task's mazes) and `landmark` (legs done).
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 6.25}  # noqa: RUF012
@@ -38,7 +39,7 @@ class MazeEnv(gymnasium.Env):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Starts an episode, the same for the same `seed`; `options={"episode": Episode(...)}` names the one to play."""
+        """Starts an episode, the same for the same `seed`; `options={"episode": Episode(...)}` says which."""
         super().reset(seed=seed)
         episode = (options or {}).get("episode")
         if episode is not None and not isinstance(episode, Episode):
@@ -83,6 +84,7 @@ class MazeEnv(gymnasium.Env):
             "success": task.success,
             "steps": task.steps,
             "path_length": task.path_length,
+            "position": self.environment.physics.position(),
             "maze": task.episode.maze,
             "landmark": task.route.leg,
         }

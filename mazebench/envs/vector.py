@@ -35,8 +35,9 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
 
     Autoreset is SAME_STEP: where an episode ends, the observation returned is the next one's first, and
     `info["final_obs"]`, `info["final_info"]` hold the ended one's last. `info` has, as arrays `[B]`: `is_first` (the
-    context is new: an episode or the leg to the next landmark began), `success`, `steps`, `path_length` (m), `maze`
-    (index among the task's mazes), `landmark` (legs done).
+    context is new: an episode or the leg to the next landmark began), `success`, `steps`, `path_length` (m), `position`
+    (`[B, 2]` m, the true one, for records and hindsight, not to act on), `maze` (index among the task's mazes),
+    `landmark` (legs done).
     """
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": ["rgb_array"], "render_fps": 6.25}  # noqa: RUF012
@@ -82,6 +83,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         self._path_length = np.zeros(num_envs)
         self._steps = np.zeros(num_envs, dtype=np.int64)
         # Cells as row * N + column, and the step at which the current leg times out: what a step is checked against.
+        self._start = np.zeros(num_envs, dtype=np.int64)
         self._target = np.zeros(num_envs, dtype=np.int64)
         self._goal = np.zeros(num_envs, dtype=np.int64)
         self._deadline = np.zeros(num_envs, dtype=np.int64)
@@ -146,7 +148,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         """Where a new leg began, where the goal was reached, where the time ran out: three `[B]` bool."""
         size = self.task_spec.size
         is_first, terminated, truncated = np.zeros((3, self.num_envs), dtype=bool)
-        cells = point_to_cell(self._positions, size) @ (size, 1)
+        cells = self.cells()
         # Nothing else can happen to a route than these three; its own rules then say which it is.
         due = (cells == self._target) | (cells == self._goal) | (self._steps >= self._deadline)
         for i in np.flatnonzero(due & self._active).tolist():
@@ -200,16 +202,17 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         self._noise[i] = episode.streams()[2] if spec.perturbation.position_noise else None
         self._positions[i] = cell_to_point(episode.start, spec.size)
         self._qpos[i] = (*self._positions[i], episode.yaw)
-        self._marker[i, 0] = (*cell_to_point(episode.goal, spec.size), 0.0)
         self._path_length[i], self._steps[i], self._maze[i] = 0.0, 0, episode.maze
-        self._goal[i] = episode.goal[0] * spec.size + episode.goal[1]
         self._begin_leg(i)
 
     def _begin_leg(self, i: int) -> None:
         route, shown = self._route(i), self._shown[i]
         assert shown is not None
         self._context[i] = self.task_spec.context(shown, route.start, route.target)
-        self._target[i] = route.target[0] * self.task_spec.size + route.target[1]
+        self._start[i], self._target[i], self._goal[i] = (
+            row * self.task_spec.size + column for row, column in (route.start, route.target, route.goal)
+        )
+        self._marker[i, 0] = (*cell_to_point(route.goal, self.task_spec.size), 0.0)
         self._deadline[i], self._landmark[i] = route.deadline, route.leg
 
     def _noisy_states(self, indices: np.ndarray | slice = slice(None)) -> np.ndarray:
@@ -233,6 +236,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
             "success": success.copy(),
             "steps": self._steps.copy(),
             "path_length": self._path_length.copy(),
+            "position": self._positions.copy(),
             "maze": self._maze.copy(),
             "landmark": self._landmark.copy(),
         }
@@ -252,9 +256,13 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         assert route is not None
         return route
 
-    def positions(self) -> np.ndarray:
-        """`[B, 2]` float: the bodies' true centres (x, y) in metres, for records and pictures; not for agents."""
-        return self._positions.copy()
+    def cells(self) -> np.ndarray:
+        """`[B]` int: the true cells of the bodies' centres, as row * N + column; for hindsight, not to act on."""
+        return point_to_cell(self._positions, self.task_spec.size) @ (self.task_spec.size, 1)
+
+    def legs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Two `[B]` int: where the current legs start and where they lead, as row * N + column."""
+        return self._start.copy(), self._target.copy()
 
     def render(self) -> tuple[np.ndarray, ...]:
         """One top-down picture `[H, W, 3]` uint8 an environment."""

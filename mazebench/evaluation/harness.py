@@ -18,9 +18,9 @@ from mazebench.agent import Agent, Interface, load_agent_class
 from mazebench.errors import InputError
 from mazebench.evaluation import metrics
 from mazebench.evaluation.protocol import EPISODES_PER_DISTANCE, Trial, select_trials
-from mazebench.evaluation.records import CONFIG, SUMMARY, Record, RecordLog, read_json, write_json
 from mazebench.evaluation.runner import run_trials
 from mazebench.maps.benchmark import VERSION, manifest_hash
+from mazebench.records import CONFIG, SUMMARY, Record, RecordLog, read_json, write_json
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.registry import make_spec
 from mazebench.tasks.spec import EVAL_DISTANCES, TaskSpec

@@ -11,7 +11,7 @@ from mazebench.agent import Agent
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.evaluation.metrics import spl
 from mazebench.evaluation.protocol import Trial
-from mazebench.evaluation.records import Record
+from mazebench.records import Record
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.spec import TaskSpec
 

@@ -21,7 +21,6 @@ _MAX_PIXELS = _MAX_SIDE**2  # of a picture read: above any phone's 50 megapixels
 
 # Neighbouring wall cells differ by a shade that hardly shows: it makes the cells of every drawing countable.
 _WALL_SHADES = np.array([[30, 32, 38], [34, 36, 42]], dtype=np.uint8)
-_FREE_SHADE = np.array([255, 255, 255], dtype=np.uint8)
 _START_SHADE = (64, 160, 100)
 _GOAL_SHADE = (214, 60, 60)
 _PATH_SHADES = np.array([[70, 90, 200], [200, 80, 160], [250, 160, 50]])  # at the path's start, middle and end
@@ -40,7 +39,7 @@ _MIN_FIT = 0.4
 _NEARLY_BEST = 0.97  # of the best fit
 _CORE = 0.5  # part of a cell's side that decides what the cell is
 _MIN_CONTRAST = 64  # between walls and floor, of 255
-_UNCLEAR_BAND = 0.1  # of the contrast; a core so near to the middle is neither wall nor floor
+_MIN_CLARITY = 0.1  # of the contrast: how far a core's shade is from the middle between wall and floor
 
 
 def draw_maze(
@@ -52,14 +51,8 @@ def draw_maze(
 ) -> np.ndarray:
     """A picture of `maze`, `[H, W, 3]` uint8 RGB with H = W = N * cell_pixels: walls near-black, floor white.
 
-    Without `start`, `goal` and `path`, `maze_from_image` gives back the same maze.
-
-    Args:
-      maze: what to draw.
-      cell_pixels: the side of a cell in pixels.
-      start: a free cell to mark by a green disc.
-      goal: a free cell to mark by a red disc.
-      path: `[T, 2]` points (x, y) in metres, equally spaced in time, drawn as a line from blue (first) to orange (last).
+    `start` is marked by a green disc, `goal` by a red one; `path`, `[T, 2]` points (x, y) in metres equally spaced in
+    time, is a line from blue (first) to orange (last). Without these, `maze_from_image` gives back the same maze.
 
     Raises:
       InputError: if the picture would be larger than 8192 pixels a side or `path` is no list of finite points.
@@ -68,7 +61,7 @@ def draw_maze(
     if not 1 <= cell_pixels <= _MAX_SIDE // maze.size:
         raise InputError(f"expected 1 to {_MAX_SIDE // maze.size} pixels a cell for this maze, found {cell_pixels}")
     chequered = _WALL_SHADES[np.indices(maze.walls.shape).sum(axis=0) % 2]
-    cells = np.where(maze.walls[..., None], chequered, _FREE_SHADE)
+    cells = np.where(maze.walls[..., None], chequered, np.uint8(255))
     image = np.ascontiguousarray(cells.repeat(cell_pixels, axis=0).repeat(cell_pixels, axis=1))
     if path is not None:
         _draw_path(image, path, cell_pixels)
@@ -124,7 +117,7 @@ def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maz
     Args:
       image: `[H, W]` gray, `[H, W, 3]` RGB or `[H, W, 4]` RGB and opacity, uint8 or uint16.
       size: N; estimated from the drawing if None.
-      name: of the maze; errors call the picture so.
+      name: what the maze, and an error, calls the picture.
 
     Raises:
       InputError: if `size` is no size of a maze.
@@ -149,26 +142,19 @@ def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maz
 
 def _draw_path(image: np.ndarray, path: np.ndarray, cell_pixels: int) -> None:
     points = np.asarray(path, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+    if points.shape != (len(points), 2) or len(points) == 0 or not np.isfinite(points).all():
         raise InputError(f"expected a path of finite points, shape [T, 2], found shape {points.shape}")
     side = len(image)
     pixels = np.clip(points * [cell_pixels, -cell_pixels] + [0, side], -side, 2 * side)
-    kept = _spaced(pixels, 2.0)
+    travelled = np.r_[0, np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))]
+    # Two pixels a segment: many shorter ones, each blended into the image, would harden the soft edge of the line.
+    kept = np.unique(np.r_[np.searchsorted(travelled, np.arange(0, travelled[-1], 2)), len(points) - 1])
     times = np.linspace(0, 1, len(points))[kept]
     shades = np.stack([np.interp(times, [0, 0.5, 1], shade) for shade in _PATH_SHADES.T], axis=1)
-    corners = _to_subpixels(pixels[kept])
+    corners = _to_subpixels(pixels[kept]).tolist()
     thickness = max(1, round(cell_pixels / 6))
     for before, after, shade in zip(corners[:-1], corners[1:], shades[1:], strict=True):
-        cv2.line(image, before.tolist(), after.tolist(), shade.tolist(), thickness, cv2.LINE_AA, _SUBPIXEL_BITS)
-
-
-def _spaced(points: np.ndarray, spacing: float) -> list[int]:
-    """The indices of points `spacing` apart, and of the last: shorter segments would blend away a line's soft edge."""
-    kept = [0]
-    for i in range(1, len(points)):
-        if i == len(points) - 1 or np.hypot(*(points[i] - points[kept[-1]])) >= spacing:
-            kept.append(i)
-    return kept[: len(points)]
+        cv2.line(image, before, after, shade.tolist(), thickness, cv2.LINE_AA, _SUBPIXEL_BITS)
 
 
 def _to_subpixels(points: np.ndarray) -> np.ndarray:
@@ -245,20 +231,30 @@ def _to_gray(image: np.ndarray, name: str) -> np.ndarray:
 def _pixel_map(gray: np.ndarray, size: int | None) -> np.ndarray | None:
     """`[N, N]` bool: the walls of a pixel map; None if the picture isn't one."""
     height, width = gray.shape
-    shades = np.flatnonzero(np.bincount(gray.ravel()))
+    shades = np.flatnonzero(cv2.calcHist([gray], [0], None, [256], [0, 256]))
     if height != width or len(shades) < 2:
         return None
-    rows = np.flatnonzero((gray[1:] != gray[:-1]).any(axis=1)) + 1
-    columns = np.flatnonzero((gray[:, 1:] != gray[:, :-1]).any(axis=0)) + 1
-    block = int(np.gcd.reduce([*rows, *columns, height]))  # pixels; shades change at multiples of it only
-    cell = block if size is None else height // size
-    if cell == 0 or block % cell or not MIN_SIZE <= height // cell <= MAX_SIZE:
+    dark = gray < shades[[0, -1]].mean()
+    block = _block(gray)
+    border = gray[0, ::block]
+    if not (border[1:] != border[:-1]).all():  # not chequered as `draw_maze` does: shades may be what JPEG left of two
+        block = _block(dark)
+    num_cells = size or height // block
+    cell = height // num_cells
+    if not MIN_SIZE <= num_cells <= MAX_SIZE or cell * num_cells != height or block % cell:
         return None
     if block == 1 and len(shades) > _MAX_MAP_SHADES:
         return None
-    walls = gray[::cell, ::cell] < shades[[0, -1]].mean()
+    walls = dark[::cell, ::cell]
     has_margin = not (walls[0].any() or walls[-1].any() or walls[:, 0].any() or walls[:, -1].any())
     return None if has_margin else walls
+
+
+def _block(picture: np.ndarray) -> int:
+    """The side in pixels of the largest square blocks of one shade that a square picture consists of."""
+    rows = np.flatnonzero((picture[1:] != picture[:-1]).any(axis=1)) + 1
+    columns = np.flatnonzero((picture[:, 1:] != picture[:, :-1]).any(axis=0)) + 1
+    return int(np.gcd.reduce([*rows, *columns, len(picture)]))
 
 
 def _flatten(gray: np.ndarray) -> np.ndarray:
@@ -266,9 +262,9 @@ def _flatten(gray: np.ndarray) -> np.ndarray:
     gray = cv2.medianBlur(_shrink(gray, _WORKING_SIDE), 3)
     small = _shrink(gray, _LIGHT_SIDE)
     # A closing as wide as half the picture replaces the ink by the paper around it.
-    light = cv2.morphologyEx(small, cv2.MORPH_CLOSE, np.ones((max(small.shape) // 2,) * 2, np.uint8)).astype(np.float32)
-    light = cv2.GaussianBlur(np.maximum(light, _MIN_LIGHT * np.percentile(light, 95)), (0, 0), 3)
-    light = cv2.resize(light, gray.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    closed = cv2.morphologyEx(small, cv2.MORPH_CLOSE, np.ones((max(small.shape) // 2,) * 2, np.uint8))
+    light = np.maximum(closed, _MIN_LIGHT * np.percentile(closed, 95)).astype(np.float32)
+    light = cv2.resize(cv2.GaussianBlur(light, (0, 0), 3), gray.shape[::-1], interpolation=cv2.INTER_LINEAR)
     paper = np.clip(255.0 * gray / np.maximum(light, 1), 0, 255).astype(np.uint8)
     return cv2.copyMakeBorder(paper, *(_MARGIN,) * 4, cv2.BORDER_CONSTANT, value=255)
 
@@ -281,21 +277,24 @@ def _shrink(gray: np.ndarray, side: int) -> np.ndarray:
 
 def _ink(paper: np.ndarray) -> np.ndarray:
     """uint8 of the same shape: 255 at ink, 0 at paper."""
-    return (paper < _middle(paper)).astype(np.uint8) * 255
+    return (paper < np.mean(_dark_and_light(paper))).astype(np.uint8) * 255
 
 
-def _middle(shades: np.ndarray) -> float:
-    """The shade halfway between the dark and the light ones of `shades` (uint8, 2-D), as Otsu's method parts them."""
-    threshold, is_light = cv2.threshold(shades, 0, 1, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
-    # The threshold itself may be the lightest of the dark shades.
-    dark, light = (shades[is_light == side].mean() if (is_light == side).any() else threshold for side in (0, 1))
-    return (dark + light) / 2
+def _dark_and_light(shades: np.ndarray) -> tuple[float, float]:
+    """The means of the dark and of the light ones of `shades` (uint8, 2-D), parted by Otsu's method; 0 if none are."""
+    # Otsu's threshold may be the lightest of the dark shades: it parts them, but need not lie halfway between them.
+    threshold, _ = cv2.threshold(shades, 0, 1, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
+    counts = cv2.calcHist([shades], [0], None, [256], [0, 256]).ravel()
+    levels = np.arange(256)
+    parts = (levels <= threshold, levels > threshold)
+    dark, light = (float(counts[part] @ levels[part] / max(1, counts[part].sum())) for part in parts)
+    return dark, light
 
 
 def _frames(ink: np.ndarray) -> Iterator[np.ndarray]:
-    """The corners of the largest shape if it is a frame, then of the largest one clear of the picture's edge.
+    """The corners of the largest shape, then of the largest clear of the picture's edge, as far as these are square.
 
-    The drawing is the first, or the second if the dark table under the paper is in the picture too.
+    The second is the drawing where the picture shows a dark table around the paper.
     """
     clear = ink.copy()
     clear[:_MARGIN] = clear[-_MARGIN:] = clear[:, :_MARGIN] = clear[:, -_MARGIN:] = 255
@@ -311,41 +310,35 @@ def _frames(ink: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _fit_corners(outline: np.ndarray) -> np.ndarray | None:
-    """`[4, 2]` float32: the corners (x, y), clockwise from top left, of the four straight sides of an outline, if any."""
-    hull = cv2.convexHull(outline)
+    """`[4, 2]` float32: the corners (x, y), clockwise from top left, of an outline of four straight sides, or None."""
+    hull = cv2.convexHull(outline, clockwise=False)  # clockwise if y points down
     tolerances = cv2.arcLength(hull, True) * np.arange(0.01, 0.1, 0.005)
     polygons = (cv2.approxPolyDP(hull, tolerance, True)[:, 0] for tolerance in tolerances)
     rough = next((polygon for polygon in polygons if len(polygon) == 4), None)
     if rough is None:
         return None
-    rough = _clockwise_from_top_left(rough.astype(np.float64))
+    rightwards = np.roll(rough, -1, axis=0)[:, 0] - rough[:, 0]  # of the side that starts at each corner
+    rough = np.roll(rough, -int(np.argmax(rightwards - np.roll(rightwards, 2))), axis=0).astype(np.float64)
     points = outline[:, 0].astype(np.float64)
     sides = [_fit_side(points, rough[i], rough[(i + 1) % 4]) for i in range(4)]
     meetings = np.array([np.cross(sides[i - 1], sides[i]) for i in range(4)])  # homogeneous
     if (np.abs(meetings[:, 2]) < 1e-9).any():
         return None
     corners = (meetings[:, :2] / meetings[:, 2:]).astype(np.float32)
-    areas = sorted((cv2.contourArea(outline), cv2.contourArea(corners)))
-    return corners if areas[0] >= _MIN_FRAME_FILL * areas[1] else None
-
-
-def _clockwise_from_top_left(corners: np.ndarray) -> np.ndarray:
-    x, y = (corners - corners.mean(axis=0)).T
-    corners = corners[np.argsort(np.arctan2(y, x))]  # y points down: growing angles turn clockwise
-    rightwards = np.roll(corners, -1, axis=0)[:, 0] - corners[:, 0]  # of the side that starts at each corner
-    return np.roll(corners, -int(np.argmax(rightwards - np.roll(rightwards, 2))), axis=0)
+    smaller, larger = sorted((cv2.contourArea(outline), cv2.contourArea(corners)))
+    return corners if smaller >= _MIN_FRAME_FILL * larger else None
 
 
 def _fit_side(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """`[3]` float: the homogeneous line through those of an outline's `points` that lie near a side, away from its ends."""
+    """`[3]` float: the homogeneous line through the `points` of an outline near a side, away from its ends."""
     length = np.hypot(*(end - start))
     along = (end - start) / length
     share = (points - start) @ along / length
     away = np.abs((points - start) @ [-along[1], along[0]])
     near = points[(share > 0.05) & (share < 0.95) & (away < 0.03 * length)]
     near = np.concatenate([near, [start, end]])  # with the ends there is always a line
-    along_x, along_y, x, y = cv2.fitLine(near.astype(np.float32), cv2.DIST_HUBER, 0, 0.01, 0.01)[:, 0].astype(np.float64)
-    return np.cross([x, y, 1.0], [x + along_x, y + along_y, 1.0])
+    direction, point = cv2.fitLine(near.astype(np.float32), cv2.DIST_HUBER, 0, 0.01, 0.01).reshape(2, 2).astype(float)
+    return np.cross([*point, 1.0], [*(point + direction), 1.0])
 
 
 def _deskew(paper: np.ndarray, corners: np.ndarray) -> np.ndarray:
@@ -362,29 +355,30 @@ def _read_plan(square: np.ndarray, size: int | None, name: str) -> Maze:
         is_best = (fits[1:-1] >= fits[:-2]) & (fits[1:-1] >= fits[2:]) & (fits[1:-1] >= _NEARLY_BEST * fits.max())
         size = 1 + int(np.argmax(is_best))
     if fits[size] < _MIN_FIT:
-        raise MazeError(f"{name}: expected walls along a grid of {MIN_SIZE} or more cells a side, found edges off it")
+        raise MazeError(f"{name}: expected walls along the lines of a square grid of cells, found edges off it")
     cores = _cores(square, size)
-    walls = cores < _middle(np.round(cores).astype(np.uint8))
-    walls[[0, -1], :] = walls[:, [0, -1]] = True
-    maze = Maze(walls, name)
-    dark, light = np.median(cores[walls]), np.median(cores[~walls])
+    dark, light = _dark_and_light(np.round(cores).astype(np.uint8))
     if light - dark < _MIN_CONTRAST:
         raise MazeError(f"{name}: expected dark walls on light paper, found shades {dark:.0f} and {light:.0f} of 255")
-    distance = np.abs(cores - (dark + light) / 2)[1:-1, 1:-1]
-    if distance.min() < _UNCLEAR_BAND * (light - dark):
-        row, column = np.argwhere(distance == distance.min())[0] + 1
-        raise MazeError(f"{name}: expected {size} x {size} cells of wall or floor, found ({row}, {column}) between the two")
-    return maze
+    clarity = np.abs(cores - (dark + light) / 2) / (light - dark)
+    clarity[[0, -1], :] = clarity[:, [0, -1]] = 1
+    if clarity.min() < _MIN_CLARITY:
+        cell = tuple(map(int, np.argwhere(clarity == clarity.min())[0]))
+        raise MazeError(f"{name}: expected {size} x {size} cells of wall or floor, found cell {cell} between the two")
+    walls = cores < (dark + light) / 2
+    walls[[0, -1], :] = walls[:, [0, -1]] = True
+    return Maze(walls, name)
 
 
 def _grid_fits(ink: np.ndarray) -> np.ndarray:
     """`[MAX_SIZE + 2]` float: for each N, how well the edges of the ink lie on its grid, at best 1; -1 below MIN_SIZE.
 
-    It is the mean of `cos(2 pi N x)` over the edges' positions `x` in parts of the frame's side. Multiples of the true N
-    fit as well, but for what inexact edges cost them: among nearly equal N the least is the true one.
+    It is the mean of `cos(2 pi N x)` over the positions `x` of edges in parts of the frame's side. Multiples of the
+    true N fit as well, but for what inexact edges cost them: of nearly equal N the least is the true one.
     """
-    ink = ink.astype(np.int16)
-    edges = np.abs(np.diff(ink, axis=0)).sum(axis=1) + np.abs(np.diff(ink, axis=1)).sum(axis=0)
+    across = cv2.reduce(cv2.absdiff(ink[1:], ink[:-1]), 1, cv2.REDUCE_SUM, dtype=cv2.CV_64F)
+    down = cv2.reduce(cv2.absdiff(ink[:, 1:], ink[:, :-1]), 0, cv2.REDUCE_SUM, dtype=cv2.CV_64F)
+    edges = across.ravel() + down.ravel()
     positions = np.arange(1, len(ink)) / len(ink)
     edges[np.minimum(positions, 1 - positions) < 0.5 / MAX_SIZE] = 0  # the outside of the frame
     sizes = np.arange(MIN_SIZE, MAX_SIZE + 2)
@@ -395,6 +389,7 @@ def _grid_fits(ink: np.ndarray) -> np.ndarray:
 def _cores(square: np.ndarray, size: int) -> np.ndarray:
     """`[size, size]` float: the mean shade of the core of each cell."""
     sums = cv2.integral(square)
-    starts, ends = (np.round((np.arange(size) + share) * _SQUARE_SIDE / size).astype(int) for share in (0.5 - _CORE / 2, 0.5 + _CORE / 2))
+    bounds = (np.arange(size)[:, None] + [0.5 - _CORE / 2, 0.5 + _CORE / 2]) * _SQUARE_SIDE / size
+    starts, ends = np.round(bounds).astype(int).T
     totals = sums[ends][:, ends] - sums[starts][:, ends] - sums[ends][:, starts] + sums[starts][:, starts]
     return totals / np.outer(ends - starts, ends - starts)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+from collections.abc import Callable
 
 import numpy as np
 
@@ -24,8 +25,8 @@ class Episode:
     seed: int  # of everything else drawn in the episode: flips, warp, noise
 
     def streams(self) -> list[np.random.Generator]:
-        """Three independent streams: of the flipped cells, of the warp, of the position noise."""
-        return [np.random.default_rng(child) for child in np.random.SeedSequence(self.seed).spawn(3)]
+        """Four independent streams: of the flipped cells, the warp, the position noise, the goals after the first."""
+        return [np.random.default_rng(child) for child in np.random.SeedSequence(self.seed).spawn(4)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,11 +41,21 @@ class Route:
     """The cells an agent is sent to, one after the other, and the rules of when the next one comes and when it ends.
 
     `cells` are the start, the landmarks (none in a local episode) and the goal. Leg i goes from cell i to cell i + 1.
+    With `next_goal`, a route of `num_goals` goals: where one is reached or timed out, the next leg starts in the body's
+    cell and leads to the cell that `next_goal` draws for it.
     """
 
-    def __init__(self, cells: list[Cell], time_limit: int):
+    def __init__(
+        self,
+        cells: list[Cell],
+        time_limit: int,
+        num_goals: int = 1,
+        next_goal: Callable[[Cell], Cell] | None = None,
+    ):
         self.cells = cells
         self.leg = 0
+        self._goals_left = num_goals - 1
+        self._next_goal = next_goal
         self.deadline = time_limit  # the episode's step after which the current leg has timed out
         self._time_limit = time_limit
 
@@ -68,10 +79,15 @@ class Route:
 
         Reaching the goal wins over a time limit met on the same step. After LANDMARK the leg is the next one.
         """
+        if cell != self.target and cell != self.goal and step < self.deadline:
+            return Event.NONE
+        if self._goals_left and self._next_goal is not None:
+            self._goals_left -= 1
+            self.cells = [cell, self._next_goal(cell)]
+            self.deadline = step + self._time_limit
+            return Event.LANDMARK
         if cell == self.goal:
             return Event.REACHED
-        if cell != self.target and step < self.deadline:
-            return Event.NONE
         if self.target == self.goal:
             return Event.TIMEOUT
         self.leg += 1

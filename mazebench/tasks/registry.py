@@ -26,6 +26,7 @@ def make_spec(
     time_limit: int = TIME_LIMIT,
     landmark_distance: int = 5,
     context_size: int | None = None,
+    num_goals: int = 1,
     map_flip: float = 0.0,
     map_warp: float = 0.0,
     position_noise: float = 0.0,
@@ -42,6 +43,7 @@ def make_spec(
       time_limit: agent steps to reach the goal, or each landmark.
       landmark_distance: cells between landmarks.
       context_size: M, the side of the context's planes; min(N, 21) by default.
+      num_goals: of a local episode, one after the other; rewards and `success` speak of the last one only.
       map_flip, map_warp, position_noise: see `Perturbation`.
 
     Raises:
@@ -65,6 +67,7 @@ def make_spec(
         time_limit,
         landmark_distance,
         context_size or 0,
+        num_goals,
         Perturbation(map_flip, map_warp, position_noise),
     )
     if size is not None and spec.size != size:

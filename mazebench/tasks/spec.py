@@ -59,6 +59,7 @@ class TaskSpec:
     time_limit: int = TIME_LIMIT  # agent steps to the goal, or to each landmark
     landmark_distance: int = 5  # cells between the landmarks of a hierarchical episode
     context_size: int = 0  # M; 0 for min(N, 21)
+    num_goals: int = 1  # of a local episode, one after the other without a reset: long trajectories to learn from
     perturbation: Perturbation = Perturbation()
 
     def __post_init__(self):
@@ -73,6 +74,7 @@ class TaskSpec:
         self._require("time_limit", 1, np.inf)
         self._require("landmark_distance", 1, np.inf)
         self._require("context_size", 3, MAX_SIZE)
+        self._require("num_goals", 1, np.inf if self.task == "local" else 1)
         if self.task == "local":
             self._check_distances()
 
@@ -132,9 +134,24 @@ class TaskSpec:
         Landmarks are cells of the world, so they are planned before a warp moves the planes.
         """
         if self.task == "local":
-            return Route([episode.start, episode.goal], self.time_limit)
+            return Route([episode.start, episode.goal], self.time_limit, self.num_goals, self._next_goal(episode))
         path = path_through_walls(shown.walls, episode.start, episode.goal)
         return Route([*path[: -1 : self.landmark_distance], path[-1]], self.time_limit)
+
+    def _next_goal(self, episode: Episode) -> Callable[[Cell], Cell] | None:
+        """Draws a goal at a wanted distance from a cell, as near to it as the maze has one."""
+        if self.num_goals == 1:
+            return None
+        maze, rng = self.mazes[episode.maze], episode.streams()[3]
+
+        def draw(start: Cell) -> Cell:
+            farthest = int(maze.distances(start).max())
+            distance = min(self.distances[rng.integers(len(self.distances))], farthest)
+            goals = maze.cells_at(start, distance)
+            row, column = goals[rng.integers(len(goals))]
+            return int(row), int(column)
+
+        return draw
 
     def context(self, shown: ShownMap, start: Cell, goal: Cell) -> np.ndarray:
         """`[4, M, M]` float32: the context of a leg (see `build_context`)."""

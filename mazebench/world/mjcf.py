@@ -178,7 +178,7 @@ def _add_body(spec: mujoco.MjSpec, maze: Maze) -> None:
     )
     body.add_site(name="agent", pos=[0, 0, 0], size=[0.01, 0.01, 0.01], group=4)
     eye = _EYE_HEIGHT - BODY_HEIGHT / 2
-    # Looks along the body's x axis: the camera's right is -y, its up is z. It sits above the nose, which it must not see.
+    # Looks along the body's x axis: the camera's right is -y, its up is z. It must not see the nose below it.
     body.add_camera(name="egocentric", pos=[0.12, 0, eye], xyaxes=[0, -1, 0, 0, 0, 1], fovy=75)
     body.add_camera(name="chase", pos=[-1.6, 0, 2.2], xyaxes=[0, -1, 0, 0.75, 0, 0.66], fovy=60)
     _add_actuators(spec)

@@ -27,9 +27,9 @@ class RecordLog:
     def __init__(self, folder: pathlib.Path, num_episodes: int):
         self._folder = folder
         self._num_episodes = num_episodes
-        in_order = _read_whole_lines(folder / EPISODES)
+        in_order = read_whole_lines(folder / EPISODES, "episode")
         self._records = dict(enumerate(in_order))
-        for record in _read_whole_lines(folder / JOURNAL):
+        for record in read_whole_lines(folder / JOURNAL, "episode"):
             self._records.setdefault(record["episode"], record)
         self._num_written = len(in_order)
         self._episodes = open(folder / EPISODES, "a", encoding="utf-8")  # noqa: SIM115 (closed by __exit__)
@@ -109,8 +109,8 @@ def read_json(path: pathlib.Path) -> Any:
         raise InputError(f"{path}: expected JSON, found {error}") from error
 
 
-def _read_whole_lines(path: pathlib.Path) -> list[Record]:
-    """The records of a file of lines; a last line that a kill cut short is removed from the file.
+def read_whole_lines(path: pathlib.Path, key: str) -> list[Record]:
+    """The records of a file of lines, each with a number `key`; a last line that a kill cut short is removed from it.
 
     Raises:
       InputError: if a whole line is not a record.
@@ -125,7 +125,7 @@ def _read_whole_lines(path: pathlib.Path) -> list[Record]:
     for number, line in enumerate(content[:end].splitlines(), 1):
         try:
             record = json.loads(line)
-            record["episode"] += 0
+            record[key] += 0
         except (ValueError, TypeError, KeyError) as error:
             raise InputError(f"{path}: expected a record in line {number}, found {line[:60]!r}") from error
         records.append(record)

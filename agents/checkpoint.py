@@ -1,0 +1,92 @@
+"""Checkpoints: safetensors with JSON metadata, never pickle; written whole or not at all, read with suspicion."""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+import struct
+from collections.abc import Mapping
+from typing import Any
+
+import safetensors
+import safetensors.torch
+import torch
+
+from mazebench.errors import InputError
+
+FORMAT = "mazebench-agent-1"
+AGENT_FILE = "agent.safetensors"
+
+_MAX_BYTES = 256 * 2**20
+_MAX_HEADER_BYTES = 2**20
+
+
+def save_checkpoint(path: pathlib.Path, tensors: Mapping[str, torch.Tensor], metadata: Mapping[str, Any]) -> None:
+    """Writes `tensors` and `metadata`; a reader finds the file from before or the whole new one."""
+    header = {"format": FORMAT, "metadata": json.dumps(metadata, sort_keys=True)}
+    content = safetensors.torch.save({name: tensor.detach().contiguous() for name, tensor in tensors.items()}, header)
+    temporary = path.with_name(path.name + ".tmp")
+    with temporary.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.replace(path)
+
+
+def load_checkpoint(path: pathlib.Path, agent: str) -> tuple[dict[str, torch.Tensor], dict[str, Any]]:
+    """The tensors and the metadata of a checkpoint of `agent`.
+
+    Raises:
+      InputError: if the file can't be read, is no such checkpoint, or another agent's.
+    """
+    content = _read(path)
+    _check_header(path, content)
+    try:
+        tensors = safetensors.torch.load(content)
+        metadata = json.loads(json.loads(content[8 : 8 + _header_length(content)])["__metadata__"]["metadata"])
+    except (safetensors.SafetensorError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path}: expected a checkpoint of {FORMAT}, found a damaged one: {error}") from error
+    if not isinstance(metadata, dict) or metadata.get("agent") != agent:
+        found = metadata.get("agent") if isinstance(metadata, dict) else metadata
+        raise InputError(f"{path}: expected a checkpoint of agent {agent!r}, found one of {str(found)[:80]!r}")
+    return tensors, metadata
+
+
+def load_into(path: pathlib.Path, module: torch.nn.Module, tensors: Mapping[str, torch.Tensor]) -> None:
+    """Puts `tensors` into `module`.
+
+    Raises:
+      InputError: if a name or a shape doesn't fit; the message names the first.
+    """
+    wanted = module.state_dict()
+    for name in sorted(set(wanted) | set(tensors)):
+        expected = tuple(wanted[name].shape) if name in wanted else "no such tensor"
+        found = tuple(tensors[name].shape) if name in tensors else "no such tensor"
+        if expected != found:
+            raise InputError(f"{path}: expected {name} {expected}, found {found}")
+    module.load_state_dict(dict(tensors))
+
+
+def _read(path: pathlib.Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            content = file.read(_MAX_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"{path}: can't read the checkpoint: {error.strerror}") from error
+    if len(content) > _MAX_BYTES:
+        raise InputError(f"{path}: expected a checkpoint of at most {_MAX_BYTES} bytes, found more")
+    return content
+
+
+def _check_header(path: pathlib.Path, content: bytes) -> None:
+    """Refuses what the parser need not see: other formats (pickle) and headers of absurd length."""
+    length = _header_length(content)
+    if not 2 <= length <= min(_MAX_HEADER_BYTES, len(content) - 8) or content[8:9] != b"{":
+        raise InputError(
+            f"{path}: expected a safetensors file with a header of at most {_MAX_HEADER_BYTES} bytes, found none"
+        )
+
+
+def _header_length(content: bytes) -> int:
+    return struct.unpack("<Q", content[:8])[0] if len(content) >= 8 else 0

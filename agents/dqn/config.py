@@ -1,0 +1,36 @@
+"""The numbers of an Ape-X DQN with hindsight, and where each comes from."""
+
+from __future__ import annotations
+
+import dataclasses
+
+
+@dataclasses.dataclass(frozen=True)
+class DQNConfig:
+    """Ape-X DQN (Horgan et al. 2018) with hindsight (Andrychowicz et al. 2017), sized for two CPU cores."""
+
+    use_context: bool = True  # MAH with, DQN-dagger without: the paper's "no task context c provided"
+    channels: int = 32  # of the map encoder
+    hidden: int = 256  # units of the two layers after it
+    num_envs: int = 128  # side by side: long enough a ladder of epsilons
+    n_step: int = 3  # Ape-X's; hindsight recomputes rewards and ends within the n steps
+    replay_capacity: int = 1_000_000  # rows of some 100 bytes
+    min_rows: int = 20_000  # before learning begins
+    groups: int = 32  # contexts in a batch
+    steps: int = 16  # learned from in each: the map's convolutions are most of an update, and shared by them
+    steps_per_update: int = 256  # environment steps; fixed, so that scores do not depend on the workers' speed
+    learning_rate: float = 5e-4
+    max_gradient_norm: float = 10.0
+    target_rate: float = 0.01  # of the target network's moving average
+    longest_value: float = 100.0  # targets lie in [-this, 0]: a timeout's steps; bounds values of goals out of reach
+    hindsight_ratio: float = 0.8  # as HER's four relabelled samples for each that is not
+    hindsight_mean_offset: float = 16.0  # steps; about eight cells
+    hindsight_window: int = 60
+    relabel_start: bool = True  # beyond the paper, which keeps the start: contexts as after a landmark
+    num_goals: int = 4  # an episode, without a reset between: beyond the paper, whose episodes end at the goal
+    symmetries: bool = True  # beyond the paper: rotations and mirror images of what was experienced
+    localization_weight: float = 0.1  # beyond the paper: where a step was on the map, which hindsight knows, is learned
+    priority_exponent: float = 0.6  # Ape-X's
+    importance_exponent: float = 0.4  # Ape-X's
+    epsilon_base: float = 0.4  # Ape-X's ladder: environment i explores at base ** (1 + alpha i / (B - 1))
+    epsilon_alpha: float = 7.0

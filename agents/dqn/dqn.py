@@ -1,0 +1,127 @@
+"""Ape-X DQN with hindsight. With the task context it is the paper's MAH, without it its DQN-dagger.
+
+docs/agents/dqn.md says what was trained, and how it differs from the paper.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+from collections.abc import Mapping
+from importlib import resources
+from typing import Any, ClassVar
+
+import numpy as np
+import torch
+
+from mazebench.agent import Interface, Observation
+from mazebench.errors import InputError
+
+from ..checkpoint import load_checkpoint, load_into
+from ..overrides import override
+from .config import DQNConfig
+from .network import NUM_ACTIONS, QNetwork, state_features
+
+
+@dataclasses.dataclass
+class ActorState:
+    """What acting carries from step to step in B environments."""
+
+    origin: np.ndarray  # [B, 2] float32, x and y observed where the context was new
+    code: torch.Tensor | None  # [B, C + 4, M * M], the encoded contexts
+
+
+class DQN:
+    """Acts greedily by a Q-network; where it explores, environment i follows Ape-X's ladder of epsilons."""
+
+    name: ClassVar[str] = "dqn"
+    default_config: ClassVar[DQNConfig] = DQNConfig(use_context=False)
+
+    def __init__(self, config: DQNConfig, context_size: int, seed: int = 0, num_envs: int | None = None):
+        """`num_envs` is the length of the epsilon ladder, and the config's by default."""
+        torch.set_num_threads(1)
+        torch.manual_seed(seed)
+        self.config = config
+        self.context_size_built = context_size
+        self.network = QNetwork(config.channels if config.use_context else 0, config.hidden)
+        self.explore_from(0, config.num_envs if num_envs is None else num_envs, seed)
+
+    def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
+        """Takes the rungs `first_env` to `first_env + num_envs` of the ladder, and a new stream of random numbers."""
+        rung = (first_env + np.arange(num_envs)) / max(1, self.config.num_envs - 1)
+        self._epsilon = self.config.epsilon_base ** (1 + self.config.epsilon_alpha * rung)
+        self._rng = np.random.default_rng(seed)
+
+    def parameters(self) -> dict[str, np.ndarray]:
+        """The network's, by name."""
+        return {name: value.numpy().copy() for name, value in self.network.state_dict().items()}
+
+    def set_parameters(self, parameters: dict[str, np.ndarray]) -> None:
+        """Takes over another network's."""
+        self.network.load_state_dict({name: torch.from_numpy(value.copy()) for name, value in parameters.items()})
+
+    @classmethod
+    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> DQN:
+        """The agent of a checkpoint, by default of the one that ships.
+
+        Raises:
+          InputError: if the checkpoint can't be used here.
+        """
+        path = cls._shipped() if checkpoint is None else checkpoint
+        tensors, metadata = load_checkpoint(path, cls.name)
+        try:
+            config = override(cls.default_config, metadata["config"])
+            trained_size = int(metadata["context_size"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(f"{path}: expected metadata with config and context_size, found {error}") from error
+        agent = cls(config, trained_size, seed)
+        load_into(path, agent.network, tensors)
+        return agent
+
+    @classmethod
+    def build_learner(
+        cls, interface: Interface, mazes: Any, *, seed: int = 0, overrides: Mapping[str, str] | None = None
+    ) -> Any:
+        """A learner of this agent's kind; see `mazebench.agent.LearningAgent`."""
+        from .learner import DQNLearner
+
+        config = override(cls.default_config, overrides or {})
+        return DQNLearner(cls(config, interface.context_size, seed), tuple(mazes), seed)
+
+    @classmethod
+    def _shipped(cls) -> pathlib.Path:
+        path = resources.files("mazebench_assets").joinpath("checkpoints", f"{cls.name}-13.safetensors")
+        return pathlib.Path(str(path))
+
+    def initial_state(self, batch_size: int) -> ActorState:
+        """No context encoded yet: `act` does it where one is first."""
+        size = self.context_size_built
+        code = torch.zeros(batch_size, self.config.channels + 4, size * size) if self.config.use_context else None
+        return ActorState(np.zeros((batch_size, 2), dtype=np.float32), code)
+
+    @torch.no_grad()
+    def act(
+        self, observation: Observation, is_first: np.ndarray, state: ActorState, explore: bool = False
+    ) -> tuple[np.ndarray, ActorState]:
+        """Actions `[B]`; a context is encoded once, where it is new."""
+        new = np.flatnonzero(is_first)
+        if len(new):
+            state.origin[new] = observation["state"][new, :2]
+            if state.code is not None:
+                code = self.network.encode(torch.from_numpy(observation["context"][new]))
+                if state.code.shape[1:] != code.shape[1:]:  # maps of another size than it was trained on
+                    state.code = torch.zeros(len(state.origin), *code.shape[1:])
+                state.code[new] = code
+        features = state_features(torch.from_numpy(observation["state"]), torch.from_numpy(state.origin))
+        actions = self.network(features[:, None], state.code)[:, 0].argmax(dim=-1).numpy()
+        if explore:
+            at_random = self._rng.random(len(actions)) < self._epsilon
+            actions = np.where(at_random, self._rng.integers(NUM_ACTIONS, size=len(actions)), actions)
+        return actions, state
+
+
+class MAH(DQN):
+    """The map-conditioned Ape-X HER DQN of the paper."""
+
+    name = "mah"
+    default_config = DQNConfig()

@@ -1,0 +1,32 @@
+"""Config values given as text: typed by the config, unknown names refused."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+import pydantic
+
+from mazebench.errors import InputError, unknown
+
+Config = TypeVar("Config")
+
+
+def override(config: Config, values: Mapping[str, Any]) -> Config:
+    """`config`, a frozen dataclass, with `values` in place of its own, each text turned into its field's type.
+
+    Raises:
+      InputError: if a name is unknown, with the list of those there are, or a value is not of its field's type.
+    """
+    types = {field.name: field.type for field in dataclasses.fields(config)}  # type: ignore[arg-type]
+    known = {name: {"bool": bool, "int": int, "float": float, "str": str}[str(kind)] for name, kind in types.items()}
+    typed: dict[str, Any] = {}
+    for name, value in values.items():
+        if name not in known:
+            raise unknown("config key", name, known)
+        try:
+            typed[name] = pydantic.TypeAdapter(known[name]).validate_python(value)
+        except pydantic.ValidationError as error:
+            raise InputError(f"config key {name!r}: expected {types[name]}, found {value!r}") from error
+    return dataclasses.replace(config, **typed)  # type: ignore[type-var]

@@ -1,0 +1,286 @@
+"""Trajectories, stored once and compactly, and the hindsight that is sampled from them; shared by the learning agents.
+
+`B` is the number of environments, `G` the number of groups in a sample, `K` of steps in a group, `n` of the return's
+steps. Cells are numbers, row * N + column. A row is one observation; the context of a row is never stored, but built
+again from maze, start and goal.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+import zipfile
+from typing import NamedTuple
+
+import numpy as np
+
+from mazebench.errors import InputError
+from mazebench.training.experience import Experience
+
+from .sum_tree import SumTree
+
+_ROW_FIELDS = ("state", "origin", "action", "cell", "start", "goal", "maze", "trajectory", "leg")
+_ENV_FIELDS = ("next", "current", "current_leg", "leg_origin")
+_NO_ACTION = -1  # of the row after a trajectory's last step
+_STATE_SIZE = 12
+
+
+class Sample(NamedTuple):
+    """G groups of K steps; the steps of a group share one context, which makes learning from many of them cheap."""
+
+    row: np.ndarray  # [G] int, the rows whose priorities the groups were drawn by
+    weight: np.ndarray  # [G] float32, importance weights, at most 1
+    maze: np.ndarray  # [G] int
+    start: np.ndarray  # [G] int, cell
+    goal: np.ndarray  # [G] int, cell
+    origin: np.ndarray  # [G, 2] float32, x and y observed where the context's leg started
+    cell: np.ndarray  # [G, K] int, the body's true cell at `state`
+    state: np.ndarray  # [G, K, 12] float32
+    action: np.ndarray  # [G, K] int
+    reward: np.ndarray  # [G, K] float32, the sum of up to n rewards towards `goal`
+    discount: np.ndarray  # [G, K] float32, of `next_state`: 0 where the goal was reached within the n steps, else 1
+    next_state: np.ndarray  # [G, K, 12] float32, after up to n steps; a trajectory's last one where it ends before
+    valid: np.ndarray  # [G, K] bool, the step was taken outside the goal
+
+
+@dataclasses.dataclass(frozen=True)
+class Hindsight:
+    """Which goals a sample is relabelled with."""
+
+    ratio: float = 0.8  # share of relabelled groups
+    mean_offset: float = 16.0  # steps ahead of the row at which the goal was reached; geometric
+    window: int = 60  # steps; no goal lies farther ahead, no step of a group farther before it
+    relabel_start: bool = False  # whether the context's start moves along, to the group's first step
+
+
+class Replay:
+    """A ring of rows for each of B environments."""
+
+    def __init__(self, num_envs: int, capacity: int, priority_exponent: float = 0.0):
+        """`capacity` is the number of rows of all environments together."""
+        self._length = max(2, capacity // num_envs)  # rows of one environment
+        self._num_envs = num_envs
+        shape = (num_envs, self._length)
+        self._state = np.zeros((*shape, _STATE_SIZE), dtype=np.float32)
+        self._origin = np.zeros((*shape, 2), dtype=np.float32)
+        self._action = np.full(shape, _NO_ACTION, dtype=np.int8)
+        self._cell = np.zeros(shape, dtype=np.uint16)
+        self._start = np.zeros(shape, dtype=np.uint16)
+        self._goal = np.zeros(shape, dtype=np.uint16)
+        self._maze = np.zeros(shape, dtype=np.uint16)
+        self._trajectory = np.full(shape, -1, dtype=np.int64)  # numbers that no two trajectories of a ring share
+        self._leg = np.full(shape, -1, dtype=np.int64)  # likewise, of the leg to one goal
+        self._next = np.zeros(
+            num_envs, dtype=np.int64
+        )  # the row each environment writes next, counted without wrapping
+        self._current = np.zeros(num_envs, dtype=np.int64)  # the trajectory each environment is in
+        self._current_leg = np.zeros(num_envs, dtype=np.int64)
+        self._leg_origin = np.zeros((num_envs, 2), dtype=np.float32)
+        self._tree = SumTree(num_envs * self._length)
+        self._exponent = priority_exponent
+        self._largest_priority = 1.0
+
+    @property
+    def num_rows(self) -> int:
+        """Rows stored now."""
+        return int(np.minimum(self._next, self._length).sum())
+
+    def save(self, path: pathlib.Path) -> None:
+        """Writes the rows in use and everything that sampling depends on."""
+        used = slice(0, min(self._length, int(self._next.max())))
+        rows = {name: getattr(self, f"_{name}")[:, used] for name in _ROW_FIELDS}
+        leaves = self._tree.priorities(np.arange(self._num_envs * self._length)).reshape(self._num_envs, -1)[:, used]
+        np.savez(path, **rows, **{name: getattr(self, f"_{name}") for name in _ENV_FIELDS}, priorities=leaves)
+
+    def load(self, path: pathlib.Path) -> None:
+        """Goes on from what `save` wrote.
+
+        Raises:
+          InputError: if the file is damaged or of another shape.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as arrays:
+                loaded = {name: arrays[name] for name in (*_ROW_FIELDS, *_ENV_FIELDS, "priorities")}
+        except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+            raise InputError(f"{path}: expected a replay, found a damaged one: {error}") from error
+        used = loaded["cell"].shape[1]
+        if loaded["cell"].shape[0] != self._num_envs or used > self._length:
+            raise InputError(f"{path}: expected {self._num_envs} x {self._length} rows, found {loaded['cell'].shape}")
+        for name in _ROW_FIELDS:
+            getattr(self, f"_{name}")[:, :used] = loaded[name]
+        for name in _ENV_FIELDS:
+            setattr(self, f"_{name}", loaded[name])
+        items = np.arange(self._num_envs * self._length).reshape(self._num_envs, -1)[:, :used]
+        self._tree.set(items.ravel(), loaded["priorities"].ravel())
+        self._largest_priority = max(1.0, float(loaded["priorities"].max(initial=0.0)))
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory of all rows, used or not."""
+        arrays = [getattr(self, f"_{name}") for name in _ROW_FIELDS]
+        return sum(array.nbytes for array in arrays)
+
+    def add(self, experience: Experience, first_env: int = 0) -> None:
+        """Stores one step of each of the environments from `first_env` on."""
+        indices = np.arange(len(experience.action))
+        envs = first_env + indices
+        self._current[envs] += experience.begins
+        self._current_leg[envs] += experience.is_first
+        self._leg_origin[envs[experience.is_first]] = experience.state[experience.is_first, :2]
+        self._write(envs, indices, experience, experience.state, experience.cell, experience.action)
+        ended = np.flatnonzero(experience.ended)
+        if len(ended):
+            no_action = np.full(len(indices), _NO_ACTION)
+            self._write(envs[ended], ended, experience, experience.final_state, experience.final_cell, no_action)
+
+    def _write(
+        self,
+        envs: np.ndarray,
+        indices: np.ndarray,
+        experience: Experience,
+        state: np.ndarray,
+        cell: np.ndarray,
+        action: np.ndarray,
+    ) -> None:
+        """Writes a row of each of `envs`, which are the experience's `indices`."""
+        place = (envs, self._next[envs] % self._length)
+        self._state[place] = state[indices]
+        self._cell[place] = cell[indices]
+        self._action[place] = action[indices]
+        self._origin[place] = self._leg_origin[envs]
+        self._start[place] = experience.start[indices]
+        self._goal[place] = experience.goal[indices]
+        self._maze[place] = experience.maze[indices]
+        self._trajectory[place] = self._current[envs]
+        self._leg[place] = self._current_leg[envs]
+        priority = np.where(action[indices] == _NO_ACTION, 0.0, self._largest_priority)
+        self._tree.set(place[0] * self._length + place[1], priority)
+        self._next[envs] += 1
+
+    def sample(
+        self, num_groups: int, num_steps: int, n: int, hindsight: Hindsight, rng: np.random.Generator, beta: float = 0.0
+    ) -> Sample:
+        """Draws groups by priority and relabels a share of them with goals that were reached later in the trajectory.
+
+        The goal of a relabelled group is the cell that the body was in some steps after the drawn row. Rewards, ends
+        and the context's goal follow from it; map and start stay, unless `hindsight.relabel_start`.
+
+        Args:
+          num_groups, num_steps: G and K.
+          n: largest number of steps of a return.
+          hindsight: how to relabel.
+          rng: the source of all draws.
+          beta: exponent of the importance weights, 0 for none (Schaul et al. 2016).
+        """
+        row = self._tree.sample(num_groups, rng)
+        env, place = np.divmod(row, self._length)
+        offset = np.minimum(rng.geometric(1 / hindsight.mean_offset, size=num_groups), hindsight.window)
+        reached = self._forward(env, place, offset)
+        relabelled = rng.random(num_groups) < hindsight.ratio
+        goal = np.where(relabelled, self._cell[env, reached], self._goal[env, place]).astype(np.int64)
+        end = np.where(relabelled, reached, self._forward(env, place, np.full_like(place, hindsight.window // 2)))
+        part = self._trajectory if hindsight.relabel_start else self._leg
+        steps = self._draw_steps(env, place, end, part, num_steps, hindsight.window, rng)
+        start, origin = self._start[env, place].astype(np.int64), self._origin[env, place]
+        if hindsight.relabel_start:
+            first = self._earliest(env, place, steps)
+            moved = relabelled[:, None]
+            start = np.where(relabelled, self._cell[env, first], start)
+            origin = np.where(moved, self._state[env, first, :2], origin)
+        reward, discount, last = self._returns(env[:, None], steps, goal[:, None], n)
+        return Sample(
+            row,
+            self._weights(row, beta),
+            self._maze[env, place].astype(np.int64),
+            start,
+            goal,
+            origin,
+            self._cell[env[:, None], steps].astype(np.int64),
+            self._state[env[:, None], steps],
+            self._action[env[:, None], steps].astype(np.int64),
+            reward,
+            discount,
+            self._state[env[:, None], last],
+            (self._cell[env[:, None], steps] != goal[:, None]) & (last != steps),
+        )
+
+    def update_priorities(self, row: np.ndarray, error: np.ndarray) -> None:
+        """Gives the rows of a sample priorities by the errors `[G]` that learning found in their groups."""
+        if self._exponent == 0:
+            return
+        priority = (np.abs(error) + 1e-3) ** self._exponent
+        # A row may have been overwritten by a trajectory's last one since, which is never to be drawn.
+        priority[self._action.reshape(-1)[row] == _NO_ACTION] = 0.0
+        self._largest_priority = max(self._largest_priority, float(priority.max()))
+        self._tree.set(row, priority)
+
+    def _weights(self, row: np.ndarray, beta: float) -> np.ndarray:
+        priority = self._tree.priorities(row)
+        return ((priority.min() / priority) ** beta).astype(np.float32)
+
+    def _forward(self, env: np.ndarray, place: np.ndarray, offset: np.ndarray) -> np.ndarray:
+        """The place up to `offset` rows on from `place`, within the trajectory: it is walked by doubling jumps."""
+        trajectory = self._trajectory[env, place]
+        here = place
+        jump = 1 << int(offset.max()).bit_length()
+        left = offset.copy()
+        while jump:
+            there = (here + np.minimum(jump, left)) % self._length
+            ok = (self._trajectory[env, there] == trajectory) & self._is_later(env, here, there)
+            moved = np.where(ok, np.minimum(jump, left), 0)
+            here = (here + moved) % self._length
+            left = left - moved
+            jump >>= 1
+        return here
+
+    def _is_later(self, env: np.ndarray, here: np.ndarray, there: np.ndarray) -> np.ndarray:
+        """Whether the row at `there` was written after the one at `here` (or is it)."""
+        newest = self._next[env] - 1
+        age_here, age_there = (newest - here) % self._length, (newest - there) % self._length
+        return age_there <= age_here
+
+    def _draw_steps(
+        self,
+        env: np.ndarray,
+        place: np.ndarray,
+        end: np.ndarray,
+        part: np.ndarray,
+        num_steps: int,
+        window: int,
+        rng: np.random.Generator,
+    ) -> np.ndarray:
+        """`[G, K]` places: the drawn row, then others of the same `part`, at most `window` rows before `end`.
+
+        What would lie outside is the drawn row again.
+        """
+        back = rng.integers(1, window + 1, size=(len(env), num_steps))
+        back[:, 0] = (end - place) % self._length
+        steps = (end[:, None] - back) % self._length
+        same = part[env[:, None], steps] == part[env, place][:, None]
+        inside = same & self._is_later(env[:, None], steps, end[:, None])
+        return np.where(inside, steps, place[:, None])
+
+    def _earliest(self, env: np.ndarray, place: np.ndarray, steps: np.ndarray) -> np.ndarray:
+        """`[G]`: the place of each group's first step."""
+        age = (self._next[env, None] - 1 - steps) % self._length
+        return np.take_along_axis(steps, age.argmax(axis=1)[:, None], axis=1)[:, 0]
+
+    def _returns(
+        self, env: np.ndarray, steps: np.ndarray, goal: np.ndarray, n: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Sums of rewards, discounts and last places `[G, K]` of returns of up to n steps from `steps` towards `goal`.
+
+        A step that ends in the goal is rewarded 0 and ends the return with discount 0; every other one is rewarded -1.
+        A trajectory that ends before was cut short, not finished: the return then goes on from its last state.
+        """
+        reward = np.zeros(steps.shape, dtype=np.float32)
+        going, hit = np.ones(steps.shape, dtype=bool), np.zeros(steps.shape, dtype=bool)
+        last = steps.copy()
+        for _ in range(n):
+            going &= self._action[env, last] != _NO_ACTION
+            going &= last != (self._next[env] - 1) % self._length  # the newest row has no next one yet
+            last = np.where(going, (last + 1) % self._length, last)
+            hit |= going & (self._cell[env, last] == goal)
+            reward -= going & ~hit
+            going &= ~hit
+        return reward, (~hit).astype(np.float32), last

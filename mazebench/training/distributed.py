@@ -1,0 +1,140 @@
+"""Collecting on Ray: actors that play, each with its share of the environments, and one learner that they feed.
+
+Ape-X as published (Horgan et al. 2018), but for one thing: the learner makes a fixed number of updates for each step
+that arrives, so that scores do not depend on how fast the actors are.
+"""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from mazebench.agent import ExploringAgent, LearningAgent
+from mazebench.errors import InputError
+from mazebench.tasks.spec import TaskSpec
+from mazebench.training.experience import Collector, Experience
+
+try:
+    import ray
+except ModuleNotFoundError as error:
+    raise InputError("--workers needs Ray, which is not installed; try: pip install 'mazebench-mujoco[ray]'") from error
+
+if TYPE_CHECKING:
+    from mazebench.training.loop import TrainOptions
+
+_STEPS_PER_CALL = 16  # environment steps an actor takes before it answers
+_CALLS_PER_PUBLISH = 4  # answers of an actor between the newest networks it gets: 64 of its steps
+_MAX_FAILURES = 20  # of actors in a run, before it gives up
+
+
+class _Player:
+    """Plays in its share of the environments; lives in a process of its own."""
+
+    def __init__(self, task_spec: TaskSpec, actor: ExploringAgent, first_env: int, num_envs: int):
+        self._collector = Collector(task_spec, num_envs, seed=0, num_threads=1)
+        self._actor = actor
+        self._first_env = first_env
+
+    def restart(self, seed: int) -> None:
+        """Begins new trajectories everywhere, and a new stream of exploration."""
+        self._collector.restart(seed)
+        self._actor.explore_from(self._first_env, self._collector.num_envs, seed)
+        self._state = self._actor.initial_state(self._collector.num_envs)
+
+    def play(self, parameters: dict[str, Any] | None) -> list[Experience]:
+        """Takes some steps, with new `parameters` if there are any."""
+        if parameters is not None:
+            self._actor.set_parameters(parameters)
+        experiences = []
+        for _ in range(_STEPS_PER_CALL):
+            collector = self._collector
+            actions, self._state = self._actor.act(collector.observation, collector.is_first, self._state, explore=True)
+            experiences.append(collector.step(actions))
+        return experiences
+
+
+class RaySource:
+    """Experience of Ray actors in the order in which it arrives; an actor that dies is replaced."""
+
+    def __init__(self, options: TrainOptions, task_spec: TaskSpec, learner: LearningAgent):
+        """Starts `options.workers` actors, on the cluster at `options.ray_address` or on a local one.
+
+        Raises:
+          InputError: if the cluster can't be reached, or there are fewer environments than workers.
+        """
+        if options.workers > learner.num_envs:
+            raise InputError(
+                f"expected at most {learner.num_envs} workers, one an environment, found {options.workers}"
+            )
+        self._started = not ray.is_initialized()
+        try:
+            if self._started:
+                ray.init(address=options.ray_address, log_to_driver=False, include_dashboard=False)
+        except (ConnectionError, ValueError) as error:
+            raise InputError(f"can't reach a Ray cluster at {options.ray_address!r}: {error}") from error
+        self._learner, self._task_spec = learner, task_spec
+        bounds = [worker * learner.num_envs // options.workers for worker in range(options.workers + 1)]
+        self._shares = list(itertools.pairwise(bounds))
+        self._players: list[Any] = [None] * options.workers
+        self._calls: dict[Any, int] = {}  # the worker of each answer that is awaited
+        self._num_answers = [0] * options.workers
+        self._num_failures = self._seed = 0
+
+    def restart(self, seed: int) -> None:
+        """Begins new trajectories in all actors; what is under way is thrown away."""
+        self._seed = seed
+        self._calls = {}
+        for worker in range(len(self._players)):
+            if self._players[worker] is None:
+                self._start(worker)
+            else:
+                self._begin(worker)
+
+    def collect(self) -> Iterator[tuple[int, Experience]]:
+        """Waits for one actor's steps and lets it go on."""
+        done, _ = ray.wait(list(self._calls), num_returns=1)
+        worker = self._calls.pop(done[0])
+        try:
+            experiences = ray.get(done[0])
+        except ray.exceptions.RayActorError as error:
+            self._replace(worker, error)
+            return
+        self._num_answers[worker] += 1
+        self._play(worker, publish=self._num_answers[worker] % _CALLS_PER_PUBLISH == 0)
+        for experience in experiences:
+            yield self._shares[worker][0], experience
+
+    def _start(self, worker: int) -> None:
+        first_env, end = self._shares[worker]
+        player = ray.remote(num_cpus=1)(_Player)
+        actor = copy.deepcopy(self._learner.actor)
+        self._players[worker] = player.remote(self._task_spec, actor, first_env, end - first_env)
+        self._begin(worker)
+
+    def _begin(self, worker: int) -> None:
+        self._players[worker].restart.remote(self._seed + worker + self._num_failures * len(self._players))
+        self._play(worker, publish=True)
+
+    def _play(self, worker: int, publish: bool) -> None:
+        parameters = self._learner.actor.parameters() if publish else None
+        self._calls[self._players[worker].play.remote(parameters)] = worker
+
+    def _replace(self, worker: int, error: Exception) -> None:
+        self._num_failures += 1
+        if self._num_failures > _MAX_FAILURES:
+            raise RuntimeError(f"{_MAX_FAILURES} Ray actors died, the last of: {str(error).splitlines()[0]}") from error
+        print(f"mazebench: Ray actor {worker} died; it is replaced", file=sys.stderr)
+        self._start(worker)
+
+    def __enter__(self) -> RaySource:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        for player in self._players:
+            if player is not None:
+                ray.kill(player)
+        if self._started:
+            ray.shutdown()

@@ -1,0 +1,351 @@
+"""Pictures of mazes: exact drawings, synthetic photographs and files from outside."""
+
+import pathlib
+import struct
+import tempfile
+import zlib
+
+import cv2
+import hypothesis
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+from scipy import ndimage
+
+from mazebench.errors import InputError
+from mazebench.maps.image import draw_maze, maze_from_image, read_image_maze, write_image
+from mazebench.maps.maze import Maze, MazeError
+
+SEEDS = st.integers(0, 2**32 - 1)
+FEW = hypothesis.settings(max_examples=100, deadline=None)
+
+
+def random_maze(size: int, rng: np.random.Generator) -> Maze:
+    """The largest free area of random cells, of which a share between a third and all are free."""
+    free = np.zeros((size, size), dtype=bool)
+    free[1:-1, 1:-1] = rng.random((size - 2, size - 2)) < rng.uniform(0.3, 1)
+    free[size // 2, size // 2] = True
+    areas, _ = ndimage.label(free)
+    return Maze(areas != 1 + np.argmax(np.bincount(areas.ravel())[1:]))
+
+
+def corridors(size: int, rng: np.random.Generator) -> Maze:
+    """A maze of corridors by a random depth-first walk; `size` is odd."""
+    walls = np.ones((size, size), dtype=bool)
+    stack = [(1, 1)]
+    walls[1, 1] = False
+    while stack:
+        row, column = stack[-1]
+        steps = [(row + 2, column), (row - 2, column), (row, column + 2), (row, column - 2)]
+        steps = [(r, c) for r, c in steps if 0 < r < size and 0 < c < size and walls[r, c]]
+        if steps:
+            r, c = steps[rng.integers(len(steps))]
+            walls[r, c] = walls[(r + row) // 2, (c + column) // 2] = False
+            stack.append((r, c))
+        else:
+            stack.pop()
+    return Maze(walls)
+
+
+def blocks(walls: np.ndarray, cell_pixels: int) -> np.ndarray:
+    """A black and white gray picture of `walls`."""
+    return np.where(walls, 0, 255).astype(np.uint8).repeat(cell_pixels, axis=0).repeat(cell_pixels, axis=1)
+
+
+def photograph(walls: np.ndarray, rng: np.random.Generator, table: bool = False) -> np.ndarray:
+    """The plan on paper: turned up to 15 degrees, in perspective, half in shade, blurred, noisy, a JPEG."""
+    ink = rng.uniform(10, 90)
+    paper = np.maximum(blocks(walls, 24), ink).astype(np.float32)
+    paper = cv2.copyMakeBorder(paper, *(len(paper) // 4,) * 4, cv2.BORDER_CONSTANT, value=255)
+    side = len(paper)
+    angle = np.deg2rad(rng.uniform(-15, 15))
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    corners = np.array([[0, 0], [side, 0], [side, side], [0, side]], dtype=np.float32)
+    seen = (corners - side / 2) @ turn.T * 0.8 + side / 2 + rng.uniform(-0.06, 0.06, (4, 2)) * side
+    transform = cv2.getPerspectiveTransform(corners, seen.astype(np.float32))
+    image = cv2.warpPerspective(paper, transform, (side, side), borderValue=60 if table else 255)
+    across = np.linspace(0, 1, side) if rng.random() < 0.5 else np.linspace(1, 0, side)[:, None]
+    image = cv2.GaussianBlur(image * (0.95 - 0.5 * across), (0, 0), 1.2) + rng.normal(0, 8, image.shape)
+    tinted = np.clip(image[..., None] * [0.9, 0.96, 0.98], 0, 255).astype(np.uint8)
+    _, content = cv2.imencode(".jpg", tinted, [cv2.IMWRITE_JPEG_QUALITY, 75])
+    return cv2.cvtColor(cv2.imdecode(content, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+
+
+def encode(image: np.ndarray, extension: str = ".png") -> bytes:
+    return cv2.imencode(extension, image)[1].tobytes()
+
+
+def read_bytes(content: bytes, size: int | None = None) -> Maze:
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "plan.png"
+        path.write_bytes(content)
+        return read_image_maze(path, size)
+
+
+def refusal(content: bytes) -> str:
+    """The one line that refuses a file."""
+    with pytest.raises(InputError) as caught:
+        read_bytes(content)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def png_declaring(width: int, height: int) -> bytes:
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    pixels = chunk(b"IDAT", zlib.compress(bytes(1000)))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + pixels + chunk(b"IEND", b"")
+
+
+@pytest.fixture(scope="module")
+def maze() -> Maze:
+    return corridors(13, np.random.default_rng(0))
+
+
+# Drawing.
+
+
+def test_drawing_has_a_dark_block_for_each_wall_when_plain(maze):
+    image = draw_maze(maze, cell_pixels=4)
+    assert image.shape == (52, 52, 3)
+    assert image.dtype == np.uint8
+    cells = image.reshape(13, 4, 13, 4, 3).transpose(0, 2, 1, 3, 4).reshape(13, 13, -1)
+    assert (cells[maze.walls] < 48).all()
+    assert (cells[~maze.walls] == 255).all()
+
+
+@hypothesis.given(SEEDS, st.integers(5, 40), st.integers(1, 20))
+@FEW
+def test_drawing_is_read_back_for_any_maze_and_scale(seed, size, cell_pixels):
+    drawn = random_maze(size, np.random.default_rng(seed))
+    image = draw_maze(drawn, cell_pixels)
+    assert maze_from_image(image) == drawn
+    assert maze_from_image(image, size) == drawn
+
+
+@pytest.mark.parametrize("cell_pixels", [1, 2, 16])
+def test_drawing_is_read_back_when_every_cell_is_doubled(maze, cell_pixels):
+    doubled = Maze(maze.walls.repeat(2, axis=0).repeat(2, axis=1))
+    assert maze_from_image(draw_maze(doubled, cell_pixels)) == doubled
+
+
+def test_largest_maze_is_read_back_from_its_file(tmp_path):
+    drawn = random_maze(255, np.random.default_rng(0))
+    write_image(draw_maze(drawn, 8), tmp_path / "large.png")
+    assert read_image_maze(tmp_path / "large.png") == drawn
+
+
+def test_drawing_marks_start_goal_and_path_when_given(maze):
+    path = np.array([[1.5, 11.5], [1.5, 10.5], [11.5, 10.5], [11.5, 1.5]])
+    image = draw_maze(maze, 16, start=(1, 1), goal=(11, 11), path=path).astype(int)
+    red, green, blue = image[1 * 16 + 8, 1 * 16 + 8]
+    assert green > max(red, blue)
+    red, green, blue = image[11 * 16 + 8, 11 * 16 + 8]
+    assert red > max(green, blue)
+    red, green, blue = image[2 * 16, 1 * 16 + 8]  # half a metre from the path's start
+    assert blue > max(red, green)
+    red, green, blue = image[10 * 16, 11 * 16 + 8]  # a metre and a half from its end
+    assert red > green > blue
+    assert (image[5, 5] == draw_maze(maze, 16)[5, 5]).all()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"cell_pixels": 0},
+        {"cell_pixels": 8192 // 13 + 1},
+        {"start": (0, 0)},
+        {"goal": (1, 99)},
+        {"path": np.zeros((4, 3))},
+        {"path": np.zeros((0, 2))},
+        {"path": np.array([[1.5, np.nan]])},
+    ],
+)
+def test_drawing_is_refused_when_an_argument_is_out_of_range(maze, arguments):
+    with pytest.raises(InputError, match="expected"):
+        draw_maze(maze, **arguments)
+
+
+def test_writing_is_refused_when_the_folder_is_missing(maze, tmp_path):
+    with pytest.raises(InputError, match=r"can't write the picture: No such file"):
+        write_image(draw_maze(maze), tmp_path / "missing" / "maze.png")
+
+
+# Pixel maps.
+
+
+@pytest.mark.parametrize("extension", [".png", ".bmp", ".jpg"])
+@pytest.mark.parametrize("cell_pixels", [8, 16])
+def test_map_is_read_from_each_format(maze, tmp_path, extension, cell_pixels):
+    path = tmp_path / f"plan{extension}"
+    path.write_bytes(encode(draw_maze(maze, cell_pixels), extension))
+    assert read_image_maze(path) == maze
+    assert read_image_maze(path).name == "plan"
+
+
+def test_map_is_read_when_pixels_are_gray_deep_or_transparent(maze):
+    gray = blocks(maze.walls, 3)
+    deep = gray.astype(np.uint16) * 257
+    transparent = np.zeros((*gray.shape, 4), dtype=np.uint8)  # black everywhere, the floor seen through
+    transparent[..., 3] = 255 - gray
+    for image in (gray, deep, np.dstack([deep] * 3), transparent, transparent.astype(np.uint16) * 257):
+        assert maze_from_image(image) == maze
+        assert read_bytes(encode(image)) == maze
+
+
+def test_map_is_read_in_the_size_given(maze):
+    assert maze_from_image(blocks(maze.walls, 8), 26) == Maze(maze.walls.repeat(2, axis=0).repeat(2, axis=1))
+    assert maze_from_image(blocks(maze.walls, 1), 13) == maze
+    with pytest.raises(MazeError, match="are there 9 cells a side"):
+        maze_from_image(blocks(maze.walls, 1), 9)
+
+
+def test_map_is_read_when_paper_surrounds_it(maze):
+    assert maze_from_image(np.pad(blocks(maze.walls, 16), 16, constant_values=255)) == maze
+
+
+def test_map_is_refused_when_the_border_is_open(maze):
+    walls = maze.walls.copy()
+    walls[0, 3] = False
+    with pytest.raises(MazeError, match=r"expected a closed border, found cell \(0, 3\) free"):
+        maze_from_image(blocks(walls, 16))
+
+
+# Photographs.
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("size", [13, 21])
+def test_photograph_is_read_with_and_without_the_size(size, seed):
+    rng = np.random.default_rng(seed)
+    drawn = corridors(size, rng) if seed % 2 else random_maze(size, rng)
+    image = photograph(drawn.walls, rng)
+    assert maze_from_image(image, size) == drawn
+    assert maze_from_image(image) == drawn
+
+
+def test_photograph_is_read_when_the_table_shows(maze):
+    assert maze_from_image(photograph(maze.walls, np.random.default_rng(0), table=True)) == maze
+
+
+def test_photograph_is_turned_upright_when_the_camera_was_held_sideways(maze):
+    content = encode(np.rot90(photograph(maze.walls, np.random.default_rng(0))), ".jpg")
+    # One entry of a little-endian TIFF directory: orientation (0x0112) 6, "turn right to see it upright".
+    exif = b"Exif\0\0II*\0" + struct.pack("<IHHHIII", 8, 1, 0x0112, 3, 1, 6, 0)
+    assert read_bytes(content[:2] + b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif + content[2:]) == maze
+
+
+@pytest.mark.parametrize("size", [11, 12, 14, 15])
+def test_photograph_is_refused_when_the_size_given_is_wrong(maze, size):
+    with pytest.raises(MazeError, match=f"are there {size} cells a side"):
+        maze_from_image(photograph(maze.walls, np.random.default_rng(0)), size)
+
+
+def test_photograph_is_refused_with_the_cell_when_a_pocket_is_cut_off(maze):
+    walls = maze.walls.copy()
+    walls[1:4, 1:4] = True
+    walls[1, 1] = False
+    with pytest.raises(
+        MazeError, match=r"cell \(\d+, \d+\) cannot be reached from \(1, 1\) \(give the number of cells"
+    ):
+        maze_from_image(photograph(walls, np.random.default_rng(0)))
+
+
+def test_photograph_is_refused_with_the_cell_when_it_is_half_filled(maze):
+    image = blocks(maze.walls, 24)
+    row, column = maze.free_cells[7]
+    image[row * 24 : row * 24 + 24, column * 24 : column * 24 + 12] = 0
+    image = cv2.GaussianBlur(np.pad(image, 100, constant_values=250), (0, 0), 1)
+    with pytest.raises(MazeError, match=rf"13 x 13 cells of wall or floor, found cell \({row}, {column}\) between"):
+        maze_from_image(image)
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        np.zeros((50, 50), np.uint8),
+        np.full((50, 80), 255, np.uint8),
+        np.random.default_rng(0).integers(0, 256, (120, 90, 3), dtype=np.uint8),
+        255 - cv2.circle(np.zeros((200, 200), np.uint8), (100, 100), 80, 255, -1),
+        np.zeros((5, 3000), np.uint8),
+        np.zeros((4, 50), np.uint8),
+        np.zeros((50, 50), np.float64),
+        np.zeros((50, 50, 2), np.uint8),
+        np.zeros(50, np.uint8),
+    ],
+    ids=["black", "white", "noise", "disc", "strip", "low", "float", "two-channels", "flat"],
+)
+def test_picture_is_refused_when_it_shows_no_plan(image):
+    with pytest.raises(MazeError, match="expected"):
+        maze_from_image(image)
+
+
+@pytest.mark.parametrize("size", [4, 256, -1, 0])
+def test_size_is_refused_when_no_maze_has_it(maze, size):
+    with pytest.raises(InputError, match=f"expected a size of 5 to 255 cells, found {size}"):
+        maze_from_image(draw_maze(maze), size)
+
+
+# Files from outside.
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        png_declaring(60000, 60000),
+        b"BM" + bytes(12) + struct.pack("<Iii", 40, 60000, -60000) + bytes(100),
+        b"\xff\xd8\xff\xe0\x00\x04JF\xff\xc0\x00\x11\x08" + struct.pack(">HH", 60000, 60000) + bytes(100),
+    ],
+    ids=["png", "bmp", "jpeg"],
+)
+def test_file_is_refused_before_decoding_when_it_declares_too_many_pixels(content):
+    assert refusal(content).endswith(f"expected a picture of 1 to {8192**2} pixels, found 60000 x 60000")
+
+
+@pytest.mark.parametrize("content", [b"", b"BM", b"GIF89a" + bytes(50), b"\xff\xd8", b"\x89PNG\r\n\x1a\n", b"#####\n"])
+def test_file_is_refused_when_the_format_is_unknown(content):
+    assert f"expected a PNG, JPEG or BMP picture, found {len(content)} bytes" in refusal(content)
+
+
+@pytest.mark.parametrize("extension", [".png", ".bmp", ".jpg"])
+def test_file_is_refused_when_it_is_cut_short(maze, extension):
+    content = encode(draw_maze(maze), extension)
+    assert "expected a whole 208 x 208 picture" in refusal(content[: len(content) // 2])
+
+
+def test_file_is_refused_when_it_has_too_many_bytes(tmp_path):
+    with (tmp_path / "huge.png").open("wb") as file:
+        file.truncate(32 * 2**20 + 1)
+    with pytest.raises(MazeError, match="at most 32 MiB, found more"):
+        read_image_maze(tmp_path / "huge.png")
+
+
+def test_file_is_refused_when_it_is_missing(tmp_path):
+    with pytest.raises(InputError, match="can't read the picture: No such file"):
+        read_image_maze(tmp_path / "missing.png")
+
+
+STARTS = [b"", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", b"BM", b"\xff\xd8\xff"]
+
+
+@hypothesis.given(st.sampled_from(STARTS), st.binary(max_size=400))
+@FEW
+def test_file_is_refused_in_one_line_when_it_is_random_bytes(start, content):
+    refusal(start + content)
+
+
+@hypothesis.given(SEEDS, st.sampled_from([".png", ".bmp", ".jpg"]), st.integers(1, 8))
+@hypothesis.settings(max_examples=60, deadline=None)
+def test_file_is_read_or_refused_in_one_line_when_bytes_are_changed(seed, extension, num_changes):
+    rng = np.random.default_rng(seed)
+    content = bytearray(encode(draw_maze(corridors(7, rng), 3), extension))
+    for position in rng.integers(len(content), size=num_changes):
+        content[position] = rng.integers(256)
+    message = ""
+    try:
+        read_bytes(bytes(content))
+    except InputError as error:
+        message = str(error)
+    assert "\n" not in message

@@ -1,0 +1,248 @@
+"""The body moves as DeepMind Lab's does (DESIGN section 4) and never gets into a wall."""
+
+from __future__ import annotations
+
+import mujoco
+import mujoco.batch
+import numpy as np
+import pytest
+
+from mazebench.maps.generators import generate
+from mazebench.maps.maze import Maze, point_to_cell
+from mazebench.world.mjcf import ACTIONS, BODY_HEIGHT, BODY_RADIUS, STEPS_PER_ACTION, action_controls
+from mazebench.world.models import MazeModels
+from mazebench.world.physics import Physics
+
+STEPS_PER_FRAME = 2
+FRAMES_PER_ACTION = 10
+DRIVES = ("forward", "backward", "strafe_left", "strafe_right")
+# Where a drive leads, as an angle from the heading.
+BEARINGS = {"forward": 0, "backward": np.pi, "strafe_left": np.pi / 2, "strafe_right": -np.pi / 2}
+YAWS = np.random.default_rng(0).uniform(-np.pi, np.pi, size=4)
+TURN = np.deg2rad(2.112)  # a frame
+
+# DeepMind Lab's, 1 unit being 1 cm.
+LAB_SPEEDS = {1: 0.51, 2: 0.93, 4: 1.73, 8: 2.93, 10: 3.20}  # m/s after so many frames from rest
+LAB_TOP_SPEED = 3.2
+LAB_FRAMES_FOR_FIRST_METRE = 23
+LAB_STOPPING_DISTANCE = 0.4
+
+ROUNDING = 1e-9
+
+
+def open_maze(size: int, *walls: tuple[slice | int, slice | int]) -> Maze:
+    grid = np.pad(np.zeros((size - 2, size - 2), dtype=bool), 1, constant_values=True)
+    for block in walls:
+        grid[block] = True
+    return Maze(grid)
+
+
+FIELD = open_maze(25)
+MIDDLE = np.array([12.5, 12.5])
+
+
+def physics_at(maze: Maze, position, yaw: float = 0.0, velocity=(0.0, 0.0)) -> Physics:
+    physics = Physics.of_maze(MazeModels([maze])[0])
+    with physics.reset_context():
+        physics.place_agent(np.asarray(position), yaw)
+        physics.data.qvel[:2] = velocity
+    return physics
+
+
+def trajectory(physics: Physics, action: str | None, num_steps: int, nstep: int = 1) -> np.ndarray:
+    """`[num_steps + 1, 6]`: x, y, yaw and their rates, now and after every `nstep` steps; None lets the body coast."""
+    physics.data.ctrl[:] = 0
+    if action is not None:
+        physics.set_action(ACTIONS.index(action))
+    rows = [np.r_[physics.data.qpos, physics.data.qvel]]
+    for _ in range(num_steps):
+        physics.step(nstep)
+        rows.append(np.r_[physics.data.qpos, physics.data.qvel])
+    return np.array(rows)
+
+
+def depth(walls: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """`[K]` m: how far discs at `[K, 2]` points reach into the nearest wall; negative where they are clear of it."""
+    cells = point_to_cell(points, len(walls))
+    nearest = np.full(len(points), np.inf)
+    for down in (-1, 0, 1):
+        for right in (-1, 0, 1):
+            row, column = np.clip(cells + (down, right), 0, len(walls) - 1).T
+            centre = np.stack([column + 0.5, len(walls) - row - 0.5], axis=-1)
+            distance = np.hypot(*np.maximum(np.abs(points - centre) - 0.5, 0).T)
+            nearest = np.where(walls[row, column], np.minimum(nearest, distance), nearest)
+    return BODY_RADIUS - nearest
+
+
+class TestDriving:
+    @pytest.mark.parametrize("action", DRIVES)
+    @pytest.mark.parametrize("yaw", YAWS)
+    def test_speed_when_starting_from_rest(self, action, yaw):
+        frames = trajectory(physics_at(FIELD, MIDDLE, yaw), action, 12, STEPS_PER_FRAME)
+        direction = np.array([np.cos(yaw + BEARINGS[action]), np.sin(yaw + BEARINGS[action])])
+        along = frames[:, 3:5] @ direction
+        for frame, expected in LAB_SPEEDS.items():
+            assert along[frame] == pytest.approx(expected, rel=0.1), f"after {frame} frames"
+        # implicitfast leaves out how the drives' damping couples x and y, which turns the velocity by up to 0.3 degrees.
+        np.testing.assert_allclose(frames[:, 3:5] - along[:, None] * direction, 0, atol=0.005 * LAB_TOP_SPEED)
+        np.testing.assert_allclose(frames[:, 2], yaw, atol=ROUNDING)
+
+    @pytest.mark.parametrize("action", DRIVES)
+    def test_first_metre_when_starting_from_rest(self, action):
+        steps = trajectory(physics_at(FIELD, MIDDLE), action, 80)
+        distances = np.hypot(*(steps[:, :2] - MIDDLE).T)
+        assert np.interp(1.0, distances, np.arange(81)) / STEPS_PER_FRAME == pytest.approx(
+            LAB_FRAMES_FOR_FIRST_METRE, rel=0.1
+        )
+
+    @pytest.mark.parametrize("action", DRIVES)
+    @pytest.mark.parametrize("yaw", YAWS)
+    def test_speed_when_cruising(self, action, yaw):
+        physics = physics_at(FIELD, MIDDLE, yaw)
+        trajectory(physics, action, 150)
+        assert physics.speed() == pytest.approx(LAB_TOP_SPEED, rel=0.001)
+
+    @pytest.mark.parametrize("yaw", YAWS)
+    def test_distance_when_stopping_from_top_speed(self, yaw):
+        velocity = LAB_TOP_SPEED * np.array([np.cos(yaw), np.sin(yaw)])
+        steps = trajectory(physics_at(FIELD, MIDDLE, yaw, velocity), None, 250)
+        assert np.hypot(*(steps[-1, :2] - MIDDLE)) == pytest.approx(LAB_STOPPING_DISTANCE, rel=0.1)
+        assert np.hypot(*steps[-1, 3:5]) < 0.001
+
+    def test_speed_when_drive_is_reversed(self):
+        physics = physics_at(FIELD, MIDDLE)
+        trajectory(physics, "forward", 150)
+        frames = trajectory(physics, "backward", 100, STEPS_PER_FRAME)
+        assert np.all(np.diff(frames[:, 3]) <= ROUNDING)
+        assert frames[-1, 3] == pytest.approx(-LAB_TOP_SPEED, rel=0.001)
+
+
+class TestTurning:
+    @pytest.mark.parametrize(("action", "sign"), [("look_left", 1), ("look_right", -1)])
+    @pytest.mark.parametrize("yaw", YAWS)
+    def test_yaw_when_looking(self, action, sign, yaw):
+        frames = trajectory(physics_at(FIELD, MIDDLE, yaw), action, FRAMES_PER_ACTION, STEPS_PER_FRAME)
+        assert frames[-1, 2] - yaw == pytest.approx(sign * np.deg2rad(21.12), rel=0.01)
+        np.testing.assert_allclose(np.diff(frames[:, 2])[1:], sign * TURN, rtol=0.001)
+        assert frames[1, 5] == pytest.approx(sign * TURN / 0.016, rel=0.02)  # the rate stands within a frame
+        np.testing.assert_allclose(frames[:, :2] - MIDDLE, 0, atol=ROUNDING)
+
+    @pytest.mark.parametrize("action", ["look_left", "look_right"])
+    def test_yaw_when_let_go(self, action):
+        physics = physics_at(FIELD, MIDDLE)
+        trajectory(physics, action, 20)
+        frames = trajectory(physics, None, 10, STEPS_PER_FRAME)
+        assert abs(frames[1, 5]) < 0.02 * TURN / 0.016
+        assert abs(frames[-1, 2] - frames[0, 2]) < 0.1 * TURN
+
+    def test_velocity_when_turning_at_speed(self):
+        # Turning does not steer what is in motion: the body coasts on in the old direction.
+        physics = physics_at(FIELD, MIDDLE, velocity=(LAB_TOP_SPEED, 0))
+        steps = trajectory(physics, "look_left", STEPS_PER_ACTION)
+        np.testing.assert_allclose(steps[:, 4], 0, atol=ROUNDING)
+        assert np.all(np.diff(steps[:, 3]) < 0)
+
+
+class TestWalls:
+    @pytest.mark.parametrize("heading", np.deg2rad([100, 120, 150]))
+    def test_slide_when_coasting_along_a_wall(self, heading):
+        # Against the left wall: what goes along it goes as far as in the open, so there is no friction.
+        velocity = LAB_TOP_SPEED * np.array([np.cos(heading), np.sin(heading)])
+        at_wall = trajectory(physics_at(FIELD, (1.3, 12.5), 0.0, velocity), None, 250)
+        in_open = trajectory(physics_at(FIELD, MIDDLE, 0.0, velocity), None, 250)
+        assert at_wall[:, 0].min() < 1.25
+        np.testing.assert_allclose(at_wall[:, 1], in_open[:, 1], atol=1e-6)
+
+    @pytest.mark.parametrize("heading", np.deg2rad([100, 135, 180]))
+    @pytest.mark.parametrize("gap", np.linspace(0.25, 0.28, 4))
+    def test_bounce_when_coasting_into_a_wall(self, heading, gap):
+        velocity = LAB_TOP_SPEED * np.array([np.cos(heading), np.sin(heading)])
+        steps = trajectory(physics_at(FIELD, (1 + gap, 12.5), 0.0, velocity), None, 100)
+        assert steps[:, 3].max() < 0.05 * abs(velocity[0])
+
+    @pytest.mark.parametrize("heading", np.deg2rad([100, 120, 150]))
+    def test_slide_when_boxes_meet_in_a_flat_wall(self, heading):
+        # The L's right face is made of two boxes, that of its foot and that of its stem.
+        maze = open_maze(15, np.s_[8, 2:5], np.s_[8:14, 4])
+        physics = physics_at(maze, (5.3, 2.5), heading)
+        steps = trajectory(physics, "forward", 400)
+        along = steps[(steps[:, 1] > 4) & (steps[:, 1] < 6.5)]
+        assert along[:, 0].max() < 5.25
+        assert np.ptp(along[:, 4]) < 0.02 * along[:, 4].mean()
+        assert np.abs(along[:, 3]).max() < 0.02 * along[:, 4].mean()
+
+    def test_body_when_driving_head_on_into_walls_and_corners(self):
+        # Discs all round a wall block, at top speed, straight at its middle, its corners and past them.
+        maze = open_maze(11, np.s_[5, 5])
+        angles = np.arange(0, 2 * np.pi, np.pi / 12)
+        offsets = np.linspace(-0.9, 0.9, 19)
+        angle, offset = (grid.ravel() for grid in np.meshgrid(angles, offsets))
+        ahead = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        aside = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
+        batch = mujoco.batch.Batch(MazeModels([maze])[0], len(angle), 0)
+        qpos, qvel, ctrl = batch.bind("qpos"), batch.bind("qvel"), batch.bind("ctrl")
+        for action in ("forward", "look_left"):  # driving on and coasting
+            qpos[:] = np.c_[np.array([5.5, 5.5]) - 1.5 * ahead + offset[:, None] * aside, angle]
+            qvel[:] = np.c_[LAB_TOP_SPEED * ahead, np.zeros(len(angle))]
+            ctrl[:] = action_controls()[ACTIONS.index(action)]
+            for _ in range(150):
+                batch.step(None, nstep=1)
+                assert depth(maze.walls, qpos[:, :2]).max() <= 0.01
+
+    def test_body_when_driving_into_every_wall_of_a_room(self):
+        maze = open_maze(5)
+        for yaw in np.deg2rad(np.arange(0, 360, 15)):
+            steps = trajectory(physics_at(maze, (2.5, 2.5), yaw), "forward", 200)
+            assert depth(maze.walls, steps[:, :2]).max() <= 0.01
+            assert depth(maze.walls, steps[-1:, :2])[0] > -0.1  # it did get there
+
+    @pytest.mark.parametrize(("style", "size"), [("dfs", 13), ("rooms", 15), ("obstacles", 11)])
+    def test_body_when_acting_at_random_for_thousands_of_steps(self, style, size):
+        num_mazes, num_actions = 8, 105
+        rng = np.random.default_rng(size)
+        mazes = [generate(style, size, rng) for _ in range(num_mazes)]
+        models = MazeModels(mazes)
+        num_bodies = 8 * num_mazes
+        maze_of_body = np.arange(num_bodies) % num_mazes
+        batch = mujoco.batch.Batch(models[0], num_bodies, 0)
+        batch.set_models([models[index] for index in maze_of_body])
+        qpos, ctrl = batch.bind("qpos"), batch.bind("ctrl")
+        for body, index in enumerate(maze_of_body):
+            cells = mazes[index].free_cells
+            row, column = cells[rng.integers(len(cells))]
+            qpos[body] = column + 0.5, size - row - 0.5, rng.uniform(-np.pi, np.pi)
+        actions = rng.integers(len(ACTIONS), size=num_bodies)
+        visited = np.empty((num_actions * STEPS_PER_ACTION, num_bodies, 2))
+        for step in range(len(visited)):
+            if step % STEPS_PER_ACTION == 0:
+                # Persistent, or the bodies would hardly leave their cells.
+                changed = rng.random(num_bodies) < 0.3
+                actions = np.where(changed, rng.integers(len(ACTIONS), size=num_bodies), actions)
+                ctrl[:] = action_controls()[actions]
+            batch.step(None, nstep=1)
+            visited[step] = qpos[:, :2]
+        for index, maze in enumerate(mazes):
+            points = visited[:, maze_of_body == index].reshape(-1, 2)
+            assert points.min() > 0
+            assert points.max() < size
+            row, column = point_to_cell(points, size).T
+            assert not maze.walls[row, column].any()
+            depths = depth(maze.walls, points)
+            assert depths.max() <= 0.01
+            assert (depths > -0.1).any()  # walls were met
+
+
+class TestFixedFreedoms:
+    def test_height_roll_and_pitch_when_acting_at_random(self):
+        rng = np.random.default_rng(3)
+        maze = generate("dfs", 9, rng)
+        row, column = maze.free_cells[0]
+        physics = physics_at(maze, (column + 0.5, maze.size - row - 0.5), 0.7)
+        for _ in range(200):
+            physics.set_action(int(rng.integers(len(ACTIONS))))
+            physics.step(STEPS_PER_ACTION)
+            state = physics.state()
+            np.testing.assert_allclose(state[2:5], (BODY_HEIGHT / 2, 0, 0), atol=1e-12)  # z, roll, pitch
+            np.testing.assert_allclose(state[[8, 9, 10]], 0, atol=1e-12)  # velocity up, roll and pitch rates
+            upright = physics.named.data.xmat["agent"].reshape(3, 3)[2]
+            np.testing.assert_allclose(upright, (0, 0, 1), atol=1e-12)
