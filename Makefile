@@ -15,7 +15,7 @@ eval: .venv/installed
 	$(BIN)/mazebench eval --agent $(AGENT)
 
 test: .venv/installed
-	$(BIN)/python -m pytest -m "not slow"
+	$(BIN)/pytest -m "not slow"
 
 check: .venv/installed
 	$(BIN)/ruff format --check .
@@ -24,7 +24,7 @@ check: .venv/installed
 	$(MAKE) test
 
 check-full: check
-	$(BIN)/python -m pytest -m slow
+	$(BIN)/pytest -m slow
 
 bench: .venv/installed
 	$(BIN)/mazebench bench

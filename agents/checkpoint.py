@@ -24,7 +24,8 @@ _MAX_HEADER_BYTES = 2**20
 
 def save_checkpoint(path: pathlib.Path, tensors: Mapping[str, torch.Tensor], metadata: Mapping[str, Any]) -> None:
     """Writes `tensors` and `metadata`; a reader finds the file from before or the whole new one."""
-    header = {"format": FORMAT, "metadata": json.dumps(metadata, sort_keys=True)}
+    # One key only: the order of several in the file would be left to chance.
+    header = {FORMAT: json.dumps(metadata, sort_keys=True)}
     content = safetensors.torch.save({name: tensor.detach().contiguous() for name, tensor in tensors.items()}, header)
     temporary = path.with_name(path.name + ".tmp")
     with temporary.open("wb") as file:
@@ -44,7 +45,7 @@ def load_checkpoint(path: pathlib.Path, agent: str) -> tuple[dict[str, torch.Ten
     _check_header(path, content)
     try:
         tensors = safetensors.torch.load(content)
-        metadata = json.loads(json.loads(content[8 : 8 + _header_length(content)])["__metadata__"]["metadata"])
+        metadata = json.loads(json.loads(content[8 : 8 + _header_length(content)])["__metadata__"][FORMAT])
     except (safetensors.SafetensorError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: expected a checkpoint of {FORMAT}, found a damaged one: {error}") from error
     if not isinstance(metadata, dict) or metadata.get("agent") != agent:

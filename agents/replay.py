@@ -101,7 +101,7 @@ class Replay:
         try:
             with np.load(path, allow_pickle=False) as arrays:
                 loaded = {name: arrays[name] for name in (*_ROW_FIELDS, *_ENV_FIELDS, "priorities")}
-        except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
             raise InputError(f"{path}: expected a replay, found a damaged one: {error}") from error
         used = loaded["cell"].shape[1]
         if loaded["cell"].shape[0] != self._num_envs or used > self._length:

@@ -146,9 +146,10 @@ def _class_at_hand(name: str) -> type[Agent]:
     if "" not in sys.path and "." not in sys.path:
         sys.path.insert(0, "")
     try:
-        return _checked(name, getattr(importlib.import_module(module_name), class_name))
-    except (ImportError, AttributeError, ValueError) as error:
+        loaded = getattr(importlib.import_module(module_name), class_name)
+    except (ImportError, AttributeError, ValueError, TypeError) as error:
         raise InputError(f"agent {name!r}: expected module:Class that can be imported, found: {error}") from error
+    return _checked(name, loaded)
 
 
 def _checked(name: str, loaded: Any) -> type[Agent]:

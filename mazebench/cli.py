@@ -45,7 +45,10 @@ class Split(enum.StrEnum):
 def main() -> None:
     """Runs a command: exit status 0 done, 1 a run failed, 2 bad input, which gets one line and no traceback."""
     try:
-        sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0)
+        status = app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0
+        if status == 130:  # typer's, of an interrupt
+            raise KeyboardInterrupt
+        sys.exit(status)
     except _UsageError as error:
         _fail(error.format_message(), 2)  # type: ignore[attr-defined]
     except InputError as error:
@@ -222,6 +225,7 @@ def train(
     checkpoint_steps: Annotated[
         int, typer.Option(min=1, help="Agent steps between checkpoints, each with an evaluation.")
     ] = 200_000,
+    eval_mazes: Annotated[int, typer.Option(min=1, help="Held-out mazes of an evaluation, 10 episodes in each.")] = 20,
     workers: Annotated[int, typer.Option(min=0, help="Ray actors that collect; 0 collects in this process.")] = 0,
     ray: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Of a Ray cluster for the workers; local if not given.")
@@ -239,6 +243,7 @@ def train(
         minutes=minutes,
         env_steps=env_steps,
         checkpoint_steps=checkpoint_steps,
+        eval_mazes=eval_mazes,
         workers=workers,
         ray_address=ray,
     )
@@ -367,6 +372,8 @@ def parse_distances(text: str) -> tuple[int, ...]:
         low, dash, high = part.strip().partition("-")
         if not low.isdecimal() or (dash and not high.isdecimal()) or len(low) > 5 or len(high) > 5:
             raise InputError(f"expected distances like 1-5,8,10, found {text!r}")
+        if int(low) > int(high or low):
+            raise InputError(f"expected distances from low to high, found {part.strip()!r}")
         distances.update(range(int(low), int(high or low) + 1))
     if not distances or min(distances) < 1:
         raise InputError(f"expected distances of 1 cell or more, found {text!r}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -19,20 +19,18 @@ _DEFAULT_SIZE = 13
 _PICTURE_PIXELS = 1024  # about the side of a maze's picture
 
 
-def make_mazes(size: int | None, count: int, seed: int, style: str, image: pathlib.Path | None) -> list[Maze]:
-    """`count` mazes of a style, named after style, size, seed and number; or the one that a picture shows.
+def make_mazes(size: int | None, count: int, seed: int, style: str, image: pathlib.Path | None) -> Iterator[Maze]:
+    """Yields `count` mazes of a style, named after style, size, seed and number; or the one that a picture shows.
 
     Raises:
       InputError: if the style can't make that size, or the picture shows no maze.
     """
     if image is not None:
-        return [read_maze(image, size)]
+        yield read_maze(image, size)
+        return
     size = _DEFAULT_SIZE if size is None else size
-    streams = np.random.SeedSequence(seed).spawn(count)
-    return [
-        generate(style, size, np.random.default_rng(stream), f"{style}-{size}-{seed}-{index:03d}")
-        for index, stream in enumerate(streams)
-    ]
+    for index in range(count):
+        yield generate(style, size, np.random.default_rng([seed, index]), f"{style}-{size}-{seed}-{index:03d}")
 
 
 def parse_formats(text: str) -> list[str]:

@@ -28,6 +28,9 @@ class RecordLog:
         self._folder = folder
         self._num_episodes = num_episodes
         in_order = read_whole_lines(folder / EPISODES, "episode")
+        for number, record in enumerate(in_order):
+            if record["episode"] != number:
+                raise InputError(f"{folder / EPISODES}: expected episode {number} next, found {record['episode']}")
         self._records = dict(enumerate(in_order))
         for record in read_whole_lines(folder / JOURNAL, "episode"):
             self._records.setdefault(record["episode"], record)
@@ -64,6 +67,7 @@ class RecordLog:
     def finish(self) -> None:
         """Removes the journal; all records must be there."""
         assert self._num_written == self._num_episodes
+        self._episodes.flush()
         self._journal.close()
         (self._folder / JOURNAL).unlink()
 

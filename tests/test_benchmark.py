@@ -122,11 +122,11 @@ def test_shortest_paths_when_computed_again(task, size, count):
 
 class TestRefusal:
     def test_size_when_unknown(self):
-        with pytest.raises(InputError, match="^unknown size '14'; available: 13, 15, 17, 19, 21$"):
+        with pytest.raises(InputError, match=r"^unknown size '14'; available: 13, 15, 17, 19, 21$"):
             load_mazes(14, "eval")
 
     def test_split_when_unknown(self):
-        with pytest.raises(InputError, match="^unknown split 'test'; available: eval, train$"):
+        with pytest.raises(InputError, match=r"^unknown split 'test'; available: eval, train$"):
             load_mazes(13, "test")
 
     @pytest.mark.parametrize("name", [mazes_file(13, "eval"), episodes_file("local", 13)])

@@ -72,6 +72,14 @@ class TestLog:
             log.finish()
         assert (tmp_path / EPISODES).read_text() == lines(0, 1, 2, 3)
 
+    def test_files_when_journal_goes(self, tmp_path):
+        # All that is left to do on resuming is to put the journal's records in their places.
+        (tmp_path / JOURNAL).write_text(lines(1, 0))
+        with RecordLog(tmp_path, 2) as log:
+            log.finish()
+            # A kill could come now.
+            assert (tmp_path / EPISODES).read_text() == lines(0, 1)
+
     def test_log_when_finished_run_is_opened(self, tmp_path):
         (tmp_path / EPISODES).write_text(lines(0, 1))
         with RecordLog(tmp_path, 2) as log:
@@ -91,7 +99,9 @@ class TestLog:
         assert (tmp_path / EPISODES).read_text() == lines(0, 1)
 
     @pytest.mark.parametrize("name", [EPISODES, JOURNAL])
-    @pytest.mark.parametrize("line", ["rubbish", "{", "[]", "null", "7", "{}", '{"episode":"1"}', '{"episode":null}', ""])
+    @pytest.mark.parametrize(
+        "line", ["rubbish", "{", "[]", "null", "7", "{}", '{"episode":"1"}', '{"episode":null}', ""]
+    )
     def test_whole_line_when_corrupted(self, tmp_path, name, line):
         content = lines(0) + line + "\n" + lines(2)
         (tmp_path / name).write_text(content)

@@ -70,14 +70,16 @@ def test_mazes_when_sizes_differ(mazes, tmp_path):
 def test_mazes_when_folder_holds_none(tmp_path, content):
     for name in content:
         (tmp_path / name).touch()
-    with pytest.raises(InputError, match=r"expected 1 to 10000 maps \(\.txt \.map \.png \.jpg \.jpeg \.bmp\), found 0$"):
+    with pytest.raises(
+        InputError, match=r"expected 1 to 10000 maps \(\.txt \.map \.png \.jpg \.jpeg \.bmp\), found 0$"
+    ):
         read_mazes(tmp_path)
 
 
 def test_mazes_when_folder_holds_too_many(tmp_path):
     for index in range(MAX_FILES + 1):
         (tmp_path / f"{index}.txt").touch()
-    with pytest.raises(InputError, match="expected 1 to 10000 maps .*, found 10001$"):
+    with pytest.raises(InputError, match=r"expected 1 to 10000 maps .*, found 10001$"):
         read_mazes(tmp_path)
 
 
@@ -90,7 +92,7 @@ def test_mazes_when_one_of_a_folder_is_broken(mazes, tmp_path):
 
 @pytest.mark.parametrize("suffix", ["txt", "png", ""])
 def test_maze_when_file_is_missing(tmp_path, suffix):
-    with pytest.raises(InputError, match="can't read the (map|picture): No such file or directory$"):
+    with pytest.raises(InputError, match=r"can't read the (map|picture): No such file or directory$"):
         read_mazes(tmp_path / f"none.{suffix}")
 
 

@@ -63,7 +63,7 @@ def test_obstacles_when_size_is_even(size):
 
 
 def test_style_when_unknown():
-    with pytest.raises(InputError, match="^unknown style 'spiral'; available: dfs, obstacles, rooms$"):
+    with pytest.raises(InputError, match=r"^unknown style 'spiral'; available: dfs, obstacles, rooms$"):
         generate("spiral", 13, np.random.default_rng(0))
 
 

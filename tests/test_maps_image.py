@@ -90,21 +90,18 @@ def refusal(content: bytes) -> str:
     return str(caught.value)
 
 
-def png_declaring(width: int, height: int) -> bytes:
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+def png_chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
-    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    pixels = chunk(b"IDAT", zlib.compress(bytes(1000)))
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + pixels + chunk(b"IEND", b"")
+
+def png_declaring(width: int, height: int) -> bytes:
+    header = png_chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0))
+    return b"\x89PNG\r\n\x1a\n" + header + png_chunk(b"IDAT", zlib.compress(bytes(1000))) + png_chunk(b"IEND", b"")
 
 
 @pytest.fixture(scope="module")
 def maze() -> Maze:
     return corridors(13, np.random.default_rng(0))
-
-
-# Drawing.
 
 
 def test_drawing_has_a_dark_block_for_each_wall_when_plain(maze):
@@ -173,9 +170,6 @@ def test_writing_is_refused_when_the_folder_is_missing(maze, tmp_path):
         write_image(draw_maze(maze), tmp_path / "missing" / "maze.png")
 
 
-# Pixel maps.
-
-
 @pytest.mark.parametrize("extension", [".png", ".bmp", ".jpg"])
 @pytest.mark.parametrize("cell_pixels", [8, 16])
 def test_map_is_read_from_each_format(maze, tmp_path, extension, cell_pixels):
@@ -211,9 +205,6 @@ def test_map_is_refused_when_the_border_is_open(maze):
     walls[0, 3] = False
     with pytest.raises(MazeError, match=r"expected a closed border, found cell \(0, 3\) free"):
         maze_from_image(blocks(walls, 16))
-
-
-# Photographs.
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -288,9 +279,6 @@ def test_size_is_refused_when_no_maze_has_it(maze, size):
         maze_from_image(draw_maze(maze), size)
 
 
-# Files from outside.
-
-
 @pytest.mark.parametrize(
     "content",
     [
@@ -313,6 +301,18 @@ def test_file_is_refused_when_the_format_is_unknown(content):
 def test_file_is_refused_when_it_is_cut_short(maze, extension):
     content = encode(draw_maze(maze), extension)
     assert "expected a whole 208 x 208 picture" in refusal(content[: len(content) // 2])
+
+
+def test_file_is_refused_when_a_chunk_declares_more_than_it_holds(maze):
+    content = encode(draw_maze(maze))
+    content = content.replace(content[33:41], struct.pack(">I", 2**31 - 1) + b"IDAT", 1)
+    assert "expected a whole 208 x 208 picture" in refusal(content)
+
+
+def test_file_is_read_without_the_texts_it_carries(maze):
+    content = encode(draw_maze(maze))
+    text = png_chunk(b"zTXt", b"Comment\0\0" + zlib.compress(bytes(7_000_000)))
+    assert read_bytes(content[:33] + 500 * text + content[33:]) == maze
 
 
 def test_file_is_refused_when_it_has_too_many_bytes(tmp_path):

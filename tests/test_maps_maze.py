@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import heapq
+import itertools
 
 import hypothesis
 import numpy as np
@@ -275,7 +276,7 @@ class TestDistances:
         assert (path[0], path[-1]) == (start, goal)
         assert len(path) - 1 == maze.distance(start, goal)
         assert not any(maze.walls[cell] for cell in path)
-        assert all(after in neighbours(before) for before, after in zip(path, path[1:], strict=False))
+        assert all(after in neighbours(before) for before, after in itertools.pairwise(path))
 
 
 class TestConversion:
@@ -374,7 +375,7 @@ class TestPathThroughWalls:
 def check_path(walls: np.ndarray, start: tuple[int, int], goal: tuple[int, int]) -> None:
     path = path_through_walls(walls, start, goal)
     assert (path[0], path[-1]) == (start, goal)
-    assert all(after in neighbours(before) for before, after in zip(path, path[1:], strict=False))
+    assert all(after in neighbours(before) for before, after in itertools.pairwise(path))
     assert sum(1000 if walls[cell] else 1 for cell in path[1:]) == cheapest(walls, start, goal)
 
 

@@ -111,7 +111,9 @@ class TestRefusal:
         path = tmp_path / "huge.txt"
         path.touch()
         os.truncate(path, 10**11)
-        with pytest.raises(MazeError, match=r"huge\.txt: expected a map of at most 65535 bytes .255 x 255 cells., found"):
+        with pytest.raises(
+            MazeError, match=r"huge\.txt: expected a map of at most 65535 bytes .255 x 255 cells., found"
+        ):
             read_text_maze(path)
 
 

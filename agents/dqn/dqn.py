@@ -72,7 +72,7 @@ class DQN:
         try:
             config = override(cls.default_config, metadata["config"])
             trained_size = int(metadata["context_size"])
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"{path}: expected metadata with config and context_size, found {error}") from error
         agent = cls(config, trained_size, seed)
         load_into(path, agent.network, tensors)

@@ -194,7 +194,7 @@ def _prepare(out: pathlib.Path, config: dict[str, Any], resume: bool) -> None:
         found = sorted(path.name for path in out.iterdir())
     except OSError as error:
         raise InputError(f"{out}: can't write there: {error.strerror}") from error
-    if not found:
+    if not found or found == [f"{CONFIG}.tmp"]:
         try:
             write_json(out / CONFIG, config)
         except OSError as error:

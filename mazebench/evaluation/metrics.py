@@ -26,7 +26,7 @@ def spl(success: np.ndarray, shortest: np.ndarray, driven: np.ndarray) -> np.nda
       driven: `[E]` m, p.
     """
     longest = np.maximum(shortest, driven)
-    return np.where(success, np.where(longest > 0, shortest / np.where(longest > 0, longest, 1.0), 1.0), 0.0)
+    return np.where(success, np.where(shortest > 0, shortest / np.where(longest > 0, longest, 1.0), 1.0), 0.0)
 
 
 def wilson_interval(successes: int, trials: int, confidence: float = CONFIDENCE) -> tuple[float, float]:

@@ -13,7 +13,13 @@ def print_summary(summary: dict[str, Any]) -> None:
     """Prints success rate, SPL and SPL by grid distance with their 95 % intervals, by distance for local episodes."""
     title = f"{summary['agent']}: {summary['task']}, {summary['split']} mazes {summary['size']} x {summary['size']}"
     perturbed = ", ".join(f"{name} {value}" for name, value in summary["perturbation"].items() if value)
-    table = Table(title=f"{title}{', ' + perturbed if perturbed else ''}", title_justify="left", box=box.SIMPLE)
+    table = Table(
+        title=f"{title}{', ' + perturbed if perturbed else ''}",
+        title_justify="left",
+        box=box.SIMPLE,
+        pad_edge=False,
+        padding=(0, 1, 0, 0),
+    )
     columns = ("episodes", "success rate", "SPL", "SPL by grid")
     for name in ("distance", *columns) if summary["task"] == "local" else columns:
         table.add_column(name, justify="right", no_wrap=True)

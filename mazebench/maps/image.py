@@ -18,6 +18,7 @@ from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, Cell, Maze, MazeError
 _MAX_BYTES = 32 * 2**20
 _MAX_SIDE = 8192  # pixels of a drawing's side
 _MAX_PIXELS = _MAX_SIDE**2  # of a picture read: above any phone's 50 megapixels, and every drawing can be read back
+_PNG_START = b"\x89PNG\r\n\x1a\n"
 
 # Neighbouring wall cells differ by a shade that hardly shows: it makes the cells of every drawing countable.
 _WALL_SHADES = np.array([[30, 32, 38], [34, 36, 42]], dtype=np.uint8)
@@ -173,7 +174,9 @@ def _decode(content: bytes, name: str) -> np.ndarray:
     if width < 1 or not 1 <= height <= _MAX_PIXELS // width:
         raise MazeError(f"{name}: expected a picture of 1 to {_MAX_PIXELS} pixels, found {width} x {height}")
     # Opacity is read from PNG only. A photograph is turned as its camera was held, which UNCHANGED would leave undone.
-    flags = cv2.IMREAD_UNCHANGED if content.startswith(b"\x89PNG") else cv2.IMREAD_COLOR
+    flags = cv2.IMREAD_COLOR
+    if content.startswith(_PNG_START):
+        content, flags = _bare_png(content), cv2.IMREAD_UNCHANGED
     try:
         image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), flags)
     except cv2.error:
@@ -187,7 +190,7 @@ def _decode(content: bytes, name: str) -> np.ndarray:
 
 def _dimensions(content: bytes) -> tuple[int, int] | None:
     """The width and height that a picture's header declares; None if it is no PNG, JPEG or BMP."""
-    if content.startswith(b"\x89PNG\r\n\x1a\n") and content[12:16] == b"IHDR" and len(content) >= 24:
+    if content.startswith(_PNG_START) and content[12:16] == b"IHDR" and len(content) >= 24:
         return struct.unpack_from(">II", content, 16)
     if content.startswith(b"BM") and len(content) >= 26:
         (header_bytes,) = struct.unpack_from("<I", content, 14)
@@ -208,6 +211,24 @@ def _jpeg_dimensions(content: bytes) -> tuple[int, int] | None:
             return width, height
         position += 2 + segment_bytes
     return None
+
+
+def _bare_png(content: bytes) -> bytes:
+    """The chunks of a PNG that make the picture, up to the first that the file cuts short.
+
+    A decoder would reserve the memory that a chunk cut short declares, and unpack texts of gigabytes.
+    """
+    kept = [_PNG_START]
+    position = len(_PNG_START)
+    while position + 12 <= len(content):
+        data_bytes, kind = struct.unpack_from(">I4s", content, position)
+        end = position + 12 + data_bytes
+        if end > len(content):
+            break
+        if kind in (b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"):
+            kept.append(content[position:end])
+        position = end
+    return b"".join(kept)
 
 
 def _to_gray(image: np.ndarray, name: str) -> np.ndarray:

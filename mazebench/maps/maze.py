@@ -80,7 +80,7 @@ class Maze:
           MazeError: if it is a wall or outside.
         """
         if not self.is_free(cell):
-            raise MazeError(f"{self.name}: expected a free cell, found {tuple(cell)}, a wall or outside")
+            raise MazeError(f"{self.name}: expected a free cell, found {tuple(map(int, cell))}, a wall or outside")
         return (int(cell[0]), int(cell[1]))
 
     def distances(self, source: Cell) -> np.ndarray:
@@ -151,7 +151,8 @@ def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]
     """
     index = np.where(walls, -1, np.cumsum(~walls).reshape(walls.shape) - 1)
     distances = np.full(walls.shape, np.inf)
-    distances[~walls] = csgraph.dijkstra(grid_graph(index), unweighted=True, indices=index[goal])
+    if not walls[goal]:
+        distances[~walls] = csgraph.dijkstra(grid_graph(index), unweighted=True, indices=index[goal])
     if not np.isfinite(distances[start]):
         every_cell = np.arange(walls.size).reshape(walls.shape)
         graph = grid_graph(every_cell).astype(np.float64).tocoo()

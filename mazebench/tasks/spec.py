@@ -77,6 +77,9 @@ class TaskSpec:
         self._require("num_goals", 1, np.inf if self.task == "local" else 1)
         if self.task == "local":
             self._check_distances()
+        for maze in self.mazes:
+            if len(maze.free_cells) < 2:
+                raise InputError(f"{maze.name}: expected two free cells for a start and a goal, found one")
 
     def _require(self, name: str, lowest: float, highest: float) -> None:
         value = getattr(self, name)
@@ -121,7 +124,7 @@ class TaskSpec:
         perturbation = self.perturbation
         if not perturbation.map_flip and not perturbation.map_warp:
             return ShownMap(walls)
-        flips, warps, _ = episode.streams()
+        flips, warps, *_ = episode.streams()
         if perturbation.map_flip:
             walls = perturb.flip(walls, perturbation.map_flip, [episode.start, episode.goal], flips)
         if perturbation.map_warp:

@@ -24,7 +24,6 @@ from mazebench.training.run_folder import COUNTERS, RunFolder
 from mazebench.training.sources import InProcessSource, Source, ray_source
 
 _HELD_OUT_SEED = 20_000  # of mazes that are drawn like the benchmark's, and in none of its splits
-_NUM_HELD_OUT = 20
 _HELD_OUT_DISTANCES = (2, 4, 6, 8, 10)
 _HELD_OUT_EPISODES = 2  # for each maze and distance
 
@@ -45,6 +44,7 @@ class TrainOptions:
     minutes: float | None = None  # of this sitting
     env_steps: int | None = None  # of the run, all sittings together
     checkpoint_steps: int = 200_000  # agent steps between checkpoints, each with an evaluation
+    eval_mazes: int = 20  # held-out ones of an evaluation, with 10 episodes each
     workers: int = 0  # Ray actors that collect; 0 collects in this process
     ray_address: str | None = None  # of a cluster; None starts one on this machine
 
@@ -83,9 +83,9 @@ class _Run:
         self, options: TrainOptions, folder: RunFolder, learner: LearningAgent, task_spec: TaskSpec, report: Report
     ):
         self._options, self._folder, self._learner, self._report = options, folder, learner, report
-        self._held_out = _held_out_spec(task_spec)
+        self._held_out = _held_out_spec(task_spec, options.eval_mazes)
         self._task_spec = task_spec
-        self._env_steps = self._updates = 0
+        self._env_steps = self._updates = self._saved_steps = 0
         self._sums: dict[str, float] = {}  # of what updates returned since the last line
         self._num_summed = 0
 
@@ -103,7 +103,8 @@ class _Run:
                 if self._env_steps >= self._next_checkpoint:
                     self._checkpoint()
                     self._restart(source)
-            self._checkpoint()
+            if self._env_steps > self._saved_steps:
+                self._checkpoint()
 
     def _open(self, resume: bool) -> None:
         config = {
@@ -123,6 +124,7 @@ class _Run:
             return
         counters = read_json(checkpoints[-1] / COUNTERS)
         self._env_steps, self._updates = counters["env_steps"], counters["updates"]
+        self._saved_steps = self._env_steps
         self._learner.load(checkpoints[-1])
         self._folder.forget_metrics_after(self._env_steps)
         self._report(0.0, f"resuming {self._folder.path} at {self._env_steps:,} steps")
@@ -182,6 +184,7 @@ class _Run:
         counters = {"env_steps": self._env_steps, "updates": self._updates}
         provenance = {**counters, "agent": self._options.agent, "size": self._options.size, "seed": self._options.seed}
         self._folder.save_checkpoint(self._env_steps, counters, lambda folder: self._learner.save(folder, provenance))
+        self._saved_steps = self._env_steps
 
     def _evaluate(self) -> dict[int, float]:
         """Success rate by distance in mazes drawn like the training ones, but never trained in."""
@@ -193,8 +196,8 @@ class _Run:
         return {distance: float(np.mean(successes)) for distance, successes in reached.items()}
 
 
-def _held_out_spec(task_spec: TaskSpec) -> TaskSpec:
-    streams = np.random.SeedSequence([_HELD_OUT_SEED, task_spec.size]).spawn(_NUM_HELD_OUT)
+def _held_out_spec(task_spec: TaskSpec, num_mazes: int) -> TaskSpec:
+    streams = np.random.SeedSequence([_HELD_OUT_SEED, task_spec.size]).spawn(num_mazes)
     mazes = tuple(
         generate("dfs", task_spec.size, np.random.default_rng(stream), f"held-out-{index}")
         for index, stream in enumerate(streams)

@@ -1,0 +1,152 @@
+"""The DQN agents: targets, network, config, and that they learn."""
+
+import ast
+import dataclasses
+import inspect
+import re
+
+import numpy as np
+import pytest
+import torch
+from mazebench_agents.dqn import DQN, MAH
+from mazebench_agents.dqn import config as config_module
+from mazebench_agents.dqn.config import DQNConfig
+from mazebench_agents.dqn.learner import double_q_target
+from mazebench_agents.dqn.network import QNetwork, marked_place
+from mazebench_agents.overrides import override
+
+from mazebench.agent import Interface
+from mazebench.errors import InputError
+from mazebench.maps.maze import Maze
+from mazebench.tasks.spec import TaskSpec
+from mazebench.training.experience import Collector
+
+
+def test_double_q_target_by_hand():
+    target = double_q_target(torch.tensor([-2.0, -3.0]), torch.tensor([0.0, 1.0]), torch.tensor([-50.0, -4.0]))
+    assert target.tolist() == [-2.0, -7.0]
+
+
+def test_marked_place_is_row_and_column_of_the_mark():
+    planes = torch.zeros(2, 4, 4)
+    planes[0, 1, 3] = planes[1, 2, 0] = 1
+    assert marked_place(planes).tolist() == [[1.0, 3.0], [2.0, 0.0]]
+
+
+def test_network_with_the_true_scale_reads_the_map_where_the_agent_is():
+    torch.manual_seed(0)
+    network = QNetwork(4, 8)
+    with torch.no_grad():
+        network.scale.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))  # times 5: a cell a metre, y up
+        network.sharpness.fill_(20.0)
+    context = torch.zeros(1, 4, 7, 7)
+    context[0, 3, 5, 1] = context[0, 2, 1, 5] = 1
+    code = network.encode(context)
+    moved = torch.tensor([[[0.0, 0.0], [2.0, 0.0], [1.0, 3.0]]])
+    assert network.locate(moved, code)[0].tolist() == [[5.0, 1.0], [5.0, 3.0], [2.0, 2.0]]
+    read = network.read(moved, code)
+    features = code[0, :4].reshape(4, 7, 7)
+    for k, (row, column) in enumerate([(5, 1), (5, 3), (2, 2)]):
+        torch.testing.assert_close(read[0, k, :4], features[:, row, column])
+    torch.testing.assert_close(read[0, 2, 4:6], torch.tensor([-0.1, 0.3]))
+
+
+def test_network_without_context_does_not_depend_on_it():
+    agent = DQN(DQN.default_config, 13)
+    assert agent.initial_state(2).code is None
+    assert not any("encoder" in name for name, _ in agent.network.named_parameters())
+
+
+def test_batch_permuted_permutes_the_actions():
+    agent = MAH(MAH.default_config, 13, seed=1)
+    rng = np.random.default_rng(0)
+    observation = {
+        "state": rng.normal(size=(16, 12)).astype(np.float32),
+        "context": (rng.random((16, 4, 13, 13)) < 0.3).astype(np.float32),
+    }
+    order = rng.permutation(16)
+    first = np.ones(16, dtype=bool)
+    actions, _ = agent.act(observation, first, agent.initial_state(16))
+    permuted = {key: value[order] for key, value in observation.items()}
+    again, _ = agent.act(permuted, first, agent.initial_state(16))
+    np.testing.assert_array_equal(actions[order], again)
+
+
+def test_epsilon_ladder_is_that_of_ape_x():
+    config = dataclasses.replace(MAH.default_config, num_envs=3)
+    agent = MAH(config, 13)
+    np.testing.assert_allclose(agent._epsilon, [0.4, 0.4**4.5, 0.4**8])
+    agent.explore_from(2, 1, seed=0)
+    np.testing.assert_allclose(agent._epsilon, [0.4**8])
+
+
+def test_every_config_key_has_a_comment_with_its_reason():
+    source = inspect.getsource(config_module)
+    fields = {field.name for field in dataclasses.fields(DQNConfig)}
+    assert {node.target.id for node in ast.walk(ast.parse(source)) if isinstance(node, ast.AnnAssign)} == fields
+    for name in fields:
+        assert re.search(rf"^    {name}: .*  # .+", source, re.MULTILINE), name
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"colour": "red"}, "unknown config key 'colour'; available: channels"),
+        ({"hidden": "many"}, "config key 'hidden': expected int, found 'many'"),
+        ({"symmetries": "perhaps"}, "config key 'symmetries': expected bool"),
+        ({"learning_rate": ""}, "config key 'learning_rate': expected float"),
+    ],
+)
+def test_override_with_a_wrong_key_or_value_is_refused(values, message):
+    with pytest.raises(InputError, match=message):
+        override(DQNConfig(), values)
+
+
+def test_override_turns_text_into_the_fields_types():
+    config = override(DQNConfig(), {"hidden": "64", "symmetries": "false", "learning_rate": "1e-3"})
+    assert (config.hidden, config.symmetries, config.learning_rate) == (64, False, 1e-3)
+
+
+OPEN_FIELD = Maze(np.pad(np.zeros((3, 3), dtype=bool), 1, constant_values=True), "open-5")
+
+
+def test_mah_after_a_minute_beats_random_in_a_small_maze():
+    """The learning test: goals up to 3 cells away in 25 steps, where acting at random reaches some 40 %."""
+    values = {
+        "hidden": 128,
+        "min_rows": 2000,
+        "steps_per_update": 64,
+        "groups": 16,
+        "num_envs": 64,
+        "learning_rate": 2e-3,
+        "target_rate": 0.02,
+        "longest_value": 25,
+        "hindsight_mean_offset": 8,
+        "hindsight_window": 30,
+    }
+    spec = TaskSpec("local", (OPEN_FIELD,), (2, 3), time_limit=25, num_goals=4)
+    learner = MAH.build_learner(Interface("local", 5, 5), spec.mazes, overrides={k: str(v) for k, v in values.items()})
+    before = success_rate(learner.actor)
+    collector = Collector(spec, learner.num_envs, seed=0)
+    learner.actor.explore_from(0, learner.num_envs, seed=0)
+    state = learner.actor.initial_state(learner.num_envs)
+    updates = 0
+    while updates < 1500:
+        actions, state = learner.actor.act(collector.observation, collector.is_first, state, explore=True)
+        learner.observe(collector.step(actions))
+        while updates < learner.num_updates_due(learner._replay.num_rows):
+            learner.update()
+            updates += 1
+    after = success_rate(learner.actor)
+    assert before < 0.6
+    assert after > 0.8
+
+
+def success_rate(actor):
+    """Of acting greedily, over 64 episodes."""
+    from mazebench.evaluation.protocol import select_trials
+    from mazebench.evaluation.runner import run_trials
+
+    spec = TaskSpec("local", (OPEN_FIELD,), (2, 3), time_limit=25)
+    trials = list(enumerate(select_trials("local", spec.mazes, False, (2, 3), 32, seed=7)))
+    return np.mean([record["success"] for records in run_trials(actor, spec, trials, 64) for record in records])

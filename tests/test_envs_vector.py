@@ -1,0 +1,462 @@
+"""The vector environment plays bit for bit what the single ones play, and resets as Gymnasium says."""
+
+from __future__ import annotations
+
+import collections
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from mazebench.envs.gym import MazeEnv
+from mazebench.envs.vector import MazeVectorEnv
+from mazebench.maps.generators import generate
+from mazebench.maps.maze import Maze
+from mazebench.tasks.episode import Episode
+from mazebench.tasks.navigation import Environment
+from mazebench.tasks.registry import make_spec
+from mazebench.tasks.spec import TaskSpec
+
+NUM_STEPS = 320
+SEEDS = [3, 1000, 17, 4]
+NUM_ENVS = len(SEEDS)
+INFOS = ("is_first", "success", "steps", "path_length", "position", "maze", "landmark")
+FORWARD, LOOK_LEFT = 0, 4
+
+
+def dfs_mazes() -> list[Maze]:
+    rng = np.random.default_rng(0)
+    return [generate("dfs", 9, rng) for _ in range(3)]
+
+
+def small_mazes() -> list[Maze]:
+    """So small that random actions now and then go from corner to corner."""
+    rng = np.random.default_rng(0)
+    return [generate("obstacles", 6, rng) for _ in range(4)]
+
+
+SPECS = {
+    "local": make_spec(maps=dfs_mazes(), distances=[1, 2], time_limit=25),
+    "hierarchical": make_spec("hierarchical", maps=small_mazes(), landmark_distance=2, time_limit=12),
+    "map_flip": make_spec("hierarchical", maps=small_mazes(), landmark_distance=2, time_limit=12, map_flip=0.2),
+    "map_warp": make_spec(maps=dfs_mazes(), distances=[1, 2], time_limit=25, map_warp=0.2),
+    "position_noise": make_spec(maps=dfs_mazes(), distances=[1, 2], time_limit=25, position_noise=0.4),
+    "context_size": make_spec(maps=dfs_mazes(), distances=[1, 2], time_limit=25, context_size=6),
+    "num_goals": make_spec(maps=dfs_mazes(), distances=[1, 2], time_limit=15, num_goals=3),
+}
+every_spec = pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
+
+
+class Step(NamedTuple):
+    """What one environment showed: after a step that ended an episode, the state before the next one began."""
+
+    state: np.ndarray
+    context: np.ndarray
+    reward: float | None
+    terminated: bool
+    truncated: bool
+    info: dict
+
+
+def random_actions(num_steps: int, num_envs: int, seed: int = 0) -> np.ndarray:
+    """`[num_steps, num_envs]`, kept up for a few steps each and mostly forward, so that bodies get somewhere."""
+    rng = np.random.default_rng(seed)
+    actions = rng.integers(6, size=(num_steps, num_envs))
+    actions[rng.random(actions.shape) < 0.4] = FORWARD
+    for step in range(1, num_steps):
+        kept = rng.random(num_envs) < 0.5
+        actions[step, kept] = actions[step - 1, kept]
+    return actions
+
+
+def play_dm_env(spec: TaskSpec, seed: int, actions: np.ndarray) -> Iterator[Step]:
+    env = Environment(spec)
+
+    def seen(time_step) -> Step:
+        ended, task = time_step.last(), env.task
+        info = {name: getattr(task, name) for name in ("is_first", "success", "steps", "path_length")}
+        info |= {"position": env.physics.position(), "maze": task.episode.maze, "landmark": task.route.leg}
+        terminated = ended and time_step.discount == 0
+        state, context = time_step.observation["state"], time_step.observation["context"]
+        return Step(state, context, time_step.reward, terminated, ended and not terminated, info)
+
+    yield seen(env.reset(seed=seed))
+    for action in actions:
+        time_step = env.step(action)
+        yield seen(time_step)
+        if time_step.last():
+            yield seen(env.reset())
+
+
+def play_gym(spec: TaskSpec, seed: int, actions: np.ndarray) -> Iterator[Step]:
+    env = MazeEnv(spec)
+
+    def reset(**options) -> Step:
+        observation, info = env.reset(**options)
+        return Step(observation["state"], observation["context"], None, False, False, info)
+
+    yield reset(seed=seed)
+    for action in actions:
+        observation, reward, terminated, truncated, info = env.step(action)
+        yield Step(observation["state"], observation["context"], reward, terminated, truncated, info)
+        if terminated or truncated:
+            yield reset()
+
+
+def play_vector(env: MazeVectorEnv, actions: np.ndarray, seeds) -> list[list[Step]]:
+    """What each slot shows, in the order in which a single environment would."""
+    slots = range(env.num_envs)
+
+    def seen(slot: int, observation: dict, infos: dict, reward: float | None = None, ends=(False, False)) -> Step:
+        info = {name: infos[name][slot] for name in INFOS}
+        return Step(observation["state"], observation["context"], reward, *ends, info)
+
+    def of_slot(observations: dict, slot: int) -> dict:
+        return {key: value[slot] for key, value in observations.items()}
+
+    observations, infos = env.reset(seed=seeds)
+    steps = [[seen(slot, of_slot(observations, slot), infos)] for slot in slots]
+    for action in actions:
+        observations, rewards, terminated, truncated, infos = env.step(action)
+        for slot in slots:
+            reward, ends = rewards[slot], (bool(terminated[slot]), bool(truncated[slot]))
+            if any(ends):
+                steps[slot].append(seen(slot, infos["final_obs"][slot], infos["final_info"], reward, ends))
+                reward, ends = None, (False, False)
+            steps[slot].append(seen(slot, of_slot(observations, slot), infos, reward, ends))
+    return steps
+
+
+def assert_same(expected: Iterable[Step], found: Iterable[Step]) -> None:
+    """Bit for bit."""
+    for number, (one, other) in enumerate(zip(expected, found, strict=True)):
+        np.testing.assert_array_equal(one.state, other.state, err_msg=f"state {number}")
+        np.testing.assert_array_equal(one.context, other.context, err_msg=f"context {number}")
+        assert one[2:5] == other[2:5], f"step {number}"
+        for name in INFOS:
+            np.testing.assert_array_equal(one.info[name], other.info[name], err_msg=f"{name} {number}")
+
+
+def assert_tree_equal(one, other) -> None:
+    if isinstance(one, dict):
+        assert one.keys() == other.keys()
+        for key in one:
+            assert_tree_equal(one[key], other[key])
+    else:
+        np.testing.assert_array_equal(one, other)
+
+
+class TestSameEpisodes:
+    @every_spec
+    def test_steps_when_compared_with_dm_env(self, spec):
+        self.compare(spec, play_dm_env)
+
+    @every_spec
+    def test_steps_when_compared_with_gymnasium(self, spec):
+        self.compare(spec, play_gym)
+
+    def compare(self, spec, play_single) -> None:
+        actions = random_actions(NUM_STEPS, NUM_ENVS)
+        kinds = collections.Counter()
+        for slot, steps in enumerate(play_vector(MazeVectorEnv(spec, NUM_ENVS), actions, SEEDS)):
+            assert_same(play_single(spec, SEEDS[slot], actions[:, slot]), steps)
+            kinds["terminated"] += sum(step.terminated for step in steps)
+            kinds["truncated"] += sum(step.truncated for step in steps)
+            kinds["mazes"] += len({step.info["maze"] for step in steps}) - 1
+            kinds["switches"] += sum(step.info["is_first"] and step.reward is not None for step in steps)
+        # What is to be compared did happen.
+        assert kinds["terminated"] > 0
+        assert kinds["truncated"] > 0
+        assert kinds["mazes"] > 0
+        assert (kinds["switches"] > 0) == (spec.task == "hierarchical" or spec.num_goals > 1)
+
+    @pytest.mark.parametrize("name", ["local", "hierarchical", "position_noise"])
+    @pytest.mark.parametrize(("num_envs", "num_threads"), [(1, 1), (3, 1), (7, 2), (7, 0)])
+    def test_steps_when_environments_and_threads_vary(self, name, num_envs, num_threads):
+        spec, others = SPECS[name], random_actions(100, num_envs, seed=1)
+        mine = random_actions(100, 1)[:, 0]
+        for slot in {0, num_envs - 1}:
+            others[:, slot] = mine
+            seeds = list(range(50, 50 + num_envs))
+            seeds[slot] = SEEDS[0]
+            env = MazeVectorEnv(spec, num_envs, num_threads=num_threads)
+            assert_same(play_gym(spec, SEEDS[0], mine), play_vector(env, others, seeds)[slot])
+
+
+class TestSeeds:
+    def reset_states(self, seed, constructor_seed: int | None = None) -> np.ndarray:
+        env = MazeVectorEnv(SPECS["local"], 3, seed=constructor_seed)
+        return env.reset(seed=seed)[0]["state"]
+
+    def test_seed_when_integer(self):
+        np.testing.assert_array_equal(self.reset_states(7), self.reset_states([7, 8, 9]))
+
+    def test_seed_when_numpy_integer(self):
+        np.testing.assert_array_equal(self.reset_states(np.int64(7)), self.reset_states([7, 8, 9]))
+
+    def test_seed_when_list(self):
+        states = self.reset_states([9, 9, 2])
+        np.testing.assert_array_equal(states[0], states[1])
+        for slot, seed in enumerate((9, 9, 2)):
+            single, _ = MazeEnv(SPECS["local"]).reset(seed=seed)
+            np.testing.assert_array_equal(states[slot], single["state"])
+
+    def test_seed_when_given_to_the_constructor(self):
+        np.testing.assert_array_equal(self.reset_states(None, constructor_seed=7), self.reset_states(7))
+
+    def test_seed_when_none(self):
+        # The streams go on: the second reset draws what the single environments' second resets draw.
+        env = MazeVectorEnv(SPECS["local"], 3)
+        first, _ = env.reset(seed=7)
+        second, _ = env.reset()
+        for slot in range(3):
+            single = MazeEnv(SPECS["local"])
+            np.testing.assert_array_equal(first["state"][slot], single.reset(seed=7 + slot)[0]["state"])
+            np.testing.assert_array_equal(second["state"][slot], single.reset()[0]["state"])
+
+    def test_seed_when_list_has_none(self):
+        env = MazeVectorEnv(SPECS["local"], 3)
+        env.reset(seed=7)
+        states = env.reset(seed=[1, None, 1])[0]["state"]
+        np.testing.assert_array_equal(states[0], states[2])
+        single = MazeEnv(SPECS["local"])
+        single.reset(seed=8)
+        np.testing.assert_array_equal(states[1], single.reset()[0]["state"])
+
+    @every_spec
+    def test_reset_when_seed_was_played_before(self, spec):
+        env, actions = MazeVectorEnv(spec, NUM_ENVS), random_actions(30, NUM_ENVS)
+
+        def played() -> list:
+            return [env.reset(seed=5), *(env.step(action) for action in actions)]
+
+        first = played()
+        for action in random_actions(17, NUM_ENVS, seed=2):
+            env.step(action)
+        for one, other in zip(first, played(), strict=True):
+            assert_tree_equal(one[0], other[0])
+            assert_tree_equal(without_final(one[-1]), without_final(other[-1]))
+            for expected, found in zip(one[1:-1], other[1:-1], strict=True):  # reward and flags
+                np.testing.assert_array_equal(expected, found)
+
+    @pytest.mark.parametrize("seed", [[1, 2], [1, 2, 3, 4], [], -1, [1, -1, 2]])
+    def test_seed_when_invalid(self, seed):
+        with pytest.raises(ValueError, match=r"expected 3 seeds, found|expected non-negative integer"):
+            MazeVectorEnv(SPECS["local"], 3).reset(seed=seed)
+
+
+def without_final(infos: dict) -> dict:
+    """Arrays of objects hold dicts, which numpy can't compare."""
+    return {key: infos[key] for key in infos if "final" not in key}
+
+
+class TestAutoreset:
+    @every_spec
+    def test_step_when_compared_with_sync_vector_env(self, spec):
+        ours = MazeVectorEnv(spec, NUM_ENVS)
+        theirs = SyncVectorEnv([lambda: MazeEnv(spec)] * NUM_ENVS, autoreset_mode=AutoresetMode.SAME_STEP)
+        assert ours.metadata["autoreset_mode"] == theirs.metadata["autoreset_mode"]
+        assert ours.observation_space == theirs.observation_space
+        assert ours.action_space == theirs.action_space
+        self.assert_same_infos(ours.reset(seed=SEEDS), theirs.reset(seed=SEEDS))
+        ended = 0
+        for action in random_actions(150, NUM_ENVS):
+            one, other = ours.step(action), theirs.step(action)
+            for expected, found in zip(other[1:4], one[1:4], strict=True):  # rewards and flags
+                np.testing.assert_array_equal(found, expected)
+                assert found.dtype == expected.dtype
+            self.assert_same_infos((one[0], one[4]), (other[0], other[4]))
+            ended += (one[2] | one[3]).sum()
+        assert ended > 3
+
+    def assert_same_infos(self, ours, theirs) -> None:
+        for key in ("state", "context"):
+            np.testing.assert_array_equal(ours[0][key], theirs[0][key])
+            assert ours[0][key].dtype == theirs[0][key].dtype
+        self.compare_infos(ours[1], theirs[1])
+
+    def compare_infos(self, ours: dict, theirs: dict) -> None:
+        assert ours.keys() == theirs.keys()
+        for key in theirs:
+            if key == "final_info":
+                self.compare_infos(ours[key], theirs[key])
+            elif key.startswith("_"):
+                np.testing.assert_array_equal(ours[key], theirs[key], err_msg=key)
+            elif key == "final_obs":
+                for one, other in zip(ours[key], theirs[key], strict=True):
+                    assert (one is None) == (other is None)
+                    if one is not None:
+                        assert_tree_equal(one, other)
+            else:
+                mask = theirs[f"_{key}"]
+                np.testing.assert_array_equal(ours[key][mask], theirs[key][mask], err_msg=key)
+
+    @pytest.mark.parametrize("name", ["local", "hierarchical", "map_flip", "num_goals"])
+    def test_context_when_nothing_began(self, name):
+        env = MazeVectorEnv(SPECS[name], NUM_ENVS)
+        before = env.reset(seed=SEEDS)[0]["context"]
+        for action in random_actions(150, NUM_ENVS):
+            observation, _, terminated, truncated, infos = env.step(action)
+            changed = (observation["context"] != before).any(axis=(1, 2, 3))
+            assert not (changed & ~infos["is_first"]).any()
+            assert infos["is_first"][terminated | truncated].all()
+            before = observation["context"]
+
+    def test_final_obs_when_goal_was_reached(self):
+        # The ended episode's last state lies in its goal's cell, the new one's first at its start, at rest.
+        spec = SPECS["local"]
+        env = MazeVectorEnv(spec, NUM_ENVS)
+        env.reset(seed=SEEDS)
+        reached = 0
+        for action in random_actions(150, NUM_ENVS):
+            goals = [episode.goal for episode in env.episodes]
+            observation, _, terminated, _, infos = env.step(action)
+            for slot in np.flatnonzero(terminated):
+                x, y = infos["final_obs"][slot]["state"][:2]
+                assert (spec.size - 1 - int(y), int(x)) == goals[slot]
+                row, column = env.episodes[slot].start
+                np.testing.assert_allclose(observation["state"][slot][:2], (column + 0.5, spec.size - row - 0.5))
+                np.testing.assert_array_equal(observation["state"][slot][6:], 0)
+                assert infos["final_info"]["success"][slot]
+                assert not infos["success"][slot]
+                assert infos["steps"][slot] == infos["path_length"][slot] == 0
+                reached += 1
+        assert reached > 3
+
+
+class TestEpisodeSource:
+    """Two episodes in a corridor for three slots: the goal is 6 steps forward."""
+
+    def env(self, num_episodes: int, time_limit: int = 100) -> MazeVectorEnv:
+        walls = np.ones((9, 9), dtype=bool)
+        walls[1, 1:8] = False
+        waiting = collections.deque(Episode(0, (1, 1), (1, 4), 0.0, seed) for seed in range(num_episodes))
+        spec = make_spec(maps=Maze(walls), time_limit=time_limit, position_noise=0.0)
+        return MazeVectorEnv(spec, 3, episode_source=lambda slot: waiting.popleft() if waiting else None)
+
+    def test_slots_when_there_are_fewer_episodes(self):
+        env = self.env(num_episodes=2)
+        env.reset()
+        for _ in range(5):
+            _, rewards, terminated, truncated, infos = env.step(np.zeros(3, dtype=int))
+            np.testing.assert_array_equal(rewards, [-1, -1, 0])
+            assert not terminated.any()
+            assert not truncated.any()
+            assert infos["steps"][2] == 0
+
+    def test_slots_when_episodes_run_out(self):
+        env = self.env(num_episodes=3)
+        env.reset()
+        for _ in range(6):
+            last = env.step(np.zeros(3, dtype=int))
+        np.testing.assert_array_equal(last[2], [True, True, True])
+        for action in (FORWARD, LOOK_LEFT):
+            for _ in range(120):  # more than the time limit
+                observation, rewards, terminated, truncated, infos = env.step(np.full(3, action))
+                np.testing.assert_array_equal(rewards, 0)
+                assert not (terminated | truncated).any()
+                assert "final_obs" not in infos
+                np.testing.assert_array_equal(infos["position"], last[4]["position"])
+                np.testing.assert_array_equal(observation["state"], last[0]["state"])
+        assert env.episodes == [None, None, None]
+
+    def test_slots_when_one_goes_on(self):
+        # The slot that reaches its goal gets the fourth episode; the two others turn until their time is out.
+        env = self.env(num_episodes=4, time_limit=8)
+        env.reset()
+        ended = np.zeros(3, dtype=int)
+        for _ in range(6 + 6):
+            _, _, terminated, truncated, infos = env.step(np.array([FORWARD, LOOK_LEFT, LOOK_LEFT]))
+            ended += terminated | truncated
+        np.testing.assert_array_equal(ended, [2, 1, 1])
+        np.testing.assert_array_equal(infos["_final_info"], [True, False, False])
+
+    def test_slots_when_reset_again(self):
+        env = self.env(num_episodes=5)
+        env.reset()
+        for _ in range(3):
+            env.step(np.zeros(3, dtype=int))
+        observation, _ = env.reset()  # two episodes are left
+        np.testing.assert_allclose(observation["state"][:2, :2], [[1.5, 7.5]] * 2)
+        _, rewards, _, _, _ = env.step(np.zeros(3, dtype=int))
+        np.testing.assert_array_equal(rewards, [-1, -1, 0])
+
+
+class TestArrays:
+    @every_spec
+    def test_arrays_when_written_to(self, spec):
+        actions = random_actions(40, NUM_ENVS)
+        clean, dirty = MazeVectorEnv(spec, NUM_ENVS), MazeVectorEnv(spec, NUM_ENVS)
+        expected, found = clean.reset(seed=1), dirty.reset(seed=1)
+        for action in actions:
+            assert_tree_equal(expected[0], found[0])
+            assert_tree_equal(without_final(expected[-1]), without_final(found[-1]))
+            self.scribble(found)
+            expected, found = clean.step(action), dirty.step(action.copy())
+            for one, other in zip(expected[1:4], found[1:4], strict=True):
+                np.testing.assert_array_equal(one, other)
+
+    def test_arrays_when_the_next_step_is_taken(self):
+        env = MazeVectorEnv(SPECS["hierarchical"], NUM_ENVS)
+        kept = env.reset(seed=1)
+        copies = [{key: value.copy() for key, value in tree.items()} for tree in kept]
+        for action in random_actions(40, NUM_ENVS):
+            env.step(action)
+        for tree, copied in zip(kept, copies, strict=True):
+            assert_tree_equal(tree, copied)
+
+    def test_legs_and_cells_when_written_to(self):
+        env = MazeVectorEnv(SPECS["hierarchical"], NUM_ENVS)
+        env.reset(seed=1)
+        expected = [array.copy() for array in (env.cells(), *env.legs())]
+        for array in (env.cells(), *env.legs()):
+            array[:] = -1
+        for one, other in zip(expected, (env.cells(), *env.legs()), strict=True):
+            np.testing.assert_array_equal(one, other)
+
+    def scribble(self, result: tuple) -> None:
+        for part in result:
+            if isinstance(part, dict):
+                self.scribble(tuple(part.values()))
+            elif isinstance(part, np.ndarray) and part.dtype != object:
+                part[...] = 1 if part.dtype == bool else 77
+
+
+class TestBadInput:
+    @pytest.mark.parametrize(
+        "actions",
+        [[0, 0], [0, 0, 0, 0], [0, 0, 6], [0, -1, 0], [[0, 0, 0]], 0, [0.5, 0, 0], [np.nan, 0, 0]],
+    )
+    def test_actions_when_invalid(self, actions):
+        env = MazeVectorEnv(SPECS["local"], 3)
+        env.reset(seed=0)
+        with pytest.raises(ValueError, match="expected 3 actions from 0 to 5"):
+            env.step(np.array(actions))
+
+    def test_state_when_actions_were_refused(self):
+        env, other = (MazeVectorEnv(SPECS["local"], 3) for _ in range(2))
+        for each in (env, other):
+            each.reset(seed=0)
+        with pytest.raises(ValueError, match="expected 3 actions"):
+            env.step(np.array([0, 0, 6]))
+        assert_tree_equal(env.step(np.zeros(3, dtype=int))[0], other.step(np.zeros(3, dtype=int))[0])
+
+    @pytest.mark.parametrize("dtype", [np.int32, np.uint8, np.int64])
+    def test_actions_when_of_another_integer_type(self, dtype):
+        env, other = (MazeVectorEnv(SPECS["local"], 3) for _ in range(2))
+        for each in (env, other):
+            each.reset(seed=0)
+        actions = [0, 2, 4]
+        assert_tree_equal(env.step(np.array(actions, dtype=dtype))[0], other.step(np.array(actions))[0])
+
+    def test_step_when_not_reset(self):
+        with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+            MazeVectorEnv(SPECS["local"], 3).step(np.zeros(3, dtype=int))
+
+    @pytest.mark.parametrize("num_envs", [0, -1])
+    def test_num_envs_when_not_positive(self, num_envs):
+        with pytest.raises(ValueError, match="expected at least one environment, found num_envs="):
+            MazeVectorEnv(SPECS["local"], num_envs)

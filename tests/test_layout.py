@@ -1,0 +1,227 @@
+"""The house rules of docs/architecture.md: who imports whom, what is packaged, what an import does."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import json
+import pathlib
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+
+import pytest
+
+ROOT = pathlib.Path(__file__).parent.parent
+# A module imports only from those of lines above it and its own.
+ORDER = (
+    {"errors"},
+    {"maps"},
+    {"world"},
+    {"tasks"},
+    {"envs"},
+    {"agent"},
+    {"records"},
+    {"evaluation"},
+    {"training"},
+    {"report"},
+    {"bench", "testing", "making", "cli", "__main__"},
+)
+LAYERS = {name: layer for layer, names in enumerate(ORDER) for name in names}
+# Where in the repository a library may be imported.
+WALLS = {
+    "mujoco": ("mazebench/world", "mazebench/tasks", "mazebench/envs", "mazebench/bench.py"),
+    "dm_control": ("mazebench/world", "mazebench/tasks", "mazebench/envs", "mazebench/bench.py"),
+    "torch": ("agents",),
+    "gymnasium": ("mazebench/envs", "mazebench/bench.py"),
+    "ray": ("mazebench/evaluation", "mazebench/training"),
+    "matplotlib": ("mazebench/report",),
+    "plotly": ("mazebench/report",),
+}
+FOLDERS = {"mazebench": "mazebench", "mazebench_agents": "agents", "mazebench_assets": "assets"}
+# Methods of dm_control's, Gymnasium's and torch's classes, which document them.
+OVERRIDES = {
+    "initialize_episode", "before_step", "after_step", "get_observation", "get_reward", "get_termination",
+    "action_spec", "observation_spec", "reward_spec", "reset", "step", "render", "close", "forward",
+}  # fmt: skip
+
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def sources(*folders: str) -> list[pathlib.Path]:
+    return sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py"))
+
+
+def parse(path: pathlib.Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"), path.name)
+
+
+def name_of(path: pathlib.Path) -> str:
+    """Relative to the repository, for messages."""
+    return path.relative_to(ROOT).as_posix()
+
+
+def imports(path: pathlib.Path) -> Iterator[str]:
+    """The dotted names that a file imports when it runs, those inside functions included."""
+    folders = {folder: package for package, folder in FOLDERS.items()}
+    top, *inner = path.relative_to(ROOT).parent.parts
+    package = [folders[top], *inner]
+    for node in running(parse(path)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            yield from (f"{module}.{alias.name}" for alias in node.names)
+
+
+def running(node: ast.AST) -> Iterator[ast.AST]:
+    """All nodes but those under `if TYPE_CHECKING`, which is never true when code runs."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.If) and isinstance(child.test, ast.Name) and child.test.id == "TYPE_CHECKING":
+            continue
+        yield child
+        yield from running(child)
+
+
+def layer_of(dotted: str) -> str | None:
+    """`maps` for `mazebench.maps.maze`; None for other packages, and for what mazebench/__init__.py gives."""
+    package, _, rest = dotted.partition(".")
+    name = rest.partition(".")[0]
+    return name if package == "mazebench" and name in modules() else None
+
+
+def modules() -> set[str]:
+    """The modules and folders of mazebench."""
+    inside = [
+        path for path in (ROOT / "mazebench").iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()
+    ]
+    return {path.stem for path in inside} - {"__init__"}
+
+
+class TestImports:
+    def test_layers_when_compared_with_folders(self):
+        assert modules() <= set(LAYERS), "a new module needs a place in ORDER and in docs/architecture.md"
+
+    @pytest.mark.parametrize("path", sources("mazebench"), ids=name_of)
+    def test_imports_when_within_mazebench(self, path):
+        importer = path.relative_to(ROOT / "mazebench").parts[0].removesuffix(".py")
+        imported = {layer for layer in map(layer_of, imports(path)) if layer}
+        if importer == "__init__":
+            assert imported == set()
+            return
+        below = {layer for layer in imported if LAYERS[layer] > LAYERS[importer]}
+        assert not below, f"{name_of(path)} may import only what stands above {importer}"
+
+    @pytest.mark.parametrize("library", WALLS)
+    def test_library_when_imported(self, library):
+        homes = [ROOT / home for home in WALLS[library]]
+        strays = [
+            name_of(path)
+            for path in sources("mazebench", "agents", "assets")
+            if any(dotted.split(".")[0] == library for dotted in imports(path))
+            and not any(path == home or home in path.parents for home in homes)
+        ]
+        assert strays == []
+
+    def test_agents_when_mazebench_is_imported(self):
+        for path in sources("mazebench"):
+            assert not [dotted for dotted in imports(path) if dotted.startswith("mazebench_agents")], name_of(path)
+
+    def test_process_when_mazebench_is_imported(self):
+        program = (
+            "import os, sys, json\n"
+            "before = dict(os.environ)\n"
+            "import mazebench\n"
+            "heavy = ['mujoco', 'dm_control', 'torch', 'gymnasium', 'cv2', 'scipy', 'numpy', 'ray', 'matplotlib']\n"
+            "print(json.dumps([dict(os.environ) == before, [name for name in heavy if name in sys.modules]]))"
+        )
+        output = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+        assert json.loads(output) == [True, []]
+
+    def test_environment_when_everything_is_imported(self):
+        # The command line may choose a rendering backend when it renders; to import a module is no such choice.
+        names = [dotted for package in ("mazebench",) for dotted in module_names(package) if "__main__" not in dotted]
+        program = (
+            "import importlib, os, sys\n"
+            "before = dict(os.environ)\n"
+            f"for name in {names}:\n"
+            "    importlib.import_module(name)\n"
+            "    assert 'torch' not in sys.modules, name\n"
+            "    assert os.environ.get('MUJOCO_GL') == before.get('MUJOCO_GL'), name\n"
+        )
+        result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+        assert result.returncode == 0, result.stderr
+
+
+def module_names(package: str) -> list[str]:
+    """The dotted names of all modules of a package."""
+    names = []
+    for path in sources(FOLDERS[package]):
+        parts = (package, *path.relative_to(ROOT / FOLDERS[package]).with_suffix("").parts)
+        names.append(".".join(parts).removesuffix(".__init__"))
+    return names
+
+
+class TestPackaging:
+    def test_packages_when_compared_with_folders(self):
+        found = {
+            ".".join((package, *path.parent.relative_to(ROOT / folder).parts))
+            for package, folder in FOLDERS.items()
+            for path in (ROOT / folder).rglob("__init__.py")
+        }
+        listed = PYPROJECT["tool"]["setuptools"]["packages"]
+        assert len(listed) == len(set(listed))
+        assert set(listed) == found
+
+    def test_folders_when_they_hold_modules(self):
+        for path in sources(*FOLDERS.values()):
+            assert (path.parent / "__init__.py").exists(), f"{name_of(path)} would not be packaged"
+
+    def test_package_dir_when_compared_with_folders(self):
+        renamed = {package: folder for package, folder in FOLDERS.items() if package != folder}
+        assert PYPROJECT["tool"]["setuptools"]["package-dir"] == renamed
+
+    def test_data_when_compared_with_files(self):
+        # A file that no pattern matches is missing from the wheel.
+        patterns = PYPROJECT["tool"]["setuptools"]["package-data"]
+        for package in PYPROJECT["tool"]["setuptools"]["packages"]:
+            top, *inner = package.split(".")
+            for path in ROOT.joinpath(FOLDERS[top], *inner).iterdir():
+                if path.is_file() and path.suffix != ".py":
+                    globs = patterns.get("*", []) + patterns.get(package, [])
+                    assert any(path.match(pattern) for pattern in globs), name_of(path)
+
+    @pytest.mark.parametrize(
+        "target",
+        [
+            *PYPROJECT["project"]["scripts"].values(),
+            *(target for group in PYPROJECT["project"]["entry-points"].values() for target in group.values()),
+        ],
+    )
+    def test_entry_point_when_loaded(self, target):
+        module, _, attribute = target.partition(":")
+        assert callable(getattr(importlib.import_module(module), attribute))
+
+
+class TestDocstrings:
+    @pytest.mark.parametrize("path", sources("mazebench", "agents"), ids=name_of)
+    def test_docstrings_when_public(self, path):
+        tree = parse(path)
+        missing = [name for name, node in public(tree) if not ast.get_docstring(node)]
+        if tree.body and not ast.get_docstring(tree):
+            missing.insert(0, "the module")
+        assert missing == []
+
+
+def public(tree: ast.Module | ast.ClassDef, prefix: str = "") -> Iterator[tuple[str, ast.AST]]:
+    """The public functions and classes, and their methods but for special ones and overrides."""
+    overrides = OVERRIDES if isinstance(tree, ast.ClassDef) and tree.bases else set()
+    for node in tree.body:
+        if not isinstance(node, (ast.FunctionDef, ast.ClassDef)) or node.name.startswith("_"):
+            continue
+        if node.name not in overrides:
+            yield prefix + node.name, node
+        if isinstance(node, ast.ClassDef):
+            yield from public(node, f"{prefix}{node.name}.")

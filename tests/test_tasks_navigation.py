@@ -1,0 +1,510 @@
+"""The dm_control environment, driven by hand along a corridor."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import subprocess
+import sys
+
+import dm_env
+import numpy as np
+import pytest
+from absl.testing import absltest
+from dm_env import test_utils
+
+import mazebench
+from mazebench.maps.generators import generate
+from mazebench.maps.maze import Maze
+from mazebench.tasks.episode import Episode
+from mazebench.tasks.navigation import Environment
+from mazebench.testing import ConformanceError, check_environment
+from mazebench.world.mjcf import ACTIONS, TURN_RATE
+
+FORWARD, BACKWARD, STRAFE_LEFT, STRAFE_RIGHT, LOOK_LEFT, LOOK_RIGHT = range(6)
+EAST, NORTH, WEST = 0.0, np.pi / 2, np.pi
+SIZE, ROW, Y = 9, 4, 4.5  # the corridor is the row 4, with y = 9 - 4 - 0.5
+STEPS_TO_GOAL = 6  # from rest at (4, 1) to the cell (4, 4), 2.5 m on: 1 m in 24 frames, 1.5 m at 3.2 m/s
+PROBE_FAILED = 77
+
+
+def corridor() -> Maze:
+    """7 free cells, from (4, 1) to (4, 7)."""
+    walls = np.ones((SIZE, SIZE), dtype=bool)
+    walls[ROW, 1:8] = False
+    return Maze(walls, "corridor")
+
+
+def room() -> Maze:
+    return Maze(np.pad(np.zeros((SIZE - 2, SIZE - 2), dtype=bool), 1, constant_values=True), "room")
+
+
+def dfs_mazes(count: int = 3) -> list[Maze]:
+    rng = np.random.default_rng(0)
+    return [generate("dfs", SIZE, rng) for _ in range(count)]
+
+
+def eastwards(start: int = 1, goal: int = 4, yaw: float = EAST) -> Episode:
+    return Episode(0, (ROW, start), (ROW, goal), yaw, seed=0)
+
+
+def play(env: Environment, actions, **reset) -> list[dm_env.TimeStep]:
+    """Resets, then steps until the actions or the episode end."""
+    time_steps = [env.reset(**reset)]
+    for action in actions:
+        if time_steps[-1].last():
+            break
+        time_steps.append(env.step(action))
+    return time_steps
+
+
+def assert_equal(first: list[dm_env.TimeStep], second: list[dm_env.TimeStep]) -> None:
+    for one, other in zip(first, second, strict=True):
+        assert (one.step_type, one.reward, one.discount) == (other.step_type, other.reward, other.discount)
+        assert one.observation.keys() == other.observation.keys()
+        for key in one.observation:
+            np.testing.assert_array_equal(one.observation[key], other.observation[key], err_msg=key)
+
+
+def contexts(time_steps: list[dm_env.TimeStep]) -> list[np.ndarray]:
+    return [time_step.observation["context"] for time_step in time_steps]
+
+
+class LocalContractTest(test_utils.EnvironmentTestMixin, absltest.TestCase):
+    def make_object_under_test(self):
+        return mazebench.load("local", maps=dfs_mazes(), time_limit=8, seed=0)
+
+
+class HierarchicalContractTest(test_utils.EnvironmentTestMixin, absltest.TestCase):
+    def make_object_under_test(self):
+        return mazebench.load("hierarchical", maps=corridor(), time_limit=4, seed=0)
+
+
+class PerturbedContractTest(test_utils.EnvironmentTestMixin, absltest.TestCase):
+    def make_object_under_test(self):
+        noise = {"map_flip": 0.1, "map_warp": 0.1, "position_noise": 0.3}
+        return mazebench.load("hierarchical", maps=dfs_mazes(), time_limit=4, context_size=7, seed=0, **noise)
+
+
+class TestRewardsAndEndings:
+    def test_time_steps_when_goal_is_reached(self):
+        env = mazebench.load(maps=corridor())
+        time_steps = play(env, [FORWARD] * 20, episode=eastwards())
+        assert time_steps[0].step_type is dm_env.StepType.FIRST
+        assert (time_steps[0].reward, time_steps[0].discount) == (None, None)
+        assert len(time_steps) == 1 + STEPS_TO_GOAL
+        for time_step in time_steps[1:-1]:
+            assert (time_step.step_type, time_step.reward, time_step.discount) == (dm_env.StepType.MID, -1.0, 1.0)
+            assert time_step.observation["state"][0] < 4
+        last = time_steps[-1]
+        assert (last.step_type, last.reward, last.discount) == (dm_env.StepType.LAST, 0.0, 0.0)
+        assert 4 <= last.observation["state"][0] < 5
+        assert env.task.success
+        assert env.task.steps == STEPS_TO_GOAL
+
+    def test_time_steps_when_time_is_out(self):
+        env = mazebench.load(maps=corridor(), time_limit=STEPS_TO_GOAL - 1)
+        time_steps = play(env, [FORWARD] * 20, episode=eastwards())
+        assert len(time_steps) == STEPS_TO_GOAL
+        last = time_steps[-1]
+        assert (last.step_type, last.reward, last.discount) == (dm_env.StepType.LAST, -1.0, 1.0)
+        assert not env.task.success
+
+    def test_time_steps_when_goal_is_reached_on_the_last_step(self):
+        env = mazebench.load(maps=corridor(), time_limit=STEPS_TO_GOAL)
+        last = play(env, [FORWARD] * 20, episode=eastwards())[-1]
+        assert (last.step_type, last.reward, last.discount) == (dm_env.StepType.LAST, 0.0, 0.0)
+
+    def test_time_limit_when_not_given(self):
+        time_steps = play(mazebench.load(maps=corridor()), [LOOK_LEFT] * 200, episode=eastwards())
+        assert len(time_steps) == 101
+        assert time_steps[-1].discount == 1.0
+
+    def test_episode_when_stepped_after_its_end(self):
+        env = mazebench.load(maps=corridor(), time_limit=1)
+        play(env, [FORWARD], episode=eastwards())
+        assert env.needs_reset
+        assert env.step(FORWARD).first()
+        assert not env.needs_reset
+
+    def test_goal_when_only_its_neighbour_was_reached(self):
+        # Along the corridor's south wall the goal's cell is never entered, however near it is.
+        env = mazebench.load(maps=room())
+        episode = Episode(0, (6, 1), (5, 4), EAST, 0)
+        assert not any(time_step.last() for time_step in play(env, [FORWARD] * 20, episode=episode))
+
+    def test_path_length_when_driving_to_and_fro(self):
+        env = mazebench.load(maps=room())
+        env.reset(episode=Episode(0, (4, 2), (1, 1), EAST, 0))
+        driven = 0.0
+        for action in [FORWARD] * 4 + [BACKWARD] * 6:
+            before = env.physics.position()
+            env.step(action)
+            driven += np.hypot(*(env.physics.position() - before))
+        assert env.task.path_length == pytest.approx(driven, abs=1e-12)
+        assert driven > np.hypot(*(env.physics.position() - (2.5, 4.5))) + 0.5
+
+    def test_reward_spec_when_asked_for(self):
+        spec = mazebench.load(maps=corridor()).reward_spec()
+        assert (spec.minimum, spec.maximum) == (-1, 0)
+
+
+class TestState:
+    def test_state_when_episode_begins(self):
+        # The centre of (4, 3) of 9 x 9 is (3.5, 4.5).
+        state = play(mazebench.load(maps=room()), [], episode=eastwards(start=3, yaw=0.5))[0].observation["state"]
+        assert state.dtype == np.float32
+        np.testing.assert_allclose(state, [3.5, Y, 0.28, 0, 0, 0.5] + [0] * 6, atol=1e-6)
+
+    @pytest.mark.parametrize(
+        ("action", "forward", "left"),
+        [(FORWARD, 1, 0), (BACKWARD, -1, 0), (STRAFE_LEFT, 0, 1), (STRAFE_RIGHT, 0, -1)],
+    )
+    @pytest.mark.parametrize("yaw", [EAST, NORTH, 2.0, -1.0])
+    def test_velocity_when_driving(self, action, forward, left, yaw):
+        env = mazebench.load(maps=room())
+        state = play(env, [action], episode=Episode(0, (4, 4), (1, 1), yaw, 0))[-1].observation["state"]
+        speed = 3.0  # m/s after 10 frames
+        np.testing.assert_allclose(state[6:9], [forward * speed, left * speed, 0], atol=0.05)
+        np.testing.assert_allclose(state[9:], 0, atol=1e-6)
+        moved = state[:2] - (4.5, Y)
+        bearing = yaw + np.arctan2(left, forward)
+        np.testing.assert_allclose(moved, np.hypot(*moved) * np.array([np.cos(bearing), np.sin(bearing)]), atol=1e-3)
+        assert state[5] == pytest.approx(yaw, abs=1e-6)
+
+    @pytest.mark.parametrize(("action", "sign"), [(LOOK_LEFT, 1), (LOOK_RIGHT, -1)])
+    def test_angular_velocity_when_turning(self, action, sign):
+        env = mazebench.load(maps=room())
+        state = play(env, [action], episode=Episode(0, (4, 4), (1, 1), 0.0, 0))[-1].observation["state"]
+        np.testing.assert_allclose(state[9:], [0, 0, sign * TURN_RATE], atol=1e-3)
+        assert state[5] == pytest.approx(sign * np.deg2rad(21.12), rel=0.01)
+        np.testing.assert_allclose(state[6:9], 0, atol=1e-6)
+
+    @pytest.mark.parametrize(("action", "yaw", "sign"), [(LOOK_LEFT, 3.1, 1), (LOOK_RIGHT, -3.1, -1)])
+    def test_yaw_when_passing_half_a_turn(self, action, yaw, sign):
+        env = mazebench.load(maps=room())
+        first, second = play(env, [action], episode=Episode(0, (4, 4), (1, 1), yaw, 0))
+        assert first.observation["state"][5] == pytest.approx(yaw, abs=1e-6)
+        expected = yaw + sign * (np.deg2rad(21.12) - 2 * np.pi)
+        assert second.observation["state"][5] == pytest.approx(expected, abs=0.005)
+
+    @pytest.mark.parametrize("action", [LOOK_LEFT, LOOK_RIGHT])
+    def test_yaw_when_turning_round_and_round(self, action):
+        env = mazebench.load(maps=room())
+        time_steps = play(env, [action] * 60, episode=Episode(0, (4, 4), (1, 1), 3.0, 0))
+        yaws = np.array([time_step.observation["state"][5] for time_step in time_steps])
+        assert np.all((yaws >= -np.pi) & (yaws < np.pi))
+        turns = np.diff(np.unwrap(yaws)) / np.deg2rad(21.12)
+        np.testing.assert_allclose(turns, 1 if action == LOOK_LEFT else -1, rtol=0.01)
+
+    def test_measurements_when_compared_with_state(self):
+        env = mazebench.load(maps=room())
+        time_step = play(env, [STRAFE_LEFT, LOOK_LEFT], episode=Episode(0, (4, 4), (1, 1), 3.0, 0))[-1]
+        state, physics = time_step.observation["state"], env.physics
+        np.testing.assert_allclose(physics.position(), state[:2], atol=1e-6)
+        assert physics.yaw() == pytest.approx(state[5], abs=1e-6)
+        assert physics.speed() == pytest.approx(np.hypot(state[6], state[7]), abs=1e-6)
+        assert physics.turn_rate() == pytest.approx(state[11], abs=1e-6)
+
+
+class TestContext:
+    def test_context_when_episode_goes_on(self):
+        env = mazebench.load(maps=dfs_mazes(), seed=0)
+        rng = np.random.default_rng(0)
+        for _ in range(3):
+            first, *others = contexts(play(env, rng.integers(6, size=30)))
+            assert others
+            for context in others:
+                np.testing.assert_array_equal(context, first)
+
+    def test_planes_when_maze_is_a_corridor(self):
+        context = contexts(play(mazebench.load(maps=corridor()), [], episode=eastwards()))[0]
+        assert context.shape == (4, SIZE, SIZE)
+        assert context.dtype == np.float32
+        np.testing.assert_array_equal(context[0], corridor().walls)
+        np.testing.assert_array_equal(np.argwhere(context[2]), [[ROW, 4]])
+        np.testing.assert_array_equal(np.argwhere(context[3]), [[ROW, 1]])
+
+    def test_context_when_an_agent_writes_to_it(self):
+        env = mazebench.load(maps=corridor())
+        first = env.reset(episode=eastwards())
+        kept = {key: value.copy() for key, value in first.observation.items()}
+        first.observation["context"][:] = 9
+        first.observation["state"][:] = 9
+        second = env.step(LOOK_LEFT)
+        np.testing.assert_array_equal(second.observation["context"], kept["context"])
+        np.testing.assert_allclose(second.observation["state"][:2], kept["state"][:2], atol=1e-6)
+
+    def test_observation_when_task_is_local(self):
+        assert mazebench.load(maps=corridor()).reset().observation.keys() == {"state", "context"}
+
+
+class TestPositionNoise:
+    def test_state_when_noisy(self):
+        episode = Episode(0, (4, 4), (1, 1), 0.3, seed=11)
+        clean, noisy = (mazebench.load(maps=room(), position_noise=scale) for scale in (0.0, 0.5))
+        actions = np.random.default_rng(0).integers(6, size=90)
+        clean_states, noisy_states = (self.states(env, actions, episode) for env in (clean, noisy))
+        np.testing.assert_array_equal(noisy_states[:, 2:], clean_states[:, 2:])
+        noise = noisy_states[:, :2] - clean_states[:, :2]
+        assert np.all(noise != 0)
+        assert noise.std() == pytest.approx(0.5, rel=0.2)
+        assert abs(noise.mean()) < 0.15
+        np.testing.assert_array_equal(noisy.physics.position(), clean.physics.position())
+        assert noisy.task.path_length == clean.task.path_length
+
+    def test_noise_when_episode_is_played_again(self):
+        env = mazebench.load(maps=room(), position_noise=0.5)
+        episode = Episode(0, (4, 4), (1, 1), 0.3, seed=11)
+        first, again = (self.states(env, [LOOK_LEFT] * 10, episode) for _ in range(2))
+        np.testing.assert_array_equal(first, again)
+        other = self.states(env, [LOOK_LEFT] * 10, Episode(0, (4, 4), (1, 1), 0.3, seed=12))
+        assert np.all(other[:, :2] != first[:, :2])
+
+    def test_goal_when_position_reads_wrong(self):
+        # Reward and end speak of the true position.
+        env = mazebench.load(maps=corridor(), position_noise=3.0)
+        time_steps = play(env, [FORWARD] * 20, episode=eastwards())
+        assert len(time_steps) == 1 + STEPS_TO_GOAL
+        assert time_steps[-1].discount == 0.0
+
+    def states(self, env: Environment, actions, episode: Episode) -> np.ndarray:
+        return np.array([time_step.observation["state"] for time_step in play(env, actions, episode=episode)])
+
+
+class TestHierarchical:
+    def test_switches_when_landmarks_time_out(self):
+        # From (4, 7) to (4, 1), 6 cells: landmarks at columns 5 and 3, then the goal at 1.
+        env = mazebench.load("hierarchical", maps=corridor(), landmark_distance=2, time_limit=3)
+        time_steps = play(env, [LOOK_LEFT] * 20, seed=0)
+        assert len(time_steps) == 1 + 9
+        assert self.first_steps(time_steps) == [0, 3, 6]
+        assert self.marked_columns(time_steps, plane=3) == [7, 7, 7, 5, 5, 5, 3, 3, 3, 3]
+        assert self.marked_columns(time_steps, plane=2) == [5, 5, 5, 3, 3, 3, 1, 1, 1, 1]
+        assert all(time_step.mid() and time_step.discount == 1.0 for time_step in time_steps[1:-1])
+        assert all(time_step.reward == -1.0 for time_step in time_steps[1:])
+        assert time_steps[-1].last()
+        assert time_steps[-1].discount == 1.0
+
+    def test_switches_when_landmarks_are_reached(self):
+        env = mazebench.load("hierarchical", maps=corridor(), landmark_distance=2)
+        time_steps = play(env, [FORWARD] * 50, episode=eastwards(start=7, goal=1, yaw=WEST))
+        columns = [int(time_step.observation["state"][0]) for time_step in time_steps]
+        first_in = [columns.index(column) for column in (7, 5, 3)]
+        assert self.first_steps(time_steps) == first_in
+        last = time_steps[-1]
+        assert (last.reward, last.discount, columns[-1]) == (0.0, 0.0, 1)
+        assert all(time_step.reward == -1.0 for time_step in time_steps[1:-1])
+        assert env.task.success
+
+    def test_local_map_when_landmark_switches(self):
+        env = mazebench.load("hierarchical", maps=corridor(), landmark_distance=2, time_limit=3)
+        for time_step in play(env, [LOOK_LEFT] * 20, seed=0):
+            column = int(np.argwhere(time_step.observation["context"][3])[0, 1])
+            local_map = time_step.observation["context"][1]
+            # The start stands at (4, 4): the corridor's ends, columns 1 and 7, are as far from there as from it.
+            free = [index for index in range(SIZE) if 1 <= column + index - 4 <= 7]
+            np.testing.assert_array_equal(np.flatnonzero(local_map[4] == 0), free)
+            assert local_map[[0, 1, 2, 3, 5, 6, 7, 8]].all()
+
+    def test_context_when_no_switch_is_marked(self):
+        env = mazebench.load("hierarchical", maps=dfs_mazes(), landmark_distance=1, time_limit=7, seed=0)
+        rng = np.random.default_rng(1)
+        time_steps = play(env, rng.integers(6, size=100))
+        switches = 0
+        for before, after in itertools.pairwise(time_steps):
+            changed = not np.array_equal(*contexts([before, after]))
+            assert changed == bool(after.observation["is_first"])
+            switches += changed
+        assert switches > 5
+
+    def test_episode_when_goal_is_entered_before_the_landmarks(self):
+        # The landmarks lie along two sides of the room, the body drives along its diagonal.
+        env = mazebench.load("hierarchical", maps=room(), landmark_distance=5)
+        time_steps = play(env, [FORWARD] * 50, episode=Episode(0, (1, 7), (7, 1), -3 * np.pi / 4, 0))
+        assert env.task.route.cells == [(1, 7), (1, 2), (5, 1), (7, 1)]
+        assert env.task.route.leg == 0
+        assert self.first_steps(time_steps) == [0]
+        assert (time_steps[-1].reward, time_steps[-1].discount) == (0.0, 0.0)
+
+    def first_steps(self, time_steps: list[dm_env.TimeStep]) -> list[int]:
+        return [index for index, time_step in enumerate(time_steps) if time_step.observation["is_first"]]
+
+    def marked_columns(self, time_steps: list[dm_env.TimeStep], plane: int) -> list[int]:
+        marked = [np.argwhere(context[plane]) for context in contexts(time_steps)]
+        assert all(cells.shape == (1, 2) and cells[0, 0] == ROW for cells in marked)
+        return [int(cells[0, 1]) for cells in marked]
+
+
+class TestSeeds:
+    OPTIONS = pytest.mark.parametrize(
+        "options",
+        [
+            {"task": "local"},
+            {"task": "hierarchical", "landmark_distance": 1, "time_limit": 5},
+            {"task": "local", "map_flip": 0.3, "map_warp": 0.1, "position_noise": 0.2},
+        ],
+        ids=["local", "hierarchical", "perturbed"],
+    )
+    ACTIONS = tuple(int(action) for action in np.random.default_rng(5).integers(6, size=20))
+
+    @OPTIONS
+    def test_episode_when_seed_is_given_again(self, options):
+        env = mazebench.load(maps=dfs_mazes(), seed=0, **options)
+        first = play(env, self.ACTIONS, seed=4)
+        play(env, [FORWARD] * 7)  # breaks off in the middle
+        play(env, [STRAFE_LEFT] * 200)
+        assert_equal(first, play(env, self.ACTIONS, seed=4))
+
+    @OPTIONS
+    def test_episode_when_environment_is_loaded_with_seed(self, options):
+        loaded = mazebench.load(maps=dfs_mazes(), seed=4, **options)
+        reset = mazebench.load(maps=dfs_mazes(), seed=99, **options)
+        assert_equal(play(loaded, self.ACTIONS), play(reset, self.ACTIONS, seed=4))
+
+    @OPTIONS
+    def test_stream_when_reset_without_seed(self, options):
+        # The next episodes follow from the seed too, and are others.
+        first, second = (mazebench.load(maps=dfs_mazes(), seed=4, **options) for _ in range(2))
+        episodes = []
+        for _ in range(3):
+            assert_equal(play(first, self.ACTIONS), play(second, self.ACTIONS))
+            episodes.append(first.task.episode)
+        assert len({episode.seed for episode in episodes}) == 3
+
+    def test_episode_when_seeds_differ(self):
+        env = mazebench.load(maps=dfs_mazes())
+        starts = [env.reset(seed=seed).observation["state"] for seed in range(5)]
+        assert len({state.tobytes() for state in starts}) == 5
+
+    def test_stream_when_an_episode_is_given(self):
+        # Playing a given episode draws nothing.
+        one, other = (mazebench.load(maps=dfs_mazes(), seed=4) for _ in range(2))
+        one.reset(episode=Episode(1, tuple(dfs_mazes()[1].free_cells[0]), tuple(dfs_mazes()[1].free_cells[-1]), 0.0, 0))
+        assert_equal([one.reset()], [other.reset()])
+
+
+class TestActions:
+    @pytest.mark.parametrize("action", [-1, 6, 2.5])
+    def test_action_when_out_of_range(self, action):
+        env = mazebench.load(maps=corridor())
+        env.reset(episode=eastwards())
+        with pytest.raises(ValueError, match=r"expected an action from 0 to 5 \(forward, .*, look_right\), found"):
+            env.step(action)
+
+    @pytest.mark.parametrize("action", [float("nan"), "jump"])
+    def test_action_when_no_number(self, action):
+        env = mazebench.load(maps=corridor())
+        env.reset(episode=eastwards())
+        with pytest.raises(ValueError, match=r"jump|NaN"):
+            env.step(action)
+
+    def test_episode_when_an_action_was_refused(self):
+        env = mazebench.load(maps=corridor())
+        expected = play(env, [FORWARD] * 3, episode=eastwards())
+        env.reset(episode=eastwards())
+        with pytest.raises(ValueError, match="expected an action"):
+            env.step(6)
+        assert_equal(expected[1:], [env.step(FORWARD) for _ in range(3)])
+
+    @pytest.mark.parametrize("action", [0, 0.0, np.int64(0), np.uint8(0), np.array(0)])
+    def test_action_when_of_another_type(self, action):
+        env = mazebench.load(maps=corridor())
+        assert_equal(play(env, [FORWARD], episode=eastwards()), play(env, [action], episode=eastwards()))
+
+    def test_spec_when_asked_for(self):
+        spec = mazebench.load(maps=corridor()).action_spec()
+        assert spec.num_values == len(ACTIONS) == 6
+
+
+class TestPhysics:
+    def test_physics_when_reset_to_another_maze(self):
+        mazes = dfs_mazes()
+        env = mazebench.load(maps=mazes)
+        physics, model, data = env.physics, env.physics.model.ptr, env.physics.data.ptr
+        for index in (0, 2, 1):
+            first, last = (tuple(map(int, mazes[index].free_cells[end])) for end in (0, -1))
+            env.reset(episode=Episode(index, first, last, 0.0, 0))
+            assert (env.physics, env.physics.model.ptr, env.physics.data.ptr) == (physics, model, data)
+            np.testing.assert_array_equal(model.geom_pos, env.task.spec.models[index].geom_pos)
+            for action in [FORWARD, STRAFE_LEFT] * 10:
+                if env.step(action).last():
+                    break
+            x, y = env.physics.position()
+            assert not mazes[index].walls[SIZE - 1 - int(y), int(x)]
+
+    def test_goal_marker_when_episode_begins(self):
+        env = mazebench.load(maps=corridor())
+        env.reset(episode=eastwards(goal=6))
+        np.testing.assert_allclose(env.physics.named.data.xpos["goal"], (6.5, Y, 0))
+
+    def test_picture_when_rendered(self):
+        program = f"""
+import sys, mujoco, numpy as np
+try:
+    mujoco.GLContext(64, 64).make_current()
+except (RuntimeError, ImportError, AttributeError):
+    sys.exit({PROBE_FAILED})
+import mazebench
+env = mazebench.load(size=13, seed=0)
+pictures = []
+for _ in range(2):
+    env.reset()
+    pictures += [env.physics.render(64, 96, camera_id=camera) for camera in ("top", "egocentric")]
+assert all(picture.shape == (64, 96, 3) and picture.dtype == np.uint8 for picture in pictures)
+assert all(picture.std() > 5 for picture in pictures)
+assert not np.array_equal(pictures[0], pictures[2])
+"""
+        environment = os.environ | {"MUJOCO_GL": "egl"}
+        result = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+        if result.returncode == PROBE_FAILED:
+            pytest.skip("EGL is not usable here")
+        assert result.returncode == 0, result.stderr
+
+
+class TestConformance:
+    @pytest.mark.parametrize("task", ["local", "hierarchical"])
+    def test_check_when_environment_is_ours(self, task):
+        check_environment(mazebench.load(task, maps=dfs_mazes(), seed=0))
+
+    @pytest.mark.parametrize(
+        ("broken", "message"),
+        [
+            (lambda step: step._replace(reward=0.0), r"expected reward -1\.0, found 0\.0"),
+            (lambda step: step._replace(discount=0.9), r"expected discount 1\.0, found 0\.9"),
+            (lambda step: with_observation(step, state=np.zeros(11, np.float32)), r"expected a state of 12 float32"),
+            (lambda step: with_observation(step, state=np.zeros(12)), r"12 float32, found \(12,\) float64"),
+            (lambda step: with_observation(step, state=np.full(12, np.nan, np.float32)), r"expected a finite state"),
+            (
+                lambda step: with_observation(step, context=np.zeros((3, 9, 9), np.float32)),
+                r"found \(3, 9, 9\) float32",
+            ),
+            (
+                lambda step: with_observation(step, context=1 - step.observation["context"]),
+                r"expected the context to stay the same until is_first",
+            ),
+        ],
+    )
+    def test_check_when_environment_is_broken(self, broken, message):
+        with pytest.raises(ConformanceError, match=message):
+            check_environment(Broken(mazebench.load(maps=dfs_mazes(), seed=0), broken))
+
+    def test_check_when_episode_never_ends(self):
+        env = mazebench.load(maps=dfs_mazes(), distances=[5], time_limit=10_000, seed=0)
+        with pytest.raises(ConformanceError, match="expected the episode to end within 10 steps, found it going on"):
+            check_environment(env, max_steps=10)
+
+
+class Broken:
+    """An environment in which something is wrong with every step but the first."""
+
+    def __init__(self, env: Environment, change):
+        self._env, self._change = env, change
+        self.action_spec, self.reset = env.action_spec, env.reset
+
+    def step(self, action: int) -> dm_env.TimeStep:
+        return self._change(self._env.step(action))
+
+
+def with_observation(time_step: dm_env.TimeStep, **changes: np.ndarray) -> dm_env.TimeStep:
+    return time_step._replace(observation=time_step.observation | changes)

@@ -1,0 +1,157 @@
+"""Models of one set of mazes take each other's place; `python tests/test_world_models.py` rewrites the golden file."""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+import pytest
+
+from mazebench.errors import InputError
+from mazebench.maps.generators import generate
+from mazebench.maps.maze import Maze
+from mazebench.maps.text import parse_maze
+from mazebench.world.export import write_mjcf
+from mazebench.world.mjcf import ACTIONS, STEPS_PER_ACTION
+from mazebench.world.models import _MAZE_FIELDS, MazeModels, copy_maze
+from mazebench.world.physics import Physics
+
+GOLDEN = pathlib.Path(__file__).parent / "golden" / "maze-5.xml"
+# In MuJoCo's structs of options, what is no number or array of numbers is a struct of its own.
+NESTED = ("opt", "stat", "vis", "global_", "headlight", "map", "quality", "rgba", "scale")
+
+
+def golden_maze() -> Maze:
+    return parse_maze("#####\n#..##\n##..#\n#...#\n#####", "maze-5")
+
+
+def mazes(seed: int, size: int = 13, count: int = 4) -> list[Maze]:
+    """Of different styles, so that the numbers of their wall boxes differ."""
+    rng = np.random.default_rng(seed)
+    return [generate(style, size, rng, f"{style}-{size}") for style in ("dfs", "rooms", "obstacles", "dfs")[:count]]
+
+
+def fields(struct: object, prefix: str = "") -> Iterator[tuple[str, object]]:
+    """The names and values of all that a model holds."""
+    for name in dir(struct):
+        if name.startswith("_"):
+            continue
+        value = getattr(struct, name)
+        if name in NESTED:
+            yield from fields(value, f"{prefix}{name}.")
+        elif isinstance(value, (np.ndarray, int, float, bytes)):
+            yield f"{prefix}{name}", value
+
+
+def differences(first: mujoco.MjModel, second: mujoco.MjModel) -> set[str]:
+    return {
+        name
+        for (name, one), (_, other) in zip(fields(first), fields(second), strict=True)
+        if not np.array_equal(one, other)
+    }
+
+
+class TestMazeModels:
+    def test_fields_when_mazes_differ(self):
+        models = MazeModels(mazes(0))
+        assert {"nq", "opt.timestep", "stat.extent", "vis.map.znear", "geom_size"} < {
+            name for name, _ in fields(models[0])
+        }
+        found = set().union(*(differences(models[0], models[index]) for index in range(1, len(models))))
+        assert "geom_pos" in found
+        assert found <= set(_MAZE_FIELDS)
+
+    def test_model_when_asked_for_twice(self):
+        models = MazeModels(mazes(1))
+        assert len(models) == 4
+        assert models[2] is models[2]
+
+    def test_models_when_sizes_differ(self):
+        with pytest.raises(InputError, match=r"expected mazes of one size, found sizes \[11, 13\]"):
+            MazeModels([*mazes(0, size=13, count=1), *mazes(0, size=11, count=1)])
+
+    def test_models_when_there_is_no_maze(self):
+        with pytest.raises(InputError, match="expected mazes of one size"):
+            MazeModels([])
+
+    def test_model_when_maze_is_large(self):
+        model = MazeModels([generate("dfs", 101, np.random.default_rng(0))])[0]
+        assert model.ngeom > 1000
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 100)
+        assert np.isfinite(data.qpos).all()
+
+    def test_trajectory_when_padded(self):
+        few, many = (Maze(np.pad(np.zeros((9, 9), dtype=bool), 1, constant_values=True)), mazes(2, size=11)[2])
+        padded, alone = MazeModels([few, many])[0], MazeModels([few])[0]
+        assert padded.ngeom > alone.ngeom
+        assert drive(padded) == pytest.approx(drive(alone), abs=1e-9)
+
+    def test_trajectory_when_maze_is_padded_and_full_of_walls(self):
+        first, second = sorted(mazes(3, count=2), key=lambda maze: MazeModels([maze])[0].ngeom)
+        padded, alone = MazeModels([first, second])[0], MazeModels([first])[0]
+        assert padded.ngeom > alone.ngeom
+        assert drive(padded) == pytest.approx(drive(alone), abs=1e-9)
+
+
+def drive(model: mujoco.MjModel) -> np.ndarray:
+    """`[200, 2]` positions of a body that acts at random, each action a few steps long."""
+    physics, rng = Physics.of_maze(model), np.random.default_rng(7)
+    action, positions = 0, []
+    for _ in range(200):
+        if rng.random() < 0.3:
+            action = int(rng.integers(len(ACTIONS)))
+        physics.set_action(action)
+        physics.step(STEPS_PER_ACTION)
+        positions.append(physics.position())
+    return np.array(positions)
+
+
+class TestCopyMaze:
+    def test_copy_when_mazes_differ(self):
+        models = MazeModels(mazes(4))
+        physics = Physics.of_maze(models[0])
+        target = physics.model.ptr
+        for index in (1, 2, 3, 0):
+            copy_maze(models[index], target)
+            assert differences(models[index], target) == set()
+
+    def test_copy_when_source_is_left_alone(self):
+        models = MazeModels(mazes(4, count=2))
+        before = MazeModels(mazes(4, count=2))[0]
+        physics = Physics.of_maze(models[0])
+        physics.load_maze(models[1])
+        assert differences(models[0], before) == set()
+
+    def test_trajectory_when_maze_was_swapped_in(self):
+        models = MazeModels(mazes(5, count=2))
+        physics = Physics.of_maze(models[0])
+        with physics.reset_context():
+            physics.load_maze(models[1])
+            physics.data.qpos[:] = models[1].key_qpos[0]
+        fresh = Physics.of_maze(models[1])
+        for swapped in (physics, fresh):
+            swapped.set_action(ACTIONS.index("forward"))
+            swapped.step(500)
+        np.testing.assert_array_equal(physics.data.qpos, fresh.data.qpos)
+
+
+class TestMjcf:
+    def test_file_when_compared_with_golden_one(self, tmp_path):
+        write_mjcf(golden_maze(), tmp_path / "maze-5.xml")
+        assert (tmp_path / "maze-5.xml").read_text(encoding="utf-8") == GOLDEN.read_text(encoding="utf-8")
+
+    def test_file_when_opened_by_plain_mujoco(self):
+        model = mujoco.MjModel.from_xml_path(str(GOLDEN))
+        walls = [model.geom(index) for index in range(model.ngeom) if model.geom(index).name.startswith("wall_")]
+        volume = sum(8 * np.prod(wall.size) for wall in walls)
+        assert volume == pytest.approx(golden_maze().walls.sum())  # each wall cell is 1 m x 1 m x 1 m
+        assert model.nu == 5
+        np.testing.assert_allclose(model.key_qpos[0], (1.5, 3.5, 0))  # the first free cell, (1, 1)
+
+
+if __name__ == "__main__":
+    GOLDEN.parent.mkdir(exist_ok=True)
+    write_mjcf(golden_maze(), GOLDEN)
