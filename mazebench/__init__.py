@@ -1,13 +1,15 @@
 """mazebench: zero-shot navigation in unseen 3-D mazes from abstract top-down maps, on MuJoCo.
 
-`load` gives a dm_control environment, `make_vec` many environments on all cores; after `pip install`, Gymnasium knows
-`mazebench/Local-13-v1` and the others by itself.
+`load` gives a dm_control environment, `make_vec` many environments on all cores. Importing mazebench registers
+`mazebench/Local-13-v1` and the others with Gymnasium.
 """
 
 from __future__ import annotations
 
 import importlib
 from typing import TYPE_CHECKING, Any
+
+from mazebench.envs.registration import register_environments
 
 if TYPE_CHECKING:
     from mazebench.envs.registration import make_vec
@@ -20,6 +22,9 @@ if TYPE_CHECKING:
     from mazebench.tasks.spec import TaskSpec
 
 __version__ = "0.1.0"
+
+# Gymnasium 1.x has no plugins: a package's ids are known once it is imported.
+register_environments()
 
 # Imported when first used: MuJoCo and dm_control take over a second to load.
 _HOMES = {

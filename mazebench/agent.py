@@ -97,6 +97,9 @@ class LearningAgent(Protocol):
     def config(self) -> dict[str, Any]:
         """All values that the learner was built with, as plain data."""
 
+    def description(self) -> str:
+        """One line for people: the size of the network, and of the memory that its replay will take."""
+
     def task_options(self) -> dict[str, Any]:
         """The options of `make_spec` that it wants to collect with."""
 

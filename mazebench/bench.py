@@ -5,6 +5,7 @@ Each ratio is the median over rounds in which the two sides take turns, so that 
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import resource
 import statistics
@@ -20,13 +21,16 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from mazebench.agent import Interface, agent_names, load_agent_class
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
+from mazebench.errors import InputError
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
+from mazebench.training.experience import Collector
 from mazebench.world.mjcf import ACTIONS, PHYSICS_TIMESTEP, STEPS_PER_ACTION, action_controls
 
 _SIZES = (13, 21, 51, 101)
@@ -58,6 +62,8 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
     ]
     say("dm_control's own random maze")
     results["environments"].append(_random_maze_row(spec, seconds, rounds))
+    say("training")
+    results["training"] = _training_rows(spec, seconds * rounds)
     say("resets")
     results["resets"] = _resets(spec, 20 if quick else 200)
     say("cost against size")
@@ -71,7 +77,7 @@ def print_tables(results: dict[str, Any]) -> None:
     """Prints what `run` returned, for people."""
     console = Console(markup=False)
     print(f"{results['machine']['cores']} cores, MuJoCo {results['machine']['mujoco']}")
-    for name in ("environments", "resets", "sizes", "num_envs"):
+    for name in ("environments", "training", "resets", "sizes", "num_envs"):
         rows = results[name]
         table = Table(box=box.SIMPLE, title=name.replace("_", " "), title_justify="left")
         for column in rows[0]:
@@ -181,6 +187,56 @@ def _random_maze_row(spec: TaskSpec, seconds: float, rounds: int) -> dict[str, A
     bare = _bare_loop(spec, _random_actions(1)[:, 0].tolist())
     what = "dm_control RandomMazeWithTargets, rolling ball"
     return _ratio(what, 1, lambda count: environment.step(forces[count % 512]), bare, seconds, rounds)
+
+
+def _training_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
+    """Where a learner's time goes, for each learning agent that is installed."""
+    rows = []
+    for name in agent_names():
+        try:
+            agent_class = load_agent_class(name)
+        except InputError:  # its dependencies are not installed
+            continue
+        if hasattr(agent_class, "build_learner"):
+            rows.append(_training_row(name, agent_class, spec, seconds))
+    return rows
+
+
+def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -> dict[str, Any]:
+    interface = Interface("local", spec.size, spec.context_size)
+    learner = agent_class.build_learner(interface, spec.mazes, overrides={"num_envs": "256"})
+    collector = Collector(dataclasses.replace(spec, **learner.task_options()), learner.num_envs, seed=0)
+    learner.actor.explore_from(0, learner.num_envs, seed=0)
+    state = learner.actor.initial_state(learner.num_envs)
+    times = {"act": 0.0, "step": 0.0, "store": 0.0}
+    count = 0
+    while sum(times.values()) < seconds:
+        marks = [time.perf_counter()]
+        actions, state = learner.actor.act(collector.observation, collector.is_first, state, explore=True)
+        marks.append(time.perf_counter())
+        experience = collector.step(actions)
+        marks.append(time.perf_counter())
+        learner.observe(experience)
+        marks.append(time.perf_counter())
+        for part, begin, end in zip(times, marks, marks[1:], strict=False):
+            times[part] += end - begin
+        count += 1
+    updates, begin = 0, time.perf_counter()
+    while (elapsed := time.perf_counter() - begin) < seconds:
+        learner.update()
+        updates += 1
+    collecting = sum(times.values()) / (count * learner.num_envs)  # seconds a step
+    # One more update falls due with each so many steps, whatever their number is by now.
+    learning = elapsed / updates * (learner.num_updates_due(10**9) / 10**9)
+    total = collecting + learning
+    return {
+        "what": f"{name}, {learner.num_envs} environments",
+        "collected steps/s": round(1 / collecting),
+        "updates/s": updates / elapsed,
+        "trained steps/s": round(1 / total),
+        **{f"% {part}": 100 * value / sum(times.values()) * collecting / total for part, value in times.items()},
+        "% update": 100 * learning / total,
+    }
 
 
 def _resets(spec: TaskSpec, count: int) -> list[dict[str, Any]]:

@@ -115,7 +115,7 @@ BAD_INPUT = [
     ((*TINY, "--map-flip", "nan"), "expected map_flip from 0 to 1.0, found nan"),
     ((*TINY, "--map-warp", "0.3"), "expected map_warp from 0 to 0.25, found 0.3"),
     ((*TINY, "--map-warp", "-0.1"), "expected map_warp from 0 to 0.25, found -0.1"),
-    ((*TINY, "--position-noise", "nan"), "expected position_noise from 0 to inf, found nan"),
+    ((*TINY, "--position-noise", "nan"), "expected position_noise from 0 to 1000.0, found nan"),
     ((*TINY, "--position-noise", "inf"), "expected position_noise from 0 to inf, found inf"),
     ((*TINY, "--position-noise", "-1"), "expected position_noise from 0 to inf, found -1"),
     ((*TINY, "--distances", "one"), "expected distances like 1-5,8,10, found 'one'"),

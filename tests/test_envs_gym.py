@@ -25,9 +25,10 @@ IDS = [f"mazebench/{task}-{size}-v1" for task in ("Local", "Hierarchical") for s
 FORWARD, LOOK_LEFT = 0, 4
 PROBE_FAILED = 77
 OPEN_EGL = f"""
-import sys, mujoco
+import sys
 try:
-    mujoco.GLContext(64, 64).make_current()
+    import mujoco
+    mujoco.GLContext(64, 64).free()
 except (RuntimeError, ImportError, AttributeError):
     sys.exit({PROBE_FAILED})
 """
@@ -54,8 +55,8 @@ def random_env(task: str, **options) -> MazeEnv:
     return MazeEnv(make_spec(task, maps=[generate("obstacles", 6, rng) for _ in range(3)], **options))
 
 
-def run(program: str) -> None:
-    environment = os.environ | {"MUJOCO_GL": "egl"}
+def run(program: str, **variables: str) -> None:
+    environment = os.environ | variables
     result = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
     if result.returncode == PROBE_FAILED:
         pytest.skip("EGL is not usable here")
@@ -67,10 +68,13 @@ class TestRegistration:
     def test_make_when_mazebench_was_not_imported(self, task):
         run(
             "import gymnasium\n"
-            f"env = gymnasium.make('mazebench/{task}-13-v1')\n"
+            f"env = gymnasium.make('mazebench:mazebench/{task}-13-v1')\n"
             "observation, info = env.reset(seed=0)\n"
             "assert observation['state'].shape == (12,)"
         )
+
+    def test_make_when_mazebench_was_imported_first(self):
+        run("import mazebench\nimport gymnasium\ngymnasium.make('mazebench/Local-13-v1').reset(seed=0)")
 
     def test_ids_when_listed(self):
         assert {name for name in registration.registry if name.startswith("mazebench/")} == set(IDS)
@@ -229,7 +233,8 @@ envs[0].reset(seed=1)
 np.testing.assert_array_equal(envs[0].render(), second)
 for env in envs:
     env.close()
-"""
+""",
+            MUJOCO_GL="egl",
         )
 
     def test_pictures_when_vector_environment_renders(self):
@@ -247,5 +252,6 @@ for seed, picture in enumerate(pictures):
     env.reset(seed=seed)
     assert np.abs(env.render().astype(int) - picture).mean() < 1, "not the picture of the single environment"
     env.close()
-"""
+""",
+            MUJOCO_GL="egl",
         )

@@ -440,9 +440,11 @@ class TestPhysics:
 
     def test_picture_when_rendered(self):
         program = f"""
-import sys, mujoco, numpy as np
+import sys
+import numpy as np
 try:
-    mujoco.GLContext(64, 64).make_current()
+    import mujoco
+    mujoco.GLContext(64, 64).free()
 except (RuntimeError, ImportError, AttributeError):
     sys.exit({PROBE_FAILED})
 import mazebench

@@ -1,6 +1,7 @@
 """The training loop: run folders, resuming, faults, and collecting on Ray."""
 
 import dataclasses
+import itertools
 import json
 import math
 import resource
@@ -165,7 +166,7 @@ def test_collector_gives_trajectories_that_hang_together():
     collector = Collector(spec, 4, seed=1)
     rng = np.random.default_rng(0)
     steps = [collector.step(rng.integers(6, size=4)) for _ in range(80)]
-    for before, after in zip(steps[:-1], steps[1:], strict=True):
+    for before, after in itertools.pairwise(steps):
         np.testing.assert_array_equal(after.begins, before.ended)
         assert (after.is_first | ~after.begins).all()
         unchanged = ~after.is_first

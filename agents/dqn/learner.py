@@ -53,6 +53,12 @@ class DQNLearner:
         """All values of the config."""
         return dataclasses.asdict(self._config)
 
+    def description(self) -> str:
+        """The size of the network and of the replay."""
+        weights = sum(parameter.numel() for parameter in self.actor.network.parameters())
+        megabytes = self._replay.num_bytes / 2**20
+        return f"{weights:,} weights; replay of {self._config.replay_capacity:,} rows, {megabytes:.0f} MiB"
+
     def task_options(self) -> dict[str, Any]:
         """Episodes of several goals, as the config has it."""
         return {"num_goals": self._config.num_goals}

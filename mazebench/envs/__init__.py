@@ -1,0 +1,1 @@
+"""The navigation task for Gymnasium: one environment, or many on all cores."""

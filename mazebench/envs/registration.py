@@ -1,4 +1,4 @@
-"""Gymnasium ids, `mazebench/Local-13-v1` and so on; Gymnasium finds this module by its plugin entry point."""
+"""Gymnasium ids, `mazebench/Local-13-v1` and so on, which `import mazebench` registers."""
 
 from __future__ import annotations
 
@@ -6,21 +6,24 @@ from typing import Any
 
 import gymnasium
 
-from mazebench.maps.benchmark import SIZES
+from mazebench.maps import BENCHMARK_SIZES
 
 _VERSION = 1
 _TASKS = {"Local": "local", "Hierarchical": "hierarchical"}
 
 
 def register_environments() -> None:
-    """Registers every task and size, without the namespace, which Gymnasium puts in front.
+    """Registers every task and size; a second call changes nothing.
 
     No `max_episode_steps`: its wrapper would call a step truncated that reached the goal on the limit.
     """
     for title, task in _TASKS.items():
-        for size in SIZES:
+        for size in BENCHMARK_SIZES:
+            env_id = f"mazebench/{title}-{size}-v{_VERSION}"
+            if env_id in gymnasium.registry:
+                continue
             gymnasium.register(
-                id=f"{title}-{size}-v{_VERSION}",
+                id=env_id,
                 entry_point="mazebench.envs.registration:make_env",
                 vector_entry_point="mazebench.envs.registration:make_vec",
                 kwargs={"task": task, "size": size},

@@ -63,6 +63,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._episode_source = episode_source or self._draw_episode
         self._rngs = _streams(seed, num_envs)
+        self._was_reset = False
         self._allocate()
         self._models = [task_spec.models[0]] * num_envs
         self._batch = mujoco.batch.Batch(task_spec.models[0], num_envs, num_threads)
@@ -107,6 +108,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
                 old if keep and seed[i] is None else new  # type: ignore[index]
                 for i, (old, new) in enumerate(zip(self._rngs, fresh, strict=True))
             ]
+        self._was_reset = True
         self._active[:] = True
         self._begin_episodes(range(self.num_envs))
         is_first = np.ones(self.num_envs, dtype=bool)
@@ -115,7 +117,14 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
     def step(
         self, actions: np.ndarray
     ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Takes one agent step (0.16 s) in each environment; `actions` is `[B]` int."""
+        """Takes one agent step (0.16 s) in each environment; `actions` is `[B]` int.
+
+        Raises:
+          gymnasium.error.ResetNeeded: before the first reset.
+          ValueError: if `actions` are not B of those there are.
+        """
+        if not self._was_reset:
+            raise gymnasium.error.ResetNeeded("expected a call to reset() before this step()")
         self._ctrl[:] = self._controls[self._check_actions(actions)]
         resting = not self._active.all()
         ids = np.flatnonzero(self._active) if resting else None
@@ -137,7 +146,8 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
 
     def _check_actions(self, actions: np.ndarray) -> np.ndarray:
         actions = np.asarray(actions)
-        if actions.shape != (self.num_envs,) or actions.min() < 0 or actions.max() >= len(ACTIONS):
+        is_integer = np.issubdtype(actions.dtype, np.integer)
+        if actions.shape != (self.num_envs,) or not is_integer or actions.min() < 0 or actions.max() >= len(ACTIONS):
             raise ValueError(
                 f"expected {self.num_envs} actions from 0 to {len(ACTIONS) - 1}, "
                 f"found shape {actions.shape}, values {actions}"
@@ -269,6 +279,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         data = [self._batch.get_data(i) for i in range(self.num_envs)]
         for model, values in zip(self._models, data, strict=True):
             mujoco.mj_kinematics(model, values)
+            mujoco.mj_camlight(model, values)
         return tuple(render(model, values, "top") for model, values in zip(self._models, data, strict=True))
 
 

@@ -1,0 +1,1 @@
+"""Evaluations: protocols, runs, metrics, tables and films."""

@@ -8,11 +8,12 @@ import json
 from importlib import resources
 
 from mazebench.errors import InputError, unknown
+from mazebench.maps import BENCHMARK_SIZES
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 
 VERSION = "v1"
-SIZES = (13, 15, 17, 19, 21)
+SIZES = BENCHMARK_SIZES
 SPLITS = ("train", "eval")
 MAZES_PER_SPLIT = 20
 MANIFEST = "manifest.json"

@@ -41,8 +41,12 @@ class Navigation(control.Task):
         self._event = Event.NONE
 
     def set_next_episode(self, episode: Episode) -> None:
-        """Makes the next reset play `episode` instead of one that is drawn."""
-        self._next_episode = episode
+        """Makes the next reset play `episode` instead of one that is drawn.
+
+        Raises:
+          InputError: if it can't be played in this task's mazes.
+        """
+        self._next_episode = self.spec.check_episode(episode)
 
     @property
     def success(self) -> bool:

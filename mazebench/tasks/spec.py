@@ -24,6 +24,7 @@ TRAIN_DISTANCES = tuple(range(1, 6))
 EVAL_DISTANCES = tuple(range(1, 16))
 PAIRS = ("random", "fixed")
 
+_MAX_POSITION_NOISE = 1000.0  # m; more would be a mistake
 _SEEDS = 2**31
 _MAX_TRIES = 1000
 _FIXED_PAIR_SEED = 20210  # of the pairs of the extremely-low-data regime; any number, once and for all
@@ -38,9 +39,13 @@ class Perturbation:
     position_noise: float = 0.0  # m, standard deviation on x and y of each observation
 
     def __post_init__(self):
-        for name, highest in (("map_flip", 1.0), ("map_warp", perturb.MAX_WARP), ("position_noise", np.inf)):
+        for name, highest in (
+            ("map_flip", 1.0),
+            ("map_warp", perturb.MAX_WARP),
+            ("position_noise", _MAX_POSITION_NOISE),
+        ):
             value = getattr(self, name)
-            if not 0 <= value <= highest or value == np.inf:
+            if not 0 <= value <= highest:
                 raise InputError(f"expected {name} from 0 to {highest}, found {value}")
 
 
@@ -117,6 +122,18 @@ class TaskSpec:
         maze = int(rng.integers(len(self.mazes)))
         start, goal = TASKS[self.task](self, maze, rng)
         return Episode(maze, start, goal, float(rng.uniform(-np.pi, np.pi)), int(rng.integers(_SEEDS)))
+
+    def check_episode(self, episode: Episode) -> Episode:
+        """`episode` itself if it can be played here.
+
+        Raises:
+          InputError: if there is no such maze, or start or goal is not free in it.
+        """
+        if not 0 <= episode.maze < len(self.mazes):
+            raise InputError(f"expected a maze from 0 to {len(self.mazes) - 1}, found {episode.maze}")
+        for cell in (episode.start, episode.goal):
+            self.mazes[episode.maze].require_free(cell)
+        return episode
 
     def show(self, episode: Episode) -> ShownMap:
         """The map that the agent is shown in `episode`."""

@@ -1,0 +1,1 @@
+"""Training: the loop, run folders, and where experience comes from."""

@@ -93,6 +93,8 @@ class _Run:
         """Trains until the time or the steps are up."""
         self._open(resume)
         self._begin = self._last_line = time.monotonic()
+        self._steps_at_last_line = self._env_steps
+        self._report(0.0, f"{self._options.agent}: {self._learner.description()}")
         with self._make_source() as source:
             self._restart(source)
             while not self._is_over():
@@ -176,9 +178,11 @@ class _Run:
         line = ", ".join(
             f"{name} {value:.3g}" for name, value in metrics.items() if name not in ("env_steps", "updates")
         )
-        rate = f"{self._num_summed / max(elapsed, 1e-9):.1f} updates/s" if self._num_summed else "filling the replay"
+        steps_rate = (self._env_steps - self._steps_at_last_line) / max(elapsed, 1e-9)
+        rate = f"{steps_rate:,.0f} steps/s, {self._num_summed / max(elapsed, 1e-9):.1f} updates/s"
         self._report(min(1.0, self._share()), f"{self._env_steps:,} steps, {self._updates:,} updates, {rate}: {line}")
         self._sums, self._num_summed, self._last_line = {}, 0, time.monotonic()
+        self._steps_at_last_line = self._env_steps
 
     def _save(self) -> None:
         counters = {"env_steps": self._env_steps, "updates": self._updates}

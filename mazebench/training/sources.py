@@ -36,11 +36,13 @@ class InProcessSource:
         self._actor = actor
 
     def restart(self, seed: int) -> None:
+        """Begins new trajectories everywhere, and a new stream of exploration."""
         self._collector.restart(seed)
         self._actor.explore_from(0, self._collector.num_envs, seed)
         self._state: Any = self._actor.initial_state(self._collector.num_envs)
 
     def collect(self) -> Iterator[tuple[int, Experience]]:
+        """Takes one step in each environment."""
         collector = self._collector
         actions, self._state = self._actor.act(collector.observation, collector.is_first, self._state, explore=True)
         yield 0, collector.step(actions)

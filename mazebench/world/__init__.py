@@ -1,0 +1,1 @@
+"""A maze in MuJoCo: model, body, physics, meshes, pictures."""

@@ -28,6 +28,10 @@ _DRIVE_SPEED = TOP_SPEED * (1 + _DAMPING / _DRIVE_GAIN)
 _DRIVE_FORCE = 34.0  # caps the acceleration from rest
 _YAW_GAIN = 20.0  # with _YAW_INERTIA a time constant of 1 ms: the turn rate stands within a frame
 _YAW_INERTIA = 0.02
+# Contacts act this far before a wall (margins of two geoms add up, so the body has none): it never sinks in.
+_CONTACT_MARGIN = 0.03
+# As stiff as the timestep allows, and overdamped: with a damping ratio of 1 walls throw back up to 18 % of the speed.
+_CONTACT_SOLREF = [2 * PHYSICS_TIMESTEP, 3.0]
 _EYE_HEIGHT = 0.45
 _PARKED_DEPTH = 10.0  # metres below the floor
 
@@ -38,13 +42,13 @@ NUM_SENSORS = 10
 def maze_spec(maze: Maze) -> mujoco.MjSpec:
     """The standalone model of one maze, without padding: what `mazebench generate` writes."""
     boxes = cover(maze.walls)
-    return build_spec(maze, boxes, len(boxes))
+    return build_spec(maze, boxes, len(boxes), maze.name)
 
 
-def build_spec(maze: Maze, boxes: list[Rectangle], num_boxes: int) -> mujoco.MjSpec:
+def build_spec(maze: Maze, boxes: list[Rectangle], num_boxes: int, name: str = "maze") -> mujoco.MjSpec:
     """The model of `maze` with walls as `boxes`, padded to `num_boxes` with boxes parked below the floor."""
     spec = mujoco.MjSpec()
-    spec.modelname = maze.name
+    spec.modelname = name
     spec.option.timestep = PHYSICS_TIMESTEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0, 0, 0]
@@ -143,8 +147,8 @@ def _add_walls(spec: mujoco.MjSpec, size: int, boxes: list[Rectangle], num_boxes
             size=half,
             material="wall",
             condim=1,
-            margin=0.03,
-            solref=[2 * PHYSICS_TIMESTEP, 1],
+            margin=_CONTACT_MARGIN,
+            solref=_CONTACT_SOLREF,
         )
 
 
@@ -170,8 +174,7 @@ def _add_body(spec: mujoco.MjSpec, maze: Maze) -> None:
         size=[BODY_RADIUS, BODY_HEIGHT / 2 - BODY_RADIUS, 0],
         material="agent",
         condim=1,
-        margin=0.03,
-        solref=[2 * PHYSICS_TIMESTEP, 1],
+        solref=_CONTACT_SOLREF,
     )
     body.add_site(
         name="nose", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0.11, 0, 0.02], size=[0.06, 0.09, 0.05], material="nose"
