@@ -90,7 +90,8 @@ class Replay:
         used = slice(0, min(self._length, int(self._next.max())))
         rows = {name: getattr(self, f"_{name}")[:, used] for name in _ROW_FIELDS}
         leaves = self._tree.priorities(np.arange(self._num_envs * self._length)).reshape(self._num_envs, -1)[:, used]
-        np.savez(path, **rows, **{name: getattr(self, f"_{name}") for name in _ENV_FIELDS}, priorities=leaves)
+        envs = {name: getattr(self, f"_{name}") for name in _ENV_FIELDS}
+        np.savez(path, **rows, **envs, priorities=leaves, largest_priority=self._largest_priority)
 
     def load(self, path: pathlib.Path) -> None:
         """Goes on from what `save` wrote.
@@ -100,7 +101,7 @@ class Replay:
         """
         try:
             with np.load(path, allow_pickle=False) as arrays:
-                loaded = {name: arrays[name] for name in (*_ROW_FIELDS, *_ENV_FIELDS, "priorities")}
+                loaded = {name: arrays[name] for name in (*_ROW_FIELDS, *_ENV_FIELDS, "priorities", "largest_priority")}
         except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
             raise InputError(f"{path}: expected a replay, found a damaged one: {error}") from error
         used = loaded["cell"].shape[1]
@@ -112,7 +113,7 @@ class Replay:
             setattr(self, f"_{name}", loaded[name])
         items = np.arange(self._num_envs * self._length).reshape(self._num_envs, -1)[:, :used]
         self._tree.set(items.ravel(), loaded["priorities"].ravel())
-        self._largest_priority = max(1.0, float(loaded["priorities"].max(initial=0.0)))
+        self._largest_priority = float(loaded["largest_priority"])
 
     @property
     def num_bytes(self) -> int:
@@ -205,8 +206,8 @@ class Replay:
         )
 
     def update_priorities(self, row: np.ndarray, error: np.ndarray) -> None:
-        """Gives the rows of a sample priorities by the errors `[G]` that learning found in their groups."""
-        if self._exponent == 0:
+        """Gives `row` `[K]`, of a sample, priorities by the errors `[K]` that learning found there."""
+        if self._exponent == 0 or not len(row):
             return
         priority = (np.abs(error) + 1e-3) ** self._exponent
         # A row may have been overwritten by a trajectory's last one since, which is never to be drawn.
@@ -278,8 +279,11 @@ class Replay:
         last = steps.copy()
         for _ in range(n):
             going &= self._action[env, last] != _NO_ACTION
-            going &= last != (self._next[env] - 1) % self._length  # the newest row has no next one yet
-            last = np.where(going, (last + 1) % self._length, last)
+            after = (last + 1) % self._length
+            # The newest row has no next one yet, and where collecting began anew, the next one is another trajectory's.
+            going &= last != (self._next[env] - 1) % self._length
+            going &= self._trajectory[env, after] == self._trajectory[env, last]
+            last = np.where(going, after, last)
             hit |= going & (self._cell[env, last] == goal)
             reward -= going & ~hit
             going &= ~hit

@@ -23,7 +23,9 @@ from mazebench.training.experience import Collector
 
 
 def test_double_q_target_by_hand():
-    target = double_q_target(torch.tensor([-2.0, -3.0]), torch.tensor([0.0, 1.0]), torch.tensor([-50.0, -4.0]))
+    value = torch.tensor([[-50.0, -1.0], [-4.0, -1.0]])  # believes the second action
+    selector = torch.tensor([[0.0, -9.0], [0.0, -9.0]])  # chooses the first
+    target = double_q_target(torch.tensor([-2.0, -3.0]), torch.tensor([0.0, 1.0]), value, selector)
     assert target.tolist() == [-2.0, -7.0]
 
 

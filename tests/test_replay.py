@@ -137,6 +137,16 @@ def test_sample_never_crosses_trajectories():
     np.testing.assert_array_equal(sample.next_state[:, :, 0] < 100, first)
 
 
+def test_return_never_goes_on_into_a_trajectory_that_began_before_the_last_one_ended():
+    replay = Replay(1, 1000)
+    fill(replay, [10, 11, 12])  # cut short, as where a run was resumed: no last row
+    fill(replay, [20, 21, 22], final_cell=23, first_x=100)
+    steps = by_step(replay.sample(256, 2, 5, NO_HINDSIGHT, np.random.default_rng(0)))
+    assert steps[0] == (-2.0, 1.0, 2)
+    assert steps[1] == (-1.0, 1.0, 2)
+    assert 2 not in steps
+
+
 def test_sample_after_the_ring_wrapped_holds_only_what_is_left():
     replay = Replay(1, 8)
     for begin in range(0, 60, 20):
@@ -182,9 +192,11 @@ def test_saved_and_loaded_replay_samples_the_same(tmp_path):
     replay = Replay(1, 50, priority_exponent=0.6)
     fill(replay, list(range(10, 40)), final_cell=41)
     replay.update_priorities(np.arange(20), np.linspace(0, 3, 20))
+    replay.update_priorities(np.arange(20), np.linspace(0, 1, 20))
     replay.save(tmp_path / "replay.npz")
     other = Replay(1, 50, priority_exponent=0.6)
     other.load(tmp_path / "replay.npz")
+    assert other._largest_priority == replay._largest_priority > 1.5
     for mine, theirs in zip(
         replay.sample(16, 4, 3, ALWAYS, np.random.default_rng(3), 0.4),
         other.sample(16, 4, 3, ALWAYS, np.random.default_rng(3), 0.4),

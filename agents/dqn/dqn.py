@@ -37,14 +37,14 @@ class DQN:
     name: ClassVar[str] = "dqn"
     default_config: ClassVar[DQNConfig] = DQNConfig(use_context=False)
 
-    def __init__(self, config: DQNConfig, context_size: int, seed: int = 0, num_envs: int | None = None):
-        """`num_envs` is the length of the epsilon ladder, and the config's by default."""
+    def __init__(self, config: DQNConfig, context_size: int, seed: int = 0):
         torch.set_num_threads(1)
-        torch.manual_seed(seed)
         self.config = config
         self.context_size_built = context_size
-        self.network = QNetwork(config.channels if config.use_context else 0, config.hidden)
-        self.explore_from(0, config.num_envs if num_envs is None else num_envs, seed)
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            self.network = QNetwork(config.channels if config.use_context else 0, config.hidden)
+        self.explore_from(0, config.num_envs, seed)
 
     def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
         """Takes the rungs `first_env` to `first_env + num_envs` of the ladder, and a new stream of random numbers."""

@@ -94,9 +94,9 @@ class DQNLearner:
             metrics["localization_error"] = self._localization_error(sample, turned, features, code)
             loss = loss + config.localization_weight * metrics["localization_error"]
         metrics["gradient_norm"] = self._descend(loss)
-        with torch.no_grad():
-            error = ((q_tm1 - target).abs() * valid).sum(dim=1) / valid.sum(dim=1).clamp(min=1)
-        self._replay.update_priorities(sample.row, error.numpy())
+        # The first step of a group is the row that was drawn; what was not learned from keeps its priority.
+        seen = sample.valid[:, 0]
+        self._replay.update_priorities(sample.row[seen], (q_tm1 - target).detach().numpy()[seen, 0])
         return {name: float(value.detach()) for name, value in metrics.items()}
 
     def _descend(self, loss: torch.Tensor) -> torch.Tensor:
@@ -137,10 +137,9 @@ class DQNLearner:
     ) -> torch.Tensor:
         """`[G, K]`: n-step double-Q targets (van Hasselt et al. 2016), within the values that there are."""
         features = self._features(sample.next_state, sample.origin, turned)
-        best = self.actor.network(features, code).argmax(dim=-1, keepdim=True)
-        bootstrap = self._target(features, target_code).gather(-1, best)[..., 0]
-        target = double_q_target(torch.from_numpy(sample.reward), torch.from_numpy(sample.discount), bootstrap)
-        return target.clamp(-self._config.longest_value, 0.0)
+        q_selector, q_value = self.actor.network(features, code), self._target(features, target_code)
+        reward, discount = torch.from_numpy(sample.reward), torch.from_numpy(sample.discount)
+        return double_q_target(reward, discount, q_value, q_selector).clamp(-self._config.longest_value, 0.0)
 
     def _localization_error(
         self, sample: Sample, turned: int, features: torch.Tensor, code: torch.Tensor
@@ -187,6 +186,16 @@ class DQNLearner:
             self._replay.load(folder / _REPLAY_FILE)
 
 
-def double_q_target(reward: torch.Tensor, discount: torch.Tensor, bootstrap: torch.Tensor) -> torch.Tensor:
-    """The n-step return's rewards, and what follows them at the target network's value of the best action."""
-    return reward + discount * bootstrap
+def double_q_target(
+    r_t: torch.Tensor, discount_t: torch.Tensor, q_t_value: torch.Tensor, q_t_selector: torch.Tensor
+) -> torch.Tensor:
+    """`[...]`: r + discount * q_value(argmax q_selector) (van Hasselt et al. 2016, eq. 4).
+
+    Args:
+      r_t: `[...]` sums of rewards.
+      discount_t: `[...]` of what follows them.
+      q_t_value: `[..., 6]` action values that are believed, the target network's.
+      q_t_selector: `[..., 6]` action values that choose, the online network's.
+    """
+    best = q_t_selector.argmax(dim=-1, keepdim=True)
+    return r_t + discount_t * q_t_value.gather(-1, best)[..., 0]

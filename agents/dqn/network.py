@@ -14,7 +14,7 @@ from torch.nn import functional
 NUM_PLANES = 4
 NUM_STATE_FEATURES = 7
 NUM_ACTIONS = 6
-# Dilations of the 3 x 3 convolutions: the last one sees 18 cells far, across a 13 x 13 map.
+# Dilations of the 3 x 3 convolutions: the last one sees 19 cells far, across a 13 x 13 map.
 _DILATIONS = (1, 1, 2, 2, 4, 4, 2, 1, 1)
 _FREQUENCIES = (0.25, 0.5, 1.0, 2.0)  # per metre; octaves in which what was moved is given
 _SCALE_RATE = 5.0  # how much faster the scale is learned than weights of order one tenth are

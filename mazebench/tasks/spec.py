@@ -79,7 +79,7 @@ class TaskSpec:
         self._require("time_limit", 1, np.inf)
         self._require("landmark_distance", 1, np.inf)
         self._require("context_size", 3, MAX_SIZE)
-        self._require("num_goals", 1, np.inf if self.task == "local" else 1)
+        self._require("num_goals", 1, np.inf if self.task == "local" and self.pairs == "random" else 1)
         if self.task == "local":
             self._check_distances()
         for maze in self.mazes:

@@ -71,7 +71,10 @@ def train(
     wanted = getattr(agent_class, "context_size", default_context_size)(options.size)
     interface = Interface("local", options.size, wanted)
     learner = agent_class.build_learner(interface, mazes, seed=options.seed, overrides=dict(options.overrides))
-    task_spec = make_spec("local", options.size, pairs=options.pairs, context_size=wanted, **learner.task_options())
+    task_options = learner.task_options()
+    if options.pairs == "fixed":
+        task_options["num_goals"] = 1  # the only goal of a maze is its pair's
+    task_spec = make_spec("local", options.size, pairs=options.pairs, context_size=wanted, **task_options)
     with RunFolder(out) as folder:
         _Run(options, folder, learner, task_spec, report).run(resume)
 
