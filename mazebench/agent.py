@@ -42,9 +42,10 @@ class Agent(Protocol):
 
     A class named by an entry point is built by `build(interface, seed=..., checkpoint=...)`. Two more methods are
     called where they exist: the class's `context_size(size) -> int`, for an agent that needs another M than
-    min(N, 21), and `seed_episodes(seeds, mask)`, for one that draws random numbers: `seeds` `[B]` int and `mask` `[B]`
-    bool say where an episode begins, before `act` is called with its first observation, so that the draws belong to
-    the episode and not to the slot it happens to run in.
+    min(N, 21), and `seed_episodes(seeds, mask)`, for one that draws random numbers or must tell an episode's beginning
+    from a landmark's. It is called before each `act` in which `is_first` is set anywhere: `mask` `[B]` bool says where
+    an episode begins, `seeds` `[B]` int are the episodes', so that draws belong to the episode and not to its slot. And
+    `default_checkpoint() -> Path` of the class names the file that `build` reads if it is given none.
     """
 
     @classmethod

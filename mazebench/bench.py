@@ -27,7 +27,6 @@ from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import generate
-from mazebench.maps.maze import Maze
 from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
@@ -79,6 +78,8 @@ def print_tables(results: dict[str, Any]) -> None:
     print(f"{results['machine']['cores']} cores, MuJoCo {results['machine']['mujoco']}")
     for name in ("environments", "training", "resets", "sizes", "num_envs"):
         rows = results[name]
+        if not rows:  # training, where no learning agent is installed
+            continue
         table = Table(box=box.SIMPLE, title=name.replace("_", " "), title_justify="left")
         for column in rows[0]:
             table.add_column(column, justify="left" if column == "what" else "right")
@@ -190,7 +191,7 @@ def _random_maze_row(spec: TaskSpec, seconds: float, rounds: int) -> dict[str, A
 
 
 def _training_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
-    """Where a learner's time goes, for each learning agent that is installed."""
+    """Where a learner's time goes, for each learning agent that is installed, in as many environments as it wants."""
     rows = []
     for name in agent_names():
         try:
@@ -204,13 +205,13 @@ def _training_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
 
 def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -> dict[str, Any]:
     interface = Interface("local", spec.size, spec.context_size)
-    learner = agent_class.build_learner(interface, spec.mazes, overrides={"num_envs": "256"})
+    learner = agent_class.build_learner(interface, spec.mazes)
     collector = Collector(dataclasses.replace(spec, **learner.task_options()), learner.num_envs, seed=0)
     learner.actor.explore_from(0, learner.num_envs, seed=0)
     state = learner.actor.initial_state(learner.num_envs)
     times = {"act": 0.0, "step": 0.0, "store": 0.0}
     count = 0
-    while sum(times.values()) < seconds:
+    while sum(times.values()) < seconds or not learner.num_updates_due(10**9):  # until it may learn
         marks = [time.perf_counter()]
         actions, state = learner.actor.act(collector.observation, collector.is_first, state, explore=True)
         marks.append(time.perf_counter())
@@ -273,12 +274,8 @@ def _size_row(size: int, seconds: float, rounds: int) -> dict[str, Any]:
         spec.models[index]
     compiled = (time.perf_counter() - begin) / len(mazes)
     row = _ratio(f"{size} x {size}, 256 environments", 256, *_vector_pair(spec, 256, 0), seconds, rounds)
-    return {**row, "compile ms": 1e3 * compiled, "walls": _num_boxes(spec, mazes)}
-
-
-def _num_boxes(spec: TaskSpec, mazes: list[Maze]) -> int:
-    """Wall boxes in each model, padding included; floor and body are the two other geoms."""
-    return spec.models[0].ngeom - 2
+    # Padding included; floor and body are the two other geoms.
+    return {**row, "compile ms": 1e3 * compiled, "walls": spec.models[0].ngeom - 2}
 
 
 def _num_envs_row(spec: TaskSpec, num_envs: int, seconds: float, rounds: int) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import typer
 
 from mazebench import __version__
-from mazebench.errors import InputError
+from mazebench.errors import InputError, RunError
 
 # The parser's own error, which typer exports by its children only.
 _UsageError: type[Exception] = typer.BadParameter.__mro__[2]
@@ -55,7 +55,7 @@ def main() -> None:
         _fail(str(error), 2)
     except OSError as error:
         _fail(f"{error.filename or 'file'}: {error.strerror or error}", 2)
-    except RuntimeError as error:
+    except RunError as error:
         _fail(str(error), 1)
     except (KeyboardInterrupt, typer.Abort):
         _fail("interrupted; what was written is kept, and eval goes on with --resume", 130)
@@ -106,7 +106,7 @@ def generate(
     mazes = making.make_mazes(size, count, seed, style, from_image)
     chosen = making.parse_formats(formats)
     for index, maze in enumerate(mazes):
-        for path in making.write_maze(maze, out, chosen):
+        for path in making.write_maze(maze, out, chosen, from_image):
             print(path)
         if index == 0:
             _preview(maze)
@@ -282,9 +282,7 @@ def _training_progress() -> Iterator[Any]:
 
 @app.command()
 def render(
-    out: Annotated[
-        pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its start or of its map and path.")
-    ],
+    out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
     agent: Annotated[str, typer.Option(help="Who drives.")] = "planner-closed-loop",
     task: Annotated[TaskName, typer.Option(help="Kind of navigation.")] = TaskName.local,
     size: Annotated[int | None, typer.Option(help="Of the benchmark's mazes; 13 if not given.")] = None,

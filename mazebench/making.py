@@ -46,19 +46,22 @@ def parse_formats(text: str) -> list[str]:
     return formats
 
 
-def write_maze(maze: Maze, folder: pathlib.Path, formats: list[str]) -> list[pathlib.Path]:
+def write_maze(
+    maze: Maze, folder: pathlib.Path, formats: list[str], source: pathlib.Path | None = None
+) -> list[pathlib.Path]:
     """Writes `maze` into `folder` in each format and returns the files.
 
     Raises:
-      InputError: if the folder can't be written.
+      InputError: if the folder can't be written, or a file is `source`, the picture that the maze was read from.
     """
-    paths = []
+    paths = [folder / f"{maze.name}.{_WRITERS[name][0]}" for name in formats]
+    for path in paths:
+        if source is not None and path.exists() and path.samefile(source):
+            raise InputError(f"{path}: is the picture that the maze is read from; name another --out or --format")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name in formats:
-            suffix, write = _WRITERS[name]
-            paths.append(folder / f"{maze.name}.{suffix}")
-            write(maze, paths[-1])
+        for name, path in zip(formats, paths, strict=True):
+            _WRITERS[name][1](maze, path)
     except OSError as error:
         raise InputError(f"{folder}: can't write there: {error.strerror}") from error
     return paths

@@ -6,6 +6,7 @@ which goes when the last episode is in place.
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import pathlib
@@ -21,23 +22,63 @@ SUMMARY = "summary.json"
 Record = dict[str, Any]
 
 
+def make_folder(path: pathlib.Path) -> None:
+    """Makes a folder to write to.
+
+    Raises:
+      InputError: if that can't be.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: can't write there: {error.strerror}") from error
+
+
+class FolderLock:
+    """Keeps other processes out of a folder as long as it is held; a context manager, released by a kill too."""
+
+    def __init__(self, folder: pathlib.Path):
+        """Takes the lock.
+
+        Raises:
+          InputError: if another process holds it.
+        """
+        self._descriptor = os.open(folder, os.O_RDONLY)  # of the folder itself, so that nothing is left in it
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(self._descriptor)
+            raise InputError(f"{folder}: is in use by another process") from None
+
+    def __enter__(self) -> FolderLock:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        os.close(self._descriptor)
+
+
 class RecordLog:
     """The records of `num_episodes` episodes in `folder`, those already there included; a context manager."""
 
     def __init__(self, folder: pathlib.Path, num_episodes: int):
         self._folder = folder
         self._num_episodes = num_episodes
-        in_order = read_whole_lines(folder / EPISODES, "episode")
+        in_order = repair_and_read_lines(folder / EPISODES, "episode")
         for number, record in enumerate(in_order):
             if record["episode"] != number:
                 raise InputError(f"{folder / EPISODES}: expected episode {number} next, found {record['episode']}")
         self._records = dict(enumerate(in_order))
-        for record in read_whole_lines(folder / JOURNAL, "episode"):
+        for record in repair_and_read_lines(folder / JOURNAL, "episode"):
             self._records.setdefault(record["episode"], record)
         self._num_written = len(in_order)
         self._episodes = open(folder / EPISODES, "a", encoding="utf-8")  # noqa: SIM115 (closed by __exit__)
         self._journal = open(folder / JOURNAL, "a", encoding="utf-8")  # noqa: SIM115
         self._write_in_order()
+
+    @property
+    def num_done(self) -> int:
+        """How many episodes have a record."""
+        return len(self._records)
 
     @property
     def missing(self) -> list[int]:
@@ -113,7 +154,7 @@ def read_json(path: pathlib.Path) -> Any:
         raise InputError(f"{path}: expected JSON, found {error}") from error
 
 
-def read_whole_lines(path: pathlib.Path, key: str) -> list[Record]:
+def repair_and_read_lines(path: pathlib.Path, key: str) -> list[Record]:
     """The records of a file of lines, each with a number `key`; a last line that a kill cut short is removed from it.
 
     Raises:

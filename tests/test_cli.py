@@ -104,7 +104,7 @@ BAD_INPUT = [
     ((*TINY, "--split", "test"), "'test' is not one of 'train', 'eval'"),
     ((*TINY, "--size", "14"), "unknown size '14'; available: 13, 15, 17, 19, 21"),
     ((*TINY, "--speed", "9"), "No such option: --speed"),
-    ((*TINY, "--checkpoint", "none"), "none: can't read the checkpoint: No such file or directory"),
+    ((*TINY, "--checkpoint", "none"), "agent 'random' reads no checkpoint; found --checkpoint none"),
     # eval: numbers
     ((*TINY, "--num-envs", "0"), "Invalid value for '--num-envs'"),
     ((*TINY, "--workers", "-1"), "Invalid value for '--workers'"),

@@ -152,3 +152,43 @@ def success_rate(actor):
     spec = TaskSpec("local", (OPEN_FIELD,), (2, 3), time_limit=25)
     trials = list(enumerate(select_trials("local", spec.mazes, False, (2, 3), 32, seed=7)))
     return np.mean([record["success"] for records in run_trials(actor, spec, trials, 64) for record in records])
+
+
+def test_actions_do_not_depend_on_what_else_is_in_the_batch():
+    """PyTorch rounds differently at another batch size; an episode's actions must not."""
+    agent = MAH(MAH.default_config, 13, seed=2)
+    rng = np.random.default_rng(0)
+    observation = {
+        "state": rng.normal(size=(77, 12)).astype(np.float32),
+        "context": (rng.random((77, 4, 13, 13)) < 0.3).astype(np.float32),
+    }
+
+    def values(rows):
+        state = agent.initial_state(len(rows))
+        part = {key: value[rows] for key, value in observation.items()}
+        agent.act(part, np.ones(len(rows), dtype=bool), state)
+        return state.code.numpy()
+
+    together = values(np.arange(77))
+    for rows in (np.array([76]), np.arange(40, 77), rng.permutation(77)):
+        np.testing.assert_array_equal(values(rows), together[rows])
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"num_envs": "0"}, "expected config key 'num_envs' from 1"),
+        ({"steps_per_update": "0"}, "expected config key 'steps_per_update' from 1"),
+        ({"hindsight_mean_offset": "0.5"}, "expected config key 'hindsight_mean_offset' from 1.0"),
+        ({"learning_rate": "nan"}, "expected config key 'learning_rate' from 0.0"),
+        ({"replay_capacity": "1000"}, "expected a replay_capacity of at least min_rows 20000"),
+    ],
+)
+def test_config_out_of_range_is_refused(values, message):
+    with pytest.raises(InputError, match=message):
+        override(DQNConfig(), values)
+
+
+def test_every_number_of_the_config_has_a_range():
+    numbers = {field.name for field in dataclasses.fields(DQNConfig) if field.type in ("int", "float")}
+    assert set(config_module._RANGES) == numbers

@@ -355,7 +355,7 @@ class TestOut:
             ({"agent": "nobody"}, "unknown agent 'nobody'; available: "),
             ({"task": "locl"}, "unknown task 'locl'; available: hierarchical, local"),
             ({"size": 14}, "unknown size '14'"),
-            ({"checkpoint": "/none"}, "can't read the checkpoint"),
+            ({"checkpoint": "/none"}, "reads no checkpoint"),
             ({"map_warp": 0.3}, r"expected map_warp from 0 to 0\.25, found 0\.3"),
         ],
     )

@@ -3,11 +3,44 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+
+from mazebench.errors import InputError
+
+# The least and the largest value of each key that has any; what is drawn or divided by must not vanish.
+_RANGES = {
+    "channels": (1, 1024),
+    "hidden": (1, 8192),
+    "num_envs": (1, 65536),
+    "n_step": (1, 100),
+    "replay_capacity": (2, 100_000_000),
+    "min_rows": (1, 100_000_000),
+    "groups": (1, 65536),
+    "steps": (1, 65536),
+    "steps_per_update": (1, 1_000_000),
+    "learning_rate": (0.0, math.inf),
+    "max_gradient_norm": (0.0, math.inf),
+    "target_rate": (0.0, 1.0),
+    "longest_value": (1.0, 1e6),
+    "hindsight_ratio": (0.0, 1.0),
+    "hindsight_mean_offset": (1.0, 1e6),
+    "hindsight_window": (1, 1_000_000),
+    "num_goals": (1, 1_000_000),
+    "localization_weight": (0.0, math.inf),
+    "priority_exponent": (0.0, 10.0),
+    "importance_exponent": (0.0, 10.0),
+    "epsilon_base": (0.0, 1.0),
+    "epsilon_alpha": (0.0, 1000.0),
+}
 
 
 @dataclasses.dataclass(frozen=True)
 class DQNConfig:
-    """Ape-X DQN (Horgan et al. 2018) with hindsight (Andrychowicz et al. 2017), sized for two CPU cores."""
+    """Ape-X DQN (Horgan et al. 2018) with hindsight (Andrychowicz et al. 2017), sized for two CPU cores.
+
+    Raises:
+      InputError: if a value is out of its range.
+    """
 
     use_context: bool = True  # MAH with, DQN-dagger without: the paper's "no task context c provided"
     channels: int = 32  # of the map encoder
@@ -34,3 +67,14 @@ class DQNConfig:
     importance_exponent: float = 0.4  # Ape-X's
     epsilon_base: float = 0.4  # Ape-X's ladder: environment i explores at base ** (1 + alpha i / (B - 1))
     epsilon_alpha: float = 7.0  # Ape-X's
+
+    def __post_init__(self):
+        for name, (lowest, highest) in _RANGES.items():
+            value = getattr(self, name)
+            if not lowest <= value <= highest:
+                raise InputError(f"expected config key {name!r} from {lowest} to {highest}, found {value}")
+        rows = self.replay_capacity // self.num_envs * self.num_envs
+        if rows < self.min_rows:
+            raise InputError(
+                f"expected a replay_capacity of at least min_rows {self.min_rows}, found one of {rows} rows"
+            )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import resources
 from typing import Any, ClassVar
 
@@ -16,11 +16,15 @@ import torch
 
 from mazebench.agent import Interface, Observation
 from mazebench.errors import InputError
+from mazebench.maps.maze import MAX_SIZE
 
 from ..checkpoint import load_checkpoint, load_into
 from ..overrides import override
 from .config import DQNConfig
 from .network import NUM_ACTIONS, QNetwork, state_features
+
+_ENCODED_AT_ONCE = 8  # contexts; few are new at a time
+_ACTED_AT_ONCE = 64  # states
 
 
 @dataclasses.dataclass
@@ -67,11 +71,13 @@ class DQN:
         Raises:
           InputError: if the checkpoint can't be used here.
         """
-        path = cls._shipped() if checkpoint is None else checkpoint
+        path = cls.default_checkpoint() if checkpoint is None else checkpoint
         tensors, metadata = load_checkpoint(path, cls.name)
         try:
             config = override(cls.default_config, metadata["config"])
             trained_size = int(metadata["context_size"])
+            if not 3 <= trained_size <= MAX_SIZE:
+                raise ValueError(f"context_size {trained_size}")
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"{path}: expected metadata with config and context_size, found {error}") from error
         agent = cls(config, trained_size, seed)
@@ -89,7 +95,8 @@ class DQN:
         return DQNLearner(cls(config, interface.context_size, seed), tuple(mazes), seed)
 
     @classmethod
-    def _shipped(cls) -> pathlib.Path:
+    def default_checkpoint(cls) -> pathlib.Path:
+        """The checkpoint that ships."""
         path = resources.files("mazebench_assets").joinpath("checkpoints", f"{cls.name}-13.safetensors")
         return pathlib.Path(str(path))
 
@@ -108,16 +115,29 @@ class DQN:
         if len(new):
             state.origin[new] = observation["state"][new, :2]
             if state.code is not None:
-                code = self.network.encode(torch.from_numpy(observation["context"][new]))
+                code = in_batches(self.network.encode, _ENCODED_AT_ONCE, torch.from_numpy(observation["context"][new]))
                 if state.code.shape[1:] != code.shape[1:]:  # maps of another size than it was trained on
                     state.code = torch.zeros(len(state.origin), *code.shape[1:])
                 state.code[new] = code
-        features = state_features(torch.from_numpy(observation["state"]), torch.from_numpy(state.origin))
-        actions = self.network(features[:, None], state.code)[:, 0].argmax(dim=-1).numpy()
+        features = state_features(torch.from_numpy(observation["state"]), torch.from_numpy(state.origin))[:, None]
+        inputs = (features,) if state.code is None else (features, state.code)
+        actions = in_batches(self.network, _ACTED_AT_ONCE, *inputs)[:, 0].argmax(dim=-1).numpy()
         if explore:
             at_random = self._rng.random(len(actions)) < self._epsilon
             actions = np.where(at_random, self._rng.integers(NUM_ACTIONS, size=len(actions)), actions)
         return actions, state
+
+
+def in_batches(function: Callable[..., torch.Tensor], size: int, *inputs: torch.Tensor) -> torch.Tensor:
+    """`function` of `inputs` `[B, ...]`, computed on `size` rows at a time, the last ones padded by zeros.
+
+    PyTorch rounds differently at another batch size; so a row's result depends on the row alone.
+    """
+    num_rows = len(inputs[0])
+    padding = -num_rows % size
+    padded = [torch.cat([values, values.new_zeros(padding, *values.shape[1:])]) for values in inputs]
+    parts = zip(*(values.split(size) for values in padded), strict=True)
+    return torch.cat([function(*part) for part in parts])[:num_rows]
 
 
 class MAH(DQN):

@@ -63,7 +63,7 @@ class QNetwork(nn.Module):
         size = planes.shape[-1]
         return torch.cat([planes, torch.cat(places, dim=-1)[:, :, None].expand(-1, -1, size)], dim=1)
 
-    def forward(self, state: torch.Tensor, code: torch.Tensor | None) -> torch.Tensor:
+    def forward(self, state: torch.Tensor, code: torch.Tensor | None = None) -> torch.Tensor:
         """Action values `[G, K, 6]` of states `[G, K, 9]` (see `state_features`) in contexts encoded as `code`."""
         features = state[..., 2:]
         if self.channels:

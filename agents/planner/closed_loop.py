@@ -104,7 +104,7 @@ class ClosedLoopPlanner:
         return cls()
 
     def __init__(self):
-        self._begins: np.ndarray | None = None
+        self._begins = np.zeros(0, dtype=bool)
 
     @staticmethod
     def context_size(size: int) -> int:
@@ -113,6 +113,7 @@ class ClosedLoopPlanner:
 
     def initial_state(self, batch_size: int) -> list[_Pilot]:
         """Pilots that know nothing yet."""
+        self._begins = np.ones(batch_size, dtype=bool)
         return [_Pilot() for _ in range(batch_size)]
 
     def seed_episodes(self, seeds: np.ndarray, mask: np.ndarray) -> None:
@@ -123,7 +124,7 @@ class ClosedLoopPlanner:
         self, observation: Observation, is_first: np.ndarray, state: list[_Pilot], explore: bool = False
     ) -> tuple[np.ndarray, list[_Pilot]]:
         """Actions `[B]`, one environment after the other."""
-        begins, self._begins = is_first if self._begins is None else self._begins, None
+        begins, self._begins = self._begins, np.zeros_like(is_first)
         size = observation["context"].shape[-1]
         actions = np.zeros(len(state), dtype=np.int64)
         for slot, values in enumerate(observation["state"].tolist()):

@@ -71,7 +71,7 @@ class MazeEnv(gymnasium.Env):
 
     def close(self) -> None:
         if self._renderer is not None:
-            self._renderer.__exit__()
+            self._renderer.close()
             self._renderer = None
 
     def _observation(self, time_step: dm_env.TimeStep) -> dict[str, np.ndarray]:

@@ -28,7 +28,7 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
 
     Args:
       options: who drives where, as for an evaluation.
-      out: an .mp4 or .gif of the episode, or a .png: of the map with the driven path, or a camera's first view.
+      out: an .mp4 or .gif of the episode, or a .png of its last moment, with the whole path on the map.
       view: a camera, "map", or "all" for all of them side by side.
       pixels: side of a view.
 
@@ -63,14 +63,16 @@ def _run(options: EvalOptions, views: tuple[str, ...], pixels: int) -> tuple[lis
     environment = Environment(task_spec)
     time_step = environment.reset(episode=trial.episode)
     state = agent.initial_state(1)
-    if hasattr(agent, "seed_episodes"):
-        agent.seed_episodes(np.array([trial.episode.seed]), np.ones(1, dtype=bool))
+    seed_episodes = getattr(agent, "seed_episodes", lambda seeds, mask: None)
     scene = _Scene(environment, task_spec, views, pixels)
     try:
         frames = [scene.draw()]
         while not time_step.last():
             observation = {key: time_step.observation[key][None] for key in ("state", "context")}
-            actions, state = agent.act(observation, np.array([environment.task.is_first]), state)
+            is_first = np.array([environment.task.is_first])
+            if is_first[0]:
+                seed_episodes(np.array([trial.episode.seed]), np.array([time_step.first()]))
+            actions, state = agent.act(observation, is_first, state)
             time_step = environment.step(int(actions[0]))
             frames.append(scene.draw())
     finally:
@@ -105,7 +107,7 @@ class _Scene:
 
     def close(self) -> None:
         if self._renderer is not None:
-            self._renderer.__exit__()
+            self._renderer.close()
 
     def _view(self, view: str) -> np.ndarray:
         if view != MAP:
@@ -119,7 +121,6 @@ class _Scene:
 
 
 def _write_png(frames: list[np.ndarray], out: pathlib.Path) -> None:
-    # A map tells most with the whole path on it; cameras are given side by side with it, at the same moment.
     write_image(frames[-1], out)
 
 

@@ -15,17 +15,17 @@ from importlib import metadata
 from typing import Any
 
 from mazebench.agent import Agent, Interface, load_agent_class
-from mazebench.errors import InputError
+from mazebench.errors import InputError, RunError
 from mazebench.evaluation import metrics
 from mazebench.evaluation.protocol import EPISODES_PER_DISTANCE, Trial, select_trials
 from mazebench.evaluation.runner import run_trials
 from mazebench.maps.benchmark import VERSION, manifest_hash
-from mazebench.records import CONFIG, SUMMARY, Record, RecordLog, read_json, write_json
+from mazebench.records import CONFIG, SUMMARY, FolderLock, Record, RecordLog, make_folder, read_json, write_json
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.registry import make_spec
 from mazebench.tasks.spec import EVAL_DISTANCES, TaskSpec
+from mazebench.world.mjcf import maze_spec
 
-_DEFAULT_SIZE = 13
 _POLL_SECONDS = 1.0  # between looks whether all workers are alive
 
 # Called with the number of episodes done and of all.
@@ -91,13 +91,30 @@ def evaluate(
         options.seed,
     )
     config = _config(options, task_spec)
-    _prepare(out, config, resume)
+    make_folder(out)
+    with FolderLock(out):
+        _prepare(out, config, resume)
+        return _fill(options, agent_class, task_spec, trials, config, out, num_envs, workers, progress)
+
+
+def _fill(
+    options: EvalOptions,
+    agent_class: type[Agent],
+    task_spec: TaskSpec,
+    trials: Sequence[Trial],
+    config: dict[str, Any],
+    out: pathlib.Path,
+    num_envs: int,
+    workers: int,
+    progress: Progress,
+) -> dict[str, Any]:
+    """Runs what `out` has no record of yet, and writes the summary."""
     with RecordLog(out, len(trials)) as log:
         todo = [(index, trials[index]) for index in log.missing]
         progress(len(trials) - len(todo), len(trials))
         for records in _run(options, agent_class, task_spec, todo, num_envs, workers):
             log.add([{**config["record"], **record, **config["perturbation"]} for record in records])
-            progress(len(log.records), len(trials))
+            progress(log.num_done, len(trials))
         summary = {
             **config["record"],
             "benchmark": VERSION,
@@ -154,7 +171,7 @@ def provenance(options: EvalOptions) -> dict[str, Any]:
     packages = ("mazebench-mujoco", "mujoco", "dm-control", "numpy", "scipy", "opencv-python-headless", "torch")
     return {
         "benchmark_manifest_sha256": manifest_hash(),
-        "checkpoint_sha256": _hash_of(options.checkpoint),
+        "checkpoint_sha256": _hash_of(_checkpoint(options, load_agent_class(options.agent))),
         "options": dataclasses.asdict(options),
         "command": [pathlib.Path(sys.argv[0]).name, *sys.argv[1:]],
         "python": platform.python_version(),
@@ -179,7 +196,8 @@ def _config(options: EvalOptions, task_spec: TaskSpec) -> dict[str, Any]:
         },
         "benchmark_manifest_sha256": manifest_hash(),
         "mazes_sha256": hashlib.sha256(b"".join(maze.walls.tobytes() for maze in task_spec.mazes)).hexdigest(),
-        "checkpoint_sha256": _hash_of(options.checkpoint),
+        "world_sha256": hashlib.sha256(maze_spec(task_spec.mazes[0]).to_xml().encode("utf-8")).hexdigest(),
+        "checkpoint_sha256": _hash_of(_checkpoint(options, load_agent_class(options.agent))),
         "distances": list(options.distances),
         "episodes_per_distance": options.episodes_per_distance,
         "landmark_distance": options.landmark_distance,
@@ -189,16 +207,9 @@ def _config(options: EvalOptions, task_spec: TaskSpec) -> dict[str, Any]:
 
 def _prepare(out: pathlib.Path, config: dict[str, Any], resume: bool) -> None:
     """Makes `out` ready to hold the run of `config`, or refuses."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        found = sorted(path.name for path in out.iterdir())
-    except OSError as error:
-        raise InputError(f"{out}: can't write there: {error.strerror}") from error
-    if not found or found == [f"{CONFIG}.tmp"]:
-        try:
-            write_json(out / CONFIG, config)
-        except OSError as error:
-            raise InputError(f"{out}: can't write there: {error.strerror}") from error
+    found = sorted(path.name for path in out.iterdir())
+    if set(found) <= {f"{CONFIG}.tmp"}:
+        write_json(out / CONFIG, config)
         return
     if CONFIG not in found:
         raise InputError(f"{out}: expected an empty folder or an evaluation's, found {found[0]!r} in it")
@@ -250,7 +261,7 @@ def _run_in_processes(
             except queue.Empty:
                 dead = [process.exitcode for process in processes if process.exitcode]
                 if dead:
-                    raise RuntimeError(f"a worker ended with exit status {dead[0]}; go on with --resume") from None
+                    raise RunError(f"a worker ended with exit status {dead[0]}; go on with --resume") from None
                 continue
             missing -= len(records)
             yield records
@@ -265,6 +276,20 @@ def _work(options: EvalOptions, todo: Sequence[tuple[int, Trial]], num_envs: int
     task_spec = make_task_spec(options, agent_class)
     for records in run_trials(build_agent(options, agent_class, task_spec), task_spec, todo, num_envs, num_threads=1):
         results.put(records)
+
+
+def _checkpoint(options: EvalOptions, agent_class: type[Agent]) -> str | None:
+    """The file that the agent is read from, None for one that doesn't learn.
+
+    Raises:
+      InputError: if a checkpoint is given to an agent that reads none.
+    """
+    default = getattr(agent_class, "default_checkpoint", None)
+    if options.checkpoint is None:
+        return None if default is None else str(default())
+    if default is None and not hasattr(agent_class, "build_learner") and ":" not in options.agent:
+        raise InputError(f"agent {options.agent!r} reads no checkpoint; found --checkpoint {options.checkpoint}")
+    return options.checkpoint
 
 
 def _hash_of(path: str | None) -> str | None:

@@ -25,7 +25,7 @@ def run_trials(
       agent: acts greedily; only its `initial_state`, `seed_episodes` and `act` are called.
       task_spec: the task, with the mazes the trials index.
       trials: (index, trial) of the episodes to run.
-      num_envs: environments side by side; the records do not depend on it.
+      num_envs: environments side by side; the records of an agent that keeps to its contract do not depend on it.
       num_threads: of the simulation, 0 for all cores.
     """
     if not trials:
@@ -44,7 +44,7 @@ def run_trials(
     begins = np.ones(num_envs, dtype=bool)
     seed_episodes = getattr(agent, "seed_episodes", None)
     while any(running):
-        if seed_episodes is not None and begins.any():
+        if seed_episodes is not None and info["is_first"].any():
             seed_episodes(np.array([trial[1].episode.seed if trial else 0 for trial in running]), begins)
         actions, state = agent.act(observation, info["is_first"], state)
         ran = list(running)

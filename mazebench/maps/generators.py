@@ -11,7 +11,7 @@ from scipy import ndimage
 from mazebench.errors import InputError, unknown
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, Cell, Maze
 
-# Share of the walls between two corridors that are opened. With it, 91 % of 13 x 13 mazes have the paper's 3 to 6
+# Share of the walls between two corridors that are opened. With it, over 90 % of 13 x 13 mazes have the paper's 3 to 6
 # landmarks at distance 5 from corner to corner (docs/maps.md has the distribution over 1,000 mazes).
 DFS_OPENINGS = 0.10
 _OBSTACLE_DENSITY = 0.25  # share of the inner cells that become walls

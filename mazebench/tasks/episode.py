@@ -53,7 +53,8 @@ class Route:
         next_goal: Callable[[Cell], Cell] | None = None,
     ):
         self.cells = cells
-        self.leg = 0
+        self.leg = 0  # counted from 0
+        self._first = 0  # the current leg starts at this place in `cells`
         self._goals_left = num_goals - 1
         self._next_goal = next_goal
         self.deadline = time_limit  # the episode's step after which the current leg has timed out
@@ -62,12 +63,12 @@ class Route:
     @property
     def start(self) -> Cell:
         """Where the current leg starts."""
-        return self.cells[self.leg]
+        return self.cells[self._first]
 
     @property
     def target(self) -> Cell:
         """Where the current leg leads."""
-        return self.cells[self.leg + 1]
+        return self.cells[self._first + 1]
 
     @property
     def goal(self) -> Cell:
@@ -84,12 +85,12 @@ class Route:
         if self._goals_left and self._next_goal is not None:
             self._goals_left -= 1
             self.cells = [cell, self._next_goal(cell)]
-            self.deadline = step + self._time_limit
-            return Event.LANDMARK
-        if cell == self.goal:
+        elif cell == self.goal:
             return Event.REACHED
-        if self.target == self.goal:
+        elif self.target == self.goal:
             return Event.TIMEOUT
+        else:
+            self._first += 1
         self.leg += 1
         self.deadline = step + self._time_limit
         return Event.LANDMARK

@@ -24,7 +24,7 @@ class Navigation(control.Task):
       state: `[12]` float32: x, y, z (m); roll, pitch, yaw (rad, yaw in [-pi, pi)); velocity forward, left, up (m/s);
         angular velocity about the body's x, y, z (rad/s). With `position_noise`, x and y are noisy.
       context: `[4, M, M]` float32, constant until the next landmark: the map, the map around the start, goal, start.
-      is_first: bool, hierarchical task only: this context is new, at a landmark as at the start of an episode.
+      is_first: bool, only where an episode has several legs: this context is new, as at the start of an episode.
 
     Reward: -1 a step, 0 for the step that reaches the goal cell; never discounted on the way.
 
@@ -101,7 +101,7 @@ class Navigation(control.Task):
         if self._noise is not None:
             state[:2] += self._noise.normal(0.0, self.spec.perturbation.position_noise, size=2)
         observation = {"state": state.astype(np.float32), "context": self._context.copy()}
-        if self.spec.task == "hierarchical":
+        if self.spec.has_legs:
             observation["is_first"] = np.array(self._is_first)
         return observation
 
@@ -120,7 +120,7 @@ class Navigation(control.Task):
             "state": specs.Array((STATE_SIZE,), np.float32, name="state"),
             "context": specs.BoundedArray((NUM_PLANES, size, size), np.float32, 0.0, 1.0, name="context"),
         }
-        if self.spec.task == "hierarchical":
+        if self.spec.has_legs:
             result["is_first"] = specs.Array((), bool, name="is_first")
         return result
 

@@ -112,6 +112,11 @@ class TaskSpec:
             raise InputError(f"expected mazes of one size, found sizes {sizes}")
         return sizes[0]
 
+    @property
+    def has_legs(self) -> bool:
+        """Whether the context may change within an episode: at landmarks, or where a goal follows another."""
+        return self.task == "hierarchical" or self.num_goals > 1
+
     @functools.cached_property
     def models(self) -> MazeModels:
         """The MuJoCo models of `mazes`, shared by all environments that play this task."""

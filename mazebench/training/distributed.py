@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from mazebench.agent import ExploringAgent, LearningAgent
-from mazebench.errors import InputError
+from mazebench.errors import InputError, RunError
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector, Experience
 
@@ -69,16 +69,21 @@ class RaySource:
             raise InputError(
                 f"expected at most {learner.num_envs} workers, one an environment, found {options.workers}"
             )
+        self._players: list[Any] = []
         self._started = not ray.is_initialized()
         try:
             if self._started:
                 ray.init(address=options.ray_address, log_to_driver=False, include_dashboard=False)
         except (ConnectionError, ValueError) as error:
             raise InputError(f"can't reach a Ray cluster at {options.ray_address!r}: {error}") from error
+        num_cpus = int(ray.cluster_resources().get("CPU", 0))
+        if num_cpus < options.workers:
+            self.__exit__()
+            raise InputError(f"expected at most {num_cpus} workers, one a CPU of the cluster, found {options.workers}")
         self._learner, self._task_spec = learner, task_spec
         bounds = [worker * learner.num_envs // options.workers for worker in range(options.workers + 1)]
         self._shares = list(itertools.pairwise(bounds))
-        self._players: list[Any] = [None] * options.workers
+        self._players = [None] * options.workers
         self._calls: dict[Any, int] = {}  # the worker of each answer that is awaited
         self._num_answers = [0] * options.workers
         self._num_failures = self._seed = 0
@@ -125,7 +130,7 @@ class RaySource:
     def _replace(self, worker: int, error: Exception) -> None:
         self._num_failures += 1
         if self._num_failures > _MAX_FAILURES:
-            raise RuntimeError(f"{_MAX_FAILURES} Ray actors died, the last of: {str(error).splitlines()[0]}") from error
+            raise RunError(f"{_MAX_FAILURES} Ray actors died, the last of: {str(error).splitlines()[0]}") from error
         print(f"mazebench: Ray actor {worker} died; it is replaced", file=sys.stderr)
         self._start(worker)
 

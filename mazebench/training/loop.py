@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mazebench.agent import Interface, LearningAgent, load_agent_class
-from mazebench.errors import InputError
+from mazebench.errors import InputError, RunError
 from mazebench.evaluation.protocol import select_trials
 from mazebench.evaluation.runner import run_trials
 from mazebench.maps.generators import generate
@@ -28,7 +28,7 @@ _HELD_OUT_DISTANCES = (2, 4, 6, 8, 10)
 _HELD_OUT_EPISODES = 2  # for each maze and distance
 
 
-class TrainingError(RuntimeError):
+class TrainingError(RunError):
     """A run can't go on; what it saved is intact."""
 
 
@@ -64,6 +64,8 @@ def train(
     """
     if options.minutes is None and options.env_steps is None:
         raise InputError("expected --minutes or --env-steps, found neither")
+    if options.ray_address is not None and not options.workers:
+        raise InputError("--ray needs --workers, the number of actors on the cluster")
     agent_class = load_agent_class(options.agent)
     if not hasattr(agent_class, "build_learner"):
         raise InputError(f"agent {options.agent!r} doesn't learn: its class has no build_learner")
@@ -87,6 +89,7 @@ class _Run:
     ):
         self._options, self._folder, self._learner, self._report = options, folder, learner, report
         self._held_out = _held_out_spec(task_spec, options.eval_mazes)
+        self._trials = select_trials("local", self._held_out.mazes, False, _HELD_OUT_DISTANCES, _HELD_OUT_EPISODES)
         self._task_spec = task_spec
         self._env_steps = self._updates = self._saved_steps = 0
         self._sums: dict[str, float] = {}  # of what updates returned since the last line
@@ -94,22 +97,29 @@ class _Run:
 
     def run(self, resume: bool) -> None:
         """Trains until the time or the steps are up."""
+        # Before anything is written: a cluster that can't be had must not leave a run behind.
+        with self._make_source() as source:
+            self._train(source, resume)
+
+    def _train(self, source: Source, resume: bool) -> None:
         self._open(resume)
         self._begin = self._last_line = time.monotonic()
+        if self._options.env_steps is not None and self._env_steps >= self._options.env_steps:
+            self._report(1.0, f"{self._folder.path}: the run is finished, at {self._env_steps:,} steps")
+            return
         self._steps_at_last_line = self._env_steps
         self._report(0.0, f"{self._options.agent}: {self._learner.description()}")
-        with self._make_source() as source:
-            self._restart(source)
-            while not self._is_over():
-                for first_env, experience in source.collect():
-                    self._learner.observe(experience, first_env)
-                    self._env_steps += len(experience.action)
-                self._learn()
-                if self._env_steps >= self._next_checkpoint:
-                    self._checkpoint()
-                    self._restart(source)
-            if self._env_steps > self._saved_steps:
+        self._restart(source)
+        while not self._is_over():
+            for first_env, experience in source.collect():
+                self._learner.observe(experience, first_env)
+                self._env_steps += len(experience.action)
+            self._learn()
+            if self._env_steps >= self._next_checkpoint:
                 self._checkpoint()
+                self._restart(source)
+        if self._env_steps > self._saved_steps:
+            self._checkpoint()
 
     def _open(self, resume: bool) -> None:
         config = {
@@ -189,15 +199,17 @@ class _Run:
 
     def _save(self) -> None:
         counters = {"env_steps": self._env_steps, "updates": self._updates}
-        provenance = {**counters, "agent": self._options.agent, "size": self._options.size, "seed": self._options.seed}
+        provenance = {**counters, "agent": self._options.agent, "size": self._options.size}
+        provenance |= {"pairs": self._options.pairs, "seed": self._options.seed}
         self._folder.save_checkpoint(self._env_steps, counters, lambda folder: self._learner.save(folder, provenance))
         self._saved_steps = self._env_steps
 
     def _evaluate(self) -> dict[int, float]:
         """Success rate by distance in mazes drawn like the training ones, but never trained in."""
-        trials = select_trials("local", self._held_out.mazes, False, _HELD_OUT_DISTANCES, _HELD_OUT_EPISODES)
         reached: dict[int, list[bool]] = {distance: [] for distance in _HELD_OUT_DISTANCES}
-        for records in run_trials(self._learner.actor, self._held_out, list(enumerate(trials)), len(trials)):
+        for records in run_trials(
+            self._learner.actor, self._held_out, list(enumerate(self._trials)), len(self._trials)
+        ):
             for record in records:
                 reached[record["distance"]].append(record["success"])
         return {distance: float(np.mean(successes)) for distance, successes in reached.items()}

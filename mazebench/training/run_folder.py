@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import pathlib
@@ -10,16 +9,13 @@ import shutil
 from collections.abc import Callable
 from typing import Any
 
-import tensorboardX
-
-from mazebench.errors import InputError
-from mazebench.records import read_json, read_whole_lines, to_line, write_json
+from mazebench.errors import InputError, RunError
+from mazebench.records import FolderLock, make_folder, read_json, repair_and_read_lines, to_line, write_json
 
 CONFIG = "config.json"
 METRICS = "metrics.jsonl"
 CHECKPOINTS = "checkpoints"
 COUNTERS = "counters.json"
-_LOCK = "lock"
 _BOARD = "tensorboard"
 _KEPT_CHECKPOINTS = 2
 
@@ -35,16 +31,14 @@ class RunFolder:
         """
         self.path = path
         self._board: Any = None
-        try:
-            (path / CHECKPOINTS).mkdir(parents=True, exist_ok=True)
-            self._lock = open(path / _LOCK, "w", encoding="ascii")  # noqa: SIM115 (held until __exit__)
-        except OSError as error:
-            raise InputError(f"{path}: can't write there: {error.strerror}") from error
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self._lock.close()
-            raise InputError(f"{path}: is in use by another process") from None
+        found = sorted(item.name for item in path.iterdir()) if path.is_dir() else []
+        if CONFIG not in found and set(found) - {f"{CONFIG}.tmp", CHECKPOINTS}:
+            raise InputError(f"{path}: expected an empty folder or a training run's, found {found[0]!r} in it")
+        make_folder(path)
+        self._lock = FolderLock(path)
+        (path / CHECKPOINTS).mkdir(exist_ok=True)
+        if CONFIG not in found and self.checkpoints():
+            raise InputError(f"{path}: expected {CONFIG} beside the checkpoints, found none")
 
     def checkpoints(self) -> list[pathlib.Path]:
         """The complete checkpoints, oldest first."""
@@ -54,7 +48,7 @@ class RunFolder:
         """Lets `save` fill a new checkpoint, which then takes its place at once; the last two are kept.
 
         Raises:
-          InputError: if it can't be written; the checkpoints before are intact.
+          RunError: if it can't be written; the checkpoints before are intact.
         """
         final = self.path / CHECKPOINTS / f"{env_steps:012d}"
         temporary = final.with_suffix(".tmp")
@@ -68,7 +62,7 @@ class RunFolder:
         except OSError as error:
             shutil.rmtree(temporary, ignore_errors=True)
             last = next(reversed(self.checkpoints()), None)
-            raise InputError(f"{final}: can't save: {error.strerror}; the last checkpoint is {last}") from error
+            raise RunError(f"{final}: can't save: {error.strerror}; the last checkpoint is {last}") from error
         for old in self.checkpoints()[:-_KEPT_CHECKPOINTS]:
             shutil.rmtree(old)
 
@@ -78,6 +72,8 @@ class RunFolder:
             file.write(to_line(metrics))
         step = metrics["env_steps"]
         if self._board is None:
+            import tensorboardX
+
             # A resumed run takes steps again: what TensorBoard shows of them from before is purged.
             self._board = tensorboardX.SummaryWriter(str(self.path / _BOARD), purge_step=step)
         for name, value in metrics.items():
@@ -87,7 +83,7 @@ class RunFolder:
     def forget_metrics_after(self, env_steps: int) -> None:
         """Removes the metrics of steps that a resumed run takes again."""
         path = self.path / METRICS
-        kept = [line for line in read_whole_lines(path, "env_steps") if line["env_steps"] <= env_steps]
+        kept = [line for line in repair_and_read_lines(path, "env_steps") if line["env_steps"] <= env_steps]
         temporary = path.with_suffix(".tmp")
         temporary.write_text("".join(map(to_line, kept)), encoding="utf-8")
         temporary.replace(path)
@@ -114,4 +110,4 @@ class RunFolder:
     def __exit__(self, *exception: object) -> None:
         if self._board is not None:
             self._board.close()
-        self._lock.close()
+        self._lock.__exit__()

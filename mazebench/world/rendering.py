@@ -46,5 +46,8 @@ class Renderer:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        # Left to the interpreter's exit, the context would be closed after what it needs is gone, noisily.
+        self.close()
+
+    def close(self) -> None:
+        """Closes the context. Left to the interpreter's exit, that would come after what it needs is gone, noisily."""
         self._renderer.close()
