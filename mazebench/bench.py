@@ -6,6 +6,7 @@ Each ratio is the median over rounds in which the two sides take turns, so that 
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 import resource
 import statistics
@@ -35,6 +36,13 @@ from mazebench.world.mjcf import ACTIONS, PHYSICS_TIMESTEP, STEPS_PER_ACTION, ac
 _SIZES = (13, 21, 51, 101)
 _NUM_ENVS = (1, 16, 256, 1024, 4096)
 _MAZES_PER_SIZE = 8
+_TITLES = {
+    "environments": "agent steps a second, beside the bare simulation's",
+    "training": "training, and where its time goes",
+    "resets": "resets",
+    "sizes": "against the size of the maze",
+    "num_envs": "against the number of environments",
+}
 _SECONDS, _ROUNDS = 0.5, 7  # of each side of a ratio
 _QUICK_SECONDS, _QUICK_ROUNDS = 0.1, 3
 
@@ -76,11 +84,11 @@ def print_tables(results: dict[str, Any]) -> None:
     """Prints what `run` returned, for people."""
     console = Console(markup=False)
     print(f"{results['machine']['cores']} cores, MuJoCo {results['machine']['mujoco']}")
-    for name in ("environments", "training", "resets", "sizes", "num_envs"):
+    for name, title in _TITLES.items():
         rows = results[name]
         if not rows:  # training, where no learning agent is installed
             continue
-        table = Table(box=box.SIMPLE, title=name.replace("_", " "), title_justify="left")
+        table = Table(box=box.SIMPLE, title=title, title_justify="left", pad_edge=False, padding=(0, 1, 0, 0))
         for column in rows[0]:
             table.add_column(column, justify="left" if column == "what" else "right")
         for row in rows:
@@ -191,7 +199,7 @@ def _random_maze_row(spec: TaskSpec, seconds: float, rounds: int) -> dict[str, A
 
 
 def _training_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
-    """Where a learner's time goes, for each learning agent that is installed, in as many environments as it wants."""
+    """Where a learner's time goes, for each learning agent that is installed, in 256 environments where it can."""
     rows = []
     for name in agent_names():
         try:
@@ -205,7 +213,10 @@ def _training_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
 
 def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -> dict[str, Any]:
     interface = Interface("local", spec.size, spec.context_size)
-    learner = agent_class.build_learner(interface, spec.mazes)
+    try:
+        learner = agent_class.build_learner(interface, spec.mazes, overrides={"num_envs": "256"})
+    except InputError:  # it calls its number of environments by another name, or has none
+        learner = agent_class.build_learner(interface, spec.mazes)
     collector = Collector(dataclasses.replace(spec, **learner.task_options()), learner.num_envs, seed=0)
     learner.actor.explore_from(0, learner.num_envs, seed=0)
     state = learner.actor.initial_state(learner.num_envs)
@@ -273,7 +284,7 @@ def _size_row(size: int, seconds: float, rounds: int) -> dict[str, Any]:
     for index in range(len(mazes)):
         spec.models[index]
     compiled = (time.perf_counter() - begin) / len(mazes)
-    row = _ratio(f"{size} x {size}, 256 environments", 256, *_vector_pair(spec, 256, 0), seconds, rounds)
+    row = _ratio(f"{size} x {size}", 256, *_vector_pair(spec, 256, 0), seconds, rounds)
     # Padding included; floor and body are the two other geoms.
     return {**row, "compile ms": 1e3 * compiled, "walls": spec.models[0].ngeom - 2}
 
@@ -281,16 +292,24 @@ def _size_row(size: int, seconds: float, rounds: int) -> dict[str, Any]:
 def _num_envs_row(spec: TaskSpec, num_envs: int, seconds: float, rounds: int) -> dict[str, Any]:
     with _memory_growth() as grown:
         env = MazeVectorEnv(spec, num_envs, seed=0)
-        env.reset()
-    del env
+        observation = env.reset()
+    del env, observation
     row = _ratio(f"{num_envs} environments", num_envs, *_vector_pair(spec, num_envs, 0), seconds, rounds)
     return {**row, "KiB an environment": grown[0] / num_envs}
 
 
 @contextmanager
 def _memory_growth() -> Iterator[list[float]]:
-    """Yields a list whose only element becomes the growth, in KiB, of the process's largest memory: a lower bound."""
+    """Yields a list whose only element becomes the growth, in KiB, of the memory that the process holds (on Linux)."""
     grown = [0.0]
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    before = _resident_kib()
     yield grown
-    grown[0] = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+    grown[0] = _resident_kib() - before
+
+
+def _resident_kib() -> float:
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:
+            return int(file.read().split()[1]) * resource.getpagesize() / 1024
+    except OSError:
+        return math.nan

@@ -1,0 +1,33 @@
+"""The throughput tables: that they can be measured, not what they say."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from mazebench import bench
+from mazebench.maps.benchmark import load_mazes
+from mazebench.tasks.spec import TaskSpec
+
+SPEC = TaskSpec("local", load_mazes(13, "train")[:2])
+
+
+def test_ratio_of_an_environment_to_the_bare_simulation_is_measured():
+    row = bench._ratio("dm_env", 1, *bench._dm_env_pair(SPEC), seconds=0.05, rounds=2)
+    assert row["steps/s"] > 0
+    assert 0 < row["ratio"] < 2
+
+
+def test_resets_are_measured():
+    rows = bench._resets(SPEC, 3)
+    assert len(rows) == 3
+    assert all(row["ms"] > 0 for row in rows)
+
+
+@pytest.mark.slow
+def test_bench_command_prints_json():
+    command = [sys.executable, "-m", "mazebench", "bench", "--quick", "--json"]
+    results = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    assert {row["what"] for row in results["training"]} >= {"mah, 256 environments", "dqn, 256 environments"}
+    assert [row["what"] for row in results["num_envs"]][-1] == "4096 environments"

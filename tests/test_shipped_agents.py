@@ -1,0 +1,37 @@
+"""The trained agents that ship: they load, keep the contract, and do what their page says, far from it at least not."""
+
+import json
+
+import pytest
+from mazebench_agents.checkpoint import load_checkpoint
+
+from mazebench import testing
+from mazebench.agent import load_agent_class
+from mazebench.evaluation.harness import EvalOptions, evaluate
+
+SHIPPED = ("mah", "dqn")
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_agent_keeps_the_contract(name):
+    testing.check_agent(load_agent_class(name))
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_checkpoint_has_its_config_and_curve_beside_it(name):
+    path = load_agent_class(name).default_checkpoint()
+    _, metadata = load_checkpoint(path, name)
+    config = json.loads(path.with_name(f"{name}-13.config.json").read_text())
+    curve = [json.loads(line) for line in path.with_name(f"{name}-13.metrics.jsonl").read_text().splitlines()]
+    assert metadata["config"] == config["agent_config"]
+    assert metadata["provenance"]["env_steps"] == curve[-1]["env_steps"]
+
+
+def test_shipped_mah_reaches_near_goals_in_its_training_mazes(tmp_path):
+    options = EvalOptions(agent="mah", split="train", distances=(2, 4), episodes_per_distance=2)
+    assert evaluate(options, tmp_path / "mah")["overall"]["success_rate"] > 0.9
+
+
+def test_shipped_dqn_without_a_map_does_not(tmp_path):
+    options = EvalOptions(agent="dqn", split="train", distances=(4,), episodes_per_distance=2)
+    assert evaluate(options, tmp_path / "dqn")["overall"]["success_rate"] < 0.6
