@@ -13,7 +13,7 @@ import safetensors
 import safetensors.torch
 import torch
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, read_at_most
 
 FORMAT = "mazebench-agent-1"
 AGENT_FILE = "agent.safetensors"
@@ -70,11 +70,7 @@ def load_into(path: pathlib.Path, module: torch.nn.Module, tensors: Mapping[str,
 
 
 def _read(path: pathlib.Path) -> bytes:
-    try:
-        with path.open("rb") as file:
-            content = file.read(_MAX_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: can't read the checkpoint: {error.strerror}") from error
+    content = read_at_most(path, _MAX_BYTES, "checkpoint")
     if len(content) > _MAX_BYTES:
         raise InputError(f"{path}: expected a checkpoint of at most {_MAX_BYTES} bytes, found more")
     return content

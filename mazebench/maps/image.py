@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import cv2
 import numpy as np
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, read_at_most
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, Cell, Maze, MazeError
 
 _MAX_BYTES = 32 * 2**20
@@ -96,11 +96,7 @@ def read_image_maze(path: str | pathlib.Path, size: int | None = None) -> Maze:
       MazeError: if it is too large, no such picture, or shows no legal maze.
     """
     path = pathlib.Path(path)
-    try:
-        with path.open("rb") as file:
-            content = file.read(_MAX_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: can't read the picture: {error.strerror}") from error
+    content = read_at_most(path, _MAX_BYTES, "picture")
     return maze_from_image(_decode(content, str(path)), size, path.stem)
 
 

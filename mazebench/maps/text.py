@@ -6,7 +6,7 @@ import pathlib
 
 import numpy as np
 
-from mazebench.errors import InputError
+from mazebench.errors import read_at_most
 from mazebench.maps.maze import MAX_SIZE, Maze, MazeError
 
 _WALL = "#*1"
@@ -54,11 +54,7 @@ def read_text_maze(path: str | pathlib.Path) -> Maze:
       MazeError: if it is too large, not text or not a legal maze.
     """
     path = pathlib.Path(path)
-    try:
-        with path.open("rb") as file:
-            content = file.read(_MAX_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: can't read the map: {error.strerror}") from error
+    content = read_at_most(path, _MAX_BYTES, "map")
     if len(content) > _MAX_BYTES:
         raise MazeError(
             f"{path}: expected a map of at most {_MAX_BYTES} bytes ({MAX_SIZE} x {MAX_SIZE} cells), found more"
