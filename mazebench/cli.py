@@ -268,14 +268,15 @@ def _training_progress() -> Iterator[Any]:
 
     console = Console()
     if not console.is_terminal:
-        yield lambda share, line: print(line, flush=True)
+        yield lambda share, line: line and print(line, flush=True)
         return
     with Progress(BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), console=console) as bar:
         task = bar.add_task("", total=1.0)
 
         def report(share: float, line: str) -> None:
             bar.update(task, completed=share)
-            console.print(line, markup=False, highlight=False)
+            if line is not None:
+                console.print(line, markup=False, highlight=False)
 
         yield report
 

@@ -84,6 +84,16 @@ def test_resume_reports_no_step_twice(tmp_path):
     assert [line["env_steps"] for line in metrics(tmp_path)] == [800, 1600]
 
 
+def test_resume_says_whether_the_run_goes_on_or_is_finished(unbroken, tmp_path):
+    lines: list[str | None] = []
+    train(tiny_options(env_steps=2400), unbroken, resume=True, report=lambda share, line: lines.append(line))
+    assert lines[-1] == f"{unbroken}: the run is finished, at 2,400 steps"
+    assert not any("resuming" in line for line in lines if line)
+    train(tiny_options(env_steps=800), tmp_path)
+    train(tiny_options(env_steps=1600), tmp_path, resume=True, report=lambda share, line: lines.append(line))
+    assert f"resuming {tmp_path} at 800 steps" in lines
+
+
 def test_folder_of_a_run_is_refused_without_resume_and_for_another_config(unbroken):
     with pytest.raises(InputError, match="holds a run already"):
         train(tiny_options(env_steps=2400), unbroken)

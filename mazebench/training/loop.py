@@ -49,8 +49,8 @@ class TrainOptions:
     ray_address: str | None = None  # of a cluster; None starts one on this machine
 
 
-# Told how far the sitting is, 0 to 1, and what there is to say.
-Report = Callable[[float, str], None]
+# Told how far the sitting is, 0 to 1, now and then with a line of what there is to say.
+Report = Callable[[float, str | None], None]
 
 
 def train(
@@ -107,6 +107,8 @@ class _Run:
         if self._options.env_steps is not None and self._env_steps >= self._options.env_steps:
             self._report(1.0, f"{self._folder.path}: the run is finished, at {self._env_steps:,} steps")
             return
+        if self._env_steps:
+            self._report(0.0, f"resuming {self._folder.path} at {self._env_steps:,} steps")
         self._steps_at_last_line = self._env_steps
         self._report(0.0, f"{self._options.agent}: {self._learner.description()}")
         self._restart(source)
@@ -115,6 +117,7 @@ class _Run:
                 self._learner.observe(experience, first_env)
                 self._env_steps += len(experience.action)
             self._learn()
+            self._report(min(1.0, self._share()), None)
             if self._env_steps >= self._next_checkpoint:
                 self._checkpoint()
                 self._restart(source)
@@ -142,7 +145,6 @@ class _Run:
         self._saved_steps = self._env_steps
         self._learner.load(checkpoints[-1])
         self._folder.forget_metrics_after(self._env_steps)
-        self._report(0.0, f"resuming {self._folder.path} at {self._env_steps:,} steps")
 
     def _make_source(self) -> Source:
         if self._options.workers:
