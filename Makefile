@@ -15,7 +15,7 @@ eval: .venv/installed
 	$(BIN)/mazebench eval --agent $(AGENT)
 
 test: .venv/installed
-	$(BIN)/pytest -m "not slow"
+	$(BIN)/pytest -n auto -m "not slow"
 
 check: .venv/installed
 	$(BIN)/ruff format --check .
