@@ -6,6 +6,7 @@ Each ratio is the median over rounds in which the two sides take turns, so that 
 from __future__ import annotations
 
 import dataclasses
+import logging
 import math
 import os
 import resource
@@ -172,6 +173,8 @@ def _gym_pair(spec: TaskSpec) -> tuple[Step, Step]:
 
 def _random_maze_row(spec: TaskSpec, seconds: float, rounds: int) -> dict[str, Any]:
     """dm_control's RandomMazeWithTargets with a rolling ball, as many physics steps an action as here."""
+    # Its warning of a walker without a free joint means nothing here.
+    logging.getLogger("absl").setLevel(logging.ERROR)
     from dm_control import composer
     from dm_control.locomotion.arenas import mazes
     from dm_control.locomotion.tasks import random_goal_maze
@@ -242,7 +245,7 @@ def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -
     learning = elapsed / updates * (learner.num_updates_due(10**9) / 10**9)
     total = collecting + learning
     return {
-        "what": f"{name}, {learner.num_envs} environments",
+        "what": f"{name}, {learner.num_envs} envs",
         "collected steps/s": round(1 / collecting),
         "updates/s": updates / elapsed,
         "trained steps/s": round(1 / total),

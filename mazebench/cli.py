@@ -152,7 +152,7 @@ def evaluate(
     ] = 0.0,
     position_noise: Annotated[float, typer.Option(help="Standard deviation of the noise on x and y, in metres.")] = 0.0,
     checkpoint: Annotated[
-        pathlib.Path | None, typer.Option(help="Of a learned agent; the shipped one if not given.")
+        pathlib.Path | None, typer.Option(help="Of a learned agent, or its run folder; the shipped one if not given.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the agent's draws, and of episodes that are not frozen.")] = 0,
     out: Annotated[
@@ -189,8 +189,9 @@ def evaluate(
         print(f"{folder}: the run is finished")
         table.print_summary(read_json(folder / SUMMARY))
         return
-    if resume and folder.exists() and any(folder.iterdir()):
-        print(f"resuming {folder}")
+    if resume:
+        begun = folder.is_dir() and any(folder.iterdir())
+        print(f"resuming {folder}" if begun else f"nothing to resume in {folder}; starting anew")
     with _progress(f"{agent}, {task.value}") as advance:
         summary = harness.evaluate(options, folder, resume=resume, num_envs=num_envs, workers=workers, progress=advance)
     table.print_summary(summary)
@@ -199,11 +200,13 @@ def evaluate(
 
 def _new_folder(options: Any) -> pathlib.Path:
     """A folder in results/ that no run has."""
-    now = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
+    # With the process, for runs that start in the same second.
+    now = f"{datetime.datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}"
     name = f"{options.agent.replace(':', '-')}-{options.task}-{now}"
     for number in range(1000):
         folder = pathlib.Path("results") / (f"{name}-{number}" if number else name)
         if not folder.exists():
+            print(f"writing to {folder}", file=sys.stderr)
             return folder
     raise InputError(f"results/{name}: exists a thousand times over; give --out")
 
@@ -250,7 +253,7 @@ def train(
     folder = out or pathlib.Path("runs") / f"{agent.replace(':', '-')}-{size}-{seed}"
     with _training_progress() as report:
         loop.train(options, folder, resume, report)
-    print(f"run in {folder}")
+    print(f"run in {folder}; evaluate it by: mazebench eval --agent {agent} --checkpoint {folder}")
 
 
 def _parse_override(text: str) -> tuple[str, str]:

@@ -29,5 +29,5 @@ def test_resets_are_measured():
 def test_bench_command_prints_json():
     command = [sys.executable, "-m", "mazebench", "bench", "--quick", "--json"]
     results = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-    assert {row["what"] for row in results["training"]} >= {"mah, 256 environments", "dqn, 256 environments"}
+    assert {row["what"] for row in results["training"]} >= {"mah, 256 envs", "dqn, 256 envs"}
     assert [row["what"] for row in results["num_envs"]][-1] == "4096 environments"

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import inspect
 import multiprocessing
 import os
 import pathlib
 import platform
 import queue
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from importlib import metadata
 from typing import Any
@@ -148,7 +151,7 @@ def make_task_spec(options: EvalOptions, agent_class: type[Agent]) -> TaskSpec:
 def build_agent(options: EvalOptions, agent_class: type[Agent], task_spec: TaskSpec) -> Agent:
     """The agent for a task."""
     interface = Interface(options.task, task_spec.size, task_spec.context_size)
-    checkpoint = None if options.checkpoint is None else pathlib.Path(options.checkpoint)
+    checkpoint = None if options.checkpoint is None else _newest_checkpoint(pathlib.Path(options.checkpoint))
     return agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)
 
 
@@ -196,6 +199,7 @@ def _config(options: EvalOptions, task_spec: TaskSpec) -> dict[str, Any]:
         },
         "benchmark_manifest_sha256": manifest_hash(),
         "mazes_sha256": hashlib.sha256(b"".join(maze.walls.tobytes() for maze in task_spec.mazes)).hexdigest(),
+        "agent_code_sha256": _code_hash(options, load_agent_class(options.agent)),
         "world_sha256": hashlib.sha256(maze_spec(task_spec.mazes[0]).to_xml().encode("utf-8")).hexdigest(),
         "checkpoint_sha256": _hash_of(_checkpoint(options, load_agent_class(options.agent))),
         "distances": list(options.distances),
@@ -272,10 +276,18 @@ def _run_in_processes(
 
 
 def _work(options: EvalOptions, todo: Sequence[tuple[int, Trial]], num_envs: int, results: Any) -> None:
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     agent_class = load_agent_class(options.agent)
     task_spec = make_task_spec(options, agent_class)
     for records in run_trials(build_agent(options, agent_class, task_spec), task_spec, todo, num_envs, num_threads=1):
         results.put(records)
+
+
+def _end_with(parent: int) -> None:
+    """Ends this process when its parent is gone: one that was killed could not end its workers."""
+    while os.getppid() == parent:
+        time.sleep(_POLL_SECONDS)
+    os._exit(1)
 
 
 def _checkpoint(options: EvalOptions, agent_class: type[Agent]) -> str | None:
@@ -289,7 +301,26 @@ def _checkpoint(options: EvalOptions, agent_class: type[Agent]) -> str | None:
         return None if default is None else str(default())
     if default is None and not hasattr(agent_class, "build_learner") and ":" not in options.agent:
         raise InputError(f"agent {options.agent!r} reads no checkpoint; found --checkpoint {options.checkpoint}")
-    return options.checkpoint
+    return str(_newest_checkpoint(pathlib.Path(options.checkpoint)))
+
+
+def _newest_checkpoint(path: pathlib.Path) -> pathlib.Path:
+    """`path` itself, or of a training run's folder, or a checkpoint's, the newest agent in it.
+
+    Raises:
+      InputError: if a folder holds none.
+    """
+    if not path.is_dir():
+        return path
+    found = sorted(path.glob("agent.safetensors")) + sorted(path.glob("checkpoints/*/agent.safetensors"))
+    if not found:
+        raise InputError(f"{path}: expected a checkpoint or the folder of a training run, found neither")
+    return found[-1]
+
+
+def _code_hash(options: EvalOptions, agent_class: type[Agent]) -> str | None:
+    """Of the file of an agent at hand, which may be edited between two sittings of a run; None for installed ones."""
+    return _hash_of(inspect.getfile(agent_class)) if ":" in options.agent else None
 
 
 def _hash_of(path: str | None) -> str | None:

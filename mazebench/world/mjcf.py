@@ -101,7 +101,7 @@ def _add_materials(spec: mujoco.MjSpec, size: int) -> None:
     spec.add_material(name="wall", rgba=[0.36, 0.47, 0.60, 1])
     spec.add_material(name="agent", rgba=[0.90, 0.45, 0.13, 1])
     spec.add_material(name="nose", rgba=[0.15, 0.15, 0.18, 1])
-    spec.add_material(name="goal", rgba=[0.20, 0.70, 0.35, 0.6], emission=0.1)
+    spec.add_material(name="goal", rgba=[0.84, 0.24, 0.24, 0.7], emission=0.1)
 
 
 def _add_room(spec: mujoco.MjSpec, size: int) -> None:

@@ -31,7 +31,7 @@ class Renderer:
         try:
             self._renderer = mujoco.Renderer(model, height, width)
         # mujoco.gl_context is whichever backend MUJOCO_GL names; each has error classes of its own.
-        except (RuntimeError, ImportError, AttributeError, OSError, ValueError) as error:
+        except (mujoco.FatalError, RuntimeError, ImportError, AttributeError, OSError, ValueError) as error:
             raise RenderingError(
                 f"can't open a rendering context: {str(error).splitlines()[0] if str(error) else error!r}; "
                 "on a machine without a display set MUJOCO_GL=egl (or osmesa)"
