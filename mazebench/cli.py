@@ -10,7 +10,7 @@ import pathlib
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -58,10 +58,10 @@ def main() -> None:
     except RunError as error:
         _fail(str(error), 1)
     except (KeyboardInterrupt, typer.Abort):
-        _fail("interrupted; what was written is kept, and eval goes on with --resume", 130)
+        _fail("interrupted; what was written is kept, go on with --resume", 130)
 
 
-def _fail(message: str, status: int) -> None:
+def _fail(message: str, status: int) -> NoReturn:
     print(f"mazebench: {' '.join(message.split())}", file=sys.stderr)
     sys.exit(status)
 
@@ -192,8 +192,13 @@ def evaluate(
     if resume:
         begun = folder.is_dir() and any(folder.iterdir())
         print(f"resuming {folder}" if begun else f"nothing to resume in {folder}; starting anew")
-    with _progress(f"{agent}, {task.value}") as advance:
-        summary = harness.evaluate(options, folder, resume=resume, num_envs=num_envs, workers=workers, progress=advance)
+    try:
+        with _progress(f"{agent}, {task.value}") as advance:
+            summary = harness.evaluate(
+                options, folder, resume=resume, num_envs=num_envs, workers=workers, progress=advance
+            )
+    except KeyboardInterrupt:
+        _fail(f"interrupted; what was written is kept, go on with the same options and --resume --out {folder}", 130)
     table.print_summary(summary)
     print(f"results in {folder}")
 
@@ -206,7 +211,6 @@ def _new_folder(options: Any) -> pathlib.Path:
     for number in range(1000):
         folder = pathlib.Path("results") / (f"{name}-{number}" if number else name)
         if not folder.exists():
-            print(f"writing to {folder}", file=sys.stderr)
             return folder
     raise InputError(f"results/{name}: exists a thousand times over; give --out")
 

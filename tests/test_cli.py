@@ -127,7 +127,7 @@ BAD_INPUT = [
     ((*TINY, "--out", "a" * 300), "can't write there: File name too long"),
     ((*TINY, "--out", "{bad}/used"), "expected an empty folder or an evaluation's, found 'thesis.tex' in it"),
     ((*TINY, "--out", "{bad}/used", "--resume"), "expected an empty folder or an evaluation's, found 'thesis.tex'"),
-    ((*TINY, "--out", "{bad}/file", "--resume"), "file: Not a directory"),
+    ((*TINY, "--out", "{bad}/file", "--resume"), "file: can't write there: File exists"),
     ((*TINY, "--resume"), "--resume needs --out"),
     ((*TINY, "--maps", "none.txt"), "none.txt: can't read the map: No such file or directory"),
     ((*TINY, "--maps", "{bad}/binary.txt"), "binary.txt: expected a text map, found byte 0x"),
