@@ -70,9 +70,8 @@ class Replay:
         self._maze = np.zeros(shape, dtype=np.uint16)
         self._trajectory = np.full(shape, -1, dtype=np.int64)  # numbers that no two trajectories of a ring share
         self._leg = np.full(shape, -1, dtype=np.int64)  # likewise, of the leg to one goal
-        self._next = np.zeros(
-            num_envs, dtype=np.int64
-        )  # the row each environment writes next, counted without wrapping
+        # The row that each environment writes next, counted without wrapping.
+        self._next = np.zeros(num_envs, dtype=np.int64)
         self._current = np.zeros(num_envs, dtype=np.int64)  # the trajectory each environment is in
         self._current_leg = np.zeros(num_envs, dtype=np.int64)
         self._leg_origin = np.zeros((num_envs, 2), dtype=np.float32)

@@ -280,7 +280,7 @@ def _training_progress() -> Iterator[Any]:
     with Progress(BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), console=console) as bar:
         task = bar.add_task("", total=1.0)
 
-        def report(share: float, line: str) -> None:
+        def report(share: float, line: str | None) -> None:
             bar.update(task, completed=share)
             if line is not None:
                 console.print(line, markup=False, highlight=False)

@@ -32,7 +32,7 @@ class ActorState:
     """What acting carries from step to step in B environments."""
 
     origin: np.ndarray  # [B, 2] float32, x and y observed where the context was new
-    code: torch.Tensor | None  # [B, C + 4, M * M], the encoded contexts
+    code: torch.Tensor | None  # [B, C + 4, M * M], the encoded contexts; None until there is one
 
 
 class DQN:
@@ -102,9 +102,7 @@ class DQN:
 
     def initial_state(self, batch_size: int) -> ActorState:
         """No context encoded yet: `act` does it where one is first."""
-        size = self.context_size_built
-        code = torch.zeros(batch_size, self.config.channels + 4, size * size) if self.config.use_context else None
-        return ActorState(np.zeros((batch_size, 2), dtype=np.float32), code)
+        return ActorState(np.zeros((batch_size, 2), dtype=np.float32), None)
 
     @torch.no_grad()
     def act(
@@ -114,10 +112,10 @@ class DQN:
         new = np.flatnonzero(is_first)
         if len(new):
             state.origin[new] = observation["state"][new, :2]
-            if state.code is not None:
+            if self.config.use_context:
                 code = in_batches(self.network.encode, _ENCODED_AT_ONCE, torch.from_numpy(observation["context"][new]))
-                if state.code.shape[1:] != code.shape[1:]:  # maps of another size than it was trained on
-                    state.code = torch.zeros(len(state.origin), *code.shape[1:])
+                if state.code is None:
+                    state.code = code.new_zeros(len(state.origin), *code.shape[1:])
                 state.code[new] = code
         features = state_features(torch.from_numpy(observation["state"]), torch.from_numpy(state.origin))[:, None]
         inputs = (features,) if state.code is None else (features, state.code)

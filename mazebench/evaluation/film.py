@@ -11,7 +11,7 @@ import numpy as np
 
 from mazebench.agent import load_agent_class
 from mazebench.errors import InputError, unknown
-from mazebench.evaluation.harness import EvalOptions, build_agent, make_task_spec
+from mazebench.evaluation.harness import EvalOptions, build_agent, is_frozen, make_task_spec, resolve_checkpoint
 from mazebench.evaluation.protocol import select_trials
 from mazebench.maps.image import draw_maze, write_image
 from mazebench.tasks.navigation import Environment
@@ -55,9 +55,9 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
 
 def _run(options: EvalOptions, views: tuple[str, ...], pixels: int) -> tuple[list[np.ndarray], str]:
     agent_class = load_agent_class(options.agent)
+    options = resolve_checkpoint(options, agent_class)
     task_spec = make_task_spec(options, agent_class)
-    frozen = options.maps is None and options.split == "eval"
-    trials = select_trials(options.task, task_spec.mazes, frozen, options.distances)
+    trials = select_trials(options.task, task_spec.mazes, is_frozen(options), options.distances)
     trial = trials[options.seed % len(trials)]
     agent = build_agent(options, agent_class, task_spec)
     environment = Environment(task_spec)

@@ -84,16 +84,17 @@ def evaluate(
         if value < lowest:
             raise InputError(f"expected {name} of at least {lowest}, found {value}")
     agent_class = load_agent_class(options.agent)
+    options = resolve_checkpoint(options, agent_class)
     task_spec = make_task_spec(options, agent_class)
     trials = select_trials(
         options.task,
         task_spec.mazes,
-        _is_frozen(options),
+        is_frozen(options),
         options.distances,
         options.episodes_per_distance,
         options.seed,
     )
-    config = _config(options, task_spec)
+    config = _config(options, agent_class, task_spec)
     make_folder(out)
     with FolderLock(out):
         _prepare(out, config, resume)
@@ -123,7 +124,7 @@ def _fill(
             "benchmark": VERSION,
             "episodes": len(trials),
             "perturbation": config["perturbation"],
-            "provenance": provenance(options),
+            "provenance": _provenance(options, config),
             **metrics.summarize(log.records),
         }
         log.finish()
@@ -151,7 +152,7 @@ def make_task_spec(options: EvalOptions, agent_class: type[Agent]) -> TaskSpec:
 def build_agent(options: EvalOptions, agent_class: type[Agent], task_spec: TaskSpec) -> Agent:
     """The agent for a task."""
     interface = Interface(options.task, task_spec.size, task_spec.context_size)
-    checkpoint = None if options.checkpoint is None else _newest_checkpoint(pathlib.Path(options.checkpoint))
+    checkpoint = None if options.checkpoint is None else pathlib.Path(options.checkpoint)
     return agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)
 
 
@@ -166,15 +167,17 @@ def check_same_run(options: EvalOptions, out: pathlib.Path) -> None:
     Raises:
       InputError: if it is another; the message names the first difference.
     """
-    _compare(out, _config(options, make_task_spec(options, load_agent_class(options.agent))))
+    agent_class = load_agent_class(options.agent)
+    options = resolve_checkpoint(options, agent_class)
+    _compare(out, _config(options, agent_class, make_task_spec(options, agent_class)))
 
 
-def provenance(options: EvalOptions) -> dict[str, Any]:
+def _provenance(options: EvalOptions, config: dict[str, Any]) -> dict[str, Any]:
     """What a result came from: versions, benchmark, options, command and machine."""
     packages = ("mazebench-mujoco", "mujoco", "dm-control", "numpy", "scipy", "opencv-python-headless", "torch")
     return {
-        "benchmark_manifest_sha256": manifest_hash(),
-        "checkpoint_sha256": _hash_of(_checkpoint(options, load_agent_class(options.agent))),
+        "benchmark_manifest_sha256": config["benchmark_manifest_sha256"],
+        "checkpoint_sha256": config["checkpoint_sha256"],
         "options": dataclasses.asdict(options),
         "command": [pathlib.Path(sys.argv[0]).name, *sys.argv[1:]],
         "python": platform.python_version(),
@@ -183,11 +186,12 @@ def provenance(options: EvalOptions) -> dict[str, Any]:
     }
 
 
-def _is_frozen(options: EvalOptions) -> bool:
+def is_frozen(options: EvalOptions) -> bool:
+    """Whether the benchmark's eval mazes are asked for, which have frozen episodes."""
     return options.maps is None and options.split == "eval"
 
 
-def _config(options: EvalOptions, task_spec: TaskSpec) -> dict[str, Any]:
+def _config(options: EvalOptions, agent_class: type[Agent], task_spec: TaskSpec) -> dict[str, Any]:
     """What identifies a run; `record` and `perturbation` are also the part of it that each record repeats."""
     split = options.split if options.maps is None else "custom"
     return {
@@ -199,9 +203,9 @@ def _config(options: EvalOptions, task_spec: TaskSpec) -> dict[str, Any]:
         },
         "benchmark_manifest_sha256": manifest_hash(),
         "mazes_sha256": hashlib.sha256(b"".join(maze.walls.tobytes() for maze in task_spec.mazes)).hexdigest(),
-        "agent_code_sha256": _code_hash(options, load_agent_class(options.agent)),
+        "agent_code_sha256": _code_hash(options, agent_class),
         "world_sha256": hashlib.sha256(maze_spec(task_spec.mazes[0]).to_xml().encode("utf-8")).hexdigest(),
-        "checkpoint_sha256": _hash_of(_checkpoint(options, load_agent_class(options.agent))),
+        "checkpoint_sha256": _hash_of(options.checkpoint),
         "distances": list(options.distances),
         "episodes_per_distance": options.episodes_per_distance,
         "landmark_distance": options.landmark_distance,
@@ -290,18 +294,20 @@ def _end_with(parent: int) -> None:
     os._exit(1)
 
 
-def _checkpoint(options: EvalOptions, agent_class: type[Agent]) -> str | None:
-    """The file that the agent is read from, None for one that doesn't learn.
+def resolve_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:
+    """`options` with the very file that the agent is read from, None for one that reads none.
+
+    A run's folder may gain a newer checkpoint any time, so it is looked into once, before anything is hashed or built.
 
     Raises:
       InputError: if a checkpoint is given to an agent that reads none.
     """
     default = getattr(agent_class, "default_checkpoint", None)
     if options.checkpoint is None:
-        return None if default is None else str(default())
+        return options if default is None else dataclasses.replace(options, checkpoint=str(default()))
     if default is None and not hasattr(agent_class, "build_learner") and ":" not in options.agent:
         raise InputError(f"agent {options.agent!r} reads no checkpoint; found --checkpoint {options.checkpoint}")
-    return str(_newest_checkpoint(pathlib.Path(options.checkpoint)))
+    return dataclasses.replace(options, checkpoint=str(_newest_checkpoint(pathlib.Path(options.checkpoint))))
 
 
 def _newest_checkpoint(path: pathlib.Path) -> pathlib.Path:
