@@ -83,6 +83,7 @@ def _root(
 
 @app.command()
 def generate(
+    context: typer.Context,
     size: Annotated[
         int | None,
         typer.Option(help="Cells a side, 5 to 255; 13 if not given. With --from-image, what the picture shows."),
@@ -103,6 +104,7 @@ def generate(
     """Make mazes: MJCF for MuJoCo, text, picture, mesh."""
     from mazebench import making
 
+    _refuse_ignored(context, (from_image is not None, "the picture shows one maze", ("count", "seed", "style")))
     mazes = making.make_mazes(size, count, seed, style, from_image)
     chosen = making.parse_formats(formats)
     for index, maze in enumerate(mazes):
@@ -132,9 +134,26 @@ def _preview(maze: Any) -> None:
         console.print(line)
 
 
+# Options that another one leaves without effect, and why.
+_LOCAL = ("distances", "episodes_per_distance")
+_EVALUATION = ("task", "size", "split", "maps", *_LOCAL, "landmark_distance", "map_flip", "map_warp", "position_noise")
+_HIERARCHICAL = ("the hierarchical task leads from corner to corner", _LOCAL)
+_OWN_MAPS = ("with --maps the mazes are your own", ("split",))
+
+
 @app.command("eval")
 def evaluate(
-    agent: Annotated[str, typer.Option(help="An installed agent (see `mazebench list`), or module:Class.")],
+    context: typer.Context,
+    agents: Annotated[
+        list[str],
+        typer.Option(
+            "--agent", help="An installed agent (see `mazebench list`), or module:Class; several with --suite."
+        ),
+    ],
+    suite: Annotated[
+        str | None,
+        typer.Option(help="Evaluations by name instead: paper, the whole protocol, or quick, minutes of it."),
+    ] = None,
     task: Annotated[TaskName, typer.Option(help="Kind of navigation.")] = TaskName.local,
     size: Annotated[
         int | None, typer.Option(help="Of the benchmark's mazes: 13 (if not given), 15, 17, 19 or 21.")
@@ -159,15 +178,35 @@ def evaluate(
         pathlib.Path | None, typer.Option(help="Folder for the results; a new one in results/ if not given.")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in --out.")] = False,
+    record: Annotated[
+        bool | None,
+        typer.Option("--record/--no-record", help="Write trajectories too; a suite does if nothing is said."),
+    ] = None,
     num_envs: Annotated[int, typer.Option(min=1, help="Environments side by side in each process.")] = 256,
-    workers: Annotated[int, typer.Option(min=0, help="Processes; 0 runs in this one.")] = 0,
+    workers: Annotated[
+        int, typer.Option(min=0, help="Processes; 0 runs in this one, and with --ray on all its CPUs.")
+    ] = 0,
+    ray: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Of a Ray cluster for the workers; auto, or local for a new one."),
+    ] = None,
 ) -> None:
-    """Evaluate an agent on unseen mazes: success rate and SPL with 95 % intervals."""
-    from mazebench.evaluation import harness, table
-    from mazebench.records import SUMMARY, read_json
+    """Evaluate agents on unseen mazes: success rate and SPL with 95 % intervals."""
+    from mazebench.evaluation import harness
 
+    if suite is None and len(agents) > 1:
+        raise InputError(f"expected one --agent without --suite, found {len(agents)}")
+    _refuse_ignored(
+        context,
+        (suite is not None, f"the suite {suite!r} has evaluations of its own", _EVALUATION),
+        (task == TaskName.hierarchical, *_HIERARCHICAL),
+        (task == TaskName.local, "the local task has no landmarks", ("landmark_distance",)),
+        (maps is not None, *_OWN_MAPS),
+    )
+    if resume and out is None:
+        raise InputError("--resume needs --out, the folder of the run to go on with")
     options = harness.EvalOptions(
-        agent=agent,
+        agent=agents[0],
         task=task.value,
         size=size,
         split=split.value,
@@ -181,33 +220,73 @@ def evaluate(
         checkpoint=None if checkpoint is None else str(checkpoint),
         seed=seed,
     )
-    if resume and out is None:
-        raise InputError("--resume needs --out, the folder of the run to go on with")
-    folder = out or _new_folder(options)
-    if resume and harness.is_finished(folder):
+    folder = out or _new_folder(f"{agents[0].replace(':', '-')}-{task.value}" if suite is None else suite)
+    running = {"num_envs": num_envs, "workers": workers, "ray_address": ray}
+    try:
+        if suite is None:
+            _evaluate_one(options, folder, resume, bool(record), running)
+        else:
+            _evaluate_suite(suite, agents, options, folder, resume, record is not False, running)
+    except KeyboardInterrupt:
+        _fail(f"interrupted; what was written is kept, go on with the same options and --resume --out {folder}", 130)
+    print(f"results in {folder}")
+
+
+def _evaluate_one(options: Any, folder: pathlib.Path, resume: bool, record: bool, running: dict[str, Any]) -> None:
+    from mazebench.evaluation import harness, table
+    from mazebench.records import SUMMARY, read_json
+
+    if resume and harness.is_finished(folder, record):
         harness.check_same_run(options, folder)
         print(f"{folder}: the run is finished")
         table.print_summary(read_json(folder / SUMMARY))
         return
+    _say_whether_resuming(folder, resume)
+    with _progress(f"{options.agent}, {options.task}") as advance:
+        summary = harness.evaluate(options, folder, resume=resume, record=record, progress=advance, **running)
+    table.print_summary(summary)
+
+
+def _evaluate_suite(
+    suite: str,
+    agents: list[str],
+    options: Any,
+    folder: pathlib.Path,
+    resume: bool,
+    record: bool,
+    running: dict[str, Any],
+) -> None:
+    from mazebench.evaluation import suites, table
+
+    run = suites.SuiteRun(suite, agents, folder, checkpoint=options.checkpoint, seed=options.seed, record=record)
+    if resume and run.is_finished:
+        print(f"{folder}: the run is finished")
+    else:
+        _say_whether_resuming(folder, resume)
+    with _progress(f"{suite}, {', '.join(agents)}") as advance:
+        run.run(resume=resume, progress=advance, **running)
+    table.print_suite(run.summaries())
+
+
+def _say_whether_resuming(folder: pathlib.Path, resume: bool) -> None:
     if resume:
         begun = folder.is_dir() and any(folder.iterdir())
         print(f"resuming {folder}" if begun else f"nothing to resume in {folder}; starting anew")
-    try:
-        with _progress(f"{agent}, {task.value}") as advance:
-            summary = harness.evaluate(
-                options, folder, resume=resume, num_envs=num_envs, workers=workers, progress=advance
-            )
-    except KeyboardInterrupt:
-        _fail(f"interrupted; what was written is kept, go on with the same options and --resume --out {folder}", 130)
-    table.print_summary(summary)
-    print(f"results in {folder}")
 
 
-def _new_folder(options: Any) -> pathlib.Path:
+def _refuse_ignored(context: typer.Context, *rules: tuple[bool, str, tuple[str, ...]]) -> None:
+    """Refuses options that were given and would make no difference: (whether so, why, the options) of each rule."""
+    for is_so, reason, names in rules:
+        for name in names if is_so else ():
+            source = context.get_parameter_source(name)
+            if source is not None and source.name != "DEFAULT":
+                raise InputError(f"{reason}; found --{name.replace('_', '-')}, which would be ignored")
+
+
+def _new_folder(name: str) -> pathlib.Path:
     """A folder in results/ that no run has."""
     # With the process, for runs that start in the same second.
-    now = f"{datetime.datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}"
-    name = f"{options.agent.replace(':', '-')}-{options.task}-{now}"
+    name = f"{name}-{datetime.datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}"
     for number in range(1000):
         folder = pathlib.Path("results") / (f"{name}-{number}" if number else name)
         if not folder.exists():
@@ -216,7 +295,32 @@ def _new_folder(options: Any) -> pathlib.Path:
 
 
 @app.command()
+def compare(
+    a: Annotated[pathlib.Path, typer.Argument(metavar="A", help="The folder of an evaluation, or of a suite's agent.")],
+    b: Annotated[pathlib.Path, typer.Argument(metavar="B", help="Of another agent on the same episodes.")],
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print JSON, with all intervals, instead of a table.")
+    ] = False,
+) -> None:
+    """Compare two agents on the same episodes: what A has more than B, with 95 % intervals over mazes."""
+    from mazebench.evaluation import comparison, table
+
+    found = comparison.compare_folders(a, b)
+    for line in found.notes:
+        print(f"mazebench: {line}", file=sys.stderr)
+    if as_json:
+        print(json.dumps(found.parts.get("", found.parts), indent=1))
+        return
+    if "" in found.parts:
+        rows = found.parts[""]["by_distance"] if found.has_distances else {}
+        table.print_comparison(found.title, "distance", {**rows, "all": found.parts[""]["overall"]})
+    else:
+        table.print_comparison(found.title, "part", {name: part["overall"] for name, part in found.parts.items()})
+
+
+@app.command()
 def train(
+    context: typer.Context,
     agent: Annotated[str, typer.Option(help="A learning agent: mah or dqn, or module:Class.")],
     size: Annotated[int, typer.Option(help="Of the benchmark's training mazes: 13, 15, 17, 19 or 21.")] = 13,
     pairs: Annotated[str, typer.Option(help="random, or fixed: one start-goal pair a maze.")] = "random",
@@ -241,6 +345,7 @@ def train(
     """Train an agent on the benchmark's training mazes; evaluated now and then on held-out mazes of the same kind."""
     from mazebench.training import loop
 
+    _refuse_ignored(context, (not workers, "without --workers this process collects by itself", ("ray",)))
     options = loop.TrainOptions(
         agent=agent,
         size=size,
@@ -289,7 +394,23 @@ def _training_progress() -> Iterator[Any]:
 
 
 @app.command()
+def report(
+    results: Annotated[
+        list[pathlib.Path], typer.Argument(help="Evaluation folders, runs of suites, or folders above them.")
+    ],
+    out: Annotated[pathlib.Path, typer.Option(help="Folder for the report; an earlier report in it is replaced.")],
+) -> None:
+    """Make tables, figures and a page to explore every episode from results of `mazebench eval`."""
+    from mazebench.report import writing
+
+    reported = writing.write_report(results, out, warn=lambda line: print(f"mazebench: {line}", file=sys.stderr))
+    agents = sorted({result.label for result in reported})
+    print(f"{len(reported)} results of {', '.join(agents)}: {out / writing.PAGE}, {out / writing.DOCUMENT}")
+
+
+@app.command()
 def render(
+    context: typer.Context,
     out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
     agent: Annotated[str, typer.Option(help="Who drives.")] = "planner-closed-loop",
     task: Annotated[TaskName, typer.Option(help="Kind of navigation.")] = TaskName.local,
@@ -306,6 +427,7 @@ def render(
     pixels: Annotated[int, typer.Option(min=64, max=1280, help="Side of a view.")] = 360,
 ) -> None:
     """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
+    _refuse_ignored(context, (task == TaskName.hierarchical, *_HIERARCHICAL), (maps is not None, *_OWN_MAPS))
     _choose_rendering_backend()
     from mazebench.evaluation import film, harness
 

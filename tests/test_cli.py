@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pathlib
 import shutil
@@ -25,6 +26,7 @@ from mazebench.maps.maze import point_to_cell
 from mazebench.maps.text import format_maze, write_text_maze
 
 TINY = ("eval", "--agent", "random", "--distances", "1,2", "--episodes-per-distance", "1")
+QUICK = ("eval", "--suite", "quick", "--agent", "random")
 PLAN = "#####\n#...#\n#.#.#\n#...#\n#####\n"
 
 
@@ -87,6 +89,7 @@ BAD_INPUT = [
     (("generate", "--format", ""), "unknown format ''"),
     (("generate", "--out", "{bad}/file/mazes"), "file/mazes: can't write there: Not a directory"),
     (("generate", "--out", "{bad}/file"), "file: can't write there: File exists"),
+    (("generate", "--from-image", "x.png", "--seed", "1"), "the picture shows one maze; found --seed, which would"),
     (("generate", "--from-image", "none.png"), "none.png: can't read the picture: No such file or directory"),
     (("generate", "--from-image", "{bad}/binary.png"), "expected a PNG, JPEG or BMP picture, found 3000 bytes"),
     (("generate", "--from-image", "{bad}/gray.png"), "gray: expected "),
@@ -110,6 +113,36 @@ BAD_INPUT = [
     ((*TINY, "--workers", "-1"), "Invalid value for '--workers'"),
     ((*TINY, "--episodes-per-distance", "0"), "Invalid value for '--episodes-per-distance'"),
     ((*TINY, "--landmark-distance", "0"), "Invalid value for '--landmark-distance'"),
+    # eval: options that another one leaves without effect
+    ((*TINY, "--task", "hierarchical"), "leads from corner to corner; found --distances, which would be ignored"),
+    (("eval", "--agent", "random", "--task", "hierarchical", "--episodes-per-distance", "5"), "found --episodes-per"),
+    ((*TINY, "--landmark-distance", "5"), "the local task has no landmarks; found --landmark-distance, which would"),
+    (
+        (*TINY, "--maps", "{bad}/good.txt", "--split", "eval"),
+        "with --maps the mazes are your own; found --split, which",
+    ),
+    ((*TINY, "--agent", "planner"), "expected one --agent without --suite, found 2"),
+    # eval: suites
+    ((*QUICK, "--suite", "papr"), "unknown suite 'papr'; available: paper, quick"),
+    ((*QUICK, "--task", "local"), "the suite 'quick' has evaluations of its own; found --task, which would be ignored"),
+    ((*QUICK, "--size", "13"), "found --size, which would be ignored"),
+    ((*QUICK, "--maps", "{bad}/good.txt"), "found --maps, which would be ignored"),
+    ((*QUICK, "--distances", "2"), "found --distances, which would be ignored"),
+    ((*QUICK, "--position-noise", "0"), "found --position-noise, which would be ignored"),
+    ((*QUICK, "--agent", "random"), "expected agents with folders of their own, found two for 'random'"),
+    ((*QUICK, "--agent", "planner", "--checkpoint", "x"), "expected one agent with --checkpoint, found 2"),
+    ((*QUICK, "--agent", "nobody"), "unknown agent 'nobody'; available: "),
+    ((*QUICK, "--out", "{bad}/used"), "expected an empty folder or a suite's, found 'thesis.tex' in it"),
+    ((*QUICK, "--out", "{bad}/file/out"), "file/out: can't write there: Not a directory"),
+    ((*QUICK, "--resume"), "--resume needs --out"),
+    # compare
+    (("compare", "{bad}/empty"), "Missing argument 'B'"),
+    (("compare", "none", "{bad}/used"), "none: expected a finished evaluation, found nothing there"),
+    (("compare", "{bad}/empty", "{bad}/used"), "empty: expected a finished evaluation, found an empty folder"),
+    (("compare", "{bad}/used", "{bad}/empty"), "used: expected a finished evaluation, found 'thesis.tex' in it"),
+    (("compare", "{bad}/file", "{bad}/used"), "file: expected a finished evaluation, found a file"),
+    # train
+    (("train", "--agent", "mah", "--ray", "auto"), "without --workers this process collects by itself; found --ray"),
     ((*TINY, "--seed", "-1"), "Invalid value for '--seed'"),
     ((*TINY, "--map-flip", "1.5"), "expected map_flip from 0 to 1.0, found 1.5"),
     ((*TINY, "--map-flip", "nan"), "expected map_flip from 0 to 1.0, found nan"),
@@ -142,11 +175,13 @@ BAD_INPUT = [
     ((*TINY, "--maps", "{bad}/mixed"), "expected mazes of one size, found sizes [5, 7]"),
     ((*TINY, "--maps", "{bad}/good.txt", "--size", "7"), "expected mazes of size 7, found size 5"),
     ((*TINY, "--maps", "{bad}/cell.txt"), "cell: no two cells are 2 cells apart; the farthest are 0"),
-    ((*TINY, "--maps", "{bad}/cell.txt", "--task", "hierarchical"), "cell: "),
+    (("eval", "--agent", "random", "--maps", "{bad}/cell.txt", "--task", "hierarchical"), "cell: "),
     ((*TINY, "--maps", "{bad}/good.txt", "--distances", "1-5"), "good: no two cells are 5 cells apart; the farthest"),
     # render
     (("render",), "Missing option '--out'"),
     (("render", "--out", "film.avi"), "unknown suffix '.avi'; available: .gif, .mp4, .png"),
+    (("render", "--out", "x.png", "--task", "hierarchical", "--distances", "9"), "found --distances, which would be"),
+    (("render", "--out", "x.png", "--maps", "{bad}/good.txt", "--split", "train"), "found --split, which would be ign"),
     (("render", "--out", "x.png", "--view", "side"), "unknown view 'side'; available: all, chase, egocentric, map"),
     (("render", "--out", "x.png", "--pixels", "10"), "Invalid value for '--pixels'"),
     (("render", "--out", "x.png", "--agent", "nobody"), "unknown agent 'nobody'"),
@@ -378,6 +413,32 @@ class TestEval:
         assert status == 0
         assert "random: local, custom mazes 5 x 5" in output
 
+    def test_trajectories_when_asked_for(self, command, tmp_path):
+        assert command(*TINY, "--out", "run", "--record")[0] == 0
+        assert (tmp_path / "run" / "trajectories.npz").exists()
+
+    def test_eval_when_an_agent_breaks_its_contract(self, command, tmp_path):
+        (tmp_path / "wrong_at_hand.py").write_text(
+            "class Wrong:\n"
+            "    @classmethod\n"
+            "    def build(cls, interface, *, seed=0, checkpoint=None):\n"
+            "        return cls()\n"
+            "    def initial_state(self, batch_size):\n"
+            "        return None\n"
+            "    def act(self, observation, is_first, state, explore=False):\n"
+            "        return [0.5] * len(is_first), state\n"
+        )
+        (tmp_path / "broken_at_hand.py").write_text("class Broken:\n    build = = 3\n")
+        arguments = TINY[3:]
+        assert command("eval", "--agent", "wrong_at_hand:Wrong", *arguments)[::2] == (
+            1,
+            "wrong_at_hand:Wrong, local: 0 of 40 episodes\n"
+            "mazebench: agent 'wrong_at_hand:Wrong': expected act() to return integer actions, found float64\n",
+        )
+        status, _, errors = command("eval", "--agent", "broken_at_hand:Broken", *arguments)
+        assert (status, errors.count("\n")) == (2, 1)
+        assert "agent 'broken_at_hand:Broken': its module can't be imported: SyntaxError: invalid syntax" in errors
+
     def test_eval_when_interrupted(self, tmp_path):
         command = [sys.executable, "-m", "mazebench", "eval", "--agent", "random", "--num-envs", "1", "--out", "run"]
         # Where these tests run in the background, interrupts are ignored, and processes inherit that.
@@ -394,6 +455,58 @@ class TestEval:
         assert process.returncode == 130
         assert errors.splitlines()[-1].startswith("mazebench: interrupted; ")
         assert "Traceback" not in errors
+
+
+class TestSuite:
+    def test_results_when_run_and_compared(self, command, tmp_path, monkeypatch):
+        monkeypatch.setenv("COLUMNS", "80")
+        quick = ("eval", "--suite", "quick", "--agent", "random", "--agent", "planner", "--out", "run")
+        status, output, errors = command(*quick)
+        assert status == 0
+        assert "quick, random, planner: 840 of 840 episodes\n" in errors
+        assert "random: suite quick" in output
+        assert "results in run\n" in output
+        parts = {path.name for path in (tmp_path / "run" / "planner").iterdir()}
+        assert {"local-13", "hierarchical-13-k5", "flip-0.1", "warp-0.1", "noise-0.5"} <= parts
+        assert all((path / "trajectories.npz").exists() for path in (tmp_path / "run" / "planner").iterdir())
+
+        before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+        status, again, errors = command(*quick, "--resume")
+        assert (status, errors) == (0, "")
+        assert again.startswith("run: the run is finished\n")
+        assert again.endswith(output)
+
+        status, compared, errors = command("compare", "run/planner", "run/random")
+        assert (status, errors) == (0, "")
+        status, near, _ = command("compare", "run/planner/local-13", "run/random/local-13")
+        assert status == 0
+        for text in (output, compared, near):
+            assert "…" not in text
+            assert max(len(line.rstrip()) for line in text.splitlines()) <= 80
+        assert [line.split()[0] for line in compared.splitlines()[3:]] == [
+            *("local-13", "local-21", "hierarchical-13-k5", "flip-0.1", "warp-0.1", "noise-0.5")
+        ]
+        assert "hierarchical-13-k5 1.00 0.00 +1.00 [+0.84, +1.00]" in compared
+        status, text, _ = command("compare", "run/planner/local-13", "run/random/local-13", "--json")
+        assert list(json.loads(text)["by_distance"]) == ["2", "4", "6", "8", "10"]
+
+        for arguments, said in [
+            (
+                ("run", "run/planner"),
+                "run: expected one agent's results, found 2 agents'; name one of: run/random, run",
+            ),
+            (("run/planner", "run/random/local-13"), "expected results of the same parts, found local-13, "),
+            (("run/planner/local-13", "run/planner/local-21"), "expected results of one size to compare, found 13 in"),
+            (("run/planner/local-21", "run/planner/noise-0.5"), "expected results of one size to compare, found 21 in"),
+            (
+                ("run/planner/local-13", "run/planner/warp-0.1"),
+                "expected the same episodes in run/planner/local-13 and",
+            ),
+        ]:
+            status, _, errors = command("compare", *arguments)
+            assert (status, errors.count("\n")) == (2, 1)
+            assert said in errors
+        assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 
 class TestRender:

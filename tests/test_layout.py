@@ -35,9 +35,8 @@ WALLS = {
     "dm_control": ("mazebench/world", "mazebench/tasks", "mazebench/envs", "mazebench/bench.py"),
     "torch": ("agents",),
     "gymnasium": ("mazebench/envs", "mazebench/bench.py"),
-    "ray": ("mazebench/evaluation", "mazebench/training"),
+    "ray": ("mazebench/evaluation/cluster.py", "mazebench/training/distributed.py"),
     "matplotlib": ("mazebench/report",),
-    "plotly": ("mazebench/report",),
 }
 FOLDERS = {"mazebench": "mazebench", "mazebench_agents": "agents", "mazebench_assets": "assets"}
 # Methods of dm_control's, Gymnasium's and torch's classes, which document them.

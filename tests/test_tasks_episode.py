@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mazebench.maps.maze import Maze
-from mazebench.tasks.episode import Episode, Event, Route
+from mazebench.tasks.episode import Episode, Event, Route, ShownMap
 from mazebench.tasks.spec import TaskSpec
 
 START, FIRST, SECOND, GOAL, ELSEWHERE = (1, 1), (1, 3), (1, 5), (1, 7), (2, 2)
@@ -161,3 +161,18 @@ class TestStreams:
 
     def draws(self, seed: int) -> np.ndarray:
         return np.array([stream.random(10) for stream in Episode(0, START, GOAL, 0.0, seed).streams()])
+
+
+class TestShownMap:
+    def test_walls_when_nothing_is_transformed(self):
+        walls = np.eye(5, dtype=bool)
+        assert ShownMap(walls).seen_walls() is walls
+
+    def test_walls_when_moved_by_a_cell(self):
+        walls = np.zeros((5, 5), dtype=bool)
+        walls[1, 2] = True
+        right_and_down = np.array([[1, 0, 1], [0, 1, 1], [0, 0, 1]], dtype=float)  # of (column, row)
+        seen = ShownMap(walls, right_and_down).seen_walls()
+        expected = np.zeros((5, 5), dtype=bool)
+        expected[0] = expected[:, 0] = expected[2, 3] = True  # outside is wall
+        np.testing.assert_array_equal(seen, expected)

@@ -11,7 +11,7 @@ import numpy as np
 
 from mazebench.agent import load_agent_class
 from mazebench.errors import InputError, unknown
-from mazebench.evaluation.harness import EvalOptions, build_agent, is_frozen, make_task_spec, resolve_checkpoint
+from mazebench.evaluation.options import EvalOptions, build_agent, is_frozen, make_task_spec, resolve_checkpoint
 from mazebench.evaluation.protocol import select_trials
 from mazebench.maps.image import draw_maze, write_image
 from mazebench.tasks.navigation import Environment
@@ -63,7 +63,6 @@ def _run(options: EvalOptions, views: tuple[str, ...], pixels: int) -> tuple[lis
     environment = Environment(task_spec)
     time_step = environment.reset(episode=trial.episode)
     state = agent.initial_state(1)
-    seed_episodes = getattr(agent, "seed_episodes", lambda seeds, mask: None)
     scene = _Scene(environment, task_spec, views, pixels)
     try:
         frames = [scene.draw()]
@@ -71,7 +70,7 @@ def _run(options: EvalOptions, views: tuple[str, ...], pixels: int) -> tuple[lis
             observation = {key: time_step.observation[key][None] for key in ("state", "context")}
             is_first = np.array([environment.task.is_first])
             if is_first[0]:
-                seed_episodes(np.array([trial.episode.seed]), np.array([time_step.first()]))
+                agent.seed_episodes(np.array([trial.episode.seed]), np.array([time_step.first()]))
             actions, state = agent.act(observation, is_first, state)
             time_step = environment.step(int(actions[0]))
             frames.append(scene.draw())

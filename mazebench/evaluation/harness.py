@@ -1,57 +1,29 @@
-"""The evaluation of one agent on one protocol, from options to files; resumable."""
+"""Evaluations from options to files; resumable, and several at a time."""
 
 from __future__ import annotations
 
-import dataclasses
+import contextlib
 import hashlib
-import inspect
-import multiprocessing
-import os
+import math
 import pathlib
-import platform
-import queue
-import sys
-import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
-from importlib import metadata
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-from mazebench.agent import Agent, Interface, load_agent_class
-from mazebench.errors import InputError, RunError
+from mazebench.agent import load_agent_class
+from mazebench.errors import InputError
 from mazebench.evaluation import metrics
-from mazebench.evaluation.protocol import EPISODES_PER_DISTANCE, Trial, select_trials
-from mazebench.evaluation.runner import run_trials
+from mazebench.evaluation.options import EvalOptions, is_frozen, make_task_spec, resolve_checkpoint
+from mazebench.evaluation.protocol import Trial, select_trials
+from mazebench.evaluation.provenance import code_hash, file_hash, provenance
+from mazebench.evaluation.results import check_records
+from mazebench.evaluation.trajectories import JOURNAL, TRAJECTORIES, TrajectoryLog
+from mazebench.evaluation.workers import Ended, Job, run_here, run_in_processes
 from mazebench.maps.benchmark import VERSION, manifest_hash
-from mazebench.records import CONFIG, SUMMARY, FolderLock, Record, RecordLog, make_folder, read_json, write_json
-from mazebench.tasks.context import default_context_size
-from mazebench.tasks.registry import make_spec
-from mazebench.tasks.spec import EVAL_DISTANCES, TaskSpec
+from mazebench.records import CONFIG, SUMMARY, FolderLock, RecordLog, make_folder, read_json, write_json
 from mazebench.world.mjcf import maze_spec
-
-_POLL_SECONDS = 1.0  # between looks whether all workers are alive
 
 # Called with the number of episodes done and of all.
 Progress = Callable[[int, int], None]
-
-
-@dataclasses.dataclass(frozen=True)
-class EvalOptions:
-    """What is evaluated. Two runs with equal options give the same `episodes.jsonl`."""
-
-    agent: str
-    task: str = "local"
-    size: int | None = None  # of benchmark v1's mazes, 13 if not given; with `maps` only checked
-    split: str = "eval"
-    maps: str | None = None  # a file or folder of mazes of one's own
-    distances: tuple[int, ...] = EVAL_DISTANCES
-    episodes_per_distance: int = EPISODES_PER_DISTANCE
-    landmark_distance: int = 5
-    map_flip: float = 0.0
-    map_warp: float = 0.0
-    position_noise: float = 0.0
-    checkpoint: str | None = None
-    seed: int = 0
 
 
 def evaluate(
@@ -59,8 +31,10 @@ def evaluate(
     out: pathlib.Path,
     *,
     resume: bool = False,
+    record: bool = False,
     num_envs: int = 256,
     workers: int = 0,
+    ray_address: str | None = None,
     progress: Progress = lambda done, of: None,
 ) -> dict[str, Any]:
     """Runs the evaluation and returns its summary, which `out` then holds beside the records and the options.
@@ -69,96 +43,25 @@ def evaluate(
       options: what to evaluate.
       out: the folder to write to.
       resume: go on with the run that `out` holds; an empty or missing folder starts one.
+      record: write trajectories too.
       num_envs: environments side by side in each process.
       workers: processes; 0 runs in this one, on all cores.
+      ray_address: of a Ray cluster to run the workers on; 0 of them then are as many as it has CPUs.
       progress: called as episodes end.
 
     Raises:
       InputError: if an option can't be met, `out` can't be written or holds another run.
+      RunError: if the agent or a worker failed; what ended until then is kept.
     """
-    for name, value, lowest in (
-        ("num_envs", num_envs, 1),
-        ("workers", workers, 0),
-        ("episodes_per_distance", options.episodes_per_distance, 1),
-    ):
-        if value < lowest:
-            raise InputError(f"expected {name} of at least {lowest}, found {value}")
-    agent_class = load_agent_class(options.agent)
-    options = resolve_checkpoint(options, agent_class)
-    task_spec = make_task_spec(options, agent_class)
-    trials = select_trials(
-        options.task,
-        task_spec.mazes,
-        is_frozen(options),
-        options.distances,
-        options.episodes_per_distance,
-        options.seed,
-    )
-    config = _config(options, agent_class, task_spec)
-    make_folder(out)
-    with FolderLock(out):
-        _prepare(out, config, resume)
-        return _fill(options, agent_class, task_spec, trials, config, out, num_envs, workers, progress)
+    evaluation = Evaluation(options, out, record)
+    return run_evaluations(
+        [evaluation], resume=resume, num_envs=num_envs, workers=workers, ray_address=ray_address, progress=progress
+    )[0]
 
 
-def _fill(
-    options: EvalOptions,
-    agent_class: type[Agent],
-    task_spec: TaskSpec,
-    trials: Sequence[Trial],
-    config: dict[str, Any],
-    out: pathlib.Path,
-    num_envs: int,
-    workers: int,
-    progress: Progress,
-) -> dict[str, Any]:
-    """Runs what `out` has no record of yet, and writes the summary."""
-    with RecordLog(out, len(trials)) as log:
-        todo = [(index, trials[index]) for index in log.missing]
-        progress(len(trials) - len(todo), len(trials))
-        for records in _run(options, agent_class, task_spec, todo, num_envs, workers):
-            log.add([{**config["record"], **record, **config["perturbation"]} for record in records])
-            progress(log.num_done, len(trials))
-        summary = {
-            **config["record"],
-            "benchmark": VERSION,
-            "episodes": len(trials),
-            "perturbation": config["perturbation"],
-            "provenance": _provenance(options, config),
-            **metrics.summarize(log.records),
-        }
-        log.finish()
-    write_json(out / SUMMARY, summary)
-    return summary
-
-
-def make_task_spec(options: EvalOptions, agent_class: type[Agent]) -> TaskSpec:
-    """The task that `options` name, with the context size that the agent wants."""
-    spec = make_spec(
-        options.task,
-        options.size,
-        options.split,
-        maps=options.maps,
-        distances=options.distances,
-        landmark_distance=options.landmark_distance,
-        map_flip=options.map_flip,
-        map_warp=options.map_warp,
-        position_noise=options.position_noise,
-    )
-    wanted = getattr(agent_class, "context_size", default_context_size)(spec.size)
-    return dataclasses.replace(spec, context_size=wanted)
-
-
-def build_agent(options: EvalOptions, agent_class: type[Agent], task_spec: TaskSpec) -> Agent:
-    """The agent for a task."""
-    interface = Interface(options.task, task_spec.size, task_spec.context_size)
-    checkpoint = None if options.checkpoint is None else pathlib.Path(options.checkpoint)
-    return agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)
-
-
-def is_finished(out: pathlib.Path) -> bool:
-    """Whether `out` holds a run that came to its end."""
-    return (out / SUMMARY).exists()
+def is_finished(out: pathlib.Path, record: bool = False) -> bool:
+    """Whether `out` holds a run that came to its end, with trajectories if they are to be recorded."""
+    return (out / SUMMARY).exists() and (not record or (out / TRAJECTORIES).exists())
 
 
 def check_same_run(options: EvalOptions, out: pathlib.Path) -> None:
@@ -167,50 +70,206 @@ def check_same_run(options: EvalOptions, out: pathlib.Path) -> None:
     Raises:
       InputError: if it is another; the message names the first difference.
     """
-    agent_class = load_agent_class(options.agent)
-    options = resolve_checkpoint(options, agent_class)
-    _compare(out, _config(options, agent_class, make_task_spec(options, agent_class)))
+    Evaluation(options, out).check_same_run()
 
 
-def _provenance(options: EvalOptions, config: dict[str, Any]) -> dict[str, Any]:
-    """What a result came from: versions, benchmark, options, command and machine."""
-    packages = ("mazebench-mujoco", "mujoco", "dm-control", "numpy", "scipy", "opencv-python-headless", "torch")
-    return {
-        "benchmark_manifest_sha256": config["benchmark_manifest_sha256"],
-        "checkpoint_sha256": config["checkpoint_sha256"],
-        "options": dataclasses.asdict(options),
-        "command": [pathlib.Path(sys.argv[0]).name, *sys.argv[1:]],
-        "python": platform.python_version(),
-        "packages": {name: _version(name) for name in packages},
-        "machine": {"system": platform.system(), "processor": platform.machine(), "cores": os.cpu_count()},
-    }
+class Evaluation:
+    """One evaluation and the folder of its results: what is left to run, and where to put what was."""
+
+    def __init__(
+        self, options: EvalOptions, out: pathlib.Path, record: bool = False, labels: Mapping[str, str] | None = None
+    ):
+        """Reads what is needed and writes nothing; `labels` are more keys for the summary.
+
+        Raises:
+          InputError: if an option can't be met.
+        """
+        if options.episodes_per_distance < 1:
+            raise InputError(f"expected episodes_per_distance of at least 1, found {options.episodes_per_distance}")
+        self.out = out
+        self._record = record
+        self._labels = dict(labels or {})
+        self._agent_class = load_agent_class(options.agent)
+        self._options = resolve_checkpoint(options, self._agent_class)
+        self._task_spec = make_task_spec(self._options, self._agent_class)
+        self.trials: Sequence[Trial] = select_trials(
+            options.task,
+            self._task_spec.mazes,
+            is_frozen(options),
+            options.distances,
+            options.episodes_per_distance,
+            options.seed,
+        )
+        self._config = self._make_config()
+        self._opened = contextlib.ExitStack()
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether its folder holds all its results."""
+        return is_finished(self.out, self._record)
+
+    def check_same_run(self) -> None:
+        """Does nothing if its folder holds this run.
+
+        Raises:
+          InputError: if it holds another; the message names the first difference.
+        """
+        _compare(self.out, self._config)
+
+    def open(self, resume: bool) -> None:
+        """Makes its folder ready, and finds out what is left to run.
+
+        Raises:
+          InputError: if the folder can't be written, is in use, holds another run or is damaged.
+        """
+        make_folder(self.out)
+        self._opened.enter_context(FolderLock(self.out))
+        _prepare(self.out, self._config, resume)
+        # Trajectories of a part of the episodes would be of no use: what began to record goes on.
+        self._record = self._record or (self.out / JOURNAL).exists()
+        self._log = self._opened.enter_context(RecordLog(self.out, len(self.trials)))
+        check_records(self.out, self._log.records, self.trials)
+        self._todo = set(self._log.missing)
+        self._trajectories = None
+        if self._record:
+            self._trajectories = self._opened.enter_context(TrajectoryLog(self.out, len(self.trials)))
+            self._todo |= set(self._trajectories.missing)
+
+    def close(self) -> None:
+        """Closes its files and frees its folder; everything that ended is kept."""
+        self._opened.close()
+
+    @property
+    def num_done(self) -> int:
+        """How many episodes need not be run any more."""
+        return len(self.trials) - len(self._todo)
+
+    def jobs(self, number: int, pieces: int) -> Iterator[Job]:
+        """What is left to run, in up to `pieces` parts of one size; `number` is what they are called."""
+        todo = [(index, self.trials[index]) for index in sorted(self._todo)]
+        for piece in range(min(pieces, len(todo))):
+            yield Job(number, self._options, tuple(todo[piece::pieces]), self._record, self._task_spec)
+
+    def add(self, ended: Ended) -> None:
+        """Puts episodes that ended on disk."""
+        if self._trajectories is not None:
+            self._trajectories.add(ended.trajectories)
+        config = self._config
+        self._log.add([{**config["record"], **record, **config["perturbation"]} for record in ended.records])
+        self._todo -= {record["episode"] for record in ended.records}
+
+    def finish(self) -> dict[str, Any]:
+        """Writes the summary, and returns it; all episodes must have ended."""
+        if self._trajectories is not None:
+            self._trajectories.finish()
+        summary = {
+            **self._config["record"],
+            **self._labels,
+            "benchmark": VERSION,
+            "episodes": len(self.trials),
+            "perturbation": self._config["perturbation"],
+            "provenance": {
+                **provenance(self._options, self._agent_class),
+                "mazes_sha256": self._config["mazes_sha256"],
+            },
+            **metrics.summarize(self._log.records),
+        }
+        self._log.finish()
+        write_json(self.out / SUMMARY, summary)
+        self.close()
+        return summary
+
+    def _make_config(self) -> dict[str, Any]:
+        """What identifies a run; `record` and `perturbation` are also the part of it that each record repeats."""
+        options, mazes = self._options, self._task_spec.mazes
+        split = options.split if options.maps is None else "custom"
+        return {
+            "record": {"agent": options.agent, "task": options.task, "size": self._task_spec.size, "split": split},
+            "perturbation": {
+                "map_flip": options.map_flip,
+                "map_warp": options.map_warp,
+                "position_noise": options.position_noise,
+            },
+            "benchmark_manifest_sha256": manifest_hash(),
+            "mazes_sha256": hashlib.sha256(b"".join(maze.walls.tobytes() for maze in mazes)).hexdigest(),
+            "agent_code_sha256": code_hash(options, self._agent_class),
+            "world_sha256": hashlib.sha256(maze_spec(mazes[0]).to_xml().encode("utf-8")).hexdigest(),
+            "checkpoint_sha256": file_hash(options.checkpoint),
+            "distances": list(options.distances),
+            "episodes_per_distance": options.episodes_per_distance,
+            "landmark_distance": options.landmark_distance,
+            "seed": options.seed,
+        }
 
 
-def is_frozen(options: EvalOptions) -> bool:
-    """Whether the benchmark's eval mazes are asked for, which have frozen episodes."""
-    return options.maps is None and options.split == "eval"
+def run_evaluations(
+    evaluations: Sequence[Evaluation],
+    *,
+    resume: bool,
+    num_envs: int,
+    workers: int,
+    ray_address: str | None = None,
+    smallest_job: int = 1,
+    progress: Progress = lambda done, of: None,
+) -> list[dict[str, Any]]:
+    """Runs what is left of several evaluations, each opened when its turn comes; returns their summaries in order.
+
+    Args:
+      evaluations: each with a folder of its own.
+      resume: go on with what the folders hold.
+      num_envs, workers, ray_address, progress: as for `evaluate`.
+      smallest_job: the number of episodes below which an evaluation is not split up among workers.
+
+    Raises:
+      InputError, RunError: as for `evaluate`.
+    """
+    for name, value, lowest in (("num_envs", num_envs, 1), ("workers", workers, 0)):
+        if value < lowest:
+            raise InputError(f"expected {name} of at least {lowest}, found {value}")
+    total = sum(len(evaluation.trials) for evaluation in evaluations)
+    summaries: dict[int, dict[str, Any]] = {}
+    num_done = 0
+
+    def jobs(pieces: int) -> Iterator[Job]:
+        nonlocal num_done
+        for number, evaluation in enumerate(evaluations):
+            evaluation.open(resume)
+            num_done += evaluation.num_done
+            progress(num_done, total)
+            if evaluation.num_done == len(evaluation.trials):
+                summaries[number] = evaluation.finish()
+            yield from evaluation.jobs(number, min(pieces, math.ceil(len(evaluation.trials) / smallest_job)))
+
+    try:
+        with _runner(num_envs, workers, ray_address) as (run, pieces):
+            for ended in run(jobs(pieces)):
+                evaluation = evaluations[ended.number]
+                evaluation.add(ended)
+                num_done += len(ended.records)
+                progress(num_done, total)
+                if evaluation.num_done == len(evaluation.trials):
+                    summaries[ended.number] = evaluation.finish()
+    finally:
+        for evaluation in evaluations:
+            evaluation.close()
+    return [summaries[number] for number in range(len(evaluations))]
 
 
-def _config(options: EvalOptions, agent_class: type[Agent], task_spec: TaskSpec) -> dict[str, Any]:
-    """What identifies a run; `record` and `perturbation` are also the part of it that each record repeats."""
-    split = options.split if options.maps is None else "custom"
-    return {
-        "record": {"agent": options.agent, "task": options.task, "size": task_spec.size, "split": split},
-        "perturbation": {
-            "map_flip": options.map_flip,
-            "map_warp": options.map_warp,
-            "position_noise": options.position_noise,
-        },
-        "benchmark_manifest_sha256": manifest_hash(),
-        "mazes_sha256": hashlib.sha256(b"".join(maze.walls.tobytes() for maze in task_spec.mazes)).hexdigest(),
-        "agent_code_sha256": _code_hash(options, agent_class),
-        "world_sha256": hashlib.sha256(maze_spec(task_spec.mazes[0]).to_xml().encode("utf-8")).hexdigest(),
-        "checkpoint_sha256": _hash_of(options.checkpoint),
-        "distances": list(options.distances),
-        "episodes_per_distance": options.episodes_per_distance,
-        "landmark_distance": options.landmark_distance,
-        "seed": options.seed,
-    }
+@contextlib.contextmanager
+def _runner(
+    num_envs: int, workers: int, ray_address: str | None
+) -> Iterator[tuple[Callable[[Iterator[Job]], Iterator[Ended]], int]]:
+    """What runs jobs, and into how many pieces a large evaluation should be cut for it."""
+    if ray_address is not None:
+        from mazebench.evaluation.cluster import Cluster  # Ray is an extra
+
+        with Cluster(ray_address) as cluster:
+            wanted = workers or cluster.num_cpus
+            yield lambda jobs: cluster.run(jobs, num_envs, wanted), wanted
+    elif workers:
+        yield lambda jobs: run_in_processes(jobs, num_envs, workers), workers
+    else:
+        yield lambda jobs: run_here(jobs, num_envs), 1
 
 
 def _prepare(out: pathlib.Path, config: dict[str, Any], resume: bool) -> None:
@@ -232,115 +291,3 @@ def _compare(out: pathlib.Path, config: dict[str, Any]) -> None:
         if not isinstance(before, dict) or before.get(key) != value:
             old = before.get(key) if isinstance(before, dict) else before
             raise InputError(f"{out}: holds another run: its {key} is {old}, this one's {value}")
-
-
-def _run(
-    options: EvalOptions,
-    agent_class: type[Agent],
-    task_spec: TaskSpec,
-    todo: Sequence[tuple[int, Trial]],
-    num_envs: int,
-    workers: int,
-) -> Iterator[list[Record]]:
-    if workers == 0 or not todo:
-        yield from run_trials(build_agent(options, agent_class, task_spec), task_spec, todo, num_envs)
-    else:
-        yield from _run_in_processes(options, todo, num_envs, min(workers, len(todo)))
-
-
-def _run_in_processes(
-    options: EvalOptions, todo: Sequence[tuple[int, Trial]], num_envs: int, workers: int
-) -> Iterator[list[Record]]:
-    """Every worker takes each `workers`-th episode and sends back what ended, step by step."""
-    # Not forked: threads of the simulation may be running in this process.
-    context = multiprocessing.get_context("spawn")
-    results: Any = context.Queue()
-    processes = [
-        context.Process(target=_work, args=(options, todo[index::workers], num_envs, results), daemon=True)
-        for index in range(workers)
-    ]
-    for process in processes:
-        process.start()
-    try:
-        missing = len(todo)
-        while missing:
-            try:
-                records = results.get(timeout=_POLL_SECONDS)
-            except queue.Empty:
-                dead = [process.exitcode for process in processes if process.exitcode]
-                if dead:
-                    raise RunError(f"a worker ended with exit status {dead[0]}; go on with --resume") from None
-                continue
-            missing -= len(records)
-            yield records
-    finally:
-        for process in processes:
-            process.terminate()
-            process.join()
-
-
-def _work(options: EvalOptions, todo: Sequence[tuple[int, Trial]], num_envs: int, results: Any) -> None:
-    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
-    agent_class = load_agent_class(options.agent)
-    task_spec = make_task_spec(options, agent_class)
-    for records in run_trials(build_agent(options, agent_class, task_spec), task_spec, todo, num_envs, num_threads=1):
-        results.put(records)
-
-
-def _end_with(parent: int) -> None:
-    """Ends this process when its parent is gone: one that was killed could not end its workers."""
-    while os.getppid() == parent:
-        time.sleep(_POLL_SECONDS)
-    os._exit(1)
-
-
-def resolve_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:
-    """`options` with the very file that the agent is read from, None for one that reads none.
-
-    A run's folder may gain a newer checkpoint any time, so it is looked into once, before anything is hashed or built.
-
-    Raises:
-      InputError: if a checkpoint is given to an agent that reads none.
-    """
-    default = getattr(agent_class, "default_checkpoint", None)
-    if options.checkpoint is None:
-        return options if default is None else dataclasses.replace(options, checkpoint=str(default()))
-    if default is None and not hasattr(agent_class, "build_learner") and ":" not in options.agent:
-        raise InputError(f"agent {options.agent!r} reads no checkpoint; found --checkpoint {options.checkpoint}")
-    return dataclasses.replace(options, checkpoint=str(_newest_checkpoint(pathlib.Path(options.checkpoint))))
-
-
-def _newest_checkpoint(path: pathlib.Path) -> pathlib.Path:
-    """`path` itself, or of a training run's folder, or a checkpoint's, the newest agent in it.
-
-    Raises:
-      InputError: if a folder holds none.
-    """
-    if not path.is_dir():
-        return path
-    found = sorted(path.glob("agent.safetensors")) + sorted(path.glob("checkpoints/*/agent.safetensors"))
-    if not found:
-        raise InputError(f"{path}: expected a checkpoint or the folder of a training run, found neither")
-    return found[-1]
-
-
-def _code_hash(options: EvalOptions, agent_class: type[Agent]) -> str | None:
-    """Of the file of an agent at hand, which may be edited between two sittings of a run; None for installed ones."""
-    return _hash_of(inspect.getfile(agent_class)) if ":" in options.agent else None
-
-
-def _hash_of(path: str | None) -> str | None:
-    if path is None:
-        return None
-    try:
-        with open(path, "rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise InputError(f"{path}: can't read the checkpoint: {error.strerror}") from error
-
-
-def _version(package: str) -> str | None:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return None

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from mazebench.maps import perturb
 from mazebench.maps.maze import Cell
 
 # What the agent's step brought about.
@@ -33,8 +34,12 @@ class Episode:
 class ShownMap:
     """The map as the agent gets it: the true one, or flipped, or seen through a perspective transform."""
 
-    walls: np.ndarray  # [N, N] bool
+    walls: np.ndarray  # [N, N] bool, before the transform
     homography: np.ndarray | None = None  # [3, 3], from true cells to shown ones; None if they are the same
+
+    def seen_walls(self) -> np.ndarray:
+        """`[N, N]` bool: the walls as they lie on the map that the agent sees."""
+        return self.walls if self.homography is None else perturb.warp_walls(self.walls, self.homography)
 
 
 class Route:

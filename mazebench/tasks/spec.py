@@ -180,11 +180,9 @@ class TaskSpec:
 
     def context(self, shown: ShownMap, start: Cell, goal: Cell) -> np.ndarray:
         """`[4, M, M]` float32: the context of a leg (see `build_context`)."""
-        walls = shown.walls
         if shown.homography is not None:
-            walls = perturb.warp_walls(walls, shown.homography)
             start, goal = (perturb.warp_cell(cell, shown.homography, self.size) for cell in (start, goal))
-        return build_context(walls, start, goal, self.context_size)
+        return build_context(shown.seen_walls(), start, goal, self.context_size)
 
 
 def sample_pair(maze: Maze, distance: int, rng: np.random.Generator) -> tuple[Cell, Cell]:

@@ -1,0 +1,108 @@
+"""What a result came from: versions, benchmark, checkpoint, options, command and machine."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import inspect
+import json
+import os
+import pathlib
+import platform
+import struct
+import sys
+from collections.abc import Mapping
+from importlib import metadata
+from typing import Any
+
+from mazebench.agent import Agent
+from mazebench.errors import InputError
+from mazebench.evaluation.options import EvalOptions
+from mazebench.maps.benchmark import VERSION, manifest_hash
+
+_PACKAGES = (
+    *("mazebench-mujoco", "mujoco", "dm-control", "dm-env", "gymnasium", "numpy", "scipy"),
+    *("opencv-python-headless", "torch", "ray"),
+)
+_MAX_HEADER_BYTES = 2**20  # of a checkpoint
+
+
+def provenance(options: EvalOptions, agent_class: type[Agent]) -> dict[str, Any]:
+    """The part of a summary that lets someone else repeat the run; versions are None where nothing is installed."""
+    return {
+        "benchmark": VERSION,
+        "benchmark_manifest_sha256": manifest_hash(),
+        "checkpoint_sha256": file_hash(options.checkpoint),
+        "checkpoint_metadata": checkpoint_metadata(options.checkpoint),
+        "agent_class": f"{agent_class.__module__}:{agent_class.__qualname__}",
+        "agent_package": _package_of(agent_class),
+        "agent_code_sha256": code_hash(options, agent_class),
+        "seed": options.seed,
+        "options": dataclasses.asdict(options),
+        "command": [pathlib.Path(sys.argv[0]).name, *sys.argv[1:]],
+        "python": platform.python_version(),
+        "packages": {name: _version(name) for name in _PACKAGES},
+        "machine": {
+            "system": platform.system(),
+            "release": platform.release(),
+            "processor": platform.machine(),
+            "cores": os.cpu_count(),
+        },
+    }
+
+
+def code_hash(options: EvalOptions, agent_class: type[Agent]) -> str | None:
+    """Of the file of an agent at hand, which may be edited between two sittings of a run; None for installed ones."""
+    return file_hash(inspect.getfile(agent_class)) if ":" in options.agent else None
+
+
+def file_hash(path: str | None) -> str | None:
+    """SHA-256 of a file; None for none."""
+    if path is None:
+        return None
+    try:
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: can't read the checkpoint: {error.strerror}") from error
+
+
+def checkpoint_metadata(path: str | None) -> dict[str, Any] | None:
+    """The agent's config and training as its checkpoint tells them; None if it is no safetensors file with JSON in it.
+
+    The file's header alone is read: whether the checkpoint is any good is for the agent to say.
+    """
+    if path is None:
+        return None
+    with open(path, "rb") as file:
+        start = file.read(8)
+        length = struct.unpack("<Q", start)[0] if len(start) == 8 else 0
+        header = file.read(length) if length <= _MAX_HEADER_BYTES else b""
+    try:
+        texts = json.loads(header)["__metadata__"]
+        return {key: json.loads(text, parse_constant=_refuse) for key, text in texts.items()}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(f"{constant} is no JSON")  # and could not be written to a summary
+
+
+def _package_of(agent_class: type[Agent]) -> str | None:
+    """Name and version of the distribution that an installed agent belongs to."""
+    names = _distributions().get(agent_class.__module__.partition(".")[0])
+    return f"{names[0]} {_version(names[0])}" if names else None
+
+
+@functools.cache
+def _distributions() -> Mapping[str, list[str]]:
+    return metadata.packages_distributions()
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
