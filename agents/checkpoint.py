@@ -14,6 +14,9 @@ import safetensors.torch
 import torch
 
 from mazebench.errors import InputError, read_at_most
+from mazebench.maps.maze import MAX_SIZE
+
+from .overrides import Config, override
 
 FORMAT = "mazebench-agent-1"
 AGENT_FILE = "agent.safetensors"
@@ -52,6 +55,23 @@ def load_checkpoint(path: pathlib.Path, agent: str) -> tuple[dict[str, torch.Ten
         found = metadata.get("agent") if isinstance(metadata, dict) else metadata
         raise InputError(f"{path}: expected a checkpoint of agent {agent!r}, found one of {str(found)[:80]!r}")
     return tensors, metadata
+
+
+def load_agent(path: pathlib.Path, agent: str, default: Config) -> tuple[dict[str, torch.Tensor], Config, int]:
+    """The tensors of a checkpoint of `agent`, its config, in the kind of `default`, and the context size M it is for.
+
+    Raises:
+      InputError: if the file can't be read, is no such checkpoint, another agent's, or lacks any of them.
+    """
+    tensors, metadata = load_checkpoint(path, agent)
+    try:
+        config = override(default, metadata["config"])
+        context_size = int(metadata["context_size"])
+        if not 3 <= context_size <= MAX_SIZE:
+            raise ValueError(f"context_size {context_size}")
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(f"{path}: expected metadata with config and context_size, found {error}") from error
+    return tensors, config, context_size
 
 
 def load_into(path: pathlib.Path, module: torch.nn.Module, tensors: Mapping[str, torch.Tensor]) -> None:

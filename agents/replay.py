@@ -43,6 +43,22 @@ class Sample(NamedTuple):
     valid: np.ndarray  # [G, K] bool, the step was taken outside the goal
 
 
+class SequenceSample(NamedTuple):
+    """G groups of S sequences of L steps and so L + 1 states; the sequences of a group share one context."""
+
+    row: np.ndarray  # [G] int, the rows whose priorities the groups were drawn by
+    weight: np.ndarray  # [G] float32, importance weights, at most 1
+    maze: np.ndarray  # [G] int
+    start: np.ndarray  # [G] int, cell
+    goal: np.ndarray  # [G] int, cell
+    relabelled: np.ndarray  # [G] bool, the goal is one of hindsight
+    origin: np.ndarray  # [G, 2] float32, x and y observed where the context's leg started
+    state: np.ndarray  # [G, S, L + 1, 12] float32
+    cell: np.ndarray  # [G, S, L + 1] int, the body's true cell at `state`
+    action: np.ndarray  # [G, S, L] int, taken in the first L states
+    exists: np.ndarray  # [G, S, L + 1] bool, the trajectory goes as far; the rest repeats its last state
+
+
 @dataclasses.dataclass(frozen=True)
 class Hindsight:
     """Which goals a sample is relabelled with."""
@@ -51,6 +67,19 @@ class Hindsight:
     mean_offset: float = 16.0  # steps ahead of the row at which the goal was reached; geometric
     window: int = 60  # steps; no goal lies farther ahead, no step of a group farther before it
     relabel_start: bool = False  # whether the context's start moves along, to the group's first step
+
+
+class _Groups(NamedTuple):
+    """What `Replay` draws before it looks at what happened: see `Sample`."""
+
+    row: np.ndarray  # [G]
+    env: np.ndarray  # [G]
+    steps: np.ndarray  # [G, K], places in the ring
+    maze: np.ndarray  # [G]
+    start: np.ndarray  # [G]
+    goal: np.ndarray  # [G]
+    relabelled: np.ndarray  # [G] bool
+    origin: np.ndarray  # [G, 2]
 
 
 class Replay:
@@ -172,6 +201,61 @@ class Replay:
           rng: the source of all draws.
           beta: exponent of the importance weights, 0 for none (Schaul et al. 2016).
         """
+        group = self._draw_groups(num_groups, num_steps, hindsight, rng)
+        env, steps, goal = group.env[:, None], group.steps, group.goal[:, None]
+        reward, discount, last = self._returns(env, steps, goal, n)
+        return Sample(
+            group.row,
+            self._weights(group.row, beta),
+            group.maze,
+            group.start,
+            group.goal,
+            group.origin,
+            self._cell[env, steps].astype(np.int64),
+            self._state[env, steps],
+            self._action[env, steps].astype(np.int64),
+            reward,
+            discount,
+            self._state[env, last],
+            (self._cell[env, steps] != goal) & (last != steps),
+        )
+
+    def sample_sequences(
+        self,
+        num_groups: int,
+        num_sequences: int,
+        num_steps: int,
+        hindsight: Hindsight,
+        rng: np.random.Generator,
+        beta: float = 0.0,
+    ) -> SequenceSample:
+        """Draws groups as `sample` does, of sequences that go on for `num_steps` L or to their trajectory's end."""
+        group = self._draw_groups(num_groups, num_sequences, hindsight, rng)
+        env = group.env[:, None]
+        place, going = group.steps, np.ones(group.steps.shape, dtype=bool)
+        places, exists = [place], [going]
+        for _ in range(num_steps):
+            going = going & self._has_next(env, place)
+            place = np.where(going, (place + 1) % self._length, place)
+            places.append(place)
+            exists.append(going)
+        env, places_at = env[..., None], np.stack(places, axis=-1)
+        return SequenceSample(
+            group.row,
+            self._weights(group.row, beta),
+            group.maze,
+            group.start,
+            group.goal,
+            group.relabelled,
+            group.origin,
+            self._state[env, places_at],
+            self._cell[env, places_at].astype(np.int64),
+            np.maximum(self._action[env, places_at[..., :-1]], 0).astype(np.int64),
+            np.stack(exists, axis=-1),
+        )
+
+    def _draw_groups(self, num_groups: int, num_steps: int, hindsight: Hindsight, rng: np.random.Generator) -> _Groups:
+        """Draws the rows of groups and relabels a share of them."""
         row = self._tree.sample(num_groups, rng)
         env, place = np.divmod(row, self._length)
         offset = np.minimum(rng.geometric(1 / hindsight.mean_offset, size=num_groups), hindsight.window)
@@ -187,22 +271,8 @@ class Replay:
             moved = relabelled[:, None]
             start = np.where(relabelled, self._cell[env, first], start)
             origin = np.where(moved, self._state[env, first, :2], origin)
-        reward, discount, last = self._returns(env[:, None], steps, goal[:, None], n)
-        return Sample(
-            row,
-            self._weights(row, beta),
-            self._maze[env, place].astype(np.int64),
-            start,
-            goal,
-            origin,
-            self._cell[env[:, None], steps].astype(np.int64),
-            self._state[env[:, None], steps],
-            self._action[env[:, None], steps].astype(np.int64),
-            reward,
-            discount,
-            self._state[env[:, None], last],
-            (self._cell[env[:, None], steps] != goal[:, None]) & (last != steps),
-        )
+        maze = self._maze[env, place].astype(np.int64)
+        return _Groups(row, env, steps, maze, start, goal, relabelled, origin)
 
     def update_priorities(self, row: np.ndarray, error: np.ndarray) -> None:
         """Gives `row` `[K]`, of a sample, priorities by the errors `[K]` that learning found there."""
@@ -277,13 +347,17 @@ class Replay:
         going, hit = np.ones(steps.shape, dtype=bool), np.zeros(steps.shape, dtype=bool)
         last = steps.copy()
         for _ in range(n):
-            going &= self._action[env, last] != _NO_ACTION
-            after = (last + 1) % self._length
-            # The newest row has no next one yet, and where collecting began anew, the next one is another trajectory's.
-            going &= last != (self._next[env] - 1) % self._length
-            going &= self._trajectory[env, after] == self._trajectory[env, last]
-            last = np.where(going, after, last)
+            going &= self._has_next(env, last)
+            last = np.where(going, (last + 1) % self._length, last)
             hit |= going & (self._cell[env, last] == goal)
             reward -= going & ~hit
             going &= ~hit
         return reward, (~hit).astype(np.float32), last
+
+    def _has_next(self, env: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Whether the trajectory at `place` goes on by a row."""
+        after = (place + 1) % self._length
+        # The newest row has no next one yet, and where collecting began anew, the next one is another trajectory's.
+        newest = place == (self._next[env] - 1) % self._length
+        same = self._trajectory[env, after] == self._trajectory[env, place]
+        return (self._action[env, place] != _NO_ACTION) & ~newest & same

@@ -22,7 +22,7 @@ def turn_planes(planes: torch.Tensor, symmetry: int) -> torch.Tensor:
 
 
 def turn_features(features: torch.Tensor, symmetry: int) -> torch.Tensor:
-    """`[..., 9]` state features (see `dqn.network.state_features`) as they are in the turned world."""
+    """`[..., 9]` state features (see `layers.state_features`) as they are in the turned world."""
     x, y, sine, cosine, forward, left, yaw_rate, far_x, far_y = features.unbind(-1)
     if symmetry >= 4:
         x, far_x, cosine, left, yaw_rate = -x, -far_x, -cosine, -left, -yaw_rate

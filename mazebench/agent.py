@@ -45,7 +45,9 @@ class Agent(Protocol):
     min(N, 21), and `seed_episodes(seeds, mask)`, for one that draws random numbers or must tell an episode's beginning
     from a landmark's. It is called before each `act` in which `is_first` is set anywhere: `mask` `[B]` bool says where
     an episode begins, `seeds` `[B]` int are the episodes', so that draws belong to the episode and not to its slot. And
-    `default_checkpoint() -> Path` of the class names the file that `build` reads if it is given none.
+    `default_checkpoint() -> Path` of the class names the file that `build` reads if it is given none. Where the class
+    has `measure(seconds) -> dict[str, list[dict[str, Any]]]`, `mazebench bench` adds the tables that it returns: rows
+    by title, a row's values by column, the first of which is "what". Each figure should take about so many seconds.
     """
 
     @classmethod
@@ -137,12 +139,15 @@ def load_agent_class(name: str) -> type[Agent]:
     if name not in entry_points:
         raise unknown("agent", name, entry_points)
     try:
-        return _checked(name, entry_points[name].load())
+        loaded = entry_points[name].load()
     except ModuleNotFoundError as error:
         raise InputError(
             f"agent {name!r} needs the module {error.name!r}, which is not installed; "
             "try: pip install 'mazebench-mujoco[agents]'"
         ) from error
+    except Exception as error:  # other people's modules may raise anything
+        raise _unimportable(name, error) from error
+    return _checked(name, loaded)
 
 
 def _class_at_hand(name: str) -> type[Agent]:
@@ -153,7 +158,13 @@ def _class_at_hand(name: str) -> type[Agent]:
         loaded = getattr(importlib.import_module(module_name), class_name)
     except (ImportError, AttributeError, ValueError, TypeError) as error:
         raise InputError(f"agent {name!r}: expected module:Class that can be imported, found: {error}") from error
+    except Exception as error:
+        raise _unimportable(name, error) from error
     return _checked(name, loaded)
+
+
+def _unimportable(name: str, error: Exception) -> InputError:
+    return InputError(f"agent {name!r}: its module can't be imported: {type(error).__name__}: {error}")
 
 
 def _checked(name: str, loaded: Any) -> type[Agent]:

@@ -72,6 +72,8 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
     results["environments"].append(_random_maze_row(spec, seconds, rounds))
     say("training")
     results["training"] = _training_rows(spec, seconds * rounds)
+    say("what agents measure themselves")
+    results["agents"] = _agents_tables(seconds * rounds)
     say("resets")
     results["resets"] = _resets(spec, 20 if quick else 200)
     say("cost against size")
@@ -85,8 +87,8 @@ def print_tables(results: dict[str, Any]) -> None:
     """Prints what `run` returned, for people."""
     console = Console(markup=False)
     print(f"{results['machine']['cores']} cores, MuJoCo {results['machine']['mujoco']}")
-    for name, title in _TITLES.items():
-        rows = results[name]
+    tables = {title: results[name] for name, title in _TITLES.items()} | results["agents"]
+    for title, rows in tables.items():
         if not rows:  # training, where no learning agent is installed
             continue
         table = Table(box=box.SIMPLE, title=title, title_justify="left", pad_edge=False, padding=(0, 1, 0, 0))
@@ -203,15 +205,30 @@ def _random_maze_row(spec: TaskSpec, seconds: float, rounds: int) -> dict[str, A
 
 def _training_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
     """Where a learner's time goes, for each learning agent that is installed, in 256 environments where it can."""
-    rows = []
+    return [
+        _training_row(name, agent_class, spec, seconds)
+        for name, agent_class in _installed_agents()
+        if hasattr(agent_class, "build_learner")
+    ]
+
+
+def _agents_tables(seconds: float) -> dict[str, list[dict[str, Any]]]:
+    """By title, the tables of the agents that have a speed of their own to measure."""
+    return {
+        f"{name}: {title}": rows
+        for name, agent_class in _installed_agents()
+        if hasattr(agent_class, "measure")
+        for title, rows in agent_class.measure(seconds).items()
+    }
+
+
+def _installed_agents() -> Iterator[tuple[str, Any]]:
+    """The names and classes of those whose dependencies are installed too."""
     for name in agent_names():
         try:
-            agent_class = load_agent_class(name)
-        except InputError:  # its dependencies are not installed
+            yield name, load_agent_class(name)
+        except InputError:
             continue
-        if hasattr(agent_class, "build_learner"):
-            rows.append(_training_row(name, agent_class, spec, seconds))
-    return rows
 
 
 def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -> dict[str, Any]:

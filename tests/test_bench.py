@@ -31,3 +31,4 @@ def test_bench_command_prints_json():
     results = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
     assert {row["what"] for row in results["training"]} >= {"mah, 256 envs", "dqn, 256 envs"}
     assert [row["what"] for row in results["num_envs"]][-1] == "4096 environments"
+    assert results["agents"]["mmn: tree search, 16 simulations, one thread"][0]["sims/s"] > 0

@@ -12,7 +12,8 @@ from mazebench_agents.dqn import DQN, MAH
 from mazebench_agents.dqn import config as config_module
 from mazebench_agents.dqn.config import DQNConfig
 from mazebench_agents.dqn.learner import double_q_target
-from mazebench_agents.dqn.network import QNetwork, marked_place
+from mazebench_agents.dqn.network import QNetwork
+from mazebench_agents.layers import marked_place
 from mazebench_agents.overrides import override
 
 from mazebench.agent import Interface

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 from mazebench_agents import symmetry
-from mazebench_agents.dqn.network import state_features
+from mazebench_agents.layers import state_features
 
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze

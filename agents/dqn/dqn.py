@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib import resources
 from typing import Any, ClassVar
 
@@ -15,13 +15,12 @@ import numpy as np
 import torch
 
 from mazebench.agent import Interface, Observation
-from mazebench.errors import InputError
-from mazebench.maps.maze import MAX_SIZE
 
-from ..checkpoint import load_checkpoint, load_into
+from ..checkpoint import load_agent, load_into
+from ..layers import in_batches, state_features
 from ..overrides import override
 from .config import DQNConfig
-from .network import NUM_ACTIONS, QNetwork, state_features
+from .network import NUM_ACTIONS, QNetwork
 
 _ENCODED_AT_ONCE = 8  # contexts; few are new at a time
 _ACTED_AT_ONCE = 64  # states
@@ -72,14 +71,7 @@ class DQN:
           InputError: if the checkpoint can't be used here.
         """
         path = cls.default_checkpoint() if checkpoint is None else checkpoint
-        tensors, metadata = load_checkpoint(path, cls.name)
-        try:
-            config = override(cls.default_config, metadata["config"])
-            trained_size = int(metadata["context_size"])
-            if not 3 <= trained_size <= MAX_SIZE:
-                raise ValueError(f"context_size {trained_size}")
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise InputError(f"{path}: expected metadata with config and context_size, found {error}") from error
+        tensors, config, trained_size = load_agent(path, cls.name, cls.default_config)
         agent = cls(config, trained_size, seed)
         load_into(path, agent.network, tensors)
         return agent
@@ -124,18 +116,6 @@ class DQN:
             at_random = self._rng.random(len(actions)) < self._epsilon
             actions = np.where(at_random, self._rng.integers(NUM_ACTIONS, size=len(actions)), actions)
         return actions, state
-
-
-def in_batches(function: Callable[..., torch.Tensor], size: int, *inputs: torch.Tensor) -> torch.Tensor:
-    """`function` of `inputs` `[B, ...]`, computed on `size` rows at a time, the last ones padded by zeros.
-
-    PyTorch rounds differently at another batch size; so a row's result depends on the row alone.
-    """
-    num_rows = len(inputs[0])
-    padding = -num_rows % size
-    padded = [torch.cat([values, values.new_zeros(padding, *values.shape[1:])]) for values in inputs]
-    parts = zip(*(values.split(size) for values in padded), strict=True)
-    return torch.cat([function(*part) for part in parts])[:num_rows]
 
 
 class MAH(DQN):

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-import json
 import pathlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -22,15 +21,12 @@ from mazebench.training.experience import Experience
 
 from .. import symmetry
 from ..checkpoint import AGENT_FILE, load_checkpoint, load_into, save_checkpoint
+from ..layers import state_features
+from ..learner_files import load_learner, save_learner
 from ..replay import Hindsight, Replay, Sample
-from .network import state_features
 
 if TYPE_CHECKING:
     from .dqn import DQN
-
-_TRAINING_FILE = "training.safetensors"
-_RANDOM_FILE = "random.json"
-_REPLAY_FILE = "replay.npz"
 
 
 class DQNLearner:
@@ -159,31 +155,13 @@ class DQNLearner:
             "provenance": dict(provenance),
         }
         save_checkpoint(folder / AGENT_FILE, self.actor.network.state_dict(), metadata)
-        tensors = {f"target.{name}": value for name, value in self._target.state_dict().items()}
-        for index, moments in self._optimizer.state_dict()["state"].items():
-            tensors |= {f"optimizer.{index}.{name}": torch.as_tensor(value) for name, value in moments.items()}
-        save_checkpoint(folder / _TRAINING_FILE, tensors, {"agent": self.actor.name})
-        (folder / _RANDOM_FILE).write_text(json.dumps(self._rng.bit_generator.state), encoding="ascii")
-        self._replay.save(folder / _REPLAY_FILE)
+        save_learner(folder, self.actor.name, self._target, self._optimizer, self._rng, self._replay)
 
     def load(self, folder: pathlib.Path) -> None:
         """Goes on from what `save` wrote; where the replay is gone, learning waits until it is filled again."""
         tensors, _ = load_checkpoint(folder / AGENT_FILE, self.actor.name)
         load_into(folder / AGENT_FILE, self.actor.network, tensors)
-        path = folder / _TRAINING_FILE
-        tensors, _ = load_checkpoint(path, self.actor.name)
-        target = {name.removeprefix("target."): value for name, value in tensors.items() if name.startswith("target.")}
-        load_into(path, self._target, target)
-        moments: dict[int, dict[str, torch.Tensor]] = {}
-        for name, value in tensors.items():
-            if name.startswith("optimizer."):
-                _, index, moment = name.split(".")
-                moments.setdefault(int(index), {})[moment] = value
-        groups = self._optimizer.state_dict()["param_groups"]
-        self._optimizer.load_state_dict({"state": moments, "param_groups": groups})
-        self._rng.bit_generator.state = json.loads((folder / _RANDOM_FILE).read_text(encoding="ascii"))
-        if (folder / _REPLAY_FILE).exists():
-            self._replay.load(folder / _REPLAY_FILE)
+        load_learner(folder, self.actor.name, self._target, self._optimizer, self._rng, self._replay)
 
 
 def double_q_target(

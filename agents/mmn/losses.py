@@ -1,0 +1,187 @@
+"""MMN's losses: the model is unrolled from encoded states, and held against what was experienced and planned.
+
+`G` is the number of contexts in a batch, `S` of sequences in each, `L` of steps of a sequence, so L + 1 of states. A
+root is a state from which the model is unrolled for `K` steps; `R` roots belong to a context.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch.nn import functional
+
+from .config import MMNConfig
+from .hypermodels import Code, SpatialHypermodel
+from .network import MMNNetwork, Predictions
+from .targets import cross_entropy, scale_gradient, two_hot
+
+_HIDDEN_GRADIENT = 0.5  # of an unrolled state at each step: MuZero's
+_MOVED_WEIGHT = 2.0  # of an error of metres moved, beside one of the body's motion
+
+
+class Batch(NamedTuple):
+    """A sample as tensors, rotated or mirrored."""
+
+    context: torch.Tensor  # [G, 4, M, M]
+    visited: torch.Tensor  # [G, 1, M, M], share of each place of the map where the agent has ever been in this maze
+    relabelled: torch.Tensor  # [G] bool
+    features: torch.Tensor  # [G, S, L + 1, 9]
+    place: torch.Tensor  # [G, S, L + 1, 2], where on the map the body was: (row, column) of its cell
+    action: torch.Tensor  # [G, S, L]
+    exists: torch.Tensor  # [G, S, L + 1] bool, the sequence goes as far, and the goal was not reached before
+    at_goal: torch.Tensor  # [G, S, L + 1] bool, and is reached here; what follows does not exist
+
+
+class Targets(NamedTuple):
+    """What heads are to say of the states of a batch."""
+
+    value: torch.Tensor  # [G, S, L + 1]
+    policy: torch.Tensor  # [G, S, L + 1, 6]
+
+
+class Means:
+    """Weighted means, summed up step by step."""
+
+    def __init__(self) -> None:
+        self._sums: dict[str, torch.Tensor] = {}
+        self._weights: dict[str, torch.Tensor] = {}
+
+    def add(self, name: str, values: torch.Tensor, weight: torch.Tensor) -> None:
+        """Adds `values` by `weight`, both of one shape."""
+        weight = weight.to(values.dtype)
+        total, weights = (values * weight).sum(), weight.sum()
+        self._sums[name] = self._sums[name] + total if name in self._sums else total
+        self._weights[name] = self._weights[name] + weights if name in self._weights else weights
+
+    def means(self) -> dict[str, torch.Tensor]:
+        """By name; 0 where nothing had weight."""
+        return {name: total / self._weights[name].clamp(min=1e-6) for name, total in self._sums.items()}
+
+
+def unrolled_losses(
+    network: MMNNetwork, config: MMNConfig, batch: Batch, targets: Targets, weight: torch.Tensor
+) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor], torch.Tensor]:
+    """The losses by name, whose sum is to be descended; other scalars; and the value errors `[G]` of the first roots.
+
+    The paper's task losses (values, policies, rewards and ends) at the roots and in K unrolled states, which count
+    1 / K as much, and its auxiliary model loss in the unrolled states.
+
+    Args:
+      network: it learns; the gradient goes through all of it.
+      config: the weights of the losses, and K.
+      batch: what was experienced.
+      targets: what was planned.
+      weight: `[G]`, importance weights.
+    """
+    code = network.hypermodel(batch.context)
+    roots = slice(0, config.sequence_steps - config.unroll + 1, config.unroll)
+
+    def at(values: torch.Tensor, step: int) -> torch.Tensor:
+        """`[G, R, ...]` of `[G, S, L + 1, ...]`: the states `step` steps after the roots."""
+        return values[:, :, roots.start + step : roots.stop + step : roots.step].flatten(1, 2)
+
+    latent = network.encode(at(batch.features, 0))
+    alive = at(batch.exists & ~batch.at_goal, 0)
+    losses, watched = Means(), Means()
+    value_error = torch.zeros(len(weight))
+    for step in range(config.unroll + 1):
+        exists = at(batch.exists, step) & alive if step else at(batch.exists, 0)
+        at_goal, value = at(batch.at_goal, step), at(targets.value, step)
+        share = weight[:, None] * (1 / config.unroll if step else 1.0)
+        seen = network.look(latent, code)
+        out = network.predict(latent, seen, code)
+        going = exists & ~at_goal
+        losses.add("value_loss", cross_entropy(two_hot(value, network.num_bins), out.value_logits), going * share)
+        losses.add("policy_loss", cross_entropy(at(targets.policy, step), out.policy_logits), going * share)
+        _add_outcome(losses, config, out, at_goal, exists * share)
+        if step:
+            moved_error = _add_model(losses, config, network, latent, at(batch.features, step), exists * share)
+            if step in (1, config.unroll):
+                watched.add(f"model_error_{step}", moved_error, exists)
+        else:
+            _add_places(losses, config, network, latent, code, at(batch.place, 0), exists)
+            _add_distances(losses, config, network, latent, code, value, going)
+            _add_visits(losses, config, code, batch.visited)
+            error = (network.value(out.value_logits.detach()) - value) * going
+            watched.add("value_error", error.abs(), going)
+            watched.add("value", value, going)
+            value_error = error[:, 0]
+        if step < config.unroll:
+            action = at(batch.action, step)
+            latent = network.step(latent, network.first_layer(latent, seen, code), action, code)
+            latent = scale_gradient(latent, _HIDDEN_GRADIENT)
+    return losses.means(), watched.means(), value_error
+
+
+def _add_outcome(
+    losses: Means, config: MMNConfig, out: Predictions, at_goal: torch.Tensor, weight: torch.Tensor
+) -> None:
+    """Of where episodes end, and with the paper of rewards: the goal's is 0, any other -1."""
+    truth = at_goal.float()
+    ends = functional.binary_cross_entropy_with_logits(out.goal_logit, truth, reduction="none")
+    losses.add("goal_loss", ends, weight)
+    if config.predict_reward:
+        rewards = functional.binary_cross_entropy_with_logits(out.reward_logit, truth, reduction="none")
+        losses.add("reward_loss", rewards, weight)
+
+
+def _add_model(
+    losses: Means,
+    config: MMNConfig,
+    network: MMNNetwork,
+    latent: torch.Tensor,
+    features: torch.Tensor,
+    weight: torch.Tensor,
+) -> torch.Tensor:
+    """The paper's model loss, of unrolled states against observed and encoded ones; returns errors `[G, R]` in metres.
+
+    The paper's log-likelihood of the next state, with a Laplace distribution of the place, which collisions make
+    heavy-tailed, and a normal one of the body's motion and of its code.
+    """
+    decoded = network.decode(latent)
+    with torch.no_grad():
+        encoded = network.encode(features)
+    moved_error = (decoded[..., :2] - features[..., :2]).abs().sum(dim=-1)
+    body_error = ((decoded[..., 2:] - features[..., 2:7]) ** 2).sum(dim=-1)
+    code_error = ((latent[..., 2:] - encoded[..., 2:]) ** 2).mean(dim=-1)
+    loss = config.model_weight * (_MOVED_WEIGHT * moved_error + body_error + code_error)
+    losses.add("model_loss", loss, weight)
+    return moved_error.detach()
+
+
+def _add_places(
+    losses: Means,
+    config: MMNConfig,
+    network: MMNNetwork,
+    latent: torch.Tensor,
+    code: Code,
+    place: torch.Tensor,
+    exists: torch.Tensor,
+) -> None:
+    """Beyond the paper: of where on the map the network believes the steps to be, against the cells they were in."""
+    error = (network.locate(latent, code) - place).abs().mean(dim=-1)
+    losses.add("localization_loss", config.localization_weight * error, exists)
+
+
+def _add_distances(
+    losses: Means,
+    config: MMNConfig,
+    network: MMNNetwork,
+    latent: torch.Tensor,
+    code: Code,
+    value: torch.Tensor,
+    going: torch.Tensor,
+) -> None:
+    """Beyond the paper: of propagated distances, against the values."""
+    if isinstance(network.hypermodel, SpatialHypermodel) and code.distance.shape[1]:
+        distance = network.hypermodel.distances(network.locate(latent, code).detach(), code)  # [G, R, P]
+        error = functional.smooth_l1_loss(distance, -value[..., None].expand_as(distance), reduction="none")
+        losses.add("distance_loss", config.distance_weight * error.mean(dim=-1), going)
+
+
+def _add_visits(losses: Means, config: MMNConfig, code: Code, visited: torch.Tensor) -> None:
+    """Beyond the paper: of cells that can be entered, against those of this maze where the agent has ever been."""
+    if code.enterable.shape[1]:
+        error = functional.binary_cross_entropy_with_logits(code.enterable, visited, reduction="none")
+        losses.add("visit_loss", config.visit_weight * error, torch.ones_like(error))

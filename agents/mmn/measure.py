@@ -1,0 +1,170 @@
+"""How fast the search is: beside the network that it calls, and beside mctx where that is installed.
+
+The network is a stand-in of MMN's size whose transition has other weights in each row, as a hypermodel would give it.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import torch
+
+from .search import Evaluation, Root, gumbel_muzero_policy, muzero_policy
+
+NUM_ACTIONS = 6
+LATENT = 64
+HIDDEN = 128
+NUM_BINS = 65  # of values in [-64, 0]
+NUM_SIMULATIONS = 16
+_CASES = (("gumbel", 1), ("gumbel", 64), ("gumbel", 256), ("puct", 64))  # policy, roots
+_ROUNDS = 7  # in which the sides take turns
+# XLA would use a thread a core.
+_ONE_THREAD = {
+    "JAX_PLATFORMS": "cpu",
+    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1",
+    "OMP_NUM_THREADS": "1",
+}
+
+
+def weight_shapes(batch_size: int) -> dict[str, tuple[int, ...]]:
+    """What the network consists of; the transition's layers have weights of their own in each of the rows."""
+    return {
+        "transition_1": (batch_size, LATENT + NUM_ACTIONS, LATENT),
+        "transition_2": (batch_size, LATENT, LATENT),
+        "head_1": (LATENT, HIDDEN),
+        "head_2": (HIDDEN, HIDDEN),
+        "outputs": (HIDDEN, NUM_ACTIONS + NUM_BINS + 1),  # policy, value, end
+    }
+
+
+def random_weights(batch_size: int) -> dict[str, np.ndarray]:
+    """Of the same seed for all."""
+    rng = np.random.default_rng(0)
+    return {
+        name: (rng.normal(size=shape) / shape[-2] ** 0.5).astype(np.float32)
+        for name, shape in weight_shapes(batch_size).items()
+    }
+
+
+class Network:
+    """The stand-in, in PyTorch."""
+
+    def __init__(self, batch_size: int):
+        for name, weight in random_weights(batch_size).items():
+            setattr(self, name, torch.from_numpy(weight))
+        self._one_hot = torch.eye(NUM_ACTIONS)
+        self._support = torch.linspace(1 - NUM_BINS, 0, NUM_BINS)
+        self._reward = np.full(batch_size, -1, np.float32)
+
+    transition_1: torch.Tensor
+    transition_2: torch.Tensor
+    head_1: torch.Tensor
+    head_2: torch.Tensor
+    outputs: torch.Tensor
+
+    def __call__(self, latent: torch.Tensor, action: np.ndarray) -> Evaluation:
+        """A step from latent states `[B, D]`."""
+        inputs = torch.cat([latent, self._one_hot[torch.from_numpy(action)]], dim=1)[:, None]  # [B, 1, D + A]
+        hidden = torch.relu_(inputs @ self.transition_1)
+        latent = torch.nn.functional.layer_norm(latent + (hidden @ self.transition_2)[:, 0], (LATENT,))  # [B, D]
+        policy, value, end = self.predict(latent)
+        return Evaluation(self._reward, 1 - end, policy, value, latent)
+
+    def predict(self, latent: torch.Tensor) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Logits `[B, A]`, values `[B]` and the probability `[B]` that the episode has ended."""
+        outputs = torch.relu_(torch.relu_(latent @ self.head_1) @ self.head_2) @ self.outputs
+        value = torch.softmax(outputs[:, NUM_ACTIONS:-1], dim=1) @ self._support
+        return outputs[:, :NUM_ACTIONS].numpy(), value.numpy(), torch.sigmoid(outputs[:, -1]).numpy()
+
+
+def measure(seconds: float) -> dict[str, list[dict[str, Any]]]:
+    """The table of simulations a second of a thread's own time; measures some `seconds` for a figure."""
+    torch.set_num_threads(1)
+    with _mctx() as mctx:
+        rows = [_row(policy, batch_size, seconds / _ROUNDS, mctx) for policy, batch_size in _CASES]
+    return {f"tree search, {NUM_SIMULATIONS} simulations, one thread": rows}
+
+
+def _row(policy: str, batch_size: int, seconds: float, mctx: Callable[..., float] | None) -> dict[str, Any]:
+    search_step, network_step = _steps(policy, batch_size)
+    sides = {
+        "sims/s": lambda: rate(search_step, batch_size, seconds),
+        "network sims/s": lambda: rate(network_step, batch_size, seconds),
+    }
+    if mctx is not None:
+        sides["mctx sims/s"] = lambda: mctx(policy, batch_size, seconds)
+    rounds = [{name: side() for name, side in sides.items()} for _ in range(_ROUNDS)]
+    row: dict[str, Any] = {"what": f"{policy}, {batch_size} root{'s' * (batch_size > 1)}"}
+    row |= {name: round(statistics.median(each[name] for each in rounds)) for name in sides}
+    for name in list(sides)[1:]:
+        row[f"/ {name.removesuffix(' sims/s')}"] = statistics.median(each["sims/s"] / each[name] for each in rounds)
+    return row
+
+
+def rate(step: Callable[[], Any], batch_size: int, seconds: float) -> float:
+    """Simulations a second of this process's time, where `step` does those of a whole search."""
+    step()
+    count, begin = 0, time.process_time()
+    while (elapsed := time.process_time() - begin) < seconds:
+        step()
+        count += 1
+    return count * batch_size * NUM_SIMULATIONS / elapsed
+
+
+def _steps(policy: str, batch_size: int) -> tuple[Callable[[], Any], Callable[[], Any]]:
+    """A whole search, and as many evaluations by the network alone."""
+    network, rng = Network(batch_size), np.random.default_rng(0)
+    latent = torch.from_numpy(rng.normal(size=(batch_size, LATENT)).astype(np.float32))
+    prior_logits, value, _ = network.predict(latent)
+    root = Root(prior_logits, value, latent)
+    gumbel = rng.gumbel(size=prior_logits.shape).astype(np.float32)
+    dirichlet = rng.dirichlet(np.full(NUM_ACTIONS, 0.3), batch_size).astype(np.float32)
+    actions = rng.integers(NUM_ACTIONS, size=(NUM_SIMULATIONS, batch_size))
+
+    def search() -> None:
+        if policy == "gumbel":
+            gumbel_muzero_policy(root, network, NUM_SIMULATIONS, gumbel)
+        else:
+            muzero_policy(root, network, NUM_SIMULATIONS, dirichlet, gumbel)
+
+    @torch.inference_mode()
+    def evaluate() -> None:
+        after = latent
+        for action in actions:
+            after = network(after, action).embedding
+
+    return search, evaluate
+
+
+@contextmanager
+def _mctx() -> Iterator[Callable[[str, int, float], float] | None]:
+    """Asks a process that has JAX, kept from the threads here, for rates; None where mctx is not installed."""
+    if importlib.util.find_spec("mctx") is None:
+        yield None
+        return
+    command = [sys.executable, "-m", f"{__package__}.measure_mctx"]
+    pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(command, env={**os.environ, **_ONE_THREAD}, text=True, **pipes) as process:
+        questions, answers = process.stdin, process.stdout
+        assert questions is not None
+        assert answers is not None
+
+        def ask(policy: str, batch_size: int, seconds: float) -> float:
+            questions.write(json.dumps([policy, batch_size, seconds]) + "\n")
+            questions.flush()
+            return json.loads(answers.readline())
+
+        try:
+            yield ask
+        finally:
+            questions.close()

@@ -1,0 +1,106 @@
+"""Planning in the latent model: one step of lookahead, and tree search.
+
+`G` is the number of contexts, `K` of latent states in each, B = G K.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from .config import MMNConfig
+from .hypermodels import NUM_ACTIONS, Code
+from .network import MMNNetwork, Predictions
+from .search import Evaluation, RecurrentFn, Root, SearchResult, gumbel_muzero_policy, muzero_policy
+
+_DIRICHLET_ALPHA = 0.3  # MuZero's, in its board games with the fewest actions
+_DIRICHLET_FRACTION = 0.25  # MuZero's
+
+
+def outcome(predictions: Predictions, predict_reward: bool) -> tuple[torch.Tensor, torch.Tensor]:
+    """Reward and discount `[G, K]` of arriving in states: the episode ends in the goal, and any other step costs 1."""
+    discount = torch.sigmoid(-predictions.goal_logit)
+    reward = -torch.sigmoid(-predictions.reward_logit) if predict_reward else -discount
+    return reward, discount
+
+
+def lookahead(network: MMNNetwork, latent: torch.Tensor, code: Code, predict_reward: bool) -> torch.Tensor:
+    """`[G, K, 6]`: action values of latent states `[G, K, D]` by one step of the model."""
+    first = network.first_layer(latent, network.look(latent, code), code)
+    after = network.step_all(latent, first, code)
+    predictions = network.predict(after, network.look(after, code), code)
+    reward, discount = outcome(predictions, predict_reward)
+    qvalues = reward + discount * network.value(predictions.value_logits)
+    return qvalues.unflatten(1, (-1, NUM_ACTIONS))
+
+
+@torch.no_grad()
+def plan(
+    network: MMNNetwork,
+    config: MMNConfig,
+    latent: torch.Tensor,
+    code: Code,
+    num_simulations: int,
+    rng: np.random.Generator | None = None,
+) -> SearchResult:
+    """Searches from all latent states `[G, K, D]`; the results are in the order of B. With noise if `rng` is given."""
+    size = latent.shape[0] * latent.shape[1], NUM_ACTIONS
+    root = _root(network, latent, code)
+    step = _recurrent_fn(network, config.predict_reward, latent.shape[:2], code)
+    gumbel = np.zeros(size) if rng is None else rng.gumbel(size=size)
+    if config.search == "gumbel":
+        return gumbel_muzero_policy(
+            root,
+            step,
+            num_simulations,
+            gumbel,
+            value_scale=config.value_scale,
+            maxvisit_init=config.maxvisit_init,
+            rescale_values=False,  # values are in steps: their differences mean the same everywhere
+        )
+    exploring = rng is not None
+    noise = np.zeros(size) if rng is None else rng.dirichlet([_DIRICHLET_ALPHA] * NUM_ACTIONS, size[0])
+    return muzero_policy(
+        root,
+        step,
+        num_simulations,
+        noise,
+        gumbel,
+        dirichlet_fraction=_DIRICHLET_FRACTION * exploring,
+        temperature=float(exploring),
+    )
+
+
+def _root(network: MMNNetwork, latent: torch.Tensor, code: Code) -> Root:
+    predictions, embedding = _arrive(network, latent, code)
+    value = network.value(predictions.value_logits)
+    return Root(_array(predictions.policy_logits.flatten(0, 1)), _array(value.flatten()), embedding)
+
+
+def _recurrent_fn(network: MMNNetwork, predict_reward: bool, shape: torch.Size, code: Code) -> RecurrentFn:
+    def step(embedding: torch.Tensor, action: np.ndarray) -> Evaluation:
+        latent, first = embedding.unflatten(0, shape).split(
+            [network.latent_size, embedding.shape[-1] - network.latent_size], dim=-1
+        )
+        chosen = torch.from_numpy(action).to(embedding.device).unflatten(0, shape)
+        predictions, after = _arrive(network, network.step(latent, first, chosen, code), code)
+        reward, discount = outcome(predictions, predict_reward)
+        value = network.value(predictions.value_logits)
+        scalars = torch.stack([reward, discount, value], dim=-1)
+        numbers = _array(
+            torch.cat([scalars, predictions.policy_logits], dim=-1).flatten(0, 1)
+        )  # [B, 9], copied at once
+        return Evaluation(numbers[:, 0], numbers[:, 1], numbers[:, 3:], numbers[:, 2], after)
+
+    return step
+
+
+def _arrive(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple[Predictions, torch.Tensor]:
+    """What the heads say of latent states, and their embeddings `[B, D + H]`: with the transition's first layer."""
+    seen = network.look(latent, code)
+    embedding = torch.cat([latent, network.first_layer(latent, seen, code)], dim=-1)
+    return network.predict(latent, seen, code), embedding.flatten(0, 1)
+
+
+def _array(tensor: torch.Tensor) -> np.ndarray:
+    return tensor.cpu().numpy()

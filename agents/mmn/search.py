@@ -1,0 +1,198 @@
+"""Batched tree search in a learned model: Gumbel MuZero (Danihelka et al. 2022), MuZero (Schrittwieser et al. 2020).
+
+`B` is the number of roots, `N` = num_simulations + 1 the number of nodes of a tree, `A` the number of actions and `D`
+the size of an embedding. In each simulation a kernel goes down all trees, one batch of B states is evaluated, and a
+kernel expands and backs up. The search draws no random numbers: those it needs are arguments. Among actions of exactly
+equal scores the first is taken, where mctx's MuZero adds a tiny noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import torch
+
+from . import tree as trees
+from .tree import ROOT, GumbelSettings, PUCTSettings
+
+
+class Root(NamedTuple):
+    """The states to search from, as the network sees them."""
+
+    prior_logits: np.ndarray  # [B, A] float32
+    value: np.ndarray  # [B] float32
+    embedding: torch.Tensor  # [B, D], on any device
+
+
+class Evaluation(NamedTuple):
+    """What the model predicts of one step in B states, and of the states that it leads to."""
+
+    reward: np.ndarray  # [B] float32
+    discount: np.ndarray  # [B] float32, of the value after the step; 0 where the episode ends in it
+    prior_logits: np.ndarray  # [B, A] float32
+    value: np.ndarray  # [B] float32
+    embedding: torch.Tensor  # [B, D]
+
+
+class SearchResult(NamedTuple):
+    """What was found out about the roots."""
+
+    action: np.ndarray  # [B] int64
+    action_weights: np.ndarray  # [B, A] float32, the policy to learn
+    visit_counts: np.ndarray  # [B, A] int32
+    qvalues: np.ndarray  # [B, A] float32, those of actions not visited completed as the policy does
+    value: np.ndarray  # [B] float32, the mean over the root's visits
+
+
+# Goes down all trees [B, N] and attaches nodes of an index; writes actions [B] and the parents' rows of embeddings [B].
+_Simulate = Callable[[np.ndarray, int, np.ndarray, np.ndarray], None]
+# Evaluates actions [B] int64 in the states of embeddings [B, D]; both are the search's, and valid during the call.
+RecurrentFn = Callable[[torch.Tensor, np.ndarray], Evaluation]
+
+
+def gumbel_muzero_policy(
+    root: Root,
+    recurrent_fn: RecurrentFn,
+    num_simulations: int,
+    gumbel: np.ndarray,
+    *,
+    max_num_considered_actions: int = 16,
+    value_scale: float = 0.1,
+    maxvisit_init: float = 50.0,
+    rescale_values: bool = True,
+    use_mixed_value: bool = True,
+) -> SearchResult:
+    """Sequential halving at the root, deterministic visits in proportion to the improved policy below it.
+
+    Args:
+      root: the states to search from.
+      recurrent_fn: the model. It is called once a simulation.
+      num_simulations: 0 acts by the prior.
+      gumbel: `[B, A]`, standard Gumbel noise, scaled as wanted; zeros to act without noise.
+      max_num_considered_actions: at the root.
+      value_scale: of completed q-values, beside logits.
+      maxvisit_init: added to the visits of the most visited action, which scale q-values too.
+      rescale_values: whether a node's q-values are brought to [0, 1] before they are scaled.
+      use_mixed_value: whether q-values of actions not visited are completed by the mixed value, not the network's.
+    """
+    batch_size, num_actions = root.prior_logits.shape
+    noise = np.empty((batch_size, num_actions), np.float32)
+    noise[:] = gumbel
+    settings = GumbelSettings(np.float32(value_scale), np.float32(maxvisit_init), rescale_values, use_mixed_value)
+    visits = considered_visits(min(max_num_considered_actions, num_actions), num_simulations)
+
+    def simulate(tree: np.ndarray, index: int, actions: np.ndarray, rows: np.ndarray) -> None:
+        trees.simulate_gumbel(tree, index, noise, visits[index - 1], settings, actions, rows)
+
+    tree = _search(root, recurrent_fn, num_simulations, simulate)
+    action = np.empty(batch_size, np.int64)
+    action_weights = np.empty((batch_size, num_actions), np.float32)
+    qvalues = np.empty((batch_size, num_actions), np.float32)
+    trees.gumbel_decision(tree, noise, settings, action, action_weights, qvalues)
+    return SearchResult(
+        action, action_weights, tree["child_visits"][:, ROOT].copy(), qvalues, tree["value"][:, ROOT].copy()
+    )
+
+
+def muzero_policy(
+    root: Root,
+    recurrent_fn: RecurrentFn,
+    num_simulations: int,
+    dirichlet_noise: np.ndarray,
+    action_noise: np.ndarray,
+    *,
+    dirichlet_fraction: float = 0.25,
+    pb_c_init: float = 1.25,
+    pb_c_base: float = 19652.0,
+    temperature: float = 1.0,
+) -> SearchResult:
+    """Upper confidence bounds (PUCT) everywhere; acts in proportion to visits ** (1 / temperature).
+
+    Args:
+      root: the states to search from.
+      recurrent_fn: the model. It is called once a simulation.
+      num_simulations: 0 acts by the prior with its noise, which then takes the place of the visits.
+      dirichlet_noise: `[B, A]`, a distribution over actions a root.
+      action_noise: `[B, A]`, standard Gumbel noise, by which the action is drawn; zeros to take the most visited.
+      dirichlet_fraction: of the noise in the roots' priors.
+      pb_c_init: the exploration constant c1.
+      pb_c_base: the exploration constant c2.
+      temperature: 0 takes the most visited action.
+    """
+    prior = (1 - dirichlet_fraction) * _softmax(root.prior_logits) + dirichlet_fraction * dirichlet_noise
+    noisy_root = root._replace(prior_logits=_log(prior.astype(np.float32)))
+    settings = PUCTSettings(np.float32(pb_c_init), np.float32(pb_c_base))
+
+    def simulate(tree: np.ndarray, index: int, actions: np.ndarray, rows: np.ndarray) -> None:
+        trees.simulate_puct(tree, index, settings, actions, rows)
+
+    tree = _search(noisy_root, recurrent_fn, num_simulations, simulate)
+    visit_counts = tree["child_visits"][:, ROOT].copy()
+    action_weights = visit_counts.astype(np.float32) / np.float32(num_simulations) if num_simulations else prior
+    action_weights = action_weights.astype(np.float32)
+    qvalues = np.empty_like(action_weights)
+    trees.puct_qvalues(tree, qvalues)
+    action = np.argmax(action_noise + _tempered(action_weights, temperature), axis=-1)
+    return SearchResult(action, action_weights, visit_counts, qvalues, tree["value"][:, ROOT].copy())
+
+
+def considered_visits(num_considered: int, num_simulations: int) -> list[int]:
+    """How often an action must have been visited to be considered at the root, in each simulation.
+
+    Sequential halving (Karnin et al. 2013): each phase visits all considered actions equally often, and the better half
+    of them goes on to the next. All with as many visits as the phase has given so far are those that still take part.
+    """
+    if num_considered <= 1:
+        return list(range(num_simulations))
+    num_phases = math.ceil(math.log2(num_considered))
+    sequence: list[int] = []
+    done = 0  # visits of each action still considered
+    while len(sequence) < num_simulations:
+        num_visits = max(1, num_simulations // (num_phases * num_considered))
+        for visit in range(done, done + num_visits):
+            sequence += [visit] * num_considered
+        done += num_visits
+        num_considered = max(2, num_considered // 2)
+    return sequence[:num_simulations]
+
+
+@torch.inference_mode()
+def _search(root: Root, recurrent_fn: RecurrentFn, num_simulations: int, simulate: _Simulate) -> np.ndarray:
+    """Trees `[B, N]` after `num_simulations` simulations of all roots together."""
+    batch_size, num_actions = root.prior_logits.shape
+    tree = np.empty((batch_size, num_simulations + 1), trees.node_type(num_actions))
+    # What is given is copied into arrays of one kind; for each other kind the kernels would be compiled again.
+    reward, discount, value = np.empty((3, batch_size), np.float32)
+    prior_logits = np.empty((batch_size, num_actions), np.float32)
+    prior_logits[:], value[:] = root.prior_logits, root.value
+    trees.plant(tree, prior_logits, value)
+    actions, rows = np.empty((2, batch_size), np.int64)
+    embeddings = root.embedding.new_empty((num_simulations + 1, *root.embedding.shape))  # [N, B, D]
+    embeddings[ROOT] = root.embedding
+    flat_embeddings, rows_tensor = embeddings.flatten(0, 1), torch.from_numpy(rows)
+    for index in range(1, num_simulations + 1):
+        simulate(tree, index, actions, rows)
+        parents = flat_embeddings.index_select(0, rows_tensor.to(embeddings.device))  # [B, D]
+        reward[:], discount[:], prior_logits[:], value[:], embeddings[index] = recurrent_fn(parents, actions)
+        trees.expand_and_backward(tree, index, reward, discount, prior_logits, value)
+    return tree
+
+
+def _softmax(logits: np.ndarray) -> np.ndarray:
+    exponentials = np.exp(logits - logits.max(axis=-1, keepdims=True))
+    return exponentials / exponentials.sum(axis=-1, keepdims=True)
+
+
+def _log(probs: np.ndarray) -> np.ndarray:
+    return np.log(np.maximum(probs, np.finfo(probs.dtype).tiny))
+
+
+def _tempered(probs: np.ndarray, temperature: float) -> np.ndarray:
+    """Logits of `probs ** (1 / temperature)`, up to a constant."""
+    logits = _log(probs)
+    logits -= logits.max(axis=-1, keepdims=True)
+    with np.errstate(over="ignore"):
+        return logits / np.float32(max(float(np.finfo(np.float32).tiny), temperature))

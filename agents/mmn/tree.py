@@ -1,0 +1,345 @@
+"""Search trees as arrays, and the kernels that select, expand and back up in all of them.
+
+`B` is the number of trees, `N` the number of nodes in each, `A` the number of actions. A tree is a row of an array
+`[B, N]` of `node_type`; a node first expanded in simulation i, counted from 0, has index i + 1, the root has 0. All
+arithmetic on values is in float32.
+
+Numba renews its cache of compiled kernels when this file changes, not when one that it imports does: all that they call
+belongs here.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+
+ROOT = 0
+UNVISITED = -1
+
+_ZERO = np.float32(0.0)
+_ONE = np.float32(1.0)
+_MINUS_INFINITY = np.float32(-np.inf)
+_TINY = np.finfo(np.float32).tiny
+_LEAST_RANGE = np.float32(1e-8)  # of values that are rescaled to [0, 1]
+_LEAST_SCORE = np.float32(-1e9)  # of an action that may be visited: above that of one that may not
+
+
+@functools.cache
+def node_type(num_actions: int) -> np.dtype:
+    """A node. What is in it is undefined until it is expanded, and so is the q-value of an action not visited."""
+    return np.dtype(
+        [
+            ("visits", np.int32),  # 1 when expanded, and one more for each visit of an action
+            ("raw_value", np.float32),  # the network's
+            ("value", np.float32),  # the mean over the visits
+            ("parent", np.int32),  # a node's index; undefined at the root, as are the next three
+            ("parent_action", np.int32),  # which leads from the parent to the node
+            ("reward", np.float32),  # of that action
+            ("discount", np.float32),  # of that action
+            ("children", np.int32, num_actions),  # indices of nodes, or UNVISITED
+            ("child_visits", np.int32, num_actions),  # of actions
+            ("prior_logits", np.float32, num_actions),
+            ("prior_probs", np.float32, num_actions),
+            ("qvalues", np.float32, num_actions),  # reward + discount * value of the child
+        ],
+        align=True,
+    )
+
+
+class GumbelSettings(NamedTuple):
+    """How completed q-values become additions to logits."""
+
+    value_scale: np.float32
+    maxvisit_init: np.float32
+    rescale_values: bool
+    use_mixed_value: bool
+
+
+class PUCTSettings(NamedTuple):
+    """The exploration constants c1 and c2 of Schrittwieser et al. (2020), appendix B."""
+
+    pb_c_init: np.float32
+    pb_c_base: np.float32
+
+
+def compiled(function: Callable[..., Any], inline: bool = False) -> Callable[..., Any]:
+    """`function` as machine code, kept on disk where a place for it can be written to, and otherwise in memory."""
+    options: dict[str, Any] = {"error_model": "numpy", "forceinline": inline}
+    try:
+        return numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # numba found no such place
+        return numba.njit(**options)(function)
+
+
+def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """As `compiled`, into its callers: left to LLVM, a search takes a tenth longer."""
+    return compiled(function, inline=True)
+
+
+@compiled
+def plant(tree: np.ndarray, prior_logits: np.ndarray, values: np.ndarray) -> None:
+    """Makes the roots of `prior_logits` `[B, A]` and `values` `[B]`."""
+    for b in range(len(tree)):
+        _expand(tree[b, ROOT], prior_logits[b], values[b])
+
+
+@compiled
+def simulate_gumbel(
+    tree: np.ndarray,
+    index: int,
+    gumbel: np.ndarray,
+    considered_visit: int,
+    settings: GumbelSettings,
+    actions: np.ndarray,
+    rows: np.ndarray,
+) -> None:
+    """Goes down from each root to an action not yet tried, as Danihelka et al. (2022) do, and attaches a node there.
+
+    Args:
+      tree: gets the node, not yet expanded.
+      index: of the node.
+      gumbel: `[B, A]` float32, added to the scores of the roots' actions.
+      considered_visit: only actions visited so many times are considered at the roots.
+      settings: of the completed q-values.
+      actions: `[B]`, the actions are written here,
+      rows: `[B]`, and here parent * B + b: where embeddings `[N * B, D]` hold the parents'.
+    """
+    scores = np.empty(gumbel.shape[1], np.float32)
+    for b in range(len(tree)):
+        parent, action = ROOT, _gumbel_root_action(tree[b, ROOT], gumbel[b], considered_visit, settings, scores)
+        while tree[b, parent].children[action] != UNVISITED:
+            parent = tree[b, parent].children[action]
+            action = _gumbel_interior_action(tree[b, parent], settings, scores)
+        _attach(tree, b, index, parent, action)
+        actions[b], rows[b] = action, parent * len(tree) + b
+
+
+@compiled
+def simulate_puct(tree: np.ndarray, index: int, settings: PUCTSettings, actions: np.ndarray, rows: np.ndarray) -> None:
+    """As `simulate_gumbel`, by the upper confidence bounds of Schrittwieser et al. (2020)."""
+    for b in range(len(tree)):
+        parent, action = ROOT, _puct_action(tree[b, ROOT], settings)
+        while tree[b, parent].children[action] != UNVISITED:
+            parent = tree[b, parent].children[action]
+            action = _puct_action(tree[b, parent], settings)
+        _attach(tree, b, index, parent, action)
+        actions[b], rows[b] = action, parent * len(tree) + b
+
+
+@compiled
+def expand_and_backward(
+    tree: np.ndarray,
+    index: int,
+    rewards: np.ndarray,
+    discounts: np.ndarray,
+    prior_logits: np.ndarray,
+    values: np.ndarray,
+) -> None:
+    """Expands the nodes attached last, and adds their values to the means on the way to the roots."""
+    for b in range(len(tree)):
+        node = tree[b, index]
+        node.reward, node.discount = rewards[b], discounts[b]
+        _expand(node, prior_logits[b], values[b])
+        _backward(tree, b, index)
+
+
+@compiled
+def gumbel_decision(
+    tree: np.ndarray,
+    gumbel: np.ndarray,
+    settings: GumbelSettings,
+    actions: np.ndarray,
+    action_weights: np.ndarray,
+    qvalues: np.ndarray,
+) -> None:
+    """Writes the roots' `actions` `[B]`, improved policies `action_weights` `[B, A]`, completed `qvalues` `[B, A]`.
+
+    The action is the best of the most visited ones.
+    """
+    scores = np.empty(gumbel.shape[1], np.float32)
+    for b in range(len(tree)):
+        root = tree[b, ROOT]
+        actions[b] = _gumbel_root_action(root, gumbel[b], _most_visits(root), settings, scores)
+        for a in range(len(scores)):
+            scores[a] += root.prior_logits[a]
+        _softmax(scores, action_weights[b])
+        _complete(root, settings, qvalues[b])
+
+
+@compiled
+def puct_qvalues(tree: np.ndarray, qvalues: np.ndarray) -> None:
+    """Writes the roots' `qvalues` `[B, A]`, those of actions not visited the least, as PUCT takes them to be."""
+    for b in range(len(tree)):
+        root = tree[b, ROOT]
+        lowest, _ = _value_range(root)
+        for a in range(len(root.qvalues)):
+            qvalues[b, a] = root.qvalues[a] if root.child_visits[a] > 0 else lowest
+
+
+@inlined
+def _attach(tree: np.ndarray, b: int, index: int, parent: int, action: int) -> None:
+    tree[b, parent].children[action] = index
+    tree[b, index].parent = parent
+    tree[b, index].parent_action = action
+
+
+@inlined
+def _expand(node: Any, prior_logits: np.ndarray, value: np.float32) -> None:
+    node.visits = 1
+    node.raw_value = value
+    node.value = value
+    for a in range(len(node.children)):
+        node.children[a] = UNVISITED
+        node.child_visits[a] = 0
+        node.prior_logits[a] = prior_logits[a]
+    _softmax(node.prior_logits, node.prior_probs)
+
+
+@inlined
+def _backward(tree: np.ndarray, b: int, index: int) -> None:
+    value = tree[b, index].value
+    while index != ROOT:
+        node = tree[b, index]
+        parent, action = tree[b, node.parent], node.parent_action
+        parent.qvalues[action] = node.reward + node.discount * node.value
+        parent.child_visits[action] += 1
+        value = node.reward + node.discount * value
+        count = np.float32(parent.visits)
+        parent.value = (parent.value * count + value) / (count + _ONE)
+        parent.visits += 1
+        index = node.parent
+
+
+@inlined
+def _softmax(logits: np.ndarray, probs: np.ndarray) -> None:
+    highest, total = _highest(logits), _ZERO
+    for a in range(len(logits)):
+        probs[a] = math.exp(logits[a] - highest)
+        total += probs[a]
+    for a in range(len(logits)):
+        probs[a] /= total
+
+
+@inlined
+def _highest(values: np.ndarray) -> np.float32:
+    highest = _MINUS_INFINITY
+    for a in range(len(values)):
+        highest = max(highest, values[a])
+    return highest
+
+
+@inlined
+def _most_visits(node: Any) -> int:
+    most = 0
+    for a in range(len(node.child_visits)):
+        most = max(most, node.child_visits[a])
+    return most
+
+
+@inlined
+def _gumbel_root_action(
+    root: Any, gumbel: np.ndarray, considered_visit: int, settings: GumbelSettings, scores: np.ndarray
+) -> int:
+    """The best by gumbel + logit + transformed q-value; the last are left in `scores` `[A]`."""
+    _complete(root, settings, scores)
+    _transform(root, settings, scores)
+    highest = _highest(root.prior_logits)
+    best, best_score = 0, _MINUS_INFINITY
+    for a in range(len(root.children)):
+        score = max(_LEAST_SCORE, gumbel[a] + (root.prior_logits[a] - highest) + scores[a])
+        if root.child_visits[a] == considered_visit and score > best_score:
+            best, best_score = a, score
+    return best
+
+
+@inlined
+def _gumbel_interior_action(node: Any, settings: GumbelSettings, scores: np.ndarray) -> int:
+    """Where the visits fall short of the improved policy the most (Danihelka et al. 2022, section 5)."""
+    _complete(node, settings, scores)
+    _transform(node, settings, scores)
+    for a in range(len(node.children)):
+        scores[a] += node.prior_logits[a]
+    _softmax(scores, scores)
+    best, best_score = 0, _MINUS_INFINITY
+    for a in range(len(node.children)):
+        score = scores[a] - np.float32(node.child_visits[a]) / np.float32(node.visits)
+        if score > best_score:
+            best, best_score = a, score
+    return best
+
+
+@inlined
+def _complete(node: Any, settings: GumbelSettings, qvalues: np.ndarray) -> None:
+    """Writes the node's `qvalues` `[A]`, those of actions not visited completed by a value of the node."""
+    value = _mixed_value(node) if settings.use_mixed_value else node.raw_value
+    for a in range(len(node.qvalues)):
+        qvalues[a] = node.qvalues[a] if node.child_visits[a] > 0 else value
+
+
+@inlined
+def _mixed_value(node: Any) -> np.float32:
+    """The network's value and the visited actions' in one (Danihelka et al. 2022, appendix D)."""
+    sum_probs, weighted = _ZERO, _ZERO
+    for a in range(len(node.qvalues)):
+        if node.child_visits[a] > 0:
+            sum_probs += max(_TINY, node.prior_probs[a])
+    for a in range(len(node.qvalues)):
+        if node.child_visits[a] > 0:
+            weighted += max(_TINY, node.prior_probs[a]) * node.qvalues[a] / sum_probs
+    count = np.float32(node.visits)
+    return (node.raw_value + (count - _ONE) * weighted) / count
+
+
+@inlined
+def _transform(node: Any, settings: GumbelSettings, qvalues: np.ndarray) -> None:
+    """Rescales completed `qvalues` `[A]` in place, if so set, and scales them by the visits of the most visited."""
+    if settings.rescale_values:
+        _rescale(qvalues)
+    scale = (settings.maxvisit_init + np.float32(_most_visits(node))) * settings.value_scale
+    for a in range(len(node.qvalues)):
+        qvalues[a] *= scale
+
+
+@inlined
+def _rescale(values: np.ndarray) -> None:
+    """Brings `values` `[A]` to [0, 1] in place."""
+    lowest = highest = values[0]
+    for a in range(1, len(values)):
+        lowest, highest = min(lowest, values[a]), max(highest, values[a])
+    span = max(highest - lowest, _LEAST_RANGE)
+    for a in range(len(values)):
+        values[a] = (values[a] - lowest) / span
+
+
+@inlined
+def _puct_action(node: Any, settings: PUCTSettings) -> int:
+    """The action of the highest upper confidence bound (Schrittwieser et al. 2020, appendix B)."""
+    lowest, highest = _value_range(node)
+    span = max(highest - lowest, _LEAST_RANGE)
+    count = np.float32(node.visits)
+    pb_c = settings.pb_c_init + math.log((count + settings.pb_c_base + _ONE) / settings.pb_c_base)
+    scale = math.sqrt(count) * pb_c
+    best, best_score = 0, _MINUS_INFINITY
+    for a in range(len(node.children)):
+        score = scale * node.prior_probs[a] / (np.float32(node.child_visits[a]) + _ONE)
+        if node.child_visits[a] > 0:
+            score = (node.qvalues[a] - lowest) / span + score
+        if score > best_score:
+            best, best_score = a, score
+    return best
+
+
+@inlined
+def _value_range(node: Any) -> tuple[np.float32, np.float32]:
+    """The least and the greatest among the node's value and those of its visited actions."""
+    lowest = highest = node.value
+    for a in range(len(node.qvalues)):
+        if node.child_visits[a] > 0:
+            lowest = min(lowest, node.qvalues[a])
+            highest = max(highest, node.qvalues[a])
+    return lowest, highest

@@ -1,0 +1,383 @@
+"""MMN: its hypermodels, how its model reads the map, its learner and the agent."""
+
+import ast
+import dataclasses
+import inspect
+import re
+
+import numpy as np
+import pytest
+import torch
+from mazebench_agents.mmn import MMN
+from mazebench_agents.mmn import config as config_module
+from mazebench_agents.mmn.config import PRESETS, MMNConfig
+from mazebench_agents.mmn.hypermodels import HYPERMODELS, Propagation
+from mazebench_agents.mmn.losses import unrolled_losses
+from mazebench_agents.mmn.network import MMNNetwork
+from mazebench_agents.mmn.planning import lookahead, plan
+from mazebench_agents.overrides import override
+
+from mazebench.agent import Interface
+from mazebench.errors import InputError
+from mazebench.evaluation.protocol import select_trials
+from mazebench.evaluation.runner import run_trials
+from mazebench.maps.generators import generate
+from mazebench.maps.maze import Maze
+from mazebench.tasks.spec import TaskSpec
+from mazebench.training.experience import Collector
+
+SMALL = {"channels": 8, "hidden": 16, "head_hidden": 16, "latent": 8, "groups": 4, "num_envs": 8, "min_rows": 100}
+HYPERMODEL_NAMES = tuple(HYPERMODELS)
+
+
+def small_config(preset="default", **values):
+    return dataclasses.replace(PRESETS[preset], **{**SMALL, **values})
+
+
+def a_context(seed=0, size=7, batch=1):
+    """Mazes with a start and a goal."""
+    rng = np.random.default_rng(seed)
+    context = np.zeros((batch, 4, size, size), dtype=np.float32)
+    context[:, :2] = rng.random((batch, 2, size, size)) < 0.4
+    context[:, 2, 1, size - 2] = context[:, 3, size - 2, 1] = 1
+    return torch.from_numpy(context)
+
+
+def make_learner(mazes, preset="default", seed=0, steps=100, **values):
+    """A small learner that has seen some steps of random driving."""
+    overrides = {"preset": preset} | {name: str(value) for name, value in {**SMALL, **values}.items()}
+    size = mazes[0].size
+    learner = MMN.build_learner(Interface("local", size, size), mazes, seed=seed, overrides=overrides)
+    spec = TaskSpec("local", mazes, (1, 2, 3), **learner.task_options())
+    collector = Collector(spec, learner.num_envs, seed=seed)
+    rng = np.random.default_rng(seed)
+    for _ in range(steps):
+        learner.observe(collector.step(rng.integers(6, size=learner.num_envs)))
+    return learner
+
+
+@pytest.fixture(scope="module")
+def mazes():
+    return tuple(generate("dfs", 7, np.random.default_rng(index), f"m{index}") for index in range(3))
+
+
+def make_propagation():
+    """Costs a step to leave a cell whose feature is 0; those whose feature is 1 can't be entered."""
+    propagation = Propagation(1, 1)
+    with torch.no_grad():
+        propagation.cost.weight.zero_()
+        propagation.cost.bias.fill_(np.log(np.e - 1) - 2)  # softplus(2 + bias) = 1
+        propagation.enterable.weight.fill_(-60.0)
+        propagation.enterable.bias.fill_(30.0)
+    return propagation
+
+
+def test_propagation_with_equal_costs_is_the_distance_on_the_grid():
+    walls = torch.tensor([[0, 0, 0], [1, 1, 0], [0, 0, 0]], dtype=torch.float32)[None, None]
+    goal = torch.zeros(1, 1, 3, 3)
+    goal[..., 2, 0] = 1
+    distance = make_propagation()(walls, goal)[0][0, 0]
+    torch.testing.assert_close(distance[0], torch.tensor([6.0, 5.0, 4.0]))  # around the wall
+    torch.testing.assert_close(distance[2], torch.tensor([0.0, 1.0, 2.0]))
+    slopes = Propagation.slopes(distance[None, None])[0]  # up, down, left, right, distance
+    torch.testing.assert_close(slopes[:, 0, 1], torch.tensor([2.0, 2.0, 1 / 3, -1 / 3, 5 / 30]))
+
+
+def test_propagation_passes_gradients_to_the_costs_along_the_path_only():
+    propagation = make_propagation()
+    features = torch.zeros(1, 1, 1, 6, requires_grad=True)
+    with torch.no_grad():
+        propagation.cost.weight.fill_(1.0)
+    goal = torch.zeros(1, 1, 1, 6)
+    goal[..., 1] = 1
+    propagation(features, goal)[0][0, 0, 0, 3].backward()
+    assert (features.grad[0, 0, 0] != 0).tolist() == [False, False, True, True, False, False]
+
+
+def test_cells_that_were_visited_are_what_can_be_entered(mazes):
+    learner = make_learner(mazes, steps=300)
+    free = np.stack([~maze.walls.ravel() for maze in mazes])
+    assert not learner._visited[~free].any()
+    assert learner._visited[free].mean() > 0.9
+    losses = [learner.update()["visit_loss"] for _ in range(150)]
+    assert losses[-1] < 0.5 * losses[0]
+
+
+def test_network_with_the_true_scale_looks_where_the_agent_is():
+    network = MMNNetwork(small_config(), 7)
+    with torch.no_grad():
+        network.scale.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))  # times 5: a cell a metre, y up
+        network.hypermodel.sharpness.fill_(20.0)
+    code = network.hypermodel(a_context())
+    moved = torch.tensor([[[0.0, 0.0], [2.0, 0.0], [1.0, 3.0]]])
+    latent = torch.cat([moved, torch.zeros(1, 3, 8)], dim=-1)
+    seen = network.look(latent, code)
+    for k, (row, column) in enumerate([(5, 1), (5, 3), (2, 2)]):
+        torch.testing.assert_close(seen[0, k], code.weights[0, row * 7 + column])
+
+
+def test_reading_one_place_a_map_is_reading_one_of_many():
+    hypermodel = MMNNetwork(small_config(), 7).hypermodel
+    place = torch.rand(40, 1, 2) * 9 - 1.5  # some of them outside
+    table = torch.randn(40, 49, 5)
+    many = hypermodel.read(place.expand(-1, 2, -1), table)[:, :1]
+    torch.testing.assert_close(hypermodel.read(place, table), many)
+
+
+@pytest.mark.parametrize("name", HYPERMODEL_NAMES)
+def test_another_map_gives_other_transition_weights_and_predictions(name):
+    torch.manual_seed(0)
+    network = MMNNetwork(small_config(hypermodel=name), 7)
+    first, second = network.hypermodel(a_context(0)), network.hypermodel(a_context(1))
+    assert not torch.equal(first.weights, second.weights)
+    latent = network.encode(torch.randn(1, 5, 9))
+
+    def next_latent(code):
+        return network.step(
+            latent, network.first_layer(latent, network.look(latent, code), code), torch.arange(5)[None], code
+        )
+
+    assert not torch.allclose(next_latent(first), next_latent(second), atol=1e-6)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("name", HYPERMODEL_NAMES)
+def test_task_and_model_losses_reach_the_hypermodels_weights(name, preset, mazes):
+    """The paper's point: psi learns from both, and through the transition network whose weights it predicts."""
+    learner = make_learner(mazes, preset, hypermodel=name)
+    network, config = learner.actor.network, learner.actor.config
+    with torch.no_grad():  # heads that are zero pass nothing on
+        network.heads.weight.normal_(std=0.1)
+    sample = learner._replay.sample_sequences(8, 3, config.sequence_steps, learner._hindsight, learner._rng)
+    batch = learner._batch(sample)
+    targets = learner._targets(batch)
+    losses, _, _ = unrolled_losses(network, config, batch, targets, torch.ones(8))
+    psi = {
+        "spatial": lambda: network.hypermodel.rows.weight,
+        "flat": lambda: network.hypermodel.hyper.weight,
+        "none": lambda: network.hypermodel.of_context.weight,
+    }[name]()
+    for loss in ("value_loss", "policy_loss", "goal_loss", "model_loss"):
+        (gradient,) = torch.autograd.grad(losses[loss], psi, retain_graph=True)
+        assert gradient.abs().sum() > 0, loss
+
+
+@pytest.mark.parametrize("name", HYPERMODEL_NAMES)
+def test_lookahead_is_every_action_of_the_model_by_itself(name):
+    torch.manual_seed(0)
+    network = MMNNetwork(small_config(hypermodel=name), 7)
+    torch.nn.init.normal_(network.heads.weight)
+    code = network.hypermodel(a_context(batch=2))
+    latent = network.encode(torch.randn(2, 3, 9))
+    qvalues = lookahead(network, latent, code, predict_reward=False)
+    first = network.first_layer(latent, network.look(latent, code), code)
+    for action in range(6):
+        after = network.step(latent, first, torch.full((2, 3), action), code)
+        out = network.predict(after, network.look(after, code), code)
+        # -1 and the value, unless it ends there
+        expected = torch.sigmoid(-out.goal_logit) * (network.value(out.value_logits) - 1)
+        torch.testing.assert_close(qvalues[..., action], expected)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_plan_of_a_permuted_batch_is_permuted(preset):
+    config = small_config(preset)
+    torch.manual_seed(0)
+    network = MMNNetwork(config, 7)
+    torch.nn.init.normal_(network.heads.weight)
+    context, features = a_context(batch=6), torch.randn(6, 1, 9)
+    order = torch.tensor([3, 1, 0, 5, 4, 2])
+
+    def actions(rows):
+        with torch.no_grad():
+            code, latent = network.hypermodel(context[rows]), network.encode(features[rows])
+        return plan(network, config, latent, code, 8).action
+
+    np.testing.assert_array_equal(actions(torch.arange(6))[order], actions(order))
+
+
+@pytest.mark.parametrize(
+    ("preset", "values"), [("default", {}), ("paper", {}), ("default", {"policy_target": "search"})]
+)
+def test_same_seed_gives_the_same_first_updates(preset, values, mazes):
+    learners = [make_learner(mazes, preset, **values) for _ in range(2)]
+    for _ in range(50 if preset == "default" and not values else 5):
+        first, second = (learner.update() for learner in learners)
+        assert first == second
+    assert all(np.isfinite(list(first.values())))
+
+
+def test_what_tells_early_whether_a_run_will_work_is_logged(mazes):
+    metrics = make_learner(mazes).update()
+    assert {"goal_loss", "localization_loss", "value_error", "value", "model_error_1", "model_error_4"} <= set(metrics)
+    assert {"value_loss", "policy_loss", "model_loss", "gradient_norm"} <= set(metrics)
+    assert "reward_loss" in make_learner(mazes, "paper").update()
+
+
+def test_priorities_follow_the_errors(mazes):
+    learner = make_learner(mazes, priority_exponent=0.6, replay_capacity=1000)
+    before = learner._replay._tree.priorities(np.arange(1000)).copy()
+    learner.update()
+    changed = learner._replay._tree.priorities(np.arange(1000)) != before
+    assert 1 <= changed.sum() <= SMALL["groups"]
+
+
+def test_learner_goes_on_as_if_it_had_not_been_saved(tmp_path, mazes):
+    learner = make_learner(mazes)
+    for _ in range(3):
+        learner.update()
+    learner.save(tmp_path, {})
+    expected = [learner.update() for _ in range(3)]
+    resumed = make_learner(mazes, seed=1, steps=1)
+    resumed.load(tmp_path)
+    assert [resumed.update() for _ in range(3)] == expected
+
+
+@pytest.mark.parametrize("name", HYPERMODEL_NAMES)
+def test_saved_and_built_agent_acts_identically(name, tmp_path, mazes):
+    learner = make_learner(mazes, hypermodel=name)
+    learner.update()
+    learner.save(tmp_path, {})
+    agent = MMN.build(Interface("local", 7, 7), checkpoint=tmp_path / "agent.safetensors")
+    observation = an_observation(40)
+    first = np.ones(40, dtype=bool)
+    expected, _ = learner.actor.act(observation, first, learner.actor.initial_state(40))
+    actions, _ = agent.act(observation, first, agent.initial_state(40))
+    np.testing.assert_array_equal(actions, expected)
+
+
+def an_observation(batch, size=7):
+    rng = np.random.default_rng(0)
+    return {
+        "state": rng.normal(size=(batch, 12)).astype(np.float32),
+        "context": a_context(batch=batch, size=size).numpy(),
+    }
+
+
+def test_actions_do_not_depend_on_what_else_is_in_the_batch():
+    agent = MMN(small_config(), 7, seed=2)
+    torch.nn.init.normal_(agent.network.heads.weight)
+    observation = an_observation(77)
+
+    def actions(rows):
+        part = {key: value[rows] for key, value in observation.items()}
+        return agent.act(part, np.ones(len(rows), dtype=bool), agent.initial_state(len(rows)))[0]
+
+    together = actions(np.arange(77))
+    for rows in (np.array([76]), np.arange(40, 77), np.random.default_rng(0).permutation(77)):
+        np.testing.assert_array_equal(actions(rows), together[rows])
+
+
+def test_context_is_encoded_where_it_is_new_and_only_there():
+    agent = MMN(small_config(), 7)
+    observation = an_observation(3)
+    _, state = agent.act(observation, np.ones(3, dtype=bool), agent.initial_state(3))
+    before = [part.clone() for part in state.code]
+    observation["context"] = a_context(seed=9, batch=3).numpy()
+    _, state = agent.act(observation, np.array([False, True, False]), state)
+    for old, new in zip(before, state.code, strict=True):
+        assert torch.equal(old[[0, 2]], new[[0, 2]])
+    assert not torch.equal(before[1][1], state.code.weights[1])
+
+
+def test_spatial_agent_serves_maps_of_any_size(tmp_path, mazes):
+    make_learner(mazes).save(tmp_path, {})
+    agent = MMN.build(Interface("local", 21, 21), checkpoint=tmp_path / "agent.safetensors")
+    actions, _ = agent.act(an_observation(2, size=21), np.ones(2, dtype=bool), agent.initial_state(2))
+    assert actions.shape == (2,)
+
+
+def test_flat_agent_says_which_sizes_it_serves(tmp_path, mazes):
+    make_learner(mazes, hypermodel="flat").save(tmp_path, {})
+    with pytest.raises(InputError, match=r"expected contexts of 7 x 7, the only ones .* found 13 x 13"):
+        MMN.build(Interface("local", 13, 13), checkpoint=tmp_path / "agent.safetensors")
+
+
+def test_unknown_preset_is_refused(mazes):
+    with pytest.raises(InputError, match="unknown preset 'papre'; available: default, paper"):
+        MMN.build_learner(Interface("local", 7, 7), mazes, overrides={"preset": "papre"})
+
+
+def test_paper_preset_has_nothing_beyond_the_paper():
+    paper = PRESETS["paper"]
+    assert (paper.hypermodel, paper.search, paper.policy_target, paper.value_target) == (
+        "flat",
+        "puct",
+        "paper",
+        "n_step",
+    )
+    for beyond in (paper.relabel_start, paper.symmetries, paper.num_distances, paper.localization_weight):
+        assert not beyond
+    assert (paper.num_goals, paper.epsilon_base, paper.predict_reward) == (1, 0.0, True)
+
+
+def test_every_config_key_has_a_comment_with_its_reason():
+    source = inspect.getsource(config_module)
+    fields = {field.name for field in dataclasses.fields(MMNConfig)}
+    assert {node.target.id for node in ast.walk(ast.parse(source)) if isinstance(node, ast.AnnAssign)} == fields
+    for name in fields:
+        assert re.search(rf"^    {name}: .*  # .+", source, re.MULTILINE), name
+
+
+def test_every_number_and_choice_of_the_config_has_a_range():
+    kinds = {field.name: field.type for field in dataclasses.fields(MMNConfig)}
+    assert set(config_module._RANGES) == {name for name, kind in kinds.items() if kind in ("int", "float")}
+    assert set(config_module._CHOICES) == {name for name, kind in kinds.items() if kind == "str"}
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"hypermodel": "deep"}, "expected config key 'hypermodel' as one of spatial, flat, none, found 'deep'"),
+        ({"temperature": "0"}, "expected config key 'temperature' from 0.001"),
+        ({"unroll": "9"}, "expected sequence_steps of at least unroll 9, found 8"),
+        ({"replay_capacity": "1000"}, "expected a replay_capacity of at least min_rows 20000"),
+    ],
+)
+def test_config_out_of_range_is_refused(values, message):
+    with pytest.raises(InputError, match=message):
+        override(MMNConfig(), values)
+
+
+OPEN_FIELD = Maze(np.pad(np.zeros((5, 5), dtype=bool), 1, constant_values=True), "open-7")
+
+
+def test_mmn_after_a_minute_beats_random_in_a_small_maze():
+    """The learning test: goals 3 and 4 cells away in 25 steps."""
+    values = {
+        "channels": 16,
+        "hidden": 64,
+        "head_hidden": 64,
+        "num_envs": 64,
+        "groups": 12,
+        "min_rows": 2000,
+        "steps_per_update": 64,
+        "num_simulations": 4,
+        "target_rate": 0.03,
+        "longest_value": 25,
+        "hindsight_mean_offset": 8,
+        "hindsight_window": 30,
+    }
+    spec = TaskSpec("local", (OPEN_FIELD,), (3, 4), time_limit=25, num_goals=4)
+    learner = MMN.build_learner(Interface("local", 7, 7), spec.mazes, overrides={k: str(v) for k, v in values.items()})
+    before = success_rate(learner.actor)
+    collector = Collector(spec, learner.num_envs, seed=0)
+    learner.actor.explore_from(0, learner.num_envs, seed=0)
+    state = learner.actor.initial_state(learner.num_envs)
+    updates = 0
+    while updates < 450:
+        actions, state = learner.actor.act(collector.observation, collector.is_first, state, explore=True)
+        learner.observe(collector.step(actions))
+        while updates < learner.num_updates_due(learner._replay.num_rows):
+            learner.update()
+            updates += 1
+    after = success_rate(learner.actor)
+    assert before < 0.4
+    assert after > 0.8
+
+
+def success_rate(actor):
+    """Of acting greedily, over 64 episodes."""
+    spec = TaskSpec("local", (OPEN_FIELD,), (3, 4), time_limit=25)
+    trials = list(enumerate(select_trials("local", spec.mazes, False, (3, 4), 32, seed=7)))
+    return np.mean([record["success"] for records in run_trials(actor, spec, trials, 64) for record in records])

@@ -1,0 +1,177 @@
+"""MMN's targets and losses, by numbers one can do by hand."""
+
+import dataclasses
+import math
+
+import pytest
+import torch
+from mazebench_agents.mmn.config import PRESETS
+from mazebench_agents.mmn.losses import Batch, Means, Targets, unrolled_losses
+from mazebench_agents.mmn.network import MMNNetwork
+from mazebench_agents.mmn.targets import (
+    cross_entropy,
+    n_step_returns,
+    scale_gradient,
+    tree_backup_returns,
+    two_hot,
+)
+
+NEVER = torch.zeros(4, dtype=torch.bool)
+ALL = torch.ones(4, dtype=torch.bool)
+
+
+def at(*steps):
+    """[4] bool, set at `steps`."""
+    mask = NEVER.clone()
+    mask[list(steps)] = True
+    return mask
+
+
+def test_n_step_returns_bootstrap_after_n_steps():
+    value = torch.tensor([-9.0, -7.0, -20.0, -3.0])
+    # From state 0: two steps, then -20; from 1: two steps, then -3; from 2: one step only; the last: its own value.
+    assert n_step_returns(value, NEVER, ALL, 2).tolist() == [-22.0, -5.0, -4.0, -3.0]
+
+
+def test_n_step_returns_end_at_the_goal_without_its_value():
+    value = torch.tensor([-9.0, -7.0, -20.0, -50.0])
+    # The step into the goal is rewarded 0: from state 1 the return is 0, from 0 one step of -1.
+    exists = torch.tensor([True, True, True, False])
+    assert n_step_returns(value, at(2), exists, 3).tolist()[:2] == [-1.0, 0.0]
+
+
+def test_n_step_returns_bootstrap_where_the_trajectory_was_cut_short():
+    value = torch.tensor([-9.0, -7.0, -20.0, -3.0])
+    exists = torch.tensor([True, True, False, False])
+    assert n_step_returns(value, NEVER, exists, 3).tolist()[:2] == [-8.0, -7.0]
+
+
+def test_tree_backup_returns_replace_what_was_taken():
+    qvalues = torch.tensor([[-2.0, -6.0], [-4.0, -8.0], [-1.0, -3.0]])
+    policy = torch.tensor([[0.5, 0.5], [0.25, 0.75], [0.5, 0.5]])
+    action = torch.tensor([1, 0])
+    exists, never = torch.ones(3, dtype=torch.bool), torch.zeros(3, dtype=torch.bool)
+    # State 2 believes -2. State 1 took action 0: 0.25 * (-1 - 2) + 0.75 * -8 = -6.75.
+    # State 0 took action 1: 0.5 * -2 + 0.5 * (-1 - 6.75) = -4.875.
+    assert tree_backup_returns(qvalues, policy, action, never, exists).tolist() == [-4.875, -6.75, -2.0]
+    # Reaching the goal in state 2 costs nothing more: state 1 has 0.25 * 0 + 0.75 * -8 = -6.
+    reached = torch.tensor([False, False, True])
+    assert tree_backup_returns(qvalues, policy, action, reached, exists).tolist()[1] == -6.0
+    # Cut short after state 1: what it believes, 0.25 * -4 + 0.75 * -8 = -7.
+    cut = torch.tensor([True, True, False])
+    assert tree_backup_returns(qvalues, policy, action, never, cut).tolist()[1] == -7.0
+
+
+def test_two_hot_weighs_the_two_whole_numbers_beside():
+    hot = two_hot(torch.tensor([0.0, -0.25, -4.0, -9.0]), 5)  # of -4, -3, -2, -1, 0
+    assert hot.tolist() == [
+        [0, 0, 0, 0, 1],
+        [0, 0, 0, 0.25, 0.75],
+        [1, 0, 0, 0, 0],
+        [1, 0, 0, 0, 0],  # below the support
+    ]
+
+
+def test_cross_entropy_by_hand():
+    logits = torch.log(torch.tensor([[0.5, 0.25, 0.25]]))
+    target = torch.tensor([[0.5, 0.5, 0.0]])
+    assert cross_entropy(target, logits).item() == pytest.approx(0.5 * math.log(2) + 0.5 * math.log(4))
+
+
+def test_scale_gradient_keeps_the_value():
+    x = torch.tensor(3.0, requires_grad=True)
+    y = scale_gradient(x, 0.5)
+    y.backward()
+    assert (y.item(), x.grad.item()) == (3.0, 0.5)
+
+
+def test_means_are_weighted():
+    means = Means()
+    means.add("a", torch.tensor([2.0, 100.0]), torch.tensor([True, False]))
+    means.add("a", torch.tensor([5.0, 5.0]), torch.tensor([0.25, 0.25]))
+    means.add("nothing", torch.tensor([1.0]), torch.tensor([0.0]))
+    # (2 + 0.5 * 5) / (1 + 0.5)
+    assert {name: value.item() for name, value in means.means().items()} == {"a": 3.0, "nothing": 0.0}
+
+
+def make_batch(config, at_goal_step=None):
+    """Two contexts, a sequence each; all states alike, standing still in the start, one cell left of the goal."""
+    length = config.sequence_steps + 1
+    context = torch.zeros(2, 4, 7, 7)
+    context[:, 3, 3, 2] = context[:, 2, 3, 3] = 1
+    features = torch.zeros(2, 1, length, 9)
+    features[..., 3] = 1  # cosine of yaw
+    at_goal = torch.zeros(2, 1, length, dtype=torch.bool)
+    exists = torch.ones(2, 1, length, dtype=torch.bool)
+    if at_goal_step is not None:
+        at_goal[..., at_goal_step] = True
+        exists[..., at_goal_step + 1 :] = False
+    place = torch.tensor([3.0, 2.0]).expand(2, 1, length, 2)
+    action = torch.zeros(2, 1, config.sequence_steps, dtype=torch.long)
+    visited, relabelled = torch.zeros(2, 1, 7, 7), torch.ones(2, dtype=torch.bool)
+    batch = Batch(context, visited, relabelled, features, place, action, exists, at_goal)
+    value = torch.full((2, 1, length), -3.0)
+    policy = torch.full((2, 1, length, 6), 1 / 6)
+    return batch, Targets(value, policy)
+
+
+SMALL = dataclasses.replace(PRESETS["default"], channels=4, hidden=8, head_hidden=8, latent=4, longest_value=9)
+
+
+def test_losses_of_an_untrained_network_by_hand():
+    """Its heads are zero: uniform values over ten bins, uniform policies, the goal at a logit of -4."""
+    batch, targets = make_batch(SMALL)
+    losses, metrics, error = unrolled_losses(MMNNetwork(SMALL, 7), SMALL, batch, targets, torch.ones(2))
+    assert losses["value_loss"].item() == pytest.approx(math.log(10), rel=1e-5)
+    assert losses["policy_loss"].item() == pytest.approx(math.log(6), rel=1e-5)
+    assert losses["goal_loss"].item() == pytest.approx(math.log(1 + math.exp(-4)), rel=1e-4)
+    assert losses["localization_loss"].item() == 0.0  # it believes to be at the start, and is
+    assert error.tolist() == pytest.approx([-1.5, -1.5])  # the mean of -9 to 0 is -4.5, and -3 is the target
+    assert metrics["value"].item() == -3.0
+
+
+def test_losses_stop_counting_at_the_goal():
+    """The goal in the second state: its end is learned, but neither a value nor a policy there, nor anything later."""
+    config = dataclasses.replace(SMALL, predict_reward=True)
+    batch, targets = make_batch(config, at_goal_step=1)
+    torch.manual_seed(0)
+    network = MMNNetwork(config, 7)
+    losses, _, _ = unrolled_losses(network, config, batch, targets, torch.ones(2))
+    later = batch._replace(features=batch.features.clone())
+    later.features[:, :, 2:] = 5.0
+    again, _, _ = unrolled_losses(network, config, later, targets, torch.ones(2))
+    assert {name: value.item() for name, value in losses.items()} == {name: v.item() for name, v in again.items()}
+    # The root says "not the goal" and weighs 1, the state after it "the goal" and weighs 1 / 4.
+    ends = (math.log(1 + math.exp(-4)) + 0.25 * math.log(1 + math.exp(4))) / 1.25
+    assert losses["goal_loss"].item() == pytest.approx(ends, rel=1e-4)
+    assert losses["reward_loss"].item() == pytest.approx(ends, rel=1e-4)
+
+
+def test_model_loss_by_hand():
+    """A network whose transition changes nothing, where the body in truth moved by (0.3, -0.1) metres in each step."""
+    network = MMNNetwork(SMALL, 7)
+    with torch.no_grad():
+        for parameter in network.hypermodel.transition.later[-1].parameters():
+            parameter.zero_()
+        for parameter in [*network.decoder.parameters(), *network.encoder[2].parameters()]:
+            parameter.zero_()
+    batch, targets = make_batch(SMALL)
+    steps = torch.arange(SMALL.sequence_steps + 1.0)[:, None]
+    batch.features[..., :2] = steps * torch.tensor([0.3, -0.1])
+    batch.features[..., 3] = 0.0
+    losses, metrics, _ = unrolled_losses(network, SMALL, batch, targets, torch.ones(2))
+    assert metrics["model_error_1"].item() == pytest.approx(0.4, rel=1e-5)
+    assert metrics["model_error_4"].item() == pytest.approx(1.6, rel=1e-5)
+    # 2 * (0.4 + 0.8 + 1.2 + 1.6) / 4; the body's motion is decoded as zeros, and so it is
+    assert losses["model_loss"].item() == pytest.approx(2.0, rel=1e-4)
+
+
+def test_group_without_weight_counts_nothing():
+    batch, targets = make_batch(SMALL)
+    targets.value[1] = -9.0
+    network = MMNNetwork(SMALL, 7)
+    with torch.no_grad():
+        network.heads.bias[6:16] = torch.arange(10.0)  # values near 0 are likely
+    both, _, _ = unrolled_losses(network, SMALL, batch, targets, torch.ones(2))
+    first, _, _ = unrolled_losses(network, SMALL, batch, targets, torch.tensor([1.0, 0.0]))
+    assert first["value_loss"] < both["value_loss"]
