@@ -115,7 +115,9 @@ def make_batch(config, at_goal_step=None):
     return batch, Targets(value, policy)
 
 
-SMALL = dataclasses.replace(PRESETS["default"], channels=4, hidden=8, head_hidden=8, latent=4, longest_value=9)
+SMALL = dataclasses.replace(
+    PRESETS["default"], channels=4, num_distances=0, hidden=8, head_hidden=8, latent=4, longest_value=9
+)
 
 
 def test_losses_of_an_untrained_network_by_hand():
@@ -162,8 +164,9 @@ def test_model_loss_by_hand():
     losses, metrics, _ = unrolled_losses(network, SMALL, batch, targets, torch.ones(2))
     assert metrics["model_error_1"].item() == pytest.approx(0.4, rel=1e-5)
     assert metrics["model_error_4"].item() == pytest.approx(1.6, rel=1e-5)
-    # 2 * (0.4 + 0.8 + 1.2 + 1.6) / 4; the body's motion is decoded as zeros, and so it is
-    assert losses["model_loss"].item() == pytest.approx(2.0, rel=1e-4)
+    # 2 * (0.4 + 0.8 + 1.2 + 1.6) / 4 of metres; velocities are decoded as zeros, and so they are; and the mean over the
+    # 8 numbers of a latent state of (0.3 ** 2 + 0.1 ** 2) * (1 + 4 + 9 + 16) / 4
+    assert losses["model_loss"].item() == pytest.approx(2.0 + 0.75 / 8, rel=1e-4)
 
 
 def test_group_without_weight_counts_nothing():

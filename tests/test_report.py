@@ -14,13 +14,14 @@ from made_results import make_result
 
 from mazebench.errors import InputError
 from mazebench.evaluation.metrics import summarize, wilson_interval
+from mazebench.evaluation.paper import reference
 from mazebench.evaluation.trajectories import load_trajectories
 from mazebench.records import EPISODES, SUMMARY, to_line
 from mazebench.report import writing
 from mazebench.report.distributions import GRID, density
 from mazebench.report.page import pack_poses
 from mazebench.report.provenance import provenance_rows
-from mazebench.report.reference import paper_columns, reference
+from mazebench.report.reference import paper_columns
 from mazebench.report.table import Cell, Column, Table, escape_latex, escape_markdown, to_csv, to_latex, to_markdown
 from mazebench.report.tables import build_tables, format_distances
 

@@ -118,10 +118,10 @@ class _Transition(nn.Module):
         self.inputs = nn.Linear(num_inputs, hidden)
         self.actions = nn.Embedding(NUM_ACTIONS, hidden)
         nn.init.normal_(self.actions.weight, std=0.3)  # of the order of the other terms of the first layer
-        self.later = nn.Sequential(nn.Linear(hidden, hidden), nn.ReLU(), nn.Linear(hidden, num_outputs))
+        self.later = nn.Sequential(nn.Linear(hidden, hidden), nn.ReLU(inplace=True), nn.Linear(hidden, num_outputs))
 
     def forward(self, first: torch.Tensor, action: torch.Tensor) -> torch.Tensor:
-        return self.later(functional.relu(first + self.actions(action)))
+        return self.later(functional.relu(first + self.actions(action), inplace=True))
 
 
 class SpatialHypermodel(Hypermodel):

@@ -134,7 +134,8 @@ class MMNLearner:
         code = network.hypermodel(batch.context)
         latent = network.encode(batch.features.flatten(1, 2))
         shape = batch.features.shape[1:3]
-        qvalues = lookahead(network, latent, code, config.predict_reward).unflatten(1, shape)
+        with torch.autocast(self._device.type, torch.bfloat16, enabled=_has_fast_bfloat16(self._device)):
+            qvalues = lookahead(network, latent, code, config.predict_reward).float().unflatten(1, shape)
         improved = torch.softmax(qvalues / config.temperature, dim=-1)
         if config.value_target == "tree_backup":
             value = tree_backup_returns(qvalues, improved, batch.action, batch.at_goal, batch.exists)
@@ -190,3 +191,10 @@ class MMNLearner:
         load_learner(
             folder, self.actor.name, self._target, self._optimizer, self._rng, self._replay, {"visited": self._visited}
         )
+
+
+def _has_fast_bfloat16(device: torch.device) -> bool:
+    """Whether products in bfloat16 are faster here; on a CPU with instructions for them, four times."""
+    if device.type == "cpu":
+        return torch.cpu._is_avx512_bf16_supported()
+    return torch.cuda.is_bf16_supported()

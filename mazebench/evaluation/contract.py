@@ -38,31 +38,31 @@ class CheckedAgent:
 
     def __init__(self, name: str, agent: Agent, num_actions: int):
         """`name` is what messages call it."""
-        self._name, self._agent, self._num_actions = name, agent, num_actions
+        self.name, self._agent, self._num_actions = name, agent, num_actions
         self._seed_episodes = getattr(agent, "seed_episodes", None)
 
     def initial_state(self, batch_size: int) -> Any:
         """The agent's state at the beginning."""
-        with calling(self._name, "initial_state"):
+        with calling(self.name, "initial_state"):
             return self._agent.initial_state(batch_size)
 
     def seed_episodes(self, seeds: np.ndarray, mask: np.ndarray) -> None:
         """Tells the agent, if it wants to know, which episodes begin."""
         if self._seed_episodes is not None:
-            with calling(self._name, "seed_episodes"):
+            with calling(self.name, "seed_episodes"):
                 self._seed_episodes(seeds, mask)
 
     def act(self, observation: Observation, is_first: np.ndarray, state: Any) -> tuple[np.ndarray, Any]:
         """Actions `[B]` int in range, without exploring, and the next state."""
-        with calling(self._name, "act"):
+        with calling(self.name, "act"):
             answer = self._agent.act(observation, is_first, state)
         if not isinstance(answer, tuple) or len(answer) != 2:
-            raise AgentError(f"agent {self._name!r}: expected act() to return (actions, state), found {_short(answer)}")
-        with calling(self._name, "act"):
+            raise AgentError(f"agent {self.name!r}: expected act() to return (actions, state), found {_short(answer)}")
+        with calling(self.name, "act"):
             actions = np.asarray(answer[0])
         fault = self._fault(actions, len(is_first))
         if fault:
-            raise AgentError(f"agent {self._name!r}: expected act() to return {fault}")
+            raise AgentError(f"agent {self.name!r}: expected act() to return {fault}")
         return actions, answer[1]
 
     def _fault(self, actions: np.ndarray, batch_size: int) -> str | None:
@@ -77,7 +77,8 @@ class CheckedAgent:
 def _place(error: Exception) -> str:
     """Where it was raised; nothing if the agent was not even entered, as with wrong arguments."""
     path, line, *_ = traceback.extract_tb(error.__traceback__)[-1]
-    return "" if pathlib.Path(path).parent == pathlib.Path(__file__).parent else f" ({pathlib.Path(path).name}:{line})"
+    ours = pathlib.Path(__file__).parent.parent in pathlib.Path(path).parents
+    return "" if ours else f" ({pathlib.Path(path).name}:{line})"
 
 
 def _short(value: object) -> str:

@@ -13,12 +13,12 @@ from mazebench.agent import load_agent_class
 from mazebench.errors import InputError, unknown
 from mazebench.evaluation.options import EvalOptions, build_agent, is_frozen, make_task_spec, resolve_checkpoint
 from mazebench.evaluation.protocol import select_trials
-from mazebench.maps.image import draw_maze, write_image
+from mazebench.maps import perturb
+from mazebench.maps.image import draw_grid, write_image
 from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
-from mazebench.world.rendering import Renderer
+from mazebench.world.rendering import CAMERAS, Renderer
 
-CAMERAS = ("top", "chase", "egocentric")
 MAP = "map"
 _FRAMES_PER_SECOND = 1 / 0.16  # one an agent step: the film runs in real time
 
@@ -100,7 +100,7 @@ class _Scene:
         self._renderer = Renderer(self.environment.physics.model.ptr, self.pixels, self.pixels) if cameras else None
 
     def draw(self) -> np.ndarray:
-        """`[H, W, 3]` uint8 of the state now; the map shows the path driven up to now."""
+        """`[H, W, 3]` uint8 of the state now; the map, as the agent is shown it, has the path driven up to now."""
         self._path.append(self.environment.physics.position())
         return np.concatenate([self._view(view) for view in self.views], axis=1)
 
@@ -112,10 +112,13 @@ class _Scene:
         if view != MAP:
             assert self._renderer is not None
             return self._renderer.render(self.environment.physics.data.ptr, view)
-        task = self.environment.task
-        maze = self.task_spec.mazes[task.episode.maze]
-        path = np.array(self._path) if len(self._path) > 1 else None
-        picture = draw_maze(maze, 2 * self.pixels // maze.size + 1, task.episode.start, task.episode.goal, path)
+        task, size = self.environment.task, self.task_spec.size
+        start, goal, path = task.episode.start, task.episode.goal, np.array(self._path)
+        homography = task.shown_map.homography
+        if homography is not None:
+            start, goal = (perturb.warp_cell(cell, homography, size) for cell in (start, goal))
+            path = perturb.warp_points(path, homography, size)
+        picture = draw_grid(task.shown_map.seen_walls(), 2 * self.pixels // size + 1, start, goal, path)
         return cv2.resize(picture, (self.pixels, self.pixels), interpolation=cv2.INTER_AREA)
 
 

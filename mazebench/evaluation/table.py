@@ -9,22 +9,33 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from mazebench.evaluation.paper import printed_mmn
+
 
 def print_summary(summary: dict[str, Any]) -> None:
-    """Prints success rate, SPL and SPL by grid distance with their 95 % intervals, by distance for local episodes."""
+    """Prints success rate, SPL and SPL by grid distance with their 95 % intervals, by distance for local episodes.
+
+    What the paper's MMN reached stands beside it where it can be compared.
+    """
     title = f"{summary['agent']}: {summary['task']}, {summary['split']} mazes {summary['size']} x {summary['size']}"
     perturbed = ", ".join(f"{name} {value}" for name, value in summary["perturbation"].items() if value)
     table = _table(f"{title}{', ' + perturbed if perturbed else ''}")
-    columns = ("episodes", "success rate", "SPL", "SPL by grid")
-    _add_columns(table, ("distance", *columns) if summary["task"] == "local" else columns)
+    paper = printed_mmn(summary)
+    columns = ["n", "success rate", *["paper"] * bool(paper), "SPL", "SPL by grid"]
     if summary["task"] == "local":
+        _add_columns(table, ["distance", *columns])
         for distance, row in summary["by_distance"].items():
-            table.add_row(distance, *_cells(row))
+            table.add_row(distance, *_with_paper(row, paper, int(distance)))
         table.add_section()
-        table.add_row("all", *_cells(summary["overall"]))
+        table.add_row("all", *_with_paper(summary["overall"], paper))
     else:
-        table.add_row(*_cells(summary["overall"]))
-    Console(markup=False).print(table)
+        _add_columns(table, columns)
+        landmark_distance = summary["provenance"]["options"]["landmark_distance"]
+        table.add_row(*_with_paper(summary["overall"], paper, landmark_distance))
+    console = Console(markup=False)
+    console.print(table)
+    if paper:
+        console.print("paper: success rate of the paper's MMN, in DeepMind Lab")
 
 
 def print_suite(summaries: Sequence[dict[str, Any]]) -> None:
@@ -68,6 +79,13 @@ def _comparison_cells(row: dict[str, Any]) -> list[str]:
         low, high = row[f"{key}_difference_ci95"]
         cells.append(f"{row[f'{key}_difference']:+.2f} [{low:+.2f}, {high:+.2f}]")
     return [*cells, f"{row['probability_of_improvement']:.2f}"]
+
+
+def _with_paper(row: dict[str, Any], paper: Mapping[int, float], distance: int = 0) -> list[str]:
+    """Cells of a row, with the paper's success rate behind ours if it printed any; no distance of its is 0."""
+    count, success_rate, *others = _cells(row)
+    printed = [f"{paper[distance]:.2f}" if distance in paper else ""] if paper else []
+    return [count, success_rate, *printed, *others]
 
 
 def _cells(row: dict[str, Any]) -> list[str]:

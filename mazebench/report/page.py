@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from mazebench.evaluation.paper import citation, reference
 from mazebench.evaluation.trajectories import Trajectories
 from mazebench.maps import perturb
 from mazebench.report.distributions import Distribution, Violin
 from mazebench.report.episodes import real_walls
 from mazebench.report.provenance import HEAD, provenance_rows
-from mazebench.report.reference import citation, reference
 from mazebench.report.results import METRICS, Result
 from mazebench.report.table import Cell, Table
 from mazebench.tasks.episode import Episode

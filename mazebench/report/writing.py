@@ -8,6 +8,7 @@ from types import ModuleType
 
 from mazebench.agent import agent_names
 from mazebench.errors import InputError
+from mazebench.evaluation.paper import citation, reference
 from mazebench.maps.benchmark import VERSION, manifest_hash
 from mazebench.records import make_folder
 from mazebench.report.distributions import Distribution, build_distributions
@@ -16,7 +17,6 @@ from mazebench.report.finding import find_results
 from mazebench.report.page import build_page
 from mazebench.report.provenance import HEAD, provenance_rows
 from mazebench.report.reading import read_result
-from mazebench.report.reference import citation, reference
 from mazebench.report.results import Result, Warn, drop_repeats, label_results, require_one_benchmark
 from mazebench.report.table import Table, escape_markdown, to_csv, to_latex, to_markdown
 from mazebench.report.tables import build_tables

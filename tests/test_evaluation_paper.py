@@ -1,0 +1,46 @@
+"""The paper's printed figures beside ours."""
+
+import pytest
+
+from mazebench.evaluation.paper import printed, printed_mmn
+from mazebench.evaluation.table import print_summary
+
+
+def a_summary(**values):
+    row = {"n": 4, "success_rate": 1.0, "spl": 0.9, "spl_grid": 0.95}
+    row |= {f"{name}_ci95": [0.5, 1.0] for name in ("success_rate", "spl", "spl_grid")}
+    defaults = {
+        "agent": "mmn",
+        "task": "local",
+        "size": 13,
+        "split": "eval",
+        "perturbation": {"map_flip": 0.0},
+        "overall": row,
+        "by_distance": {"2": row, "3": row},
+        "provenance": {"options": {"landmark_distance": 5}},
+    }
+    return {**defaults, **values}
+
+
+def test_printed_figures_are_those_of_the_papers_tables():
+    assert printed("local", 13)["MMN"]["success_rate"] == {2: 0.91, 4: 0.90, 6: 0.71, 8: 0.58, 10: 0.43}
+    assert printed("hierarchical", 13)["MAH"]["success_rate"] == {5: 0.45}
+    assert printed("local", 15) == {}
+
+
+@pytest.mark.parametrize("values", [{"split": "train"}, {"size": 15}, {"perturbation": {"map_flip": 0.1}}])
+def test_papers_figures_stand_only_beside_what_can_be_held_against_them(values):
+    assert printed_mmn(a_summary(**values)) == {}
+
+
+@pytest.mark.parametrize(("task", "figure"), [("local", "0.91"), ("hierarchical", "0.80")])
+def test_summary_shows_the_papers_figure(capsys, task, figure):
+    print_summary(a_summary(task=task))
+    printed_text = capsys.readouterr().out
+    assert figure in printed_text
+    assert "the paper's MMN" in printed_text
+
+
+def test_summary_of_other_landmarks_shows_no_figure(capsys):
+    print_summary(a_summary(task="hierarchical", provenance={"options": {"landmark_distance": 3}}))
+    assert "0.80" not in capsys.readouterr().out
