@@ -1,7 +1,7 @@
 # Two commands do everything on a fresh machine: `make eval` and `make test`.
 PYTHON ?= python3.11
 BIN := .venv/bin
-AGENT ?= planner-closed-loop
+AGENT ?= mmn
 
 .PHONY: eval test check check-full bench clean
 

@@ -33,14 +33,17 @@ from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 from mazebench.world.mjcf import ACTIONS, PHYSICS_TIMESTEP, STEPS_PER_ACTION, action_controls
+from mazebench.world.rendering import RenderingError
 
 _SIZES = (13, 21, 51, 101)
 _NUM_ENVS = (1, 16, 256, 1024, 4096)
 _MAZES_PER_SIZE = 8
+_PICTURE_ENVS = 16
 _TITLES = {
     "environments": "agent steps a second, beside the bare simulation's",
     "training": "training, and where its time goes",
     "resets": "resets",
+    "pictures": "pictures as observations, 64 pixels a side",
     "sizes": "against the size of the maze",
     "num_envs": "against the number of environments",
 }
@@ -76,6 +79,8 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
     results["agents"] = _agents_tables(seconds * rounds)
     say("resets")
     results["resets"] = _resets(spec, 20 if quick else 200)
+    say("pictures")
+    results["pictures"] = _picture_rows(spec, seconds * rounds)
     say("cost against size")
     results["sizes"] = [_size_row(size, seconds, rounds) for size in _SIZES]
     say("cost against the number of environments")
@@ -89,7 +94,7 @@ def print_tables(results: dict[str, Any]) -> None:
     print(f"{results['machine']['cores']} cores, MuJoCo {results['machine']['mujoco']}")
     tables = {title: results[name] for name, title in _TITLES.items()} | results["agents"]
     for title, rows in tables.items():
-        if not rows:  # training, where no learning agent is installed
+        if not rows:  # training, where no learning agent is installed; pictures, where nothing can be rendered
             continue
         table = Table(box=box.SIMPLE, title=title, title_justify="left", pad_edge=False, padding=(0, 1, 0, 0))
         for column in rows[0]:
@@ -136,7 +141,12 @@ def _vector_pair(spec: TaskSpec, num_envs: int, num_threads: int) -> tuple[Step,
         ctrl[:] = controls[actions[count % len(actions)]]
         batch.step(nstep=STEPS_PER_ACTION)
 
-    return lambda count: env.step(actions[count % len(actions)]), bare
+    return _stepping(env), bare
+
+
+def _stepping(env: MazeVectorEnv) -> Step:
+    actions = _random_actions(env.num_envs)
+    return lambda count: env.step(actions[count % len(actions)])
 
 
 def _bare_loop(spec: TaskSpec, actions: list[int]) -> Step:
@@ -284,6 +294,21 @@ def _resets(spec: TaskSpec, count: int) -> list[dict[str, Any]]:
         ("vector of 256, an environment, another maze", _milliseconds(lambda: env.reset(), max(3, count // 20)) / 256),
     ]
     return [{"what": what, "ms": value} for what, value in rows]
+
+
+def _picture_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
+    """What a step costs in the vector environment with each camera, and with none."""
+    rows = []
+    for cameras in ((), ("egocentric",), ("top",), ("egocentric", "top")):
+        env = MazeVectorEnv(dataclasses.replace(spec, cameras=cameras), _PICTURE_ENVS, seed=0)
+        try:
+            env.reset()
+        except RenderingError:
+            return []
+        rate = _rate(_stepping(env), _PICTURE_ENVS, seconds)
+        env.close()
+        rows.append({"what": " and ".join(cameras) or "no camera", "steps/s": round(rate), "ms a step": 1e3 / rate})
+    return rows
 
 
 def _milliseconds(call: Callable[[], Any], count: int) -> float:

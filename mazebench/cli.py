@@ -98,7 +98,7 @@ def generate(
         str, typer.Option("--format", help="Of mjcf, txt, png, glb, obj, stl; separated by commas.")
     ] = "txt,mjcf,png,glb",
     from_image: Annotated[
-        pathlib.Path | None, typer.Option(help="Read the maze off a picture of a floor plan instead.")
+        pathlib.Path | None, typer.Option(help="Read the maze off a picture of a floor plan, or a text map, instead.")
     ] = None,
 ) -> None:
     """Make mazes: MJCF for MuJoCo, text, picture, mesh."""
@@ -134,10 +134,17 @@ def _preview(maze: Any) -> None:
         console.print(line)
 
 
+# Options that several commands have.
+_MapFlip = Annotated[float, typer.Option(help="Probability of each cell of the shown map to be flipped.")]
+_MapWarp = Annotated[float, typer.Option(help="Largest shift of the shown map's corners, in shares of its side.")]
+_PositionNoise = Annotated[float, typer.Option(help="Standard deviation of the noise on x and y, in metres.")]
+_LandmarkDistance = Annotated[int, typer.Option(min=1, help="Cells between landmarks (hierarchical task).")]
+
 # Options that another one leaves without effect, and why.
 _LOCAL = ("distances", "episodes_per_distance")
 _EVALUATION = ("task", "size", "split", "maps", *_LOCAL, "landmark_distance", "map_flip", "map_warp", "position_noise")
 _HIERARCHICAL = ("the hierarchical task leads from corner to corner", _LOCAL)
+_NO_LANDMARKS = ("the local task has no landmarks", ("landmark_distance",))
 _OWN_MAPS = ("with --maps the mazes are your own", ("split",))
 
 
@@ -164,12 +171,10 @@ def evaluate(
     ] = None,
     distances: Annotated[str, typer.Option(help="From start to goal in cells, as 1-5,8,10 (local task).")] = "1-15",
     episodes_per_distance: Annotated[int, typer.Option(min=1, help="For each maze and distance (local task).")] = 5,
-    landmark_distance: Annotated[int, typer.Option(min=1, help="Cells between landmarks (hierarchical task).")] = 5,
-    map_flip: Annotated[float, typer.Option(help="Probability of each cell of the shown map to be flipped.")] = 0.0,
-    map_warp: Annotated[
-        float, typer.Option(help="Largest shift of the shown map's corners, in shares of its side.")
-    ] = 0.0,
-    position_noise: Annotated[float, typer.Option(help="Standard deviation of the noise on x and y, in metres.")] = 0.0,
+    landmark_distance: _LandmarkDistance = 5,
+    map_flip: _MapFlip = 0.0,
+    map_warp: _MapWarp = 0.0,
+    position_noise: _PositionNoise = 0.0,
     checkpoint: Annotated[
         pathlib.Path | None, typer.Option(help="Of a learned agent, or its run folder; the shipped one if not given.")
     ] = None,
@@ -200,7 +205,7 @@ def evaluate(
         context,
         (suite is not None, f"the suite {suite!r} has evaluations of its own", _EVALUATION),
         (task == TaskName.hierarchical, *_HIERARCHICAL),
-        (task == TaskName.local, "the local task has no landmarks", ("landmark_distance",)),
+        (task == TaskName.local, *_NO_LANDMARKS),
         (maps is not None, *_OWN_MAPS),
     )
     if resume and out is None:
@@ -421,13 +426,21 @@ def render(
     view: Annotated[
         str, typer.Option(help="top, egocentric, chase, map (shown map and driven path), or all four side by side.")
     ] = "all",
-    position_noise: Annotated[float, typer.Option(help="Standard deviation of the noise on x and y, in metres.")] = 0.0,
+    landmark_distance: _LandmarkDistance = 5,
+    map_flip: _MapFlip = 0.0,
+    map_warp: _MapWarp = 0.0,
+    position_noise: _PositionNoise = 0.0,
     checkpoint: Annotated[pathlib.Path | None, typer.Option(help="Of a learned agent.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the episode.")] = 0,
     pixels: Annotated[int, typer.Option(min=64, max=1280, help="Side of a view.")] = 360,
 ) -> None:
     """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
-    _refuse_ignored(context, (task == TaskName.hierarchical, *_HIERARCHICAL), (maps is not None, *_OWN_MAPS))
+    _refuse_ignored(
+        context,
+        (task == TaskName.hierarchical, *_HIERARCHICAL),
+        (task == TaskName.local, *_NO_LANDMARKS),
+        (maps is not None, *_OWN_MAPS),
+    )
     _choose_rendering_backend()
     from mazebench.evaluation import film, harness
 
@@ -438,6 +451,9 @@ def render(
         split=split.value,
         maps=None if maps is None else str(maps),
         distances=parse_distances(distances),
+        landmark_distance=landmark_distance,
+        map_flip=map_flip,
+        map_warp=map_warp,
         position_noise=position_noise,
         checkpoint=None if checkpoint is None else str(checkpoint),
         seed=seed,
@@ -446,9 +462,61 @@ def render(
     print(f"{out}: {outcome}")
 
 
+@app.command()
+def play(
+    context: typer.Context,
+    task: Annotated[TaskName, typer.Option(help="Kind of navigation.")] = TaskName.local,
+    size: Annotated[int | None, typer.Option(help="Of the benchmark's mazes; 13 if not given.")] = None,
+    split: Annotated[Split, typer.Option(help="The benchmark's unseen or training mazes.")] = Split.eval,
+    maps: Annotated[pathlib.Path | None, typer.Option(help="Mazes of your own.")] = None,
+    distances: Annotated[str, typer.Option(help="From start to goal in cells (local task).")] = "10",
+    landmark_distance: _LandmarkDistance = 5,
+    map_flip: _MapFlip = 0.0,
+    map_warp: _MapWarp = 0.0,
+    position_noise: _PositionNoise = 0.0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first episode and those after it.")] = 0,
+    terminal: Annotated[
+        bool, typer.Option("--terminal", help="In this terminal, where there is a display too.")
+    ] = False,
+) -> None:
+    """Drive yourself, with the keyboard: in MuJoCo's viewer, or without a display in the terminal."""
+    _refuse_ignored(
+        context,
+        (task == TaskName.hierarchical, *_HIERARCHICAL),
+        (task == TaskName.local, *_NO_LANDMARKS),
+        (maps is not None, *_OWN_MAPS),
+    )
+    from mazebench.play.game import Game
+    from mazebench.tasks.registry import make_spec
+
+    spec = make_spec(
+        task.value,
+        size,
+        split.value,
+        maps=maps,
+        distances=parse_distances(distances),
+        landmark_distance=landmark_distance,
+        map_flip=map_flip,
+        map_warp=map_warp,
+        position_noise=position_noise,
+    )
+    game = Game(spec, seed)
+    if terminal or not _has_display():
+        from mazebench.play import terminal as screen
+    else:
+        from mazebench.play import viewer as screen  # type: ignore[no-redef]
+    screen.play(game)
+    print(game.outcome())
+
+
+def _has_display() -> bool:
+    """Whether windows can be expected to open here."""
+    return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
 def _choose_rendering_backend() -> None:
     """Lets this process render without a display, unless the user chose a backend; before MuJoCo is imported."""
-    if sys.platform == "linux" and not os.environ.get("DISPLAY") and not os.environ.get("WAYLAND_DISPLAY"):
+    if not _has_display():
         os.environ.setdefault("MUJOCO_GL", "egl")
 
 
@@ -458,6 +526,7 @@ def bench(
     quick: Annotated[bool, typer.Option("--quick", help="Shorter runs, noisier figures.")] = False,
 ) -> None:
     """Measure speed on this machine, as ratios to the bare simulation taken in the same run."""
+    _choose_rendering_backend()
     from mazebench import bench as benchmark
 
     results = benchmark.run(quick=quick, say=lambda line: print(line, file=sys.stderr))
@@ -484,7 +553,7 @@ def list_() -> None:
     print("styles:     ", ", ".join(sorted(STYLES)))
     print(
         "Gymnasium:  ",
-        ", ".join(f"mazebench/{kind}-{SIZES[0]}-v1" for kind in ("Local", "Hierarchical")),
+        ", ".join(f"mazebench/{kind}-{SIZES[0]}-v1" for kind in ("Local", "Hierarchical", "LocalGoal")),
         "and the other sizes",
     )
 

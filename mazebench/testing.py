@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import Any
 
 import numpy as np
+from dm_env import specs
 
 from mazebench.agent import Agent, Interface
+from mazebench.evaluation.contract import AgentError, CheckedAgent, calling
+from mazebench.tasks.context import default_context_size
 
+_SIZE = 13
 _NUM_STEPS = 5
-_BATCH_SIZE = 3
+_EPISODES = np.arange(3)  # by their seeds
+_ADVICE = "begin anew where is_first is set, and draw an episode's random numbers by its seed, given to seed_episodes()"
 
 
 class ConformanceError(AssertionError):
@@ -17,10 +23,12 @@ class ConformanceError(AssertionError):
 
 
 def check_agent(agent_class: type[Agent], interface: Interface | None = None, checkpoint: Any = None) -> None:
-    """Builds an agent and lets it act on made-up observations of a batch of three environments.
+    """Builds an agent and lets it act on made-up observations, as an evaluation would.
 
-    Checks that `build` gives an agent; that `act` returns actions `[B]` of an integer type in range, and a state; that
-    it leaves its observation as it was; and that an agent built anew with the same seed acts the same.
+    Checks that `build` gives an agent; that `act` returns actions `[B]` of an integer type in range, and a state, in
+    three environments and in one; that it leaves what it is given as it was; and that what it does in an episode is
+    the same when built anew with the same seed, after another episode, and in another slot of the batch. Else records
+    would depend on how many environments and processes an evaluation has.
 
     Args:
       agent_class: the class that an entry point of `mazebench.agents` names.
@@ -29,65 +37,97 @@ def check_agent(agent_class: type[Agent], interface: Interface | None = None, ch
 
     Raises:
       ConformanceError: at the first thing that is wrong.
+      InputError: the agent's own, of a checkpoint that it can't use.
     """
-    if interface is None:
-        wanted = getattr(agent_class, "context_size", lambda size: size)(13)
-        interface = Interface("local", 13, wanted)
+    _check_class(agent_class)
+    try:
+        interface = interface or _default_interface(agent_class)
+        expected = _play(agent_class, interface, checkpoint, _EPISODES)
+        for when, found in (
+            ("when built anew from the same seed", _play(agent_class, interface, checkpoint, _EPISODES)),
+            ("after another one", _play(agent_class, interface, checkpoint, _EPISODES, num_times=2)),
+            ("in another slot", _play(agent_class, interface, checkpoint, _EPISODES[::-1])[:, ::-1]),
+        ):
+            _require(
+                np.array_equal(expected, found),
+                f"agent {agent_class.__name__!r}: expected the same actions in an episode {when}, found others; "
+                + _ADVICE,
+            )
+        _play(agent_class, interface, checkpoint, _EPISODES[:1])
+    except AgentError as error:
+        raise ConformanceError(str(error)) from error
+
+
+def _default_interface(agent_class: type[Agent]) -> Interface:
+    with calling(agent_class.__name__, "context_size"):
+        return Interface("local", _SIZE, int(getattr(agent_class, "context_size", default_context_size)(_SIZE)))
+
+
+def _check_class(agent_class: Any) -> None:
+    _require(isinstance(agent_class, type), f"expected a class, found {agent_class!r}")
+    name = agent_class.__name__
     for method in ("build", "initial_state", "act"):
-        _require(callable(getattr(agent_class, method, None)), f"expected a class with {method}(), found none")
-    first = _act_a_while(agent_class, interface, checkpoint)
-    second = _act_a_while(agent_class, interface, checkpoint)
-    _require(np.array_equal(first, second), "expected the same actions from the same seed, found others")
-
-
-def _act_a_while(agent_class: type[Agent], interface: Interface, checkpoint: Any) -> np.ndarray:
-    agent = agent_class.build(interface, seed=0, checkpoint=checkpoint)
-    state = agent.initial_state(_BATCH_SIZE)
-    rng = np.random.default_rng(0)
-    is_first = np.ones(_BATCH_SIZE, dtype=bool)
-    context = _made_up_context(interface)
-    taken = []
-    for step in range(_NUM_STEPS):
-        if step == 0 and hasattr(agent, "seed_episodes"):
-            agent.seed_episodes(np.arange(_BATCH_SIZE), is_first)
-        observation = {"state": _made_up_states(interface, rng), "context": context.copy()}
-        before = {key: value.copy() for key, value in observation.items()}
-        result = agent.act(observation, is_first, state)
         _require(
-            isinstance(result, tuple) and len(result) == 2,
-            f"expected act() to return (actions, state), found {result!r}",
+            callable(getattr(agent_class, method, None)),
+            f"agent {name!r}: expected a class with {method}(), found none",
         )
-        actions, state = np.asarray(result[0]), result[1]
-        _check_actions(actions, interface)
-        for key, value in before.items():
-            _require(np.array_equal(observation[key], value), f"expected act() to leave observation[{key!r}] as it was")
-        taken.append(actions)
-        is_first = np.zeros(_BATCH_SIZE, dtype=bool)
-    return np.stack(taken)
+    is_method = inspect.isfunction(inspect.getattr_static(agent_class, "build"))
+    _require(not is_method, f"agent {name!r}: expected build() to be a classmethod, found a method of its objects")
 
 
-def _check_actions(actions: np.ndarray, interface: Interface) -> None:
-    _require(actions.shape == (_BATCH_SIZE,), f"expected actions of shape ({_BATCH_SIZE},), found {actions.shape}")
-    _require(np.issubdtype(actions.dtype, np.integer), f"expected integer actions, found {actions.dtype}")
-    in_range = (actions >= 0) & (actions < interface.num_actions)
-    _require(bool(in_range.all()), f"expected actions from 0 to {interface.num_actions - 1}, found {actions}")
+def _built(agent_class: type[Agent], interface: Interface, checkpoint: Any) -> CheckedAgent:
+    name = agent_class.__name__
+    with calling(name, "build"):
+        agent = agent_class.build(interface, seed=0, checkpoint=checkpoint)
+    for method in ("initial_state", "act"):
+        _require(
+            callable(getattr(agent, method, None)),
+            f"agent {name!r}: expected build() to return an object with {method}(), found {type(agent).__name__}",
+        )
+    return CheckedAgent(name, agent, interface.num_actions)
+
+
+def _play(
+    agent_class: type[Agent], interface: Interface, checkpoint: Any, episodes: np.ndarray, num_times: int = 1
+) -> np.ndarray:
+    """`[steps, B]`: a new agent's actions in made-up episodes side by side, played so many times; those of the last."""
+    agent = _built(agent_class, interface, checkpoint)
+    state = agent.initial_state(len(episodes))
+    states, context = _made_up_states(interface)[:, episodes], _made_up_context(interface)[episodes]
+    taken = np.zeros(states.shape[:2], dtype=np.int64)
+    for _ in range(num_times):
+        for step in range(_NUM_STEPS):
+            is_first = np.full(len(episodes), step == 0)
+            if step == 0:
+                agent.seed_episodes(episodes.copy(), is_first.copy())
+            given = {"state": states[step].copy(), "context": context.copy(), "is_first": is_first.copy()}
+            observation = {key: given[key] for key in ("state", "context")}
+            taken[step], state = agent.act(observation, given["is_first"], state)
+            for key, value in (("state", states[step]), ("context", context), ("is_first", is_first)):
+                what = key if key == "is_first" else f"observation[{key!r}]"
+                _require(
+                    np.array_equal(given[key], value), f"agent {agent.name!r}: expected act() to leave {what} as it was"
+                )
+    return taken
 
 
 def _made_up_context(interface: Interface) -> np.ndarray:
-    """`[B, 4, M, M]`: an open field, start and goal in opposite corners."""
+    """`[B, 4, M, M]`: open fields, the start in a corner, each goal in another place."""
     size = interface.context_size
-    context = np.zeros((_BATCH_SIZE, 4, size, size), dtype=np.float32)
+    context = np.zeros((len(_EPISODES), 4, size, size), dtype=np.float32)
     context[:, :2, [0, -1]] = context[:, :2, :, [0, -1]] = 1
-    context[:, 2, -2, 1] = context[:, 3, 1, -2] = 1
+    context[:, 3, 1, -2] = 1
+    context[_EPISODES, 2, -2, 1 + _EPISODES % (size - 2)] = 1
     return context
 
 
-def _made_up_states(interface: Interface, rng: np.random.Generator) -> np.ndarray:
-    """`[B, 12]`: bodies somewhere inside."""
-    states = np.zeros((_BATCH_SIZE, 12), dtype=np.float32)
-    states[:, :2] = rng.uniform(1.2, interface.size - 1.2, size=(_BATCH_SIZE, 2))
-    states[:, 2] = 0.28
-    states[:, 5] = rng.uniform(-np.pi, np.pi, size=_BATCH_SIZE)
+def _made_up_states(interface: Interface) -> np.ndarray:
+    """`[steps, B, 12]`: bodies somewhere inside."""
+    rng, shape = np.random.default_rng(0), (_NUM_STEPS, len(_EPISODES))
+    states = np.zeros((*shape, 12), dtype=np.float32)
+    states[..., :2] = rng.uniform(1.2, interface.size - 1.2, size=(*shape, 2))
+    states[..., 2] = 0.28
+    states[..., 5] = rng.uniform(-np.pi, np.pi, size=shape)
     return states
 
 
@@ -101,13 +141,13 @@ def check_environment(environment: Any, num_episodes: int = 2, max_steps: int = 
       ConformanceError: at the first thing that is wrong.
     """
     rng = np.random.default_rng(0)
-    num_actions = environment.action_spec().num_values
+    action_spec = environment.action_spec()
     for _ in range(num_episodes):
         time_step = environment.reset()
         _require(time_step.first(), f"expected reset() to return a FIRST time step, found {time_step.step_type!r}")
         context = _check_observation(time_step.observation)
         for _ in range(max_steps):
-            time_step = environment.step(int(rng.integers(num_actions)))
+            time_step = environment.step(_random_action(action_spec, rng))
             observed = _check_observation(time_step.observation)
             _require(
                 np.array_equal(observed, context) or bool(time_step.observation.get("is_first", False)),
@@ -119,6 +159,12 @@ def check_environment(environment: Any, num_episodes: int = 2, max_steps: int = 
                 break
         else:
             raise ConformanceError(f"expected the episode to end within {max_steps} steps, found it going on")
+
+
+def _random_action(spec: specs.Array, rng: np.random.Generator) -> Any:
+    if isinstance(spec, specs.DiscreteArray):
+        return int(rng.integers(spec.num_values))
+    return rng.uniform(spec.minimum, spec.maximum, size=spec.shape).astype(spec.dtype)
 
 
 def _check_observation(observation: dict[str, np.ndarray]) -> np.ndarray:

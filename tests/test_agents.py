@@ -31,6 +31,7 @@ class Toy:
         return np.zeros(batch_size, dtype=int)
 
     def act(self, observation, is_first, state, explore=False):
+        state = np.where(is_first, 0, state)
         return state % 6, state + 1
 
 
@@ -91,6 +92,91 @@ class Stateless(Toy):
         return np.zeros(len(is_first), dtype=int)
 
 
+class Watcher(Toy):
+    def act(self, observation, is_first, state, explore=False):
+        is_first[:] = False
+        return super().act(observation, is_first, state)
+
+
+class Continuing(Toy):
+    """Counts on where the last episode ended."""
+
+    def act(self, observation, is_first, state, explore=False):
+        return state % 6, state + 1
+
+
+class Numbering(Toy):
+    """Takes its slot in the batch for something that it may know."""
+
+    def act(self, observation, is_first, state, explore=False):
+        return np.arange(len(is_first)) % 6, state
+
+
+class OneStream(Toy):
+    """Draws for all environments from one generator, which is seeded, but by no episode."""
+
+    @classmethod
+    def build(cls, interface, *, seed=0, checkpoint=None):
+        agent = cls()
+        agent.rng = np.random.default_rng(seed)
+        return agent
+
+    def act(self, observation, is_first, state, explore=False):
+        return self.rng.integers(6, size=len(is_first)), state
+
+
+class OnlyThree(Toy):
+    def act(self, observation, is_first, state, explore=False):
+        return np.zeros(3, dtype=int), state
+
+
+class Raising(Toy):
+    def act(self, observation, is_first, state, explore=False):
+        return observation["map"], state
+
+
+class Unbuilt(Toy):
+    @classmethod
+    def build(cls, interface, *, seed=0, checkpoint=None):
+        cls()
+
+
+class Unbuildable(Toy):
+    @classmethod
+    def build(cls, interface):
+        return cls()
+
+
+class BuiltByItself(Toy):
+    def build(self, interface, *, seed=0, checkpoint=None):
+        return self
+
+
+class Forgetful(Toy):
+    def initial_state(self):
+        return None
+
+
+class Unseedable(Toy):
+    def seed_episodes(self, seeds):
+        pass
+
+
+class Sizeless(Toy):
+    def context_size(self, size):
+        return size
+
+
+class Words(Toy):
+    def act(self, observation, is_first, state, explore=False):
+        return ["forward"] * len(is_first), state
+
+
+class Ragged(Toy):
+    def act(self, observation, is_first, state, explore=False):
+        return [[0], [0, 1], 0], state
+
+
 class Motionless:
     @classmethod
     def build(cls, interface, *, seed=0, checkpoint=None):
@@ -117,23 +203,43 @@ class TestConformance:
     @pytest.mark.parametrize(
         ("broken", "message"),
         [
-            (OneTooMany, r"^expected actions of shape \(3,\), found \(4,\)$"),
-            (OnlyOne, r"^expected actions of shape \(3,\), found \(\)$"),
-            (Columns, r"^expected actions of shape \(3,\), found \(3, 1\)$"),
-            (Floats, r"^expected integer actions, found float64$"),
-            (Booleans, r"^expected integer actions, found bool$"),
-            (TooHigh, r"^expected actions from 0 to 5, found \[6 6 6\]$"),
-            (Negative, r"^expected actions from 0 to 5, found \[-1 -1 -1\]$"),
-            (Meddler, r"^expected act\(\) to leave observation\['context'\] as it was$"),
-            (Normalizer, r"^expected act\(\) to leave observation\['state'\] as it was$"),
-            (Unseeded, r"^expected the same actions from the same seed, found others$"),
-            (Stateless, r"^expected act\(\) to return \(actions, state\), found "),
-            (Motionless, r"^expected a class with act\(\), found none$"),
+            (OneTooMany, r"expected act\(\) to return 3 actions, one an environment, found shape \(4,\)$"),
+            (OnlyOne, r"expected act\(\) to return 3 actions, one an environment, found shape \(\)$"),
+            (Columns, r"expected act\(\) to return 3 actions, one an environment, found shape \(3, 1\)$"),
+            (OnlyThree, r"expected act\(\) to return 1 actions, one an environment, found shape \(3,\)$"),
+            (Floats, r"expected act\(\) to return integer actions, found float64$"),
+            (Booleans, r"expected act\(\) to return integer actions, found bool$"),
+            (Words, r"expected act\(\) to return integer actions, found <U7$"),
+            (Ragged, r"act\(\) raised ValueError: .*inhomogeneous"),
+            (TooHigh, r"expected act\(\) to return actions from 0 to 5, found 6$"),
+            (Negative, r"expected act\(\) to return actions from 0 to 5, found -1$"),
+            (Meddler, r"expected act\(\) to leave observation\['context'\] as it was$"),
+            (Normalizer, r"expected act\(\) to leave observation\['state'\] as it was$"),
+            (Watcher, r"expected act\(\) to leave is_first as it was$"),
+            (Unseeded, r"expected the same actions in an episode when built anew from the same seed, found others; "),
+            (Continuing, r"expected the same actions in an episode after another one, found others; begin anew where "),
+            (Numbering, r"expected the same actions in an episode in another slot, found others"),
+            (OneStream, r"expected the same actions in an episode after another one, .* given to seed_episodes\(\)$"),
+            (Stateless, r"expected act\(\) to return \(actions, state\), found "),
+            (Raising, r"act\(\) raised KeyError: 'map' \(test_agents\.py:\d+\)$"),
+            (Unbuilt, r"expected build\(\) to return an object with initial_state\(\), found NoneType$"),
+            (Unbuildable, r"build\(\) raised TypeError: .* unexpected keyword argument 'seed'$"),
+            (BuiltByItself, r"expected build\(\) to be a classmethod, found a method of its objects$"),
+            (Forgetful, r"initial_state\(\) raised TypeError: .* 1 positional argument but 2 were given$"),
+            (Unseedable, r"seed_episodes\(\) raised TypeError: .* 2 positional arguments but 3 were given$"),
+            (Sizeless, r"context_size\(\) raised TypeError: .* missing 1 required positional argument"),
+            (Motionless, r"expected a class with act\(\), found none$"),
         ],
     )
     def test_agent_when_broken(self, broken, message):
-        with pytest.raises(ConformanceError, match=message):
+        with pytest.raises(ConformanceError, match=message) as caught:
             check_agent(broken)
+        assert str(caught.value).startswith(f"agent '{broken.__name__}': ")
+        assert "\n" not in str(caught.value)
+
+    def test_agent_when_it_is_no_class(self):
+        with pytest.raises(ConformanceError, match=r"^expected a class, found <.*Toy object at .*>$"):
+            check_agent(Toy())
 
 
 class TestLoading:

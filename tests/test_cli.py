@@ -182,6 +182,15 @@ BAD_INPUT = [
     (("render", "--out", "film.avi"), "unknown suffix '.avi'; available: .gif, .mp4, .png"),
     (("render", "--out", "x.png", "--task", "hierarchical", "--distances", "9"), "found --distances, which would be"),
     (("render", "--out", "x.png", "--maps", "{bad}/good.txt", "--split", "train"), "found --split, which would be ign"),
+    (("render", "--out", "x.png", "--landmark-distance", "3"), "found --landmark-distance, which would be ignored"),
+    (("render", "--out", "x.png", "--map-warp", "0.5"), "expected map_warp from 0 to 0.25, found 0.5"),
+    (("play", "--task", "hierarchical", "--distances", "9"), "found --distances, which would be ignored"),
+    (("play", "--landmark-distance", "3"), "found --landmark-distance, which would be ignored"),
+    (("play", "--maps", "{bad}/good.txt", "--split", "train"), "found --split, which would be ignored"),
+    (("play", "--maps", "{bad}/open.txt"), "expected a closed border"),
+    (("play", "--maps", "{bad}/good.txt", "--distances", "9"), "no two cells are 9 cells apart"),
+    (("play", "--size", "14"), "unknown size '14'"),
+    (("play", "--terminal"), "expected a terminal to play on, found a file or a pipe"),
     (("render", "--out", "x.png", "--view", "side"), "unknown view 'side'; available: all, chase, egocentric, map"),
     (("render", "--out", "x.png", "--pixels", "10"), "Invalid value for '--pixels'"),
     (("render", "--out", "x.png", "--agent", "nobody"), "unknown agent 'nobody'"),
@@ -376,7 +385,7 @@ class TestEval:
         _, output, _ = command(*TINY, "--out", "run")
         assert "…" not in output
         assert max(len(line) for line in output.splitlines()) <= 80
-        for word in ("distance", "episodes", "success rate", "SPL", "SPL by grid", "all"):
+        for word in ("distance", "success rate", "paper", "SPL", "SPL by grid", "all"):
             assert word in output
 
     @pytest.mark.parametrize("there", [False, True])
@@ -517,6 +526,22 @@ class TestRender:
         assert (status, errors) == (0, "")
         assert output.startswith("new/map.png: planner reached the goal after ")
         assert cv2.imread(str(tmp_path / "new" / "map.png")).shape == (96, 96, 3)
+
+    @pytest.mark.parametrize("perturbation", ["--map-flip", "--map-warp"])
+    def test_map_when_perturbed(self, command, tmp_path, perturbation):
+        pictures = []
+        for strength in ("0", "0.2"):
+            options = ("--view", "map", "--pixels", "260", perturbation, strength)
+            assert command(*self.ARGUMENTS[:-2], *options, "--out", "map.png")[0] == 0
+            pictures.append(cv2.imread(str(tmp_path / "map.png"))[10::20, 10::20].mean(axis=2) < 60)
+        assert pictures[0].shape == (13, 13)
+        assert 0 < (pictures[0] != pictures[1]).mean() < 0.6  # another map, drawn cell by cell
+
+    def test_film_when_landmarks_stand_close(self, command, tmp_path):
+        options = ("--task", "hierarchical", "--landmark-distance", "2", "--map-flip", "0.1", "--view", "map")
+        status, output, _ = command("render", "--agent", "planner-closed-loop", *options, "--out", "map.png")
+        assert status == 0
+        assert "planner-closed-loop " in output
 
     @pytest.mark.parametrize(("suffix", "magic"), [("gif", b"GIF89a"), ("mp4", b"ftyp")])
     def test_film_when_of_the_map(self, command, tmp_path, suffix, magic):

@@ -21,7 +21,8 @@ from mazebench.maps.maze import Maze
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.registry import make_spec
 
-IDS = [f"mazebench/{task}-{size}-v1" for task in ("Local", "Hierarchical") for size in (13, 15, 17, 19, 21)]
+TITLES = ("Local", "Hierarchical", "LocalGoal")
+IDS = [f"mazebench/{title}-{size}-v1" for title in TITLES for size in (13, 15, 17, 19, 21)]
 FORWARD, LOOK_LEFT = 0, 4
 PROBE_FAILED = 77
 OPEN_EGL = f"""
@@ -83,9 +84,9 @@ class TestRegistration:
     def test_spec_when_looked_up(self, name):
         spec = gymnasium.spec(name)
         assert spec.max_episode_steps is None
-        task, size = name.removeprefix("mazebench/").split("-")[:2]
+        title, size = name.removeprefix("mazebench/").split("-")[:2]
         task_spec = gymnasium.make(name).unwrapped.task_spec
-        assert (task_spec.task, task_spec.size) == (task.lower(), int(size))
+        assert (task_spec.task, task_spec.size) == (title.removesuffix("Goal").lower(), int(size))
 
     def test_make_when_given_options(self):
         env = gymnasium.make("mazebench/Local-13-v1", split="eval", distances=[7], context_size=9, seed=3)
@@ -162,8 +163,8 @@ class TestSteps:
         env = random_env(task, distances=[1, 2], time_limit=20)
         rng = np.random.default_rng(0)
         ends = set()
-        for _ in range(30):
-            env.reset()
+        for episode in range(30):
+            env.reset(seed=episode)
             terminated = truncated = False
             while not (terminated or truncated):
                 action = FORWARD if rng.random() < 0.5 else int(rng.integers(6))

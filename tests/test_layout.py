@@ -26,23 +26,33 @@ ORDER = (
     {"evaluation"},
     {"training"},
     {"report"},
+    {"play"},
     {"bench", "testing", "making", "cli", "__main__"},
 )
 LAYERS = {name: layer for layer, names in enumerate(ORDER) for name in names}
 # Where in the repository a library may be imported.
 WALLS = {
-    "mujoco": ("mazebench/world", "mazebench/tasks", "mazebench/envs", "mazebench/bench.py"),
+    "mujoco": (
+        "mazebench/world",
+        "mazebench/tasks",
+        "mazebench/envs",
+        "mazebench/play/viewer.py",
+        "mazebench/bench.py",
+    ),
     "dm_control": ("mazebench/world", "mazebench/tasks", "mazebench/envs", "mazebench/bench.py"),
     "torch": ("agents",),
     "gymnasium": ("mazebench/envs", "mazebench/bench.py"),
+    "numba": ("agents/mmn",),
     "ray": ("mazebench/evaluation/cluster.py", "mazebench/training/distributed.py"),
     "matplotlib": ("mazebench/report",),
+    "curses": ("mazebench/play/terminal.py",),
 }
 FOLDERS = {"mazebench": "mazebench", "mazebench_agents": "agents", "mazebench_assets": "assets"}
 # Methods of dm_control's, Gymnasium's and torch's classes, which document them.
 OVERRIDES = {
     "initialize_episode", "before_step", "after_step", "get_observation", "get_reward", "get_termination",
-    "action_spec", "observation_spec", "reward_spec", "reset", "step", "render", "close", "forward",
+    "action_spec", "observation_spec", "reward_spec", "reset", "step", "render", "close", "close_extras",
+    "forward",
 }  # fmt: skip
 
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))

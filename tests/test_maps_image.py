@@ -349,3 +349,46 @@ def test_file_is_read_or_refused_in_one_line_when_bytes_are_changed(seed, extens
     except InputError as error:
         message = str(error)
     assert "\n" not in message
+
+
+def thin_line_plan(num_cells: int, cell_pixels: int, line: int, frame: int, blur: float) -> np.ndarray:
+    """Rooms between lines, a door in each, inside a frame, on paper."""
+    side, margin = num_cells * cell_pixels, 40
+    image = np.full((side + 2 * margin,) * 2, 255, dtype=np.uint8)
+    for row in range(num_cells):
+        for column in range(num_cells - 1):
+            x, top = margin + (column + 1) * cell_pixels, margin + row * cell_pixels
+            if (row + column) % 3:
+                cv2.line(image, (x, top), (x, top + cell_pixels), 0, line)
+                cv2.line(image, (top, x), (top + cell_pixels, x), 0, line)
+    cv2.rectangle(image, (margin, margin), (margin + side, margin + side), 0, frame)
+    return cv2.GaussianBlur(image, (0, 0), blur) if blur else image
+
+
+@pytest.mark.parametrize("blur", [0, 1.2])
+@pytest.mark.parametrize(("cell_pixels", "frame"), [(24, 20), (24, 8), (40, 20), (16, 8)])
+@pytest.mark.parametrize("line", [1, 2])
+def test_picture_is_refused_when_walls_are_thin_lines(line, cell_pixels, frame, blur):
+    image = thin_line_plan(8, cell_pixels, line, frame, blur)
+    with pytest.raises(MazeError, match="expected "):
+        maze_from_image(image)
+
+
+def test_photograph_is_refused_with_the_cell_when_a_line_crosses_the_floor(maze):
+    image = np.pad(blocks(maze.walls, 24), 100, constant_values=250)
+    row, column = next((r, c) for r, c in maze.free_cells if not maze.walls[r, c + 1])
+    x, y = 100 + 24 * (column + 1), 100 + 24 * row
+    image[y : y + 24, x : x + 2] = 0
+    with pytest.raises(MazeError, match=rf"found a thin line across the floor at \({row}, ({column}|{column + 1})\)"):
+        maze_from_image(image)
+
+
+def test_photograph_is_read_when_the_paper_is_squared_and_cells_have_letters(maze):
+    image = np.pad(blocks(maze.walls, 24), 96, constant_values=255)
+    faint = np.full_like(image, 255)
+    faint[::24] = faint[:, ::24] = 215
+    image = np.minimum(image, faint)
+    for letter, (row, column) in zip("SG", maze.free_cells[[0, -1]], strict=True):
+        place = (96 + 24 * int(column) + 6, 96 + 24 * int(row) + 18)
+        cv2.putText(image, letter, place, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 0, 1)
+    assert maze_from_image(image) == maze

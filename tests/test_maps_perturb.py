@@ -9,7 +9,8 @@ from hypothesis import strategies
 
 from mazebench.errors import InputError
 from mazebench.maps.generators import corner_cells, generate
-from mazebench.maps.perturb import MAX_WARP, flip, random_homography, warp_cell, warp_walls
+from mazebench.maps.maze import cell_to_point, point_to_cell
+from mazebench.maps.perturb import MAX_WARP, flip, random_homography, warp_cell, warp_points, warp_walls
 
 
 @pytest.fixture(scope="module")
@@ -96,6 +97,13 @@ class TestWarp:
         perspective = np.array([[1.0, 0, 0], [0, 1, 0], [0.25, 0, 1]])
         assert warp_cell((0, 1), perspective, 5) == (0, 1)  # (1.5, 0.5) / 1.375 = (1.09, 0.36)
         assert warp_cell((4, 4), perspective, 5) == (2, 2)  # (4.5, 4.5) / 2.125 = (2.12, 2.12)
+
+    def test_warp_points_when_compared_with_cells(self):
+        homography = random_homography(21, 0.2, np.random.default_rng(0))
+        cells = [(row, column) for row in range(5, 16) for column in range(5, 16)]
+        points = warp_points(cell_to_point(np.array(cells), 21), homography, 21)
+        expected = [warp_cell(cell, homography, 21) for cell in cells]
+        np.testing.assert_array_equal(np.clip(point_to_cell(points, 21), 0, 20), expected)
 
     def test_warp_cell_when_it_leaves_the_map(self):
         shift = np.array([[1.0, 0, 3], [0, 1, -4], [0, 0, 1]])

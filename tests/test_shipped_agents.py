@@ -9,7 +9,7 @@ from mazebench import testing
 from mazebench.agent import load_agent_class
 from mazebench.evaluation.harness import EvalOptions, evaluate
 
-SHIPPED = ("mah", "dqn")
+SHIPPED = ("mmn", "mah", "dqn")
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -27,9 +27,10 @@ def test_shipped_checkpoint_has_its_config_and_curve_beside_it(name):
     assert metadata["provenance"]["env_steps"] == curve[-1]["env_steps"]
 
 
-def test_shipped_mah_reaches_near_goals_in_its_training_mazes(tmp_path):
-    options = EvalOptions(agent="mah", split="train", distances=(2, 4), episodes_per_distance=2)
-    assert evaluate(options, tmp_path / "mah")["overall"]["success_rate"] > 0.9
+@pytest.mark.parametrize("name", ["mmn", "mah"])
+def test_shipped_agent_with_a_map_reaches_near_goals_in_its_training_mazes(tmp_path, name):
+    options = EvalOptions(agent=name, split="train", distances=(2, 4), episodes_per_distance=2)
+    assert evaluate(options, tmp_path / name)["overall"]["success_rate"] > 0.9
 
 
 def test_shipped_dqn_without_a_map_does_not(tmp_path):

@@ -15,6 +15,7 @@ from mazebench.world.physics import Physics
 
 STEPS_PER_FRAME = 2
 FRAMES_PER_ACTION = 10
+CONTROLS = action_controls()
 DRIVES = ("forward", "backward", "strafe_left", "strafe_right")
 # Where a drive leads, as an angle from the heading.
 BEARINGS = {"forward": 0, "backward": np.pi, "strafe_left": np.pi / 2, "strafe_right": -np.pi / 2}
@@ -53,7 +54,7 @@ def trajectory(physics: Physics, action: str | None, num_steps: int, nstep: int 
     """`[num_steps + 1, 6]`: x, y, yaw and their rates, now and after every `nstep` steps; None lets the body coast."""
     physics.data.ctrl[:] = 0
     if action is not None:
-        physics.set_action(ACTIONS.index(action))
+        physics.set_controls(CONTROLS[ACTIONS.index(action)])
     rows = [np.r_[physics.data.qpos, physics.data.qvel]]
     for _ in range(num_steps):
         physics.step(nstep)
@@ -245,7 +246,7 @@ class TestFixedFreedoms:
         row, column = maze.free_cells[0]
         physics = physics_at(maze, (column + 0.5, maze.size - row - 0.5), 0.7)
         for _ in range(200):
-            physics.set_action(int(rng.integers(len(ACTIONS))))
+            physics.set_controls(CONTROLS[rng.integers(len(ACTIONS))])
             physics.step(STEPS_PER_ACTION)
             state = physics.state()
             np.testing.assert_allclose(state[2:5], (BODY_HEIGHT / 2, 0, 0), atol=1e-12)  # z, roll, pitch

@@ -14,10 +14,11 @@ from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 from mazebench.world.export import write_mjcf
-from mazebench.world.mjcf import ACTIONS, STEPS_PER_ACTION
+from mazebench.world.mjcf import ACTIONS, STEPS_PER_ACTION, action_controls
 from mazebench.world.models import _MAZE_FIELDS, MazeModels, copy_maze
 from mazebench.world.physics import Physics
 
+CONTROLS = action_controls()
 GOLDEN = pathlib.Path(__file__).parent / "golden" / "maze-5.xml"
 # In MuJoCo's structs of options, what is no number or array of numbers is a struct of its own.
 NESTED = ("opt", "stat", "vis", "global_", "headlight", "map", "quality", "rgba", "scale")
@@ -103,7 +104,7 @@ def drive(model: mujoco.MjModel) -> np.ndarray:
     for _ in range(200):
         if rng.random() < 0.3:
             action = int(rng.integers(len(ACTIONS)))
-        physics.set_action(action)
+        physics.set_controls(CONTROLS[action])
         physics.step(STEPS_PER_ACTION)
         positions.append(physics.position())
     return np.array(positions)
@@ -133,7 +134,7 @@ class TestCopyMaze:
             physics.data.qpos[:] = models[1].key_qpos[0]
         fresh = Physics.of_maze(models[1])
         for swapped in (physics, fresh):
-            swapped.set_action(ACTIONS.index("forward"))
+            swapped.set_controls(CONTROLS[ACTIONS.index("forward")])
             swapped.step(500)
         np.testing.assert_array_equal(physics.data.qpos, fresh.data.qpos)
 

@@ -31,7 +31,7 @@ class MazeEnv(gymnasium.Env):
         self.task_spec = task_spec
         self.render_mode = render_mode
         self.observation_space = spaces.observation_space(task_spec)
-        self.action_space = spaces.action_space()
+        self.action_space = spaces.action_space(task_spec)
         self.environment = Environment(task_spec, seed)
         self._camera = camera
         self._renderer: Renderer | None = None
@@ -47,7 +47,7 @@ class MazeEnv(gymnasium.Env):
         time_step = self.environment.reset(seed, episode)
         return self._observation(time_step), self._info()
 
-    def step(self, action: int) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
+    def step(self, action: int | np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         """Takes one agent step of 0.16 s.
 
         Raises:
@@ -73,9 +73,10 @@ class MazeEnv(gymnasium.Env):
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
+        self.environment.close()
 
     def _observation(self, time_step: dm_env.TimeStep) -> dict[str, np.ndarray]:
-        return {"state": time_step.observation["state"], "context": time_step.observation["context"]}
+        return {key: time_step.observation[key] for key in ("state", "context", *self.task_spec.cameras)}
 
     def _info(self) -> dict[str, Any]:
         task = self.environment.task

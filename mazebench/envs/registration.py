@@ -28,6 +28,10 @@ def register_environments() -> None:
                 vector_entry_point="mazebench.envs.registration:make_vec",
                 kwargs={"task": task, "size": size},
             )
+    for size in BENCHMARK_SIZES:
+        env_id = f"mazebench/LocalGoal-{size}-v{_VERSION}"
+        if env_id not in gymnasium.registry:
+            gymnasium.register(env_id, "mazebench.envs.registration:make_goal_env", kwargs={"size": size})
 
 
 def make_env(
@@ -38,6 +42,14 @@ def make_env(
     from mazebench.tasks.registry import make_spec
 
     return MazeEnv(make_spec(task, **options), seed, render_mode, camera)
+
+
+def make_goal_env(*, seed: int | None = None, render_mode: str | None = None, camera: str = "top", **options: Any):
+    """A `GoalMazeEnv` of the local task; `options` are those of `mazebench.make_spec`."""
+    from mazebench.envs.goal import GoalMazeEnv
+    from mazebench.tasks.registry import make_spec
+
+    return GoalMazeEnv(make_spec("local", **options), seed, render_mode, camera)
 
 
 def make_vec(

@@ -17,16 +17,18 @@ from gymnasium.vector.utils import batch_space
 
 from mazebench.envs import spaces
 from mazebench.maps.maze import cell_to_point, point_to_cell
+from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_actions, controls_of_velocities
 from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode, Event, Route, ShownMap
 from mazebench.tasks.spec import TaskSpec
-from mazebench.world.mjcf import ACTIONS, STEPS_PER_ACTION, action_controls
+from mazebench.world.mjcf import STEPS_PER_ACTION
 from mazebench.world.physics import states_from_sensors
-from mazebench.world.rendering import render
+from mazebench.world.rendering import Cameras
 
 # Gives environment i its next episode, or None to let it rest: it is not stepped any more.
 EpisodeSource = Callable[[int], Episode | None]
 
+_PICTURE_SIZE = 480  # pixels a side of what `render` returns
 _VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)  # makes the sensors current at the new state
 
 
@@ -58,7 +60,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         self.num_envs = num_envs
         self.render_mode = render_mode
         self.single_observation_space = spaces.observation_space(task_spec)
-        self.single_action_space = spaces.action_space()
+        self.single_action_space = spaces.action_space(task_spec)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._episode_source = episode_source or self._draw_episode
@@ -71,7 +73,8 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         self._qpos = self._batch.bind("qpos")
         self._ctrl = self._batch.bind("ctrl")
         self._marker = self._batch.bind("mocap_pos")
-        self._controls = action_controls()
+        self._cameras = task_spec.open_cameras()
+        self._top_camera: Cameras | None = None  # of `render`
 
     def _allocate(self) -> None:
         num_envs, size = self.num_envs, self.task_spec.context_size
@@ -117,7 +120,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
     def step(
         self, actions: np.ndarray
     ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Takes one agent step (0.16 s) in each environment; `actions` is `[B]` int.
+        """Takes one agent step (0.16 s) in each environment; `actions` is `[B]` int, or `[B, 3]` float if continuous.
 
         Raises:
           gymnasium.error.ResetNeeded: before the first reset.
@@ -125,7 +128,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         """
         if not self._was_reset:
             raise gymnasium.error.ResetNeeded("expected a call to reset() before this step()")
-        self._ctrl[:] = self._controls[self._check_actions(actions)]
+        self._ctrl[:] = self._controls(actions)
         resting = not self._active.all()
         ids = np.flatnonzero(self._active) if resting else None
         self._batch.step(ids, nstep=STEPS_PER_ACTION, stage=_VELOCITY_STAGE)
@@ -144,15 +147,10 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
             infos = self._autoreset(ended, states, infos)
         return self._observations(states), rewards, terminated, truncated, infos
 
-    def _check_actions(self, actions: np.ndarray) -> np.ndarray:
-        actions = np.asarray(actions)
-        is_integer = np.issubdtype(actions.dtype, np.integer)
-        if actions.shape != (self.num_envs,) or not is_integer or actions.min() < 0 or actions.max() >= len(ACTIONS):
-            raise ValueError(
-                f"expected {self.num_envs} actions from 0 to {len(ACTIONS) - 1}, "
-                f"found shape {actions.shape}, values {actions}"
-            )
-        return actions.astype(np.int64, copy=False)
+    def _controls(self, actions: np.ndarray) -> np.ndarray:
+        if self.task_spec.continuous:
+            return controls_of_velocities(actions, (self.num_envs, VELOCITY_SIZE))
+        return controls_of_actions(actions, self.num_envs)
 
     def _advance(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Where a new leg began, where the goal was reached, where the time ran out: three `[B]` bool."""
@@ -175,8 +173,10 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         final_obs = np.full(self.num_envs, None, dtype=object)
         mask = np.zeros(self.num_envs, dtype=bool)
         mask[ended] = True
-        for i in ended:
+        pictures = self._pictures(ended)
+        for place, i in enumerate(ended):
             final_obs[i] = {"state": states[i].copy(), "context": self._context[i].copy()}
+            final_obs[i] |= {name: taken[place] for name, taken in pictures.items()}
         final_info = {key: value if key.startswith("_") else value.copy() for key, value in infos.items()}
         final_info.update({key: mask for key in infos if key.startswith("_")})
         began = self._begin_episodes(ended)
@@ -238,7 +238,14 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         return states.astype(np.float32)
 
     def _observations(self, states: np.ndarray) -> dict[str, np.ndarray]:
-        return {"state": states, "context": self._context.copy()}
+        return {"state": states, "context": self._context.copy(), **self._pictures(range(self.num_envs))}
+
+    def _pictures(self, indices: np.ndarray | range) -> dict[str, np.ndarray]:
+        """`[K, H, W, 3]` uint8 by camera: what is observed in the environments `indices`, one after the other."""
+        if self._cameras is None:
+            return {}
+        taken = [self._cameras.take(self._models[i], self._qpos[i], self._marker[i, 0]) for i in indices]
+        return {name: np.stack([pictures[name] for pictures in taken]) for name in self.task_spec.cameras}
 
     def _infos(self, is_first: np.ndarray, success: np.ndarray) -> dict[str, Any]:
         infos = {
@@ -275,12 +282,16 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         return self._start.copy(), self._target.copy()
 
     def render(self) -> tuple[np.ndarray, ...]:
-        """One top-down picture `[H, W, 3]` uint8 an environment."""
-        data = [self._batch.get_data(i) for i in range(self.num_envs)]
-        for model, values in zip(self._models, data, strict=True):
-            mujoco.mj_kinematics(model, values)
-            mujoco.mj_camlight(model, values)
-        return tuple(render(model, values, "top") for model, values in zip(self._models, data, strict=True))
+        """One top-down picture `[480, 480, 3]` uint8 an environment."""
+        if self._top_camera is None:
+            self._top_camera = Cameras(self._models[0], ("top",), _PICTURE_SIZE, smooth=True)
+        worlds = zip(self._models, self._qpos, self._marker[:, 0], strict=True)
+        return tuple(self._top_camera.take(*world)["top"] for world in worlds)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        for cameras in (self._cameras, self._top_camera):
+            if cameras is not None:
+                cameras.close()
 
 
 def _streams(seed: int | Sequence[int | None] | None, num_envs: int) -> list[np.random.Generator]:

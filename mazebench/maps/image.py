@@ -40,6 +40,8 @@ _MIN_FIT = 0.4
 _NEARLY_BEST = 0.97  # of the best fit
 _CORE = 0.5  # part of a cell's side that decides what the cell is
 _MIN_CONTRAST = 64  # between walls and floor, of 255
+_MIN_LINE = 0.22  # of the contrast: what is drawn as a line, fainter than which are those of squared paper
+_LINE_WIDTH, _LINE_LENGTH = 0.6, 0.9  # of a cell's side: what is a line and not a wall, nor a letter in a cell
 _MIN_CLARITY = 0.1  # of the contrast: how far a core's shade is from the middle between wall and floor
 
 
@@ -61,15 +63,32 @@ def draw_maze(
     """
     if not 1 <= cell_pixels <= _MAX_SIDE // maze.size:
         raise InputError(f"expected 1 to {_MAX_SIDE // maze.size} pixels a cell for this maze, found {cell_pixels}")
-    chequered = _WALL_SHADES[np.indices(maze.walls.shape).sum(axis=0) % 2]
-    cells = np.where(maze.walls[..., None], chequered, np.uint8(255))
+    for cell in (start, goal):
+        if cell is not None:
+            maze.require_free(cell)
+    return draw_grid(maze.walls, cell_pixels, start, goal, path)
+
+
+def draw_grid(
+    walls: np.ndarray,
+    cell_pixels: int,
+    start: Cell | None = None,
+    goal: Cell | None = None,
+    path: np.ndarray | None = None,
+) -> np.ndarray:
+    """The picture that `draw_maze` makes, of any `[N, N]` bool walls, such as those of a perturbed map.
+
+    Raises:
+      InputError: if `path` is no list of finite points.
+    """
+    chequered = _WALL_SHADES[np.indices(walls.shape).sum(axis=0) % 2]
+    cells = np.where(walls[..., None], chequered, np.uint8(255))
     image = np.ascontiguousarray(cells.repeat(cell_pixels, axis=0).repeat(cell_pixels, axis=1))
     if path is not None:
         _draw_path(image, path, cell_pixels)
     for cell, shade in ((start, _START_SHADE), (goal, _GOAL_SHADE)):
         if cell is not None:
-            row, column = maze.require_free(cell)
-            centre = _to_subpixels(np.array([column + 0.5, row + 0.5]) * cell_pixels)
+            centre = _to_subpixels(np.array([cell[1] + 0.5, cell[0] + 0.5]) * cell_pixels)
             radius = round(0.36 * cell_pixels * 2**_SUBPIXEL_BITS)
             cv2.circle(image, centre.tolist(), radius, shade, cv2.FILLED, cv2.LINE_AA, _SUBPIXEL_BITS)
     return image
@@ -126,11 +145,11 @@ def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maz
     walls = _pixel_map(gray, size)
     if walls is not None:
         return Maze(walls, name)
-    paper = _flatten(gray)
+    paper, fine = _flatten(gray)
     problem = f"{name}: expected a drawing whose dark outer walls form a closed square, found none"
     for corners in _frames(_ink(paper)):
         try:
-            return _read_plan(_deskew(paper, corners), size, name)
+            return _read_plan(_deskew(paper, corners), _deskew(fine, corners), size, name)
         except MazeError as error:
             problem = str(error)
     advice = "give the number of cells a side" if size is None else f"are there {size} cells a side?"
@@ -274,16 +293,20 @@ def _block(picture: np.ndarray) -> int:
     return int(np.gcd.reduce([*rows, *columns, len(picture)]))
 
 
-def _flatten(gray: np.ndarray) -> np.ndarray:
-    """`[H', W']` uint8: the picture at working size as if evenly lit: 255 is the paper, also in a margin around it."""
-    gray = cv2.medianBlur(_shrink(gray, _WORKING_SIDE), 3)
+def _flatten(gray: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`[H', W']` uint8, twice: the picture at working size as if evenly lit, without its noise and with it.
+
+    255 is the paper, also in a margin around it.
+    """
+    gray = _shrink(gray, _WORKING_SIDE)
     small = _shrink(gray, _LIGHT_SIDE)
     # A closing as wide as half the picture replaces the ink by the paper around it.
     closed = cv2.morphologyEx(small, cv2.MORPH_CLOSE, np.ones((max(small.shape) // 2,) * 2, np.uint8))
     light = np.maximum(closed, _MIN_LIGHT * np.percentile(closed, 95)).astype(np.float32)
     light = cv2.resize(cv2.GaussianBlur(light, (0, 0), 3), gray.shape[::-1], interpolation=cv2.INTER_LINEAR)
-    paper = np.clip(255.0 * gray / np.maximum(light, 1), 0, 255).astype(np.uint8)
-    return cv2.copyMakeBorder(paper, *(_MARGIN,) * 4, cv2.BORDER_CONSTANT, value=255)
+    fine = np.clip(255.0 * gray / np.maximum(light, 1), 0, 255).astype(np.uint8)
+    fine = cv2.copyMakeBorder(fine, *(_MARGIN,) * 4, cv2.BORDER_CONSTANT, value=255)
+    return cv2.medianBlur(fine, 3), fine
 
 
 def _shrink(gray: np.ndarray, side: int) -> np.ndarray:
@@ -298,13 +321,14 @@ def _ink(paper: np.ndarray) -> np.ndarray:
 
 
 def _dark_and_light(shades: np.ndarray) -> tuple[float, float]:
-    """The means of the dark and of the light ones of `shades` (uint8, 2-D), parted by Otsu's method; 0 if none are."""
+    """The means of the dark and of the light ones of `shades` (uint8, 2-D), by Otsu's method; equal if all are."""
     # Otsu's threshold may be the lightest of the dark shades: it parts them, but need not lie halfway between them.
     threshold, _ = cv2.threshold(shades, 0, 1, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
     counts = cv2.calcHist([shades], [0], None, [256], [0, 256]).ravel()
     levels = np.arange(256)
-    parts = (levels <= threshold, levels > threshold)
-    dark, light = (float(counts[part] @ levels[part] / max(1, counts[part].sum())) for part in parts)
+    everything = np.ones(256, dtype=bool)
+    parts = (part if counts[part].any() else everything for part in (levels <= threshold, levels > threshold))
+    dark, light = (float(counts[part] @ levels[part] / counts[part].sum()) for part in parts)
     return dark, light
 
 
@@ -365,8 +389,8 @@ def _deskew(paper: np.ndarray, corners: np.ndarray) -> np.ndarray:
     return cv2.warpPerspective(paper, transform, (_SQUARE_SIDE, _SQUARE_SIDE), borderValue=255)
 
 
-def _read_plan(square: np.ndarray, size: int | None, name: str) -> Maze:
-    """The maze in a deskewed drawing; the outermost cells are the frame, walls all."""
+def _read_plan(square: np.ndarray, fine: np.ndarray, size: int | None, name: str) -> Maze:
+    """The maze in a deskewed drawing, `fine` with its noise; the outermost cells are the frame, walls all."""
     fits = _grid_fits(_ink(square))
     if size is None:
         is_best = (fits[1:-1] >= fits[:-2]) & (fits[1:-1] >= fits[2:]) & (fits[1:-1] >= _NEARLY_BEST * fits.max())
@@ -384,7 +408,31 @@ def _read_plan(square: np.ndarray, size: int | None, name: str) -> Maze:
         raise MazeError(f"{name}: expected {size} x {size} cells of wall or floor, found cell {cell} between the two")
     walls = cores < (dark + light) / 2
     walls[[0, -1], :] = walls[:, [0, -1]] = True
+    lines = _lines_in_floor(fine, walls, _MIN_LINE * (light - dark))
+    if lines.any():
+        cell = tuple(map(int, np.argwhere(lines)[0]))
+        raise MazeError(
+            f"{name}: expected filled walls as thick as a cell, found a thin line across the floor at {cell}"
+        )
     return Maze(walls, name)
+
+
+def _lines_in_floor(fine: np.ndarray, walls: np.ndarray, contrast: float) -> np.ndarray:
+    """`[N, N]` bool: the floor cells through which, or along which, a dark line runs that is a cell long or longer."""
+    size = len(walls)
+    cell = _SQUARE_SIDE // size
+    thick, long = max(3, round(_LINE_WIDTH * cell)), max(3, round(_LINE_LENGTH * cell))
+    dark = cv2.morphologyEx(fine, cv2.MORPH_BLACKHAT, np.ones((thick, thick), np.uint8)) > contrast
+    lines = np.zeros(fine.shape, dtype=bool)
+    for kernel in (np.ones((1, long), np.uint8), np.ones((long, 1), np.uint8)):
+        lines |= cv2.morphologyEx(dark.astype(np.uint8), cv2.MORPH_OPEN, kernel) > 0
+    floor = cv2.resize((~walls).astype(np.uint8), fine.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    # The edges of walls are left out: a blur, or a drawing a little off its grid, casts shadows there.
+    floor = cv2.erode(floor, np.ones((2 * (cell // 4) + 1,) * 2, np.uint8))
+    rows, columns = np.nonzero(lines & (floor > 0))
+    found = np.zeros_like(walls)
+    found[rows * size // len(fine), columns * size // len(fine)] = True
+    return found
 
 
 def _grid_fits(ink: np.ndarray) -> np.ndarray:

@@ -51,6 +51,12 @@ def warp_walls(walls: np.ndarray, homography: np.ndarray) -> np.ndarray:
     return warped.astype(bool)
 
 
+def warp_points(points: np.ndarray, homography: np.ndarray, size: int) -> np.ndarray:
+    """`[T, 2]` float: where points (x, y) of a maze of `size` cells a side come to lie on the map seen through it."""
+    rows = np.column_stack([points[:, 0], size - points[:, 1], np.ones(len(points))]) @ homography.T
+    return np.column_stack([rows[:, 0] / rows[:, 2], size - rows[:, 1] / rows[:, 2]])
+
+
 def warp_cell(cell: Cell, homography: np.ndarray, size: int) -> Cell:
     """Where the centre of `cell` comes to lie, moved into the map if it leaves it."""
     column, row, scale = homography @ (cell[1] + 0.5, cell[0] + 0.5, 1.0)

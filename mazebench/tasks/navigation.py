@@ -8,6 +8,7 @@ from dm_control.rl import control
 from dm_env import specs
 
 from mazebench.maps.maze import cell_to_point, point_to_cell
+from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_action, controls_of_velocities
 from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode, Event
 from mazebench.tasks.spec import TaskSpec
@@ -18,13 +19,16 @@ from mazebench.world.physics import STATE_SIZE, Physics
 class Navigation(control.Task):
     """Drive to the goal cell of a maze never seen before, with a map of it at hand.
 
-    Actions: one of six, 0.16 s each: forward, backward, strafe_left, strafe_right, look_left, look_right.
+    Actions: one of six, 0.16 s each: forward, backward, strafe_left, strafe_right, look_left, look_right. With
+      `continuous`, `[3]` velocities to drive at for 0.16 s, each in [-1, 1]: forward and left in shares of the top
+      speed (together no faster than it), turning to the left in shares of the turn rate.
 
     Observations:
       state: `[12]` float32: x, y, z (m); roll, pitch, yaw (rad, yaw in [-pi, pi)); velocity forward, left, up (m/s);
         angular velocity about the body's x, y, z (rad/s). With `position_noise`, x and y are noisy.
       context: `[4, M, M]` float32, constant until the next landmark: the map, the map around the start, goal, start.
       is_first: bool, only where an episode has several legs: this context is new, as at the start of an episode.
+      egocentric, top, chase: `[H, H, 3]` uint8, those of `cameras`; they show the true world, the goal's marker in it.
 
     Reward: -1 a step, 0 for the step that reaches the goal cell; never discounted on the way.
 
@@ -39,6 +43,7 @@ class Navigation(control.Task):
         self.steps = 0  # agent steps since the start of the episode
         self._next_episode: Episode | None = None
         self._event = Event.NONE
+        self._cameras = spec.open_cameras()
 
     def set_next_episode(self, episode: Episode) -> None:
         """Makes the next reset play `episode` instead of one that is drawn.
@@ -71,13 +76,11 @@ class Navigation(control.Task):
         self.path_length, self.steps, self._event = 0.0, 0, Event.NONE
         self._begin_leg(physics)
 
-    def before_step(self, action: int, physics: Physics) -> None:
-        index = int(action)
-        if not (0 <= index < len(ACTIONS) and index == action):
-            raise ValueError(
-                f"expected an action from 0 to {len(ACTIONS) - 1} ({', '.join(ACTIONS)}), found {action!r}"
-            )
-        physics.set_action(index)
+    def before_step(self, action: int | np.ndarray, physics: Physics) -> None:
+        if self.spec.continuous:
+            physics.set_controls(controls_of_velocities(np.asarray(action), (VELOCITY_SIZE,)))
+        else:
+            physics.set_controls(controls_of_action(action))  # type: ignore[arg-type]
 
     def after_step(self, physics: Physics) -> None:
         position = physics.position()
@@ -103,6 +106,9 @@ class Navigation(control.Task):
         observation = {"state": state.astype(np.float32), "context": self._context.copy()}
         if self.spec.has_legs:
             observation["is_first"] = np.array(self._is_first)
+        if self._cameras is not None:
+            model = self.spec.models[self.episode.maze]
+            observation |= self._cameras.take(model, physics.data.qpos, physics.data.mocap_pos[0])
         return observation
 
     def get_reward(self, physics: Physics) -> float:
@@ -111,7 +117,9 @@ class Navigation(control.Task):
     def get_termination(self, physics: Physics) -> float | None:
         return {Event.REACHED: 0.0, Event.TIMEOUT: 1.0}.get(self._event)
 
-    def action_spec(self, physics: Physics) -> specs.DiscreteArray:
+    def action_spec(self, physics: Physics) -> specs.DiscreteArray | specs.BoundedArray:
+        if self.spec.continuous:
+            return specs.BoundedArray((VELOCITY_SIZE,), np.float32, -1.0, 1.0, name="action")
         return specs.DiscreteArray(len(ACTIONS), name="action")
 
     def observation_spec(self, physics: Physics) -> dict[str, specs.Array]:
@@ -122,7 +130,13 @@ class Navigation(control.Task):
         }
         if self.spec.has_legs:
             result["is_first"] = specs.Array((), bool, name="is_first")
-        return result
+        shape = (self.spec.camera_size, self.spec.camera_size, 3)
+        return result | {name: specs.BoundedArray(shape, np.uint8, 0, 255, name) for name in self.spec.cameras}
+
+    def close(self) -> None:
+        """Closes the rendering context of the cameras, if there is one."""
+        if self._cameras is not None:
+            self._cameras.close()
 
 
 class Environment(control.Environment):
@@ -148,6 +162,9 @@ class Environment(control.Environment):
     def needs_reset(self) -> bool:
         """Whether no episode is under way, so that the next `step` would start one."""
         return self._reset_next_step
+
+    def close(self) -> None:
+        self.task.close()
 
     def reward_spec(self) -> specs.BoundedArray:
         return specs.BoundedArray((), float, -1.0, 0.0, name="reward")

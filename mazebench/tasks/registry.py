@@ -30,6 +30,9 @@ def make_spec(
     map_flip: float = 0.0,
     map_warp: float = 0.0,
     position_noise: float = 0.0,
+    continuous: bool = False,
+    cameras: str | Iterable[str] = (),
+    camera_size: int = 64,
 ) -> TaskSpec:
     """A navigation task.
 
@@ -45,6 +48,9 @@ def make_spec(
       context_size: M, the side of the context's planes; min(N, 21) by default.
       num_goals: of a local episode, one after the other; rewards and `success` speak of the last one only.
       map_flip, map_warp, position_noise: see `Perturbation`.
+      continuous: whether actions are velocities (forward, left, turn), `[3]` in [-1, 1], instead of one of six.
+      cameras: of "egocentric", "top" and "chase", those whose pictures are observed too.
+      camera_size: pixels a side of these pictures.
 
     Raises:
       InputError: if an option is unknown or out of range, or a map can't be read.
@@ -69,6 +75,9 @@ def make_spec(
         context_size or 0,
         num_goals,
         Perturbation(map_flip, map_warp, position_noise),
+        continuous,
+        (cameras,) if isinstance(cameras, str) else tuple(cameras),
+        camera_size,
     )
     if size is not None and spec.size != size:
         raise InputError(f"expected mazes of size {size}, found size {spec.size}")

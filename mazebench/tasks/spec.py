@@ -18,6 +18,7 @@ from mazebench.maps.maze import MAX_SIZE, Cell, Maze, path_through_walls
 from mazebench.tasks.context import build_context, default_context_size
 from mazebench.tasks.episode import Episode, Route, ShownMap
 from mazebench.world.models import MazeModels
+from mazebench.world.rendering import CAMERAS, MAX_PIXELS, Cameras
 
 TIME_LIMIT = 100  # agent steps a leg
 TRAIN_DISTANCES = tuple(range(1, 6))
@@ -66,10 +67,18 @@ class TaskSpec:
     context_size: int = 0  # M; 0 for min(N, 21)
     num_goals: int = 1  # of a local episode, one after the other without a reset: long trajectories to learn from
     perturbation: Perturbation = Perturbation()
+    continuous: bool = False  # actions are velocities (forward, left, turn) instead of one of six
+    cameras: tuple[str, ...] = ()  # whose pictures are observed too
+    camera_size: int = 64  # pixels a side of these pictures
 
     def __post_init__(self):
         if self.task not in TASKS:
             raise unknown("task", self.task, TASKS)
+        for camera in self.cameras:
+            if camera not in CAMERAS:
+                raise unknown("camera", camera, CAMERAS)
+        if len(set(self.cameras)) < len(self.cameras):
+            raise InputError(f"expected each camera once, found {', '.join(self.cameras)}")
         if self.pairs not in PAIRS:
             raise unknown("pairs", self.pairs, PAIRS)
         if not self.mazes:
@@ -79,6 +88,7 @@ class TaskSpec:
         self._require("time_limit", 1, np.inf)
         self._require("landmark_distance", 1, np.inf)
         self._require("context_size", 3, MAX_SIZE)
+        self._require("camera_size", 1, MAX_PIXELS)
         self._require("num_goals", 1, np.inf if self.task == "local" and self.pairs == "random" else 1)
         if self.task == "local":
             self._check_distances()
@@ -121,6 +131,10 @@ class TaskSpec:
     def models(self) -> MazeModels:
         """The MuJoCo models of `mazes`, shared by all environments that play this task."""
         return MazeModels(self.mazes)
+
+    def open_cameras(self) -> Cameras | None:
+        """What takes the pictures that are observed; None if none are."""
+        return Cameras(self.models[0], self.cameras, self.camera_size) if self.cameras else None
 
     def sample_episode(self, rng: np.random.Generator) -> Episode:
         """Draws an episode as the task has it."""

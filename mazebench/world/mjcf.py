@@ -229,3 +229,21 @@ def action_controls() -> np.ndarray:
     controls[np.arange(4), np.arange(4)] = 1.0
     controls[4, 4], controls[5, 4] = TURN_RATE, -TURN_RATE
     return controls
+
+
+def velocity_controls(velocities: np.ndarray) -> np.ndarray:
+    """`[..., 5]` float: the controls that drive the body at `[..., 3]` velocities, as far as nothing is in the way.
+
+    A velocity is forward and to the left in shares of the top speed, in the body's frame, and turning to the left in
+    shares of the turn rate, each in [-1, 1]. Forward and left together are shortened to the top speed. One of them at
+    1 or -1 and the others at 0 are the controls of an action; 0 everywhere lets the body coast.
+    """
+    drive = velocities[..., :2] / np.maximum(1.0, np.hypot(velocities[..., 0], velocities[..., 1]))[..., None]
+    controls = np.zeros((*velocities.shape[:-1], 5))
+    for forwards, backwards, share in ((0, 1, drive[..., 0]), (2, 3, drive[..., 1])):
+        # The control under which drive and damping balance at `share * TOP_SPEED`.
+        control = _DAMPING * np.abs(share) / (_DRIVE_GAIN * (1 - np.abs(share)) + _DAMPING)
+        controls[..., forwards] = np.where(share > 0, control, 0.0)
+        controls[..., backwards] = np.where(share < 0, control, 0.0)
+    controls[..., 4] = TURN_RATE * velocities[..., 2]
+    return controls

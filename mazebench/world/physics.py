@@ -14,7 +14,7 @@ with warnings.catch_warnings():
     from dm_control.mujoco import engine, wrapper
 
 from mazebench.maps.maze import Cell, cell_to_point
-from mazebench.world.mjcf import NUM_SENSORS, action_controls
+from mazebench.world.mjcf import NUM_SENSORS
 from mazebench.world.models import copy_maze
 
 STATE_SIZE = 12
@@ -43,9 +43,9 @@ class Physics(engine.Physics):
         """Moves the goal marker, which touches nothing, to a cell of a maze of `size` cells a side."""
         self.data.mocap_pos[0] = (*cell_to_point(cell, size), 0.0)
 
-    def set_action(self, action: int) -> None:
-        """Sets the controls of one of `mjcf.ACTIONS`."""
-        self.data.ctrl[:] = _CONTROLS[action]
+    def set_controls(self, controls: np.ndarray) -> None:
+        """Sets the controls `[5]` of the four drives and the turn, such as `mjcf.action_controls` and its like give."""
+        self.data.ctrl[:] = controls
 
     def position(self) -> np.ndarray:
         """`[2]` float: the body's centre (x, y) in metres."""
@@ -84,6 +84,3 @@ def states_from_sensors(sensors: np.ndarray) -> np.ndarray:
     states[..., 5] = wrap_angle(sensors[..., 3])
     states[..., 6:] = sensors[..., 4:NUM_SENSORS]
     return states
-
-
-_CONTROLS = action_controls()

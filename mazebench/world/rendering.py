@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
+import atexit
+import copy
+import weakref
+
 import mujoco
 import numpy as np
 
 from mazebench.errors import InputError
+from mazebench.world.models import copy_maze
+
+CAMERAS = ("top", "chase", "egocentric")
+MAX_PIXELS = 1280  # a side; the models' offscreen buffers have this size
 
 
 class RenderingError(InputError):
     """No picture can be rendered on this machine as it is set up."""
 
 
-def render(
-    model: mujoco.MjModel, data: mujoco.MjData, camera: str = "top", height: int = 480, width: int = 480
-) -> np.ndarray:
-    """`[height, width, 3]` uint8: what `camera` ("top", "egocentric" or "chase") sees.
+class Renderer:
+    """A rendering context for one model, kept open over many pictures; a context manager.
 
     Raises:
       RenderingError: if no rendering context can be opened; the message says what to set.
     """
-    with Renderer(model, height, width) as renderer:
-        return renderer.render(data, camera)
-
-
-class Renderer:
-    """A rendering context for one model, kept open over many pictures; a context manager."""
 
     def __init__(self, model: mujoco.MjModel, height: int = 480, width: int = 480):
         try:
@@ -36,6 +36,7 @@ class Renderer:
                 f"can't open a rendering context: {str(error).splitlines()[0] if str(error) else error!r}; "
                 "on a machine without a display set MUJOCO_GL=egl (or osmesa)"
             ) from error
+        _close_at_exit(self)
 
     def render(self, data: mujoco.MjData, camera: str = "top") -> np.ndarray:
         """`[H, W, 3]` uint8 of the state in `data`."""
@@ -49,5 +50,65 @@ class Renderer:
         self.close()
 
     def close(self) -> None:
-        """Closes the context. Left to the interpreter's exit, that would come after what it needs is gone, noisily."""
+        """Closes the context; nothing can be rendered any more."""
         self._renderer.close()
+
+
+class Cameras:
+    """Pictures of any worlds of one `MazeModels` through one rendering context, which opens with the first of them."""
+
+    def __init__(self, model: mujoco.MjModel, names: tuple[str, ...], pixels: int, smooth: bool = False):
+        """`names` are of `CAMERAS`, `pixels` is the side of a picture; `model` is any of the models.
+
+        Edges are stepped unless `smooth`: without a GPU, smoothing takes four fifths of the time of a small picture.
+        """
+        self._model = copy.copy(model)
+        if not smooth:
+            self._model.vis.quality.offsamples = 0
+        self._data = mujoco.MjData(self._model)
+        self._names, self._pixels = names, pixels
+        self._shown: mujoco.MjModel | None = None
+        self._renderer: Renderer | None = None
+
+    def take(self, model: mujoco.MjModel, qpos: np.ndarray, marker: np.ndarray) -> dict[str, np.ndarray]:
+        """`[pixels, pixels, 3]` uint8 by camera, of the maze of `model`.
+
+        Args:
+          model: of the same `MazeModels` as all others.
+          qpos: `[3]`, the body's x, y (m) and yaw (rad).
+          marker: `[3]` m, where the goal's marker stands.
+
+        Raises:
+          RenderingError: if no rendering context can be opened.
+        """
+        if self._renderer is None:
+            self._renderer = Renderer(self._model, self._pixels, self._pixels)
+        if model is not self._shown:
+            copy_maze(model, self._model)
+            self._shown = model
+        self._data.qpos[:], self._data.mocap_pos[0] = qpos, marker
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+        return {name: self._renderer.render(self._data, name) for name in self._names}
+
+    def close(self) -> None:
+        """Closes the context, if it was opened; the next picture opens another."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+_open_renderers: weakref.WeakSet[Renderer] = weakref.WeakSet()
+
+
+def _close_at_exit(renderer: Renderer) -> None:
+    """Has a renderer that nobody closes closed before the interpreter takes apart what closing needs."""
+    _open_renderers.add(renderer)
+    # Last in, first out: registered anew with each renderer, it comes before what a backend registered when it opened.
+    atexit.unregister(_close_renderers)
+    atexit.register(_close_renderers)
+
+
+def _close_renderers() -> None:
+    for renderer in list(_open_renderers):
+        renderer.close()

@@ -1,0 +1,34 @@
+"""Observes through cameras: a policy on pictures in many environments, and what they saw as a picture.
+
+MUJOCO_GL=egl python docs/examples/pixels.py --out pixels.png
+"""
+
+import argparse
+
+import cv2
+import numpy as np
+import torch
+from torch import nn
+
+import mazebench
+
+parser = argparse.ArgumentParser()
+parser.add_argument("--num-envs", type=int, default=4)
+parser.add_argument("--steps", type=int, default=10)
+parser.add_argument("--out", default="pixels.png")
+arguments = parser.parse_args()
+
+envs = mazebench.make_vec("local", arguments.num_envs, size=13, cameras=["egocentric", "top"], camera_size=84)
+policy = nn.Sequential(
+    nn.Conv2d(3, 16, 8, stride=4), nn.ReLU(), nn.Conv2d(16, 32, 4, stride=2), nn.ReLU(), nn.Flatten(), nn.LazyLinear(6)
+)
+observations, infos = envs.reset(seed=0)
+for _ in range(arguments.steps):
+    pictures = torch.as_tensor(observations["egocentric"]).permute(0, 3, 1, 2) / 255  # [B, 3, 84, 84]
+    with torch.no_grad():
+        actions = torch.distributions.Categorical(logits=policy(pictures)).sample().numpy()
+    observations, rewards, terminated, truncated, infos = envs.step(actions)
+rows = [np.concatenate(list(observations[camera]), axis=1) for camera in ("egocentric", "top")]
+cv2.imwrite(arguments.out, cv2.cvtColor(np.concatenate(rows), cv2.COLOR_RGB2BGR))
+print(f"{arguments.out}: what {arguments.num_envs} environments saw last, above through the agent's eyes")
+envs.close()

@@ -1,0 +1,81 @@
+"""The local task as a goal-conditioned Gymnasium environment, for hindsight experience replay."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import dm_env
+import gymnasium
+import numpy as np
+
+from mazebench.envs import spaces
+from mazebench.envs.gym import MazeEnv
+from mazebench.errors import InputError
+from mazebench.maps.maze import cell_to_point, point_to_cell
+from mazebench.tasks.context import GOAL, NUM_PLANES
+from mazebench.tasks.spec import TaskSpec
+from mazebench.world.physics import STATE_SIZE
+
+_SHOWN_PLANES = [plane for plane in range(NUM_PLANES) if plane != GOAL]
+
+# What `info` may be where goals are arrays: one for all, or one for each.
+Infos = Mapping[str, Any] | Sequence[Mapping[str, Any]]
+
+
+class GoalMazeEnv(MazeEnv):
+    """A `MazeEnv` whose goal stands in `desired_goal` alone, so that another may be put in its place afterwards.
+
+    Observations:
+      observation: `[12 + 3 M M]` float32: the state, then the planes of the context that do not show the goal (the map,
+        the map around the start, the start), row by row.
+      achieved_goal: `[2]` float32: the centre (x, y) in m of the cell in which the body is, its true one.
+      desired_goal: `[2]` float32: the centre of the goal cell.
+      and the pictures of `cameras`, in which the goal's marker is seen.
+
+    For any goals, `compute_reward`, `compute_terminated` and `compute_truncated` say what a step that led to
+    `achieved_goal` would have brought on the way to `desired_goal`. They take single goals and arrays of them.
+    """
+
+    def __init__(
+        self, task_spec: TaskSpec, seed: int | None = None, render_mode: str | None = None, camera: str = "top"
+    ):
+        if task_spec.has_legs:
+            raise InputError("expected the local task with one goal for a goal-conditioned environment, found several")
+        super().__init__(task_spec, seed, render_mode, camera)
+        size, num_values = task_spec.size, STATE_SIZE + len(_SHOWN_PLANES) * task_spec.context_size**2
+        pictures = {name: spaces.observation_space(task_spec)[name] for name in task_spec.cameras}
+        self.observation_space = gymnasium.spaces.Dict(
+            {
+                "observation": gymnasium.spaces.Box(-np.inf, np.inf, (num_values,), np.float32),
+                "achieved_goal": gymnasium.spaces.Box(0.0, size, (2,), np.float32),
+                "desired_goal": gymnasium.spaces.Box(0.0, size, (2,), np.float32),
+                **pictures,
+            }
+        )
+
+    def compute_reward(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Infos) -> np.ndarray:
+        """`[...]` float: 0 where the achieved goal `[..., 2]` is the desired one, else -1; `info` is not needed."""
+        return np.where(self.compute_terminated(achieved_goal, desired_goal, info), 0.0, -1.0)[()]
+
+    def compute_terminated(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Infos) -> np.ndarray:
+        """`[...]` bool: where the achieved goal `[..., 2]` is the desired one; `info` is not needed."""
+        # Centres of cells are float32 numbers without rounding.
+        return (np.asarray(achieved_goal) == np.asarray(desired_goal)).all(axis=-1)
+
+    def compute_truncated(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Infos) -> np.ndarray:
+        """`[...]` bool: where time ran out short of the goal, by the "steps" of `info`, one for all or one for each."""
+        steps = info["steps"] if isinstance(info, Mapping) else np.array([each["steps"] for each in info])
+        return (steps >= self.task_spec.time_limit) & ~self.compute_terminated(achieved_goal, desired_goal, info)
+
+    def _observation(self, time_step: dm_env.TimeStep) -> dict[str, np.ndarray]:
+        shown = super()._observation(time_step)
+        size = self.task_spec.size
+        cell = point_to_cell(self.environment.physics.position(), size)
+        planes = shown.pop("context")[_SHOWN_PLANES]
+        return {
+            "observation": np.concatenate([shown.pop("state"), planes.ravel()]),
+            "achieved_goal": cell_to_point(cell, size).astype(np.float32),
+            "desired_goal": cell_to_point(self.environment.task.route.goal, size).astype(np.float32),
+            **shown,
+        }

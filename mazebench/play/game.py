@@ -1,0 +1,98 @@
+"""Episodes that a person drives, one agent step at a key, whatever they are shown on."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mazebench.maps.maze import Cell
+from mazebench.tasks.navigation import Environment
+from mazebench.tasks.spec import TaskSpec
+
+# The action of a key, by letter and by arrow.
+LETTERS = {"w": 0, "s": 1, "a": 2, "d": 3, "q": 4, "e": 5}
+ARROWS = {"up": 0, "down": 1, "left": 4, "right": 5}
+RESTART, NEXT = "r", "n"
+HELP = "w s a d  drive   q e  turn   arrows too   r  again   n  next   Esc  quit"
+
+
+class Game:
+    """An environment and what happened in it; `restart` and `next_episode` begin episodes, `act` takes a step."""
+
+    def __init__(self, task_spec: TaskSpec, seed: int):
+        """The first episode is the first of `seed`."""
+        self.task_spec = task_spec
+        self.environment = Environment(task_spec, seed)
+        self.num_episodes = 0
+        self.num_reached = 0
+        self.next_episode()
+
+    def press(self, key: str) -> None:
+        """Does what a key stands for, a letter or an arrow by its name; others do nothing."""
+        if key == RESTART:
+            self.restart()
+        elif key == NEXT:
+            self.next_episode()
+        elif key in LETTERS or key in ARROWS:
+            self.act({**LETTERS, **ARROWS}[key])
+
+    def next_episode(self) -> None:
+        """Begins another episode."""
+        self._begin(self.environment.reset())
+
+    def restart(self) -> None:
+        """Begins the same episode again."""
+        self._begin(self.environment.reset(episode=self.environment.task.episode))
+
+    def _begin(self, time_step) -> None:
+        self.time_step = time_step
+        self.num_episodes += 1
+        self.path = [self.environment.physics.position()]  # [2] m each, where the body was
+
+    def act(self, action: int) -> None:
+        """Takes one agent step, if the episode has not ended."""
+        if self.time_step.last():
+            return
+        self.time_step = self.environment.step(action)
+        self.path.append(self.environment.physics.position())
+        self.num_reached += self.environment.task.success
+
+    @property
+    def walls(self) -> np.ndarray:
+        """`[N, N]` bool: the real ones."""
+        return self.task_spec.mazes[self.environment.task.episode.maze].walls
+
+    @property
+    def context(self) -> np.ndarray:
+        """`[4, M, M]` float32: what an agent is given."""
+        return self.time_step.observation["context"]
+
+    @property
+    def landmarks(self) -> list[Cell]:
+        """The cells still to be reached before the goal, of the real maze."""
+        task = self.environment.task
+        return [] if task.spec.task == "local" else task.route.cells[task.route.leg + 1 : -1]
+
+    def title(self) -> str:
+        """Which episode this is, in words."""
+        task = self.environment.task
+        maze, episode = self.task_spec.mazes[task.episode.maze], task.episode
+        distance = maze.distance(episode.start, episode.goal)
+        return f"maze {maze.name}, {self.task_spec.task}: the goal is {distance} cells away"
+
+    def status(self) -> str:
+        """How the episode stands, in words."""
+        task, physics = self.environment.task, self.environment.physics
+        driven = f"{task.steps} steps, {task.path_length:.2f} m"
+        if self.time_step.last():
+            return f"GOAL REACHED after {driven}" if task.success else f"OUT OF TIME after {driven}"
+        x, y = self.time_step.observation["state"][:2]
+        heading = math.degrees(physics.yaw())
+        left = task.route.deadline - task.steps
+        where = f"x {x:.2f}  y {y:.2f} m  heading {heading:+.0f} deg  {physics.speed():.2f} m/s"
+        return f"{where}  {driven}, {left} steps left" + (f", landmark {task.route.leg + 1}" if self.landmarks else "")
+
+    def outcome(self) -> str:
+        """What came of all episodes, in words."""
+        return f"{self.num_reached} of {self.num_episodes} episodes ended at the goal"

@@ -1,0 +1,114 @@
+"""The game on a terminal, with nothing but the standard library."""
+
+from __future__ import annotations
+
+import contextlib
+import locale
+import signal
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+from mazebench.errors import InputError
+from mazebench.play.game import Game
+from mazebench.play.picture import Style, draw
+
+_ESCAPE = 27
+_ESCAPE_DELAY = 25  # ms to wait for the rest of an arrow's sequence
+_LOST = 8  # readings in a row that fail: the terminal is gone, not only interrupted
+
+
+def play(game: Game) -> None:
+    """Plays until Escape or Ctrl-C; the terminal is left as it was found, also by an error or a signal to end.
+
+    Raises:
+      InputError: if this is no terminal, or one that can't be drawn on.
+    """
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise InputError("expected a terminal to play on, found a file or a pipe")
+    try:
+        import curses
+    except ImportError as error:
+        raise InputError("playing in a terminal needs Python's curses, which this system's Python lacks") from error
+    locale.setlocale(locale.LC_ALL, "")
+    with _ending_by_signals(), contextlib.suppress(KeyboardInterrupt):
+        try:
+            curses.wrapper(lambda screen: _Screen(curses, screen).run(game))
+        except curses.error as error:
+            raise InputError(f"can't draw on this terminal: {error}; is TERM set to its kind?") from error
+
+
+@contextlib.contextmanager
+def _ending_by_signals() -> Iterator[None]:
+    """Lets the signals that end a process end it by an exception, so that the terminal is put back first."""
+
+    def end(number: int, frame: Any) -> None:
+        sys.exit(128 + number)
+
+    numbers = [signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
+    before = [signal.signal(number, end) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+class _Screen:
+    """A curses screen and its colours."""
+
+    def __init__(self, curses: Any, screen: Any):
+        self._curses, self._screen = curses, screen
+        curses.set_escdelay(_ESCAPE_DELAY)
+        with contextlib.suppress(curses.error):  # some terminals can't hide it
+            curses.curs_set(0)
+        self._attributes = self._colours()
+        self._plain = locale.getpreferredencoding(False).lower().replace("-", "") != "utf8"
+        self._keys = {
+            curses.KEY_UP: "up",
+            curses.KEY_DOWN: "down",
+            curses.KEY_LEFT: "left",
+            curses.KEY_RIGHT: "right",
+        }
+
+    def _colours(self) -> dict[int, int]:
+        """The curses attribute of each style; none where the terminal has no colours."""
+        curses = self._curses
+        if not curses.has_colors():
+            return {Style.BODY: curses.A_BOLD, Style.WALL: curses.A_REVERSE}
+        pairs = {
+            Style.FLOOR: (curses.COLOR_BLACK, curses.COLOR_WHITE),
+            Style.WALL: (curses.COLOR_BLUE, curses.COLOR_BLUE),
+            Style.PATH: (curses.COLOR_MAGENTA, curses.COLOR_WHITE),
+            Style.START: (curses.COLOR_WHITE, curses.COLOR_GREEN),
+            Style.GOAL: (curses.COLOR_WHITE, curses.COLOR_RED),
+            Style.LANDMARK: (curses.COLOR_BLACK, curses.COLOR_YELLOW),
+            Style.BODY: (curses.COLOR_WHITE, curses.COLOR_BLACK),
+        }
+        for style, (ink, paper) in pairs.items():
+            curses.init_pair(style, ink, paper)
+        bold = {Style.GOAL, Style.START, Style.BODY}
+        return {style: curses.color_pair(style) | (curses.A_BOLD if style in bold else 0) for style in pairs}
+
+    def run(self, game: Game) -> None:
+        """Draws, waits for a key, does what it stands for; until Escape."""
+        num_lost = 0
+        while num_lost < _LOST:
+            self._show(game)
+            code = self._screen.getch()
+            num_lost = num_lost + 1 if code < 0 else 0
+            if code == _ESCAPE:
+                return
+            game.press(self._keys.get(code) or (chr(code).lower() if 0 <= code < 128 else ""))
+
+    def _show(self, game: Game) -> None:
+        height, width = self._screen.getmaxyx()
+        glyphs, styles = draw(game, width, height, self._plain)
+        self._screen.erase()
+        for row in range(height):
+            # The last place of a line is left: writing to the last of all would scroll.
+            for column in range(width - 1):
+                attribute = self._attributes.get(int(styles[row, column]), 0)
+                with contextlib.suppress(self._curses.error):  # made smaller since it was measured
+                    self._screen.addstr(row, column, glyphs[row, column], attribute)
+        self._screen.refresh()

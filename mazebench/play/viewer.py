@@ -1,0 +1,86 @@
+"""The game in MuJoCo's viewer."""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import warnings
+
+import mujoco
+
+from mazebench.errors import InputError
+from mazebench.play.game import HELP, Game
+from mazebench.play.picture import map_pixels
+
+_ESCAPE = 256  # GLFW's codes of keys; those of letters are the capital letters'
+_ARROWS = {262: "right", 263: "left", 264: "down", 265: "up"}
+_MAP_PIXELS = 260  # side of the map in the window's corner
+_SECONDS_A_FRAME = 0.02
+
+
+def play(game: Game) -> None:
+    """Plays until Escape or Ctrl-C, or until the window is closed.
+
+    Raises:
+      InputError: if no window can be opened.
+    """
+    viewer_module = _import_viewer()
+    physics = game.environment.physics
+    model, data = physics.model.ptr, physics.data.ptr
+    keys: queue.SimpleQueue[int] = queue.SimpleQueue()
+    try:
+        viewer = viewer_module.launch_passive(
+            model, data, key_callback=keys.put, show_left_ui=False, show_right_ui=False
+        )
+    except RuntimeError as error:  # macOS without mjpython
+        raise InputError(f"can't open MuJoCo's viewer: {error}; or play with --terminal") from error
+    with contextlib.suppress(KeyboardInterrupt), viewer:
+        viewer.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        viewer.cam.fixedcamid = model.camera("chase").id
+        # The viewer has switches of its own on our letters: they are put back at every key.
+        flags = viewer.opt.flags.copy(), viewer.user_scn.flags.copy()
+        while viewer.is_running():
+            with viewer.lock():
+                viewer.opt.flags[:], viewer.user_scn.flags[:] = flags
+            _overlay(viewer, game)
+            viewer.sync()
+            try:
+                code = keys.get(timeout=_SECONDS_A_FRAME)
+            except queue.Empty:
+                continue
+            if code == _ESCAPE:
+                return
+            with viewer.lock():
+                game.press(_ARROWS.get(code) or (chr(code).lower() if code < 128 else ""))
+
+
+def _import_viewer():
+    """mujoco.viewer, where a window can be opened: it would wait for ever for one that can't."""
+    try:
+        import glfw
+        import mujoco.viewer
+    except (ImportError, RuntimeError) as error:
+        raise InputError(f"can't open MuJoCo's viewer: {error}; play with --terminal") from error
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", glfw.GLFWError)  # said below, in one line
+        opens = glfw.init()
+    if not opens:
+        raise InputError("can't open a window on this display; play with --terminal")
+    return mujoco.viewer
+
+
+def _overlay(viewer, game: Game) -> None:
+    """The map in the upper right corner, the episode and the keys on the left."""
+    window = viewer.viewport
+    if window is None:
+        return
+    side = min(_MAP_PIXELS, window.width // 3, window.height // 2)
+    place = mujoco.MjrRect(window.width - side - 10, window.height - side - 10, side, side)
+    viewer.set_images((place, map_pixels(game, side)))
+    corner = mujoco.mjtGridPos
+    viewer.set_texts(
+        [
+            (None, corner.mjGRID_TOPLEFT, game.title(), ""),
+            (None, corner.mjGRID_BOTTOMLEFT, f"{game.status()}\n{HELP}", ""),
+        ]
+    )

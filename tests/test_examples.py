@@ -1,0 +1,144 @@
+"""What docs/examples holds: each script runs with a small budget, and the package is built, installed and evaluated."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+
+import cv2
+import mujoco
+import pytest
+
+from mazebench.maps.files import read_maze
+
+EXAMPLES = pathlib.Path(__file__).parent.parent / "docs" / "examples"
+# One thread: several slow each other down where other tests run at the same time.
+SERIAL = {"OMP_NUM_THREADS": "1"}
+
+
+def run(*arguments: str | pathlib.Path, folder: pathlib.Path, **variables: str) -> str:
+    """What a Python process prints on standard output; it must succeed."""
+    result = subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        cwd=folder,
+        env=os.environ | SERIAL | variables,
+        capture_output=True,
+        text=True,
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def needs(*modules: str) -> None:
+    for module in modules:
+        if importlib.util.find_spec(module) is None:
+            pytest.skip(f"{module} is not installed")
+
+
+class TestScripts:
+    def test_scripts_when_counted(self):
+        source = pathlib.Path(__file__).read_text(encoding="utf-8")
+        assert [path.name for path in EXAMPLES.glob("*.py") if f'"{path.name}"' not in source] == []
+
+    def test_dm_env_loop(self, tmp_path):
+        lines = run(EXAMPLES / "dm_env_loop.py", "--episodes", "2", folder=tmp_path).splitlines()
+        assert [line.split(":")[0] for line in lines] == ["episode 0", "episode 1"]
+
+    def test_vector_dqn(self, tmp_path):
+        needs("torch")
+        budget = ("--steps", "3000", "--num-envs", "16", "--learning-starts", "500", "--target-updates", "50")
+        output = run(EXAMPLES / "vector_dqn.py", *budget, folder=tmp_path)
+        assert "156 updates; success rate " in output
+
+    def test_sb3_her(self, tmp_path):
+        needs("stable_baselines3")
+        output = run(EXAMPLES / "sb3_her.py", "--steps", "320", "--episodes", "2", folder=tmp_path)
+        assert " in 2 episodes of unseen mazes" in output
+
+    def test_sb3_continuous(self, tmp_path):
+        needs("stable_baselines3")
+        assert " drove " in run(EXAMPLES / "sb3_continuous.py", "--steps", "110", folder=tmp_path)
+
+    def test_pixels(self, tmp_path):
+        needs("torch")
+        probe = "import mujoco; mujoco.GLContext(64, 64).free()"
+        egl = {"MUJOCO_GL": "egl"}
+        if subprocess.run([sys.executable, "-c", probe], env=os.environ | egl, capture_output=True).returncode:
+            pytest.skip("EGL is not usable here")
+        run(EXAMPLES / "pixels.py", "--steps", "2", "--out", "seen.png", folder=tmp_path, **egl)
+        assert cv2.imread(str(tmp_path / "seen.png")).shape == (2 * 84, 4 * 84, 3)
+
+    def test_own_maze(self, tmp_path):
+        run(EXAMPLES / "own_maze.py", "--out", "mazes", folder=tmp_path)
+        assert read_maze(tmp_path / "mazes" / "ring.txt").size == 7
+        mujoco.MjModel.from_xml_path(str(tmp_path / "mazes" / "ring.xml"))
+        options = ("--maps", "mazes", "--distances", "1-6", "--out", "results")
+        run("-m", "mazebench", "eval", "--agent", "planner", *options, folder=tmp_path)
+        summary = json.loads((tmp_path / "results" / "summary.json").read_text())
+        assert (summary["overall"]["n"], summary["overall"]["success_rate"]) == (30, 1.0)
+
+    def test_minari_dataset(self, tmp_path):
+        needs("minari", "h5py")
+        datasets = {"MINARI_DATASETS_PATH": str(tmp_path)}
+        output = run(EXAMPLES / "minari_dataset.py", "--episodes", "3", folder=tmp_path, **datasets)
+        assert output.startswith("3 episodes, ")
+        # Read back where nobody has imported mazebench: every episode ends at the goal, which the last reward is 0 for.
+        check = (
+            "import minari\n"
+            "dataset = minari.load_dataset('mazebench/local-13-planner-v0')\n"
+            "for episode in dataset.iterate_episodes():\n"
+            "    assert episode.terminations[-1] and episode.rewards[-1] == 0 and (episode.rewards[:-1] == -1).all()\n"
+            "    assert episode.observations['context'].shape == (len(episode.actions) + 1, 4, 13, 13)\n"
+            "dataset.recover_environment().reset(seed=0)\n"
+        )
+        run("-c", check, folder=tmp_path, **datasets)
+
+
+@pytest.mark.parametrize("page", ["options.md", "maps.md"])
+def test_blocks_of_a_page_when_run_one_after_the_other(page):
+    text = (EXAMPLES.parent / page).read_text(encoding="utf-8")
+    names: dict[str, object] = {}
+    for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
+        exec(compile(block, page, "exec"), names)
+
+
+class TestPackage:
+    """docs/examples/crow_agent, a package of somebody else's."""
+
+    TINY = ("--distances", "1,2", "--episodes-per-distance", "1", "--out", "results")
+
+    def test_length_when_counted(self):
+        lines = (EXAMPLES / "crow_agent" / "crow_agent.py").read_text(encoding="utf-8").splitlines()
+        assert len(lines) < 30
+
+    @pytest.mark.parametrize("name", ["crow_agent.py", "pyproject.toml"])
+    def test_file_when_compared_with_the_page(self, name):
+        page = (EXAMPLES.parent / "agents.md").read_text(encoding="utf-8")
+        assert f"\n{(EXAMPLES / 'crow_agent' / name).read_text(encoding='utf-8')}```\n" in page
+
+    def test_agent_when_its_package_is_installed(self, tmp_path):
+        source, target = tmp_path / "crow_agent", tmp_path / "target"
+        shutil.copytree(EXAMPLES / "crow_agent", source)  # the build leaves files behind
+        offline = ("--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check")
+        run("-m", "pip", "install", "--quiet", *offline, "--target", target, source, folder=tmp_path)
+        installed = {"PYTHONPATH": str(target)}
+        assert "crow, " in run("-m", "mazebench", "list", folder=tmp_path, **installed)
+        run("-m", "mazebench", "eval", "--agent", "crow", *self.TINY, folder=tmp_path, **installed)
+        summary = json.loads((tmp_path / "results" / "summary.json").read_text())
+        assert (summary["agent"], summary["overall"]["n"]) == ("crow", 40)
+        assert summary["provenance"]["agent_package"] == "crow-agent 0.1.0"
+        assert summary["by_distance"]["1"]["success_rate"] > 0.8  # nothing stands between neighbouring cells
+        check = "import crow_agent, mazebench.testing; mazebench.testing.check_agent(crow_agent.Crow)"
+        run("-c", check, folder=tmp_path, **installed)
+
+    def test_agent_when_its_file_is_at_hand(self, tmp_path):
+        shutil.copy(EXAMPLES / "crow_agent" / "crow_agent.py", tmp_path)
+        run("-m", "mazebench", "eval", "--agent", "crow_agent:Crow", *self.TINY, folder=tmp_path)
+        summary = json.loads((tmp_path / "results" / "summary.json").read_text())
+        assert (summary["agent"], summary["overall"]["n"]) == ("crow_agent:Crow", 40)
