@@ -381,16 +381,3 @@ def success_rate(actor):
     spec = TaskSpec("local", (OPEN_FIELD,), (3, 4), time_limit=25)
     trials = list(enumerate(select_trials("local", spec.mazes, False, (3, 4), 32, seed=7)))
     return np.mean([record["success"] for records in run_trials(actor, spec, trials, 64) for record in records])
-
-
-def test_noise_of_the_search_falls_along_the_ladder():
-    """The last environment acts as in evaluation, the first with all of the noise."""
-    agent = MMN(dataclasses.replace(small_config(), num_envs=65, epsilon_base=0.0), 7, seed=2)
-    torch.nn.init.normal_(agent.network.heads.weight)
-    observation = {key: np.repeat(value, 65, axis=0) for key, value in an_observation(1).items()}
-    first = np.ones(65, dtype=bool)
-    agent.config = dataclasses.replace(agent.config, num_simulations=16)
-    greedy, _ = agent.act(observation, first, agent.initial_state(65))
-    draws = np.stack([agent.act(observation, first, agent.initial_state(65), explore=True)[0] for _ in range(40)])
-    assert (draws[:, -1] == greedy[-1]).all()
-    assert (draws[:, 0] != greedy[0]).any()

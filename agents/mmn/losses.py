@@ -144,7 +144,7 @@ def _add_model(
         encoded = network.encode(features)
     moved_error = (decoded[..., :2] - features[..., :2]).abs().sum(dim=-1)
     body_error = ((decoded[..., 2:] - features[..., 2:7]) ** 2).sum(dim=-1)
-    code_error = ((latent - encoded) ** 2).mean(dim=-1)
+    code_error = ((latent[..., 2:] - encoded[..., 2:]) ** 2).mean(dim=-1)
     loss = config.model_weight * (_MOVED_WEIGHT * moved_error + body_error + code_error)
     losses.add("model_loss", loss, weight)
     return moved_error.detach()

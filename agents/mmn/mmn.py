@@ -52,13 +52,9 @@ class MMN:
         self.explore_from(0, config.num_envs, seed)
 
     def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
-        """Takes the rungs `first_env` to `first_env + num_envs` of the ladder, and a new stream of random numbers.
-
-        Up the ladder there are fewer random actions, and less noise in Gumbel MuZero's search.
-        """
+        """Takes the rungs `first_env` to `first_env + num_envs` of the ladder, and a new stream of random numbers."""
         rung = (first_env + np.arange(num_envs)) / max(1, self.config.num_envs - 1)
         self._epsilon = self.config.epsilon_base ** (1 + self.config.epsilon_alpha * rung)
-        self._noise_scale = 1.0 - rung  # the last environment acts as in evaluation: where that gets stuck, is learned
         self._rng = np.random.default_rng(seed)
 
     def parameters(self) -> dict[str, np.ndarray]:
@@ -162,9 +158,8 @@ class MMN:
         latent = self.network.encode(_padded(features))
         code = Code(*(_padded(part[rows]) for part in code))
         num_simulations = config.num_simulations if explore else config.num_eval_simulations
-        scale = np.resize(self._noise_scale[rows], len(latent)) if explore else 1.0
-        rng = self._rng if explore else None
-        return plan(self.network, config, latent, code, num_simulations, rng, scale).action[: len(features)]
+        result = plan(self.network, config, latent, code, num_simulations, self._rng if explore else None)
+        return result.action[: len(features)]
 
 
 def _slices(num_rows: int) -> list[slice]:

@@ -14,8 +14,7 @@ from ..layers import NUM_WAVES, waves
 from .config import MMNConfig
 from .hypermodels import HYPERMODELS, NUM_ACTIONS, Code, Hypermodel
 
-_NUM_POSE = 4  # x and y moved, sine and cosine of yaw: the first numbers of a latent state, as of state features
-_NUM_VELOCITIES = 3  # forward, left and of yaw
+NUM_BODY_FEATURES = 5  # sine and cosine of yaw, velocities forward, left and of yaw
 _SCALE_RATE = 5.0  # how much faster the map's scale is learned than weights of order one tenth are
 _RARE = -4.0  # logit of being in the goal, before anything is learned
 
@@ -32,31 +31,30 @@ class Predictions(NamedTuple):
 class MMNNetwork(nn.Module):
     """The paper's e (`encode`), h (`hypermodel`), f (`first_layer`, then `step`) and g (`predict`).
 
-    A latent state is a pose, metres moved since the context was new and sine and cosine of yaw, and a learned code of
-    the body's motion. The transition predicts how the body moves in its own frame, which is the same wherever it heads.
-    Where it is on the map, is learned: the start plus a learned linear map of what was moved.
+    A latent state is two metres moved since the context was new, and a code of the body's motion. Where that is on the
+    map, is learned: the start plus a learned linear map of what was moved.
     """
 
     support: torch.Tensor  # [bins], the values that a categorical value weighs
 
     def __init__(self, config: MMNConfig, context_size: int):
         super().__init__()
-        self.latent_size = _NUM_POSE + config.latent
+        self.latent_size = 2 + config.latent
         self.encoder = nn.Sequential(
-            nn.Linear(_NUM_VELOCITIES, config.hidden),
+            nn.Linear(NUM_BODY_FEATURES, config.hidden),
             nn.ReLU(inplace=True),
             nn.Linear(config.hidden, config.latent),
             nn.LayerNorm(config.latent),
         )
         make_hypermodel = HYPERMODELS[config.hypermodel]
-        num_inputs = config.latent + 2 + NUM_WAVES
-        self.hypermodel: Hypermodel = make_hypermodel(config, num_inputs, 3 + config.latent, context_size)
+        self.hypermodel: Hypermodel = make_hypermodel(config, config.latent + NUM_WAVES, self.latent_size, context_size)
         self.scale = nn.Parameter(torch.zeros(2, 2))
         self.normalize = nn.LayerNorm(config.latent)
-        self.decoder = nn.Linear(config.latent, _NUM_VELOCITIES)
+        self.decoder = nn.Linear(config.latent, NUM_BODY_FEATURES)
         self.num_bins = config.longest_value + 1
+        num_inputs = config.latent + NUM_WAVES + 2 + self.hypermodel.num_task_features
         self.body = nn.Sequential(
-            nn.Linear(num_inputs + 2 + self.hypermodel.num_task_features, config.head_hidden),
+            nn.Linear(num_inputs, config.head_hidden),
             nn.ReLU(inplace=True),
             nn.Linear(config.head_hidden, config.head_hidden),
             nn.ReLU(inplace=True),
@@ -69,11 +67,11 @@ class MMNNetwork(nn.Module):
 
     def encode(self, features: torch.Tensor) -> torch.Tensor:
         """Latent states `[G, K, D]` of state features `[G, K, 9]`; see `state_features`."""
-        return torch.cat([features[..., :_NUM_POSE], self.encoder(features[..., _NUM_POSE:7])], dim=-1)
+        return torch.cat([features[..., :2], self.encoder(features[..., 2:7])], dim=-1)
 
     def decode(self, latent: torch.Tensor) -> torch.Tensor:
         """`[G, K, 7]`: the first seven state features, back from latent states."""
-        return torch.cat([latent[..., :_NUM_POSE], self.decoder(latent[..., _NUM_POSE:])], dim=-1)
+        return torch.cat([latent[..., :2], self.decoder(latent[..., 2:])], dim=-1)
 
     def locate(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
         """`[G, K, 2]`: where on the map, (row, column), latent states are believed to be."""
@@ -90,10 +88,7 @@ class MMNNetwork(nn.Module):
     def step(self, latent: torch.Tensor, first: torch.Tensor, action: torch.Tensor, code: Code) -> torch.Tensor:
         """`[G, K, D]`: the next latent states, from what `first_layer` gave and actions `[G, K]`."""
         change = self.hypermodel.later_layers(first, action, code)
-        moved = latent[..., :2] + rotate(change[..., :2], latent[..., 2:_NUM_POSE])
-        turned = torch.stack([torch.sin(change[..., 2]), torch.cos(change[..., 2])], dim=-1)
-        heading = rotate(latent[..., 2:_NUM_POSE].flip(-1), turned).flip(-1)
-        return torch.cat([moved, heading, self.normalize(latent[..., _NUM_POSE:] + change[..., 3:])], dim=-1)
+        return torch.cat([latent[..., :2] + change[..., :2], self.normalize(latent[..., 2:] + change[..., 2:])], dim=-1)
 
     def step_all(self, latent: torch.Tensor, first: torch.Tensor, code: Code) -> torch.Tensor:
         """`[G, 6 K, D]`: the next latent states of every action, those of one state side by side."""
@@ -114,11 +109,5 @@ class MMNNetwork(nn.Module):
         return torch.softmax(value_logits, dim=-1) @ self.support
 
     def _body(self, latent: torch.Tensor) -> torch.Tensor:
-        """`[G, K, D + 14]`: the body's heading and motion, and where in a cell it is."""
+        """`[G, K, D + 14]`: the body's motion, and where in a cell it is."""
         return torch.cat([latent[..., 2:], waves(latent[..., :2])], dim=-1)
-
-
-def rotate(vector: torch.Tensor, heading: torch.Tensor) -> torch.Tensor:
-    """`[..., 2]` vectors, turned by the angles whose sines and cosines are `heading` `[..., 2]`."""
-    (x, y), (sine, cosine) = vector.unbind(-1), heading.unbind(-1)
-    return torch.stack([cosine * x - sine * y, sine * x + cosine * y], dim=-1)
