@@ -353,7 +353,8 @@ def test_mmn_after_a_minute_beats_random_in_a_small_maze():
         "min_rows": 2000,
         "steps_per_update": 64,
         "num_simulations": 4,
-        "target_rate": 0.03,
+        "learning_rate": 2e-3,
+        "target_rate": 0.05,
         "longest_value": 25,
         "hindsight_mean_offset": 8,
         "hindsight_window": 30,
@@ -365,7 +366,7 @@ def test_mmn_after_a_minute_beats_random_in_a_small_maze():
     learner.actor.explore_from(0, learner.num_envs, seed=0)
     state = learner.actor.initial_state(learner.num_envs)
     updates = 0
-    while updates < 450:
+    while updates < 700:
         actions, state = learner.actor.act(collector.observation, collector.is_first, state, explore=True)
         learner.observe(collector.step(actions))
         while updates < learner.num_updates_due(learner._replay.num_rows):
@@ -381,3 +382,13 @@ def success_rate(actor):
     spec = TaskSpec("local", (OPEN_FIELD,), (3, 4), time_limit=25)
     trials = list(enumerate(select_trials("local", spec.mazes, False, (3, 4), 32, seed=7)))
     return np.mean([record["success"] for records in run_trials(actor, spec, trials, 64) for record in records])
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+def test_first_update_on_a_gpu_is_that_on_a_cpu(mazes, monkeypatch):
+    on_gpu = make_learner(mazes)
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    on_cpu = make_learner(mazes)
+    found, expected = on_gpu.update(), on_cpu.update()
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value, rel=0.05, abs=1e-3), name

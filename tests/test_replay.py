@@ -216,3 +216,41 @@ def test_damaged_replay_is_refused(tmp_path, content):
 def test_memory_is_bounded_by_the_capacity():
     replay = Replay(4, 1000)
     assert replay.num_bytes == 1000 * (12 * 4 + 2 * 4 + 1 + 4 * 2 + 2 * 8)
+
+
+def test_sequences_are_consecutive_and_stop_with_their_trajectory():
+    replay = Replay(1, 100)
+    fill(replay, [3, 4, 5, 6], final_cell=7)  # states x 0 to 4
+    fill(replay, [20, 21, 22], first_x=10)  # still running: states x 10 to 12
+    sample = replay.sample_sequences(64, 2, 3, ALWAYS, np.random.default_rng(0))
+    first = {0: [0, 1, 2, 3], 1: [1, 2, 3, 4], 2: [2, 3, 4], 3: [3, 4], 10: [10, 11, 12], 11: [11, 12], 12: [12]}
+    cell = {0: 3, 1: 4, 2: 5, 3: 6, 4: 7, 10: 20, 11: 21, 12: 22}
+    seen = set()
+    for state_, cells, action, exists in zip(
+        sample.state.reshape(-1, 4, 12),
+        sample.cell.reshape(-1, 4),
+        sample.action.reshape(-1, 3),
+        sample.exists.reshape(-1, 4),
+        strict=True,
+    ):
+        xs = state_[exists, 0].astype(int).tolist()
+        assert xs == first[xs[0]]
+        assert cells[exists].tolist() == [cell[x] for x in xs]
+        assert action[: len(xs) - 1].tolist() == [x % 10 for x in xs[:-1]]
+        seen.add(xs[0])
+    assert seen == set(first)
+
+
+def test_sequences_have_goals_that_were_reached_later_if_relabelled():
+    replay = Replay(1, 100)
+    fill(replay, [3, 4, 5, 6], goal=50, final_cell=7)
+    half = Hindsight(ratio=0.5, mean_offset=2.0, window=10)
+    sample = replay.sample_sequences(200, 1, 2, half, np.random.default_rng(0))
+    assert (sample.goal[~sample.relabelled] == 50).all()
+    assert 60 < sample.relabelled.sum() < 140
+    # The row that was drawn comes first, in a group of one sequence.
+    first = sample.state[:, 0, 0, 0].astype(int)
+    later = np.array([3, 4, 5, 6, 7])
+    for x, goal in zip(first[sample.relabelled], sample.goal[sample.relabelled], strict=True):
+        assert goal in later[x + 1 :]
+    assert (sample.start == 3).all()  # the start stays

@@ -6,6 +6,7 @@ import csv
 import dataclasses
 import io
 import json
+import pathlib
 import re
 
 import numpy as np
@@ -39,6 +40,17 @@ def table_of(*labels: str, **changes) -> Table:
     return dataclasses.replace(table, **changes)
 
 
+def set_outcomes(folder: pathlib.Path, outcomes: tuple[int, ...]) -> None:
+    """Makes each episode a drive of 4 m that ends so: SPL l / 4 by the body's path, distance / 4 by the grid."""
+    records = [json.loads(line) for line in (folder / EPISODES).read_text().splitlines()]
+    for record, success in zip(records, outcomes, strict=True):
+        record |= {"success": bool(success), "path_length": 4.0, "shortest_path": 1.0}
+        record |= {"spl": success * 0.25, "spl_grid": success * record["distance"] / 4}
+    (folder / EPISODES).write_text("".join(map(to_line, records)))
+    summary = json.loads((folder / SUMMARY).read_text()) | summarize(records)
+    (folder / SUMMARY).write_text(json.dumps(summary))
+
+
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     """A small run of two agents: local, two landmark distances, a flip, a warp, noise."""
@@ -66,14 +78,7 @@ def report(results, tmp_path_factory):
 class TestFigures:
     def test_measures_when_worked_by_hand(self, tmp_path):
         folder = make_result(tmp_path / "made", "planner", num_mazes=4, distances=(2, 4), record=False)
-        records = [json.loads(line) for line in (folder / EPISODES).read_text().splitlines()]
-        for record, success in zip(records, (1, 1, 1, 0, 1, 1, 1, 0), strict=True):
-            # Each drives 4 m: l / 4 by the body's path, distance / 4 by the grid.
-            record |= {"success": bool(success), "path_length": 4.0, "shortest_path": 1.0}
-            record |= {"spl": success * 0.25, "spl_grid": success * record["distance"] / 4}
-        (folder / EPISODES).write_text("".join(map(to_line, records)))
-        summary = json.loads((folder / SUMMARY).read_text()) | summarize(records)
-        (folder / SUMMARY).write_text(json.dumps(summary))
+        set_outcomes(folder, (1, 1, 1, 0, 1, 1, 1, 0))
         [table, _] = build_tables(writing.read_results([folder], silent), ["planner"])
         ours = table.columns[0].cells
         assert table.rows == ("2", "4", "2, 4")
@@ -83,6 +88,49 @@ class TestFigures:
         low, high = wilson_interval(4, 4)
         assert (ours["success_rate"][0].low, ours["success_rate"][0].high) == (low, high)
         assert (ours["success_rate"][1].low, ours["success_rate"][1].high) == (0.0, 1.0)
+
+    def test_pooled_runs_when_worked_by_hand(self, tmp_path):
+        # Two mazes, each at 2 and 4 cells. A second seed of a checkpoint is no further training run.
+        outcomes = {("a", 0): (1, 0, 1, 1), ("b", 0): (1, 1, 1, 1), ("b", 1): (0, 0, 0, 0)}
+        for (checkpoint, seed), successes in outcomes.items():
+            options = {"num_mazes": 2, "record": False, "checkpoint": 64 * checkpoint, "seed": seed}
+            set_outcomes(make_result(tmp_path / f"{checkpoint}{seed}", "mah", **options), successes)
+        make_result(tmp_path / "random", "random", num_mazes=2, record=False)
+        writing.write_report([tmp_path], tmp_path / "report", silent)
+        file = (tmp_path / "report" / "tables" / "pooled-local-13.csv").read_text()
+        lines = [line for line in csv.DictReader(io.StringIO(file)) if line["metric"] == "success_rate"]
+        figures = {(line["column"], line["row"]): (line["value"], line["low95"], line["high95"]) for line in lines}
+        # At 4 cells maze a draws twice from 0 and 1, maze b gets 1; of four scores a lowest and a highest go.
+        assert figures == {
+            ("mah, mean", "2"): ("1", "1", "1"),
+            ("mah, IQM", "2"): ("1", "1", "1"),
+            ("mah, mean", "4"): ("0.75", "0.5", "1"),
+            ("mah, IQM", "4"): ("1", "0.5", "1"),
+            ("mah, mean", "2, 4"): ("0.875", "0.75", "1"),
+            ("mah, IQM", "2, 4"): ("1", "0.75", "1"),
+        }
+        assert {(line["episodes"], line["runs"]) for line in lines if line["row"] == "4"} == {("4", "2")}
+        document = (tmp_path / "report" / "report.md").read_text()
+        assert "| 4 | 0.75 [0.50, 1.00], 2 runs | 1.00 [0.50, 1.00], 2 runs |" in document
+
+    def test_pooled_runs_when_of_several_landmark_distances(self, tmp_path):
+        options = {"task": "hierarchical", "num_mazes": 2, "record": False}
+        for checkpoint, landmark_distance in (("a", 1), ("b", 1), ("c", 1), ("a", 5), ("b", 5), ("a", 3)):
+            folder = tmp_path / f"{checkpoint}{landmark_distance}"
+            make_result(folder, "mah", landmark_distance=landmark_distance, checkpoint=64 * checkpoint, **options)
+        results = writing.read_results([tmp_path], silent)
+        tables = {table.name: table for table in build_tables(results, [result.label for result in results])}
+        pooled = tables["pooled-hierarchical-13"]
+        assert pooled.title == "Hierarchical navigation, 13 × 13, pooled over training runs"
+        assert pooled.rows == ("1", "3", "5")
+        assert [cell and cell.runs for cell in pooled.columns[0].cells["spl"]] == [3, None, 2]
+
+    def test_pooled_runs_when_there_is_one(self, tmp_path):
+        for seed in (0, 1):
+            make_result(tmp_path / str(seed), "mah", num_mazes=2, record=False, checkpoint=64 * "a", seed=seed)
+        results = writing.read_results([tmp_path], silent)
+        tables = build_tables(results, [result.label for result in results])
+        assert [table.name for table in tables if table.name.startswith("pooled")] == []
 
     def test_printed_figures_when_beside_ours(self):
         [mmn] = paper_columns("local", 13, [1, 2, 10], 4)

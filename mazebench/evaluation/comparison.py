@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from mazebench.errors import InputError
 from mazebench.evaluation.metrics import CONFIDENCE, bootstrap_interval, wilson_interval
@@ -108,7 +107,9 @@ def probability_of_improvement(a: np.ndarray, b: np.ndarray, mazes: np.ndarray) 
 
 def interquartile_mean(scores: np.ndarray) -> float:
     """The mean of the middle half of all `scores` (Agarwal et al. 2021)."""
-    return float(stats.trim_mean(scores, _TRIMMED, axis=None))
+    ordered = np.sort(scores, axis=None)
+    cut = int(_TRIMMED * len(ordered))
+    return float(ordered[cut : len(ordered) - cut].mean())
 
 
 def stratified_bootstrap_interval(

@@ -37,8 +37,9 @@ function swatch(label) {
 
 function formatCell(cell) {
   if (!cell) return "";
-  const [value, low, high] = cell;
-  return value.toFixed(2) + (low === null ? "" : ` [${low.toFixed(2)}, ${high.toFixed(2)}]`);
+  const [value, low, high, , runs] = cell;
+  const interval = low === null ? "" : ` [${low.toFixed(2)}, ${high.toFixed(2)}]`;
+  return value.toFixed(2) + interval + (runs ? `, ${runs} runs` : "");
 }
 
 // Columns that hold a figure of the chosen metric and are not switched off.

@@ -112,7 +112,7 @@ def _cell(cell: Cell | None) -> list[float | int | None] | None:
     if cell is None:
         return None
     low, high = (None if value is None else round(value, 4) for value in (cell.low, cell.high))
-    return [round(cell.value, 4), low, high, cell.episodes]
+    return [round(cell.value, 4), low, high, cell.episodes, *([] if cell.runs is None else [cell.runs])]
 
 
 def _table(table: Table) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import re
 
 from mazebench.report.results import METRICS
 
-_CSV_COLUMNS = ("table", "metric", "row", "column", "source", "episodes", "value", "low95", "high95")
+_CSV_COLUMNS = ("table", "metric", "row", "column", "source", "episodes", "value", "low95", "high95", "runs")
 _LATEX = {
     **{character: f"\\{character}" for character in "&%$#_{}"},
     "\\": r"\textbackslash{}",
@@ -31,10 +31,11 @@ class Cell:
     low: float | None = None  # of the 95 % interval
     high: float | None = None
     episodes: int | None = None
+    runs: int | None = None  # of training, where several are pooled
 
     def __str__(self) -> str:
         interval = "" if self.low is None else f" [{self.low:.2f}, {self.high:.2f}]"
-        return f"{self.value:.2f}{interval}"
+        return f"{self.value:.2f}{interval}{'' if self.runs is None else f', {self.runs} runs'}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,7 +94,7 @@ def to_csv(table: Table) -> str:
                 if cell is not None:
                     source = "paper" if column.is_paper else "measured"
                     figures = [_digits(value) for value in (cell.value, cell.low, cell.high)]
-                    writer.writerow([table.name, metric, row, column.label, source, cell.episodes, *figures])
+                    writer.writerow([table.name, metric, row, column.label, source, cell.episodes, *figures, cell.runs])
     return file.getvalue()
 
 

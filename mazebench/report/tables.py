@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mazebench.evaluation.metrics import bootstrap_interval, success_interval
+from mazebench.report.pooling import NOTE, pool_columns, training_runs
 from mazebench.report.reference import paper_columns
 from mazebench.report.results import METRICS, PERTURBATIONS, Result, Setting
 from mazebench.report.table import Cell, Column, Table
@@ -25,7 +26,7 @@ def build_tables(results: Sequence[Result], labels: Sequence[str]) -> list[Table
         chosen = [result for result in results if (result.setting.split, result.setting.mazes) == mazes]
         tables += [
             dataclasses.replace(table, name=prefix + table.name, title=table.title + suffix)
-            for table in _tables_of(chosen, labels, with_paper=mazes[0] == "eval")
+            for table in (*_tables_of(chosen, labels, with_paper=mazes[0] == "eval"), *_pooled_tables(chosen))
         ]
     return [*tables, _overview(results, labels)]
 
@@ -165,6 +166,45 @@ def _perturbation_tables(
         if level:
             title = f"Local navigation, {base.size} × {base.size}, on maps warped by up to {level:g} of their side"
             yield _by_distance(f"warp-{level:g}-{place}", title, group, labels, with_paper, warped=True)
+
+
+def _pooled_tables(results: Sequence[Result]) -> Iterator[Table]:
+    """For each task, size and perturbation of which an agent has several training runs: all such agents."""
+    for kind in sorted({_any_landmarks(result.setting) for result in results}):
+        agents = training_runs([result for result in results if _any_landmarks(result.setting) == kind])
+        if not agents:
+            continue
+        row_name, rows = _pooled_rows([result for runs in agents.values() for result in runs])
+        columns = [column for agent, runs in agents.items() for column in pool_columns(agent, runs, [*rows.values()])]
+        if any(any(column.cells["success_rate"]) for column in columns):
+            levels = "".join(f"-{name.rpartition('_')[2]}-{getattr(kind, name):g}" for name in kind.perturbed)
+            parts = [f"{kind.task.capitalize()} navigation, {kind.size} × {kind.size}"]
+            parts += [f"{LEVEL_NAMES[name]} {getattr(kind, name):g}" for name in kind.perturbed]
+            title = ", ".join([*parts, "pooled over training runs"])
+            yield Table(f"pooled-{kind.task}-{kind.size}{levels}", title, NOTE, row_name, (*rows,), (), (*columns,))
+
+
+def _any_landmarks(setting: Setting) -> Setting:
+    return dataclasses.replace(setting, landmark_distance=0)
+
+
+def _pooled_rows(results: Sequence[Result]) -> tuple[str, dict[str, Callable[[Result], np.ndarray]]]:
+    """What the rows differ in, and each one's name and episodes (`[E]` bool)."""
+    rows: dict[str, Callable[[Result], np.ndarray]]
+    if results[0].setting.task == "hierarchical":
+        levels = sorted({result.setting.landmark_distance for result in results})
+        rows = {str(level): lambda result, k=level: _all_if(result, k) for level in levels}  # type: ignore[misc]
+        return "landmark distance", rows
+    distances = sorted({distance for result in results for distance in result.episodes.distance.tolist()})
+    rows = {str(distance): lambda result, d=distance: result.episodes.distance == d for distance in distances}  # type: ignore[misc]
+    common = common_distances(results)
+    if len(common) > 1:
+        rows[format_distances(common)] = lambda result: chosen_episodes(result, common)
+    return "distance", rows
+
+
+def _all_if(result: Result, landmark_distance: int) -> np.ndarray:
+    return np.full(len(result.episodes), result.setting.landmark_distance == landmark_distance)
 
 
 def _is_default(base: Setting) -> bool:
