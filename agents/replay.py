@@ -19,8 +19,20 @@ from mazebench.training.experience import Experience
 
 from .sum_tree import SumTree
 
-_ROW_FIELDS = ("state", "origin", "action", "cell", "start", "goal", "maze", "trajectory", "leg")
-_ENV_FIELDS = ("next", "current", "current_leg", "leg_origin")
+_ROW_FIELDS = (
+    "state",
+    "origin",
+    "anchor_origin",
+    "action",
+    "cell",
+    "start",
+    "anchor",
+    "goal",
+    "maze",
+    "trajectory",
+    "leg",
+)
+_ENV_FIELDS = ("next", "current", "current_leg", "leg_origin", "current_anchor", "current_anchor_origin")
 _NO_ACTION = -1  # of the row after a trajectory's last step
 _STATE_SIZE = 12
 
@@ -52,7 +64,8 @@ class SequenceSample(NamedTuple):
     start: np.ndarray  # [G] int, cell
     goal: np.ndarray  # [G] int, cell
     relabelled: np.ndarray  # [G] bool, the goal is one of hindsight
-    origin: np.ndarray  # [G, 2] float32, x and y observed where the context's leg started
+    anchor: np.ndarray  # [G] int, the cell where `origin` was observed
+    origin: np.ndarray  # [G, 2] float32, x and y observed where the context's leg started, or the trajectory
     state: np.ndarray  # [G, S, L + 1, 12] float32
     cell: np.ndarray  # [G, S, L + 1] int, the body's true cell at `state`
     action: np.ndarray  # [G, S, L] int, taken in the first L states
@@ -67,6 +80,7 @@ class Hindsight:
     mean_offset: float = 16.0  # steps ahead of the row at which the goal was reached; geometric
     window: int = 60  # steps; no goal lies farther ahead, no step of a group farther before it
     relabel_start: bool = False  # whether the context's start moves along, to the group's first step
+    keep_anchor: bool = False  # whether motion is told from the trajectory's start, a cell's centre, and not the leg's
 
 
 class _Groups(NamedTuple):
@@ -79,6 +93,7 @@ class _Groups(NamedTuple):
     start: np.ndarray  # [G]
     goal: np.ndarray  # [G]
     relabelled: np.ndarray  # [G] bool
+    anchor: np.ndarray  # [G]
     origin: np.ndarray  # [G, 2]
 
 
@@ -92,9 +107,11 @@ class Replay:
         shape = (num_envs, self._length)
         self._state = np.zeros((*shape, _STATE_SIZE), dtype=np.float32)
         self._origin = np.zeros((*shape, 2), dtype=np.float32)
+        self._anchor_origin = np.zeros((*shape, 2), dtype=np.float32)
         self._action = np.full(shape, _NO_ACTION, dtype=np.int8)
         self._cell = np.zeros(shape, dtype=np.uint16)
         self._start = np.zeros(shape, dtype=np.uint16)
+        self._anchor = np.zeros(shape, dtype=np.uint16)
         self._goal = np.zeros(shape, dtype=np.uint16)
         self._maze = np.zeros(shape, dtype=np.uint16)
         self._trajectory = np.full(shape, -1, dtype=np.int64)  # numbers that no two trajectories of a ring share
@@ -104,6 +121,8 @@ class Replay:
         self._current = np.zeros(num_envs, dtype=np.int64)  # the trajectory each environment is in
         self._current_leg = np.zeros(num_envs, dtype=np.int64)
         self._leg_origin = np.zeros((num_envs, 2), dtype=np.float32)
+        self._current_anchor = np.zeros(num_envs, dtype=np.int64)  # the cell where its trajectory started
+        self._current_anchor_origin = np.zeros((num_envs, 2), dtype=np.float32)
         self._tree = SumTree(num_envs * self._length)
         self._exponent = priority_exponent
         self._largest_priority = 1.0
@@ -156,6 +175,9 @@ class Replay:
         self._current[envs] += experience.begins
         self._current_leg[envs] += experience.is_first
         self._leg_origin[envs[experience.is_first]] = experience.state[experience.is_first, :2]
+        begins = experience.begins
+        self._current_anchor[envs[begins]] = experience.start[begins]
+        self._current_anchor_origin[envs[begins]] = experience.state[begins, :2]
         self._write(envs, indices, experience, experience.state, experience.cell, experience.action)
         ended = np.flatnonzero(experience.ended)
         if len(ended):
@@ -177,6 +199,8 @@ class Replay:
         self._cell[place] = cell[indices]
         self._action[place] = action[indices]
         self._origin[place] = self._leg_origin[envs]
+        self._anchor[place] = self._current_anchor[envs]
+        self._anchor_origin[place] = self._current_anchor_origin[envs]
         self._start[place] = experience.start[indices]
         self._goal[place] = experience.goal[indices]
         self._maze[place] = experience.maze[indices]
@@ -247,6 +271,7 @@ class Replay:
             group.start,
             group.goal,
             group.relabelled,
+            group.anchor,
             group.origin,
             self._state[env, places_at],
             self._cell[env, places_at].astype(np.int64),
@@ -271,8 +296,11 @@ class Replay:
             moved = relabelled[:, None]
             start = np.where(relabelled, self._cell[env, first], start)
             origin = np.where(moved, self._state[env, first, :2], origin)
+        anchor = start
+        if hindsight.keep_anchor:
+            anchor, origin = self._anchor[env, place].astype(np.int64), self._anchor_origin[env, place]
         maze = self._maze[env, place].astype(np.int64)
-        return _Groups(row, env, steps, maze, start, goal, relabelled, origin)
+        return _Groups(row, env, steps, maze, start, goal, relabelled, anchor, origin)
 
     def update_priorities(self, row: np.ndarray, error: np.ndarray) -> None:
         """Gives `row` `[K]`, of a sample, priorities by the errors `[K]` that learning found there."""

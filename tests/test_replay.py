@@ -215,7 +215,7 @@ def test_damaged_replay_is_refused(tmp_path, content):
 
 def test_memory_is_bounded_by_the_capacity():
     replay = Replay(4, 1000)
-    assert replay.num_bytes == 1000 * (12 * 4 + 2 * 4 + 1 + 4 * 2 + 2 * 8)
+    assert replay.num_bytes == 1000 * (12 * 4 + 2 * 8 + 1 + 5 * 2 + 2 * 8)
 
 
 def test_sequences_are_consecutive_and_stop_with_their_trajectory():

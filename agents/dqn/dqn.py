@@ -8,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 import pathlib
 from collections.abc import Mapping
-from importlib import resources
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,6 +15,7 @@ import torch
 
 from mazebench.agent import Interface, Observation
 
+from ..actor import NetworkAgent
 from ..checkpoint import load_agent, load_into
 from ..layers import in_batches, state_features
 from ..overrides import override
@@ -34,11 +34,12 @@ class ActorState:
     code: torch.Tensor | None  # [B, C + 4, M * M], the encoded contexts; None until there is one
 
 
-class DQN:
+class DQN(NetworkAgent):
     """Acts greedily by a Q-network; where it explores, environment i follows Ape-X's ladder of epsilons."""
 
     name: ClassVar[str] = "dqn"
     default_config: ClassVar[DQNConfig] = DQNConfig(use_context=False)
+    network: QNetwork
 
     def __init__(self, config: DQNConfig, context_size: int, seed: int = 0):
         torch.set_num_threads(1)
@@ -48,20 +49,6 @@ class DQN:
             torch.manual_seed(seed)
             self.network = QNetwork(config.channels if config.use_context else 0, config.hidden)
         self.explore_from(0, config.num_envs, seed)
-
-    def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
-        """Takes the rungs `first_env` to `first_env + num_envs` of the ladder, and a new stream of random numbers."""
-        rung = (first_env + np.arange(num_envs)) / max(1, self.config.num_envs - 1)
-        self._epsilon = self.config.epsilon_base ** (1 + self.config.epsilon_alpha * rung)
-        self._rng = np.random.default_rng(seed)
-
-    def parameters(self) -> dict[str, np.ndarray]:
-        """The network's, by name."""
-        return {name: value.numpy().copy() for name, value in self.network.state_dict().items()}
-
-    def set_parameters(self, parameters: dict[str, np.ndarray]) -> None:
-        """Takes over another network's."""
-        self.network.load_state_dict({name: torch.from_numpy(value.copy()) for name, value in parameters.items()})
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> DQN:
@@ -86,12 +73,6 @@ class DQN:
         config = override(cls.default_config, overrides or {})
         return DQNLearner(cls(config, interface.context_size, seed), tuple(mazes), seed)
 
-    @classmethod
-    def default_checkpoint(cls) -> pathlib.Path:
-        """The checkpoint that ships."""
-        path = resources.files("mazebench_assets").joinpath("checkpoints", f"{cls.name}-13.safetensors")
-        return pathlib.Path(str(path))
-
     def initial_state(self, batch_size: int) -> ActorState:
         """No context encoded yet: `act` does it where one is first."""
         return ActorState(np.zeros((batch_size, 2), dtype=np.float32), None)
@@ -113,8 +94,7 @@ class DQN:
         inputs = (features,) if state.code is None else (features, state.code)
         actions = in_batches(self.network, _ACTED_AT_ONCE, *inputs)[:, 0].argmax(dim=-1).numpy()
         if explore:
-            at_random = self._rng.random(len(actions)) < self._epsilon
-            actions = np.where(at_random, self._rng.integers(NUM_ACTIONS, size=len(actions)), actions)
+            actions = self._explored(actions, NUM_ACTIONS)
         return actions, state
 
 

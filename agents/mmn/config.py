@@ -32,6 +32,7 @@ _RANGES = {
     "n_step": (1, 1000),
     "steps_per_update": (1, 1_000_000),
     "learning_rate": (0.0, math.inf),
+    "constant_updates": (1, 1_000_000_000),
     "weight_decay": (0.0, math.inf),
     "max_gradient_norm": (0.0, math.inf),
     "target_rate": (0.0, 1.0),
@@ -79,6 +80,8 @@ class MMNConfig:
     maxvisit_init: float = 10.0  # Gumbel's c_visit
     epsilon_base: float = 0.4  # Ape-X's ladder, beside the search's own noise: environment i takes a random action
     epsilon_alpha: float = 7.0  # at base ** (1 + alpha i / (B - 1))
+    noise_ladder: bool = True  # and Gumbel noise is multiplied by 1 - i / (B - 1): some act nearly as in evaluation,
+    # and what is learned is how to go on where that gets stuck
     # Experience
     num_envs: int = 128  # side by side
     num_goals: int = 4  # an episode, without a reset between: beyond the paper, whose episodes end at the goal
@@ -87,9 +90,11 @@ class MMNConfig:
     priority_exponent: float = 0.0  # 0 draws uniformly
     importance_exponent: float = 0.4  # Ape-X's, where rows are drawn by priority
     hindsight_ratio: float = 0.8  # as HER's four relabelled samples for each that is not
-    hindsight_mean_offset: float = 16.0  # steps; about eight cells
-    hindsight_window: int = 60  # steps; how far ahead a goal may lie, long enough for far ones
+    hindsight_mean_offset: float = 24.0  # steps; about twelve cells, the way gone
+    hindsight_window: int = 100  # steps; how far ahead a goal may lie, long enough for far ones
     relabel_start: bool = True  # beyond the paper, which keeps the start: contexts as after a landmark
+    keep_anchor: bool = True  # beyond the paper: through landmarks and relabelled starts, motion is told from the
+    # trajectory's first cell, whose centre is known, and not from wherever in its cell the body then is
     symmetries: bool = True  # beyond the paper: rotations and mirror images of what was experienced
     # Learning
     groups: int = 32  # contexts in a batch: the hypermodel is much of an update, and shared by
@@ -102,7 +107,8 @@ class MMNConfig:
     # "paper": a search's where the goal was the real one, the network's own policy where it was relabelled
     temperature: float = 0.4  # steps; of the improved policy, softmax(q / temperature), in "lookahead"
     steps_per_update: int = 256  # environment steps; fixed, so that scores do not depend on the workers' speed
-    learning_rate: float = 1e-3  # AdamW's
+    learning_rate: float = 3e-3  # AdamW's
+    constant_updates: int = 3000  # before the learning rate falls, as one over the number of updates
     weight_decay: float = 1e-4  # AdamW's
     max_gradient_norm: float = 10.0  # against the steep slopes while values are still far off
     target_rate: float = 0.01  # of the target network's moving average
@@ -141,6 +147,7 @@ PRESETS = {
         epsilon_base=0.0,
         num_goals=1,
         relabel_start=False,
+        keep_anchor=False,
         symmetries=False,
         sequence_steps=10,
         unroll=5,

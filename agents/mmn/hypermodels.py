@@ -35,7 +35,7 @@ _TASK_CODE = 64  # what the heads get of that code
 class Code(NamedTuple):
     """What a context becomes."""
 
-    places: torch.Tensor  # [G, 4], start and goal on the map, each (row, column)
+    places: torch.Tensor  # [G, 4], anchor and goal on the map, each (row, column)
     weights: torch.Tensor  # [G, ..., W], of the transition network, and last what the heads get; shaped as read
     distance: torch.Tensor  # [G, P, M, M], learned steps to the goal; P is 0 where none are propagated
     enterable: torch.Tensor  # [G, 1, M, M], logits that cells can be entered; 0 planes where P is 0
@@ -49,9 +49,13 @@ class Hypermodel(nn.Module):
     """What the three have in common: the interface of a transition network whose weights come from a context."""
 
     num_task_features: int  # T
+    hidden: int  # H
 
-    def forward(self, context: torch.Tensor) -> Code:
-        """The code of contexts `[G, 4, M, M]`."""
+    def forward(self, context: torch.Tensor, anchor: torch.Tensor | None = None) -> Code:
+        """The code of contexts `[G, 4, M, M]`.
+
+        Motion is told from an anchor, a cell's centre (row, column): `[G, 2]`, by default the contexts' marked start.
+        """
         raise NotImplementedError
 
     def look(self, place: torch.Tensor, code: Code) -> torch.Tensor:
@@ -135,9 +139,10 @@ class SpatialHypermodel(Hypermodel):
         self.propagation = Propagation(self.num_task_features, config.num_distances) if config.num_distances else None
         self.num_task_features += 5 * config.num_distances
         self.sharpness = nn.Parameter(torch.tensor(0.0))
+        self.hidden = config.hidden
         self.transition = _Transition(num_inputs, config.hidden, num_outputs)
 
-    def forward(self, context: torch.Tensor) -> Code:
+    def forward(self, context: torch.Tensor, anchor: torch.Tensor | None = None) -> Code:
         encoded = self.encoder(context)
         features = torch.cat([encoded, context], dim=1)
         rows = self.rows(features)  # [G, H, M, M]
@@ -146,7 +151,7 @@ class SpatialHypermodel(Hypermodel):
             distance, enterable = self.propagation(features, context[:, 2:3])
             features = torch.cat([features, self.propagation.slopes(distance)], dim=1)
         table = torch.cat([rows, features], dim=1).flatten(2).transpose(1, 2)  # [G, M * M, H + T]
-        return Code(_places(context), table, distance, enterable)
+        return Code(_places(context, anchor), table, distance, enterable)
 
     def look(self, place: torch.Tensor, code: Code) -> torch.Tensor:
         """The rows around, of weights and of task features."""
@@ -201,11 +206,11 @@ class CodeHypermodel(Hypermodel):
         )
         self.task = nn.Linear(_EMBEDDING, _TASK_CODE)
 
-    def forward(self, context: torch.Tensor) -> Code:
+    def forward(self, context: torch.Tensor, anchor: torch.Tensor | None = None) -> Code:
         embedding = self.embedding(self.encoder(context).flatten(1))
         nothing = context[:, :0]
         weights = torch.cat([self.weights(embedding), self.task(embedding)], dim=-1)
-        return Code(_places(context), weights, nothing, nothing)
+        return Code(_places(context, anchor), weights, nothing, nothing)
 
     def weights(self, embedding: torch.Tensor) -> torch.Tensor:
         """What the transition gets from contexts embedded as `[G, 256]`."""
@@ -225,6 +230,8 @@ class FlatHypermodel(CodeHypermodel):
 
     Bias-HyperInit (Beck et al. 2022): they begin as an ordinary network's, nearly the same for all contexts.
     """
+
+    hidden = _FLAT_HIDDEN
 
     def __init__(self, config: MMNConfig, num_inputs: int, num_outputs: int, context_size: int):
         super().__init__(context_size)
@@ -268,6 +275,7 @@ class NoHypermodel(CodeHypermodel):
 
     def __init__(self, config: MMNConfig, num_inputs: int, num_outputs: int, context_size: int):
         super().__init__(context_size)
+        self.hidden = config.hidden
         self.of_context = nn.Linear(_EMBEDDING, config.hidden)
         self.transition = _Transition(num_inputs + 2, config.hidden, num_outputs)
 
@@ -287,9 +295,10 @@ class NoHypermodel(CodeHypermodel):
 HYPERMODELS = {"spatial": SpatialHypermodel, "flat": FlatHypermodel, "none": NoHypermodel}
 
 
-def _places(context: torch.Tensor) -> torch.Tensor:
-    """`[G, 4]`: the marked start and goal."""
-    return torch.cat([marked_place(context[:, plane]) for plane in (3, 2)], dim=-1)
+def _places(context: torch.Tensor, anchor: torch.Tensor | None) -> torch.Tensor:
+    """`[G, 4]`: the anchor, which is the marked start if there is no other, and the marked goal."""
+    start, goal = (marked_place(context[:, plane]) for plane in (3, 2))
+    return torch.cat([start if anchor is None else anchor, goal], dim=-1)
 
 
 def _nearness(

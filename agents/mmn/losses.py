@@ -24,6 +24,7 @@ class Batch(NamedTuple):
     """A sample as tensors, rotated or mirrored."""
 
     context: torch.Tensor  # [G, 4, M, M]
+    anchor: torch.Tensor  # [G, 2], the place (row, column) from which motion is told
     visited: torch.Tensor  # [G, 1, M, M], share of each place of the map where the agent has ever been in this maze
     relabelled: torch.Tensor  # [G] bool
     features: torch.Tensor  # [G, S, L + 1, 9]
@@ -74,7 +75,7 @@ def unrolled_losses(
       targets: what was planned.
       weight: `[G]`, importance weights.
     """
-    code = network.hypermodel(batch.context)
+    code = network.hypermodel(batch.context, batch.anchor)
     roots = slice(0, config.sequence_steps - config.unroll + 1, config.unroll)
 
     def at(values: torch.Tensor, step: int) -> torch.Tensor:
@@ -136,15 +137,15 @@ def _add_model(
 ) -> torch.Tensor:
     """The paper's model loss, of unrolled states against observed and encoded ones; returns errors `[G, R]` in metres.
 
-    The paper's log-likelihood of the next state, with a Laplace distribution of the place, which collisions make
-    heavy-tailed, and a normal one of the body's motion and of its code.
+    The paper's log-likelihood of the next state, with a Laplace distribution, since collisions are heavy-tailed, of the
+    body's pose and velocities, and a normal one of the code of its motion.
     """
     decoded = network.decode(latent)
     with torch.no_grad():
         encoded = network.encode(features)
     moved_error = (decoded[..., :2] - features[..., :2]).abs().sum(dim=-1)
-    body_error = ((decoded[..., 2:] - features[..., 2:7]) ** 2).sum(dim=-1)
-    code_error = ((latent[..., 2:] - encoded[..., 2:]) ** 2).mean(dim=-1)
+    body_error = (decoded[..., 2:] - features[..., 2:7]).abs().sum(dim=-1)
+    code_error = ((latent - encoded) ** 2).mean(dim=-1)
     loss = config.model_weight * (_MOVED_WEIGHT * moved_error + body_error + code_error)
     losses.add("model_loss", loss, weight)
     return moved_error.detach()

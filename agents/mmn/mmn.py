@@ -8,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 import pathlib
 from collections.abc import Mapping
-from importlib import resources
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,8 +16,9 @@ import torch
 from mazebench.agent import Interface, Observation
 from mazebench.errors import InputError, unknown
 
+from ..actor import NetworkAgent
 from ..checkpoint import load_agent, load_into
-from ..layers import state_features
+from ..layers import marked_place, state_features
 from ..overrides import override
 from .config import PRESETS, MMNConfig
 from .hypermodels import NUM_ACTIONS, Code
@@ -32,15 +32,16 @@ _ROWS_AT_ONCE = 64  # contexts or states; always as many, since PyTorch rounds d
 class ActorState:
     """What acting carries from step to step in B environments."""
 
-    origin: np.ndarray  # [B, 2] float32, x and y observed where the context was new
+    origin: np.ndarray  # [B, 2] float32, x and y observed where motion is told from
     code: Code | None  # of B contexts; None until there is one
 
 
-class MMN:
+class MMN(NetworkAgent):
     """Acts by tree search in a latent model whose weights the hypermodel predicts from the context, once a leg."""
 
     name: ClassVar[str] = "mmn"
     default_config: ClassVar[MMNConfig] = PRESETS["default"]
+    network: MMNNetwork
 
     def __init__(self, config: MMNConfig, context_size: int, seed: int = 0, device: str = "cpu"):
         torch.set_num_threads(1)
@@ -50,20 +51,7 @@ class MMN:
             torch.manual_seed(seed)
             self.network = MMNNetwork(config, context_size).to(device)
         self.explore_from(0, config.num_envs, seed)
-
-    def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
-        """Takes the rungs `first_env` to `first_env + num_envs` of the ladder, and a new stream of random numbers."""
-        rung = (first_env + np.arange(num_envs)) / max(1, self.config.num_envs - 1)
-        self._epsilon = self.config.epsilon_base ** (1 + self.config.epsilon_alpha * rung)
-        self._rng = np.random.default_rng(seed)
-
-    def parameters(self) -> dict[str, np.ndarray]:
-        """The network's, by name."""
-        return {name: value.cpu().numpy().copy() for name, value in self.network.state_dict().items()}
-
-    def set_parameters(self, parameters: dict[str, np.ndarray]) -> None:
-        """Takes over another network's."""
-        self.network.load_state_dict({name: torch.from_numpy(value.copy()) for name, value in parameters.items()})
+        self._begins: np.ndarray | None = None  # [B] bool, where the next step begins an episode
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> MMN:
@@ -102,12 +90,6 @@ class MMN:
         return MMNLearner(cls(config, interface.context_size, seed, device), tuple(mazes), seed)
 
     @classmethod
-    def default_checkpoint(cls) -> pathlib.Path:
-        """The checkpoint that ships."""
-        path = resources.files("mazebench_assets").joinpath("checkpoints", f"{cls.name}-13.safetensors")
-        return pathlib.Path(str(path))
-
-    @classmethod
     def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
         """Tables for `mazebench bench`: how fast the search is."""
         from .measure import measure
@@ -118,6 +100,16 @@ class MMN:
         """No context encoded yet: `act` does it where one is first."""
         return ActorState(np.zeros((batch_size, 2), dtype=np.float32), None)
 
+    def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
+        """Takes these rungs of the ladder, on which there is less and less noise in the search, too."""
+        super().explore_from(first_env, num_envs, seed)
+        rung = (first_env + np.arange(num_envs)) / max(1, self.config.num_envs - 1)
+        self._noise_scale = 1.0 - rung if self.config.noise_ladder else np.ones(num_envs)
+
+    def seed_episodes(self, seeds: np.ndarray, mask: np.ndarray) -> None:
+        """Is told that episodes begin where `mask` `[B]`; without, every new context is taken for an episode's."""
+        self._begins = mask
+
     @torch.no_grad()
     def act(
         self, observation: Observation, is_first: np.ndarray, state: ActorState, explore: bool = False
@@ -125,8 +117,8 @@ class MMN:
         """Actions `[B]`; the hypermodel runs once for a context, where it is new, and all searches use what it gave."""
         new = np.flatnonzero(is_first)
         if len(new):
-            state.origin[new] = observation["state"][new, :2]
-            self._encode(observation["context"], new, state)
+            begins, self._begins = is_first if self._begins is None else self._begins, None
+            self._encode(observation, new, begins | (not self.config.keep_anchor), state)
         assert state.code is not None, "is_first must be set in an environment's first step"
         device = self.network.support.device
         features = state_features(torch.from_numpy(observation["state"]), torch.from_numpy(state.origin))
@@ -136,16 +128,23 @@ class MMN:
         ]
         action = np.concatenate(actions)
         if explore:
-            at_random = self._rng.random(len(action)) < self._epsilon
-            action = np.where(at_random, self._rng.integers(NUM_ACTIONS, size=len(action)), action)
+            action = self._explored(action, NUM_ACTIONS)
         return action, state
 
-    def _encode(self, contexts: np.ndarray, new: np.ndarray, state: ActorState) -> None:
-        """Puts the codes of the contexts at `new` into the state."""
+    def _encode(self, observation: Observation, new: np.ndarray, begins: np.ndarray, state: ActorState) -> None:
+        """Puts the codes of the contexts at `new` into the state; where no episode `begins`, their anchors stay."""
         device = self.network.support.device
+        origin = np.where(begins[new, None], observation["state"][new, :2], state.origin[new])
+        moved = torch.from_numpy(observation["state"][new, :2] - origin).to(device)
+        state.origin[new] = origin
         for rows in _slices(len(new)):
-            context = torch.from_numpy(contexts[new[rows]]).to(device)
-            code = self.network.hypermodel(_padded(context)).of(slice(len(context)))
+            context = torch.from_numpy(observation["context"][new[rows]]).to(device)
+            start = marked_place(context[:, 3])
+            anchor = start
+            if state.code is not None:
+                kept = self.network.reanchored(state.code.places[torch.from_numpy(new[rows]), :2], moved[rows], start)
+                anchor = torch.where(torch.from_numpy(begins[new[rows], None]).to(device), start, kept)
+            code = self.network.hypermodel(_padded(context), _padded(anchor)).of(slice(len(context)))
             if state.code is None:
                 size = len(state.origin)
                 state.code = Code(*(part.new_zeros(size, *part.shape[1:]) for part in code))
@@ -158,8 +157,9 @@ class MMN:
         latent = self.network.encode(_padded(features))
         code = Code(*(_padded(part[rows]) for part in code))
         num_simulations = config.num_simulations if explore else config.num_eval_simulations
-        result = plan(self.network, config, latent, code, num_simulations, self._rng if explore else None)
-        return result.action[: len(features)]
+        scale = np.resize(self._noise_scale[rows], len(latent)) if explore else 1.0
+        rng = self._rng if explore else None
+        return plan(self.network, config, latent, code, num_simulations, rng, scale).action[: len(features)]
 
 
 def _slices(num_rows: int) -> list[slice]:

@@ -14,7 +14,11 @@ from ..layers import NUM_WAVES, waves
 from .config import MMNConfig
 from .hypermodels import HYPERMODELS, NUM_ACTIONS, Code, Hypermodel
 
-NUM_BODY_FEATURES = 5  # sine and cosine of yaw, velocities forward, left and of yaw
+_NUM_POSE = 4  # x and y moved, sine and cosine of yaw: the first numbers of a latent state, as of state features
+_NUM_BODY = 7  # and velocities forward, left and of yaw
+_NUM_FREE = 6  # of a step in the body's frame: a move, a turn, velocities forward, left and of yaw
+_NUM_STOPPED = 4  # in the map's: a move, velocities
+_NUM_CHANGES = _NUM_FREE + _NUM_STOPPED
 _SCALE_RATE = 5.0  # how much faster the map's scale is learned than weights of order one tenth are
 _RARE = -4.0  # logit of being in the goal, before anything is learned
 
@@ -31,30 +35,36 @@ class Predictions(NamedTuple):
 class MMNNetwork(nn.Module):
     """The paper's e (`encode`), h (`hypermodel`), f (`first_layer`, then `step`) and g (`predict`).
 
-    A latent state is two metres moved since the context was new, and a code of the body's motion. Where that is on the
-    map, is learned: the start plus a learned linear map of what was moved.
+    A latent state is what the body's pose and velocities are believed to be, metres moved from an anchor among them,
+    and a learned code of its motion. A step adds what is linear in the body's own frame, as free motion is wherever it
+    heads, and what the transition network says of it: in that frame, and in the map's, along whose axes walls stop it.
+    Where it is on the map, is learned: the anchor plus a learned linear map of what was moved.
     """
 
     support: torch.Tensor  # [bins], the values that a categorical value weighs
 
     def __init__(self, config: MMNConfig, context_size: int):
         super().__init__()
-        self.latent_size = 2 + config.latent
+        self.latent_size = _NUM_BODY + config.latent
         self.encoder = nn.Sequential(
-            nn.Linear(NUM_BODY_FEATURES, config.hidden),
+            nn.Linear(_NUM_BODY - _NUM_POSE, config.hidden),
             nn.ReLU(inplace=True),
             nn.Linear(config.hidden, config.latent),
             nn.LayerNorm(config.latent),
         )
         make_hypermodel = HYPERMODELS[config.hypermodel]
-        self.hypermodel: Hypermodel = make_hypermodel(config, config.latent + NUM_WAVES, self.latent_size, context_size)
+        num_inputs = _NUM_BODY - 2 + config.latent + NUM_WAVES
+        num_changes = _NUM_CHANGES + config.latent
+        self.hypermodel: Hypermodel = make_hypermodel(config, num_inputs, num_changes, context_size)
         self.scale = nn.Parameter(torch.zeros(2, 2))
+        self.free = nn.Linear(_NUM_BODY - _NUM_POSE, _NUM_FREE)
+        self.free_by_action = nn.Embedding(NUM_ACTIONS, _NUM_FREE)
+        nn.init.zeros_(self.free_by_action.weight)
+        self.ahead = nn.Linear(_NUM_STOPPED, self.hypermodel.hidden)
         self.normalize = nn.LayerNorm(config.latent)
-        self.decoder = nn.Linear(config.latent, NUM_BODY_FEATURES)
         self.num_bins = config.longest_value + 1
-        num_inputs = config.latent + NUM_WAVES + 2 + self.hypermodel.num_task_features
         self.body = nn.Sequential(
-            nn.Linear(num_inputs, config.head_hidden),
+            nn.Linear(num_inputs + 2 + self.hypermodel.num_task_features, config.head_hidden),
             nn.ReLU(inplace=True),
             nn.Linear(config.head_hidden, config.head_hidden),
             nn.ReLU(inplace=True),
@@ -67,15 +77,23 @@ class MMNNetwork(nn.Module):
 
     def encode(self, features: torch.Tensor) -> torch.Tensor:
         """Latent states `[G, K, D]` of state features `[G, K, 9]`; see `state_features`."""
-        return torch.cat([features[..., :2], self.encoder(features[..., 2:7])], dim=-1)
+        return torch.cat([features[..., :_NUM_BODY], self.encoder(features[..., _NUM_POSE:_NUM_BODY])], dim=-1)
 
     def decode(self, latent: torch.Tensor) -> torch.Tensor:
         """`[G, K, 7]`: the first seven state features, back from latent states."""
-        return torch.cat([latent[..., :2], self.decoder(latent[..., 2:])], dim=-1)
+        return latent[..., :_NUM_BODY]
 
     def locate(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
         """`[G, K, 2]`: where on the map, (row, column), latent states are believed to be."""
-        return code.places[:, None, :2] + _SCALE_RATE * (latent[..., :2, None] * self.scale).sum(-2)
+        return code.places[:, None, :2] + self._displacement(latent[..., :2])
+
+    def reanchored(self, anchor: torch.Tensor, moved: torch.Tensor, start: torch.Tensor) -> torch.Tensor:
+        """`[G, 2]`: anchors after which the body, `moved` `[G, 2]` m from them, is in the cells marked as `start`.
+
+        They are those that it had, `anchor` `[G, 2]`, unless what was observed has led astray.
+        """
+        place = anchor + self._displacement(moved)
+        return anchor + torch.clamp(place, start - 0.5, start + 0.5) - place
 
     def look(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
         """`[G, K, W]`: what latent states see of their context, there."""
@@ -87,8 +105,18 @@ class MMNNetwork(nn.Module):
 
     def step(self, latent: torch.Tensor, first: torch.Tensor, action: torch.Tensor, code: Code) -> torch.Tensor:
         """`[G, K, D]`: the next latent states, from what `first_layer` gave and actions `[G, K]`."""
-        change = self.hypermodel.later_layers(first, action, code)
-        return torch.cat([latent[..., :2] + change[..., :2], self.normalize(latent[..., 2:] + change[..., 2:])], dim=-1)
+        heading, velocities = latent[..., 2:_NUM_POSE], latent[..., _NUM_POSE:_NUM_BODY]
+        free = self.free(velocities) + self.free_by_action(action)
+        ahead = torch.cat([rotate(free[..., :2], heading), rotate(free[..., 3:5], heading)], dim=-1)
+        change = self.hypermodel.later_layers(first + self.ahead(ahead), action, code)
+        in_body, in_map, motion = change.split([_NUM_FREE, _NUM_STOPPED, change.shape[-1] - _NUM_CHANGES], dim=-1)
+        in_body = free + in_body
+        moved = latent[..., :2] + rotate(in_body[..., :2], heading) + in_map[..., :2]
+        turn = torch.stack([torch.sin(in_body[..., 2]), torch.cos(in_body[..., 2])], dim=-1)
+        turned = rotate(heading.flip(-1), turn).flip(-1)
+        planar = in_body[..., 3:5] + rotate(in_map[..., 2:], heading * heading.new_tensor([-1.0, 1.0]))
+        motion = self.normalize(latent[..., _NUM_BODY:] + motion)
+        return torch.cat([moved, turned, planar, in_body[..., 5:], motion], dim=-1)
 
     def step_all(self, latent: torch.Tensor, first: torch.Tensor, code: Code) -> torch.Tensor:
         """`[G, 6 K, D]`: the next latent states of every action, those of one state side by side."""
@@ -108,6 +136,16 @@ class MMNNetwork(nn.Module):
         """`[G, K]`: means of categorical values, in steps."""
         return torch.softmax(value_logits, dim=-1) @ self.support
 
+    def _displacement(self, moved: torch.Tensor) -> torch.Tensor:
+        """`[..., 2]`: (row, column) on the map, of metres (x, y)."""
+        return _SCALE_RATE * (moved[..., None] * self.scale).sum(-2)
+
     def _body(self, latent: torch.Tensor) -> torch.Tensor:
-        """`[G, K, D + 14]`: the body's motion, and where in a cell it is."""
+        """`[G, K, D + 14]`: heading, velocities and motion, and where in a cell the body is."""
         return torch.cat([latent[..., 2:], waves(latent[..., :2])], dim=-1)
+
+
+def rotate(vector: torch.Tensor, heading: torch.Tensor) -> torch.Tensor:
+    """`[..., 2]` vectors, turned by the angles whose sines and cosines are `heading` `[..., 2]`."""
+    (x, y), (sine, cosine) = vector.unbind(-1), heading.unbind(-1)
+    return torch.stack([cosine * x - sine * y, sine * x + cosine * y], dim=-1)

@@ -42,18 +42,23 @@ def plan(
     code: Code,
     num_simulations: int,
     rng: np.random.Generator | None = None,
+    noise_scale: np.ndarray | float = 1.0,
 ) -> SearchResult:
-    """Searches from all latent states `[G, K, D]`; the results are in the order of B. With noise if `rng` is given."""
+    """Searches from all latent states `[G, K, D]`; the results are in the order of B.
+
+    With noise if `rng` is given; that of "gumbel" is multiplied by `noise_scale`, one number or `[B]`.
+    """
     size = latent.shape[0] * latent.shape[1], NUM_ACTIONS
     root = _root(network, latent, code)
     step = _recurrent_fn(network, config.predict_reward, latent.shape[:2], code)
     gumbel = np.zeros(size) if rng is None else rng.gumbel(size=size)
     if config.search == "gumbel":
+        scaled = gumbel * np.broadcast_to(noise_scale, size[:1])[:, None]
         return gumbel_muzero_policy(
             root,
             step,
             num_simulations,
-            gumbel,
+            scaled,
             value_scale=config.value_scale,
             maxvisit_init=config.maxvisit_init,
             rescale_values=False,  # values are in steps: their differences mean the same everywhere

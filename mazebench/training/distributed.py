@@ -50,9 +50,8 @@ class _Player:
             self._actor.set_parameters(parameters)
         experiences = []
         for _ in range(_STEPS_PER_CALL):
-            collector = self._collector
-            actions, self._state = self._actor.act(collector.observation, collector.is_first, self._state, explore=True)
-            experiences.append(collector.step(actions))
+            experience, self._state = self._collector.play(self._actor, self._state)
+            experiences.append(experience)
         return experiences
 
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mazebench.agent import Agent
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.maps.maze import point_to_cell
 from mazebench.tasks.spec import TaskSpec
@@ -43,8 +44,9 @@ class Collector:
 
     def restart(self, seed: int) -> None:
         """Begins new trajectories everywhere, the same for the same `seed`; make the policy's state anew, too."""
-        streams = np.random.SeedSequence(seed).generate_state(self._env.num_envs).tolist()
-        self.observation, infos = self._env.reset(seed=streams)
+        self._streams = np.random.SeedSequence(seed).generate_state(self._env.num_envs).astype(np.int64)
+        self._num_begun = np.zeros(self._env.num_envs, dtype=np.int64)  # trajectories
+        self.observation, infos = self._env.reset(seed=self._streams.tolist())
         self.is_first: np.ndarray = infos["is_first"]  # [B] bool, of the current observation
         self._begins = np.ones(self._env.num_envs, dtype=bool)
         self._maze: np.ndarray = infos["maze"]
@@ -53,6 +55,15 @@ class Collector:
     def num_envs(self) -> int:
         """B."""
         return self._env.num_envs
+
+    def play(self, actor: Agent, state: Any) -> tuple[Experience, Any]:
+        """Takes the step that `actor`, exploring, wants in its `state`; returns its next state, too."""
+        seed_episodes = getattr(actor, "seed_episodes", None)
+        if seed_episodes is not None and self.is_first.any():
+            self._num_begun += self._begins
+            seed_episodes(self._streams + self._num_begun, self._begins)
+        actions, state = actor.act(self.observation, self.is_first, state, explore=True)
+        return self.step(actions), state
 
     def step(self, action: np.ndarray) -> Experience:
         """Takes `action` `[B]` for the current observation, which the next one replaces."""

@@ -43,9 +43,8 @@ class InProcessSource:
 
     def collect(self) -> Iterator[tuple[int, Experience]]:
         """Takes one step in each environment."""
-        collector = self._collector
-        actions, self._state = self._actor.act(collector.observation, collector.is_first, self._state, explore=True)
-        yield 0, collector.step(actions)
+        experience, self._state = self._collector.play(self._actor, self._state)
+        yield 0, experience
 
     def __enter__(self) -> InProcessSource:
         return self
