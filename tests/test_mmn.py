@@ -13,7 +13,7 @@ from mazebench_agents.mmn import config as config_module
 from mazebench_agents.mmn.config import PRESETS, MMNConfig
 from mazebench_agents.mmn.hypermodels import HYPERMODELS, Propagation
 from mazebench_agents.mmn.losses import unrolled_losses
-from mazebench_agents.mmn.network import MMNNetwork
+from mazebench_agents.mmn.network import MMNNetwork, rotate
 from mazebench_agents.mmn.planning import lookahead, plan
 from mazebench_agents.overrides import override
 
@@ -110,7 +110,7 @@ def test_network_with_the_true_scale_looks_where_the_agent_is():
         network.hypermodel.sharpness.fill_(20.0)
     code = network.hypermodel(a_context())
     moved = torch.tensor([[[0.0, 0.0], [2.0, 0.0], [1.0, 3.0]]])
-    latent = torch.cat([moved, torch.zeros(1, 3, 8)], dim=-1)
+    latent = torch.cat([moved, torch.zeros(1, 3, network.latent_size - 2)], dim=-1)
     seen = network.look(latent, code)
     for k, (row, column) in enumerate([(5, 1), (5, 3), (2, 2)]):
         torch.testing.assert_close(seen[0, k], code.weights[0, row * 7 + column])
@@ -122,6 +122,42 @@ def test_reading_one_place_a_map_is_reading_one_of_many():
     table = torch.randn(40, 49, 5)
     many = hypermodel.read(place.expand(-1, 2, -1), table)[:, :1]
     torch.testing.assert_close(hypermodel.read(place, table), many)
+
+
+def test_free_motion_is_the_same_wherever_the_body_heads():
+    """Where the transition network says nothing, a step turned with the body is the step."""
+    torch.manual_seed(0)
+    network = MMNNetwork(small_config(), 7)
+    torch.nn.init.normal_(network.free_by_action.weight)
+    for last in (network.hypermodel.transition.later[-1].weight, network.hypermodel.transition.later[-1].bias):
+        torch.nn.init.zeros_(last)
+    code = network.hypermodel(a_context())
+    features = torch.randn(1, 1, 9)
+    yaw = torch.tensor(0.4)
+
+    def moved_and_heading(yaw):
+        features[..., 2:4] = torch.stack([torch.sin(yaw), torch.cos(yaw)])
+        latent = network.encode(features)
+        first = network.first_layer(latent, network.look(latent, code), code)
+        after = network.step(latent, first, torch.tensor([[3]]), code)
+        return after[0, 0, :2] - latent[0, 0, :2], after[0, 0, 2:4], after[0, 0, 4:7]
+
+    quarter = torch.tensor([1.0, 0.0])  # sine and cosine of a quarter turn
+    (moved, heading, velocities), turned = moved_and_heading(yaw), moved_and_heading(yaw + np.pi / 2)
+    torch.testing.assert_close(turned[0], rotate(moved, quarter))
+    torch.testing.assert_close(turned[1].flip(-1), rotate(heading.flip(-1), quarter))
+    torch.testing.assert_close(turned[2], velocities)
+    torch.testing.assert_close(heading.norm(), torch.tensor(1.0))
+
+
+def test_anchor_stays_as_long_as_it_agrees_with_the_cell_marked_as_start():
+    network = MMNNetwork(small_config(), 7)
+    with torch.no_grad():
+        network.scale.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))
+    anchor, moved = torch.tensor([[5.0, 1.0], [5.0, 1.0]]), torch.tensor([[2.3, 0.4], [2.3, 0.4]])  # so in (4.6, 3.3)
+    start = torch.tensor([[5.0, 3.0], [5.0, 4.0]])
+    expected = torch.tensor([[5.0, 1.0], [5.0, 1.2]])  # in the second, 0.2 cells short of where it must be
+    torch.testing.assert_close(network.reanchored(anchor, moved, start), expected)
 
 
 @pytest.mark.parametrize("name", HYPERMODEL_NAMES)
@@ -280,6 +316,57 @@ def test_context_is_encoded_where_it_is_new_and_only_there():
     assert not torch.equal(before[1][1], state.code.weights[1])
 
 
+@pytest.mark.parametrize("keep_anchor", [True, False])
+def test_motion_is_told_from_where_the_episode_began_through_its_landmarks(keep_anchor):
+    agent = MMN(small_config(keep_anchor=keep_anchor), 7)
+    with torch.no_grad():
+        agent.network.scale.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))
+    observation = an_observation(2)  # the start marked in (5, 1)
+    observation["state"][:, :2] = 0.0
+    every = np.ones(2, dtype=bool)
+    agent.seed_episodes(np.zeros(2, dtype=int), every)
+    _, state = agent.act(observation, every, agent.initial_state(2))
+    observation["state"][:, :2] = (
+        0.8,
+        1.1,
+    )  # in (4, 2), a landmark in the first environment, another episode in the second
+    observation["context"][:, 3] = 0
+    observation["context"][:, 3, 4, 2] = 1
+    agent.seed_episodes(np.zeros(2, dtype=int), np.array([False, True]))
+    _, state = agent.act(observation, every, state)
+    anew = [[0.8, 1.1], [4, 2]]
+    for env, (origin, anchor) in enumerate([[[0, 0], [5, 1]] if keep_anchor else anew, anew]):
+        np.testing.assert_allclose(state.origin[env], origin)
+        torch.testing.assert_close(state.code.places[env, :2], torch.tensor(anchor, dtype=torch.float32))
+
+
+def test_learner_tells_motion_from_the_trajectorys_start(mazes):
+    learner = make_learner(mazes, localization_weight=1.0)
+    sample = learner._replay.sample_sequences(64, 3, 8, learner._hindsight, learner._rng)
+    for _ in range(4):  # each under a symmetry of its own
+        turned = learner._batch(sample)
+        moved = turned.features[..., :2]
+        place = turned.anchor[:, None, None] + torch.stack([-moved[..., 1], moved[..., 0]], dim=-1)
+        assert ((place - turned.place).abs() <= 0.5 + 1e-4).all()  # the place that the true scale gives is in its cell
+
+
+def test_environments_up_the_ladder_search_with_less_noise():
+    agent = MMN(small_config(), 7)
+    agent.explore_from(4, 4, seed=0)
+    np.testing.assert_allclose(agent._noise_scale, [3 / 7, 2 / 7, 1 / 7, 0])
+    agent = MMN(small_config(noise_ladder=False), 7)
+    np.testing.assert_array_equal(agent._noise_scale, np.ones(8))
+
+
+def test_learning_rate_falls_after_the_constant_updates(mazes):
+    learner = make_learner(mazes, constant_updates=2, learning_rate=0.01)
+    rates = []
+    for _ in range(4):
+        learner.update()
+        rates.append(learner._optimizer.param_groups[0]["lr"])
+    assert rates == pytest.approx([0.01, 0.01, 0.02 / 3, 0.005])
+
+
 def test_spatial_agent_serves_maps_of_any_size(tmp_path, mazes):
     make_learner(mazes).save(tmp_path, {})
     agent = MMN.build(Interface("local", 21, 21), checkpoint=tmp_path / "agent.safetensors")
@@ -306,7 +393,13 @@ def test_paper_preset_has_nothing_beyond_the_paper():
         "paper",
         "n_step",
     )
-    for beyond in (paper.relabel_start, paper.symmetries, paper.num_distances, paper.localization_weight):
+    for beyond in (
+        paper.relabel_start,
+        paper.keep_anchor,
+        paper.symmetries,
+        paper.num_distances,
+        paper.localization_weight,
+    ):
         assert not beyond
     assert (paper.num_goals, paper.epsilon_base, paper.predict_reward) == (1, 0.0, True)
 

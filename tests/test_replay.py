@@ -126,6 +126,25 @@ def test_relabelled_start_is_the_cell_of_the_groups_first_step():
     np.testing.assert_array_equal(sample.origin[:, 0], first)
 
 
+@pytest.mark.parametrize("keep_anchor", [True, False])
+def test_anchor_is_the_trajectorys_start_or_moves_with_the_contexts(keep_anchor):
+    replay = Replay(1, 100)
+    cells = [10, 11, 12, 13, 14, 15, 16]
+    fill(replay, cells, goal=99, final_cell=17)
+    fill(replay, [30, 31, 32], goal=99, final_cell=33, first_x=100)
+    hindsight = Hindsight(ratio=1.0, mean_offset=3.0, window=10, relabel_start=True, keep_anchor=keep_anchor)
+    sample = replay.sample_sequences(64, 3, 2, hindsight, np.random.default_rng(0))
+    second = sample.state[:, 0, 0, 0] >= 100
+    assert second.any()
+    assert not second.all()
+    if keep_anchor:
+        np.testing.assert_array_equal(sample.anchor, np.where(second, 30, 10))
+        np.testing.assert_array_equal(sample.origin[:, 0], np.where(second, 100, 0))
+    else:
+        np.testing.assert_array_equal(sample.anchor, sample.start)
+        np.testing.assert_array_equal(sample.origin[:, 0], sample.state[:, :, 0, 0].min(axis=1))
+
+
 def test_sample_never_crosses_trajectories():
     replay = Replay(1, 1000)
     fill(replay, [10, 11, 12], final_cell=13)

@@ -191,6 +191,35 @@ def test_collector_gives_trajectories_that_hang_together():
     assert legs > sum(int(step.begins.sum()) for step in steps) > 4, "several goals an episode, several episodes"
 
 
+class Rolling:
+    """Goes forward, and notes what it is told of episodes."""
+
+    def __init__(self):
+        self.told = []
+
+    def seed_episodes(self, seeds, mask):
+        self.told.append((seeds.copy(), mask.copy()))
+
+    def act(self, observation, is_first, state, explore=False):
+        return np.zeros(len(is_first), dtype=np.int64), state + is_first
+
+
+def test_collector_tells_actors_which_new_contexts_begin_episodes():
+    walls = np.ones((7, 7), dtype=bool)
+    walls[1:-1, 1:-1] = False
+    spec = TaskSpec("local", (Maze(walls, "field"),), (1, 2), time_limit=6, num_goals=3)
+    collector, actor, state = Collector(spec, 4, seed=1), Rolling(), np.zeros(4, dtype=int)
+    steps = []
+    for _ in range(40):
+        step, state = collector.play(actor, state)
+        steps.append(step)
+    news = [step for step in steps if step.is_first.any()]
+    np.testing.assert_array_equal(np.array([mask for _, mask in actor.told]), np.array([step.begins for step in news]))
+    begun = [seed for seeds, mask in actor.told for seed in seeds[mask].tolist()]
+    assert len(begun) > 4
+    assert len(set(begun)) == len(begun), "no two episodes share a seed"
+
+
 ray = pytest.importorskip("ray")
 
 
