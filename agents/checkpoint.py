@@ -6,7 +6,7 @@ import json
 import os
 import pathlib
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import safetensors
@@ -15,6 +15,7 @@ import torch
 
 from mazebench.errors import InputError, read_at_most
 from mazebench.maps.maze import MAX_SIZE
+from mazebench.records import parse_json
 
 from .overrides import Config, override
 
@@ -48,9 +49,11 @@ def load_checkpoint(path: pathlib.Path, agent: str) -> tuple[dict[str, torch.Ten
     _check_header(path, content)
     try:
         tensors = safetensors.torch.load(content)
-        metadata = json.loads(json.loads(content[8 : 8 + _header_length(content)])["__metadata__"][FORMAT])
-    except (safetensors.SafetensorError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: expected a checkpoint of {FORMAT}, found a damaged one: {error}") from error
+        metadata = parse_json(parse_json(content[8 : 8 + _header_length(content)])["__metadata__"][FORMAT])
+    # RuntimeError is torch's, of shapes that no tensor can have.
+    except (safetensors.SafetensorError, ValueError, KeyError, TypeError, RuntimeError) as error:
+        said = str(error)[:120]
+        raise InputError(f"{path}: expected a checkpoint of {FORMAT}, found a damaged one: {said}") from error
     if not isinstance(metadata, dict) or metadata.get("agent") != agent:
         found = metadata.get("agent") if isinstance(metadata, dict) else metadata
         raise InputError(f"{path}: expected a checkpoint of agent {agent!r}, found one of {str(found)[:80]!r}")
@@ -66,27 +69,52 @@ def load_agent(path: pathlib.Path, agent: str, default: Config) -> tuple[dict[st
     tensors, metadata = load_checkpoint(path, agent)
     try:
         config = override(default, metadata["config"])
-        context_size = int(metadata["context_size"])
-        if not 3 <= context_size <= MAX_SIZE:
-            raise ValueError(f"context_size {context_size}")
+        context_size = metadata["context_size"]
+        if type(context_size) is not int or not 3 <= context_size <= MAX_SIZE:
+            raise ValueError(f"context_size {str(context_size)[:80]}")
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{path}: expected metadata with config and context_size, found {error}") from error
     return tensors, config, context_size
+
+
+def check_shapes(path: pathlib.Path, make: Callable[[], torch.nn.Module], tensors: Mapping[str, torch.Tensor]) -> None:
+    """Does nothing if `tensors` are of the network that `make` makes, which takes no memory here.
+
+    For before it is made: a config from outside may name sizes that no machine has room for.
+
+    Raises:
+      InputError: if a name or a shape doesn't fit; the message names the first.
+    """
+    with torch.device("meta"):
+        wanted = make().state_dict()
+    _check_kinds(path, wanted, tensors)
 
 
 def load_into(path: pathlib.Path, module: torch.nn.Module, tensors: Mapping[str, torch.Tensor]) -> None:
     """Puts `tensors` into `module`.
 
     Raises:
-      InputError: if a name or a shape doesn't fit; the message names the first.
+      InputError: if a name, a shape or a type doesn't fit, or a number is not finite; the message names the first.
     """
-    wanted = module.state_dict()
+    _check_kinds(path, module.state_dict(), tensors)
+    for name, tensor in tensors.items():
+        if not torch.isfinite(tensor).all():
+            raise InputError(f"{path}: expected finite numbers in {name}, found others")
+    module.load_state_dict(dict(tensors))
+
+
+def _check_kinds(path: pathlib.Path, wanted: Mapping[str, torch.Tensor], tensors: Mapping[str, torch.Tensor]) -> None:
     for name in sorted(set(wanted) | set(tensors)):
-        expected = tuple(wanted[name].shape) if name in wanted else "no such tensor"
-        found = tuple(tensors[name].shape) if name in tensors else "no such tensor"
+        expected = _kind(wanted[name]) if name in wanted else "no such tensor"
+        found = _kind(tensors[name]) if name in tensors else "no such tensor"
         if expected != found:
             raise InputError(f"{path}: expected {name} {expected}, found {found}")
-    module.load_state_dict(dict(tensors))
+
+
+def _kind(tensor: torch.Tensor) -> str:
+    """Its shape, and its type where that is not the usual one."""
+    kind = "" if tensor.dtype == torch.float32 else f" {tensor.dtype}"
+    return f"{tuple(tensor.shape)}{kind}"
 
 
 def _read(path: pathlib.Path) -> bytes:

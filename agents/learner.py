@@ -14,8 +14,10 @@ import torch
 
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze
+from mazebench.records import read_json
 from mazebench.tasks.context import build_context
 from mazebench.training.experience import Experience
+from mazebench.world.mjcf import ACTIONS
 
 from . import symmetry
 from .checkpoint import AGENT_FILE, load_checkpoint, load_into, save_checkpoint
@@ -24,6 +26,7 @@ from .replay import Hindsight, Replay, Sample, SequenceSample
 _TRAINING_FILE = "training.safetensors"
 _RANDOM_FILE = "random.json"
 _REPLAY_FILE = "replay.npz"
+_MOMENTS = {"step", "exp_avg", "exp_avg_sq"}  # Adam's
 
 
 class HindsightLearner:
@@ -110,23 +113,49 @@ class HindsightLearner:
         load_into(folder / AGENT_FILE, self.actor.network, tensors)
         path = folder / _TRAINING_FILE
         tensors, _ = load_checkpoint(path, self.actor.name)
-        target = {name.removeprefix("target."): value for name, value in tensors.items() if name.startswith("target.")}
-        load_into(path, self._target, target)
+        load_into(path, self._target, _below("target.", tensors))
+        arrays = _below("array.", tensors)
         for name, array in self._arrays.items():
-            found = tensors.get(f"array.{name}", torch.zeros(0)).numpy()
-            if found.shape != array.shape:
-                raise InputError(f"{path}: expected {name} {array.shape}, found {found.shape}")
-            array[...] = found
+            found = arrays.get(name, torch.zeros(0))
+            if found.shape != array.shape or found.dtype != torch.from_numpy(array).dtype:
+                raise InputError(f"{path}: expected {name} {array.shape}, found {tuple(found.shape)}")
+            array[...] = found.numpy()
+        self._load_optimizer(path, _below("optimizer.", tensors))
+        self._load_random(folder / _RANDOM_FILE)
+        path = folder / _REPLAY_FILE
+        if path.exists():
+            self._replay.load(path)
+            if not self._replay.fits(len(self._mazes), self._mazes[0].size ** 2, len(ACTIONS)):
+                raise InputError(f"{path}: expected the replay of these {len(self._mazes)} mazes, found another")
+
+    def _load_optimizer(self, path: pathlib.Path, tensors: Mapping[str, torch.Tensor]) -> None:
         moments: dict[int, dict[str, torch.Tensor]] = {}
+        shapes = [parameter.shape for group in self._optimizer.param_groups for parameter in group["params"]]
         for name, value in tensors.items():
-            if name.startswith("optimizer."):
-                _, index, moment = name.split(".")
-                moments.setdefault(int(index), {})[moment] = value
+            index, _, moment = name.partition(".")
+            is_known = index.isdecimal() and int(index) < len(shapes)
+            if not is_known or value.shape != (() if moment == "step" else shapes[int(index)]):
+                found = f"{name} {tuple(value.shape)}"
+                raise InputError(f"{path}: expected moments of {len(shapes)} parameters, found {found}")
+            if (
+                value.dtype != torch.float32
+                or not torch.isfinite(value).all()
+                or (moment == "step" and value.min() < 1)
+            ):
+                raise InputError(f"{path}: expected finite moments after some steps, found others in {name}")
+            moments.setdefault(int(index), {})[moment] = value
+        if any(names.keys() != _MOMENTS for names in moments.values()):
+            raise InputError(f"{path}: expected {', '.join(sorted(_MOMENTS))} of each parameter, found others")
         groups = self._optimizer.state_dict()["param_groups"]
         self._optimizer.load_state_dict({"state": moments, "param_groups": groups})
-        self._rng.bit_generator.state = json.loads((folder / _RANDOM_FILE).read_text(encoding="ascii"))
-        if (folder / _REPLAY_FILE).exists():
-            self._replay.load(folder / _REPLAY_FILE)
+
+    def _load_random(self, path: pathlib.Path) -> None:
+        try:
+            self._rng.bit_generator.state = read_json(path)
+        except (TypeError, ValueError, KeyError, OverflowError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"{path}: expected the state of a random stream, found {str(error)[:120]}") from error
 
     def _draw_symmetry(self) -> int:
         """How a batch is rotated or mirrored."""
@@ -158,7 +187,7 @@ class HindsightLearner:
     def _descend(self, loss: torch.Tensor) -> torch.Tensor:
         """One step of the optimizer, and the target network's after it; returns the gradient's norm."""
         self._optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()
         network = self.actor.network
         norm = torch.nn.utils.clip_grad_norm_(network.parameters(), self._config.max_gradient_norm)
         self._optimizer.step()
@@ -166,3 +195,8 @@ class HindsightLearner:
             for slow, fast in zip(self._target.parameters(), network.parameters(), strict=True):
                 slow.lerp_(fast, self._config.target_rate)
         return norm
+
+
+def _below(prefix: str, tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    """Those whose names begin with `prefix`, by the rest of the name."""
+    return {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
@@ -28,5 +29,7 @@ def override(config: Config, values: Mapping[str, Any]) -> Config:
         try:
             typed[name] = pydantic.TypeAdapter(known[name]).validate_python(value)
         except pydantic.ValidationError as error:
-            raise InputError(f"config key {name!r}: expected {types[name]}, found {value!r}") from error
+            raise InputError(f"config key {name!r}: expected {types[name]}, found {str(value)[:80]!r}") from error
+        if not math.isfinite(typed[name] if isinstance(typed[name], float) else 0):
+            raise InputError(f"config key {name!r}: expected a finite number, found {typed[name]}")
     return dataclasses.replace(config, **typed)  # type: ignore[type-var]

@@ -15,6 +15,7 @@ from mazebench_agents.mmn.hypermodels import HYPERMODELS, Propagation
 from mazebench_agents.mmn.losses import unrolled_losses
 from mazebench_agents.mmn.network import MMNNetwork, rotate
 from mazebench_agents.mmn.planning import lookahead, plan
+from mazebench_agents.mmn.shown import beliefs, distances_learned_from
 from mazebench_agents.overrides import override
 
 from mazebench.agent import Interface
@@ -348,6 +349,17 @@ def test_learner_tells_motion_from_the_trajectorys_start(mazes):
         moved = turned.features[..., :2]
         place = turned.anchor[:, None, None] + torch.stack([-moved[..., 1], moved[..., 0]], dim=-1)
         assert ((place - turned.place).abs() <= 0.5 + 1e-4).all()  # the place that the true scale gives is in its cell
+
+
+def test_what_a_run_has_shown_is_told_in_cells(mazes):
+    learner = make_learner(mazes, hindsight_ratio=0.0)
+    shown = distances_learned_from(learner, mazes, num_batches=2)
+    assert shown.min() >= 0
+    assert shown.max() > 1
+    found = beliefs(learner.actor.network, mazes, np.random.default_rng(0))
+    assert sum(len(values) for values in found.values()) == sum(int((~maze.walls).sum()) for maze in mazes)
+    np.testing.assert_allclose(found[0][:, 1], 0.0)  # the learned distance of the goal itself
+    assert all((values[:, 0] <= 0).all() for values in found.values())
 
 
 def test_environments_up_the_ladder_search_with_less_noise():

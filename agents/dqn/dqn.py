@@ -16,7 +16,7 @@ import torch
 from mazebench.agent import Interface, Observation
 
 from ..actor import NetworkAgent
-from ..checkpoint import load_agent, load_into
+from ..checkpoint import check_shapes, load_agent, load_into
 from ..layers import in_batches, state_features
 from ..overrides import override
 from .config import DQNConfig
@@ -47,7 +47,7 @@ class DQN(NetworkAgent):
         self.context_size_built = context_size
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
-            self.network = QNetwork(config.channels if config.use_context else 0, config.hidden)
+            self.network = _network(config)
         self.explore_from(0, config.num_envs, seed)
 
     @classmethod
@@ -59,6 +59,7 @@ class DQN(NetworkAgent):
         """
         path = cls.default_checkpoint() if checkpoint is None else checkpoint
         tensors, config, trained_size = load_agent(path, cls.name, cls.default_config)
+        check_shapes(path, lambda: _network(config), tensors)
         agent = cls(config, trained_size, seed)
         load_into(path, agent.network, tensors)
         return agent
@@ -103,3 +104,7 @@ class MAH(DQN):
 
     name = "mah"
     default_config = DQNConfig()
+
+
+def _network(config: DQNConfig) -> QNetwork:
+    return QNetwork(config.channels if config.use_context else 0, config.hidden)

@@ -50,14 +50,7 @@ class MMNLearner(HindsightLearner):
     def update(self) -> dict[str, float]:
         """Learns from one batch; returns the paper's losses by their names, and what tells early if a run will work."""
         config = self._config
-        sample = self._replay.sample_sequences(
-            config.groups,
-            config.sequences,
-            config.sequence_steps,
-            self._hindsight,
-            self._rng,
-            config.importance_exponent if config.priority_exponent else 0.0,
-        )
+        sample = self.sample()
         batch = self._batch(sample)
         targets = self._targets(batch)
         weight = torch.from_numpy(sample.weight).to(self._device)
@@ -73,6 +66,14 @@ class MMNLearner(HindsightLearner):
         # Read together: on a GPU, each reading waits for all that was launched.
         values = torch.stack([value.detach() for value in scalars.values()]).tolist()
         return dict(zip(scalars, values, strict=True))
+
+    def sample(self) -> SequenceSample:
+        """Draws what is learned from next."""
+        config = self._config
+        beta = config.importance_exponent if config.priority_exponent else 0.0
+        return self._replay.sample_sequences(
+            config.groups, config.sequences, config.sequence_steps, self._hindsight, self._rng, beta
+        )
 
     def _batch(self, sample: SequenceSample) -> Batch:
         turned = self._draw_symmetry()
