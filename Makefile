@@ -3,7 +3,7 @@ PYTHON ?= python3.11
 BIN := .venv/bin
 AGENT ?= mmn
 
-.PHONY: eval test check check-full bench clean
+.PHONY: eval test docs check check-full release pythons bench clean
 
 # Made anew where what is installed may have changed.
 .venv/installed: pyproject.toml constraints.txt
@@ -17,17 +17,31 @@ eval: .venv/installed
 test: .venv/installed
 	$(BIN)/pytest -n auto -m "not slow"
 
+# Into site/; a warning is an error. The notice that is turned off is not about our pages.
+docs: .venv/installed
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+
 check: .venv/installed
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(MAKE) docs
 	$(MAKE) test
 
 check-full: check
 	$(BIN)/pytest -m slow
+	$(MAKE) pythons
+
+# Into dist/, checked.
+release: .venv/installed
+	AGENT=$(AGENT) .ci/release dist
+
+# On every Python found; needs wheels of all dependencies.
+pythons: release
+	.ci/pythons "$$(ls -t dist/*.whl | head -n 1)"
 
 bench: .venv/installed
 	$(BIN)/mazebench bench
 
 clean:
-	rm -rf .venv build dist *.egg-info
+	rm -rf .venv build dist site *.egg-info

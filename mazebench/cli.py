@@ -15,7 +15,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from mazebench import __version__
-from mazebench.errors import InputError, RunError
+from mazebench.errors import InputError, RunError, one_line
 
 # The parser's own error, which typer exports by its children only.
 _UsageError: type[Exception] = typer.BadParameter.__mro__[2]
@@ -62,8 +62,12 @@ def main() -> None:
 
 
 def _fail(message: str, status: int) -> NoReturn:
-    print(f"mazebench: {' '.join(message.split())}", file=sys.stderr)
+    _remark(" ".join(message.split()))
     sys.exit(status)
+
+
+def _remark(line: str) -> None:
+    print(f"mazebench: {one_line(line)}", file=sys.stderr)
 
 
 def _version(asked: bool) -> None:
@@ -197,7 +201,7 @@ def evaluate(
     ] = None,
 ) -> None:
     """Evaluate agents on unseen mazes: success rate and SPL with 95 % intervals."""
-    from mazebench.evaluation import harness
+    from mazebench.evaluation.options import EvalOptions
 
     if suite is None and len(agents) > 1:
         raise InputError(f"expected one --agent without --suite, found {len(agents)}")
@@ -210,7 +214,7 @@ def evaluate(
     )
     if resume and out is None:
         raise InputError("--resume needs --out, the folder of the run to go on with")
-    options = harness.EvalOptions(
+    options = EvalOptions(
         agent=agents[0],
         task=task.value,
         size=size,
@@ -238,13 +242,13 @@ def evaluate(
 
 
 def _evaluate_one(options: Any, folder: pathlib.Path, resume: bool, record: bool, running: dict[str, Any]) -> None:
-    from mazebench.evaluation import harness, table
-    from mazebench.records import SUMMARY, read_json
+    from mazebench.evaluation import harness, results, table
 
     if resume and harness.is_finished(folder, record):
         harness.check_same_run(options, folder)
+        summary = results.load_result(folder).summary
         print(f"{folder}: the run is finished")
-        table.print_summary(read_json(folder / SUMMARY))
+        table.print_summary(summary)
         return
     _say_whether_resuming(folder, resume)
     with _progress(f"{options.agent}, {options.task}") as advance:
@@ -312,7 +316,7 @@ def compare(
 
     found = comparison.compare_folders(a, b)
     for line in found.notes:
-        print(f"mazebench: {line}", file=sys.stderr)
+        _remark(line)
     if as_json:
         print(json.dumps(found.parts.get("", found.parts), indent=1))
         return
@@ -408,7 +412,7 @@ def report(
     """Make tables, figures and a page to explore every episode from results of `mazebench eval`."""
     from mazebench.report import writing
 
-    reported = writing.write_report(results, out, warn=lambda line: print(f"mazebench: {line}", file=sys.stderr))
+    reported = writing.write_report(results, out, warn=_remark)
     agents = sorted({result.label for result in reported})
     print(f"{len(reported)} results of {', '.join(agents)}: {out / writing.PAGE}, {out / writing.DOCUMENT}")
 
@@ -442,9 +446,10 @@ def render(
         (maps is not None, *_OWN_MAPS),
     )
     _choose_rendering_backend()
-    from mazebench.evaluation import film, harness
+    from mazebench.evaluation import film
+    from mazebench.evaluation.options import EvalOptions
 
-    options = harness.EvalOptions(
+    options = EvalOptions(
         agent=agent,
         task=task.value,
         size=size,
@@ -542,9 +547,10 @@ def list_() -> None:
     from mazebench.agent import agent_names
     from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS, VERSION
     from mazebench.maps.generators import STYLES
+    from mazebench.tasks import TASK_VERSION
 
     print("agents:     ", ", ".join(agent_names()))
-    print("tasks:      ", ", ".join(task.value for task in TaskName))
+    print("tasks:      ", ", ".join(task.value for task in TaskName), f"(version {TASK_VERSION})")
     print(
         "sizes:      ",
         ", ".join(map(str, SIZES)),
@@ -553,7 +559,7 @@ def list_() -> None:
     print("styles:     ", ", ".join(sorted(STYLES)))
     print(
         "Gymnasium:  ",
-        ", ".join(f"mazebench/{kind}-{SIZES[0]}-v1" for kind in ("Local", "Hierarchical", "LocalGoal")),
+        ", ".join(f"mazebench/{kind}-{SIZES[0]}-v{TASK_VERSION}" for kind in ("Local", "Hierarchical", "LocalGoal")),
         "and the other sizes",
     )
 

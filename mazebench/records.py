@@ -8,16 +8,24 @@ from __future__ import annotations
 
 import fcntl
 import json
+import math
 import os
 import pathlib
-from typing import Any
+from collections.abc import Iterator
+from typing import IO, Any
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, open_file, read_at_most
 
 EPISODES = "episodes.jsonl"
 JOURNAL = "journal.jsonl"
 CONFIG = "config.json"
 SUMMARY = "summary.json"
+
+MAX_RECORDS_BYTES = 2**28  # of a file of them; the 1,500 local episodes of a benchmark's size take 0.5 MB
+
+_MAX_JSON_BYTES = 2**22  # of a file that is one value; a summary takes some 20 KB
+_MAX_LINE = 2**16  # bytes of a record; they take 0.4 KB
+_MAX_DEPTH = 32  # of JSON; deeper nesting could not be written or compared, which Python does by recursion
 
 Record = dict[str, Any]
 
@@ -61,6 +69,11 @@ class RecordLog:
     """The records of `num_episodes` episodes in `folder`, those already there included; a context manager."""
 
     def __init__(self, folder: pathlib.Path, num_episodes: int):
+        """Reads what is there, and changes nothing but a last line that is not whole.
+
+        Raises:
+          InputError: if it is damaged.
+        """
         self._folder = folder
         self._num_episodes = num_episodes
         in_order = repair_and_read_lines(folder / EPISODES, "episode")
@@ -71,9 +84,6 @@ class RecordLog:
         for record in repair_and_read_lines(folder / JOURNAL, "episode"):
             self._records.setdefault(record["episode"], record)
         self._num_written = len(in_order)
-        self._episodes = open(folder / EPISODES, "a", encoding="utf-8")  # noqa: SIM115 (closed by __exit__)
-        self._journal = open(folder / JOURNAL, "a", encoding="utf-8")  # noqa: SIM115
-        self._write_in_order()
 
     @property
     def num_done(self) -> int:
@@ -118,6 +128,10 @@ class RecordLog:
             self._num_written += 1
 
     def __enter__(self) -> RecordLog:
+        """Opens the files to write, and puts in place what waited for it."""
+        self._episodes = open_to_write(self._folder / EPISODES, "a")
+        self._journal = open_to_write(self._folder / JOURNAL, "a")
+        self._write_in_order()
         return self
 
     def __exit__(self, *exception: object) -> None:
@@ -130,10 +144,59 @@ def to_line(record: Record) -> str:
     return json.dumps(record, separators=(",", ":"), allow_nan=False) + "\n"
 
 
+def parse_json(content: str | bytes, max_depth: int = _MAX_DEPTH) -> Any:
+    """The value of a JSON text from outside, of a kind that can be written again: finite numbers, no endless nesting.
+
+    Args:
+      content: bytes are UTF-8.
+      max_depth: levels of lists and objects in each other.
+
+    Raises:
+      ValueError: if it is anything else.
+    """
+    text = content.decode("utf-8") if isinstance(content, bytes) else content  # json.loads would guess the encoding
+    try:
+        value = json.loads(text, parse_float=_finite, parse_constant=_finite)
+    except RecursionError:
+        raise ValueError(f"nesting deeper than {max_depth} levels") from None
+    level = [value]
+    for _ in range(max_depth + 1):
+        holders = [item for item in level if isinstance(item, (dict, list))]
+        if not holders:
+            return value
+        level = [item for holder in holders for item in (holder.values() if isinstance(holder, dict) else holder)]
+    raise ValueError(f"nesting deeper than {max_depth} levels")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"the number {text[:20]}, which is no finite one")
+    return value
+
+
+def open_to_write(path: pathlib.Path, mode: str) -> IO[Any]:
+    """Opens a file of a folder that may come from outside, where a link could lead to a file of someone else's.
+
+    Raises:
+      InputError: if it is such a link, or can't be written.
+    """
+    try:
+        return open(path, mode, encoding=None if "b" in mode else "utf-8", opener=_open_no_link)
+    except OSError as error:
+        said = "it is a link" if path.is_symlink() else error.strerror
+        raise InputError(f"{path}: can't write: {said}") from error
+
+
+def _open_no_link(path: str, flags: int) -> int:
+    # A pipe without a reader is refused by the system instead of waited for.
+    return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
+
+
 def write_json(path: pathlib.Path, content: Any) -> None:
     """Writes `content` all or nothing: a reader finds the old file or the new one."""
     temporary = path.with_name(path.name + ".tmp")
-    with temporary.open("w", encoding="utf-8") as file:
+    with open_to_write(temporary, "w") as file:
         file.write(json.dumps(content, indent=1, allow_nan=False) + "\n")
         file.flush()
         os.fsync(file.fileno())
@@ -141,37 +204,60 @@ def write_json(path: pathlib.Path, content: Any) -> None:
 
 
 def read_json(path: pathlib.Path) -> Any:
-    """The content of a JSON file.
+    """The content of a JSON file, as `parse_json` takes it.
 
     Raises:
-      InputError: if it can't be read or is no JSON.
+      InputError: if it can't be read, is larger than 4 MiB or no such JSON.
     """
+    content = read_at_most(path, _MAX_JSON_BYTES, "file")
+    if len(content) > _MAX_JSON_BYTES:
+        raise InputError(f"{path}: expected at most {_MAX_JSON_BYTES} bytes, found more")
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: can't read: {error.strerror}") from error
+        return parse_json(content)
     except ValueError as error:
-        raise InputError(f"{path}: expected JSON, found {error}") from error
+        raise InputError(f"{path}: expected JSON, found {str(error)[:120]}") from error
+
+
+def read_lines(path: pathlib.Path) -> Iterator[bytes]:
+    """Yields the lines of a file of records with their line ends, which the last may lack.
+
+    Raises:
+      InputError: if it can't be read, or it or a line is too large.
+    """
+    num_left = MAX_RECORDS_BYTES
+    number = 0
+    with open_file(path, "records") as file:
+        while line := file.readline(_MAX_LINE + 1):
+            number, num_left = number + 1, num_left - len(line)
+            if num_left < 0:
+                raise InputError(f"{path}: expected records of at most {MAX_RECORDS_BYTES} bytes, found more")
+            if len(line) > _MAX_LINE:
+                raise InputError(f"{path}: expected a record in line {number}, found more than {_MAX_LINE} bytes")
+            yield line
 
 
 def repair_and_read_lines(path: pathlib.Path, key: str) -> list[Record]:
     """The records of a file of lines, each with a number `key`; a last line that a kill cut short is removed from it.
 
     Raises:
-      InputError: if a whole line is not a record.
+      InputError: if a whole line is not a record; nothing is removed then.
     """
     if not path.exists():
         return []
-    content = path.read_bytes()
-    end = content.rfind(b"\n") + 1
-    if end < len(content):
-        os.truncate(path, end)
-    records = []
-    for number, line in enumerate(content[:end].splitlines(), 1):
+    records: list[Record] = []
+    end = 0
+    for line in read_lines(path):
+        if not line.endswith(b"\n"):
+            with open_to_write(path, "r+b") as file:
+                file.truncate(end)
+            break
+        end += len(line)
         try:
-            record = json.loads(line)
+            record = parse_json(line)
             record[key] += 0
         except (ValueError, TypeError, KeyError) as error:
-            raise InputError(f"{path}: expected a record in line {number}, found {line[:60]!r}") from error
+            raise InputError(
+                f"{path}: expected a record in line {len(records) + 1}, found {line.strip()[:60]!r}"
+            ) from error
         records.append(record)
     return records

@@ -181,7 +181,7 @@ def test_actions_do_not_depend_on_what_else_is_in_the_batch():
         ({"num_envs": "0"}, "expected config key 'num_envs' from 1"),
         ({"steps_per_update": "0"}, "expected config key 'steps_per_update' from 1"),
         ({"hindsight_mean_offset": "0.5"}, "expected config key 'hindsight_mean_offset' from 1.0"),
-        ({"learning_rate": "nan"}, "expected config key 'learning_rate' from 0.0"),
+        ({"learning_rate": "nan"}, "config key 'learning_rate': expected a finite number, found nan"),
         ({"replay_capacity": "1000"}, "expected a replay_capacity of at least min_rows 20000"),
     ],
 )

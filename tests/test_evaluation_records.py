@@ -162,7 +162,7 @@ class TestJson:
         assert json.loads(to_line({"values": values}))["values"] == values
 
     def test_read_when_missing_or_no_json(self, tmp_path):
-        with pytest.raises(InputError, match=r"none\.json: can't read: No such file or directory$"):
+        with pytest.raises(InputError, match=r"none\.json: can't read the file: No such file or directory$"):
             read_json(tmp_path / "none.json")
         (tmp_path / "half.json").write_text('{"a": ')
         with pytest.raises(InputError, match=r"half\.json: expected JSON, found "):

@@ -6,7 +6,6 @@ import importlib.util
 import json
 import os
 import pathlib
-import re
 import shutil
 import subprocess
 import sys
@@ -98,14 +97,6 @@ class TestScripts:
             "dataset.recover_environment().reset(seed=0)\n"
         )
         run("-c", check, folder=tmp_path, **datasets)
-
-
-@pytest.mark.parametrize("page", ["options.md", "maps.md"])
-def test_blocks_of_a_page_when_run_one_after_the_other(page):
-    text = (EXAMPLES.parent / page).read_text(encoding="utf-8")
-    names: dict[str, object] = {}
-    for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
-        exec(compile(block, page, "exec"), names)
 
 
 class TestPackage:

@@ -109,7 +109,8 @@ def make_batch(config, at_goal_step=None):
     place = torch.tensor([3.0, 2.0]).expand(2, 1, length, 2)
     action = torch.zeros(2, 1, config.sequence_steps, dtype=torch.long)
     visited, relabelled = torch.zeros(2, 1, 7, 7), torch.ones(2, dtype=torch.bool)
-    batch = Batch(context, visited, relabelled, features, place, action, exists, at_goal)
+    anchor = torch.tensor([3.0, 2.0]).expand(2, 2)
+    batch = Batch(context, anchor, visited, relabelled, features, place, action, exists, at_goal)
     value = torch.full((2, 1, length), -3.0)
     policy = torch.full((2, 1, length, 6), 1 / 6)
     return batch, Targets(value, policy)
@@ -155,7 +156,7 @@ def test_model_loss_by_hand():
     with torch.no_grad():
         for parameter in network.hypermodel.transition.later[-1].parameters():
             parameter.zero_()
-        for parameter in [*network.decoder.parameters(), *network.encoder[2].parameters()]:
+        for parameter in [*network.free.parameters(), *network.encoder[2].parameters()]:
             parameter.zero_()
     batch, targets = make_batch(SMALL)
     steps = torch.arange(SMALL.sequence_steps + 1.0)[:, None]
@@ -164,8 +165,10 @@ def test_model_loss_by_hand():
     losses, metrics, _ = unrolled_losses(network, SMALL, batch, targets, torch.ones(2))
     assert metrics["model_error_1"].item() == pytest.approx(0.4, rel=1e-5)
     assert metrics["model_error_4"].item() == pytest.approx(1.6, rel=1e-5)
-    # 2 * (0.4 + 0.8 + 1.2 + 1.6) / 4; the body's motion is decoded as zeros, and so it is
-    assert losses["model_loss"].item() == pytest.approx(2.0, rel=1e-4)
+    # 2 * (0.4 + 0.8 + 1.2 + 1.6) / 4, and squares of 0.3 k and 0.1 k in two of the latent state's eleven numbers; all
+    # others are zero, and so they are.
+    squares = 0.1 * (1 + 4 + 9 + 16) / 4 / 11
+    assert losses["model_loss"].item() == pytest.approx(2.0 + squares, rel=1e-4)
 
 
 def test_group_without_weight_counts_nothing():

@@ -137,16 +137,16 @@ def _add_model(
 ) -> torch.Tensor:
     """The paper's model loss, of unrolled states against observed and encoded ones; returns errors `[G, R]` in metres.
 
-    The paper's log-likelihood of the next state, with a Laplace distribution, since collisions are heavy-tailed, of the
-    body's pose and velocities, and a normal one of the code of its motion.
+    The paper's log-likelihood of the next state: of the body's pose and velocities with a Laplace distribution, since
+    collisions are heavy-tailed, and of the whole latent state with a normal one.
     """
     decoded = network.decode(latent)
     with torch.no_grad():
         encoded = network.encode(features)
     moved_error = (decoded[..., :2] - features[..., :2]).abs().sum(dim=-1)
     body_error = (decoded[..., 2:] - features[..., 2:7]).abs().sum(dim=-1)
-    code_error = ((latent - encoded) ** 2).mean(dim=-1)
-    loss = config.model_weight * (_MOVED_WEIGHT * moved_error + body_error + code_error)
+    latent_error = ((latent - encoded) ** 2).mean(dim=-1)
+    loss = config.model_weight * (_MOVED_WEIGHT * moved_error + body_error + latent_error)
     losses.add("model_loss", loss, weight)
     return moved_error.detach()
 

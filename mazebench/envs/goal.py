@@ -27,11 +27,12 @@ class GoalMazeEnv(MazeEnv):
     """A `MazeEnv` whose goal stands in `desired_goal` alone, so that another may be put in its place afterwards.
 
     Observations:
-      observation: `[12 + 3 M M]` float32: the state, then the planes of the context that do not show the goal (the map,
-        the map around the start, the start), row by row.
-      achieved_goal: `[2]` float32: the centre (x, y) in m of the cell in which the body is, its true one.
-      desired_goal: `[2]` float32: the centre of the goal cell.
-      and the pictures of `cameras`, in which the goal's marker is seen.
+
+    - observation: `[12 + 3 M M]` float32: the state, then the planes of the context that do not show the goal (the map,
+      the map around the start, the start), row by row.
+    - achieved_goal: `[2]` float32: the centre (x, y) in m of the cell in which the body is, its true one.
+    - desired_goal: `[2]` float32: the centre of the goal cell.
+    - the pictures of `cameras`, in which the goal's marker is seen.
 
     For any goals, `compute_reward`, `compute_terminated` and `compute_truncated` say what a step that led to
     `achieved_goal` would have brought on the way to `desired_goal`. They take single goals and arrays of them.

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
 from mazebench.maps import BENCHMARK_SIZES
+from mazebench.tasks import TASK_VERSION
 
-_VERSION = 1
+if TYPE_CHECKING:
+    from mazebench.envs.goal import GoalMazeEnv
+    from mazebench.envs.gym import MazeEnv
+    from mazebench.envs.vector import MazeVectorEnv
+
 _TASKS = {"Local": "local", "Hierarchical": "hierarchical"}
 
 
@@ -19,7 +24,7 @@ def register_environments() -> None:
     """
     for title, task in _TASKS.items():
         for size in BENCHMARK_SIZES:
-            env_id = f"mazebench/{title}-{size}-v{_VERSION}"
+            env_id = f"mazebench/{title}-{size}-v{TASK_VERSION}"
             if env_id in gymnasium.registry:
                 continue
             gymnasium.register(
@@ -29,14 +34,14 @@ def register_environments() -> None:
                 kwargs={"task": task, "size": size},
             )
     for size in BENCHMARK_SIZES:
-        env_id = f"mazebench/LocalGoal-{size}-v{_VERSION}"
+        env_id = f"mazebench/LocalGoal-{size}-v{TASK_VERSION}"
         if env_id not in gymnasium.registry:
             gymnasium.register(env_id, "mazebench.envs.registration:make_goal_env", kwargs={"size": size})
 
 
 def make_env(
     task: str = "local", *, seed: int | None = None, render_mode: str | None = None, camera: str = "top", **options: Any
-):
+) -> MazeEnv:
     """A `MazeEnv`; `options` are those of `mazebench.make_spec`."""
     from mazebench.envs.gym import MazeEnv
     from mazebench.tasks.registry import make_spec
@@ -44,7 +49,9 @@ def make_env(
     return MazeEnv(make_spec(task, **options), seed, render_mode, camera)
 
 
-def make_goal_env(*, seed: int | None = None, render_mode: str | None = None, camera: str = "top", **options: Any):
+def make_goal_env(
+    *, seed: int | None = None, render_mode: str | None = None, camera: str = "top", **options: Any
+) -> GoalMazeEnv:
     """A `GoalMazeEnv` of the local task; `options` are those of `mazebench.make_spec`."""
     from mazebench.envs.goal import GoalMazeEnv
     from mazebench.tasks.registry import make_spec
@@ -60,7 +67,7 @@ def make_vec(
     num_threads: int = 0,
     render_mode: str | None = None,
     **options: Any,
-):
+) -> MazeVectorEnv:
     """`num_envs` environments side by side on `num_threads` threads (0: all cores); `options` as of `make_spec`."""
     from mazebench.envs.vector import MazeVectorEnv
     from mazebench.tasks.registry import make_spec

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mazebench.errors import InputError
-from mazebench.evaluation.metrics import CONFIDENCE, bootstrap_interval, wilson_interval
+from mazebench.evaluation.metrics import CONFIDENCE, bootstrap_interval, by_distance, wilson_interval
 from mazebench.evaluation.results import Result, find_parts, load_result
 from mazebench.records import Record
 
@@ -62,21 +62,18 @@ def compare_results(a: Result, b: Result) -> dict[str, Any]:
     """Where A is better than B, over all episodes and by distance.
 
     Returns:
-      {"overall": {"n", and of each metric M of success_rate, spl and spl_grid "M_a", "M_b", "M_difference" (A's less
-       B's) and "M_difference_ci95", "probability_of_improvement", "probability_of_improvement_ci95"},
+      dict: {"overall": {"n", and of each metric M of success_rate, spl and spl_grid "M_a", "M_b", "M_difference" (A's
+       less B's) and "M_difference_ci95", "probability_of_improvement", "probability_of_improvement_ci95"},
        "by_distance": {"1": {the same}, ...}}
 
     Raises:
       InputError: if the two are not of the same episodes of one version of the benchmark.
     """
     _check_pairs(a, b)
-    distances = sorted({record["distance"] for record in a.records})
+    ours, theirs = by_distance(a.records), by_distance(b.records)
     return {
         "overall": _compare(a.records, b.records),
-        "by_distance": {
-            str(distance): _compare(*([r for r in run.records if r["distance"] == distance] for run in (a, b)))
-            for distance in distances
-        },
+        "by_distance": {str(distance): _compare(ours[distance], theirs[distance]) for distance in ours},
     }
 
 
@@ -121,8 +118,8 @@ def stratified_bootstrap_interval(
     """
     num_runs, num_tasks = scores.shape
     rng = np.random.default_rng(_BOOTSTRAP_SEED)
-    drawn = rng.integers(num_runs, size=(_NUM_RESAMPLES, num_runs, num_tasks))
-    values = [statistic(scores[runs, np.arange(num_tasks)]) for runs in drawn]
+    draws = (rng.integers(num_runs, size=scores.shape) for _ in range(_NUM_RESAMPLES))
+    values = [statistic(scores[runs, np.arange(num_tasks)]) for runs in draws]
     low, high = np.quantile(values, [(1 - confidence) / 2, (1 + confidence) / 2])
     return float(low), float(high)
 

@@ -94,7 +94,7 @@ class _Scene:
     views: tuple[str, ...]
     pixels: int
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self._path: list[np.ndarray] = []
         cameras = [view for view in self.views if view != MAP]
         self._renderer = Renderer(self.environment.physics.model.ptr, self.pixels, self.pixels) if cameras else None

@@ -88,7 +88,7 @@ class Evaluation:
             raise InputError(f"expected episodes_per_distance of at least 1, found {options.episodes_per_distance}")
         self.out = out
         self._record = record
-        self._labels = dict(labels or {})
+        self.labels = dict(labels or {})
         self._agent_class = load_agent_class(options.agent)
         self._options = resolve_checkpoint(options, self._agent_class)
         self._task_spec = make_task_spec(self._options, self._agent_class)
@@ -127,12 +127,14 @@ class Evaluation:
         _prepare(self.out, self._config, resume)
         # Trajectories of a part of the episodes would be of no use: what began to record goes on.
         self._record = self._record or (self.out / JOURNAL).exists()
-        self._log = self._opened.enter_context(RecordLog(self.out, len(self.trials)))
-        check_records(self.out, self._log.records, self.trials)
+        log = RecordLog(self.out, len(self.trials))
+        check_records(self.out, log.records, self.trials)
+        self._log = self._opened.enter_context(log)
         self._todo = set(self._log.missing)
         self._trajectories = None
         if self._record:
-            self._trajectories = self._opened.enter_context(TrajectoryLog(self.out, len(self.trials)))
+            size = self._task_spec.size
+            self._trajectories = self._opened.enter_context(TrajectoryLog(self.out, len(self.trials), size))
             self._todo |= set(self._trajectories.missing)
 
     def close(self) -> None:
@@ -164,7 +166,7 @@ class Evaluation:
             self._trajectories.finish()
         summary = {
             **self._config["record"],
-            **self._labels,
+            **self.labels,
             "benchmark": VERSION,
             "episodes": len(self.trials),
             "perturbation": self._config["perturbation"],
@@ -290,4 +292,4 @@ def _compare(out: pathlib.Path, config: dict[str, Any]) -> None:
     for key, value in config.items():
         if not isinstance(before, dict) or before.get(key) != value:
             old = before.get(key) if isinstance(before, dict) else before
-            raise InputError(f"{out}: holds another run: its {key} is {old}, this one's {value}")
+            raise InputError(f"{out}: holds another run: its {key} is {str(old)[:200]}, this one's {value}")

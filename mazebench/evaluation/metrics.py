@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from scipy import stats
 CONFIDENCE = 0.95
 _NUM_RESAMPLES = 2000
 _BOOTSTRAP_SEED = 0
+_DRAWN_AT_ONCE = 2**20  # numbers, 8 MiB
 
 
 def spl(success: np.ndarray, shortest: np.ndarray, driven: np.ndarray) -> np.ndarray:
@@ -46,8 +48,12 @@ def bootstrap_interval(values: np.ndarray, clusters: np.ndarray, confidence: flo
         index = np.arange(len(values))
     sums, counts = np.bincount(index, weights=values), np.bincount(index)
     rng = np.random.default_rng(_BOOTSTRAP_SEED)
-    drawn = rng.integers(len(sums), size=(_NUM_RESAMPLES, len(sums)))
-    means = sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
+    means = np.empty(_NUM_RESAMPLES)
+    # So many at a time that the memory does not grow with the clusters; the numbers drawn are the same.
+    at_once = max(1, _DRAWN_AT_ONCE // len(sums))
+    for start in range(0, _NUM_RESAMPLES, at_once):
+        drawn = rng.integers(len(sums), size=(min(at_once, _NUM_RESAMPLES - start), len(sums)))
+        means[start : start + at_once] = sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
     low, high = np.quantile(means, [(1 - confidence) / 2, (1 + confidence) / 2])
     return float(low), float(high)
 
@@ -63,17 +69,21 @@ def summarize(records: list[dict[str, Any]]) -> dict[str, Any]:
     """Means and 95 % intervals of success rate, SPL and SPL by grid distance, overall and by distance.
 
     Returns:
-      {"overall": {"n", "success_rate", "success_rate_ci95", "spl", "spl_ci95", "spl_grid", "spl_grid_ci95"},
+      dict: {"overall": {"n", "success_rate", "success_rate_ci95", "spl", "spl_ci95", "spl_grid", "spl_grid_ci95"},
        "by_distance": {"1": {the same}, ...}}
     """
-    distances = sorted({record["distance"] for record in records})
     return {
         "overall": _aggregate(records),
-        "by_distance": {
-            str(distance): _aggregate([record for record in records if record["distance"] == distance])
-            for distance in distances
-        },
+        "by_distance": {str(distance): _aggregate(those) for distance, those in by_distance(records).items()},
     }
+
+
+def by_distance(records: Sequence[dict[str, Any]]) -> dict[int, list[dict[str, Any]]]:
+    """The records of each distance from start to goal, in its order."""
+    groups: dict[int, list[dict[str, Any]]] = {}
+    for record in records:
+        groups.setdefault(record["distance"], []).append(record)
+    return dict(sorted(groups.items()))
 
 
 def _aggregate(records: list[dict[str, Any]]) -> dict[str, Any]:

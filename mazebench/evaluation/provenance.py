@@ -6,7 +6,6 @@ import dataclasses
 import functools
 import hashlib
 import inspect
-import json
 import os
 import pathlib
 import platform
@@ -17,15 +16,18 @@ from importlib import metadata
 from typing import Any
 
 from mazebench.agent import Agent
-from mazebench.errors import InputError
+from mazebench.errors import InputError, open_file
 from mazebench.evaluation.options import EvalOptions
 from mazebench.maps.benchmark import VERSION, manifest_hash
+from mazebench.records import parse_json
+from mazebench.tasks import TASK_VERSION
 
 _PACKAGES = (
     *("mazebench-mujoco", "mujoco", "dm-control", "dm-env", "gymnasium", "numpy", "scipy"),
     *("opencv-python-headless", "torch", "ray"),
 )
-_MAX_HEADER_BYTES = 2**20  # of a checkpoint
+# Of a checkpoint. What they hold must leave a summary that can be read again, where it takes up to ten times the bytes.
+_MAX_HEADER_BYTES, _MAX_METADATA_DEPTH = 2**18, 16
 
 
 def provenance(options: EvalOptions, agent_class: type[Agent]) -> dict[str, Any]:
@@ -33,6 +35,7 @@ def provenance(options: EvalOptions, agent_class: type[Agent]) -> dict[str, Any]
     return {
         "benchmark": VERSION,
         "benchmark_manifest_sha256": manifest_hash(),
+        "task_version": TASK_VERSION,
         "checkpoint_sha256": file_hash(options.checkpoint),
         "checkpoint_metadata": checkpoint_metadata(options.checkpoint),
         "agent_class": f"{agent_class.__module__}:{agent_class.__qualname__}",
@@ -61,11 +64,11 @@ def file_hash(path: str | None) -> str | None:
     """SHA-256 of a file; None for none."""
     if path is None:
         return None
-    try:
-        with open(path, "rb") as file:
+    with open_file(path, "checkpoint") as file:
+        try:
             return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise InputError(f"{path}: can't read the checkpoint: {error.strerror}") from error
+        except OSError as error:
+            raise InputError(f"{path}: can't read the checkpoint: {error.strerror}") from error
 
 
 def checkpoint_metadata(path: str | None) -> dict[str, Any] | None:
@@ -75,19 +78,15 @@ def checkpoint_metadata(path: str | None) -> dict[str, Any] | None:
     """
     if path is None:
         return None
-    with open(path, "rb") as file:
+    with open_file(path, "checkpoint") as file:
         start = file.read(8)
         length = struct.unpack("<Q", start)[0] if len(start) == 8 else 0
         header = file.read(length) if length <= _MAX_HEADER_BYTES else b""
     try:
-        texts = json.loads(header)["__metadata__"]
-        return {key: json.loads(text, parse_constant=_refuse) for key, text in texts.items()}
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        texts = parse_json(header)["__metadata__"]
+        return {key: parse_json(text, _MAX_METADATA_DEPTH) for key, text in texts.items()}
+    except (ValueError, KeyError, TypeError, AttributeError):
         return None
-
-
-def _refuse(constant: str) -> None:
-    raise ValueError(f"{constant} is no JSON")  # and could not be written to a summary
 
 
 def _package_of(agent_class: type[Agent]) -> str | None:

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import pathlib
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from mazebench.errors import InputError, read_at_most
-from mazebench.records import CONFIG, EPISODES, SUMMARY, Record, read_json
+from mazebench.errors import InputError
+from mazebench.records import CONFIG, EPISODES, SUMMARY, Record, parse_json, read_json, read_lines
 
 if TYPE_CHECKING:
     from mazebench.evaluation.protocol import Trial
 
 SUITE = "suite.json"
 
-_MAX_BYTES = 2**30  # of records; the 1,500 local episodes of a benchmark's size take 0.6 MB
+_METRICS = ("success_rate", "spl", "spl_grid")
 _TOLERANCE = 1e-9  # of a mean that is computed again
 
 
@@ -45,7 +44,7 @@ def load_result(folder: pathlib.Path) -> Result:
     records = _read_records(folder / EPISODES)
     if len(records) != summary["episodes"]:
         raise InputError(f"{folder / EPISODES}: expected {summary['episodes']} records, found {len(records)}")
-    for key in ("success_rate", "spl", "spl_grid"):
+    for key in _METRICS:
         name = "success" if key == "success_rate" else key
         found = math.fsum(record[name] for record in records) / len(records)
         if not math.isclose(summary["overall"][key], found, abs_tol=_TOLERANCE):
@@ -126,14 +125,11 @@ def is_safe_name(name: str) -> bool:
 
 
 def _read_records(path: pathlib.Path) -> list[Record]:
-    content = read_at_most(path, _MAX_BYTES, "records")
-    if len(content) > _MAX_BYTES:
-        raise InputError(f"{path}: expected records of at most {_MAX_BYTES} bytes, found more")
-    records = []
-    for number, line in enumerate(content.splitlines()):
+    records: list[Record] = []
+    for number, line in enumerate(read_lines(path)):
         try:
-            record = json.loads(line)
-        except (ValueError, RecursionError):
+            record = parse_json(line)
+        except ValueError:
             record = None
         fault = _record_fault(record)
         if fault or record["episode"] != number:
@@ -141,12 +137,16 @@ def _read_records(path: pathlib.Path) -> list[Record]:
                 f"{path}: expected the record of episode {number} in line {number + 1}, "
                 f"found {fault or 'episode ' + str(record['episode'])}"
             )
-        records.append(record)
+        records.append({name: record[name] for name in _FIELDS})
     return records
 
 
 def _is_int(value: Any) -> bool:
-    return type(value) is int and value >= 0
+    return type(value) is int and 0 <= value < 2**53
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str) and value.isprintable()
 
 
 def _is_cell(value: Any) -> bool:
@@ -154,16 +154,24 @@ def _is_cell(value: Any) -> bool:
 
 
 def _is_length(value: Any) -> bool:
-    return type(value) in (int, float) and 0 <= value < math.inf
+    return type(value) in (int, float) and 0 <= value < 2**53
 
 
 def _is_share(value: Any) -> bool:
     return type(value) in (int, float) and 0 <= value <= 1
 
 
+def _is_made_by(options: Any) -> bool:
+    return isinstance(options, dict) and _is_int(options.get("landmark_distance"))
+
+
+def _is_short_number(text: str) -> bool:
+    return text.isascii() and text.isdecimal() and len(text) < 10
+
+
 _FIELDS: dict[str, Callable[[Any], bool]] = {
     "episode": _is_int,
-    "maze": lambda value: isinstance(value, str),
+    "maze": _is_text,
     "start": _is_cell,
     "goal": _is_cell,
     "distance": _is_int,
@@ -174,6 +182,18 @@ _FIELDS: dict[str, Callable[[Any], bool]] = {
     "spl": _is_share,
     "spl_grid": _is_share,
     "seed": _is_int,
+}
+_SUMMARY_FIELDS: dict[str, Callable[[Any], bool]] = {
+    "agent": _is_text,
+    "task": _is_text,
+    "size": _is_int,
+    "split": _is_text,
+    "benchmark": _is_text,
+    "episodes": _is_int,
+    "perturbation": lambda value: isinstance(value, dict) and all(map(_is_length, value.values())),
+    "provenance": lambda value: isinstance(value, dict) and _is_made_by(value.get("options")),
+    "overall": lambda value: isinstance(value, dict),
+    "by_distance": lambda value: isinstance(value, dict) and all(map(_is_short_number, value)),
 }
 
 
@@ -191,14 +211,27 @@ def _record_fault(record: Any) -> str | None:
 def _summary_fault(summary: Any) -> str | None:
     if not isinstance(summary, dict):
         return "no object"
-    kinds = {"agent": str, "task": str, "size": int, "split": str, "benchmark": str, "episodes": int}
-    for name, kind in {**kinds, "perturbation": dict, "provenance": dict, "overall": dict}.items():
-        if not isinstance(summary.get(name), kind):
+    for name, is_legal in _SUMMARY_FIELDS.items():
+        if not is_legal(summary.get(name)):
             return f"{name} {str(summary.get(name))[:60]!r}"
     if summary["episodes"] < 1:
         return f"{summary['episodes']} episodes"
-    wrong = [key for key in ("success_rate", "spl", "spl_grid") if not _is_share(summary["overall"].get(key))]
-    return f"overall {wrong[0]} {summary['overall'].get(wrong[0])!r}" if wrong else None
+    rows = {"overall": summary["overall"], **summary["by_distance"]}
+    faults = (f"{name} {fault}" for name, row in rows.items() if (fault := _row_fault(row)))
+    return next(faults, None)
+
+
+def _row_fault(row: Any) -> str | None:
+    """What is wrong with the figures of some episodes."""
+    if not isinstance(row, dict):
+        return f"{str(row)[:60]!r}"
+    for key in _METRICS:
+        interval = row.get(f"{key}_ci95")
+        if not _is_share(row.get(key)):
+            return f"{key} {str(row.get(key))[:60]}"
+        if not isinstance(interval, list) or len(interval) != 2 or not all(map(_is_share, interval)):
+            return f"{key}_ci95 {str(interval)[:60]}"
+    return None if _is_int(row.get("n")) else f"n {str(row.get('n'))[:60]}"
 
 
 def _what_is_in(folder: pathlib.Path) -> str:

@@ -80,7 +80,7 @@ def _present(numbered: tuple[int, Trial] | None) -> tuple[int, Trial]:
     return numbered
 
 
-def _record(task_spec: TaskSpec, index: int, trial: Trial, final_info: dict, slot: int) -> Record:
+def _record(task_spec: TaskSpec, index: int, trial: Trial, final_info: dict[str, Any], slot: int) -> Record:
     success, driven = bool(final_info["success"][slot]), float(final_info["path_length"][slot])
     both = spl(np.array([success] * 2), np.array([trial.shortest_path, float(trial.distance)]), np.array([driven] * 2))
     return {

@@ -13,9 +13,9 @@ from typing import Any
 from mazebench.errors import InputError, unknown
 from mazebench.evaluation.harness import Evaluation, Progress, run_evaluations
 from mazebench.evaluation.options import EvalOptions
-from mazebench.evaluation.results import SUITE, is_safe_name, read_suite
+from mazebench.evaluation.results import SUITE, is_safe_name, load_result, read_suite
 from mazebench.maps.benchmark import SIZES, VERSION, manifest_hash
-from mazebench.records import CONFIG, SUMMARY, FolderLock, make_folder, read_json, write_json
+from mazebench.records import CONFIG, FolderLock, make_folder, write_json
 
 _TABLE_DISTANCES = (2, 4, 6, 8, 10)  # those that the paper prints
 
@@ -133,8 +133,12 @@ class SuiteRun:
             )
 
     def summaries(self) -> list[dict[str, Any]]:
-        """Of all parts, by agent and then in the suite's order; all must be finished."""
-        return [read_json(evaluation.out / SUMMARY) for evaluation in self.evaluations]
+        """Of all parts, by agent and then in the suite's order; all must be finished.
+
+        Raises:
+          InputError: if one is damaged.
+        """
+        return [{**load_result(evaluation.out).summary, **evaluation.labels} for evaluation in self.evaluations]
 
     def _prepare(self, resume: bool) -> dict[str, Any]:
         """What is to be said of the folder, or a refusal; agents that it does not have yet are added to it."""
@@ -156,7 +160,7 @@ class SuiteRun:
             for key, value in content.items():
                 if before.get(key) != value:
                     raise InputError(
-                        f"{self.out}: holds another run: its {key} is {before.get(key)}, this one's {value}"
+                        f"{self.out}: holds another run: its {key} is {str(before.get(key))[:200]}, this one's {value}"
                     )
             agents = before["folders"]
         agents = _folders([*agents, *(agent for agent in self._folders if agent not in agents)])

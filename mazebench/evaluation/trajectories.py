@@ -10,24 +10,23 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import io
 import math
 import os
 import pathlib
 import struct
-import tokenize
-import zipfile
 import zlib
 
 import numpy as np
 
-from mazebench.errors import InputError
+from mazebench.arrays import read_arrays
+from mazebench.errors import InputError, open_file, read_at_most
+from mazebench.records import open_to_write
 
 TRAJECTORIES = "trajectories.npz"
 JOURNAL = "trajectories.journal"
 FORMAT = "mazebench-trajectories-1"
 
-_MAX_BYTES = 2**30  # of all arrays together; the 1,500 local episodes of a benchmark's size take at most 1 MB
+_MAX_BYTES = 2**28  # of all arrays together; the 1,500 local episodes of a benchmark's size take at most 1 MB
 _DTYPES: dict[str, np.dtype] = {
     "length": np.dtype("<i4"),
     "pose": np.dtype("<f2"),
@@ -35,12 +34,6 @@ _DTYPES: dict[str, np.dtype] = {
     "num_landmarks": np.dtype("<i4"),
     "landmark": np.dtype("<i4"),
 }
-_MAX_HEADER = 10_000  # bytes that describe an array
-# What zipfile, zlib and NumPy's header reader raise for content that is damaged or made up.
-_DAMAGE = (
-    *(zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, EOFError, SyntaxError),
-    *(ValueError, KeyError, RuntimeError, OverflowError, UnicodeError),
-)
 _BLOCK = struct.Struct("<IIIII")  # episode, L, bytes of the map, landmarks, CRC-32 of the rest of the block
 
 
@@ -94,13 +87,13 @@ def load_trajectories(path: pathlib.Path, num_episodes: int) -> Trajectories:
     Raises:
       InputError: if the file can't be read, is damaged, too large or of other episodes.
     """
-    try:
-        arrays = _read_arrays(path)
-    except OSError as error:
-        raise InputError(f"{path}: can't read the trajectories: {error.strerror or error}") from error
-    except _DAMAGE as error:
-        found = " ".join(str(error).split())[:120] or type(error).__name__
-        raise InputError(f"{path}: expected trajectories ({FORMAT}), found a damaged file: {found}") from error
+    with open_file(path, "trajectories") as file:
+        try:
+            arrays = read_arrays(file, {"format": None, **_DTYPES}, _MAX_BYTES)
+            if str(arrays.pop("format")) != FORMAT:
+                raise ValueError("another format")
+        except ValueError as error:
+            raise InputError(f"{path}: expected trajectories ({FORMAT}), found a damaged file: {error}") from error
     trajectories = Trajectories(**arrays)
     fault = _fault(trajectories, num_episodes)
     if fault:
@@ -112,7 +105,7 @@ def save_trajectories(path: pathlib.Path, trajectories: Trajectories) -> None:
     """Writes them all or nothing: a reader finds the old file or the new one. The same content gives the same bytes."""
     temporary = path.with_name(path.name + ".tmp")
     arrays = {name: np.ascontiguousarray(getattr(trajectories, name), dtype=dtype) for name, dtype in _DTYPES.items()}
-    with temporary.open("wb") as file:
+    with open_to_write(temporary, "wb") as file:
         np.savez_compressed(file, allow_pickle=False, format=np.array(FORMAT), **arrays)
         file.flush()
         os.fsync(file.fileno())
@@ -133,8 +126,10 @@ def pack_trajectories(episodes: list[Trajectory]) -> Trajectories:
 class TrajectoryLog:
     """The trajectories of `num_episodes` episodes in `folder`, those already there included; a context manager."""
 
-    def __init__(self, folder: pathlib.Path, num_episodes: int):
-        """Reads what is there; a block of the journal that is not whole is cut off, with all behind it.
+    def __init__(self, folder: pathlib.Path, num_episodes: int, size: int):
+        """Reads what is there, of mazes of `size` cells a side.
+
+        A block of the journal that is not whole is cut off, with all behind it.
 
         Raises:
           InputError: if the folder's trajectories are damaged or of other episodes.
@@ -143,11 +138,12 @@ class TrajectoryLog:
         self._episodes: dict[int, Trajectory] = {}
         if (folder / TRAJECTORIES).exists():
             whole = load_trajectories(folder / TRAJECTORIES, num_episodes)
+            if whole.size != size:
+                raise InputError(f"{folder / TRAJECTORIES}: expected maps of {size} cells a side, found {whole.size}")
             self._episodes = {index: whole[index] for index in range(num_episodes)}
-        self._episodes |= {
-            index: episode for index, episode in _repair_and_read(folder / JOURNAL).items() if index < num_episodes
-        }
-        self._journal = open(folder / JOURNAL, "ab")  # noqa: SIM115 (closed by __exit__)
+        waiting = _repair_and_read(folder / JOURNAL, size)
+        self._episodes |= {index: episode for index, episode in waiting.items() if index < num_episodes}
+        self._journal = open_to_write(folder / JOURNAL, "ab")  # closed by __exit__
 
     @property
     def missing(self) -> list[int]:
@@ -173,31 +169,6 @@ class TrajectoryLog:
 
     def __exit__(self, *exception: object) -> None:
         self._journal.close()
-
-
-def _read_arrays(path: pathlib.Path) -> dict[str, np.ndarray]:
-    with zipfile.ZipFile(path) as archive:
-        sizes = {member.filename: member.file_size for member in archive.infolist()}
-        if sum(sizes.values()) > _MAX_BYTES:
-            raise ValueError(f"{sum(sizes.values())} bytes of content, more than {_MAX_BYTES}")
-        content = {name: archive.read(f"{name}.npy") for name in ("format", *_DTYPES)}
-    if str(_to_array(content.pop("format"), None)) != FORMAT:
-        raise ValueError("another format")
-    return {name: _to_array(content[name], dtype) for name, dtype in _DTYPES.items()}
-
-
-def _to_array(content: bytes, dtype: np.dtype | None) -> np.ndarray:
-    """An array in NumPy's file format; `dtype` None for a short text."""
-    file = io.BytesIO(content)
-    if np.lib.format.read_magic(file) != (1, 0):
-        raise ValueError("an array of another version of NumPy's format")
-    shape, is_fortran, found = np.lib.format.read_array_header_1_0(file, max_header_size=_MAX_HEADER)
-    if is_fortran or (found != dtype if dtype is not None else found.kind != "U"):
-        raise ValueError(f"an array of {found}")
-    num_bytes = math.prod(shape) * found.itemsize
-    if min(shape, default=1) < 0 or len(content) - file.tell() != num_bytes:
-        raise ValueError(f"{len(content) - file.tell()} bytes for an array of shape {shape}")
-    return np.frombuffer(content, found, offset=file.tell()).reshape(shape) if num_bytes else np.empty(shape, found)
 
 
 def _fault(trajectories: Trajectories, num_episodes: int) -> str | None:
@@ -233,11 +204,18 @@ def _to_block(index: int, episode: Trajectory) -> bytes:
     return _BLOCK.pack(*counts, zlib.crc32(body, zlib.crc32(_BLOCK.pack(*counts, 0)))) + body
 
 
-def _repair_and_read(path: pathlib.Path) -> dict[int, Trajectory]:
-    """The episodes of a journal by index; what follows its last whole block is removed from it."""
+def _repair_and_read(path: pathlib.Path, size: int) -> dict[int, Trajectory]:
+    """The episodes of a journal by index; what follows its last whole block is removed from it.
+
+    Raises:
+      InputError: if a whole block holds no trajectory in a maze of `size` cells a side.
+    """
     if not path.exists():
         return {}
-    content, episodes, start = path.read_bytes(), {}, 0
+    content = read_at_most(path, _MAX_BYTES, "trajectories")
+    if len(content) > _MAX_BYTES:
+        raise InputError(f"{path}: expected at most {_MAX_BYTES} bytes, found more")
+    episodes, start = {}, 0
     while start + _BLOCK.size <= len(content):
         *counts, checksum = _BLOCK.unpack_from(content, start)
         index, num_poses, num_map_bytes, num_landmarks = counts
@@ -245,10 +223,16 @@ def _repair_and_read(path: pathlib.Path) -> dict[int, Trajectory]:
         body = content[start + _BLOCK.size : end]
         if end > len(content) or zlib.crc32(body, zlib.crc32(_BLOCK.pack(*counts, 0))) != checksum:
             break
+        if num_map_bytes != -(-size * size // 8) or min(num_poses, num_landmarks) < 1:
+            raise InputError(f"{path}: expected a pose, a goal and a map of {size} cells a side, found episode {index}")
         episodes[index] = _from_body(body, num_poses, num_map_bytes)
+        fault = _fault(pack_trajectories([episodes[index]]), 1)
+        if fault:
+            raise InputError(f"{path}: episode {index}: {fault}")
         start = end
     if start < len(content):
-        os.truncate(path, start)
+        with open_to_write(path, "r+b") as file:
+            file.truncate(start)
     return episodes
 
 

@@ -6,6 +6,7 @@ import functools
 import hashlib
 import json
 from importlib import resources
+from typing import Any
 
 from mazebench.errors import InputError, unknown
 from mazebench.maps import BENCHMARK_SIZES
@@ -57,7 +58,7 @@ def read_asset(name: str) -> str:
 
 
 @functools.cache
-def manifest() -> dict:
+def manifest() -> dict[str, Any]:
     """The benchmark's version, how it was made, and the SHA-256 of each of its files."""
     return json.loads(_folder().joinpath(MANIFEST).read_text(encoding="ascii"))
 

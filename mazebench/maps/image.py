@@ -19,6 +19,8 @@ _MAX_BYTES = 32 * 2**20
 _MAX_SIDE = 8192  # pixels of a drawing's side
 _MAX_PIXELS = _MAX_SIDE**2  # of a picture read: above any phone's 50 megapixels, and every drawing can be read back
 _PNG_START = b"\x89PNG\r\n\x1a\n"
+_JPEG_SCAN = b"\xff\xda"  # begins a scan, and stands nowhere else in the coded picture
+_MAX_SCANS = 100  # of a JPEG: progressive photographs have about ten, and a decoder goes over the whole picture in each
 
 # Neighbouring wall cells differ by a shade that hardly shows: it makes the cells of every drawing countable.
 _WALL_SHADES = np.array([[30, 32, 38], [34, 36, 42]], dtype=np.uint8)
@@ -188,6 +190,9 @@ def _decode(content: bytes, name: str) -> np.ndarray:
     width, height = dimensions
     if width < 1 or not 1 <= height <= _MAX_PIXELS // width:
         raise MazeError(f"{name}: expected a picture of 1 to {_MAX_PIXELS} pixels, found {width} x {height}")
+    num_scans = content.count(_JPEG_SCAN) if content.startswith(b"\xff\xd8") else 0
+    if num_scans > _MAX_SCANS:
+        raise MazeError(f"{name}: expected a JPEG of at most {_MAX_SCANS} scans, found {num_scans}")
     # Opacity is read from PNG only. A photograph is turned as its camera was held, which UNCHANGED would leave undone.
     flags = cv2.IMREAD_COLOR
     if content.startswith(_PNG_START):

@@ -44,7 +44,7 @@ class Maze:
     walls: np.ndarray  # [N, N] bool, True is wall; copied and made read-only
     name: str = "maze"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         walls = np.array(self.walls)
         if walls.dtype != bool:
             raise MazeError(f"{self.name}: expected walls of dtype bool, found {walls.dtype}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import dm_env
 import numpy as np
 
 from mazebench.maps.maze import Cell
@@ -45,7 +46,7 @@ class Game:
         """Begins the same episode again."""
         self._begin(self.environment.reset(episode=self.environment.task.episode))
 
-    def _begin(self, time_step) -> None:
+    def _begin(self, time_step: dm_env.TimeStep) -> None:
         self.time_step = time_step
         self.num_episodes += 1
         self.path = [self.environment.physics.position()]  # [2] m each, where the body was

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import queue
+import types
 import warnings
+from typing import Any
 
 import mujoco
 
@@ -54,7 +56,7 @@ def play(game: Game) -> None:
                 game.press(_ARROWS.get(code) or (chr(code).lower() if code < 128 else ""))
 
 
-def _import_viewer():
+def _import_viewer() -> types.ModuleType:
     """mujoco.viewer, where a window can be opened: it would wait for ever for one that can't."""
     try:
         import glfw
@@ -69,7 +71,7 @@ def _import_viewer():
     return mujoco.viewer
 
 
-def _overlay(viewer, game: Game) -> None:
+def _overlay(viewer: Any, game: Game) -> None:
     """The map in the upper right corner, the episode and the keys on the left."""
     window = viewer.viewport
     if window is None:

@@ -216,13 +216,13 @@ def _pack_drives(result: Result) -> str:
     return _pack(columns, b"" if trajectories is None else pack_poses(trajectories, result.setting.size))
 
 
-def _pack(columns: dict[str, list], content: bytes) -> str:
+def _pack(columns: dict[str, list[Any]], content: bytes) -> str:
     """Columns and bytes behind them, deflated: as explorer.js unpacks them."""
     text = json.dumps(columns, separators=(",", ":")).encode("ascii")
     return _base64(zlib.compress(len(text).to_bytes(4, "little") + text + content, 9))
 
 
-def _trial_columns(result: Result) -> dict[str, list]:
+def _trial_columns(result: Result) -> dict[str, list[Any]]:
     episodes, trajectories, size = result.episodes, result.trajectories, result.setting.size
     columns = {
         "maze": episodes.maze.tolist(),

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import math
 import pathlib
 from typing import Any
 
 import numpy as np
 
-from mazebench.errors import InputError, read_at_most, unknown
+from mazebench.errors import InputError, unknown
 from mazebench.evaluation.metrics import spl
 from mazebench.evaluation.trajectories import TRAJECTORIES, Trajectories, load_trajectories
+from mazebench.maps.benchmark import SIZES
+from mazebench.maps.files import MAX_FILES
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE
 from mazebench.maps.perturb import MAX_WARP
-from mazebench.records import EPISODES, SUMMARY
+from mazebench.records import EPISODES, SUMMARY, parse_json, read_json, read_lines
 from mazebench.report.results import METRICS, PERTURBATIONS, Episodes, Result, Setting, Warn
 from mazebench.tasks.spec import TASKS
 
-_MAX_BYTES = 2**28  # of a file; the records of 1,500 episodes take 0.5 MB
 _TOLERANCE = 1e-6  # of figures that should be equal
 _SPLITS = ("train", "eval", "custom")
 _FIELDS: dict[str, type] = {
@@ -36,6 +36,7 @@ _FIELDS: dict[str, type] = {
     "spl_grid": float,
     "seed": int,
 }
+_KEPT = (*_FIELDS, "split", "start", "goal", *PERTURBATIONS)  # of a record
 
 
 def read_result(folder: pathlib.Path, warn: Warn) -> Result:
@@ -72,10 +73,7 @@ def read_result(folder: pathlib.Path, warn: Warn) -> Result:
 
 
 def _read_object(path: pathlib.Path) -> dict[str, Any]:
-    try:
-        content = json.loads(_read_text(path), parse_constant=_refuse_constant)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: expected JSON, found {_excerpt(error)}") from error
+    content = read_json(path)
     if not isinstance(content, dict):
         raise InputError(f"{path}: expected an evaluation's summary, found another kind of JSON")
     for key, kind in (("agent", str), ("task", str), ("size", int), ("benchmark", str), ("episodes", int)):
@@ -84,38 +82,19 @@ def _read_object(path: pathlib.Path) -> dict[str, Any]:
     return content
 
 
-def _read_text(path: pathlib.Path) -> str:
-    content = read_at_most(path, _MAX_BYTES, "file")
-    if len(content) > _MAX_BYTES:
-        raise InputError(f"{path}: expected at most {_MAX_BYTES} bytes, found more")
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: expected text in UTF-8, found {_excerpt(error)}") from error
-
-
-def _refuse_constant(name: str) -> None:
-    raise ValueError(f"{name}, which is no JSON")
-
-
-def _excerpt(error: Exception) -> str:
-    return " ".join(str(error).split())[:120]
-
-
 def _read_records(path: pathlib.Path) -> list[dict[str, Any]]:
-    text = _read_text(path)
-    records = []
-    for number, line in enumerate(text.split("\n")[:-1], 1):
+    records: list[dict[str, Any]] = []
+    for number, line in enumerate(read_lines(path), 1):
+        if not line.endswith(b"\n"):
+            raise InputError(f"{path}: is cut short in line {number}")
         try:
-            record = json.loads(line, parse_constant=_refuse_constant)
-        except (ValueError, RecursionError) as error:
-            raise InputError(f"{path}: expected a record in line {number}, found {_excerpt(error)}") from error
+            record = parse_json(line)
+        except ValueError as error:
+            raise InputError(f"{path}: expected a record in line {number}, found {str(error)[:120]}") from error
         fault = _record_fault(record)
         if fault:
             raise InputError(f"{path}: line {number}: {fault}")
-        records.append(record)
-    if text and not text.endswith("\n"):
-        raise InputError(f"{path}: is cut short in line {len(records) + 1}")
+        records.append({key: record.get(key) for key in _KEPT})
     if not records:
         raise InputError(f"{path}: expected records, found none")
     return records
@@ -123,10 +102,12 @@ def _read_records(path: pathlib.Path) -> list[dict[str, Any]]:
 
 def _is_a(value: Any, kind: type) -> bool:
     if kind is float:
-        return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 2**53
     if kind is str:
         return isinstance(value, str) and value.isprintable()  # half a character could not be written again
-    return isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
+    if kind is int:
+        return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**53
+    return isinstance(value, kind)
 
 
 def _record_fault(record: Any) -> str | None:
@@ -145,6 +126,8 @@ def _record_fault(record: Any) -> str | None:
             return f"expected {key} as a cell, found {str(cell)[:40]!r}"
         if not all(0 <= index < record["size"] for index in cell):
             return f"expected {key} in a maze of {record['size']} cells a side, found {cell}"
+    if record["distance"] >= record["size"] ** 2:
+        return f"expected a distance in a maze of {record['size']} cells a side, found {record['distance']}"
     return None
 
 
@@ -156,6 +139,8 @@ def _read_setting(path: pathlib.Path, summary: dict[str, Any], records: list[dic
     split = summary.get("split")
     if split not in _SPLITS:
         raise InputError(f"{path}: {unknown('split', split, _SPLITS)}")
+    if split != "custom" and summary["size"] not in SIZES:
+        raise InputError(f"{path}: {unknown('size', summary['size'], SIZES)}")
     perturbation = summary.get("perturbation")
     if not isinstance(perturbation, dict) or not all(_is_a(perturbation.get(name), float) for name in PERTURBATIONS):
         raise InputError(f"{path}: expected perturbation with {', '.join(PERTURBATIONS)} as numbers, found another")
@@ -175,7 +160,7 @@ def _read_setting(path: pathlib.Path, summary: dict[str, Any], records: list[dic
 def _landmark_distance(path: pathlib.Path, summary: dict[str, Any]) -> int:
     options = _optional(_optional(summary, "provenance", dict, {}), "options", dict, {})
     found = summary.get("landmark_distance", options.get("landmark_distance"))
-    if found is None or not _is_a(found, int) or found < 1:
+    if found is None or not _is_a(found, int) or not 1 <= found <= MAX_SIZE**2:
         raise InputError(f"{path}: expected a landmark distance of at least 1 cell, found {str(found)[:40]}")
     return found
 
@@ -184,6 +169,9 @@ def _check_records(path: pathlib.Path, records: list[dict[str, Any]], summary: d
     """Refuses records that are not all of the summary's evaluation, in order."""
     if len(records) != summary["episodes"]:
         raise InputError(f"{path}: expected the summary's {summary['episodes']} records, found {len(records)}")
+    num_mazes = len({record["maze"] for record in records})
+    if num_mazes > MAX_FILES:
+        raise InputError(f"{path}: expected records of at most {MAX_FILES} mazes, found {num_mazes}")
     expected = {key: summary[key] for key in ("agent", "task", "size", "split")} | summary["perturbation"]
     for number, record in enumerate(records):
         for key, value in {"episode": number, **expected}.items():

@@ -20,15 +20,16 @@ class Navigation(control.Task):
     """Drive to the goal cell of a maze never seen before, with a map of it at hand.
 
     Actions: one of six, 0.16 s each: forward, backward, strafe_left, strafe_right, look_left, look_right. With
-      `continuous`, `[3]` velocities to drive at for 0.16 s, each in [-1, 1]: forward and left in shares of the top
-      speed (together no faster than it), turning to the left in shares of the turn rate.
+    `continuous`, `[3]` velocities to drive at for 0.16 s, each in [-1, 1]: forward and left in shares of the top speed
+    (together no faster than it), turning to the left in shares of the turn rate.
 
     Observations:
-      state: `[12]` float32: x, y, z (m); roll, pitch, yaw (rad, yaw in [-pi, pi)); velocity forward, left, up (m/s);
-        angular velocity about the body's x, y, z (rad/s). With `position_noise`, x and y are noisy.
-      context: `[4, M, M]` float32, constant until the next landmark: the map, the map around the start, goal, start.
-      is_first: bool, only where an episode has several legs: this context is new, as at the start of an episode.
-      egocentric, top, chase: `[H, H, 3]` uint8, those of `cameras`; they show the true world, the goal's marker in it.
+
+    - state: `[12]` float32: x, y, z (m); roll, pitch, yaw (rad, yaw in [-pi, pi)); velocity forward, left, up (m/s);
+      angular velocity about the body's x, y, z (rad/s). With `position_noise`, x and y are noisy.
+    - context: `[4, M, M]` float32, constant until the next landmark: the map, the map around the start, goal, start.
+    - is_first: bool, only where an episode has several legs: this context is new, as at the start of an episode.
+    - egocentric, top, chase: `[H, H, 3]` uint8, those of `cameras`; they show the true world, the goal's marker in it.
 
     Reward: -1 a step, 0 for the step that reaches the goal cell; never discounted on the way.
 

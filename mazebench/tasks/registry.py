@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pathlib
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import load_mazes
@@ -47,7 +48,9 @@ def make_spec(
       landmark_distance: cells between landmarks.
       context_size: M, the side of the context's planes; min(N, 21) by default.
       num_goals: of a local episode, one after the other; rewards and `success` speak of the last one only.
-      map_flip, map_warp, position_noise: see `Perturbation`.
+      map_flip: probability of each inner cell but start and goal to be shown flipped.
+      map_warp: how far each corner of the shown map may be moved, in shares of its side.
+      position_noise: m, standard deviation of the noise on x and y of each observation.
       continuous: whether actions are velocities (forward, left, turn), `[3]` in [-1, 1], instead of one of six.
       cameras: of "egocentric", "top" and "chase", those whose pictures are observed too.
       camera_size: pixels a side of these pictures.
@@ -85,7 +88,7 @@ def make_spec(
 
 
 def load(
-    task: str = "local", size: int | None = None, split: str = "train", seed: int | None = None, **options
+    task: str = "local", size: int | None = None, split: str = "train", seed: int | None = None, **options: Any
 ) -> Environment:
     """A dm_control environment of a navigation task; `options` are those of `make_spec`.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from mazebench.errors import InputError, unknown
 from mazebench.maps import perturb
 from mazebench.maps.generators import corner_cells
 from mazebench.maps.maze import MAX_SIZE, Cell, Maze, path_through_walls
+from mazebench.tasks import TASK_VERSION
 from mazebench.tasks.context import build_context, default_context_size
 from mazebench.tasks.episode import Episode, Route, ShownMap
 from mazebench.world.models import MazeModels
@@ -39,7 +41,7 @@ class Perturbation:
     map_warp: float = 0.0  # largest shift of a corner of the map, in shares of its side
     position_noise: float = 0.0  # m, standard deviation on x and y of each observation
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name, highest in (
             ("map_flip", 1.0),
             ("map_warp", perturb.MAX_WARP),
@@ -58,6 +60,8 @@ class TaskSpec:
       InputError: if an option is out of range, or no pair of cells of a maze is a wanted distance apart.
     """
 
+    version: ClassVar[int] = TASK_VERSION  # of what an episode is, whichever environment plays it
+
     task: str  # a name in TASKS
     mazes: tuple[Maze, ...]
     distances: tuple[int, ...] = TRAIN_DISTANCES  # cells; of start and goal of a local episode
@@ -71,7 +75,7 @@ class TaskSpec:
     cameras: tuple[str, ...] = ()  # whose pictures are observed too
     camera_size: int = 64  # pixels a side of these pictures
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.task not in TASKS:
             raise unknown("task", self.task, TASKS)
         for camera in self.cameras:

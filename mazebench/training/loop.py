@@ -140,8 +140,7 @@ class _Run:
         if not checkpoints:
             self._save()
             return
-        counters = read_json(checkpoints[-1] / COUNTERS)
-        self._env_steps, self._updates = counters["env_steps"], counters["updates"]
+        self._env_steps, self._updates = _read_counters(checkpoints[-1])
         self._saved_steps = self._env_steps
         self._learner.load(checkpoints[-1])
         self._folder.forget_metrics_after(self._env_steps)
@@ -224,6 +223,22 @@ def _held_out_spec(task_spec: TaskSpec, num_mazes: int) -> TaskSpec:
         for index, stream in enumerate(streams)
     )
     return dataclasses.replace(task_spec, mazes=mazes, distances=_HELD_OUT_DISTANCES, num_goals=1, pairs="random")
+
+
+def _read_counters(checkpoint: pathlib.Path) -> tuple[int, int]:
+    """Agent steps and updates at a checkpoint, which is named after its steps.
+
+    Raises:
+      InputError: if they can't be read.
+    """
+    counters = read_json(checkpoint / COUNTERS)
+    steps, updates = (counters.get(key) if isinstance(counters, dict) else None for key in ("env_steps", "updates"))
+    if type(steps) is not int or type(updates) is not int or steps != int(checkpoint.name) or updates < 0:
+        raise InputError(
+            f"{checkpoint / COUNTERS}: expected env_steps {int(checkpoint.name)} and updates, "
+            f"found {str(counters)[:80]}"
+        )
+    return steps, updates
 
 
 def _mix(*numbers: int) -> int:

@@ -5,12 +5,21 @@ from __future__ import annotations
 import json
 import os
 import pathlib
+import re
 import shutil
 from collections.abc import Callable
 from typing import Any
 
 from mazebench.errors import InputError, RunError
-from mazebench.records import FolderLock, make_folder, read_json, repair_and_read_lines, to_line, write_json
+from mazebench.records import (
+    FolderLock,
+    make_folder,
+    open_to_write,
+    read_json,
+    repair_and_read_lines,
+    to_line,
+    write_json,
+)
 
 CONFIG = "config.json"
 METRICS = "metrics.jsonl"
@@ -18,6 +27,7 @@ CHECKPOINTS = "checkpoints"
 COUNTERS = "counters.json"
 _BOARD = "tensorboard"
 _KEPT_CHECKPOINTS = 2
+_CHECKPOINT_NAME = re.compile(r"[0-9]{12,}")  # agent steps; older ones are removed, so nothing else must look alike
 
 
 class RunFolder:
@@ -42,7 +52,8 @@ class RunFolder:
 
     def checkpoints(self) -> list[pathlib.Path]:
         """The complete checkpoints, oldest first."""
-        return sorted(path for path in (self.path / CHECKPOINTS).iterdir() if path.name.isdecimal())
+        folders = (self.path / CHECKPOINTS).iterdir()
+        return sorted(path for path in folders if _CHECKPOINT_NAME.fullmatch(path.name))
 
     def save_checkpoint(self, env_steps: int, counters: dict[str, Any], save: Callable[[pathlib.Path], None]) -> None:
         """Lets `save` fill a new checkpoint, which then takes its place at once; the last two are kept.
@@ -68,7 +79,7 @@ class RunFolder:
 
     def log(self, metrics: dict[str, Any]) -> None:
         """Appends a line to the metrics."""
-        with open(self.path / METRICS, "a", encoding="utf-8") as file:
+        with open_to_write(self.path / METRICS, "a") as file:
             file.write(to_line(metrics))
         step = metrics["env_steps"]
         if self._board is None:
@@ -85,7 +96,8 @@ class RunFolder:
         path = self.path / METRICS
         kept = [line for line in repair_and_read_lines(path, "env_steps") if line["env_steps"] <= env_steps]
         temporary = path.with_suffix(".tmp")
-        temporary.write_text("".join(map(to_line, kept)), encoding="utf-8")
+        with open_to_write(temporary, "w") as file:
+            file.write("".join(map(to_line, kept)))
         temporary.replace(path)
 
     def check_config(self, config: dict[str, Any]) -> None:
