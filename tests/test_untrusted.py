@@ -619,7 +619,7 @@ class TestResults:
         assert all("not installed" in line for line in lines)
         assert "<script>alert" not in (tmp_path / "out" / "report.html").read_text()
 
-    @very_few_or_many
+    @pytest.mark.parametrize("num_examples", [12, pytest.param(100, marks=pytest.mark.slow)])
     def test_report_when_numbers_are_strange_but_legal(self, tmp_path, num_examples):
         good = make_result(tmp_path / "good", "mah", num_mazes=2)
         lines = [json.loads(line) for line in (good / "episodes.jsonl").read_text().splitlines()]
