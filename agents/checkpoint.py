@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import pathlib
 import struct
 from collections.abc import Callable, Mapping
@@ -13,7 +12,8 @@ import safetensors
 import safetensors.torch
 import torch
 
-from mazebench.errors import InputError, read_at_most
+from mazebench.errors import InputError
+from mazebench.files import open_whole, read_at_most
 from mazebench.maps.maze import MAX_SIZE
 from mazebench.records import parse_json
 
@@ -31,12 +31,8 @@ def save_checkpoint(path: pathlib.Path, tensors: Mapping[str, torch.Tensor], met
     # One key only: the order of several in the file would be left to chance.
     header = {FORMAT: json.dumps(metadata, sort_keys=True)}
     content = safetensors.torch.save({name: tensor.detach().contiguous() for name, tensor in tensors.items()}, header)
-    temporary = path.with_name(path.name + ".tmp")
-    with temporary.open("wb") as file:
+    with open_whole(path) as file:
         file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
 
 
 def load_checkpoint(path: pathlib.Path, agent: str) -> tuple[dict[str, torch.Tensor], dict[str, Any]]:

@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mazebench.arrays import read_arrays
-from mazebench.errors import InputError, open_file
+from mazebench.errors import InputError
+from mazebench.files import open_file
 from mazebench.training.experience import Experience
 
 from .sum_tree import SumTree

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import datetime
 import enum
 import json
 import os
 import pathlib
+import shlex
+import shutil
+import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -42,8 +46,20 @@ class Split(enum.StrEnum):
     eval = "eval"
 
 
+class _Terminated(BaseException):
+    """The process was asked to end by SIGTERM; of no kind that anyone below catches."""
+
+
+def _terminate(number: int, frame: object) -> NoReturn:
+    raise _Terminated
+
+
 def main() -> None:
-    """Runs a command: exit status 0 done, 1 a run failed, 2 bad input, which gets one line and no traceback."""
+    """Runs a command: exit status 0 done, 1 a run failed, 2 bad input, which gets one line and no traceback.
+
+    An interrupt ends it with 130 and SIGTERM with 143, and one line that says how to go on.
+    """
+    at_end = signal.signal(signal.SIGTERM, _terminate)
     try:
         status = app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0
         if status == 130:  # typer's, of an interrupt
@@ -57,12 +73,27 @@ def main() -> None:
         _fail(f"{error.filename or 'file'}: {error.strerror or error}", 2)
     except RunError as error:
         _fail(str(error), 1)
-    except (KeyboardInterrupt, typer.Abort):
-        _fail("interrupted; what was written is kept, go on with --resume", 130)
+    except (KeyboardInterrupt, _Terminated, typer.Abort) as stop:
+        _stop(stop, "run it again")
+    finally:
+        signal.signal(signal.SIGTERM, at_end)
 
 
 def _fail(message: str, status: int) -> NoReturn:
     _remark(" ".join(message.split()))
+    sys.exit(status)
+
+
+def _stop(stop: BaseException, kept: str, *options: str) -> NoReturn:
+    """Ends the command that was told to `stop`, saying what is kept, and that the same with `options` goes on."""
+    program = [sys.argv[0]]
+    if pathlib.Path(program[0]).name == "__main__.py":
+        program = [sys.executable, "-m", "mazebench"]
+    elif shutil.which("mazebench") == program[0]:
+        program = ["mazebench"]
+    words = [*program, *sys.argv[1:], *(option for option in options if option not in sys.argv)]
+    said, status = ("terminated", 143) if isinstance(stop, _Terminated) else ("interrupted", 130)
+    print(f"mazebench: {said}; {kept} with: {shlex.join(words)}", file=sys.stderr)
     sys.exit(status)
 
 
@@ -231,17 +262,31 @@ def evaluate(
     )
     folder = out or _new_folder(f"{agents[0].replace(':', '-')}-{task.value}" if suite is None else suite)
     running = {"num_envs": num_envs, "workers": workers, "ray_address": ray}
+    kept = _Kept()
     try:
         if suite is None:
-            _evaluate_one(options, folder, resume, bool(record), running)
+            _evaluate_one(options, folder, resume, bool(record), running, kept)
         else:
-            _evaluate_suite(suite, agents, options, folder, resume, record is not False, running)
-    except KeyboardInterrupt:
-        _fail(f"interrupted; what was written is kept, go on with the same options and --resume --out {folder}", 130)
+            _evaluate_suite(suite, agents, options, folder, resume, record is not False, running, kept)
+    except (KeyboardInterrupt, _Terminated) as stop:
+        _stop(stop, f"{kept} in {folder}; go on", *(() if out else ("--out", str(folder))), "--resume")
     print(f"results in {folder}")
 
 
-def _evaluate_one(options: Any, folder: pathlib.Path, resume: bool, record: bool, running: dict[str, Any]) -> None:
+@dataclasses.dataclass
+class _Kept:
+    """How many episodes are on disk."""
+
+    done: int = 0
+    of: int | None = None  # None before the first is run
+
+    def __str__(self) -> str:
+        return "no further episode is kept" if self.of is None else f"{self.done:,} of {self.of:,} episodes are kept"
+
+
+def _evaluate_one(
+    options: Any, folder: pathlib.Path, resume: bool, record: bool, running: dict[str, Any], kept: _Kept
+) -> None:
     from mazebench.evaluation import harness, results, table
 
     if resume and harness.is_finished(folder, record):
@@ -251,7 +296,7 @@ def _evaluate_one(options: Any, folder: pathlib.Path, resume: bool, record: bool
         table.print_summary(summary)
         return
     _say_whether_resuming(folder, resume)
-    with _progress(f"{options.agent}, {options.task}") as advance:
+    with _progress(f"{options.agent}, {options.task}", kept) as advance:
         summary = harness.evaluate(options, folder, resume=resume, record=record, progress=advance, **running)
     table.print_summary(summary)
 
@@ -264,6 +309,7 @@ def _evaluate_suite(
     resume: bool,
     record: bool,
     running: dict[str, Any],
+    kept: _Kept,
 ) -> None:
     from mazebench.evaluation import suites, table
 
@@ -272,7 +318,7 @@ def _evaluate_suite(
         print(f"{folder}: the run is finished")
     else:
         _say_whether_resuming(folder, resume)
-    with _progress(f"{suite}, {', '.join(agents)}") as advance:
+    with _progress(f"{suite}, {', '.join(agents)}", kept) as advance:
         run.run(resume=resume, progress=advance, **running)
     table.print_suite(run.summaries())
 
@@ -352,7 +398,7 @@ def train(
     ] = None,
 ) -> None:
     """Train an agent on the benchmark's training mazes; evaluated now and then on held-out mazes of the same kind."""
-    from mazebench.training import loop
+    from mazebench.training import loop, run_folder
 
     _refuse_ignored(context, (not workers, "without --workers this process collects by itself", ("ray",)))
     options = loop.TrainOptions(
@@ -369,8 +415,13 @@ def train(
         ray_address=ray,
     )
     folder = out or pathlib.Path("runs") / f"{agent.replace(':', '-')}-{size}-{seed}"
-    with _training_progress() as report:
-        loop.train(options, folder, resume, report)
+    try:
+        with _training_progress() as report:
+            loop.train(options, folder, resume, report)
+    except (KeyboardInterrupt, _Terminated) as stop:
+        last = next(reversed(run_folder.checkpoints(folder)), None)
+        kept = "no checkpoint is kept" if last is None else f"the checkpoint at {int(last.name):,} steps is kept"
+        _stop(stop, f"{kept} in {folder}; go on", "--resume")
     print(f"run in {folder}; evaluate it by: mazebench eval --agent {agent} --checkpoint {folder}")
 
 
@@ -412,7 +463,10 @@ def report(
     """Make tables, figures and a page to explore every episode from results of `mazebench eval`."""
     from mazebench.report import writing
 
-    reported = writing.write_report(results, out, warn=_remark)
+    try:
+        reported = writing.write_report(results, out, warn=_remark)
+    except (KeyboardInterrupt, _Terminated) as stop:
+        _stop(stop, f"the report in {out} is not whole; make it anew")
     agents = sorted({result.label for result in reported})
     print(f"{len(reported)} results of {', '.join(agents)}: {out / writing.PAGE}, {out / writing.DOCUMENT}")
 
@@ -584,8 +638,8 @@ def parse_distances(text: str) -> tuple[int, ...]:
 
 
 @contextmanager
-def _progress(title: str) -> Iterator[Any]:
-    """Yields a function (done, of) that moves a bar on a terminal, and elsewhere prints a line at every tenth."""
+def _progress(title: str, kept: _Kept) -> Iterator[Any]:
+    """Yields a function (done, of) that notes what is `kept` and moves a bar; without a terminal it prints tenths."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -601,6 +655,7 @@ def _progress(title: str) -> Iterator[Any]:
         tenths_seen = [-1]
 
         def say(done: int, of: int) -> None:
+            kept.done, kept.of = done, of
             tenth = 10 * done // max(of, 1)
             if tenth > tenths_seen[0]:
                 tenths_seen[0] = tenth
@@ -617,4 +672,9 @@ def _progress(title: str) -> Iterator[Any]:
     )
     with Progress(*columns, console=console) as bar:
         task = bar.add_task(title, total=None)
-        yield lambda done, of: bar.update(task, completed=done, total=of)
+
+        def advance(done: int, of: int) -> None:
+            kept.done, kept.of = done, of
+            bar.update(task, completed=done, total=of)
+
+        yield advance

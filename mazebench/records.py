@@ -6,15 +6,17 @@ which goes when the last episode is in place.
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import math
 import os
 import pathlib
 from collections.abc import Iterator
-from typing import IO, Any
+from typing import Any
 
-from mazebench.errors import InputError, open_file, read_at_most
+from mazebench.errors import InputError
+from mazebench.files import open_file, open_to_write, open_whole, read_at_most
 
 EPISODES = "episodes.jsonl"
 JOURNAL = "journal.jsonl"
@@ -28,18 +30,6 @@ _MAX_LINE = 2**16  # bytes of a record; they take 0.4 KB
 _MAX_DEPTH = 32  # of JSON; deeper nesting could not be written or compared, which Python does by recursion
 
 Record = dict[str, Any]
-
-
-def make_folder(path: pathlib.Path) -> None:
-    """Makes a folder to write to.
-
-    Raises:
-      InputError: if that can't be.
-    """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{path}: can't write there: {error.strerror}") from error
 
 
 class FolderLock:
@@ -119,6 +109,7 @@ class RecordLog:
         """Removes the journal; all records must be there."""
         assert self._num_written == self._num_episodes
         self._episodes.flush()
+        os.fsync(self._episodes.fileno())  # before there is a summary of them
         self._journal.close()
         (self._folder / JOURNAL).unlink()
 
@@ -135,8 +126,9 @@ class RecordLog:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._episodes.close()
-        self._journal.close()
+        for file in (self._episodes, self._journal):
+            with contextlib.suppress(OSError):  # what could not be written was told before, or is in the journal
+                file.close()
 
 
 def to_line(record: Record) -> str:
@@ -175,32 +167,10 @@ def _finite(text: str) -> float:
     return value
 
 
-def open_to_write(path: pathlib.Path, mode: str) -> IO[Any]:
-    """Opens a file of a folder that may come from outside, where a link could lead to a file of someone else's.
-
-    Raises:
-      InputError: if it is such a link, or can't be written.
-    """
-    try:
-        return open(path, mode, encoding=None if "b" in mode else "utf-8", opener=_open_no_link)
-    except OSError as error:
-        said = "it is a link" if path.is_symlink() else error.strerror
-        raise InputError(f"{path}: can't write: {said}") from error
-
-
-def _open_no_link(path: str, flags: int) -> int:
-    # A pipe without a reader is refused by the system instead of waited for.
-    return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
-
-
 def write_json(path: pathlib.Path, content: Any) -> None:
     """Writes `content` all or nothing: a reader finds the old file or the new one."""
-    temporary = path.with_name(path.name + ".tmp")
-    with open_to_write(temporary, "w") as file:
-        file.write(json.dumps(content, indent=1, allow_nan=False) + "\n")
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
+    with open_whole(path) as file:
+        file.write((json.dumps(content, indent=1, allow_nan=False) + "\n").encode("utf-8"))
 
 
 def read_json(path: pathlib.Path) -> Any:

@@ -6,7 +6,6 @@ import json
 import os
 import pathlib
 import shutil
-import signal
 import subprocess
 import sys
 
@@ -447,23 +446,6 @@ class TestEval:
         status, _, errors = command("eval", "--agent", "broken_at_hand:Broken", *arguments)
         assert (status, errors.count("\n")) == (2, 1)
         assert "agent 'broken_at_hand:Broken': its module can't be imported: SyntaxError: invalid syntax" in errors
-
-    def test_eval_when_interrupted(self, tmp_path):
-        command = [sys.executable, "-m", "mazebench", "eval", "--agent", "random", "--num-envs", "1", "--out", "run"]
-        # Where these tests run in the background, interrupts are ignored, and processes inherit that.
-        with subprocess.Popen(
-            command,
-            stderr=subprocess.PIPE,
-            text=True,
-            cwd=tmp_path,
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-        ) as process:
-            process.stderr.readline()  # it is under way
-            process.send_signal(signal.SIGINT)
-            errors = process.stderr.read()
-        assert process.returncode == 130
-        assert errors.splitlines()[-1].startswith("mazebench: interrupted; ")
-        assert "Traceback" not in errors
 
 
 class TestSuite:

@@ -8,7 +8,6 @@ import json
 import os
 import pathlib
 import shutil
-import subprocess
 import sys
 
 import numpy as np
@@ -237,35 +236,6 @@ class TestResume:
         (tmp_path / "config.json.tmp").write_text('{"rec')
         evaluate(RANDOM, tmp_path, resume=True)
         assert (tmp_path / "episodes.jsonl").read_bytes() == (random_run / "episodes.jsonl").read_bytes()
-
-    def test_run_when_its_process_is_killed(self, tmp_path):
-        options = EvalOptions("random", distances=tuple(range(6, 11)), episodes_per_distance=3)
-        arguments = ["--distances", "6-10", "--episodes-per-distance", "3", "--num-envs", "4"]
-        command = [
-            sys.executable,
-            "-m",
-            "mazebench",
-            "eval",
-            "--agent",
-            "random",
-            *arguments,
-            "--out",
-            tmp_path / "out",
-        ]
-        with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
-            for line in process.stderr:
-                if int(line.split(": ")[1].split(" of ")[0]) >= 60:  # "random, local: 60 of 300 episodes"
-                    process.kill()
-                    break
-        assert process.returncode == -9
-        assert not is_finished(tmp_path / "out")
-        assert 0 < len((tmp_path / "out" / "episodes.jsonl").read_bytes().splitlines()) < 300
-        evaluate(options, tmp_path / "out", resume=True)
-        evaluate(options, tmp_path / "unbroken")
-        assert (tmp_path / "out" / "episodes.jsonl").read_bytes() == (
-            tmp_path / "unbroken" / "episodes.jsonl"
-        ).read_bytes()
-        assert summary_of(tmp_path / "out")["overall"] == summary_of(tmp_path / "unbroken")["overall"]
 
 
 class TestOut:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mazebench.errors import InputError
+from mazebench.maps import files
 from mazebench.maps.files import MAX_FILES, read_maze, read_mazes
 from mazebench.maps.generators import generate
 from mazebench.maps.image import draw_maze, write_image
@@ -80,6 +81,16 @@ def test_mazes_when_folder_holds_too_many(tmp_path):
     for index in range(MAX_FILES + 1):
         (tmp_path / f"{index}.txt").touch()
     with pytest.raises(InputError, match=r"expected 1 to 10000 maps .*, found 10001$"):
+        read_mazes(tmp_path)
+
+
+def test_mazes_when_folder_holds_too_much_else(mazes, tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "_MAX_ENTRIES", 3)
+    write_text_maze(mazes[0], tmp_path / "a.txt")
+    for index in range(3):
+        assert read_mazes(tmp_path) == (mazes[0],)
+        (tmp_path / f"{index}.log").touch()
+    with pytest.raises(InputError, match="expected a folder of at most 3 files, found more"):
         read_mazes(tmp_path)
 
 

@@ -4,14 +4,11 @@ import dataclasses
 import itertools
 import json
 import math
-import resource
-import signal
-import subprocess
-import sys
 import time
 
 import numpy as np
 import pytest
+from faults import TINY
 
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze
@@ -19,18 +16,6 @@ from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 from mazebench.training.loop import TrainingError, TrainOptions, train
 from mazebench.training.run_folder import RunFolder
-
-# A network, batch and replay that take seconds.
-TINY = {
-    "channels": "4",
-    "hidden": "16",
-    "groups": "4",
-    "steps": "4",
-    "num_envs": "8",
-    "min_rows": "400",
-    "steps_per_update": "32",
-    "replay_capacity": "4000",
-}
 
 
 def tiny_options(**changes):
@@ -130,35 +115,6 @@ def test_loss_that_is_not_finite_stops_the_run_with_the_last_checkpoint(tmp_path
         TrainingError, match=r"became (nan|inf|-inf) at update .*; last good checkpoint: .*000000000000"
     ):
         train(tiny_options(env_steps=100_000, overrides=tuple(overrides.items())), tmp_path)
-
-
-COMMAND = [sys.executable, "-m", "mazebench", "train", "--agent", "mah", "--checkpoint-steps", "800"]
-COMMAND += ["--eval-mazes", "1"]
-COMMAND += [word for key, value in TINY.items() for word in ("--set", f"{key}={value}")]
-
-
-def test_disk_that_fills_while_saving_leaves_the_checkpoint_before(tmp_path):
-    def limit():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
-
-    command = [*COMMAND, "--env-steps", "4000", "--out", str(tmp_path / "run")]
-    result = subprocess.run(command, capture_output=True, text=True, preexec_fn=limit, check=False)
-    assert result.returncode == 1, result.stderr
-    assert len(result.stderr.strip().splitlines()) == 1
-    assert "can't save" in result.stderr
-    assert [path.name for path in (tmp_path / "run" / "checkpoints").iterdir()] == ["000000000000"]
-
-
-def test_run_killed_at_some_moment_goes_on_from_its_last_checkpoint(unbroken, tmp_path):
-    command = [*COMMAND, "--env-steps", "2400", "--out", str(tmp_path)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    assert process.stdout is not None
-    process.stdout.readline()  # the first checkpoint's line
-    process.send_signal(signal.SIGKILL)
-    process.communicate()
-    assert not (tmp_path / "checkpoints" / "000000002400").exists()
-    subprocess.run([*command, "--resume"], check=True, capture_output=True)
-    assert metrics(tmp_path) == metrics(unbroken)
 
 
 def test_minutes_limit_a_sitting(tmp_path):

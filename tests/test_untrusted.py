@@ -47,7 +47,7 @@ from mazebench_agents.replay import Replay
 
 from mazebench import cli
 from mazebench.agent import Interface
-from mazebench.errors import InputError
+from mazebench.errors import InputError, RunError
 from mazebench.evaluation.comparison import compare_folders
 from mazebench.evaluation.harness import EvalOptions, evaluate
 from mazebench.evaluation.results import load_result, read_suite
@@ -75,8 +75,8 @@ TRAINING = TrainOptions(
     eval_mazes=1,
 )
 # What `make check-full` runs is thousands.
-few_or_many = pytest.mark.parametrize("num_examples", [40, pytest.param(3000, marks=pytest.mark.slow)])
-very_few_or_many = pytest.mark.parametrize("num_examples", [12, pytest.param(600, marks=pytest.mark.slow)])
+few_or_many = pytest.mark.parametrize("num_examples", [40, pytest.param(1500, marks=pytest.mark.slow)])
+very_few_or_many = pytest.mark.parametrize("num_examples", [12, pytest.param(300, marks=pytest.mark.slow)])
 
 
 def fuzz(strategy: st.SearchStrategy[Any], check: Callable[[Any], object], num_examples: int) -> None:
@@ -451,7 +451,9 @@ class TestTraining:
         with pytest.raises(InputError, match=rf"replay\.npz: .*({said})"):
             self.resume(run)
 
-    @pytest.mark.parametrize("name", ["config.json", "metrics.jsonl", "metrics.tmp", "counters.json", "replay.npz"])
+    @pytest.mark.parametrize(
+        "name", ["config.json", "metrics.jsonl", "metrics.jsonl.tmp", "counters.json", "replay.npz"]
+    )
     @pytest.mark.parametrize("kind", ["folder", "pipe", "device", "link", "circular link"])
     def test_run_when_something_else_stands_for_a_file(self, training, tmp_path, name, kind):
         run = copied(training, tmp_path / "run")
@@ -607,7 +609,7 @@ class TestResults:
         for reader in ("result", "report"):
             said, megabytes = read_limited({reader: [folder]}, gigabytes=8, seconds=300)
             assert said[reader]
-            assert megabytes < 3000
+            assert megabytes < 1500
 
     def test_report_when_agents_have_strange_names(self, tmp_path):
         names = ["$\\frac{", "a|b`c`", "</script><script>alert(1)</script>", "%n & _x_ \\end{", "ä " * 40, "=1+1"]
@@ -684,7 +686,7 @@ class TestResume:
             (folder / name).write_bytes(content)
             before = content_of(folder)
             if refusal(lambda: evaluate(RANDOM, folder, resume=True)) is None:
-                assert len((folder / "episodes.jsonl").read_bytes().splitlines()) == 20
+                assert (folder / "episodes.jsonl").read_bytes().count(b"\n") == 20
             else:
                 assert content_of(folder).keys() == before.keys()
 
@@ -700,7 +702,7 @@ class TestResume:
         special_files(tmp_path)[kind](begun / name)
         if name == "config.json.tmp":
             (begun / "config.json").unlink()
-        with contextlib.suppress(IsADirectoryError):
+        with contextlib.suppress(RunError):  # of a file that is wanted only at the end
             refusal(lambda: evaluate(RANDOM, begun, resume=True, record=True))
         assert (tmp_path / "victim").read_text() == "mine\n"
         assert not (tmp_path / "nothing").exists()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import signal
 import sys
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -28,12 +30,8 @@ class Cluster:
           InputError: if there is none.
         """
         self._started = not ray.is_initialized()
-        try:
-            if self._started:
-                ray.init(address=address, log_to_driver=False, include_dashboard=False)
-        except (ConnectionError, ValueError, RuntimeError) as error:
-            said = " ".join(str(error).split())[:200]
-            raise InputError(f"can't reach a Ray cluster at {address!r}: {said}") from error
+        if self._started:
+            connect(address)
         self.num_cpus = max(1, int(ray.cluster_resources().get("CPU", 0)))
 
     def run(self, jobs: Iterator[Job], num_envs: int, workers: int) -> Iterator[Ended]:
@@ -73,6 +71,23 @@ class Cluster:
     def __exit__(self, *exception: object) -> None:
         if self._started:
             ray.shutdown()
+
+
+def connect(address: str | None) -> None:
+    """Connects this process to the cluster at `address`, as `Cluster` does; None starts one, too.
+
+    Raises:
+      InputError: if there is none.
+    """
+    at_end = signal.getsignal(signal.SIGTERM)
+    try:
+        ray.init(address=address, log_to_driver=False, include_dashboard=False)
+    except (ConnectionError, ValueError, RuntimeError) as error:
+        said = " ".join(str(error).split())[:200]
+        raise InputError(f"can't reach a Ray cluster at {address!r}: {said}") from error
+    finally:
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, at_end)  # which Ray takes
 
 
 def _start(job: Job, num_envs: int) -> Any:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
+import struct
+import tempfile
 from collections.abc import Callable
 
 import cv2
@@ -13,6 +15,7 @@ from mazebench.agent import load_agent_class
 from mazebench.errors import InputError, unknown
 from mazebench.evaluation.options import EvalOptions, build_agent, is_frozen, make_task_spec, resolve_checkpoint
 from mazebench.evaluation.protocol import select_trials
+from mazebench.files import open_whole
 from mazebench.maps import perturb
 from mazebench.maps.image import draw_grid, write_image
 from mazebench.tasks.navigation import Environment
@@ -133,19 +136,33 @@ def _write_gif(frames: list[np.ndarray], out: pathlib.Path) -> None:
     done, content = cv2.imencodeanimation(".gif", animation)
     if not done:
         raise InputError(f"{out}: this OpenCV can't write GIF")
-    out.write_bytes(content.tobytes())
+    with open_whole(out) as file:
+        file.write(content.tobytes())
 
 
 def _write_mp4(frames: list[np.ndarray], out: pathlib.Path) -> None:
-    with open(out, "wb"):  # OpenCV says nothing of a file that it can't write
-        pass
     height, width = frames[0].shape[:2]
-    writer = cv2.VideoWriter(str(out), cv2.VideoWriter.fourcc(*"mp4v"), _FRAMES_PER_SECOND, (width, height))
-    if not writer.isOpened():
-        raise InputError(f"{out}: this OpenCV can't write MP4")
-    for frame in frames:
-        writer.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
-    writer.release()
+    with tempfile.TemporaryDirectory(dir=out.parent, prefix=".film-") as folder:
+        film = pathlib.Path(folder) / "film.mp4"
+        writer = cv2.VideoWriter(str(film), cv2.VideoWriter.fourcc(*"mp4v"), _FRAMES_PER_SECOND, (width, height))
+        for frame in frames:
+            writer.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
+        writer.release()
+        # OpenCV says nothing of a disk that is full. The index of the frames, b"moov", is written last.
+        if not film.exists() or b"moov" not in _whole_boxes(film.read_bytes()):
+            raise InputError(f"{out}: can't write the film: the disk is full, or this OpenCV can't write MP4")
+        film.replace(out)
+
+
+def _whole_boxes(content: bytes) -> list[bytes]:
+    """The names of the boxes that an MP4 file is made of, up to one that is cut off."""
+    names, start = [], 0
+    while start + 8 <= len(content):
+        size, name = struct.unpack_from(">I4s", content, start)
+        start += max(size, 8)
+        if start <= len(content):
+            names.append(name)
+    return names
 
 
 _WRITERS: dict[str, Callable[[list[np.ndarray], pathlib.Path], None]] = {

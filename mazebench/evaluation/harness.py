@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from mazebench.agent import load_agent_class
-from mazebench.errors import InputError
+from mazebench.errors import InputError, RunError
 from mazebench.evaluation import metrics
 from mazebench.evaluation.options import EvalOptions, is_frozen, make_task_spec, resolve_checkpoint
 from mazebench.evaluation.protocol import Trial, select_trials
@@ -18,8 +18,9 @@ from mazebench.evaluation.provenance import code_hash, file_hash, provenance
 from mazebench.evaluation.results import check_records
 from mazebench.evaluation.trajectories import JOURNAL, TRAJECTORIES, TrajectoryLog
 from mazebench.evaluation.workers import Ended, Job, run_here, run_in_processes
+from mazebench.files import make_folder, writing_to
 from mazebench.maps.benchmark import VERSION, manifest_hash
-from mazebench.records import CONFIG, SUMMARY, FolderLock, RecordLog, make_folder, read_json, write_json
+from mazebench.records import CONFIG, SUMMARY, FolderLock, RecordLog, read_json, write_json
 from mazebench.world.mjcf import maze_spec
 
 # Called with the number of episodes done and of all.
@@ -124,6 +125,10 @@ class Evaluation:
         """
         make_folder(self.out)
         self._opened.enter_context(FolderLock(self.out))
+        with writing_to(self.out):
+            self._open_logs(resume)
+
+    def _open_logs(self, resume: bool) -> None:
         _prepare(self.out, self._config, resume)
         # Trajectories of a part of the episodes would be of no use: what began to record goes on.
         self._record = self._record or (self.out / JOURNAL).exists()
@@ -153,17 +158,24 @@ class Evaluation:
             yield Job(number, self._options, tuple(todo[piece::pieces]), self._record, self._task_spec)
 
     def add(self, ended: Ended) -> None:
-        """Puts episodes that ended on disk."""
-        if self._trajectories is not None:
-            self._trajectories.add(ended.trajectories)
+        """Puts episodes that ended on disk.
+
+        Raises:
+          RunError: if the disk is full, or can't be written any more.
+        """
         config = self._config
-        self._log.add([{**config["record"], **record, **config["perturbation"]} for record in ended.records])
+        with self._keeping_what_is_written():
+            if self._trajectories is not None:
+                self._trajectories.add(ended.trajectories)
+            self._log.add([{**config["record"], **record, **config["perturbation"]} for record in ended.records])
         self._todo -= {record["episode"] for record in ended.records}
 
     def finish(self) -> dict[str, Any]:
-        """Writes the summary, and returns it; all episodes must have ended."""
-        if self._trajectories is not None:
-            self._trajectories.finish()
+        """Writes the summary, and returns it; all episodes must have ended.
+
+        Raises:
+          RunError: as for `add`.
+        """
         summary = {
             **self._config["record"],
             **self.labels,
@@ -176,10 +188,22 @@ class Evaluation:
             },
             **metrics.summarize(self._log.records),
         }
-        self._log.finish()
-        write_json(self.out / SUMMARY, summary)
+        with self._keeping_what_is_written():
+            if self._trajectories is not None:
+                self._trajectories.finish()
+            self._log.finish()
+            write_json(self.out / SUMMARY, summary)
         self.close()
         return summary
+
+    @contextlib.contextmanager
+    def _keeping_what_is_written(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise RunError(
+                f"{self.out}: can't write there: {error.strerror}; what was written is kept, go on with --resume"
+            ) from error
 
     def _make_config(self) -> dict[str, Any]:
         """What identifies a run; `record` and `perturbation` are also the part of it that each record repeats."""

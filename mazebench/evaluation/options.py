@@ -89,7 +89,8 @@ def _newest_checkpoint(path: pathlib.Path) -> pathlib.Path:
     """
     if not path.is_dir():
         return path
-    found = sorted(path.glob("agent.safetensors")) + sorted(path.glob("checkpoints/*/agent.safetensors"))
+    complete = (folder for folder in path.glob("checkpoints/*") if folder.name.isdecimal())
+    found = [file for folder in (path, *sorted(complete)) if (file := folder / "agent.safetensors").exists()]
     if not found:
         raise InputError(f"{path}: expected a checkpoint or the folder of a training run, found neither")
     return found[-1]

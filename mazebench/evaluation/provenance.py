@@ -16,8 +16,9 @@ from importlib import metadata
 from typing import Any
 
 from mazebench.agent import Agent
-from mazebench.errors import InputError, open_file
+from mazebench.errors import InputError
 from mazebench.evaluation.options import EvalOptions
+from mazebench.files import open_file
 from mazebench.maps.benchmark import VERSION, manifest_hash
 from mazebench.records import parse_json
 from mazebench.tasks import TASK_VERSION

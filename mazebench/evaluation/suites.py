@@ -14,8 +14,9 @@ from mazebench.errors import InputError, unknown
 from mazebench.evaluation.harness import Evaluation, Progress, run_evaluations
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.results import SUITE, is_safe_name, load_result, read_suite
+from mazebench.files import make_folder, writing_to
 from mazebench.maps.benchmark import SIZES, VERSION, manifest_hash
-from mazebench.records import CONFIG, FolderLock, make_folder, write_json
+from mazebench.records import CONFIG, FolderLock, write_json
 
 _TABLE_DISTANCES = (2, 4, 6, 8, 10)  # those that the paper prints
 
@@ -119,7 +120,8 @@ class SuiteRun:
             for evaluation in self.evaluations:
                 if (evaluation.out / CONFIG).exists():
                     evaluation.check_same_run()
-            write_json(self.out / SUITE, content)
+            with writing_to(self.out):
+                write_json(self.out / SUITE, content)
             left = [evaluation for evaluation in self.evaluations if not evaluation.is_finished]
             finished = sum(len(evaluation.trials) for evaluation in self.evaluations if evaluation.is_finished)
             run_evaluations(

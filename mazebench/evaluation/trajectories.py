@@ -8,10 +8,10 @@ they wait in `trajectories.journal`, each in a block with a checksum, so that a 
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import math
-import os
 import pathlib
 import struct
 import zlib
@@ -19,8 +19,8 @@ import zlib
 import numpy as np
 
 from mazebench.arrays import read_arrays
-from mazebench.errors import InputError, open_file, read_at_most
-from mazebench.records import open_to_write
+from mazebench.errors import InputError
+from mazebench.files import open_file, open_to_write, open_whole, read_at_most
 
 TRAJECTORIES = "trajectories.npz"
 JOURNAL = "trajectories.journal"
@@ -103,13 +103,9 @@ def load_trajectories(path: pathlib.Path, num_episodes: int) -> Trajectories:
 
 def save_trajectories(path: pathlib.Path, trajectories: Trajectories) -> None:
     """Writes them all or nothing: a reader finds the old file or the new one. The same content gives the same bytes."""
-    temporary = path.with_name(path.name + ".tmp")
     arrays = {name: np.ascontiguousarray(getattr(trajectories, name), dtype=dtype) for name, dtype in _DTYPES.items()}
-    with open_to_write(temporary, "wb") as file:
+    with open_whole(path) as file:
         np.savez_compressed(file, allow_pickle=False, format=np.array(FORMAT), **arrays)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
 
 
 def pack_trajectories(episodes: list[Trajectory]) -> Trajectories:
@@ -168,7 +164,8 @@ class TrajectoryLog:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._journal.close()
+        with contextlib.suppress(OSError):  # what could not be written was told before
+            self._journal.close()
 
 
 def _fault(trajectories: Trajectories, num_episodes: int) -> str | None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import itertools
 import multiprocessing
+import multiprocessing.connection
+import multiprocessing.resource_tracker
 import os
-import queue
 import signal
 import threading
 import time
@@ -22,7 +24,7 @@ from mazebench.evaluation.trajectories import Trajectory
 from mazebench.records import Record
 from mazebench.tasks.spec import TaskSpec
 
-_POLL_SECONDS = 1.0  # between looks whether all workers are alive
+_POLL_SECONDS = 1.0  # between a worker's looks whether its parent is alive
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,56 +72,92 @@ def run_in_processes(jobs: Iterator[Job], num_envs: int, workers: int) -> Iterat
       InputError, RunError: what a job raised.
       RunError: if a process ended otherwise.
     """
-    # Not forked: threads of the simulation may be running in this process.
-    context = multiprocessing.get_context("spawn")
-    tasks, results = context.Queue(), context.Queue()
     first = list(itertools.islice(jobs, workers))
-    processes = [context.Process(target=_work, args=(tasks, results, num_envs), daemon=True) for _ in first]
-    for process in processes:
-        process.start()
+    processes: dict[Any, Any] = {}  # by this end of the pipe to each
     try:
-        for job in first:
-            tasks.put(dataclasses.replace(job, task_spec=None))
-        num_running = len(first)
-        while num_running:
-            result = _next_result(results, processes)
-            if isinstance(result, Exception):
-                raise result
-            if isinstance(result, Ended):
-                yield result
-                continue
-            job = next(jobs, None)  # type: ignore[assignment]
-            tasks.put(job and dataclasses.replace(job, task_spec=None))
-            num_running -= job is None
+        with _undisturbed():
+            processes |= (_start(num_envs) for _ in first)
+        for pipe, job in zip(processes, first, strict=True):
+            _send(pipe, job)
+        running = set(processes)
+        while running:
+            for pipe in multiprocessing.connection.wait(running):
+                result = _receive(pipe, processes[pipe])
+                if isinstance(result, Exception):
+                    raise result
+                if isinstance(result, Ended):
+                    yield result
+                elif job := next(jobs, None):  # type: ignore[assignment]
+                    _send(pipe, job)
+                else:
+                    running.remove(pipe)
     finally:
-        for process in processes:
+        for process in processes.values():
             process.terminate()
             process.join()
 
 
-def _next_result(results: Any, processes: list[Any]) -> Any:
-    while True:
-        try:
-            return results.get(timeout=_POLL_SECONDS)
-        except queue.Empty:
-            dead = [process.exitcode for process in processes if process.exitcode]
-            if dead:
-                raise RunError(f"a worker ended with exit status {dead[0]}; go on with --resume") from None
+def _start(num_envs: int) -> tuple[Any, Any]:
+    """This end of the pipe to a new worker, and its process."""
+    # Not forked: threads of the simulation may be running in this process.
+    context = multiprocessing.get_context("spawn")
+    # A pipe each: a worker that is killed in the middle of a message ends its own, and would block one that all share.
+    pipe, workers_end = context.Pipe()
+    process = context.Process(target=_work, args=(workers_end, num_envs), daemon=True)
+    process.start()
+    workers_end.close()
+    return pipe, process
 
 
-def _work(tasks: Any, results: Any, num_envs: int) -> None:
-    """Puts what ended into `results`, None after each job, and what a job raised."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt reaches all processes; the parent ends this one
+@contextlib.contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Lets signals to end wait until processes are started, which never get to see an interrupt.
+
+    The terminal sends those to all processes; this one ends the others.
+    """
+    multiprocessing.resource_tracker.ensure_running()  # which would start with the first process, and undo the mask
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    came: list[int] = []
+    # Handlers run in the main thread, whichever a signal is sent to.
+    numbers = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
+    handlers = [signal.signal(number, lambda number, frame: came.append(number)) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, handlers, strict=True):
+            signal.signal(number, handler)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for late in came:
+            signal.raise_signal(late)
+
+
+def _send(pipe: Any, job: Job) -> None:
+    with contextlib.suppress(BrokenPipeError):  # which reading from it will tell
+        pipe.send(dataclasses.replace(job, task_spec=None))
+
+
+def _receive(pipe: Any, process: Any) -> Any:
+    try:
+        return pipe.recv()
+    except (EOFError, ConnectionResetError):
+        process.join()
+        raise RunError(f"a worker ended with exit status {process.exitcode}; go on with --resume") from None
+
+
+def _work(pipe: Any, num_envs: int) -> None:
+    """Sends what ended, None after each job, and what a job raised."""
     threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
-    while (job := tasks.get()) is not None:
-        try:
-            for ended in run_job(job, num_envs, num_threads=1):
-                results.put(ended)
-        except (InputError, RunError) as error:
-            # As plain text: what an error was caused by need not survive the way to another process.
-            results.put(InputError(str(error)) if isinstance(error, InputError) else RunError(str(error)))
-            return
-        results.put(None)
+    with contextlib.suppress(EOFError, ConnectionError):  # of a parent that is gone
+        while True:
+            job = pipe.recv()
+            try:
+                for ended in run_job(job, num_envs, num_threads=1):
+                    pipe.send(ended)
+            except (InputError, RunError) as error:
+                # As plain text: what an error was caused by need not survive the way to another process.
+                pipe.send(InputError(str(error)) if isinstance(error, InputError) else RunError(str(error)))
+                return
+            pipe.send(None)
 
 
 def _end_with(parent: int) -> None:

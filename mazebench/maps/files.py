@@ -13,6 +13,7 @@ from mazebench.maps.text import read_text_maze
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp")
 TEXT_SUFFIXES = (".txt", ".map")
 MAX_FILES = 10_000
+_MAX_ENTRIES = 10 * MAX_FILES  # of a folder, maps or not
 
 
 def read_maze(path: str | pathlib.Path, size: int | None = None) -> Maze:
@@ -33,15 +34,17 @@ def read_mazes(path: str | pathlib.Path) -> tuple[Maze, ...]:
     Where a folder holds one map in several formats, as `mazebench generate` writes them, the text is read.
 
     Raises:
-      InputError: if there is none, one can't be read, or the folder holds more than 10,000.
+      InputError: if there is none, one can't be read, or the folder holds more than 10,000, or 100,000 files.
     """
     path = pathlib.Path(path)
     if not path.is_dir():
         return (read_maze(path),)
     try:
-        files = list(itertools.islice(path.iterdir(), 10 * MAX_FILES))
+        files = list(itertools.islice(path.iterdir(), _MAX_ENTRIES + 1))
     except OSError as error:
         raise InputError(f"{path}: can't read the folder: {error.strerror}") from error
+    if len(files) > _MAX_ENTRIES:
+        raise InputError(f"{path}: expected a folder of at most {_MAX_ENTRIES} files, found more")
     by_stem: dict[str, pathlib.Path] = {}
     for file in sorted(files, key=lambda file: (file.suffix.lower() not in TEXT_SUFFIXES, file.name)):
         if file.suffix.lower() in TEXT_SUFFIXES + IMAGE_SUFFIXES:

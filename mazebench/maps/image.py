@@ -12,7 +12,8 @@ from collections.abc import Iterator
 import cv2
 import numpy as np
 
-from mazebench.errors import InputError, read_at_most
+from mazebench.errors import InputError
+from mazebench.files import open_whole, read_at_most
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, Cell, Maze, MazeError
 
 _MAX_BYTES = 32 * 2**20
@@ -97,14 +98,15 @@ def draw_grid(
 
 
 def write_image(image: np.ndarray, path: str | pathlib.Path) -> None:
-    """Writes `image` (`[H, W, 3]` uint8 RGB) as PNG, whatever the name ends in.
+    """Writes `image` (`[H, W, 3]` uint8 RGB) as PNG, whatever the name ends in, all or nothing.
 
     Raises:
       InputError: if the file can't be written.
     """
     _, content = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
     try:
-        pathlib.Path(path).write_bytes(content.tobytes())
+        with open_whole(path) as file:
+            file.write(content.tobytes())
     except OSError as error:
         raise InputError(f"{path}: can't write the picture: {error.strerror}") from error
 

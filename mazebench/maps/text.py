@@ -6,7 +6,7 @@ import pathlib
 
 import numpy as np
 
-from mazebench.errors import read_at_most
+from mazebench.files import open_whole, read_at_most
 from mazebench.maps.maze import MAX_SIZE, Maze, MazeError
 
 _WALL = "#*1"
@@ -69,5 +69,6 @@ def read_text_maze(path: str | pathlib.Path) -> Maze:
 
 
 def write_text_maze(maze: Maze, path: str | pathlib.Path) -> None:
-    """Writes `maze` as text."""
-    pathlib.Path(path).write_text(format_maze(maze), encoding="ascii")
+    """Writes `maze` as text, all or nothing."""
+    with open_whole(path) as file:
+        file.write(format_maze(maze).encode("ascii"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import locale
+import select
 import signal
 import sys
 from collections.abc import Iterator
@@ -15,7 +16,8 @@ from mazebench.play.picture import Style, draw
 
 _ESCAPE = 27
 _ESCAPE_DELAY = 25  # ms to wait for the rest of an arrow's sequence
-_LOST = 8  # readings in a row that fail: the terminal is gone, not only interrupted
+_LOST = 8  # readings in a row that fail with something to read: the terminal is gone, not only interrupted
+_IDLE_SECONDS = 0.2  # between looks whether the terminal has another size
 
 
 def play(game: Game) -> None:
@@ -92,14 +94,22 @@ class _Screen:
 
     def run(self, game: Game) -> None:
         """Draws, waits for a key, does what it stands for; until Escape."""
-        num_lost = 0
-        while num_lost < _LOST:
+        self._show(game)
+        while (code := self._next()) != _ESCAPE:
+            game.press(self._keys.get(code) or (chr(code).lower() if code < 128 else ""))
             self._show(game)
-            code = self._screen.getch()
-            num_lost = num_lost + 1 if code < 0 else 0
-            if code == _ESCAPE:
-                return
-            game.press(self._keys.get(code) or (chr(code).lower() if 0 <= code < 128 else ""))
+
+    def _next(self) -> int:
+        """Waits for a key or another size; Escape when the terminal is gone."""
+        num_lost = 0
+        # Not in getch itself: a change of size just before it waits would stay unseen until the next key.
+        self._screen.nodelay(True)
+        while num_lost < _LOST:
+            if (code := self._screen.getch()) >= 0:
+                return code
+            ready, _, _ = select.select([sys.stdin], [], [], _IDLE_SECONDS)
+            num_lost += bool(ready)
+        return _ESCAPE
 
     def _show(self, game: Game) -> None:
         height, width = self._screen.getmaxyx()

@@ -9,8 +9,8 @@ from types import ModuleType
 from mazebench.agent import agent_names
 from mazebench.errors import InputError
 from mazebench.evaluation.paper import citation, reference
+from mazebench.files import make_folder, writing_to
 from mazebench.maps.benchmark import VERSION, manifest_hash
-from mazebench.records import make_folder
 from mazebench.report.distributions import Distribution, build_distributions
 from mazebench.report.episodes import Gallery, build_galleries
 from mazebench.report.finding import find_results
@@ -48,15 +48,16 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path, warn: Warn) -
     results = read_results(paths, remark)
     labels = sorted({result.label for result in results}, key=_rank)
     results.sort(key=lambda result: (result.setting, labels.index(result.label)))
-    _prepare(out)
     tables, distributions = build_tables(results, labels), build_distributions(results, labels)
     galleries = build_galleries(results, labels)
-    for table in tables:
-        for suffix, form in ((".md", to_markdown), (".csv", to_csv), (".tex", to_latex)):
-            _write(out / TABLES / (table.name + suffix), form(table))
-    drawn = _draw(figures, tables, distributions, galleries, labels, out / FIGURES)
-    _write(out / DOCUMENT, _document(results, labels, tables, drawn, warnings))
-    _write(out / PAGE, build_page(results, labels, tables, distributions, warnings))
+    with writing_to(out):
+        _prepare(out)
+        for table in tables:
+            for suffix, form in ((".md", to_markdown), (".csv", to_csv), (".tex", to_latex)):
+                _write(out / TABLES / (table.name + suffix), form(table))
+        drawn = _draw(figures, tables, distributions, galleries, labels, out / FIGURES)
+        _write(out / DOCUMENT, _document(results, labels, tables, drawn, warnings))
+        _write(out / PAGE, build_page(results, labels, tables, distributions, warnings))
     return results
 
 

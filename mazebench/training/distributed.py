@@ -19,6 +19,8 @@ from mazebench.training.experience import Collector, Experience
 
 try:
     import ray
+
+    from mazebench.evaluation.cluster import connect
 except ModuleNotFoundError as error:
     raise InputError("--workers needs Ray, which is not installed; try: pip install 'mazebench-mujoco[ray]'") from error
 
@@ -70,11 +72,8 @@ class RaySource:
             )
         self._players: list[Any] = []
         self._started = not ray.is_initialized()
-        try:
-            if self._started:
-                ray.init(address=options.ray_address, log_to_driver=False, include_dashboard=False)
-        except (ConnectionError, ValueError) as error:
-            raise InputError(f"can't reach a Ray cluster at {options.ray_address!r}: {error}") from error
+        if self._started:
+            connect(options.ray_address)
         num_cpus = int(ray.cluster_resources().get("CPU", 0))
         if num_cpus < options.workers:
             self.__exit__()

@@ -7,19 +7,13 @@ import os
 import pathlib
 import re
 import shutil
+import time
 from collections.abc import Callable
 from typing import Any
 
 from mazebench.errors import InputError, RunError
-from mazebench.records import (
-    FolderLock,
-    make_folder,
-    open_to_write,
-    read_json,
-    repair_and_read_lines,
-    to_line,
-    write_json,
-)
+from mazebench.files import make_folder, open_to_write, open_whole, writing_to
+from mazebench.records import FolderLock, read_json, repair_and_read_lines, to_line, write_json
 
 CONFIG = "config.json"
 METRICS = "metrics.jsonl"
@@ -40,20 +34,22 @@ class RunFolder:
           InputError: if it can't be written, or another process uses it.
         """
         self.path = path
-        self._board: Any = None
+        self._board: _Board | None = None
         found = sorted(item.name for item in path.iterdir()) if path.is_dir() else []
         if CONFIG not in found and set(found) - {f"{CONFIG}.tmp", CHECKPOINTS}:
             raise InputError(f"{path}: expected an empty folder or a training run's, found {found[0]!r} in it")
         make_folder(path)
         self._lock = FolderLock(path)
-        (path / CHECKPOINTS).mkdir(exist_ok=True)
+        make_folder(path / CHECKPOINTS)
+        for half_written in (path / CHECKPOINTS).glob("*.tmp"):
+            if _CHECKPOINT_NAME.fullmatch(half_written.stem):
+                shutil.rmtree(half_written, ignore_errors=True)
         if CONFIG not in found and self.checkpoints():
             raise InputError(f"{path}: expected {CONFIG} beside the checkpoints, found none")
 
     def checkpoints(self) -> list[pathlib.Path]:
         """The complete checkpoints, oldest first."""
-        folders = (self.path / CHECKPOINTS).iterdir()
-        return sorted(path for path in folders if _CHECKPOINT_NAME.fullmatch(path.name))
+        return checkpoints(self.path)
 
     def save_checkpoint(self, env_steps: int, counters: dict[str, Any], save: Callable[[pathlib.Path], None]) -> None:
         """Lets `save` fill a new checkpoint, which then takes its place at once; the last two are kept.
@@ -63,42 +59,41 @@ class RunFolder:
         """
         final = self.path / CHECKPOINTS / f"{env_steps:012d}"
         temporary = final.with_suffix(".tmp")
-        shutil.rmtree(temporary, ignore_errors=True)
         try:
             temporary.mkdir()
             save(temporary)
             write_json(temporary / COUNTERS, counters)
+            for path in temporary.iterdir():
+                _sync(path)
             shutil.rmtree(final, ignore_errors=True)
             os.replace(temporary, final)
         except OSError as error:
             shutil.rmtree(temporary, ignore_errors=True)
-            last = next(reversed(self.checkpoints()), None)
-            raise RunError(f"{final}: can't save: {error.strerror}; the last checkpoint is {last}") from error
+            raise self._cannot("save", final, error) from error
         for old in self.checkpoints()[:-_KEPT_CHECKPOINTS]:
             shutil.rmtree(old)
 
     def log(self, metrics: dict[str, Any]) -> None:
-        """Appends a line to the metrics."""
-        with open_to_write(self.path / METRICS, "a") as file:
-            file.write(to_line(metrics))
-        step = metrics["env_steps"]
-        if self._board is None:
-            import tensorboardX
+        """Appends a line to the metrics.
 
-            # A resumed run takes steps again: what TensorBoard shows of them from before is purged.
-            self._board = tensorboardX.SummaryWriter(str(self.path / _BOARD), purge_step=step)
-        for name, value in metrics.items():
-            self._board.add_scalar(name, value, step)
-        self._board.flush()
+        Raises:
+          RunError: if it can't be written; the checkpoints are intact.
+        """
+        try:
+            with open_to_write(self.path / METRICS, "a") as file:
+                file.write(to_line(metrics))
+            self._board = self._board or _Board(self.path / _BOARD, metrics["env_steps"])
+            self._board.add(metrics, metrics["env_steps"])
+        except OSError as error:
+            raise self._cannot("write", self.path, error) from error
 
     def forget_metrics_after(self, env_steps: int) -> None:
         """Removes the metrics of steps that a resumed run takes again."""
         path = self.path / METRICS
-        kept = [line for line in repair_and_read_lines(path, "env_steps") if line["env_steps"] <= env_steps]
-        temporary = path.with_suffix(".tmp")
-        with open_to_write(temporary, "w") as file:
-            file.write("".join(map(to_line, kept)))
-        temporary.replace(path)
+        with writing_to(self.path):
+            kept = [line for line in repair_and_read_lines(path, "env_steps") if line["env_steps"] <= env_steps]
+            with open_whole(path) as file:
+                file.write("".join(map(to_line, kept)).encode("utf-8"))
 
     def check_config(self, config: dict[str, Any]) -> None:
         """Writes the config, or compares it with the one there.
@@ -108,7 +103,8 @@ class RunFolder:
         """
         path = self.path / CONFIG
         if not path.exists():
-            write_json(path, config)
+            with writing_to(self.path):
+                write_json(path, config)
             return
         before, now = read_json(path), json.loads(json.dumps(config))
         if before != now:
@@ -120,6 +116,44 @@ class RunFolder:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        if self._board is not None:
-            self._board.close()
         self._lock.__exit__()
+
+    def _cannot(self, do: str, what: pathlib.Path, error: OSError) -> RunError:
+        last = next(reversed(self.checkpoints()), "none yet")
+        return RunError(f"{what}: can't {do}: {error.strerror}; last checkpoint: {last}; go on with --resume")
+
+
+def checkpoints(path: pathlib.Path) -> list[pathlib.Path]:
+    """The complete checkpoints of the run folder `path`, oldest first."""
+    return sorted(folder for folder in path.glob(f"{CHECKPOINTS}/*") if _CHECKPOINT_NAME.fullmatch(folder.name))
+
+
+class _Board:
+    """What TensorBoard shows of a sitting.
+
+    Written by tensorboardX's inner writer: its outer one writes in a thread, whose errors reach nobody.
+    """
+
+    def __init__(self, folder: pathlib.Path, step: int):
+        from tensorboardX.event_file_writer import EventsWriter
+        from tensorboardX.proto.event_pb2 import Event, SessionLog
+
+        folder.mkdir(exist_ok=True)
+        # With the process, as the clock may go back to the second of another sitting.
+        self._writer = EventsWriter(str(folder / "events"), f".{os.getpid()}")
+        # A resumed run takes steps again: what TensorBoard shows of them from before is purged.
+        self._writer.write_event(Event(step=step, session_log=SessionLog(status=SessionLog.START)))
+
+    def add(self, values: dict[str, Any], step: int) -> None:
+        """Writes them to the disk."""
+        from tensorboardX.proto.event_pb2 import Event
+        from tensorboardX.summary import scalar
+
+        for name, value in values.items():
+            self._writer.write_event(Event(step=step, wall_time=time.time(), summary=scalar(name, value)))
+        self._writer.flush()
+
+
+def _sync(path: pathlib.Path) -> None:
+    with path.open("rb") as file:
+        os.fsync(file.fileno())

@@ -7,6 +7,7 @@ import pathlib
 import numpy as np
 import trimesh
 
+from mazebench.files import open_whole
 from mazebench.maps.covering import cover
 from mazebench.maps.maze import WALL_HEIGHT, Maze
 from mazebench.world.mjcf import maze_spec
@@ -26,7 +27,8 @@ def write_mjcf(maze: Maze, path: pathlib.Path) -> None:
     """Writes a model that plain MuJoCo and its viewer open, without any other file."""
     spec = maze_spec(maze)
     spec.compile()
-    path.write_text(spec.to_xml(), encoding="utf-8")
+    with open_whole(path) as file:
+        file.write(spec.to_xml().encode("utf-8"))
 
 
 def wall_mesh(maze: Maze) -> trimesh.Trimesh:
@@ -60,7 +62,8 @@ def write_mesh(maze: Maze, path: pathlib.Path) -> None:
     mesh = wall_mesh(maze)
     if path.suffix == ".glb":
         mesh.apply_transform(_TO_GLTF)
-    path.write_bytes(_encoded(mesh, path.suffix[1:]))
+    with open_whole(path) as file:
+        file.write(_encoded(mesh, path.suffix[1:]))
 
 
 def _encoded(mesh: trimesh.Trimesh, file_type: str) -> bytes:

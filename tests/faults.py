@@ -1,0 +1,226 @@
+"""Real processes of the installed command, and what befalls them: kills, full disks, a clock that goes back."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+COMMAND = str(pathlib.Path(sys.executable).with_name("mazebench"))
+PATIENCE = 300  # seconds that nothing here takes, on however busy a machine
+
+# A network, batch and replay that take seconds.
+TINY = {
+    "channels": "4",
+    "hidden": "16",
+    "groups": "4",
+    "steps": "4",
+    "num_envs": "8",
+    "min_rows": "400",
+    "steps_per_update": "32",
+    "replay_capacity": "4000",
+}
+TRAIN = ["train", "--agent", "mah", "--checkpoint-steps", "800", "--eval-mazes", "1"]
+TRAIN += [word for key, value in TINY.items() for word in ("--set", f"{key}={value}")]
+
+
+def start(*words: str | pathlib.Path, **options) -> subprocess.Popen:
+    """Starts a command in a process group of its own, where interrupts work as on a terminal."""
+
+    def heed_interrupts() -> None:
+        # Where these tests run in the background, interrupts are ignored, and processes inherit that.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    options = {"preexec_fn": heed_interrupts, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
+    process = subprocess.Popen([COMMAND, *map(str, words)], text=True, start_new_session=True, **options)
+    _started.append(process)
+    return process
+
+
+_started: list[subprocess.Popen] = []
+
+
+@pytest.fixture
+def nothing_left() -> Iterator[None]:
+    """Ends what a test that failed left running."""
+    yield
+    for process in _started:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+    _started.clear()
+
+
+def run(*words: str | pathlib.Path, **options) -> tuple[int, str, str]:
+    """Exit status, output and errors of a command."""
+    process = start(*words, **options)
+    output, errors = process.communicate(timeout=PATIENCE)
+    return process.returncode, output, errors
+
+
+def said(errors: str) -> list[str]:
+    """The lines of standard error but those of progress."""
+    return [line for line in errors.splitlines() if not line.endswith(" episodes")]
+
+
+def wait_until(condition: Callable[[], object], process: subprocess.Popen | None = None) -> None:
+    """Waits until `condition` holds, or `process` ends."""
+    for _ in waiting():
+        if condition() or (process is not None and process.poll() is not None):
+            return
+
+
+def waiting() -> Iterator[None]:
+    """Yields a hundred times a second until nobody would wait any longer."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        yield
+        time.sleep(0.01)
+    raise TimeoutError(f"waited for {PATIENCE} s")
+
+
+def num_lines(folder: pathlib.Path) -> int:
+    """How many lines of records or metrics a run has written: those that wait in a journal count, too."""
+    count = 0
+    for path in folder.rglob("*.jsonl"):
+        try:
+            count += path.read_bytes().count(b"\n")
+        except FileNotFoundError:  # a journal that has just gone
+            continue
+    return count
+
+
+def run_through_kills(
+    rng: np.random.Generator,
+    folder: pathlib.Path,
+    words: list[str],
+    num_kills: int,
+    most_lines: int,
+    victim: Callable[[subprocess.Popen, np.random.Generator], int] = lambda process, rng: process.pid,
+) -> list[str]:
+    """Runs a command that writes to `folder`, killed and resumed `num_kills` times, and then to its end.
+
+    Args:
+      rng: draws the moments: when so many more lines are written, and up to 50 ms later.
+      most_lines: that are written between two kills.
+      victim: the process to kill, the command's own if not said otherwise.
+
+    Returns:
+      What each sitting that was killed said on standard error.
+    """
+    errors = []
+    for sitting in range(num_kills):
+        process = start(*words, "--out", folder, *(["--resume"] if sitting else []))
+        wanted = num_lines(folder) + int(rng.integers(1, most_lines + 1))
+        wait_until(lambda wanted=wanted: num_lines(folder) >= wanted, process)
+        time.sleep(rng.uniform(0, 0.05))
+        if process.poll() is None:
+            os.kill(victim(process, rng), signal.SIGKILL)
+        errors.append(process.communicate(timeout=PATIENCE)[1])
+        assert process.returncode != 0, f"it ended before kill {sitting}: give it more to do"
+        assert "Traceback" not in errors[-1]
+    status, _, last = run(*words, "--out", folder, "--resume")
+    assert (status, said(last)) == (0, [])
+    return errors
+
+
+def workers_of(process: subprocess.Popen) -> list[int]:
+    """The worker processes of an evaluation."""
+    return [pid for pid in descendants(process.pid) if "spawn_main" in command_line(pid)]
+
+
+def descendants(pid: int) -> list[int]:
+    """All processes that a process started, and those that they started."""
+    found = []
+    for task in pathlib.Path(f"/proc/{pid}/task").glob("*/children"):
+        for child in map(int, task.read_text().split()):
+            found += [child, *descendants(child)]
+    return found
+
+
+def command_line(pid: int) -> str:
+    """The words of a process's command; empty if it is gone."""
+    try:
+        return pathlib.Path(f"/proc/{pid}/cmdline").read_text().replace("\0", " ")
+    except OSError:
+        return ""
+
+
+def is_running(pid: int) -> bool:
+    """Whether a process is there, and no zombie."""
+    try:
+        return pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+class Disk:
+    """A small file system of its own."""
+
+    def __init__(self, path: pathlib.Path):
+        self.path = path
+        self._filler = path / "filler"
+
+    def leave(self, kilobytes: int) -> None:
+        """Fills it until so much is free."""
+        free = os.statvfs(self.path)
+        self._filler.write_bytes(bytes(free.f_bavail * free.f_frsize - 1024 * kilobytes))
+
+    def make_room(self) -> None:
+        """Frees what `leave` filled."""
+        self._filler.unlink()
+
+    def forbid_writing(self) -> None:
+        """Makes it read-only."""
+        subprocess.run(["mount", "-o", "remount,ro", str(self.path)], check=True)
+
+
+@pytest.fixture
+def disk(nothing_left: None, tmp_path: pathlib.Path) -> Iterator[Disk]:
+    """A disk of 4 MiB; skips where one may not be mounted."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    if shutil.which("mount") is None:
+        pytest.skip("a small disk needs mount, which is not installed")
+    command = ["mount", "-t", "tmpfs", "-o", "size=4m", "tmpfs", str(folder)]
+    mounted = subprocess.run(command, capture_output=True, text=True)
+    if mounted.returncode:
+        pytest.skip(f"a small disk needs the right to mount it: {mounted.stderr.strip()}")
+    yield Disk(folder)
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+# Each look at the clock finds it a minute earlier than the look before.
+BACKWARDS = """
+import datetime, itertools, time
+
+_now, _looks = time.time(), itertools.count(1)
+
+def _earlier():
+    return _now - 60.0 * next(_looks)
+
+class _Datetime(datetime.datetime):
+    @classmethod
+    def now(cls, tz=None):
+        return cls.fromtimestamp(_earlier(), tz)
+
+time.time = _earlier
+time.time_ns = lambda: int(1e9 * _earlier())
+datetime.datetime = _Datetime
+"""
+
+
+def clock_that_goes_back(folder: pathlib.Path) -> dict[str, str]:
+    """The environment of a process for which time goes backwards; a module for it is put into `folder`."""
+    folder.mkdir()
+    (folder / "sitecustomize.py").write_text(BACKWARDS)
+    paths = [str(folder), os.environ.get("PYTHONPATH", "")]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
