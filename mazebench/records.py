@@ -39,14 +39,16 @@ class FolderLock:
         """Takes the lock.
 
         Raises:
-          InputError: if another process holds it.
+          InputError: if another process holds it, or there can be none on this file system.
         """
         self._descriptor = os.open(folder, os.O_RDONLY)  # of the folder itself, so that nothing is left in it
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+        except OSError as error:
             os.close(self._descriptor)
-            raise InputError(f"{folder}: is in use by another process") from None
+            if isinstance(error, BlockingIOError):
+                raise InputError(f"{folder}: is in use by another process") from None
+            raise InputError(f"{folder}: expected a file system that can lock, found: {error.strerror}") from error
 
     def __enter__(self) -> FolderLock:
         return self

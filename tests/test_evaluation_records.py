@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import json
+import os
 import shutil
 
 import hypothesis
@@ -11,7 +14,7 @@ import pytest
 from hypothesis import strategies
 
 from mazebench.errors import InputError
-from mazebench.records import EPISODES, JOURNAL, RecordLog, read_json, to_line, write_json
+from mazebench.records import EPISODES, JOURNAL, FolderLock, RecordLog, read_json, to_line, write_json
 
 
 def record(index: int) -> dict:
@@ -170,3 +173,12 @@ class TestJson:
         (tmp_path / "binary.json").write_bytes(b"\xff\xfe\x00")
         with pytest.raises(InputError, match=r"binary\.json: expected JSON, found "):
             read_json(tmp_path / "binary.json")
+
+
+def test_lock_when_the_file_system_has_none(tmp_path, monkeypatch):
+    def flock(descriptor: int, operation: int) -> None:
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+
+    monkeypatch.setattr(fcntl, "flock", flock)
+    with pytest.raises(InputError, match="expected a file system that can lock, found: Function not implemented"):
+        FolderLock(tmp_path)

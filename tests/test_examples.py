@@ -26,7 +26,7 @@ def run(*arguments: str | pathlib.Path, folder: pathlib.Path, **variables: str) 
     result = subprocess.run(
         [sys.executable, *map(str, arguments)],
         cwd=folder,
-        env=os.environ | SERIAL | variables,
+        env=os.environ | SERIAL | {"TMPDIR": str(folder)} | variables,
         capture_output=True,
         text=True,
     )

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import pathlib
 import sys
 import tempfile
@@ -116,6 +117,8 @@ def main() -> None:
     if len(sys.argv) < 2 or sys.argv[1] not in READERS:
         sys.exit(f"expected one of {', '.join(READERS)}")
     with tempfile.TemporaryDirectory() as name:
+        if child := os.fork():  # libFuzzer ends its process at once, and would leave the folder
+            sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
         folder = pathlib.Path(name)
         (folder / "seeds").mkdir()
         content, path, read = READERS[sys.argv[1]](folder)
