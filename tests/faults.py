@@ -141,7 +141,11 @@ def descendants(pid: int) -> list[int]:
     """All processes that a process started, and those that they started."""
     found = []
     for task in pathlib.Path(f"/proc/{pid}/task").glob("*/children"):
-        for child in map(int, task.read_text().split()):
+        try:
+            children = task.read_text().split()
+        except OSError:  # a thread that has just ended
+            continue
+        for child in map(int, children):
             found += [child, *descendants(child)]
     return found
 

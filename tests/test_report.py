@@ -227,6 +227,15 @@ class TestFiles:
         names = {path.stem for path in (tmp_path / "out" / "tables").iterdir()}
         assert names == {"hierarchical-13", "all"}
 
+    def test_out_when_a_kill_left_half_of_a_report(self, tmp_path):
+        make_result(tmp_path / "a" / "x", "mah", num_mazes=1, record=False)
+        left = [tmp_path / "out" / name for name in ("report.html.tmp", "tables/old.csv.tmp", "figures/old.pdf.tmp")]
+        for path in left:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.touch()
+        writing.write_report([tmp_path / "a"], tmp_path / "out", silent)
+        assert list((tmp_path / "out").rglob("*.tmp")) == []
+
     def test_out_when_it_holds_something_else(self, results, tmp_path):
         (tmp_path / "diary.txt").touch()
         with pytest.raises(InputError, match=r"found 'diary\.txt' in it"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import pathlib
 from collections.abc import Sequence
 from typing import Any
@@ -14,6 +15,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from mazebench.files import open_whole
 from mazebench.maps.maze import cell_to_point
 from mazebench.report.distributions import GRID, Distribution, Violin
 from mazebench.report.episodes import Drive, Gallery
@@ -271,6 +273,13 @@ def _curve_handles(figure: Figure) -> list[Any]:
 
 def _save(figure: Figure, path: pathlib.Path) -> None:
     """Writes PATH.png and PATH.pdf; the same content gives the same bytes."""
-    figure.savefig(path.with_name(f"{path.name}.png"), dpi=_DPI, metadata={"Software": None})
     undated = {"CreationDate": None, "Producer": None, "Creator": None}
-    figure.savefig(path.with_name(f"{path.name}.pdf"), metadata=undated)
+    forms: dict[str, dict[str, Any]] = {
+        "png": {"dpi": _DPI, "metadata": {"Software": None}},
+        "pdf": {"metadata": undated},
+    }
+    for form, options in forms.items():
+        content = io.BytesIO()  # matplotlib loses its way on a disk that is full
+        figure.savefig(content, format=form, **options)
+        with open_whole(path.with_name(f"{path.name}.{form}")) as file:
+            file.write(content.getbuffer())

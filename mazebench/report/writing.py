@@ -9,7 +9,7 @@ from types import ModuleType
 from mazebench.agent import agent_names
 from mazebench.errors import InputError
 from mazebench.evaluation.paper import citation, reference
-from mazebench.files import make_folder, writing_to
+from mazebench.files import make_folder, open_whole, writing_to
 from mazebench.maps.benchmark import VERSION, manifest_hash
 from mazebench.report.distributions import Distribution, build_distributions
 from mazebench.report.episodes import Gallery, build_galleries
@@ -87,22 +87,23 @@ def _rank(label: str) -> tuple[int, str]:
 
 
 def _prepare(out: pathlib.Path) -> None:
-    """Makes `out` and removes an earlier report's tables and figures, or refuses."""
+    """Makes `out` and removes an earlier report's tables and figures, those that a kill left half-written too."""
     ours = {DOCUMENT, PAGE, TABLES, FIGURES}
     make_folder(out)
-    strangers = sorted(path.name for path in out.iterdir() if path.name not in ours)
+    strangers = sorted(path.name for path in out.iterdir() if path.name.removesuffix(".tmp") not in ours)
     if strangers:
         raise InputError(f"{out}: expected an empty folder or a report's, found {strangers[0]!r} in it")
     for folder, suffixes in _SUFFIXES.items():
         make_folder(out / folder)
         for path in (out / folder).iterdir():
-            if path.suffix in suffixes:
+            if path.name.removesuffix(".tmp").endswith(suffixes):
                 path.unlink()
 
 
 def _write(path: pathlib.Path, text: str) -> None:
     # Names of folders and words of commands need not be legal Unicode.
-    path.write_text(text, encoding="utf-8", errors="replace")
+    with open_whole(path) as file:
+        file.write(text.encode("utf-8", errors="replace"))
 
 
 def _load_figures() -> ModuleType:
