@@ -262,8 +262,23 @@ def test_speed_of_the_search_beside_its_network_is_measured():
     assert 0 < row["/ network"] < 2
 
 
+def test_parts_of_an_update_are_measured():
+    tiny = {
+        "channels": "4",
+        "hidden": "16",
+        "num_envs": "8",
+        "min_rows": "400",
+        "groups": "2",
+        "replay_capacity": "4000",
+    }
+    rows = measure.update_rows(0.1, tiny)
+    assert [row["what"] for row in rows] == ["sampling", "its tensors", "targets", "losses", "backward, optimizer"]
+    assert all(row["ms"] > 0 for row in rows)
+    assert abs(sum(row["%"] for row in rows) - 100) < 1e-6
+
+
 @pytest.mark.slow
 def test_speed_of_the_search_beside_mctx_is_measured():
     pytest.importorskip("mctx")
-    (rows,) = measure.measure(0.1).values()
+    rows, _ = measure.measure(0.1).values()
     assert all(row["mctx sims/s"] > 0 for row in rows)

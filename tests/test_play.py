@@ -13,6 +13,7 @@ import struct
 import subprocess
 import sys
 import termios
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -129,6 +130,12 @@ class TestPictures:
         assert [tuple(middles[1, column]) for column in (1, 2, 3)] == [(64, 160, 100), (255, 255, 255), (214, 60, 60)]
 
 
+def _take_terminal() -> None:
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+    # Where the tests run in the background, interrupts are ignored, and processes inherit that.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 class Terminal:
     """`mazebench play` on a pseudo-terminal of its own."""
 
@@ -145,7 +152,7 @@ class Terminal:
             env={key: value for key, value in os.environ.items() if key not in ("LINES", "COLUMNS")}
             | {"TERM": kind, "LC_ALL": "C.UTF-8"},
             start_new_session=True,
-            preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+            preexec_fn=_take_terminal,
         )
 
     def expect(self, words: str) -> None:
@@ -159,11 +166,11 @@ class Terminal:
 
     def end(self) -> int:
         """Waits for the end and checks that the terminal is as it was; returns the exit status."""
-        while True:
+        last = time.monotonic() + SECONDS
+        while self.process.poll() is None or select.select([self.master], [], [], 0.05)[0]:
+            assert time.monotonic() < last, f"waited for the end, found {self.output!r}"
             if select.select([self.master], [], [], 0.05)[0]:
                 self.output += os.read(self.master, 65536).decode(errors="replace")
-            elif self.process.poll() is not None:
-                break
         assert termios.tcgetattr(self.slave) == self.settings
         if "\x1b[?1049h" in self.output:  # the screen that programs draw on, and the cursor
             assert self.output.rindex("\x1b[?1049l") > self.output.rindex("\x1b[?1049h")

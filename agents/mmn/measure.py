@@ -1,6 +1,7 @@
-"""How fast the search is: beside the network that it calls, and beside mctx where that is installed.
+"""How fast the search is, beside the network that it calls and beside mctx where that is installed, and an update.
 
-The network is a stand-in of MMN's size whose transition has other weights in each row, as a hypermodel would give it.
+The search's network is a stand-in of MMN's size whose transition has other weights in each row, as a hypermodel would
+give it.
 """
 
 from __future__ import annotations
@@ -12,13 +13,19 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 import torch
 
+from mazebench.agent import Interface
+from mazebench.maps.benchmark import load_mazes
+from mazebench.tasks.spec import TaskSpec
+from mazebench.training.experience import Collector
+
+from .mmn import MMN
 from .search import Evaluation, Root, gumbel_muzero_policy, muzero_policy
 
 NUM_ACTIONS = 6
@@ -88,11 +95,48 @@ class Network:
 
 
 def measure(seconds: float) -> dict[str, list[dict[str, Any]]]:
-    """The table of simulations a second of a thread's own time; measures some `seconds` for a figure."""
+    """Tables of simulations a second of a thread's own time, and of an update's; some `seconds` for a figure."""
     torch.set_num_threads(1)
     with _mctx() as mctx:
         rows = [_row(policy, batch_size, seconds / _ROUNDS, mctx) for policy, batch_size in _CASES]
-    return {f"tree search, {NUM_SIMULATIONS} simulations, one thread": rows}
+    return {
+        f"tree search, {NUM_SIMULATIONS} simulations, one thread": rows,
+        "the parts of an update, one thread": update_rows(seconds),
+    }
+
+
+def update_rows(seconds: float, overrides: Mapping[str, str] | None = None) -> list[dict[str, Any]]:
+    """Milliseconds that the parts of an update take, once the replay holds what learning begins with."""
+    learner = MMN.build_learner(Interface("local", 13, 13), load_mazes(13, "train"), overrides=overrides)
+    collector = Collector(TaskSpec("local", load_mazes(13, "train"), **learner.task_options()), learner.num_envs, 0)
+    learner.actor.explore_from(0, learner.num_envs, seed=0)
+    state = learner.actor.initial_state(learner.num_envs)
+    while not learner.num_updates_due(10**9):
+        experience, state = collector.play(learner.actor, state)
+        learner.observe(experience)
+    learner.update()
+    times = {"sampling": 0.0, "its tensors": 0.0, "targets": 0.0, "losses": 0.0, "backward, optimizer": 0.0}
+    parts = {"sample": "sampling", "_batch": "its tensors", "_targets": "targets", "_descend": "backward, optimizer"}
+    for method, part in parts.items():
+        setattr(learner, method, _timed(getattr(learner, method), times, part))
+    count, begin = 0, time.perf_counter()
+    while (elapsed := time.perf_counter() - begin) < seconds:
+        learner.update()
+        count += 1
+    times["losses"] = elapsed - sum(times.values())
+    return [{"what": part, "ms": 1e3 * spent / count, "%": 100 * spent / elapsed} for part, spent in times.items()]
+
+
+def _timed(function: Callable[..., Any], times: dict[str, float], part: str) -> Callable[..., Any]:
+    """`function`, which adds to `times` what it takes."""
+
+    def timed(*arguments: Any) -> Any:
+        begin = time.perf_counter()
+        result = function(*arguments)
+        times[part] += time.perf_counter() - begin
+        return result
+
+    return timed
 
 
 def _row(policy: str, batch_size: int, seconds: float, mctx: Callable[..., float] | None) -> dict[str, Any]:
