@@ -15,12 +15,9 @@ from mazebench_agents.dqn.learner import double_q_target
 from mazebench_agents.dqn.network import QNetwork
 from mazebench_agents.layers import marked_place
 from mazebench_agents.overrides import override
+from small_world import learn
 
-from mazebench.agent import Interface
 from mazebench.errors import InputError
-from mazebench.maps.maze import Maze
-from mazebench.tasks.spec import TaskSpec
-from mazebench.training.experience import Collector
 
 
 def test_double_q_target_by_hand():
@@ -110,9 +107,6 @@ def test_override_turns_text_into_the_fields_types():
     assert (config.hidden, config.symmetries, config.learning_rate) == (64, False, 1e-3)
 
 
-OPEN_FIELD = Maze(np.pad(np.zeros((3, 3), dtype=bool), 1, constant_values=True), "open-5")
-
-
 def test_mah_after_a_minute_beats_random_in_a_small_maze():
     """The learning test: goals up to 3 cells away in 25 steps, where acting at random reaches some 40 %."""
     values = {
@@ -127,32 +121,9 @@ def test_mah_after_a_minute_beats_random_in_a_small_maze():
         "hindsight_mean_offset": 8,
         "hindsight_window": 30,
     }
-    spec = TaskSpec("local", (OPEN_FIELD,), (2, 3), time_limit=25, num_goals=4)
-    learner = MAH.build_learner(Interface("local", 5, 5), spec.mazes, overrides={k: str(v) for k, v in values.items()})
-    before = success_rate(learner.actor)
-    collector = Collector(spec, learner.num_envs, seed=0)
-    learner.actor.explore_from(0, learner.num_envs, seed=0)
-    state = learner.actor.initial_state(learner.num_envs)
-    updates = 0
-    while updates < 1500:
-        actions, state = learner.actor.act(collector.observation, collector.is_first, state, explore=True)
-        learner.observe(collector.step(actions))
-        while updates < learner.num_updates_due(learner._replay.num_rows):
-            learner.update()
-            updates += 1
-    after = success_rate(learner.actor)
+    before, after = learn(MAH, 3, (2, 3), 1500, values)
     assert before < 0.6
     assert after > 0.8
-
-
-def success_rate(actor):
-    """Of acting greedily, over 64 episodes."""
-    from mazebench.evaluation.protocol import select_trials
-    from mazebench.evaluation.runner import run_trials
-
-    spec = TaskSpec("local", (OPEN_FIELD,), (2, 3), time_limit=25)
-    trials = list(enumerate(select_trials("local", spec.mazes, False, (2, 3), 32, seed=7)))
-    return np.mean([record["success"] for records in run_trials(actor, spec, trials, 64) for record in records])
 
 
 def test_actions_do_not_depend_on_what_else_is_in_the_batch():

@@ -17,13 +17,11 @@ from mazebench_agents.mmn.network import MMNNetwork, rotate
 from mazebench_agents.mmn.planning import lookahead, plan
 from mazebench_agents.mmn.shown import beliefs, distances_learned_from
 from mazebench_agents.overrides import override
+from small_world import learn
 
 from mazebench.agent import Interface
 from mazebench.errors import InputError
-from mazebench.evaluation.protocol import select_trials
-from mazebench.evaluation.runner import run_trials
 from mazebench.maps.generators import generate
-from mazebench.maps.maze import Maze
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 
@@ -444,9 +442,6 @@ def test_config_out_of_range_is_refused(values, message):
         override(MMNConfig(), values)
 
 
-OPEN_FIELD = Maze(np.pad(np.zeros((5, 5), dtype=bool), 1, constant_values=True), "open-7")
-
-
 def test_mmn_after_a_minute_beats_random_in_a_small_maze():
     """The learning test: goals 3 and 4 cells away in 25 steps."""
     values = {
@@ -464,29 +459,9 @@ def test_mmn_after_a_minute_beats_random_in_a_small_maze():
         "hindsight_mean_offset": 8,
         "hindsight_window": 30,
     }
-    spec = TaskSpec("local", (OPEN_FIELD,), (3, 4), time_limit=25, num_goals=4)
-    learner = MMN.build_learner(Interface("local", 7, 7), spec.mazes, overrides={k: str(v) for k, v in values.items()})
-    before = success_rate(learner.actor)
-    collector = Collector(spec, learner.num_envs, seed=0)
-    learner.actor.explore_from(0, learner.num_envs, seed=0)
-    state = learner.actor.initial_state(learner.num_envs)
-    updates = 0
-    while updates < 700:
-        actions, state = learner.actor.act(collector.observation, collector.is_first, state, explore=True)
-        learner.observe(collector.step(actions))
-        while updates < learner.num_updates_due(learner._replay.num_rows):
-            learner.update()
-            updates += 1
-    after = success_rate(learner.actor)
+    before, after = learn(MMN, 5, (3, 4), 700, values)
     assert before < 0.4
     assert after > 0.8
-
-
-def success_rate(actor):
-    """Of acting greedily, over 64 episodes."""
-    spec = TaskSpec("local", (OPEN_FIELD,), (3, 4), time_limit=25)
-    trials = list(enumerate(select_trials("local", spec.mazes, False, (3, 4), 32, seed=7)))
-    return np.mean([record["success"] for records in run_trials(actor, spec, trials, 64) for record in records])
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
