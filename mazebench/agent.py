@@ -9,6 +9,7 @@ import dataclasses
 import importlib
 import pathlib
 import sys
+import traceback
 from collections.abc import Mapping, Sequence
 from importlib import metadata
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from mazebench.training.experience import Experience
 
 ENTRY_POINT_GROUP = "mazebench.agents"
+_IMPORTLIB = pathlib.Path(importlib.__file__).parent
 
 Observation = dict[str, np.ndarray]  # "state" [B, 12] float32, "context" [B, 4, M, M] float32
 
@@ -143,28 +145,49 @@ def load_agent_class(name: str) -> type[Agent]:
     except ModuleNotFoundError as error:
         raise InputError(
             f"agent {name!r} needs the module {error.name!r}, which is not installed; "
-            "try: pip install 'mazebench-mujoco[agents]'"
+            "the extra [agents] brings it (docs/start.md)"
         ) from error
     except Exception as error:  # other people's modules may raise anything
         raise _unimportable(name, error) from error
     return _checked(name, loaded)
 
 
+def place_of(error: BaseException) -> str:
+    """Where in an agent's own files `error` arose, as " (FILE:LINE)"; empty if the agent was not even entered."""
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if not _is_no_agents(frame.filename)]
+    if not frames:
+        return ""
+    # Below what the agent calls are libraries.
+    folder = pathlib.Path(frames[0].filename).parent
+    last = [frame for frame in frames if folder in pathlib.Path(frame.filename).parents][-1]
+    return f" ({pathlib.Path(last.filename).name}:{last.lineno})"
+
+
+def _is_no_agents(filename: str) -> bool:
+    ours = pathlib.Path(__file__).parent
+    return filename.startswith("<") or not {ours, _IMPORTLIB}.isdisjoint(pathlib.Path(filename).parents)
+
+
 def _class_at_hand(name: str) -> type[Agent]:
     module_name, _, class_name = name.partition(":")
+    if module_name.endswith(".py"):
+        wanted = f"{module_name.removesuffix('.py').replace('/', '.')}:{class_name}"
+        raise InputError(f"agent {name!r}: expected module:Class, such as {wanted}, found a file's name")
     if "" not in sys.path and "." not in sys.path:
         sys.path.insert(0, "")
     try:
         loaded = getattr(importlib.import_module(module_name), class_name)
     except (ImportError, AttributeError, ValueError, TypeError) as error:
-        raise InputError(f"agent {name!r}: expected module:Class that can be imported, found: {error}") from error
+        said = f"{error}{place_of(error)}"
+        raise InputError(f"agent {name!r}: expected module:Class that can be imported, found: {said}") from error
     except Exception as error:
         raise _unimportable(name, error) from error
     return _checked(name, loaded)
 
 
 def _unimportable(name: str, error: Exception) -> InputError:
-    return InputError(f"agent {name!r}: its module can't be imported: {type(error).__name__}: {error}")
+    said = f"{type(error).__name__}: {error}{place_of(error)}"
+    return InputError(f"agent {name!r}: its module can't be imported: {said}")
 
 
 def _checked(name: str, loaded: Any) -> type[Agent]:

@@ -8,17 +8,15 @@ import enum
 import json
 import os
 import pathlib
-import shlex
-import shutil
-import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from traceback import print_exception
 from typing import Annotated, Any, NoReturn
 
 import typer
 
-from mazebench import __version__
+from mazebench import __version__, stopping
 from mazebench.errors import InputError, RunError, one_line
 
 # The parser's own error, which typer exports by its children only.
@@ -46,25 +44,20 @@ class Split(enum.StrEnum):
     eval = "eval"
 
 
-class _Terminated(BaseException):
-    """The process was asked to end by SIGTERM; of no kind that anyone below catches."""
-
-
-def _terminate(number: int, frame: object) -> NoReturn:
-    raise _Terminated
-
-
 def main() -> None:
     """Runs a command: exit status 0 done, 1 a run failed, 2 bad input, which gets one line and no traceback.
 
     An interrupt ends it with 130 and SIGTERM with 143, and one line that says how to go on.
     """
-    at_end = signal.signal(signal.SIGTERM, _terminate)
     try:
-        status = app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0
-        if status == 130:  # typer's, of an interrupt
-            raise KeyboardInterrupt
-        sys.exit(status)
+        with stopping.listening(), stopping.stoppable(lambda: ("run it again",)):
+            try:
+                status = app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0
+            except typer.Abort:
+                status = 130
+            if status == 130:  # typer's, of an interrupt
+                raise KeyboardInterrupt
+            sys.exit(status)
     except _UsageError as error:
         _fail(error.format_message(), 2)  # type: ignore[attr-defined]
     except InputError as error:
@@ -73,27 +66,10 @@ def main() -> None:
         _fail(f"{error.filename or 'file'}: {error.strerror or error}", 2)
     except RunError as error:
         _fail(str(error), 1)
-    except (KeyboardInterrupt, _Terminated, typer.Abort) as stop:
-        _stop(stop, "run it again")
-    finally:
-        signal.signal(signal.SIGTERM, at_end)
 
 
 def _fail(message: str, status: int) -> NoReturn:
     _remark(" ".join(message.split()))
-    sys.exit(status)
-
-
-def _stop(stop: BaseException, kept: str, *options: str) -> NoReturn:
-    """Ends the command that was told to `stop`, saying what is kept, and that the same with `options` goes on."""
-    program = [sys.argv[0]]
-    if pathlib.Path(program[0]).name == "__main__.py":
-        program = [sys.executable, "-m", "mazebench"]
-    elif shutil.which("mazebench") == program[0]:
-        program = ["mazebench"]
-    words = [*program, *sys.argv[1:], *(option for option in options if option not in sys.argv)]
-    said, status = ("terminated", 143) if isinstance(stop, _Terminated) else ("interrupted", 130)
-    print(f"mazebench: {said}; {kept} with: {shlex.join(words)}", file=sys.stderr)
     sys.exit(status)
 
 
@@ -222,6 +198,9 @@ def evaluate(
         bool | None,
         typer.Option("--record/--no-record", help="Write trajectories too; a suite does if nothing is said."),
     ] = None,
+    traceback: Annotated[
+        bool, typer.Option("--traceback", help="If the agent raises, show where; not with --workers or --ray.")
+    ] = False,
     num_envs: Annotated[int, typer.Option(min=1, help="Environments side by side in each process.")] = 256,
     workers: Annotated[
         int, typer.Option(min=0, help="Processes; 0 runs in this one, and with --ray on all its CPUs.")
@@ -232,6 +211,7 @@ def evaluate(
     ] = None,
 ) -> None:
     """Evaluate agents on unseen mazes: success rate and SPL with 95 % intervals."""
+    from mazebench.evaluation.contract import AgentError
     from mazebench.evaluation.options import EvalOptions
 
     if suite is None and len(agents) > 1:
@@ -242,6 +222,7 @@ def evaluate(
         (task == TaskName.hierarchical, *_HIERARCHICAL),
         (task == TaskName.local, *_NO_LANDMARKS),
         (maps is not None, *_OWN_MAPS),
+        (bool(workers) or ray is not None, "the agent acts in other processes", ("traceback",)),
     )
     if resume and out is None:
         raise InputError("--resume needs --out, the folder of the run to go on with")
@@ -263,13 +244,22 @@ def evaluate(
     folder = out or _new_folder(f"{agents[0].replace(':', '-')}-{task.value}" if suite is None else suite)
     running = {"num_envs": num_envs, "workers": workers, "ray_address": ray}
     kept = _Kept()
+
+    def say() -> tuple[str, ...]:
+        if kept.of is None and not folder.exists():
+            return ("nothing was begun; run it again",)
+        return (f"{kept} in {folder}; go on", *(() if out else ("--out", str(folder))), "--resume")
+
     try:
-        if suite is None:
-            _evaluate_one(options, folder, resume, bool(record), running, kept)
-        else:
-            _evaluate_suite(suite, agents, options, folder, resume, record is not False, running, kept)
-    except (KeyboardInterrupt, _Terminated) as stop:
-        _stop(stop, f"{kept} in {folder}; go on", *(() if out else ("--out", str(folder))), "--resume")
+        with stopping.stoppable(say):
+            if suite is None:
+                _evaluate_one(options, folder, resume, bool(record), running, kept)
+            else:
+                _evaluate_suite(suite, agents, options, folder, resume, record is not False, running, kept)
+    except AgentError as error:
+        if traceback and error.__cause__ is not None:
+            print_exception(error.__cause__)
+        raise RunError(f"{error}; {kept} in {folder}" if kept.done else str(error)) from error
     print(f"results in {folder}")
 
 
@@ -415,13 +405,14 @@ def train(
         ray_address=ray,
     )
     folder = out or pathlib.Path("runs") / f"{agent.replace(':', '-')}-{size}-{seed}"
-    try:
-        with _training_progress() as report:
-            loop.train(options, folder, resume, report)
-    except (KeyboardInterrupt, _Terminated) as stop:
+
+    def say() -> tuple[str, ...]:
         last = next(reversed(run_folder.checkpoints(folder)), None)
         kept = "no checkpoint is kept" if last is None else f"the checkpoint at {int(last.name):,} steps is kept"
-        _stop(stop, f"{kept} in {folder}; go on", "--resume")
+        return (f"{kept} in {folder}; go on", "--resume")
+
+    with stopping.stoppable(say), _training_progress() as report:
+        loop.train(options, folder, resume, report)
     print(f"run in {folder}; evaluate it by: mazebench eval --agent {agent} --checkpoint {folder}")
 
 
@@ -440,12 +431,19 @@ def _training_progress() -> Iterator[Any]:
 
     console = Console()
     if not console.is_terminal:
-        yield lambda share, line: line and print(line, flush=True)
+
+        def say(share: float, line: str | None) -> None:
+            stopping.check()
+            if line is not None:
+                print(line, flush=True)
+
+        yield say
         return
     with Progress(BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), console=console) as bar:
         task = bar.add_task("", total=1.0)
 
         def report(share: float, line: str | None) -> None:
+            stopping.check()
             bar.update(task, completed=share)
             if line is not None:
                 console.print(line, markup=False, highlight=False)
@@ -463,10 +461,8 @@ def report(
     """Make tables, figures and a page to explore every episode from results of `mazebench eval`."""
     from mazebench.report import writing
 
-    try:
+    with stopping.stoppable(lambda: (f"the report in {out} is not whole; make it anew",)):
         reported = writing.write_report(results, out, warn=_remark)
-    except (KeyboardInterrupt, _Terminated) as stop:
-        _stop(stop, f"the report in {out} is not whole; make it anew")
     agents = sorted({result.label for result in reported})
     print(f"{len(reported)} results of {', '.join(agents)}: {out / writing.PAGE}, {out / writing.DOCUMENT}")
 
@@ -656,10 +652,11 @@ def _progress(title: str, kept: _Kept) -> Iterator[Any]:
 
         def say(done: int, of: int) -> None:
             kept.done, kept.of = done, of
+            stopping.check()
             tenth = 10 * done // max(of, 1)
             if tenth > tenths_seen[0]:
                 tenths_seen[0] = tenth
-                print(f"{title}: {done} of {of} episodes", file=sys.stderr, flush=True)
+                print(f"{title}: {done:,} of {of:,} episodes", file=sys.stderr, flush=True)
 
         yield say
         return
@@ -675,6 +672,7 @@ def _progress(title: str, kept: _Kept) -> Iterator[Any]:
 
         def advance(done: int, of: int) -> None:
             kept.done, kept.of = done, of
+            stopping.check()
             bar.update(task, completed=done, total=of)
 
         yield advance

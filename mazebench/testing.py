@@ -5,10 +5,11 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
+import dm_env
 import numpy as np
 from dm_env import specs
 
-from mazebench.agent import Agent, Interface
+from mazebench.agent import Agent, Interface, load_agent_class
 from mazebench.evaluation.contract import AgentError, CheckedAgent, calling
 from mazebench.tasks.context import default_context_size
 
@@ -22,7 +23,7 @@ class ConformanceError(AssertionError):
     """An object breaks a contract; the message says which, what was expected and what was found."""
 
 
-def check_agent(agent_class: type[Agent], interface: Interface | None = None, checkpoint: Any = None) -> None:
+def check_agent(agent_class: type[Agent] | str, interface: Interface | None = None, checkpoint: Any = None) -> None:
     """Builds an agent and lets it act on made-up observations, as an evaluation would.
 
     Checks that `build` gives an agent; that `act` returns actions `[B]` of an integer type in range, and a state, in
@@ -31,7 +32,7 @@ def check_agent(agent_class: type[Agent], interface: Interface | None = None, ch
     would depend on how many environments and processes an evaluation has.
 
     Args:
-      agent_class: the class that an entry point of `mazebench.agents` names.
+      agent_class: the class that an entry point of `mazebench.agents` names, or what `--agent` takes.
       interface: what it is built for; by default local navigation in 13 x 13 mazes.
       checkpoint: passed on to `build`.
 
@@ -39,6 +40,8 @@ def check_agent(agent_class: type[Agent], interface: Interface | None = None, ch
       ConformanceError: at the first thing that is wrong.
       InputError: the agent's own, of a checkpoint that it can't use.
     """
+    if isinstance(agent_class, str):
+        agent_class = load_agent_class(agent_class)
     _check_class(agent_class)
     try:
         interface = interface or _default_interface(agent_class)
@@ -140,6 +143,11 @@ def check_environment(environment: Any, num_episodes: int = 2, max_steps: int = 
     Raises:
       ConformanceError: at the first thing that is wrong.
     """
+    _require(
+        isinstance(environment, dm_env.Environment),
+        f"expected a dm_env environment, found {type(environment).__name__}; of Gymnasium's, "
+        "gymnasium.utils.env_checker.check_env knows the rules",
+    )
     rng = np.random.default_rng(0)
     action_spec = environment.action_spec()
     for _ in range(num_episodes):

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import pathlib
+import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -81,6 +85,27 @@ class Vague(Good):
     @staticmethod
     def context_size(size):
         return "large"
+
+
+class InLibrary(Good):
+    def answer(self, batch_size):
+        import json
+
+        return json.loads("{")  # line 76
+
+
+class Exits(Good):
+    def answer(self, batch_size):
+        raise SystemExit(3)
+
+
+class Late(Good):
+    def initial_state(self, batch_size):
+        return 0
+
+    def act(self, observation, is_first, state, explore=False):
+        assert state < 120
+        return np.full(len(is_first), 4), state + 1
 """
 
 
@@ -88,6 +113,7 @@ class Vague(Good):
 def _agents_at_hand(tmp_path, monkeypatch):
     (tmp_path / "contract_at_hand.py").write_text(AGENTS)
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "contract_at_hand", raising=False)
 
 
 BROKEN = [
@@ -96,10 +122,12 @@ BROKEN = [
     ("Ragged", "act() raised ValueError: setting an array element with a sequence"),
     ("TooHigh", "expected act() to return actions from 0 to 5, found 6"),
     ("Divides", "act() raised ZeroDivisionError: integer division or modulo by zero (contract_at_hand.py:42)"),
-    ("OnlyActions", "expected act() to return (actions, state), found array([0, 0"),
+    ("OnlyActions", "expected act() to return (actions, state), found an array of shape (20,)"),
     ("NoSeed", "build() raised TypeError: NoSeed.build() got an unexpected keyword argument 'seed'"),
     ("NoState", "initial_state() raised KeyError (contract_at_hand.py:"),
     ("Lost", "seed_episodes() raised RuntimeError: two lines (contract_at_hand.py:"),
+    ("InLibrary", "act() raised JSONDecodeError: Expecting property name enclosed in double quotes"),
+    ("Exits", "act() raised SystemExit: 3 (contract_at_hand.py:"),
     ("Vague", "context_size() raised ValueError: invalid literal for int()"),
 ]
 
@@ -116,10 +144,52 @@ class TestEvaluation:
         assert str(caught.value).startswith(f"agent 'contract_at_hand:{name}': {said}")
         assert "\n" not in str(caught.value)
 
+    def test_place_when_a_library_raised(self, tmp_path):
+        options = dataclasses.replace(OPTIONS, agent="contract_at_hand:InLibrary")
+        with pytest.raises(AgentError, match=r"\(contract_at_hand\.py:76\)$"):
+            evaluate(options, tmp_path / "out")
+
     def test_message_when_it_breaks_in_a_worker(self, tmp_path):
         options = dataclasses.replace(OPTIONS, agent="contract_at_hand:Divides")
-        with pytest.raises(RunError, match=r"^agent 'contract_at_hand:Divides': act\(\) raised ZeroDivisionError"):
+        with pytest.raises(AgentError, match=r"^agent 'contract_at_hand:Divides': act\(\) raised ZeroDivisionError"):
             evaluate(options, tmp_path / "out", workers=2)
+
+    def test_folder_when_no_episode_ended_and_the_agent_is_mended(self, tmp_path):
+        options = dataclasses.replace(OPTIONS, agent="contract_at_hand:Divides")
+        for record in (True, False):
+            with pytest.raises(AgentError):
+                evaluate(options, tmp_path / "out", record=record)
+        assert evaluate(OPTIONS, tmp_path / "out")["episodes"] == 20
+        assert not (tmp_path / "out" / "trajectories.npz").exists()
+
+    def test_folder_when_the_agents_file_was_changed(self, tmp_path):
+        evaluate(OPTIONS, tmp_path / "out")
+        (tmp_path / "contract_at_hand.py").write_text(AGENTS + "# mended\n")
+        with pytest.raises(
+            InputError, match="holds another run: its agent's file was changed since; name another fold"
+        ):
+            evaluate(OPTIONS, tmp_path / "out", resume=True)
+
+
+class TestCommand:
+    """With one environment at a time, so that some episodes end before the agent breaks."""
+
+    WORDS = ("eval", "--distances", "1", "--episodes-per-distance", "1", "--num-envs", "1", "--agent")
+
+    def run(self, folder: pathlib.Path, *words: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "mazebench", *self.WORDS, *words]
+        return subprocess.run(command, cwd=folder, capture_output=True, text=True)
+
+    def test_line_when_some_episodes_had_ended(self, tmp_path):
+        words = ("contract_at_hand:Late", "--out", "run")
+        plain, loud = self.run(tmp_path, *words), self.run(tmp_path, *words, "--resume", "--traceback")
+        assert (plain.returncode, loud.returncode) == (1, 1)
+        *_, line = plain.stderr.splitlines()
+        said = r"mazebench: agent 'contract_at_hand:Late': act\(\) raised AssertionError \(contract_at_hand.py:\d+\)"
+        assert re.fullmatch(said + "; 1 of 20 episodes are kept in run", line)
+        assert "Traceback" not in plain.stderr
+        assert "assert state < 120" in loud.stderr
+        assert loud.stderr.splitlines()[-1] == line.replace("1 of 20", "2 of 20")
 
 
 class TestCalling:

@@ -27,7 +27,7 @@ ORDER = (
     {"training"},
     {"report"},
     {"play"},
-    {"bench", "testing", "making", "cli", "__main__"},
+    {"bench", "testing", "making", "stopping", "cli", "__main__"},
 )
 LAYERS = {name: layer for layer, names in enumerate(ORDER) for name in names}
 # Where in the repository a library may be imported.

@@ -15,7 +15,7 @@ from mazebench.evaluation.workers import Ended, Job, run_job
 try:
     import ray
 except ModuleNotFoundError as error:
-    raise InputError("--ray needs Ray, which is not installed; try: pip install 'mazebench-mujoco[ray]'") from error
+    raise InputError("--ray needs Ray, which the extra [ray] brings (docs/start.md)") from error
 
 _MAX_LOST = 20  # of tasks in a run, before it gives up
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import pathlib
-import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
-from mazebench.agent import Agent, Observation
+from mazebench.agent import Agent, Observation, place_of
 from mazebench.errors import InputError, RunError
 
 
@@ -28,9 +26,9 @@ def calling(name: str, method: str) -> Iterator[None]:
         yield
     except (InputError, RunError):
         raise
-    except Exception as error:  # other people's code may raise anything
+    except (Exception, SystemExit) as error:  # other people's code may raise anything
         said = " ".join(f"{type(error).__name__}: {error}".split())[:300].removesuffix(":")
-        raise AgentError(f"agent {name!r}: {method}() raised {said}{_place(error)}") from error
+        raise AgentError(f"agent {name!r}: {method}() raised {said}{place_of(error)}") from error
 
 
 class CheckedAgent:
@@ -74,12 +72,7 @@ class CheckedAgent:
         return f"actions from 0 to {self._num_actions - 1}, found {wrong[0]}" if len(wrong) else None
 
 
-def _place(error: Exception) -> str:
-    """Where it was raised; nothing if the agent was not even entered, as with wrong arguments."""
-    path, line, *_ = traceback.extract_tb(error.__traceback__)[-1]
-    ours = pathlib.Path(__file__).parent.parent in pathlib.Path(path).parents
-    return "" if ours else f" ({pathlib.Path(path).name}:{line})"
-
-
 def _short(value: object) -> str:
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape}"
     return " ".join(repr(value).split())[:80]

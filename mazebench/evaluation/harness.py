@@ -20,9 +20,11 @@ from mazebench.evaluation.trajectories import JOURNAL, TRAJECTORIES, TrajectoryL
 from mazebench.evaluation.workers import Ended, Job, run_here, run_in_processes
 from mazebench.files import make_folder, writing_to
 from mazebench.maps.benchmark import VERSION, manifest_hash
-from mazebench.records import CONFIG, SUMMARY, FolderLock, RecordLog, read_json, write_json
+from mazebench.records import CONFIG, EPISODES, SUMMARY, FolderLock, RecordLog, read_json, write_json
+from mazebench.records import JOURNAL as RECORDS_JOURNAL
 from mazebench.world.mjcf import maze_spec
 
+_LOGS = {EPISODES, RECORDS_JOURNAL, JOURNAL}  # what grows while a run goes on
 # Called with the number of episodes done and of all.
 Progress = Callable[[int, int], None]
 
@@ -301,7 +303,9 @@ def _runner(
 def _prepare(out: pathlib.Path, config: dict[str, Any], resume: bool) -> None:
     """Makes `out` ready to hold the run of `config`, or refuses."""
     found = sorted(path.name for path in out.iterdir())
-    if set(found) <= {f"{CONFIG}.tmp"}:
+    if set(found) <= {f"{CONFIG}.tmp"} or _holds_nothing(out, found):
+        for name in _LOGS & set(found):
+            (out / name).unlink()
         write_json(out / CONFIG, config)
         return
     if CONFIG not in found:
@@ -311,9 +315,21 @@ def _prepare(out: pathlib.Path, config: dict[str, Any], resume: bool) -> None:
     _compare(out, config)
 
 
+def _holds_nothing(out: pathlib.Path, found: list[str]) -> bool:
+    """Whether a run ended before its first episode did, as when its agent could not be built."""
+    logs = set(found) - {CONFIG, f"{CONFIG}.tmp"}
+    return logs <= _LOGS and all(_is_empty(out / name) for name in logs)
+
+
+def _is_empty(path: pathlib.Path) -> bool:
+    return path.is_file() and not path.is_symlink() and path.stat().st_size == 0
+
+
 def _compare(out: pathlib.Path, config: dict[str, Any]) -> None:
     before = read_json(out / CONFIG)
     for key, value in config.items():
         if not isinstance(before, dict) or before.get(key) != value:
             old = before.get(key) if isinstance(before, dict) else before
+            if key == "agent_code_sha256" and old and value:
+                raise InputError(f"{out}: holds another run: its agent's file was changed since; name another folder")
             raise InputError(f"{out}: holds another run: its {key} is {str(old)[:200]}, this one's {value}")

@@ -17,6 +17,7 @@ from typing import Any
 
 from mazebench.agent import load_agent_class
 from mazebench.errors import InputError, RunError
+from mazebench.evaluation.contract import AgentError
 from mazebench.evaluation.options import EvalOptions, build_agent, make_task_spec
 from mazebench.evaluation.protocol import Trial
 from mazebench.evaluation.runner import run_trials
@@ -155,7 +156,8 @@ def _work(pipe: Any, num_envs: int) -> None:
                     pipe.send(ended)
             except (InputError, RunError) as error:
                 # As plain text: what an error was caused by need not survive the way to another process.
-                pipe.send(InputError(str(error)) if isinstance(error, InputError) else RunError(str(error)))
+                kinds = (InputError, AgentError, RunError)
+                pipe.send(next(kind for kind in kinds if isinstance(error, kind))(str(error)))
                 return
             pipe.send(None)
 

@@ -111,7 +111,9 @@ def _load_figures() -> ModuleType:
     try:
         from mazebench.report import figures
     except ImportError as error:
-        raise InputError(f"the report's figures need {error.name}: pip install 'mazebench-mujoco[report]'") from error
+        raise InputError(
+            f"the report's figures need {error.name}, which the extra [report] brings (docs/start.md)"
+        ) from error
     return figures
 
 

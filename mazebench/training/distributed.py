@@ -22,7 +22,7 @@ try:
 
     from mazebench.evaluation.cluster import connect
 except ModuleNotFoundError as error:
-    raise InputError("--workers needs Ray, which is not installed; try: pip install 'mazebench-mujoco[ray]'") from error
+    raise InputError("--workers needs Ray, which the extra [ray] brings (docs/start.md)") from error
 
 if TYPE_CHECKING:
     from mazebench.training.loop import TrainOptions
