@@ -5,12 +5,13 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import enum
+import io
 import json
 import os
 import pathlib
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from traceback import print_exception
 from typing import Annotated, Any, NoReturn
 
@@ -49,6 +50,9 @@ def main() -> None:
 
     An interrupt ends it with 130 and SIGTERM with 143, and one line that says how to go on.
     """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # names of files need not be legal Unicode
     try:
         with stopping.listening(), stopping.stoppable(lambda: ("run it again",)):
             try:
@@ -63,7 +67,9 @@ def main() -> None:
     except InputError as error:
         _fail(str(error), 2)
     except OSError as error:
-        _fail(f"{error.filename or 'file'}: {error.strerror or error}", 2)
+        if error.filename is None:  # as of what it is printed to
+            _fail(f"can't write: {error.strerror or error}", 1)
+        _fail(f"{error.filename}: {error.strerror or error}", 2)
     except RunError as error:
         _fail(str(error), 1)
 
@@ -114,15 +120,21 @@ def generate(
 ) -> None:
     """Make mazes: MJCF for MuJoCo, text, picture, mesh."""
     from mazebench import making
+    from mazebench.files import make_folder
+    from mazebench.records import FolderLock
 
     _refuse_ignored(context, (from_image is not None, "the picture shows one maze", ("count", "seed", "style")))
     mazes = making.make_mazes(size, count, seed, style, from_image)
     chosen = making.parse_formats(formats)
-    for index, maze in enumerate(mazes):
-        for path in making.write_maze(maze, out, chosen, from_image):
-            print(path)
-        if index == 0:
-            _preview(maze)
+    with ExitStack() as opened:
+        for index, maze in enumerate(mazes):
+            if index == 0:  # nothing is made for bad input
+                make_folder(out)
+                opened.enter_context(FolderLock(out))
+            for path in making.write_maze(maze, out, chosen, from_image):
+                print(path)
+            if index == 0:
+                _preview(maze)
 
 
 def _preview(maze: Any) -> None:
@@ -656,7 +668,8 @@ def _progress(title: str, kept: _Kept) -> Iterator[Any]:
             tenth = 10 * done // max(of, 1)
             if tenth > tenths_seen[0]:
                 tenths_seen[0] = tenth
-                print(f"{title}: {done:,} of {of:,} episodes", file=sys.stderr, flush=True)
+                with suppress(OSError):  # nobody reads it any more
+                    print(f"{title}: {done:,} of {of:,} episodes", file=sys.stderr, flush=True)
 
         yield say
         return

@@ -13,6 +13,10 @@ from typing import IO, Any
 from mazebench.errors import InputError
 
 
+class WriteError(InputError):
+    """A folder that was given can't be written."""
+
+
 def open_file(path: str | pathlib.Path, kind: str) -> io.BufferedReader:
     """Opens a file from outside to read; a pipe, which might never end, or a device is refused.
 
@@ -48,13 +52,13 @@ def open_to_write(path: pathlib.Path, mode: str) -> IO[Any]:
     """Opens a file of a folder that may come from outside, where a link could lead to a file of someone else's.
 
     Raises:
-      InputError: if it is such a link, or can't be written.
+      WriteError: if it is such a link, or can't be written.
     """
     try:
         return open(path, mode, encoding=None if "b" in mode else "utf-8", opener=_open_no_link)
     except OSError as error:
         said = "it is a link" if path.is_symlink() else error.strerror
-        raise InputError(f"{path}: can't write: {said}") from error
+        raise WriteError(f"{path}: can't write: {said}") from error
 
 
 @contextlib.contextmanager
@@ -86,12 +90,17 @@ def open_whole(path: str | pathlib.Path) -> Iterator[IO[bytes]]:
         raise OSError(error.errno, said, str(path)) from error
 
 
-def make_folder(path: pathlib.Path) -> None:
-    """Makes a folder to write to.
+def make_folder(path: pathlib.Path, within: pathlib.Path | None = None) -> None:
+    """Makes a folder to write to, or one `within` such a folder, which may come from outside.
 
     Raises:
-      InputError: if that can't be.
+      InputError: if that can't be, or a link on the way from `within` leads somewhere else.
     """
+    for folder in (path, *path.parents):
+        if within is None or folder == within:
+            break
+        if folder.is_symlink():
+            raise InputError(f"{folder}: can't write there: it is a link")
     with writing_to(path):
         path.mkdir(parents=True, exist_ok=True)
 
@@ -101,12 +110,12 @@ def writing_to(folder: pathlib.Path) -> Iterator[None]:
     """Says in a line which folder, or which file in it, can't be written.
 
     Raises:
-      InputError: if the system says so.
+      WriteError: if the system says so.
     """
     try:
         yield
     except OSError as error:
-        raise InputError(f"{error.filename or folder}: can't write there: {error.strerror}") from error
+        raise WriteError(f"{error.filename or folder}: can't write there: {error.strerror}") from error
 
 
 def _open_at_once(path: str, flags: int) -> int:

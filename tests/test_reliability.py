@@ -165,7 +165,7 @@ class TestKill:
     def test_evaluation_when_a_worker_is_killed_in_the_middle_of_a_message(self, tmp_path, monkeypatch):
         (tmp_path / "still_at_hand.py").write_text(STILL)
         monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
-        words = ["--agent", "still_at_hand:Still", "--workers", "2", "--record", "--num-envs", "128"]
+        words = ["--agent", "still_at_hand:Still", "--workers", "2", "--record", "--num-envs", "700"]
         process = start("eval", *words, "--out", tmp_path / "run")
         wait_until(lambda: len(workers_of(process)) == 2, process)
         # Nobody reads what the workers send, until the pipes are full and they wait.
@@ -291,6 +291,17 @@ class TestRay:
         assert process.returncode == 0, errors
         assert errors.count("a Ray task was lost; it is run again") == 3
         assert results_of(tmp_path / "run") == results_of(unbroken("long"))
+
+    def test_evaluation_when_told_to_end_while_ray_starts(self, tmp_path):
+        pytest.importorskip("ray")
+        process = start(*LONG, "--ray", "local", "--workers", "2", "--out", "run", cwd=tmp_path)
+        wait_until(lambda: any("gcs_server" in command_line(pid) for pid in descendants(process.pid)), process)
+        started = descendants(process.pid)
+        process.send_signal(signal.SIGTERM)
+        _, errors = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 143, errors
+        assert "mazebench: terminated; " in errors
+        wait_until(lambda: not any(map(is_running, started)))
 
     @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
     def test_training_when_told_to_end(self, tmp_path, number):

@@ -17,7 +17,7 @@ from mazebench.errors import InputError
 from mazebench.evaluation.metrics import summarize, wilson_interval
 from mazebench.evaluation.paper import reference
 from mazebench.evaluation.trajectories import load_trajectories
-from mazebench.records import EPISODES, SUMMARY, to_line
+from mazebench.records import EPISODES, SUMMARY, FolderLock, to_line
 from mazebench.report import writing
 from mazebench.report.distributions import GRID, density
 from mazebench.report.page import pack_poses
@@ -235,6 +235,21 @@ class TestFiles:
             path.touch()
         writing.write_report([tmp_path / "a"], tmp_path / "out", silent)
         assert list((tmp_path / "out").rglob("*.tmp")) == []
+
+    @pytest.mark.parametrize("name", ["tables", "figures"])
+    def test_out_when_a_link_leads_elsewhere(self, results, tmp_path, name):
+        (tmp_path / "mine").mkdir()
+        for suffix in ("csv", "png"):
+            (tmp_path / "mine" / f"data.{suffix}").touch()
+        (tmp_path / "out").mkdir()
+        (tmp_path / "out" / name).symlink_to(tmp_path / "mine")
+        with pytest.raises(InputError, match=rf"{name}: can't write there: it is a link"):
+            writing.write_report([results], tmp_path / "out", silent)
+        assert len(list((tmp_path / "mine").iterdir())) == 2
+
+    def test_out_when_another_process_writes_to_it(self, results, tmp_path):
+        with FolderLock(tmp_path), pytest.raises(InputError, match="is in use by another process"):
+            writing.write_report([results], tmp_path, silent)
 
     def test_out_when_it_holds_something_else(self, results, tmp_path):
         (tmp_path / "diary.txt").touch()

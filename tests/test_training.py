@@ -92,6 +92,26 @@ def test_folder_in_use_by_another_process_is_refused(tmp_path):
         RunFolder(tmp_path)
 
 
+def test_folder_that_was_refused_is_free_again(tmp_path):
+    (tmp_path / "checkpoints" / f"{800:012d}").mkdir(parents=True)
+    with pytest.raises(InputError, match=r"expected config\.json beside the checkpoints"):
+        RunFolder(tmp_path)
+    (tmp_path / "config.json").touch()
+    with RunFolder(tmp_path) as folder:
+        assert len(folder.checkpoints()) == 1
+
+
+def test_folder_whose_checkpoints_are_a_link_is_refused(tmp_path):
+    others = tmp_path / "other" / "checkpoints" / f"{800:012d}.tmp"
+    others.mkdir(parents=True)
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "config.json").touch()
+    (tmp_path / "run" / "checkpoints").symlink_to(others.parent)
+    with pytest.raises(InputError, match="checkpoints: can't write there: it is a link"):
+        RunFolder(tmp_path / "run")
+    assert others.exists()
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -21,6 +21,7 @@ import numpy as np
 import torch
 
 from mazebench.agent import Interface
+from mazebench.errors import RunError
 from mazebench.maps.benchmark import load_mazes
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
@@ -96,12 +97,17 @@ class Network:
 
 def measure(seconds: float) -> dict[str, list[dict[str, Any]]]:
     """Tables of simulations a second of a thread's own time, and of an update's; some `seconds` for a figure."""
+    num_threads = torch.get_num_threads()
     torch.set_num_threads(1)
-    with _mctx() as mctx:
-        rows = [_row(policy, batch_size, seconds / _ROUNDS, mctx) for policy, batch_size in _CASES]
+    try:
+        with _mctx() as mctx:
+            rows = [_row(policy, batch_size, seconds / _ROUNDS, mctx) for policy, batch_size in _CASES]
+        parts = update_rows(seconds)
+    finally:
+        torch.set_num_threads(num_threads)
     return {
         f"tree search, {NUM_SIMULATIONS} simulations, one thread": rows,
-        "the parts of an update, one thread": update_rows(seconds),
+        "the parts of an update, one thread": parts,
     }
 
 
@@ -133,6 +139,8 @@ def _timed(function: Callable[..., Any], times: dict[str, float], part: str) -> 
     def timed(*arguments: Any) -> Any:
         begin = time.perf_counter()
         result = function(*arguments)
+        if torch.cuda.is_available():
+            torch.cuda.synchronize()
         times[part] += time.perf_counter() - begin
         return result
 
@@ -206,7 +214,9 @@ def _mctx() -> Iterator[Callable[[str, int, float], float] | None]:
         def ask(policy: str, batch_size: int, seconds: float) -> float:
             questions.write(json.dumps([policy, batch_size, seconds]) + "\n")
             questions.flush()
-            return json.loads(answers.readline())
+            if not (line := answers.readline()):
+                raise RunError(f"the process that measures mctx ended with exit status {process.wait()}")
+            return json.loads(line)
 
         try:
             yield ask

@@ -79,15 +79,20 @@ def connect(address: str | None) -> None:
     Raises:
       InputError: if there is none.
     """
-    at_end = signal.getsignal(signal.SIGTERM)
+    at_end, terminated = signal.getsignal(signal.SIGTERM), False
     try:
         ray.init(address=address, log_to_driver=False, include_dashboard=False)
+    except SystemExit:  # Ray's answer to SIGTERM
+        ray.shutdown()
+        terminated = True
     except (ConnectionError, ValueError, RuntimeError) as error:
         said = " ".join(str(error).split())[:200]
         raise InputError(f"can't reach a Ray cluster at {address!r}: {said}") from error
     finally:
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGTERM, at_end)  # which Ray takes
+    if terminated:
+        signal.raise_signal(signal.SIGTERM)
 
 
 def _start(job: Job, num_envs: int) -> Any:

@@ -15,7 +15,7 @@ from mazebench.agent import load_agent_class
 from mazebench.errors import InputError, unknown
 from mazebench.evaluation.options import EvalOptions, build_agent, is_frozen, make_task_spec, resolve_checkpoint
 from mazebench.evaluation.protocol import select_trials
-from mazebench.files import open_whole
+from mazebench.files import open_whole, writing_to
 from mazebench.maps import perturb
 from mazebench.maps.image import draw_grid, write_image
 from mazebench.tasks.navigation import Environment
@@ -136,22 +136,24 @@ def _write_gif(frames: list[np.ndarray], out: pathlib.Path) -> None:
     done, content = cv2.imencodeanimation(".gif", animation)
     if not done:
         raise InputError(f"{out}: this OpenCV can't write GIF")
-    with open_whole(out) as file:
+    with writing_to(out), open_whole(out) as file:
         file.write(content.tobytes())
 
 
 def _write_mp4(frames: list[np.ndarray], out: pathlib.Path) -> None:
     height, width = frames[0].shape[:2]
-    with tempfile.TemporaryDirectory(dir=out.parent, prefix=".film-") as folder:
+    with tempfile.TemporaryDirectory() as folder:
         film = pathlib.Path(folder) / "film.mp4"
         writer = cv2.VideoWriter(str(film), cv2.VideoWriter.fourcc(*"mp4v"), _FRAMES_PER_SECOND, (width, height))
         for frame in frames:
             writer.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
         writer.release()
         # OpenCV says nothing of a disk that is full. The index of the frames, b"moov", is written last.
-        if not film.exists() or b"moov" not in _whole_boxes(film.read_bytes()):
-            raise InputError(f"{out}: can't write the film: the disk is full, or this OpenCV can't write MP4")
-        film.replace(out)
+        content = film.read_bytes() if film.exists() else b""
+        if b"moov" not in _whole_boxes(content):
+            raise InputError(f"{film}: can't make the film there: the disk is full, or this OpenCV can't write MP4")
+    with writing_to(out), open_whole(out) as file:
+        file.write(content)
 
 
 def _whole_boxes(content: bytes) -> list[bytes]:

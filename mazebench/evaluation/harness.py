@@ -18,7 +18,7 @@ from mazebench.evaluation.provenance import code_hash, file_hash, provenance
 from mazebench.evaluation.results import check_records
 from mazebench.evaluation.trajectories import JOURNAL, TRAJECTORIES, TrajectoryLog
 from mazebench.evaluation.workers import Ended, Job, run_here, run_in_processes
-from mazebench.files import make_folder, writing_to
+from mazebench.files import WriteError, make_folder, writing_to
 from mazebench.maps.benchmark import VERSION, manifest_hash
 from mazebench.records import CONFIG, EPISODES, SUMMARY, FolderLock, RecordLog, read_json, write_json
 from mazebench.records import JOURNAL as RECORDS_JOURNAL
@@ -261,7 +261,12 @@ def run_evaluations(
     def jobs(pieces: int) -> Iterator[Job]:
         nonlocal num_done
         for number, evaluation in enumerate(evaluations):
-            evaluation.open(resume)
+            try:
+                evaluation.open(resume)
+            except WriteError as error:
+                if number == 0:
+                    raise
+                raise RunError(f"{error}; what was written is kept, go on with --resume") from error
             num_done += evaluation.num_done
             progress(num_done, total)
             if evaluation.num_done == len(evaluation.trials):

@@ -118,6 +118,9 @@ class SuiteRun:
         with FolderLock(self.out):
             content = self._prepare(resume)
             for evaluation in self.evaluations:
+                make_folder(evaluation.out.parent, within=self.out)
+                if evaluation.out.is_symlink():
+                    raise InputError(f"{evaluation.out}: can't write there: it is a link")
                 if (evaluation.out / CONFIG).exists():
                     evaluation.check_same_run()
             with writing_to(self.out):

@@ -76,8 +76,13 @@ def run_in_processes(jobs: Iterator[Job], num_envs: int, workers: int) -> Iterat
     first = list(itertools.islice(jobs, workers))
     processes: dict[Any, Any] = {}  # by this end of the pipe to each
     try:
-        with _undisturbed():
-            processes |= (_start(num_envs) for _ in first)
+        try:
+            with _undisturbed():
+                processes |= (_start(num_envs) for _ in first)
+        except OSError as error:
+            raise RunError(
+                f"can't start {len(first)} worker processes: {error.strerror}; go on with --resume"
+            ) from error
         for pipe, job in zip(processes, first, strict=True):
             _send(pipe, job)
         running = set(processes)
@@ -140,7 +145,7 @@ def _send(pipe: Any, job: Job) -> None:
 def _receive(pipe: Any, process: Any) -> Any:
     try:
         return pipe.recv()
-    except (EOFError, ConnectionResetError):
+    except (EOFError, OSError):  # OSError of a message that was cut off
         process.join()
         raise RunError(f"a worker ended with exit status {process.exitcode}; go on with --resume") from None
 

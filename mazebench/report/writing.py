@@ -11,6 +11,7 @@ from mazebench.errors import InputError
 from mazebench.evaluation.paper import citation, reference
 from mazebench.files import make_folder, open_whole, writing_to
 from mazebench.maps.benchmark import VERSION, manifest_hash
+from mazebench.records import FolderLock
 from mazebench.report.distributions import Distribution, build_distributions
 from mazebench.report.episodes import Gallery, build_galleries
 from mazebench.report.finding import find_results
@@ -50,7 +51,8 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path, warn: Warn) -
     results.sort(key=lambda result: (result.setting, labels.index(result.label)))
     tables, distributions = build_tables(results, labels), build_distributions(results, labels)
     galleries = build_galleries(results, labels)
-    with writing_to(out):
+    make_folder(out)
+    with FolderLock(out), writing_to(out):
         _prepare(out)
         for table in tables:
             for suffix, form in ((".md", to_markdown), (".csv", to_csv), (".tex", to_latex)):
@@ -89,12 +91,11 @@ def _rank(label: str) -> tuple[int, str]:
 def _prepare(out: pathlib.Path) -> None:
     """Makes `out` and removes an earlier report's tables and figures, those that a kill left half-written too."""
     ours = {DOCUMENT, PAGE, TABLES, FIGURES}
-    make_folder(out)
     strangers = sorted(path.name for path in out.iterdir() if path.name.removesuffix(".tmp") not in ours)
     if strangers:
         raise InputError(f"{out}: expected an empty folder or a report's, found {strangers[0]!r} in it")
     for folder, suffixes in _SUFFIXES.items():
-        make_folder(out / folder)
+        make_folder(out / folder, within=out)
         for path in (out / folder).iterdir():
             if path.name.removesuffix(".tmp").endswith(suffixes):
                 path.unlink()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import pathlib
@@ -12,7 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mazebench.errors import InputError, RunError
-from mazebench.files import make_folder, open_to_write, open_whole, writing_to
+from mazebench.files import WriteError, make_folder, open_to_write, open_whole, writing_to
 from mazebench.records import FolderLock, read_json, repair_and_read_lines, to_line, write_json
 
 CONFIG = "config.json"
@@ -35,17 +36,22 @@ class RunFolder:
         """
         self.path = path
         self._board: _Board | None = None
-        found = sorted(item.name for item in path.iterdir()) if path.is_dir() else []
-        if CONFIG not in found and set(found) - {f"{CONFIG}.tmp", CHECKPOINTS}:
-            raise InputError(f"{path}: expected an empty folder or a training run's, found {found[0]!r} in it")
         make_folder(path)
-        self._lock = FolderLock(path)
-        make_folder(path / CHECKPOINTS)
-        for half_written in (path / CHECKPOINTS).glob("*.tmp"):
+        with contextlib.ExitStack() as opened:
+            opened.enter_context(FolderLock(path))
+            self._prepare()
+            self._opened = opened.pop_all()
+
+    def _prepare(self) -> None:
+        found = sorted(item.name for item in self.path.iterdir())
+        if CONFIG not in found and set(found) - {f"{CONFIG}.tmp", CHECKPOINTS}:
+            raise InputError(f"{self.path}: expected an empty folder or a training run's, found {found[0]!r} in it")
+        make_folder(self.path / CHECKPOINTS, within=self.path)
+        for half_written in (self.path / CHECKPOINTS).glob("*.tmp"):
             if _CHECKPOINT_NAME.fullmatch(half_written.stem):
                 shutil.rmtree(half_written, ignore_errors=True)
         if CONFIG not in found and self.checkpoints():
-            raise InputError(f"{path}: expected {CONFIG} beside the checkpoints, found none")
+            raise InputError(f"{self.path}: expected {CONFIG} beside the checkpoints, found none")
 
     def checkpoints(self) -> list[pathlib.Path]:
         """The complete checkpoints, oldest first."""
@@ -71,7 +77,7 @@ class RunFolder:
             shutil.rmtree(temporary, ignore_errors=True)
             raise self._cannot("save", final, error) from error
         for old in self.checkpoints()[:-_KEPT_CHECKPOINTS]:
-            shutil.rmtree(old)
+            shutil.rmtree(old, ignore_errors=True)
 
     def log(self, metrics: dict[str, Any]) -> None:
         """Appends a line to the metrics.
@@ -82,9 +88,11 @@ class RunFolder:
         try:
             with open_to_write(self.path / METRICS, "a") as file:
                 file.write(to_line(metrics))
-            self._board = self._board or _Board(self.path / _BOARD, metrics["env_steps"])
+            if self._board is None:
+                make_folder(self.path / _BOARD, within=self.path)
+                self._board = _Board(self.path / _BOARD, metrics["env_steps"])
             self._board.add(metrics, metrics["env_steps"])
-        except OSError as error:
+        except (OSError, WriteError) as error:
             raise self._cannot("write", self.path, error) from error
 
     def forget_metrics_after(self, env_steps: int) -> None:
@@ -116,11 +124,12 @@ class RunFolder:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._lock.__exit__()
+        self._opened.close()
 
-    def _cannot(self, do: str, what: pathlib.Path, error: OSError) -> RunError:
+    def _cannot(self, do: str, what: pathlib.Path, error: OSError | WriteError) -> RunError:
         last = next(reversed(self.checkpoints()), "none yet")
-        return RunError(f"{what}: can't {do}: {error.strerror}; last checkpoint: {last}; go on with --resume")
+        said = error.strerror if isinstance(error, OSError) else str(error)
+        return RunError(f"{what}: can't {do}: {said}; last checkpoint: {last}; go on with --resume")
 
 
 def checkpoints(path: pathlib.Path) -> list[pathlib.Path]:
@@ -138,7 +147,6 @@ class _Board:
         from tensorboardX.event_file_writer import EventsWriter
         from tensorboardX.proto.event_pb2 import Event, SessionLog
 
-        folder.mkdir(exist_ok=True)
         # With the process, as the clock may go back to the second of another sitting.
         self._writer = EventsWriter(str(folder / "events"), f".{os.getpid()}")
         # A resumed run takes steps again: what TensorBoard shows of them from before is purged.
