@@ -112,7 +112,7 @@ def generate(
         "mazes"
     ),
     formats: Annotated[
-        str, typer.Option("--format", help="Of mjcf, txt, png, glb, obj, stl; separated by commas.")
+        str, typer.Option("--format", help="Files to write: any of mjcf, txt, png, glb, obj, stl, separated by commas.")
     ] = "txt,mjcf,png,glb",
     from_image: Annotated[
         pathlib.Path | None, typer.Option(help="Read the maze off a picture of a floor plan, or a text map, instead.")
@@ -186,7 +186,7 @@ def evaluate(
     ] = None,
     task: Annotated[TaskName, typer.Option(help="Kind of navigation.")] = TaskName.local,
     size: Annotated[
-        int | None, typer.Option(help="Of the benchmark's mazes: 13 (if not given), 15, 17, 19 or 21.")
+        int | None, typer.Option(help="Size of the benchmark's mazes: 13 (if not given), 15, 17, 19 or 21.")
     ] = None,
     split: Annotated[Split, typer.Option(help="The benchmark's unseen mazes, or its training mazes.")] = Split.eval,
     maps: Annotated[
@@ -199,9 +199,12 @@ def evaluate(
     map_warp: _MapWarp = 0.0,
     position_noise: _PositionNoise = 0.0,
     checkpoint: Annotated[
-        pathlib.Path | None, typer.Option(help="Of a learned agent, or its run folder; the shipped one if not given.")
+        pathlib.Path | None,
+        typer.Option(help="A learned agent's checkpoint or run folder; the shipped one if not given."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the agent's draws, and of episodes that are not frozen.")] = 0,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Seed of what the agent draws, and of episodes that are not frozen.")
+    ] = 0,
     out: Annotated[
         pathlib.Path | None, typer.Option(help="Folder for the results; a new one in results/ if not given.")
     ] = None,
@@ -219,7 +222,7 @@ def evaluate(
     ] = 0,
     ray: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="Of a Ray cluster for the workers; auto, or local for a new one."),
+        typer.Option(metavar="ADDRESS", help="Address of a Ray cluster for the workers; auto, or local for a new one."),
     ] = None,
 ) -> None:
     """Evaluate agents on unseen mazes: success rate and SPL with 95 % intervals."""
@@ -354,7 +357,9 @@ def _new_folder(name: str) -> pathlib.Path:
 @app.command()
 def compare(
     a: Annotated[pathlib.Path, typer.Argument(metavar="A", help="The folder of an evaluation, or of a suite's agent.")],
-    b: Annotated[pathlib.Path, typer.Argument(metavar="B", help="Of another agent on the same episodes.")],
+    b: Annotated[
+        pathlib.Path, typer.Argument(metavar="B", help="The evaluation of another agent on the same episodes.")
+    ],
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON, with all intervals, instead of a table.")
     ] = False,
@@ -379,11 +384,11 @@ def compare(
 def train(
     context: typer.Context,
     agent: Annotated[str, typer.Option(help="A learning agent: mah or dqn, or module:Class.")],
-    size: Annotated[int, typer.Option(help="Of the benchmark's training mazes: 13, 15, 17, 19 or 21.")] = 13,
+    size: Annotated[int, typer.Option(help="Size of the benchmark's training mazes: 13, 15, 17, 19 or 21.")] = 13,
     pairs: Annotated[str, typer.Option(help="random, or fixed: one start-goal pair a maze.")] = "random",
     minutes: Annotated[float | None, typer.Option(min=0, help="How long this sitting lasts.")] = None,
     env_steps: Annotated[int | None, typer.Option(min=1, help="Agent steps of the run, all sittings together.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is drawn.")] = 0,
     out: Annotated[pathlib.Path | None, typer.Option(help="The run folder; runs/AGENT-SIZE-SEED if not given.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint in --out.")] = False,
     overrides: Annotated[
@@ -396,7 +401,8 @@ def train(
     eval_mazes: Annotated[int, typer.Option(min=1, help="Held-out mazes of an evaluation, 10 episodes in each.")] = 20,
     workers: Annotated[int, typer.Option(min=0, help="Ray actors that collect; 0 collects in this process.")] = 0,
     ray: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Of a Ray cluster for the workers; local if not given.")
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Address of a Ray cluster for the workers; local if not given."),
     ] = None,
 ) -> None:
     """Train an agent on the benchmark's training mazes; evaluated now and then on held-out mazes of the same kind."""
@@ -485,7 +491,7 @@ def render(
     out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
     agent: Annotated[str, typer.Option(help="Who drives.")] = "planner-closed-loop",
     task: Annotated[TaskName, typer.Option(help="Kind of navigation.")] = TaskName.local,
-    size: Annotated[int | None, typer.Option(help="Of the benchmark's mazes; 13 if not given.")] = None,
+    size: Annotated[int | None, typer.Option(help="Size of the benchmark's mazes; 13 if not given.")] = None,
     split: Annotated[Split, typer.Option(help="The benchmark's unseen or training mazes.")] = Split.eval,
     maps: Annotated[pathlib.Path | None, typer.Option(help="Mazes of your own.")] = None,
     distances: Annotated[str, typer.Option(help="From start to goal in cells (local task).")] = "10",
@@ -496,8 +502,8 @@ def render(
     map_flip: _MapFlip = 0.0,
     map_warp: _MapWarp = 0.0,
     position_noise: _PositionNoise = 0.0,
-    checkpoint: Annotated[pathlib.Path | None, typer.Option(help="Of a learned agent.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the episode.")] = 0,
+    checkpoint: Annotated[pathlib.Path | None, typer.Option(help="A learned agent's checkpoint.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the episode.")] = 0,
     pixels: Annotated[int, typer.Option(min=64, max=1280, help="Side of a view.")] = 360,
 ) -> None:
     """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
@@ -533,7 +539,7 @@ def render(
 def play(
     context: typer.Context,
     task: Annotated[TaskName, typer.Option(help="Kind of navigation.")] = TaskName.local,
-    size: Annotated[int | None, typer.Option(help="Of the benchmark's mazes; 13 if not given.")] = None,
+    size: Annotated[int | None, typer.Option(help="Size of the benchmark's mazes; 13 if not given.")] = None,
     split: Annotated[Split, typer.Option(help="The benchmark's unseen or training mazes.")] = Split.eval,
     maps: Annotated[pathlib.Path | None, typer.Option(help="Mazes of your own.")] = None,
     distances: Annotated[str, typer.Option(help="From start to goal in cells (local task).")] = "10",
@@ -541,7 +547,7 @@ def play(
     map_flip: _MapFlip = 0.0,
     map_warp: _MapWarp = 0.0,
     position_noise: _PositionNoise = 0.0,
-    seed: Annotated[int, typer.Option(min=0, help="Of the first episode and those after it.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode and those after it.")] = 0,
     terminal: Annotated[
         bool, typer.Option("--terminal", help="In this terminal, where there is a display too.")
     ] = False,

@@ -11,7 +11,7 @@ import re
 
 import numpy as np
 import pytest
-from made_results import make_result
+from made_results import edit_summary, make_result
 
 from mazebench.errors import InputError
 from mazebench.evaluation.metrics import summarize, wilson_interval
@@ -153,6 +153,33 @@ class TestFigures:
         noise = tables["noise-local-13"]
         assert (noise.rows, noise.note) == (("0", "0.5"), "Distances 4.")
         assert [cell.episodes for cell in noise.columns[0].cells["spl"]] == [2, 2]
+
+    @pytest.mark.parametrize(
+        ("distances", "row", "episodes"),
+        [
+            ((2, 4), "local, 13 × 13", 4),
+            ((4, 6), "local, 13 × 13, distances 4", 2),
+            ((6, 8), "local, 13 × 13, no distances in common", 4),
+        ],
+    )
+    def test_overview_when_agents_have_other_distances(self, tmp_path, distances, row, episodes):
+        make_result(tmp_path / "a", "mah", distances=(2, 4), num_mazes=2, record=False)
+        make_result(tmp_path / "b", "random", distances=distances, num_mazes=2, record=False)
+        tables = {
+            table.name: table for table in build_tables(writing.read_results([tmp_path], silent), ["mah", "random"])
+        }
+        assert tables["all"].rows == (row,)
+        assert [column.cells["spl"][0].episodes for column in tables["all"].columns] == [episodes, episodes]
+
+    def test_overview_when_mazes_are_of_several_sets(self, tmp_path):
+        for name in ("office", "flat"):
+            folder = make_result(tmp_path / name, "mah", num_mazes=2, record=False)
+            text = (folder / EPISODES).read_text()
+            (folder / EPISODES).write_text(text.replace('"split":"eval"', '"split":"custom"').replace("13-eval", name))
+            edit_summary(folder, split="custom")
+        tables = {table.name: table for table in build_tables(writing.read_results([tmp_path], silent), ["mah"])}
+        kind = "local, 13 × 13, custom mazes"
+        assert tables["all"].rows == (f"{kind}, flat-00 and others", f"{kind}, office-00 and others")
 
     def test_distances_when_written(self):
         assert format_distances([1, 2, 3, 5, 8, 9]) == "1–3, 5, 8–9"

@@ -1,7 +1,7 @@
 """Takes an array of one's own to a maze, an environment, and files for other tools.
 
-python docs/examples/own_maze.py --out mazes
-mazebench eval --agent planner --maps mazes --distances 1-6
+python docs/examples/own_maze.py --out own
+mazebench eval --agent planner --maps own --distances 1-6
 """
 
 import argparse
@@ -14,7 +14,7 @@ from mazebench.maps.text import write_text_maze
 from mazebench.world.export import write_mesh, write_mjcf
 
 parser = argparse.ArgumentParser()
-parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("mazes"))
+parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("own"))
 arguments = parser.parse_args()
 
 grid = np.array(

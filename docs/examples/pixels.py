@@ -30,5 +30,5 @@ for _ in range(arguments.steps):
     observations, rewards, terminated, truncated, infos = envs.step(actions)
 rows = [np.concatenate(list(observations[camera]), axis=1) for camera in ("egocentric", "top")]
 cv2.imwrite(arguments.out, cv2.cvtColor(np.concatenate(rows), cv2.COLOR_RGB2BGR))
-print(f"{arguments.out}: what {arguments.num_envs} environments saw last, above through the agent's eyes")
+print(f"{arguments.out}: what {arguments.num_envs} environments saw last: the top row through the agent's eyes")
 envs.close()

@@ -63,7 +63,7 @@ def compare_results(a: Result, b: Result) -> dict[str, Any]:
 
     Returns:
       dict: {"overall": {"n", and of each metric M of success_rate, spl and spl_grid "M_a", "M_b", "M_difference" (A's
-       less B's) and "M_difference_ci95", "probability_of_improvement", "probability_of_improvement_ci95"},
+       minus B's) and "M_difference_ci95", "probability_of_improvement", "probability_of_improvement_ci95"},
        "by_distance": {"1": {the same}, ...}}
 
     Raises:

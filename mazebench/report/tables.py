@@ -239,13 +239,31 @@ def _by_level(
 
 def _overview(results: Sequence[Result], labels: Sequence[str]) -> Table:
     settings = sorted({result.setting for result in results})
+    common = {setting: common_distances([r for r in results if r.setting == setting]) for setting in settings}
     columns = []
     for label in labels:
         by_setting = {result.setting: result for result in results if result.label == label}
-        cells = [by_setting.get(setting) for setting in settings]
-        columns.append(Column(label, False, _cells([measure(r, chosen_episodes(r, ())) if r else {} for r in cells])))
-    note = "All episodes of each result."
-    return Table("all", "All results", note, "setting", tuple(map(str, settings)), (), tuple(columns))
+        chosen = [(by_setting.get(setting), common[setting]) for setting in settings]
+        columns.append(
+            Column(label, False, _cells([measure(r, chosen_episodes(r, d)) if r else {} for r, d in chosen]))
+        )
+    rows = tuple(_overview_row(setting, common[setting], settings, results) for setting in settings)
+    note = "All episodes of each result; where results have other distances, those at the distances that all have."
+    return Table("all", "All results", note, "setting", rows, (), tuple(columns))
+
+
+def _overview_row(
+    setting: Setting, common: Sequence[int], settings: Sequence[Setting], results: Sequence[Result]
+) -> str:
+    """The setting's name, with what tells it from others and which episodes count."""
+    parts = [str(setting)]
+    if setting.mazes and sum(str(other) == str(setting) for other in settings) > 1:
+        parts.append(setting.mazes[0] + (" and others" if len(setting.mazes) > 1 else ""))
+    if any(set(r.episodes.distance.tolist()) != set(common) for r in results if r.setting == setting and common):
+        parts.append(f"distances {format_distances(common)}")
+    elif setting.task == "local" and not common:
+        parts.append("no distances in common")
+    return ", ".join(parts)
 
 
 def _cells(rows: Sequence[dict[str, Cell]]) -> dict[str, tuple[Cell | None, ...]]:
