@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
-import dm_env
 import numpy as np
 from dm_env import specs
 
@@ -144,7 +143,7 @@ def check_environment(environment: Any, num_episodes: int = 2, max_steps: int = 
       ConformanceError: at the first thing that is wrong.
     """
     _require(
-        isinstance(environment, dm_env.Environment),
+        hasattr(environment, "action_spec"),
         f"expected a dm_env environment, found {type(environment).__name__}; of Gymnasium's, "
         "gymnasium.utils.env_checker.check_env knows the rules",
     )

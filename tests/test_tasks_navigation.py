@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import dm_env
+import gymnasium
 import numpy as np
 import pytest
 from absl.testing import absltest
@@ -468,6 +469,10 @@ class TestConformance:
     @pytest.mark.parametrize("task", ["local", "hierarchical"])
     def test_check_when_environment_is_ours(self, task):
         check_environment(mazebench.load(task, maps=dfs_mazes(), seed=0))
+
+    def test_check_when_it_is_of_gymnasium(self):
+        with pytest.raises(ConformanceError, match="expected a dm_env environment, found OrderEnforcing"):
+            check_environment(gymnasium.make("mazebench/Local-13-v1"))
 
     @pytest.mark.parametrize(
         ("broken", "message"),
