@@ -157,12 +157,12 @@ class TestKill:
 
     @pytest.mark.slow
     @pytest.mark.parametrize("seed", range(3))
-    def test_evaluation_when_its_workers_are_killed_again_and_again(self, unbroken, tmp_path, seed):
+    def test_evaluation_when_its_workers_are_killed(self, unbroken, tmp_path, seed):
         kill_workers(np.random.default_rng([4, seed]), tmp_path / "run", [*LONG, "--workers", "2"], 4, 100)
         assert results_of(tmp_path / "run") == results_of(unbroken("long"))
 
     @pytest.mark.slow
-    def test_evaluation_when_a_worker_is_killed_in_the_middle_of_a_message(self, tmp_path, monkeypatch):
+    def test_evaluation_when_a_worker_dies_in_a_message(self, tmp_path, monkeypatch):
         (tmp_path / "still_at_hand.py").write_text(STILL)
         monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
         words = ["--agent", "still_at_hand:Still", "--workers", "2", "--record", "--num-envs", "700"]
@@ -551,7 +551,8 @@ def stop(process: subprocess.Popen, number: signal.Signals) -> str:
     os.killpg(process.pid, number)
     _, errors = process.communicate(timeout=PATIENCE)
     word, status = {signal.SIGINT: ("interrupted", 130), signal.SIGTERM: ("terminated", 143)}[number]
-    assert process.returncode == status, errors
+    # Python itself ends by SIGINT, 130 to a shell, if the exception went through code that was made by exec().
+    assert process.returncode in (status, -signal.SIGINT), errors
     assert "Traceback" not in errors
     line = said(errors)[-1]
     assert line.startswith(f"mazebench: {word}; ")
