@@ -171,7 +171,7 @@ _NO_LANDMARKS = ("the local task has no landmarks", ("landmark_distance",))
 _OWN_MAPS = ("with --maps the mazes are your own", ("split",))
 
 
-@app.command("eval")
+@app.command("eval", short_help="Evaluate agents on unseen mazes.")
 def evaluate(
     context: typer.Context,
     agents: Annotated[
@@ -354,7 +354,7 @@ def _new_folder(name: str) -> pathlib.Path:
     raise InputError(f"results/{name}: exists a thousand times over; give --out")
 
 
-@app.command()
+@app.command(short_help="Compare two agents on the same episodes.")
 def compare(
     a: Annotated[pathlib.Path, typer.Argument(metavar="A", help="The folder of an evaluation, or of a suite's agent.")],
     b: Annotated[
@@ -380,7 +380,7 @@ def compare(
         table.print_comparison(found.title, "part", {name: part["overall"] for name, part in found.parts.items()})
 
 
-@app.command()
+@app.command(short_help="Train an agent on the training mazes.")
 def train(
     context: typer.Context,
     agent: Annotated[str, typer.Option(help="A learning agent: mah or dqn, or module:Class.")],
@@ -469,7 +469,7 @@ def _training_progress() -> Iterator[Any]:
         yield report
 
 
-@app.command()
+@app.command(short_help="Make tables, figures and a page of results.")
 def report(
     results: Annotated[
         list[pathlib.Path], typer.Argument(help="Evaluation folders, runs of suites, or folders above them.")
@@ -485,7 +485,7 @@ def report(
     print(f"{len(reported)} results of {', '.join(agents)}: {out / writing.PAGE}, {out / writing.DOCUMENT}")
 
 
-@app.command()
+@app.command(short_help="Film or picture an episode.")
 def render(
     context: typer.Context,
     out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
@@ -535,7 +535,7 @@ def render(
     print(f"{out}: {outcome}")
 
 
-@app.command()
+@app.command(short_help="Drive yourself, with the keyboard.")
 def play(
     context: typer.Context,
     task: Annotated[TaskName, typer.Option(help="Kind of navigation.")] = TaskName.local,
@@ -593,7 +593,7 @@ def _choose_rendering_backend() -> None:
         os.environ.setdefault("MUJOCO_GL", "egl")
 
 
-@app.command()
+@app.command(short_help="Measure speed on this machine.")
 def bench(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Shorter runs, noisier figures.")] = False,
@@ -609,7 +609,7 @@ def bench(
         benchmark.print_tables(results)
 
 
-@app.command("list")
+@app.command("list", short_help="List tasks, agents, sizes and styles.")
 def list_() -> None:
     """List tasks, agents, sizes, maze styles and Gymnasium ids."""
     from mazebench.agent import agent_names

@@ -8,6 +8,7 @@ const MAX_LISTED = 2000;
 const PLASMA = [[13, 8, 135], [126, 3, 168], [204, 71, 120], [248, 149, 64], [240, 220, 50]];
 
 const byId = (id) => document.getElementById(id);
+const inCells = (count) => `${count} ${count === 1 ? "cell" : "cells"}`;
 const trials = new Map(); // promises by number
 const drives = new Map();
 const view = { result: -1, episode: -1, time: 0, timer: 0, packed: null };
@@ -143,7 +144,7 @@ async function openResult(number, episode = null) {
   const result = data.results[number];
   fill(byId("maze"), [["", "all"], ...result.mazes.map((maze, index) => [index, data.mazes[maze].name])], byId("maze").value);
   const distances = [...new Set(columns.distance)].sort((a, b) => a - b);
-  fill(byId("distance"), [["", "all"], ...distances.map((distance) => [distance, `${distance} cells`])], byId("distance").value);
+  fill(byId("distance"), [["", "all"], ...distances.map((distance) => [distance, inCells(distance)])], byId("distance").value);
   if (episode !== null && !listed().includes(episode)) {
     for (const id of ["maze", "distance"]) byId(id).value = "";
     byId("failures").checked = false;
@@ -167,7 +168,7 @@ function listEpisodes(episode) {
   const { columns } = view.packed;
   const result = data.results[view.result];
   const text = (index) =>
-    `${columns.success[index] ? "✓" : "✗"} ${index} · ${data.mazes[result.mazes[columns.maze[index]]].name} · ${columns.distance[index]} cells · ${columns.steps[index]} steps`;
+    `${columns.success[index] ? "✓" : "✗"} ${index} · ${data.mazes[result.mazes[columns.maze[index]]].name} · ${inCells(columns.distance[index])} · ${columns.steps[index]} steps`;
   const shown = found.slice(0, MAX_LISTED);
   const total = columns.success.length;
   const more = found.length > shown.length ? `, the first ${shown.length} listed` : "";
@@ -228,7 +229,7 @@ function writeNumbers() {
     ["episode", String(view.episode)],
     ["from", cell(current.start)],
     ["to", cell(current.goal)],
-    ["distance", `${current.distance} cells`],
+    ["distance", inCells(current.distance)],
     ["shortest path", `${current.shortest.toFixed(2)} m`],
     ["driven", `${current.driven.toFixed(2)} m`],
     ["time", `${current.steps} steps, ${(current.steps * STEP_SECONDS).toFixed(1)} s`],
