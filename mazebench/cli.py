@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import datetime
 import enum
 import io
@@ -10,14 +9,13 @@ import json
 import os
 import pathlib
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack
 from traceback import print_exception
 from typing import Annotated, Any, NoReturn
 
 import typer
 
-from mazebench import __version__, stopping
+from mazebench import __version__, progress, stopping
 from mazebench.errors import InputError, RunError, one_line
 
 # The parser's own error, which typer exports by its children only.
@@ -258,7 +256,7 @@ def evaluate(
     )
     folder = out or _new_folder(f"{agents[0].replace(':', '-')}-{task.value}" if suite is None else suite)
     running = {"num_envs": num_envs, "workers": workers, "ray_address": ray}
-    kept = _Kept()
+    kept = progress.Kept()
 
     def say() -> tuple[str, ...]:
         if kept.of is None and not folder.exists():
@@ -278,19 +276,8 @@ def evaluate(
     print(f"results in {folder}")
 
 
-@dataclasses.dataclass
-class _Kept:
-    """How many episodes are on disk."""
-
-    done: int = 0
-    of: int | None = None  # None before the first is run
-
-    def __str__(self) -> str:
-        return "no further episode is kept" if self.of is None else f"{self.done:,} of {self.of:,} episodes are kept"
-
-
 def _evaluate_one(
-    options: Any, folder: pathlib.Path, resume: bool, record: bool, running: dict[str, Any], kept: _Kept
+    options: Any, folder: pathlib.Path, resume: bool, record: bool, running: dict[str, Any], kept: progress.Kept
 ) -> None:
     from mazebench.evaluation import harness, results, table
 
@@ -301,7 +288,7 @@ def _evaluate_one(
         table.print_summary(summary)
         return
     _say_whether_resuming(folder, resume)
-    with _progress(f"{options.agent}, {options.task}", kept) as advance:
+    with progress.evaluating(f"{options.agent}, {options.task}", kept) as advance:
         summary = harness.evaluate(options, folder, resume=resume, record=record, progress=advance, **running)
     table.print_summary(summary)
 
@@ -314,7 +301,7 @@ def _evaluate_suite(
     resume: bool,
     record: bool,
     running: dict[str, Any],
-    kept: _Kept,
+    kept: progress.Kept,
 ) -> None:
     from mazebench.evaluation import suites, table
 
@@ -323,7 +310,7 @@ def _evaluate_suite(
         print(f"{folder}: the run is finished")
     else:
         _say_whether_resuming(folder, resume)
-    with _progress(f"{suite}, {', '.join(agents)}", kept) as advance:
+    with progress.evaluating(f"{suite}, {', '.join(agents)}", kept) as advance:
         run.run(resume=resume, progress=advance, **running)
     table.print_suite(run.summaries())
 
@@ -429,7 +416,7 @@ def train(
         kept = "no checkpoint is kept" if last is None else f"the checkpoint at {int(last.name):,} steps is kept"
         return (f"{kept} in {folder}; go on", "--resume")
 
-    with stopping.stoppable(say), _training_progress() as report:
+    with stopping.stoppable(say), progress.training() as report:
         loop.train(options, folder, resume, report)
     print(f"run in {folder}; evaluate it by: mazebench eval --agent {agent} --checkpoint {folder}")
 
@@ -439,34 +426,6 @@ def _parse_override(text: str) -> tuple[str, str]:
     if not equals or not key:
         raise InputError(f"expected --set KEY=VALUE, found {text!r}")
     return key.strip(), value.strip()
-
-
-@contextmanager
-def _training_progress() -> Iterator[Any]:
-    """Yields a function (share, line) that prints the line, on a terminal above a bar of the share."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TimeElapsedColumn
-
-    console = Console()
-    if not console.is_terminal:
-
-        def say(share: float, line: str | None) -> None:
-            stopping.check()
-            if line is not None:
-                print(line, flush=True)
-
-        yield say
-        return
-    with Progress(BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), console=console) as bar:
-        task = bar.add_task("", total=1.0)
-
-        def report(share: float, line: str | None) -> None:
-            stopping.check()
-            bar.update(task, completed=share)
-            if line is not None:
-                console.print(line, markup=False, highlight=False)
-
-        yield report
 
 
 @app.command(short_help="Make tables, figures and a page of results.")
@@ -649,49 +608,3 @@ def parse_distances(text: str) -> tuple[int, ...]:
     if not distances or min(distances) < 1:
         raise InputError(f"expected distances of 1 cell or more, found {text!r}")
     return tuple(sorted(distances))
-
-
-@contextmanager
-def _progress(title: str, kept: _Kept) -> Iterator[Any]:
-    """Yields a function (done, of) that notes what is `kept` and moves a bar; without a terminal it prints tenths."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        tenths_seen = [-1]
-
-        def say(done: int, of: int) -> None:
-            kept.done, kept.of = done, of
-            stopping.check()
-            tenth = 10 * done // max(of, 1)
-            if tenth > tenths_seen[0]:
-                tenths_seen[0] = tenth
-                with suppress(OSError):  # nobody reads it any more
-                    print(f"{title}: {done:,} of {of:,} episodes", file=sys.stderr, flush=True)
-
-        yield say
-        return
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console) as bar:
-        task = bar.add_task(title, total=None)
-
-        def advance(done: int, of: int) -> None:
-            kept.done, kept.of = done, of
-            stopping.check()
-            bar.update(task, completed=done, total=of)
-
-        yield advance

@@ -96,13 +96,23 @@ def make_folder(path: pathlib.Path, within: pathlib.Path | None = None) -> None:
     Raises:
       InputError: if that can't be, or a link on the way from `within` leads somewhere else.
     """
-    for folder in (path, *path.parents):
-        if within is None or folder == within:
-            break
-        if folder.is_symlink():
-            raise InputError(f"{folder}: can't write there: it is a link")
+    if within is not None:
+        refuse_links(path, within)
     with writing_to(path):
         path.mkdir(parents=True, exist_ok=True)
+
+
+def refuse_links(path: pathlib.Path, within: pathlib.Path) -> None:
+    """Makes sure that nothing on the way from `within` to `path`, in a folder from outside, leads somewhere else.
+
+    Raises:
+      InputError: if it does.
+    """
+    for folder in (path, *path.parents):
+        if folder == within:
+            return
+        if folder.is_symlink():
+            raise InputError(f"{folder}: can't write there: it is a link")
 
 
 @contextlib.contextmanager

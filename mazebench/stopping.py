@@ -8,8 +8,8 @@ import shlex
 import shutil
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from typing import NoReturn
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NoReturn
 
 
 class Terminated(BaseException):
@@ -23,14 +23,23 @@ _told: list[type[BaseException]] = []
 @contextlib.contextmanager
 def listening() -> Iterator[None]:
     """Turns SIGINT, unless it is ignored as in the background, and SIGTERM into exceptions."""
-    numbers = [number for number in _KINDS if signal.getsignal(number) != signal.SIG_IGN]
-    before = [signal.signal(number, _tell) for number in numbers]
+    heeded = [number for number in _KINDS if signal.getsignal(number) != signal.SIG_IGN]
+    with handling(heeded, _tell):
+        try:
+            yield
+        finally:
+            _told.clear()
+
+
+@contextlib.contextmanager
+def handling(numbers: Iterable[int], handler: Callable[[int, Any], None]) -> Iterator[None]:
+    """Lets `handler` handle these signals for a while; only the main thread may."""
+    before = {number: signal.signal(number, handler) for number in numbers}
     try:
         yield
     finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
-        _told.clear()
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
 
 
 def _tell(number: int, frame: object) -> NoReturn:

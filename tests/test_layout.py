@@ -16,7 +16,7 @@ import pytest
 ROOT = pathlib.Path(__file__).parent.parent
 # A module imports only from those of lines above it and its own.
 ORDER = (
-    {"errors", "arrays", "files"},
+    {"errors", "stopping", "arrays", "files"},
     {"maps"},
     {"world"},
     {"tasks"},
@@ -27,7 +27,7 @@ ORDER = (
     {"training"},
     {"report"},
     {"play"},
-    {"bench", "testing", "making", "stopping", "cli", "__main__"},
+    {"bench", "testing", "making", "progress", "cli", "__main__"},
 )
 LAYERS = {name: layer for layer, names in enumerate(ORDER) for name in names}
 # Where in the repository a library may be imported.

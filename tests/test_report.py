@@ -11,7 +11,7 @@ import re
 
 import numpy as np
 import pytest
-from made_results import edit_summary, make_result
+from made_results import make_result, of_own_mazes
 
 from mazebench.errors import InputError
 from mazebench.evaluation.metrics import summarize, wilson_interval
@@ -173,10 +173,7 @@ class TestFigures:
 
     def test_overview_when_mazes_are_of_several_sets(self, tmp_path):
         for name in ("office", "flat"):
-            folder = make_result(tmp_path / name, "mah", num_mazes=2, record=False)
-            text = (folder / EPISODES).read_text()
-            (folder / EPISODES).write_text(text.replace('"split":"eval"', '"split":"custom"').replace("13-eval", name))
-            edit_summary(folder, split="custom")
+            of_own_mazes(make_result(tmp_path / name, "mah", num_mazes=2, record=False), name)
         tables = {table.name: table for table in build_tables(writing.read_results([tmp_path], silent), ["mah"])}
         kind = "local, 13 × 13, custom mazes"
         assert tables["all"].rows == (f"{kind}, flat-00 and others", f"{kind}, office-00 and others")

@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from made_results import edit_summary, make_result
+from made_results import edit_summary, make_result, of_own_mazes
 
 from mazebench import cli
 from mazebench.errors import InputError
@@ -201,10 +201,7 @@ class TestRefused:
 
 
 def test_result_when_of_own_mazes(tmp_path):
-    folder = make_result(tmp_path / "own", "mah", num_mazes=2)
-    text = (folder / EPISODES).read_text()
-    (folder / EPISODES).write_text(text.replace('"split":"eval"', '"split":"custom"').replace("13-eval", "office"))
-    edit_summary(folder, split="custom")
+    folder = of_own_mazes(make_result(tmp_path / "own", "mah", num_mazes=2), "office")
     [result] = writing.write_report([folder], tmp_path / "out", lambda line: None)
     assert result.setting.mazes == ("office-00", "office-01")
     assert (tmp_path / "out" / "tables" / "custom-1-local-13.md").exists()

@@ -14,7 +14,7 @@ from mazebench.errors import InputError, unknown
 from mazebench.evaluation.harness import Evaluation, Progress, run_evaluations
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.results import SUITE, is_safe_name, load_result, read_suite
-from mazebench.files import make_folder, writing_to
+from mazebench.files import make_folder, refuse_links, writing_to
 from mazebench.maps.benchmark import SIZES, VERSION, manifest_hash
 from mazebench.records import CONFIG, FolderLock, write_json
 
@@ -118,9 +118,7 @@ class SuiteRun:
         with FolderLock(self.out):
             content = self._prepare(resume)
             for evaluation in self.evaluations:
-                make_folder(evaluation.out.parent, within=self.out)
-                if evaluation.out.is_symlink():
-                    raise InputError(f"{evaluation.out}: can't write there: it is a link")
+                refuse_links(evaluation.out, within=self.out)
                 if (evaluation.out / CONFIG).exists():
                     evaluation.check_same_run()
             with writing_to(self.out):

@@ -15,6 +15,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+from mazebench import stopping
 from mazebench.agent import load_agent_class
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.contract import AgentError
@@ -126,12 +127,10 @@ def _undisturbed() -> Iterator[None]:
     came: list[int] = []
     # Handlers run in the main thread, whichever a signal is sent to.
     numbers = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
-    handlers = [signal.signal(number, lambda number, frame: came.append(number)) for number in numbers]
     try:
-        yield
+        with stopping.handling(numbers, lambda number, frame: came.append(number)):
+            yield
     finally:
-        for number, handler in zip(numbers, handlers, strict=True):
-            signal.signal(number, handler)
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         for late in came:
             signal.raise_signal(late)

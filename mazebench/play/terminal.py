@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+from mazebench import stopping
 from mazebench.errors import InputError
 from mazebench.play.game import Game
 from mazebench.play.picture import Style, draw
@@ -47,13 +48,8 @@ def _ending_by_signals() -> Iterator[None]:
     def end(number: int, frame: Any) -> None:
         sys.exit(128 + number)
 
-    numbers = [signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])]
-    before = [signal.signal(number, end) for number in numbers]
-    try:
+    with stopping.handling([signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else [])], end):
         yield
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
 
 
 class _Screen:
