@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
 
 
 class InputError(ValueError):
-    """What a user gave can't be used; the message says what was expected and what was found, in one line."""
+    """Bad input from a user; the message says what was expected and what was found, in one line."""
 
     def __init__(self, message: str):
-        """Shows in `message` whatever it quotes that does not print, such as names of files with line ends in them."""
+        """Escapes what does not print in `message`, such as line ends in names of files."""
         super().__init__(one_line(message))
 
 
 class RunError(RuntimeError):
-    """A run that was well asked for can't go on; the message says what happened and what is kept."""
+    """A failure of a run whose input was good; the message says what happened and what is kept."""
 
 
 def one_line(text: str) -> str:
-    """`text` with what does not print escaped: line ends, and what would command a terminal."""
+    """Returns `text` with characters escaped that do not print, such as line ends and commands to a terminal."""
     return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)
 
 
 def unknown(kind: str, name: object, available: Iterable[object]) -> InputError:
-    """The `InputError` of a name that no table holds, listing the names that one does."""
+    """Returns the error of an unknown name, which lists the known ones."""
     names = ", ".join(sorted(str(item) for item in available)) or "none"
     return InputError(f"unknown {kind} {str(name)[:80]!r}; available: {names}")
+
+
+def remark(line: str) -> None:
+    """Prints a line for the user beside the output, on stderr."""
+    print(f"mazebench: {one_line(line)}", file=sys.stderr)

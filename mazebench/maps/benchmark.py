@@ -1,4 +1,4 @@
-"""The frozen mazes of benchmark v1, read from the package's assets and checked against their manifest."""
+"""The frozen mazes of benchmark v1: read from the package's assets and checked against their manifest."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ MANIFEST = "manifest.json"
 
 
 def mazes_file(size: int, split: str) -> str:
-    """The name of the file with the mazes of one size and split."""
+    """Returns the name of the file with the mazes of one size and split."""
     return f"mazes-{size}-{split}.txt"
 
 
 def load_mazes(size: int, split: str) -> tuple[Maze, ...]:
-    """The 20 mazes of one size and split.
+    """Returns the 20 mazes of one size and split.
 
     Raises:
       InputError: if there is no such size or split.
@@ -45,10 +45,10 @@ def _load_mazes(size: int, split: str) -> tuple[Maze, ...]:
 
 
 def read_asset(name: str) -> str:
-    """The text of a file of the benchmark.
+    """Returns the text of a file of the benchmark.
 
     Raises:
-      InputError: if its SHA-256 is not the manifest's: a change to the benchmark is a new version, never an edit.
+      InputError: if its SHA-256 differs from the manifest's. A changed benchmark must be a new version.
     """
     content = _folder().joinpath(name).read_bytes()
     expected, found = manifest()["files"][name], hashlib.sha256(content).hexdigest()
@@ -59,12 +59,12 @@ def read_asset(name: str) -> str:
 
 @functools.cache
 def manifest() -> dict[str, Any]:
-    """The benchmark's version, how it was made, and the SHA-256 of each of its files."""
+    """Returns the manifest: the benchmark's version, how it was made, and the SHA-256 of each of its files."""
     return json.loads(_folder().joinpath(MANIFEST).read_text(encoding="ascii"))
 
 
 def manifest_hash() -> str:
-    """SHA-256 of the manifest: the identity of the benchmark in results."""
+    """Returns the SHA-256 of the manifest, which identifies the benchmark in results."""
     return hashlib.sha256(_folder().joinpath(MANIFEST).read_bytes()).hexdigest()
 
 

@@ -17,7 +17,10 @@ class Rectangle(NamedTuple):
 
 
 def cover(walls: np.ndarray) -> list[Rectangle]:
-    """Disjoint rectangles that cover the True cells of `[N, N]` bool `walls`, each grown to the right, then down."""
+    """Returns disjoint rectangles that cover the True cells of `walls` (`[N, N]` bool).
+
+    Each starts at the first cell left in reading order, and grows first to the right, then down.
+    """
     left_over = walls.copy()
     rectangles = []
     for top, left in np.argwhere(walls):
@@ -31,5 +34,5 @@ def cover(walls: np.ndarray) -> list[Rectangle]:
 
 
 def _leading(flags: Any) -> int:
-    """How many of `flags` are True before the first that isn't."""
+    """Returns how many of `flags` are True before the first False."""
     return len(flags) if flags.all() else int(np.argmin(flags))

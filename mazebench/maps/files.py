@@ -1,8 +1,7 @@
-"""Mazes in files: text or pictures, one or a folder of them."""
+"""Mazes in files: one text or picture, or a folder of them."""
 
 from __future__ import annotations
 
-import itertools
 import pathlib
 
 from mazebench.errors import InputError
@@ -13,11 +12,14 @@ from mazebench.maps.text import read_text_maze
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp")
 TEXT_SUFFIXES = (".txt", ".map")
 MAX_FILES = 10_000
-_MAX_ENTRIES = 10 * MAX_FILES  # of a folder, maps or not
 
 
 def read_maze(path: str | pathlib.Path, size: int | None = None) -> Maze:
-    """The maze in one file, a picture by its suffix, else text; `size` helps where a picture's cells can't be counted.
+    """Reads the maze in one file: a picture if the suffix says so, else text.
+
+    Args:
+      path: of the file.
+      size: number of cells a side, for a picture whose cells can't be counted.
 
     Raises:
       InputError: if the file can't be read or holds no legal maze.
@@ -29,22 +31,20 @@ def read_maze(path: str | pathlib.Path, size: int | None = None) -> Maze:
 
 
 def read_mazes(path: str | pathlib.Path) -> tuple[Maze, ...]:
-    """The mazes of a file or of a folder's map files, in the order of their names.
+    """Reads the maze in a file, or the mazes in a folder's map files in the order of their names.
 
-    Where a folder holds one map in several formats, as `mazebench generate` writes them, the text is read.
+    If a folder holds one map in several formats, as `mazebench generate` writes them, the text is read.
 
     Raises:
-      InputError: if there is none, one can't be read, or the folder holds more than 10,000, or 100,000 files.
+      InputError: if there is no map, one can't be read, or a folder holds more than 10,000.
     """
     path = pathlib.Path(path)
     if not path.is_dir():
         return (read_maze(path),)
     try:
-        files = list(itertools.islice(path.iterdir(), _MAX_ENTRIES + 1))
+        files = list(path.iterdir())
     except OSError as error:
         raise InputError(f"{path}: can't read the folder: {error.strerror}") from error
-    if len(files) > _MAX_ENTRIES:
-        raise InputError(f"{path}: expected a folder of at most {_MAX_ENTRIES} files, found more")
     by_stem: dict[str, pathlib.Path] = {}
     for file in sorted(files, key=lambda file: (file.suffix.lower() not in TEXT_SUFFIXES, file.name)):
         if file.suffix.lower() in TEXT_SUFFIXES + IMAGE_SUFFIXES:

@@ -11,18 +11,18 @@ from scipy import ndimage
 from mazebench.errors import InputError, unknown
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, Cell, Maze
 
-# Share of the walls between two corridors that are opened. With it, over 90 % of 13 x 13 mazes have the paper's 3 to 6
-# landmarks at distance 5 from corner to corner (docs/maps.md has the distribution over 1,000 mazes).
+# Share of the walls between two corridors that are opened. With it, over 90 % of 13 x 13 mazes have 3 to 6 landmarks at
+# distance 5 from corner to corner, as in the paper (docs/maps.md has the distribution over 1,000 mazes).
 DFS_OPENINGS = 0.10
 _OBSTACLE_DENSITY = 0.25  # share of the inner cells that become walls
 _LABMAZE_SEEDS = 2**31 - 1
 
 
 def generate(style: str, size: int, rng: np.random.Generator, name: str | None = None) -> Maze:
-    """A random maze of `size` x `size` cells.
+    """Returns a random maze of `size` x `size` cells.
 
     Raises:
-      InputError: if no such style exists or the style can't make this size.
+      InputError: if the style is unknown or can't make mazes of this size.
     """
     if style not in STYLES:
         raise unknown("style", style, STYLES)
@@ -32,7 +32,11 @@ def generate(style: str, size: int, rng: np.random.Generator, name: str | None =
 
 
 def dfs_walls(size: int, rng: np.random.Generator, openings: float = DFS_OPENINGS) -> np.ndarray:
-    """`[size, size]` bool: randomised depth-first search on the odd lattice, then a share of the inner walls opened."""
+    """Returns the walls of a maze of corridors: `[size, size]` bool.
+
+    Randomised depth-first search on the cells with odd row and column joins them to a tree. Then each wall between two
+    of them is opened with probability `openings`.
+    """
     _require_odd("dfs", size)
     walls = np.ones((size, size), dtype=bool)
     start = tuple(2 * rng.integers(size // 2, size=2) + 1)
@@ -55,14 +59,17 @@ def dfs_walls(size: int, rng: np.random.Generator, openings: float = DFS_OPENING
 
 
 def _openings(walls: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
-    """The walls between two cells of the odd lattice, each kept with probability `share`."""
+    """Returns the walls between two cells of the odd lattice to open, each drawn with probability `share`."""
     candidate = np.zeros_like(walls)
     candidate[1:-1:2, 2:-1:2] = candidate[2:-1:2, 1:-1:2] = True
     return candidate & walls & (rng.random(walls.shape) < share)
 
 
 def rooms_walls(size: int, rng: np.random.Generator) -> np.ndarray:
-    """`[size, size]` bool: rooms joined by corridors, from the labmaze library; pockets it leaves are walled up."""
+    """Returns the walls of rooms joined by corridors, made by the labmaze library: `[size, size]` bool.
+
+    Free cells that can't be reached become walls.
+    """
     _require_odd("rooms", size)
     text = labmaze.RandomMaze(
         height=size,
@@ -79,7 +86,10 @@ def rooms_walls(size: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def obstacles_walls(size: int, rng: np.random.Generator) -> np.ndarray:
-    """`[size, size]` bool: an open field in which single cells are walls; what is cut off is walled up."""
+    """Returns the walls of an open field with single cells as walls: `[size, size]` bool.
+
+    Free cells that can't be reached become walls.
+    """
     walls = np.ones((size, size), dtype=bool)
     walls[1:-1, 1:-1] = rng.random((size - 2, size - 2)) < _OBSTACLE_DENSITY
     walls[tuple(rng.integers(1, size - 1, size=2))] = False
@@ -94,7 +104,7 @@ STYLES: dict[str, Callable[[int, np.random.Generator], np.ndarray]] = {
 
 
 def corner_cells(maze: Maze) -> tuple[Cell, Cell]:
-    """The free cells nearest the top-right and the bottom-left corner: the paper's global start and goal."""
+    """Returns the free cells nearest the top-right and the bottom-left corner, the paper's global start and goal."""
     rows, columns = maze.free_cells.T
     top_right = np.argmin(rows + (maze.size - 1 - columns))
     bottom_left = np.argmin((maze.size - 1 - rows) + columns)

@@ -3,8 +3,8 @@
 A taut path is made of straight pieces and of arcs of the disc's radius about corners of walls that stick out into free
 space: it is a path in the tangent graph (Liu and Arimoto 1992). Such a corner has one wall among its four cells: with
 two in a row the wall is flat there, with two on the diagonal or three the free cells see only concave angles. It
-carries a circle that a path can touch only in the quadrant opposite to the wall. The disc can be everywhere on that
-quadrant, for all other walls are a cell away.
+carries a circle that a path can touch only in the quadrant opposite to the wall. The disc fits everywhere on that
+quadrant, because all other walls are a cell away.
 
 Lattice points are (x, y) in metres, with walls indexed `[x, y]` here. `K` is the number of circles, `P` of straight
 pieces and `S` of segments tested together.
@@ -22,15 +22,15 @@ from scipy.sparse import csgraph
 from mazebench.errors import InputError
 from mazebench.maps.maze import Cell, Maze
 
-# Metres (and, as a component of a unit vector, radians) by which a contact may miss; rounding stays below 1e-12.
+# Metres (radians in a component of a unit vector) by which a contact may miss; rounding errors are below 1e-12.
 _TOLERANCE = 1e-9
-# What is tested together; it keeps temporary arrays to some ten megabytes.
+# Numbers tested at once, which keep temporary arrays to some ten megabytes.
 _PAIRS_AT_ONCE = 2**18
 _LINES_AT_ONCE = 16
 
 
 class _Circles(NamedTuple):
-    """Circles that a path may touch from outside; a point is one of radius 0."""
+    """Circles that a path may touch from outside; a point is a circle of radius 0."""
 
     centre: np.ndarray  # [K, 2] float, metres
     quadrant: np.ndarray  # [K, 2] float, signs (x, y) of the exposed normals; (0, 0) allows every normal
@@ -78,7 +78,7 @@ class DiscPaths:
         self._pieces = _concatenate(list(batches))
 
     def length(self, start: np.ndarray, goal: Cell) -> float:
-        """Metres from `start` (`[2]`, the disc's centre) to the goal cell; 0 if `start` is in it.
+        """Returns the metres from `start` (`[2]`, the disc's centre) to the goal cell; 0 if `start` is in it.
 
         Raises:
           InputError: if `start` is not at least the radius away from every wall, or `goal` is not a free cell.
@@ -87,7 +87,7 @@ class DiscPaths:
         return 0.0 if _is_in_cell(start, corner) else self._search(start, corner)[1]
 
     def path(self, start: np.ndarray, goal: Cell, arc_step: float = 0.05) -> np.ndarray:
-        """`[L, 2]` points (x, y) along a shortest path, from `start` on, on arcs at most `arc_step` metres apart.
+        """Returns points (x, y) along a shortest path from `start`, on arcs at most `arc_step` metres apart: `[L, 2]`.
 
         Raises:
           InputError: as `length` does, or if `arc_step` is not above 0.
@@ -108,7 +108,7 @@ class DiscPaths:
         return np.concatenate(points)
 
     def _check(self, start: np.ndarray, goal: Cell) -> tuple[np.ndarray, np.ndarray]:
-        """`start` as an array and the goal cell's lower left corner (`[2]` int), if both are legal."""
+        """Returns `start` as an array and the goal cell's lower left corner (`[2]` int), if both are legal."""
         point = np.asarray(start, dtype=np.float64)
         if point.shape != (2,) or not self._space.holds(point):
             raise InputError(
@@ -123,7 +123,7 @@ class DiscPaths:
         return _Pieces(*(array[keep] for array in pieces))
 
     def _search(self, start: np.ndarray, corner: np.ndarray) -> tuple[_Pieces, float, np.ndarray]:
-        """All pieces of the query, the shortest length and the ends that such a path passes, as indices into `2 P`.
+        """Returns all pieces of the query, the shortest length, and the ends on a shortest path as indices into `2 P`.
 
         The corners' circles come first, then the start; all beyond are points where a path may end.
         """
@@ -137,7 +137,7 @@ class DiscPaths:
         return pieces, float(distances[nodes[0]]), np.array(nodes[::-1])
 
     def _query_pieces(self, start: np.ndarray, corner: np.ndarray) -> _Pieces:
-        """Straight pieces from the start to the circles and from both to the goal, not tested for walls.
+        """Returns straight pieces from the start to the circles and from both to the goal, not tested for walls.
 
         The last piece meets a side of the goal cell at a right angle, or at a corner that is in the open: near a corner
         of a wall, the disc can be on the side up to where the wall's circle meets it, and it does so at a right angle.
@@ -154,7 +154,7 @@ class DiscPaths:
         return _concatenate([from_start, to_corner, to_side])
 
     def _arc(self, circle: int, first: float, last: float, arc_step: float) -> np.ndarray:
-        """`[K, 2]` points of an arc after its first point, the last included."""
+        """Returns the points of an arc without its first one: `[K, 2]`."""
         num_steps = int(np.ceil(abs(last - first) / arc_step))
         offset = np.linspace(first, last, num_steps + 1)[1:]
         quadrant = self._corners.quadrant[circle]
@@ -181,7 +181,7 @@ class _FreeSpace:
         self._edge_table = np.stack([left_or_right[:, 1:], upper_or_lower[1:].T]).ravel()
 
     def holds(self, point: np.ndarray) -> bool:
-        """Whether `point` (`[2]`) lies here."""
+        """Returns whether `point` (`[2]`) is free."""
         size = len(self.walls)
         if not np.all((point >= 0) & (point < size)):
             return False
@@ -192,12 +192,12 @@ class _FreeSpace:
         return bool(np.all(np.hypot(*outside.T) >= self._clearance))
 
     def open_corners(self, corner: np.ndarray) -> np.ndarray:
-        """`[0 to 4, 2]`: the corners that a cell (lower left corner `[2]`) shares with no wall."""
+        """Returns the 0 to 4 corners that a cell (lower left corner `[2]`) shares with no wall: `[0 to 4, 2]`."""
         corners = corner + np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
         return corners[~self._corner[tuple(corners.T)]]
 
     def sides(self, corner: np.ndarray) -> Iterator[tuple[int, float, float, float]]:
-        """The parts of a cell's sides that lie here, as (axis, level, low, high).
+        """Yields the free parts of a cell's sides as (axis, level, low, high).
 
         Such a part has x = `level` and y from `low` to `high` if `axis` is 0, or the other way round if it is 1.
         """
@@ -210,9 +210,9 @@ class _FreeSpace:
             yield axis, first[axis], first[1 - axis] + margins[0], first[1 - axis] + 1 - margins[1]
 
     def is_clear(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """`[S]` bool: whether the segments between points here (`[S, 2]` each) stay here.
+        """Returns whether the segments between free points (`[S, 2]` each) are free: `[S]` bool.
 
-        They do unless a corner of a wall is too near or they enter a wall. Both show on the lattice's lines across a
+        They are unless a corner of a wall is too near or they enter a wall. Both show on the lattice's lines across a
         segment's longer axis: the two lattice points about a crossing are the only ones on that line within 0.5 m, and
         between two lines the segment changes cells at most once.
         """
@@ -240,7 +240,7 @@ class _FreeSpace:
     def _is_blocked(
         self, line: np.ndarray, start: np.ndarray, extent: np.ndarray, slope: np.ndarray, table: np.ndarray
     ) -> np.ndarray:
-        """`[S]` bool: whether a wall shows on any of the lines at x = `line` (`[S, L]` int) of flat segments."""
+        """Returns whether a wall shows on any line at x = `line` (`[S, L]` int) of flat segments: `[S]` bool."""
         squared_cosine = 1 / (1 + slope * slope)
         along = line - start[:, :1]
         height = start[:, 1:] + slope[:, None] * along
@@ -260,7 +260,7 @@ class _FreeSpace:
 
 
 def _exposed_corners(walls: np.ndarray, radius: float) -> _Circles:
-    """The circles about all lattice points that touch exactly one wall (`walls` is `[x, y]`)."""
+    """Returns the circles about all lattice points that touch exactly one wall (`walls` is `[x, y]`)."""
     below, above = walls[:, :-1].astype(np.int64), walls[:, 1:].astype(np.int64)
     left, right = below[:-1] + above[:-1], below[1:] + above[1:]
     below, above = below[:-1] + below[1:], above[:-1] + above[1:]
@@ -275,7 +275,9 @@ def _points(points: np.ndarray) -> _Circles:
 
 
 def _candidate_pairs(corners: _Circles, side: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Batches of pairs `first < second` (`[P]` int each) whose quadrants share a normal, opposite ones if `side` is -1.
+    """Yields batches of pairs `first < second` (`[P]` int each) whose quadrants share a normal, or opposite normals.
+
+    Normals are opposite if `side` is -1.
 
     Two quadrants that share only an axis share a tangent only if it is at a right angle to that axis.
     """
@@ -294,7 +296,7 @@ def _candidate_pairs(corners: _Circles, side: int) -> Iterator[tuple[np.ndarray,
 
 
 def _tangents(circles: _Circles, first: np.ndarray, second: np.ndarray, side: int) -> _Pieces:
-    """The common tangents of pairs of circles that touch both in their exposed quadrants, not tested for walls.
+    """Returns the common tangents of pairs of circles that touch both in their exposed quadrants, not tested for walls.
 
     `side` is 1 for tangents that have both circles on one side, -1 for those that pass between them. With normal n at
     the first circle and side * n at the second, D . n = r1 - side * r2, where D joins the centres.
@@ -318,7 +320,7 @@ def _tangents(circles: _Circles, first: np.ndarray, second: np.ndarray, side: in
 
 
 def _perpendiculars(circles: _Circles, num_sources: int, axis: int, level: float, low: float, high: float) -> _Pieces:
-    """Tangents of the first `num_sources` circles that meet a part of a side (see `sides`) at a right angle.
+    """Returns tangents of the first `num_sources` circles that meet a part of a side (see `sides`) at a right angle.
 
     Where an arc itself ends on the side, its piece has length 0.
     """
@@ -333,14 +335,17 @@ def _perpendiculars(circles: _Circles, num_sources: int, axis: int, level: float
 
 
 def _offset(circles: _Circles, index: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """`[...]` metres along circles `[...]` from the middles of their quadrants to where the normals are `[..., 2]`."""
+    """Returns metres along circles `[...]` from the middle of their quadrant to the normals `[..., 2]`: `[...]`."""
     x, y = np.moveaxis(circles.quadrant[index], -1, 0)
     angle = np.arctan2(x * normal[..., 1] - y * normal[..., 0], x * normal[..., 0] + y * normal[..., 1])
     return circles.radius[index] * angle
 
 
 def _graph(pieces: _Pieces) -> sparse.csr_array:
-    """`[2 P, 2 P]`: the ends of all pieces, joined along the pieces and, on each circle, to the next end either way."""
+    """Returns the graph of the ends of all pieces, `[2 P, 2 P]`.
+
+    Ends are joined along their piece and, on each circle, to the next end either way.
+    """
     circle, offset = pieces.circle.ravel(), pieces.offset.ravel()
     num_nodes = len(circle)
     # An offset is at most pi / 4 * 0.5 m, so the sum sorts by circle first.

@@ -1,4 +1,4 @@
-"""The Maze value: a legal grid of walls, its cells, points and shortest paths.
+"""The maze: a legal grid of walls, with its cells, points and shortest paths.
 
 `N` is the number of rows and of columns of a maze, `F` the number of its free cells. A cell is `(row, column)` with
 row 0 on top; a point is `(x, y)` in metres with x to the right and y up. One cell is one metre.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 
 import numpy as np
 from scipy import ndimage, sparse
@@ -22,23 +23,23 @@ MAX_SIZE = 255
 WALL_HEIGHT = 1.0  # metres; DeepMind Lab's 100 units
 UNREACHABLE = -1
 
-# In the order in which a shortest path prefers them.
+# (rows, columns) to each neighbour, in the order in which a shortest path prefers them.
 _NEIGHBOURS = ((-1, 0), (0, -1), (1, 0), (0, 1))
-# All-pairs distances are kept (F * F int16) up to this F, which every maze of up to 45 x 45 cells is below.
+# All-pairs distances (F * F int16) are cached up to this F; every maze of up to 45 x 45 cells is below.
 _MAX_ALL_PAIRS = 2048
-_WALL_COST = 1000  # cells; what a path planned through walls pays for each
+_WALL_COST = 1000  # the cost, in cells, of each wall on a path through walls
 
 
 class MazeError(InputError):
-    """A grid is not a legal maze."""
+    """A grid that is not a legal maze."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Maze:
-    """A square, closed grid with one 4-connected free component.
+    """A square grid of cells, closed by walls, whose free cells are 4-connected.
 
     Raises:
-      MazeError: if `walls` is anything else; the message names the offending cell.
+      MazeError: if `walls` is not such a grid; the message names a cell that is wrong.
     """
 
     walls: np.ndarray  # [N, N] bool, True is wall; copied and made read-only
@@ -60,21 +61,21 @@ class Maze:
 
     @property
     def size(self) -> int:
-        """N, the number of rows and of columns."""
+        """The number N of rows and of columns."""
         return self.walls.shape[0]
 
     @functools.cached_property
     def free_cells(self) -> np.ndarray:
-        """`[F, 2]` int: the free cells in reading order."""
+        """The free cells in reading order: `[F, 2]` int."""
         return np.argwhere(~self.walls)
 
     def is_free(self, cell: Cell) -> bool:
-        """Whether `cell` lies in the maze and is not a wall."""
+        """Returns whether `cell` lies in the maze and is not a wall."""
         row, column = cell
         return 0 <= row < self.size and 0 <= column < self.size and not self.walls[row, column]
 
     def require_free(self, cell: Cell) -> Cell:
-        """`cell` itself if it is free.
+        """Returns `cell` if it is free.
 
         Raises:
           MazeError: if it is a wall or outside.
@@ -84,30 +85,33 @@ class Maze:
         return (int(cell[0]), int(cell[1]))
 
     def distances(self, source: Cell) -> np.ndarray:
-        """`[N, N]` int: length in cells of a shortest 4-connected path from `source`; -1 at walls."""
+        """Returns the length in cells of a shortest 4-connected path from `source`: `[N, N]` int, -1 at walls."""
         self.require_free(source)
         result = np.full((self.size, self.size), UNREACHABLE, dtype=np.int32)
         result[~self.walls] = self._distance_row(int(self._index[tuple(source)]))
         return result
 
     def distance(self, start: Cell, goal: Cell) -> int:
-        """Length in cells of a shortest 4-connected path between two free cells."""
+        """Returns the length in cells of a shortest 4-connected path between two free cells."""
         self.require_free(start)
         self.require_free(goal)
         return int(self._distance_row(int(self._index[tuple(start)]))[self._index[tuple(goal)]])
 
     def cells_at(self, source: Cell, distance: int) -> np.ndarray:
-        """`[K, 2]` int: the free cells at exactly `distance` from `source`, in reading order."""
+        """Returns the free cells at exactly `distance` from `source`, in reading order: `[K, 2]` int."""
         self.require_free(source)
         return self.free_cells[self._distance_row(int(self._index[tuple(source)])) == distance]
 
     def shortest_path(self, start: Cell, goal: Cell) -> list[Cell]:
-        """A shortest 4-connected path, both ends included; of equals, the first in the order up, left, down, right."""
+        """Returns a shortest 4-connected path, both ends included.
+
+        Of several, it is the one whose first differing step comes first in the order up, left, down, right.
+        """
         return _descend(self.distances(goal), self.require_free(start))
 
     @functools.cached_property
     def diameter(self) -> int:
-        """The largest distance of two free cells; with over 2,048 of them a lower bound that a double sweep finds."""
+        """The largest distance of two free cells; with over 2,048 free cells, a lower bound by a double sweep."""
         if len(self.free_cells) <= _MAX_ALL_PAIRS:
             return int(self._all_pairs.max())
         return int(self._distance_row(int(np.argmax(self._distance_row(0)))).max())
@@ -133,7 +137,7 @@ class Maze:
 
 
 def grid_graph(index: np.ndarray) -> sparse.csr_array:
-    """The 4-connected graph of the cells whose `index` (`[N, N]` int, consecutive from 0) is not negative."""
+    """Returns the 4-connected graph of the cells whose `index` (`[N, N]` int, consecutive from 0) is not negative."""
     right = (index[:, :-1].ravel(), index[:, 1:].ravel())
     down = (index[:-1].ravel(), index[1:].ravel())
     a, b = np.concatenate([right, down], axis=1)
@@ -145,9 +149,10 @@ def grid_graph(index: np.ndarray) -> sparse.csr_array:
 
 
 def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]:
-    """A cheapest 4-connected path on any grid (`[N, N]` bool): where no free path is left, a wall costs 1000 cells.
+    """Returns a cheapest 4-connected path on any grid (`[N, N]` bool).
 
-    The landmark oracle plans so on maps whose cells were flipped (the paper's appendix on perturbed planning).
+    It is a shortest free path if there is one; else each wall on the path costs 1000 cells. The landmark oracle plans
+    so on maps with flipped cells (the paper's appendix on perturbed planning).
     """
     index = np.where(walls, -1, np.cumsum(~walls).reshape(walls.shape) - 1)
     distances = np.full(walls.shape, np.inf)
@@ -156,7 +161,7 @@ def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]
     if not np.isfinite(distances[start]):
         every_cell = np.arange(walls.size).reshape(walls.shape)
         graph = grid_graph(every_cell).astype(np.float64).tocoo()
-        # Searched backwards from the goal: edge u -> v stands for the step from v into u, and pays for entering u.
+        # The search goes backwards from the goal: edge u -> v is the step from v to u, and costs what entering u costs.
         cost = np.where(walls.ravel()[graph.row], _WALL_COST, 1.0)
         weighted = sparse.csr_array((cost, (graph.row, graph.col)), shape=graph.shape)
         distances = csgraph.dijkstra(weighted, indices=every_cell[goal]).reshape(walls.shape)
@@ -166,7 +171,10 @@ def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]
 
 
 def _descend(distances: np.ndarray, start: Cell, step_cost: np.ndarray | None = None) -> list[Cell]:
-    """Follows `distances` to the goal (negative at walls) down to 0; a step into a cell pays its `step_cost`."""
+    """Returns the path that follows `distances` to the goal (negative at walls) down to 0.
+
+    A step into a cell costs its `step_cost`, 1 by default.
+    """
     size = len(distances)
     path = [start]
     while distances[path[-1]] > 0:
@@ -184,24 +192,29 @@ def _descend(distances: np.ndarray, start: Cell, step_cost: np.ndarray | None = 
 
 
 def cell_to_point(cells: np.ndarray | Cell, size: int) -> np.ndarray:
-    """`[..., 2]` float: the centres (x, y) in metres of `[..., 2]` cells of a maze of `size` cells a side."""
+    """Returns the centres (x, y) in metres, `[..., 2]` float, of `[..., 2]` cells in a maze of `size` cells a side."""
     cells = np.asarray(cells, dtype=np.float64)
     return np.stack([cells[..., 1] + 0.5, size - cells[..., 0] - 0.5], axis=-1)
 
 
 def point_to_cell(points: np.ndarray, size: int) -> np.ndarray:
-    """`[..., 2]` int: the cells that hold `[..., 2]` points (x, y); a point on a line is in the right or upper one."""
+    """Returns the cells, `[..., 2]` int, of `[..., 2]` points (x, y); of two cells, the right or upper one."""
     points = np.floor(np.asarray(points)).astype(np.int64)
     return np.stack([size - 1 - points[..., 1], points[..., 0]], axis=-1)
 
 
+def cell_of_point(x: float, y: float, size: int) -> Cell:
+    """Returns the cell of a single point, as `point_to_cell` does, but in a fraction of the time."""
+    return size - 1 - math.floor(y), math.floor(x)
+
+
 def symmetries(walls: np.ndarray) -> list[np.ndarray]:
-    """The 8 rotations and mirror images of a grid."""
+    """Returns the 8 rotations and mirror images of a grid."""
     return [np.rot90(grid, turns) for grid in (walls, walls.T) for turns in range(4)]
 
 
 def canonical_bytes(walls: np.ndarray) -> bytes:
-    """Equal for two grids exactly if one is a rotation or mirror image of the other."""
+    """Returns bytes that are equal for two grids exactly if one is a rotation or mirror image of the other."""
     return min(np.ascontiguousarray(grid).tobytes() for grid in symmetries(walls))
 
 

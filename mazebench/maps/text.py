@@ -6,30 +6,26 @@ import pathlib
 
 import numpy as np
 
-from mazebench.files import open_whole, read_at_most
 from mazebench.maps.maze import MAX_SIZE, Maze, MazeError
+from mazebench.storage.files import open_whole, read_at_most
 
 _WALL = "#*1"
 _FREE = ". 0PG"
-# The largest legal text has MAX_SIZE rows of MAX_SIZE cells and a two-byte line end.
+# Of the largest legal text, MAX_SIZE rows of MAX_SIZE cells and a line end of two bytes.
 _MAX_BYTES = MAX_SIZE * (MAX_SIZE + 2)
 
 
 def format_maze(maze: Maze) -> str:
-    """`maze` as text, one row a line, with a line end after the last."""
+    """Returns `maze` as text, one row a line, with a line end after the last."""
     return "".join("".join("#" if wall else "." for wall in row) + "\n" for row in maze.walls)
 
 
 def parse_maze(text: str, name: str = "maze") -> Maze:
-    """The maze that `text` draws.
+    """Returns the maze that `text` draws.
 
     Raises:
       MazeError: if a character is unknown, the rows differ in length, or the grid is not a legal maze.
     """
-    if len(text) > _MAX_BYTES:
-        raise MazeError(
-            f"{name}: expected a map of at most {MAX_SIZE} x {MAX_SIZE} cells, found {len(text)} characters"
-        )
     # Only line feeds end a line: splitlines() would also split at characters that a text map must refuse.
     rows = text.replace("\r\n", "\n").strip("\n").split("\n")
     for row, line in enumerate(rows):
@@ -47,18 +43,14 @@ def parse_maze(text: str, name: str = "maze") -> Maze:
 
 
 def read_text_maze(path: str | pathlib.Path) -> Maze:
-    """The maze in a text file, named after the file.
+    """Reads the maze in a text file, and names it after the file.
 
     Raises:
-      InputError: if the file can't be read.
-      MazeError: if it is too large, not text or not a legal maze.
+      InputError: if the file can't be read, or is larger than any maze's.
+      MazeError: if it is not text or not a legal maze.
     """
     path = pathlib.Path(path)
     content = read_at_most(path, _MAX_BYTES, "map")
-    if len(content) > _MAX_BYTES:
-        raise MazeError(
-            f"{path}: expected a map of at most {_MAX_BYTES} bytes ({MAX_SIZE} x {MAX_SIZE} cells), found more"
-        )
     try:
         text = content.decode("ascii")
     except UnicodeDecodeError as error:

@@ -1,4 +1,4 @@
-"""A maze for other tools: standalone MJCF, and its walls as one watertight mesh."""
+"""A maze for other tools: a standalone MJCF file, and the walls as one watertight mesh."""
 
 from __future__ import annotations
 
@@ -7,24 +7,30 @@ import pathlib
 import numpy as np
 import trimesh
 
-from mazebench.files import open_whole
 from mazebench.maps.covering import cover
 from mazebench.maps.maze import WALL_HEIGHT, Maze
+from mazebench.storage.files import open_whole
 from mazebench.world.mjcf import maze_spec
 
 MESH_FORMATS = ("glb", "obj", "stl")
 
 _WALL_COLOUR = (92, 120, 153, 255)
-# Side of the pillars that join walls which touch only at a corner: without, an edge would have four faces, and readers
-# that merge vertices (OBJ, STL) would not find the mesh watertight.
+# Metres; the side of the pillars that join walls which touch only at a corner. Without pillars an edge would have four
+# faces, and readers that merge vertices (OBJ, STL) would not find the mesh watertight.
 _PILLAR = 0.02
-_PROUD = 0.001  # by which they stand out above and below: flush ones would leave the walls' corners in the mesh
+_PROUD = (
+    0.001  # metres by which pillars stand out above and below; flush ones would leave the walls' corners in the mesh
+)
 # glTF has y up, we have z up.
 _TO_GLTF = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
 def write_mjcf(maze: Maze, path: pathlib.Path) -> None:
-    """Writes a model that plain MuJoCo and its viewer open, without any other file."""
+    """Writes a model that MuJoCo and its viewer open without any other file.
+
+    Raises:
+      OSError: if it can't be written.
+    """
     spec = maze_spec(maze)
     spec.compile()
     with open_whole(path) as file:
@@ -32,9 +38,9 @@ def write_mjcf(maze: Maze, path: pathlib.Path) -> None:
 
 
 def wall_mesh(maze: Maze) -> trimesh.Trimesh:
-    """The walls as one watertight mesh in metres, x to the right, y up the map, z up.
+    """Returns the walls as one watertight mesh in metres, x to the right, y up the map, z up.
 
-    Walls that touch only at a corner are joined there by a pillar of 2 cm, which no body can pass anyway.
+    A pillar of 2 cm joins walls that touch only at a corner, where no body can pass anyway.
     """
     boxes = [_box(left, maze.size - bottom, right, maze.size - top) for top, left, bottom, right in cover(maze.walls)]
     half = _PILLAR / 2
@@ -49,7 +55,7 @@ def _box(left: float, low: float, right: float, high: float, proud: float = 0.0)
 
 
 def _diagonal_corners(maze: Maze) -> np.ndarray:
-    """`[K, 2]` points (x, y) where two walls touch at a corner only."""
+    """Returns the `K` points (x, y) where two walls touch only at a corner: `[K, 2]` int."""
     walls = maze.walls
     top_left, top_right, bottom_left, bottom_right = walls[:-1, :-1], walls[:-1, 1:], walls[1:, :-1], walls[1:, 1:]
     touching = (top_left == bottom_right) & (top_right == bottom_left) & (top_left != top_right)
@@ -58,7 +64,11 @@ def _diagonal_corners(maze: Maze) -> np.ndarray:
 
 
 def write_mesh(maze: Maze, path: pathlib.Path) -> None:
-    """Writes the wall mesh as GLB (y up, as glTF has it), OBJ or STL (z up), by the suffix of `path`."""
+    """Writes the wall mesh as GLB (y up, as in glTF), OBJ or STL (z up), by the suffix of `path`.
+
+    Raises:
+      OSError: if it can't be written.
+    """
     mesh = wall_mesh(maze)
     if path.suffix == ".glb":
         mesh.apply_transform(_TO_GLTF)

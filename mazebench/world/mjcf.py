@@ -1,7 +1,8 @@
 """A maze as a MuJoCo model: merged wall boxes, floor, lights, cameras, and a body that moves like DeepMind Lab's.
 
 Lengths are metres, one cell is 1 m and stands for DeepMind Lab's 100 game units. The body slides along x and y and
-yaws; height, roll and pitch are fixed. DESIGN section 4 has the measurements that the constants below were fitted to.
+yaws; height, roll and pitch are fixed. The constants below are fitted to measurements in DeepMind Lab, which
+docs/tasks.md lists.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import numpy as np
 
 from mazebench.maps.covering import Rectangle, cover
 from mazebench.maps.maze import WALL_HEIGHT, Maze, cell_to_point
+from mazebench.world import MAX_PIXELS
 
 BODY_RADIUS = 0.15  # DeepMind Lab's box is 30 x 30 x 56 units
 BODY_HEIGHT = 0.56
@@ -21,16 +23,17 @@ STEPS_PER_ACTION = 20  # an action repeat of 10 frames, two physics steps each
 
 ACTIONS = ("forward", "backward", "strafe_left", "strafe_right", "look_left", "look_right")
 
-# The drives: force K (v* - v) while on, on top of linear damping, so that the cruising speed is TOP_SPEED.
+# A drive that is on adds the force gain * (speed - v) to linear damping; the two balance at TOP_SPEED.
 _DAMPING = 8.0
 _DRIVE_GAIN = 60.0
 _DRIVE_SPEED = TOP_SPEED * (1 + _DAMPING / _DRIVE_GAIN)
 _DRIVE_FORCE = 34.0  # caps the acceleration from rest
-_YAW_GAIN = 20.0  # with _YAW_INERTIA a time constant of 1 ms: the turn rate stands within a frame
+_YAW_GAIN = 20.0  # with _YAW_INERTIA a time constant of 1 ms, well within a frame
 _YAW_INERTIA = 0.02
-# Contacts act this far before a wall (margins of two geoms add up, so the body has none): it never sinks in.
+# Metres before a wall at which contacts act, so that the body never sinks in. The margins of two geoms add up, so the
+# body has none.
 _CONTACT_MARGIN = 0.03
-# As stiff as the timestep allows, and overdamped: with a damping ratio of 1 walls throw back up to 18 % of the speed.
+# As stiff as the timestep allows, and overdamped: with a damping ratio of 1 up to 18 % of the speed rebounds.
 _CONTACT_SOLREF = [2 * PHYSICS_TIMESTEP, 3.0]
 _EYE_HEIGHT = 0.45
 _PARKED_DEPTH = 10.0  # metres below the floor
@@ -40,26 +43,26 @@ NUM_SENSORS = 10
 
 
 def maze_spec(maze: Maze) -> mujoco.MjSpec:
-    """The standalone model of one maze, without padding: what `mazebench generate` writes."""
+    """Returns the standalone model of one maze, which `mazebench generate` writes."""
     boxes = cover(maze.walls)
     return build_spec(maze, boxes, len(boxes), maze.name)
 
 
 def build_spec(maze: Maze, boxes: list[Rectangle], num_boxes: int, name: str = "maze") -> mujoco.MjSpec:
-    """The model of `maze` with walls as `boxes`, padded to `num_boxes` with boxes parked below the floor."""
+    """Returns the model of `maze` with `boxes` as walls, and boxes below the floor to make up `num_boxes`."""
     spec = mujoco.MjSpec()
     spec.modelname = name
     spec.option.timestep = PHYSICS_TIMESTEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0, 0, 0]
-    # Set here, not computed, so that models of one size share camera and shadow ranges.
+    # Set, not computed by MuJoCo, so that models of one size share camera and shadow ranges.
     spec.stat.center = [maze.size / 2, maze.size / 2, WALL_HEIGHT / 2]
     spec.stat.extent = maze.size
     spec.stat.meansize = 0.5
     spec.visual.map.znear = 0.02 / maze.size
-    # `global` is a word of Python's.
-    getattr(spec.visual, "global").offwidth = 1280
-    getattr(spec.visual, "global").offheight = 1280
+    # `global` is a keyword of Python.
+    getattr(spec.visual, "global").offwidth = MAX_PIXELS
+    getattr(spec.visual, "global").offheight = MAX_PIXELS
     spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
     spec.visual.headlight.diffuse = [0.25, 0.25, 0.25]
     spec.visual.headlight.specular = [0, 0, 0]
@@ -81,7 +84,8 @@ def _add_materials(spec: mujoco.MjSpec, size: int) -> None:
         width=64,
         height=64,
     )
-    # A texture's middle comes to lie on the floor's middle: the middle of a cell if their number is odd, else a corner.
+    # The middle of the texture lies on the middle of the floor, which is the middle of a cell if `size` is odd, else a
+    # corner.
     lines = mujoco.mjtMark.mjMARK_EDGE if size % 2 else mujoco.mjtMark.mjMARK_CROSS
     spec.add_texture(
         name="cells",
@@ -107,7 +111,7 @@ def _add_materials(spec: mujoco.MjSpec, size: int) -> None:
 def _add_room(spec: mujoco.MjSpec, size: int) -> None:
     middle = size / 2
     world = spec.worldbody
-    # For looks only: the body's height is fixed, so the floor needs no contact.
+    # The floor is only seen: the body's height is fixed, so it needs no contact.
     world.add_geom(
         name="floor",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
@@ -125,7 +129,7 @@ def _add_room(spec: mujoco.MjSpec, size: int) -> None:
         diffuse=[0.55, 0.55, 0.55],
         castshadow=False,  # its shadow map is too coarse for large mazes
     )
-    # High and narrow: 1.1 * size metres fill the view, and walls lean outwards little.
+    # High and narrow, so that walls hardly lean outwards; about 1.04 * size metres at the walls' height fill the view.
     height = 4.0 * size
     fovy = np.rad2deg(2 * np.arctan(0.52 * size / (height - WALL_HEIGHT)))
     world.add_camera(name="top", pos=[middle, middle, height], quat=[1, 0, 0, 0], fovy=fovy)
@@ -138,7 +142,7 @@ def _add_walls(spec: mujoco.MjSpec, size: int, boxes: list[Rectangle], num_boxes
             pos = [(left + right) / 2, size - (top + bottom) / 2, WALL_HEIGHT / 2]
             half = [(right - left) / 2, (bottom - top) / 2, WALL_HEIGHT / 2]
         else:
-            # Collidable, each at a place of its own: geoms without contacts would change the layout of MjData.
+            # Collidable and apart from each other: geoms without contacts would change the layout of MjData.
             pos, half = [index + 0.5, 0.5, -_PARKED_DEPTH], [0.1, 0.1, 0.1]
         spec.worldbody.add_geom(
             name=f"wall_{index}",
@@ -153,7 +157,7 @@ def _add_walls(spec: mujoco.MjSpec, size: int, boxes: list[Rectangle], num_boxes
 
 
 def _add_goal(spec: mujoco.MjSpec) -> None:
-    """A marker for people; the task moves it to the goal cell by its mocap pose, and nothing collides with it."""
+    """Adds the marker of the goal. The task moves it by its mocap pose; nothing collides with it."""
     marker = spec.worldbody.add_body(name="goal", mocap=True, pos=[0, 0, -_PARKED_DEPTH])
     marker.add_site(
         name="goal", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[0.3, 0.02, 0], pos=[0, 0, 0.02], material="goal"
@@ -162,7 +166,7 @@ def _add_goal(spec: mujoco.MjSpec) -> None:
 
 def _add_body(spec: mujoco.MjSpec, maze: Maze) -> None:
     x, y = cell_to_point(maze.free_cells[0], maze.size)
-    # The joints measure from the world's origin, so qpos is (x, y, yaw); keyframe 0 stands in the first free cell.
+    # The joints measure from the world's origin, so qpos is (x, y, yaw). Keyframe 0 is in the first free cell.
     body = spec.worldbody.add_body(name="agent", pos=[0, 0, BODY_HEIGHT / 2])
     body.add_joint(name="x", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0], damping=[_DAMPING, 0, 0])
     body.add_joint(name="y", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 1, 0], damping=[_DAMPING, 0, 0])
@@ -181,7 +185,7 @@ def _add_body(spec: mujoco.MjSpec, maze: Maze) -> None:
     )
     body.add_site(name="agent", pos=[0, 0, 0], size=[0.01, 0.01, 0.01], group=4)
     eye = _EYE_HEIGHT - BODY_HEIGHT / 2
-    # Looks along the body's x axis: the camera's right is -y, its up is z. It must not see the nose below it.
+    # The camera looks along the body's x axis: its right is -y, its up is z. The nose is below its view.
     body.add_camera(name="egocentric", pos=[0.12, 0, eye], xyaxes=[0, -1, 0, 0, 0, 1], fovy=75)
     body.add_camera(name="chase", pos=[-1.6, 0, 2.2], xyaxes=[0, -1, 0, 0.75, 0, 0.66], fovy=60)
     _add_actuators(spec)
@@ -224,7 +228,7 @@ def _add_sensors(spec: mujoco.MjSpec) -> None:
 
 
 def action_controls() -> np.ndarray:
-    """`[6, 5]` float: the controls of the four drives and the turn for each of `ACTIONS`."""
+    """Returns the controls of the four drives and the turn for each of `ACTIONS`: `[6, 5]` float."""
     controls = np.zeros((len(ACTIONS), 5))
     controls[np.arange(4), np.arange(4)] = 1.0
     controls[4, 4], controls[5, 4] = TURN_RATE, -TURN_RATE
@@ -232,11 +236,12 @@ def action_controls() -> np.ndarray:
 
 
 def velocity_controls(velocities: np.ndarray) -> np.ndarray:
-    """`[..., 5]` float: the controls that drive the body at `[..., 3]` velocities, as far as nothing is in the way.
+    """Returns the controls that drive the body at `[..., 3]` velocities: `[..., 5]` float.
 
-    A velocity is forward and to the left in shares of the top speed, in the body's frame, and turning to the left in
-    shares of the turn rate, each in [-1, 1]. Forward and left together are shortened to the top speed. One of them at
-    1 or -1 and the others at 0 are the controls of an action; 0 everywhere lets the body coast.
+    A velocity is (forward, left, turn to the left) in the body's frame, each in [-1, 1]: forward and left in shares of
+    the top speed, the turn in shares of the turn rate. If forward and left together exceed the top speed, they are
+    shortened to it. With one of the three at 1 or -1 and the others at 0, the controls are those of an action. With
+    all at 0 the body coasts.
     """
     drive = velocities[..., :2] / np.maximum(1.0, np.hypot(velocities[..., 0], velocities[..., 1]))[..., None]
     controls = np.zeros((*velocities.shape[:-1], 5))

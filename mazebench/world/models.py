@@ -1,7 +1,8 @@
-"""The models of a set of mazes of one size, compiled when first asked for, and how one takes another's place."""
+"""The models of several mazes of one size, and how one model is turned into another."""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 import mujoco
@@ -12,7 +13,7 @@ from mazebench.maps.covering import cover
 from mazebench.maps.maze import Maze
 from mazebench.world.mjcf import build_spec
 
-# The only fields in which two models of one `MazeModels` differ (a test compares all the others).
+# The only fields in which two models of one `MazeModels` differ. A test compares all others.
 _MAZE_FIELDS = (
     "geom_aabb",
     "geom_pos",
@@ -27,7 +28,7 @@ _MAZE_FIELDS = (
 
 
 class MazeModels:
-    """A sequence of `MjModel`, one for each maze, whose `MjData` all have one layout."""
+    """The `MjModel` of each of some mazes, compiled on first use; the `MjData` of all of them have one layout."""
 
     def __init__(self, mazes: Sequence[Maze]):
         sizes = sorted({maze.size for maze in mazes})
@@ -49,7 +50,13 @@ class MazeModels:
         return model
 
 
+@functools.lru_cache(maxsize=4)
+def models_of(mazes: tuple[Maze, ...]) -> MazeModels:
+    """Returns the models of `mazes`, which all environments with these mazes share."""
+    return MazeModels(mazes)
+
+
 def copy_maze(source: mujoco.MjModel, target: mujoco.MjModel) -> None:
-    """Turns `target` into the maze of `source`; both must come from one `MazeModels`."""
+    """Copies the maze of `source` into `target`; both must come from one `MazeModels`."""
     for field in _MAZE_FIELDS:
         np.copyto(getattr(target, field), getattr(source, field))

@@ -1,4 +1,4 @@
-"""The dm_control Physics of a maze: named measurements of the agent's body, and mazes changed in place."""
+"""The dm_control Physics of a maze: measurements of the agent's body by name, and exchange of the maze."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 with warnings.catch_warnings():
-    # dm_control tries every rendering backend when imported; GLFW warns of a missing display even where nobody renders.
+    # dm_control tries every rendering backend when imported, and GLFW warns if there is no display.
     warnings.filterwarnings("ignore", message=".*GLFWError.*|.*DISPLAY.*")
     from dm_control.mujoco import engine, wrapper
 
@@ -21,63 +21,59 @@ STATE_SIZE = 12
 
 
 class Physics(engine.Physics):
-    """One maze and the body in it; `load_maze` swaps the maze without a new MjData or a new rendering context."""
+    """One maze and the body in it; `load_maze` exchanges the maze but keeps MjData and rendering context."""
 
     @classmethod
     def of_maze(cls, model: mujoco.MjModel) -> Physics:
-        """A simulation of its own copy of `model`, the body in the maze's first free cell."""
+        """Returns a simulation of a copy of `model`, with the body in the maze's first free cell."""
         physics = cls.from_model(wrapper.MjModel(copy.copy(model)))
         with physics.reset_context():
             physics.data.qpos[:] = physics.model.key_qpos[0]
         return physics
 
     def load_maze(self, model: mujoco.MjModel) -> None:
-        """Puts the maze of `model`, which must come from the same `MazeModels`, in the place of this one."""
+        """Changes to the maze of `model`, which must come from the same `MazeModels`."""
         copy_maze(model, self.model.ptr)
 
     def place_agent(self, position: np.ndarray, yaw: float) -> None:
-        """Stands the body at `position` `[2]` m, turned by `yaw` rad; call it within `reset_context()`."""
+        """Moves the body to `position` (`[2]`, m) and `yaw` (rad); call it within `reset_context()`."""
         self.data.qpos[:] = (*position, yaw)
 
     def place_goal(self, cell: Cell, size: int) -> None:
-        """Moves the goal marker, which touches nothing, to a cell of a maze of `size` cells a side."""
+        """Moves the goal marker to a cell of a maze of `size` cells a side."""
         self.data.mocap_pos[0] = (*cell_to_point(cell, size), 0.0)
 
     def set_controls(self, controls: np.ndarray) -> None:
-        """Sets the controls `[5]` of the four drives and the turn, such as `mjcf.action_controls` and its like give."""
+        """Sets the controls (`[5]`) of the four drives and the turn; see `mjcf.action_controls`."""
         self.data.ctrl[:] = controls
 
     def position(self) -> np.ndarray:
-        """`[2]` float: the body's centre (x, y) in metres."""
+        """Returns the body's centre (x, y) in metres: `[2]` float."""
         return self.data.qpos[:2].copy()
 
     def yaw(self) -> float:
-        """The body's heading in [-pi, pi) rad, counter-clockwise from +x."""
+        """Returns the body's heading in [-pi, pi) rad, counter-clockwise from +x."""
         return float(wrap_angle(self.data.qpos[2]))
 
     def speed(self) -> float:
-        """m/s in the plane."""
+        """Returns the body's speed in the plane in m/s."""
         return float(np.hypot(self.data.qvel[0], self.data.qvel[1]))
 
-    def turn_rate(self) -> float:
-        """rad/s, counter-clockwise."""
-        return float(self.data.qvel[2])
-
     def state(self) -> np.ndarray:
-        """`[12]` float64: see `states_from_sensors`."""
+        """Returns the state, `[12]` float64; see `states_from_sensors`."""
         return states_from_sensors(self.data.sensordata)
 
 
 def wrap_angle(angle: np.ndarray | float) -> np.ndarray:
-    """The same angle in [-pi, pi)."""
+    """Returns the same angle in [-pi, pi)."""
     return np.mod(np.asarray(angle) + np.pi, 2 * np.pi) - np.pi
 
 
 def states_from_sensors(sensors: np.ndarray) -> np.ndarray:
-    """`[..., 12]` float64 states from `[..., 10]` sensor values.
+    """Returns `[..., 12]` float64 states from `[..., 10]` sensor values.
 
-    In this order: position x, y, z (m); orientation roll, pitch, yaw (rad, yaw in [-pi, pi)); linear velocity forward,
-    left, up in the body's frame (m/s); angular velocity about the body's x, y, z (rad/s).
+    A state is, in this order: position x, y, z (m); orientation roll, pitch, yaw (rad, yaw in [-pi, pi)); linear
+    velocity forward, left, up in the body's frame (m/s); angular velocity about the body's x, y, z (rad/s).
     """
     states = np.zeros((*sensors.shape[:-1], STATE_SIZE))
     states[..., :3] = sensors[..., :3]

@@ -1,4 +1,4 @@
-"""Pictures of a world; the only place that opens a rendering context, and only when one is asked for."""
+"""Pictures of a world. Only this module opens rendering contexts, each with the first picture."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ from mazebench.errors import InputError
 from mazebench.world.models import copy_maze
 
 CAMERAS = ("top", "chase", "egocentric")
-MAX_PIXELS = 1280  # a side; the models' offscreen buffers have this size
 
 
 class RenderingError(InputError):
-    """No picture can be rendered on this machine as it is set up."""
+    """This machine, as it is set up, can't render."""
 
 
 class Renderer:
-    """A rendering context for one model, kept open over many pictures; a context manager.
+    """A rendering context for one model, open until it is closed; a context manager.
 
     Raises:
       RenderingError: if no rendering context can be opened; the message says what to set.
@@ -30,7 +29,7 @@ class Renderer:
     def __init__(self, model: mujoco.MjModel, height: int = 480, width: int = 480):
         try:
             self._renderer = mujoco.Renderer(model, height, width)
-        # mujoco.gl_context is whichever backend MUJOCO_GL names; each has error classes of its own.
+        # MUJOCO_GL names the backend, and each backend raises errors of its own.
         except (mujoco.FatalError, RuntimeError, ImportError, AttributeError, OSError, ValueError) as error:
             raise RenderingError(
                 f"can't open a rendering context: {str(error).splitlines()[0] if str(error) else error!r}; "
@@ -39,7 +38,7 @@ class Renderer:
         _close_at_exit(self)
 
     def render(self, data: mujoco.MjData, camera: str = "top") -> np.ndarray:
-        """`[H, W, 3]` uint8 of the state in `data`."""
+        """Returns a picture of the state in `data`: `[H, W, 3]` uint8."""
         self._renderer.update_scene(data, camera=camera)
         return self._renderer.render()
 
@@ -50,7 +49,7 @@ class Renderer:
         self.close()
 
     def close(self) -> None:
-        """Closes the context; nothing can be rendered any more."""
+        """Closes the context."""
         self._renderer.close()
 
 
@@ -102,9 +101,9 @@ _open_renderers: weakref.WeakSet[Renderer] = weakref.WeakSet()
 
 
 def _close_at_exit(renderer: Renderer) -> None:
-    """Has a renderer that nobody closes closed before the interpreter takes apart what closing needs."""
+    """Makes sure that `renderer` is closed before the interpreter unloads the modules that closing needs."""
     _open_renderers.add(renderer)
-    # Last in, first out: registered anew with each renderer, it comes before what a backend registered when it opened.
+    # Exit functions run in reverse order. Registered again after a renderer is opened, ours runs before the backend's.
     atexit.unregister(_close_renderers)
     atexit.register(_close_renderers)
 

@@ -1,4 +1,4 @@
-"""What `mazebench generate` does: mazes by style or from a picture, written in the formats asked for."""
+"""The work of `mazebench generate`: makes mazes, or reads one from a picture, and writes them in several formats."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _PICTURE_PIXELS = 1024  # about the side of a maze's picture
 
 
 def make_mazes(size: int | None, count: int, seed: int, style: str, image: pathlib.Path | None) -> Iterator[Maze]:
-    """Yields `count` mazes of a style, named after style, size, seed and number; or the one that a picture shows.
+    """Yields `count` mazes of a style, named after style, size, seed and index; or the one maze in the picture `image`.
 
     Raises:
-      InputError: if the style can't make that size, or the picture shows no maze.
+      InputError: if the style can't make mazes of that size, or the picture shows no maze.
     """
     if image is not None:
         yield read_maze(image, size)
@@ -34,7 +34,7 @@ def make_mazes(size: int | None, count: int, seed: int, style: str, image: pathl
 
 
 def parse_formats(text: str) -> list[str]:
-    """The formats in a list separated by commas, in its order.
+    """Returns the formats in a list separated by commas, in its order.
 
     Raises:
       InputError: if one is unknown.
@@ -57,7 +57,9 @@ def write_maze(
     paths = [folder / f"{maze.name}.{_WRITERS[name][0]}" for name in formats]
     for path in paths:
         if source is not None and path.exists() and path.samefile(source):
-            raise InputError(f"{path}: is the picture that the maze is read from; name another --out or --format")
+            raise InputError(
+                f"{path}: would overwrite the picture that the maze is read from; give another --out or --format"
+            )
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, path in zip(formats, paths, strict=True):

@@ -1,0 +1,1 @@
+"""Files that are written whole, folder locks, JSON and arrays."""

@@ -1,0 +1,101 @@
+"""Files that are read up to a limit of size, and files that are written whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import pathlib
+from collections.abc import Iterator
+from typing import IO, Any
+
+from mazebench.errors import InputError
+
+
+class WriteError(InputError):
+    """A file or folder that can't be written."""
+
+
+def open_file(path: str | pathlib.Path, kind: str) -> io.BufferedReader:
+    """Opens a file to read its bytes.
+
+    Raises:
+      InputError: if it can't be opened; the message calls it a `kind`.
+    """
+    try:
+        return open(path, "rb")
+    except OSError as error:
+        raise InputError(f"{path}: can't read the {kind}: {error.strerror}") from error
+
+
+def read_at_most(path: str | pathlib.Path, num_bytes: int, kind: str) -> bytes:
+    """Returns the content of a file.
+
+    Raises:
+      InputError: if it can't be read, or is larger than `num_bytes`; the message calls it a `kind`.
+    """
+    with open_file(path, kind) as file:
+        content = file.read(num_bytes + 1)
+    if len(content) > num_bytes:
+        raise InputError(f"{path}: expected a {kind} of at most {num_bytes} bytes, found more")
+    return content
+
+
+def open_to_write(path: pathlib.Path, mode: str) -> IO[Any]:
+    """Opens a file to write or append to; text is UTF-8.
+
+    Raises:
+      WriteError: if it can't be opened.
+    """
+    try:
+        return open(path, mode, encoding=None if "b" in mode else "utf-8")
+    except OSError as error:
+        raise WriteError(f"{path}: can't write: {error.strerror}") from error
+
+
+@contextlib.contextmanager
+def open_whole(path: str | pathlib.Path) -> Iterator[IO[bytes]]:
+    """Yields a file to write, which replaces the one at `path` when the block ends without an exception.
+
+    The content reaches the disk before the replacement, so that a reader finds the old file or the whole new one. A
+    kill may leave a `.tmp` file beside it, which the next writer overwrites.
+
+    Raises:
+      OSError: if it can't be written; its `filename` is `path`.
+    """
+    path = pathlib.Path(path)
+    temporary = path.with_name(path.name + ".tmp")
+    try:
+        with temporary.open("wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def make_folder(path: pathlib.Path) -> None:
+    """Makes a folder, and those that it lies in, unless it exists.
+
+    Raises:
+      WriteError: if it can't be made.
+    """
+    with writing_to(path):
+        path.mkdir(parents=True, exist_ok=True)
+
+
+@contextlib.contextmanager
+def writing_to(folder: pathlib.Path) -> Iterator[None]:
+    """Turns an `OSError` in the block into a `WriteError` that names the file, or `folder` if the error names none.
+
+    Raises:
+      WriteError: if the block raises an `OSError`.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise WriteError(f"{error.filename or folder}: can't write there: {error.strerror}") from error
