@@ -1,7 +1,7 @@
 """mazebench: zero-shot navigation in unseen 3-D mazes from abstract top-down maps, on MuJoCo.
 
-`load` gives a dm_control environment, `make_vec` many environments on all cores. Importing mazebench registers
-`mazebench/Local-13-v1` and the others with Gymnasium.
+`load` gives a dm_control environment, `make_vec` many environments on all cores, and `evaluate` an agent's results.
+Importing mazebench registers `mazebench/Local-13-v1` and the others with Gymnasium.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 from mazebench.envs.registration import register_environments
 
 if TYPE_CHECKING:
+    from mazebench.agent import Agent, Inputs, SingleAgent
     from mazebench.envs.registration import make_vec
     from mazebench.errors import InputError
+    from mazebench.evaluation.evaluate import evaluate
     from mazebench.maps.files import read_maze, read_mazes
     from mazebench.maps.generators import generate
     from mazebench.maps.maze import Maze, MazeError
@@ -28,11 +30,15 @@ register_environments()
 
 # Imported when first used: MuJoCo and dm_control take over a second to load.
 _HOMES = {
+    "Agent": "mazebench.agent",
     "Episode": "mazebench.tasks.episode",
     "InputError": "mazebench.errors",
+    "Inputs": "mazebench.agent",
     "Maze": "mazebench.maps.maze",
     "MazeError": "mazebench.maps.maze",
+    "SingleAgent": "mazebench.agent",
     "TaskSpec": "mazebench.tasks.spec",
+    "evaluate": "mazebench.evaluation.evaluate",
     "generate": "mazebench.maps.generators",
     "load": "mazebench.tasks.registry",
     "make_spec": "mazebench.tasks.registry",
@@ -42,11 +48,15 @@ _HOMES = {
 }
 
 __all__ = [
+    "Agent",
     "Episode",
     "InputError",
+    "Inputs",
     "Maze",
     "MazeError",
+    "SingleAgent",
     "TaskSpec",
+    "evaluate",
     "generate",
     "load",
     "make_spec",

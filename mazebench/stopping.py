@@ -1,4 +1,4 @@
-"""Signals that end a command: remembered, as code in between may lose an exception, and told in one line."""
+"""Turns SIGINT and SIGTERM into exceptions, and ends a command that they stop with one line."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from typing import Any, NoReturn
 
 
 class Terminated(BaseException):
-    """The process was asked to end by SIGTERM; of no kind that anyone below catches."""
+    """SIGTERM asked the process to end. No handler of `Exception` catches it."""
 
 
-_KINDS: dict[int, type[BaseException]] = {signal.SIGINT: KeyboardInterrupt, signal.SIGTERM: Terminated}
-_told: list[type[BaseException]] = []
+_EXCEPTIONS: dict[int, type[BaseException]] = {signal.SIGINT: KeyboardInterrupt, signal.SIGTERM: Terminated}
+_raised: list[type[BaseException]] = []  # by signals, in order
 
 
 @contextlib.contextmanager
 def listening() -> Iterator[None]:
-    """Turns SIGINT, unless it is ignored as in the background, and SIGTERM into exceptions."""
-    heeded = [number for number in _KINDS if signal.getsignal(number) != signal.SIG_IGN]
-    with handling(heeded, _tell):
+    """Turns SIGINT and SIGTERM into exceptions; SIGINT only where it is not ignored, as it is in the background."""
+    heeded = [number for number in _EXCEPTIONS if signal.getsignal(number) != signal.SIG_IGN]
+    with handling(heeded, _raise):
         try:
             yield
         finally:
-            _told.clear()
+            _raised.clear()
 
 
 @contextlib.contextmanager
 def handling(numbers: Iterable[int], handler: Callable[[int, Any], None]) -> Iterator[None]:
-    """Lets `handler` handle these signals for a while; only the main thread may."""
+    """Installs a handler of some signals for the block; only the main thread may."""
     before = {number: signal.signal(number, handler) for number in numbers}
     try:
         yield
@@ -42,32 +42,32 @@ def handling(numbers: Iterable[int], handler: Callable[[int, Any], None]) -> Ite
             signal.signal(number, earlier)
 
 
-def _tell(number: int, frame: object) -> NoReturn:
-    _told.append(_KINDS[number])
-    raise _KINDS[number]
-
-
 def check() -> None:
-    """Raises again what a signal raised in code that lost it, such as a destructor or a compiler's callback."""
-    if _told:
-        raise _told[0]
+    """Raises again what a signal raised; loops call it, since destructors and compilers' callbacks lose exceptions."""
+    if _raised:
+        raise _raised[0]
 
 
 @contextlib.contextmanager
-def stoppable(say: Callable[[], tuple[str, ...]]) -> Iterator[None]:
-    """Ends the command with one line if a signal told it to, whatever came of that inside.
+def stoppable(how_to_go_on: Callable[[], tuple[str, ...]]) -> Iterator[None]:
+    """Ends the command with one line if a signal arrived, even if another exception came of it.
 
     Args:
-      say: gives what is kept, and options with which the same command goes on.
+      how_to_go_on: returns what is kept, in words, and the options with which the same command goes on.
     """
     try:
         yield
     except (KeyboardInterrupt, Terminated) as stop:
-        _end(type(stop), *say())
+        _end(type(stop), *how_to_go_on())
     except Exception:
-        if _told:
-            _end(_told[0], *say())
+        if _raised:
+            _end(_raised[0], *how_to_go_on())
         raise
+
+
+def _raise(number: int, frame: object) -> NoReturn:
+    _raised.append(_EXCEPTIONS[number])
+    raise _EXCEPTIONS[number]
 
 
 def _end(kind: type[BaseException], kept: str, *options: str) -> NoReturn:
@@ -77,6 +77,6 @@ def _end(kind: type[BaseException], kept: str, *options: str) -> NoReturn:
     elif shutil.which("mazebench") == program[0]:
         program = ["mazebench"]
     words = [*program, *sys.argv[1:], *(option for option in options if option not in sys.argv)]
-    said, status = ("terminated", 143) if kind is Terminated else ("interrupted", 130)
-    print(f"mazebench: {said}; {kept} with: {shlex.join(words)}", file=sys.stderr)
+    event, status = ("terminated", 143) if kind is Terminated else ("interrupted", 130)
+    print(f"mazebench: {event}; {kept} with: {shlex.join(words)}", file=sys.stderr)
     sys.exit(status)

@@ -1,1 +1,1 @@
-"""The navigation task for Gymnasium: one environment, or many on all cores."""
+"""The navigation task for Gymnasium: one environment, or many of them on all cores."""

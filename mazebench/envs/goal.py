@@ -19,23 +19,23 @@ from mazebench.world.physics import STATE_SIZE
 
 _SHOWN_PLANES = [plane for plane in range(NUM_PLANES) if plane != GOAL]
 
-# What `info` may be where goals are arrays: one for all, or one for each.
+# For arrays of goals, `info` is one mapping of arrays, or one mapping for each goal.
 Infos = Mapping[str, Any] | Sequence[Mapping[str, Any]]
 
 
 class GoalMazeEnv(MazeEnv):
-    """A `MazeEnv` whose goal stands in `desired_goal` alone, so that another may be put in its place afterwards.
+    """A `MazeEnv` that shows the goal in `desired_goal` only, so that it can be replaced by another one afterwards.
 
     Observations:
 
     - observation: `[12 + 3 M M]` float32: the state, then the planes of the context that do not show the goal (the map,
       the map around the start, the start), row by row.
-    - achieved_goal: `[2]` float32: the centre (x, y) in m of the cell in which the body is, its true one.
+    - achieved_goal: `[2]` float32: the centre (x, y) in m of the cell in which the body truly is.
     - desired_goal: `[2]` float32: the centre of the goal cell.
-    - the pictures of `cameras`, in which the goal's marker is seen.
+    - what the `sensors` observe; cameras show the marker at the goal.
 
-    For any goals, `compute_reward`, `compute_terminated` and `compute_truncated` say what a step that led to
-    `achieved_goal` would have brought on the way to `desired_goal`. They take single goals and arrays of them.
+    `compute_reward`, `compute_terminated` and `compute_truncated` return what a step that led to `achieved_goal` gives
+    if the goal is `desired_goal`. They take single goals and arrays of goals.
     """
 
     def __init__(
@@ -45,27 +45,27 @@ class GoalMazeEnv(MazeEnv):
             raise InputError("expected the local task with one goal for a goal-conditioned environment, found several")
         super().__init__(task_spec, seed, render_mode, camera)
         size, num_values = task_spec.size, STATE_SIZE + len(_SHOWN_PLANES) * task_spec.context_size**2
-        pictures = {name: spaces.observation_space(task_spec)[name] for name in task_spec.cameras}
+        sensed = {name: spaces.observation_space(task_spec)[name] for name in task_spec.sensors}
         self.observation_space = gymnasium.spaces.Dict(
             {
                 "observation": gymnasium.spaces.Box(-np.inf, np.inf, (num_values,), np.float32),
                 "achieved_goal": gymnasium.spaces.Box(0.0, size, (2,), np.float32),
                 "desired_goal": gymnasium.spaces.Box(0.0, size, (2,), np.float32),
-                **pictures,
+                **sensed,
             }
         )
 
     def compute_reward(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Infos) -> np.ndarray:
-        """`[...]` float: 0 where the achieved goal `[..., 2]` is the desired one, else -1; `info` is not needed."""
+        """Returns `[...]` float: 0 where the achieved goal `[..., 2]` is the desired one, else -1; ignores `info`."""
         return np.where(self.compute_terminated(achieved_goal, desired_goal, info), 0.0, -1.0)[()]
 
     def compute_terminated(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Infos) -> np.ndarray:
-        """`[...]` bool: where the achieved goal `[..., 2]` is the desired one; `info` is not needed."""
-        # Centres of cells are float32 numbers without rounding.
+        """Returns `[...]` bool: where the achieved goal `[..., 2]` is the desired one; ignores `info`."""
+        # Exact, because the centre of a cell is a float32 number without rounding.
         return (np.asarray(achieved_goal) == np.asarray(desired_goal)).all(axis=-1)
 
     def compute_truncated(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Infos) -> np.ndarray:
-        """`[...]` bool: where time ran out short of the goal, by the "steps" of `info`, one for all or one for each."""
+        """Returns `[...]` bool: where the goal was not reached and `info["steps"]` is at the time limit."""
         steps = info["steps"] if isinstance(info, Mapping) else np.array([each["steps"] for each in info])
         return (steps >= self.task_spec.time_limit) & ~self.compute_terminated(achieved_goal, desired_goal, info)
 

@@ -18,9 +18,9 @@ from mazebench.world.rendering import Renderer
 class MazeEnv(gymnasium.Env):
     """One environment; observations, rewards and endings are those of `mazebench.tasks.navigation.Navigation`.
 
-    `info` has `is_first` (the context is new: an episode or the leg to the next landmark began), `success`, `steps`,
-    `path_length` (m), `position` (`[2]` m, the true one, for records and hindsight, not to act on), `maze` (index among
-    the task's mazes) and `landmark` (legs done).
+    `info` has `is_first` (whether the context is new: an episode or the leg to the next landmark began), `success`,
+    `steps`, `path_length` (m), `position` (`[2]` m, the true one, for records and hindsight; agents must not use it),
+    `maze` (index among the task's mazes) and `landmark` (number of legs done).
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 6.25}  # noqa: RUF012
@@ -39,7 +39,7 @@ class MazeEnv(gymnasium.Env):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Starts an episode, the same for the same `seed`; `options={"episode": Episode(...)}` says which."""
+        """Starts an episode, the same for the same `seed`, or the one of `options={"episode": Episode(...)}`."""
         super().reset(seed=seed)
         episode = (options or {}).get("episode")
         if episode is not None and not isinstance(episode, Episode):
@@ -61,7 +61,7 @@ class MazeEnv(gymnasium.Env):
         return self._observation(time_step), time_step.reward, terminated, ended and not terminated, self._info()
 
     def render(self) -> np.ndarray | None:
-        """`[480, 480, 3]` uint8 of the current state, if `render_mode` is "rgb_array"."""
+        """Returns `[480, 480, 3]` uint8 of the current state if `render_mode` is "rgb_array", else None."""
         if self.render_mode is None:
             return None
         physics = self.environment.physics
@@ -76,7 +76,7 @@ class MazeEnv(gymnasium.Env):
         self.environment.close()
 
     def _observation(self, time_step: dm_env.TimeStep) -> dict[str, np.ndarray]:
-        return {key: time_step.observation[key] for key in ("state", "context", *self.task_spec.cameras)}
+        return {key: time_step.observation[key] for key in ("state", "context", *self.task_spec.sensors)}
 
     def _info(self) -> dict[str, Any]:
         task = self.environment.task

@@ -1,4 +1,4 @@
-"""Gymnasium ids, `mazebench/Local-13-v1` and so on, which `import mazebench` registers."""
+"""The Gymnasium ids, such as `mazebench/Local-13-v1`; `import mazebench` registers them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ _TASKS = {"Local": "local", "Hierarchical": "hierarchical"}
 def register_environments() -> None:
     """Registers every task and size; a second call changes nothing.
 
-    No `max_episode_steps`: its wrapper would call a step truncated that reached the goal on the limit.
+    The ids have no `max_episode_steps`: Gymnasium's wrapper would truncate an episode that reaches its goal on the last
+    step.
     """
     for title, task in _TASKS.items():
         for size in BENCHMARK_SIZES:
@@ -42,7 +43,7 @@ def register_environments() -> None:
 def make_env(
     task: str = "local", *, seed: int | None = None, render_mode: str | None = None, camera: str = "top", **options: Any
 ) -> MazeEnv:
-    """A `MazeEnv`; `options` are those of `mazebench.make_spec`."""
+    """Returns a `MazeEnv`; `options` are those of `mazebench.make_spec`."""
     from mazebench.envs.gym import MazeEnv
     from mazebench.tasks.registry import make_spec
 
@@ -52,7 +53,7 @@ def make_env(
 def make_goal_env(
     *, seed: int | None = None, render_mode: str | None = None, camera: str = "top", **options: Any
 ) -> GoalMazeEnv:
-    """A `GoalMazeEnv` of the local task; `options` are those of `mazebench.make_spec`."""
+    """Returns a `GoalMazeEnv` of the local task; `options` are those of `mazebench.make_spec`."""
     from mazebench.envs.goal import GoalMazeEnv
     from mazebench.tasks.registry import make_spec
 
@@ -68,7 +69,10 @@ def make_vec(
     render_mode: str | None = None,
     **options: Any,
 ) -> MazeVectorEnv:
-    """`num_envs` environments side by side on `num_threads` threads (0: all cores); `options` as of `make_spec`."""
+    """Returns `num_envs` environments side by side on `num_threads` threads (0: all cores).
+
+    `options` are those of `mazebench.make_spec`.
+    """
     from mazebench.envs.vector import MazeVectorEnv
     from mazebench.tasks.registry import make_spec
 

@@ -19,13 +19,20 @@ from mazebench.envs import spaces
 from mazebench.maps.maze import cell_to_point, point_to_cell
 from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_actions, controls_of_velocities
 from mazebench.tasks.context import NUM_PLANES
-from mazebench.tasks.episode import Episode, Event, Route, ShownMap
+from mazebench.tasks.episode import Episode, sample_episode
+from mazebench.tasks.observation import OpenSensors, state_errors
+from mazebench.tasks.perturbations.base import ShownMap, StateError
+from mazebench.tasks.route import Event, Route, plan_route
+from mazebench.tasks.sensors.base import Worlds
+from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.mjcf import STEPS_PER_ACTION
+from mazebench.world.models import models_of
 from mazebench.world.physics import states_from_sensors
 from mazebench.world.rendering import Cameras
 
-# Gives environment i its next episode, or None to let it rest: it is not stepped any more.
+# Returns the next episode of environment i, or None: then the environment rests, which means that it is not stepped any
+# more.
 EpisodeSource = Callable[[int], Episode | None]
 
 _PICTURE_SIZE = 480  # pixels a side of what `render` returns
@@ -35,11 +42,11 @@ _VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)  # makes the sensors current 
 class MazeVectorEnv(gymnasium.vector.VectorEnv):
     """B environments of one task; the same seed gives the same episode as in the dm_env and Gymnasium environments.
 
-    Autoreset is SAME_STEP: where an episode ends, the observation returned is the next one's first, and
-    `info["final_obs"]`, `info["final_info"]` hold the ended one's last. `info` has, as arrays `[B]`: `is_first` (the
-    context is new: an episode or the leg to the next landmark began), `success`, `steps`, `path_length` (m), `position`
-    (`[B, 2]` m, the true one, for records and hindsight, not to act on), `maze` (index among the task's mazes),
-    `landmark` (legs done).
+    Autoreset is SAME_STEP: where an episode ends, `step` returns the first observation of the next episode, and
+    `info["final_obs"]` and `info["final_info"]` hold the last ones of the ended episode. `info` has arrays `[B]`:
+    `is_first` (whether the context is new: an episode or the leg to the next landmark began), `success`, `steps`,
+    `path_length` (m), `position` (`[B, 2]` m, the true one, for records and hindsight; agents must not use it), `maze`
+    (index among the task's mazes) and `landmark` (number of legs done).
     """
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": ["rgb_array"], "render_fps": 6.25}  # noqa: RUF012
@@ -53,7 +60,16 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         render_mode: str | None = None,
         episode_source: EpisodeSource | None = None,
     ):
-        """`num_threads` 0 uses all cores; without `episode_source`, each environment draws from a stream of its own."""
+        """Opens the environments.
+
+        Args:
+          task_spec: the task.
+          num_envs: B.
+          seed: of the first reset, as in `reset`.
+          num_threads: of the simulation; 0 uses all cores.
+          render_mode: None or "rgb_array", for Gymnasium's wrappers.
+          episode_source: returns the next episode of an environment; by default each draws from a stream of its own.
+        """
         if num_envs < 1:
             raise ValueError(f"expected at least one environment, found num_envs={num_envs}")
         self.task_spec = task_spec
@@ -67,13 +83,14 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         self._rngs = _streams(seed, num_envs)
         self._was_reset = False
         self._allocate()
-        self._models = [task_spec.models[0]] * num_envs
-        self._batch = mujoco.batch.Batch(task_spec.models[0], num_envs, num_threads)
-        self._sensors = self._batch.bind("sensordata")
+        self._maze_models = models_of(task_spec.mazes)
+        self._models = [self._maze_models[0]] * num_envs
+        self._batch = mujoco.batch.Batch(self._maze_models[0], num_envs, num_threads)
+        self._sensordata = self._batch.bind("sensordata")
         self._qpos = self._batch.bind("qpos")
         self._ctrl = self._batch.bind("ctrl")
         self._marker = self._batch.bind("mocap_pos")
-        self._cameras = task_spec.open_cameras()
+        self._sensors = OpenSensors(task_spec)
         self._top_camera: Cameras | None = None  # of `render`
 
     def _allocate(self) -> None:
@@ -81,12 +98,12 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         self.episodes: list[Episode | None] = [None] * num_envs
         self._routes: list[Route | None] = [None] * num_envs
         self._shown: list[ShownMap | None] = [None] * num_envs
-        self._noise: list[np.random.Generator | None] = [None] * num_envs
+        self._state_errors: list[list[StateError]] = [[] for _ in range(num_envs)]
         self._context = np.zeros((num_envs, NUM_PLANES, size, size), dtype=np.float32)
         self._positions = np.zeros((num_envs, 2))
         self._path_length = np.zeros(num_envs)
         self._steps = np.zeros(num_envs, dtype=np.int64)
-        # Cells as row * N + column, and the step at which the current leg times out: what a step is checked against.
+        # What each step is checked against: cells as row * N + column, and the step at which the leg times out.
         self._start = np.zeros(num_envs, dtype=np.int64)
         self._target = np.zeros(num_envs, dtype=np.int64)
         self._goal = np.zeros(num_envs, dtype=np.int64)
@@ -98,12 +115,15 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Starts an episode everywhere.
+        """Starts an episode in each environment.
 
         Args:
-          seed: a list verbatim, an integer s as s, s + 1, ...; None goes on with the environments' streams.
-          options: none are known.
+          seed: one seed for each environment, or an integer s for s, s + 1, ...; with None, an environment's stream of
+            episodes goes on.
+          options: ignored.
         """
+        if options:
+            raise ValueError(f"expected no options, found {', '.join(options)}")
         if seed is not None:
             fresh = _streams(seed, self.num_envs)
             keep = isinstance(seed, Sequence)
@@ -115,7 +135,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         self._active[:] = True
         self._begin_episodes(range(self.num_envs))
         is_first = np.ones(self.num_envs, dtype=bool)
-        return self._observations(self._noisy_states()), self._infos(is_first, np.zeros(self.num_envs, dtype=bool))
+        return self._observations(self._observed_states()), self._infos(is_first, np.zeros(self.num_envs, dtype=bool))
 
     def step(
         self, actions: np.ndarray
@@ -124,7 +144,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
 
         Raises:
           gymnasium.error.ResetNeeded: before the first reset.
-          ValueError: if `actions` are not B of those there are.
+          ValueError: if `actions` are not B legal actions.
         """
         if not self._was_reset:
             raise gymnasium.error.ResetNeeded("expected a call to reset() before this step()")
@@ -141,7 +161,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         if resting:
             rewards[~self._active] = 0.0
         infos = self._infos(is_first, terminated)
-        states = self._noisy_states()
+        states = self._observed_states()
         ended = np.flatnonzero(terminated | truncated)
         if len(ended):
             infos = self._autoreset(ended, states, infos)
@@ -153,11 +173,11 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         return controls_of_actions(actions, self.num_envs)
 
     def _advance(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where a new leg began, where the goal was reached, where the time ran out: three `[B]` bool."""
+        """Returns three `[B]` bool: where a new leg began, where the goal was reached, where the time ran out."""
         size = self.task_spec.size
         is_first, terminated, truncated = np.zeros((3, self.num_envs), dtype=bool)
         cells = self.cells()
-        # Nothing else can happen to a route than these three; its own rules then say which it is.
+        # Nothing happens to a route unless one of these holds; then the route's own rules decide.
         due = (cells == self._target) | (cells == self._goal) | (self._steps >= self._deadline)
         for i in np.flatnonzero(due & self._active).tolist():
             event = self._route(i).advance(divmod(int(cells[i]), size), int(self._steps[i]))
@@ -169,34 +189,33 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         return is_first, terminated, truncated
 
     def _autoreset(self, ended: np.ndarray, states: np.ndarray, infos: dict[str, Any]) -> dict[str, Any]:
-        """Begins the next episodes, writes their states into `states`, returns the infos with the ended ones'."""
+        """Begins the next episodes, writes their states into `states`, and adds the ended ones' infos to `infos`."""
         final_obs = np.full(self.num_envs, None, dtype=object)
         mask = np.zeros(self.num_envs, dtype=bool)
         mask[ended] = True
-        pictures = self._pictures(ended)
-        for place, i in enumerate(ended):
+        sensed = self._sense(ended)
+        for index, i in enumerate(ended):
             final_obs[i] = {"state": states[i].copy(), "context": self._context[i].copy()}
-            final_obs[i] |= {name: taken[place] for name, taken in pictures.items()}
+            final_obs[i] |= {name: values[index] for name, values in sensed.items()}
         final_info = {key: value if key.startswith("_") else value.copy() for key, value in infos.items()}
         final_info.update({key: mask for key in infos if key.startswith("_")})
         began = self._begin_episodes(ended)
-        states[began] = self._noisy_states(began)
+        states[began] = self._observed_states(began)
         is_first = infos["is_first"]
         is_first[began] = True
         infos = self._infos(is_first, infos["success"] & ~mask)
         return infos | {"final_obs": final_obs, "_final_obs": mask, "final_info": final_info, "_final_info": mask}
 
     def _begin_episodes(self, indices: Sequence[int] | np.ndarray | range) -> np.ndarray:
-        """Gives the environments `indices` their next episodes; returns those that got one, the others rest."""
+        """Begins the next episodes of the environments `indices`; returns those that have one, the others rest."""
         for i in indices:
             self.episodes[i] = self._episode_source(int(i))
             self._active[i] = self.episodes[i] is not None
         began = np.array([i for i in indices if self._active[i]], dtype=np.int64)
         if not len(began):
             return began
-        spec = self.task_spec
         for i in began:
-            self._models[i] = spec.models[self._episode(i).maze]
+            self._models[i] = self._maze_models[self._episode(i).maze]
         self._batch.set_models(self._models)
         self._batch.reset(began, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
         for i in began:
@@ -206,10 +225,10 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
 
     def _begin_episode(self, i: int) -> None:
         spec, episode = self.task_spec, self._episode(i)
-        shown = spec.show(episode)
+        shown = show_map(spec, episode)
         self._shown[i] = shown
-        self._routes[i] = spec.route(episode, shown)
-        self._noise[i] = episode.streams()[2] if spec.perturbation.position_noise else None
+        self._routes[i] = plan_route(spec, episode, shown)
+        self._state_errors[i] = state_errors(spec, episode)
         self._positions[i] = cell_to_point(episode.start, spec.size)
         self._qpos[i] = (*self._positions[i], episode.yaw)
         self._path_length[i], self._steps[i], self._maze[i] = 0.0, 0, episode.maze
@@ -218,34 +237,28 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
     def _begin_leg(self, i: int) -> None:
         route, shown = self._route(i), self._shown[i]
         assert shown is not None
-        self._context[i] = self.task_spec.context(shown, route.start, route.target)
+        self._context[i] = leg_context(self.task_spec, shown, route.start, route.target)
         self._start[i], self._target[i], self._goal[i] = (
             row * self.task_spec.size + column for row, column in (route.start, route.target, route.goal)
         )
         self._marker[i, 0] = (*cell_to_point(route.goal, self.task_spec.size), 0.0)
         self._deadline[i], self._landmark[i] = route.deadline, route.leg
 
-    def _noisy_states(self, indices: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """`[K, 12]` float32: the states of the environments `indices`, as their agents observe them."""
-        states = states_from_sensors(self._sensors[indices])
-        scale = self.task_spec.perturbation.position_noise
-        if scale:
+    def _observed_states(self, indices: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """Returns `[K, 12]` float32: the states of the environments `indices`, as their agents observe them."""
+        states = states_from_sensors(self._sensordata[indices])
+        if any(self._state_errors):
             for state, i in zip(states, np.arange(self.num_envs)[indices], strict=True):
-                noise = self._noise[i]
-                assert noise is not None
-                if self._active[i]:
-                    state[:2] += noise.normal(0.0, scale, size=2)
+                for add_error in self._state_errors[i] if self._active[i] else ():
+                    add_error(state)
         return states.astype(np.float32)
 
     def _observations(self, states: np.ndarray) -> dict[str, np.ndarray]:
-        return {"state": states, "context": self._context.copy(), **self._pictures(range(self.num_envs))}
+        return {"state": states, "context": self._context.copy(), **self._sense(slice(None))}
 
-    def _pictures(self, indices: np.ndarray | range) -> dict[str, np.ndarray]:
-        """`[K, H, W, 3]` uint8 by camera: what is observed in the environments `indices`, one after the other."""
-        if self._cameras is None:
-            return {}
-        taken = [self._cameras.take(self._models[i], self._qpos[i], self._marker[i, 0]) for i in indices]
-        return {name: np.stack([pictures[name] for pictures in taken]) for name in self.task_spec.cameras}
+    def _sense(self, indices: np.ndarray | slice) -> dict[str, np.ndarray]:
+        """Returns `[K, ...]` by sensor: what the environments `indices` observe with it."""
+        return self._sensors.read(Worlds(self._maze[indices], self._qpos[indices], self._marker[indices, 0]))
 
     def _infos(self, is_first: np.ndarray, success: np.ndarray) -> dict[str, Any]:
         infos = {
@@ -261,7 +274,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         return infos | {f"_{key}": everywhere for key in infos}
 
     def _draw_episode(self, i: int) -> Episode:
-        return self.task_spec.sample_episode(self._rngs[i])
+        return sample_episode(self.task_spec, self._rngs[i])
 
     def _episode(self, i: int) -> Episode:
         episode = self.episodes[i]
@@ -274,24 +287,24 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         return route
 
     def cells(self) -> np.ndarray:
-        """`[B]` int: the true cells of the bodies' centres, as row * N + column; for hindsight, not to act on."""
+        """Returns `[B]` int: the true cells of the bodies, as row * N + column; agents must not use them."""
         return point_to_cell(self._positions, self.task_spec.size) @ (self.task_spec.size, 1)
 
     def legs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Two `[B]` int: where the current legs start and where they lead, as row * N + column."""
+        """Returns two `[B]` int: the start cells and target cells of the current legs, as row * N + column."""
         return self._start.copy(), self._target.copy()
 
     def render(self) -> tuple[np.ndarray, ...]:
-        """One top-down picture `[480, 480, 3]` uint8 an environment."""
+        """Returns a picture `[480, 480, 3]` uint8 of each environment, seen from above."""
         if self._top_camera is None:
             self._top_camera = Cameras(self._models[0], ("top",), _PICTURE_SIZE, smooth=True)
         worlds = zip(self._models, self._qpos, self._marker[:, 0], strict=True)
         return tuple(self._top_camera.take(*world)["top"] for world in worlds)
 
     def close_extras(self, **kwargs: Any) -> None:
-        for cameras in (self._cameras, self._top_camera):
-            if cameras is not None:
-                cameras.close()
+        self._sensors.close()
+        if self._top_camera is not None:
+            self._top_camera.close()
 
 
 def _streams(seed: int | Sequence[int | None] | None, num_envs: int) -> list[np.random.Generator]:

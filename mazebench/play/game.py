@@ -1,4 +1,4 @@
-"""Episodes that a person drives, one agent step at a key, whatever they are shown on."""
+"""Episodes that a person drives, one agent step for each key, independent of how they are shown."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mazebench.maps.maze import Cell
 from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
 
-# The action of a key, by letter and by arrow.
+# The actions of letters and of arrow keys.
 LETTERS = {"w": 0, "s": 1, "a": 2, "d": 3, "q": 4, "e": 5}
 ARROWS = {"up": 0, "down": 1, "left": 4, "right": 5}
 RESTART, NEXT = "r", "n"
@@ -19,10 +19,10 @@ HELP = "w s a d  drive   q e  turn   arrows too   r  again   n  next   Esc  quit
 
 
 class Game:
-    """An environment and what happened in it; `restart` and `next_episode` begin episodes, `act` takes a step."""
+    """An environment, the path driven in the current episode, and the number of episodes and of goals reached."""
 
     def __init__(self, task_spec: TaskSpec, seed: int):
-        """The first episode is the first of `seed`."""
+        """Begins the first episode of `seed`."""
         self.task_spec = task_spec
         self.environment = Environment(task_spec, seed)
         self.num_episodes = 0
@@ -30,7 +30,7 @@ class Game:
         self.next_episode()
 
     def press(self, key: str) -> None:
-        """Does what a key stands for, a letter or an arrow by its name; others do nothing."""
+        """Does what a key stands for: a letter, or an arrow by its name. Other keys do nothing."""
         if key == RESTART:
             self.restart()
         elif key == NEXT:
@@ -49,10 +49,10 @@ class Game:
     def _begin(self, time_step: dm_env.TimeStep) -> None:
         self.time_step = time_step
         self.num_episodes += 1
-        self.path = [self.environment.physics.position()]  # [2] m each, where the body was
+        self.path = [self.environment.physics.position()]  # [2] m each: where the body was
 
     def act(self, action: int) -> None:
-        """Takes one agent step, if the episode has not ended."""
+        """Takes one agent step, unless the episode has ended."""
         if self.time_step.last():
             return
         self.time_step = self.environment.step(action)
@@ -61,29 +61,29 @@ class Game:
 
     @property
     def walls(self) -> np.ndarray:
-        """`[N, N]` bool: the real ones."""
+        """`[N, N]` bool: the true walls."""
         return self.task_spec.mazes[self.environment.task.episode.maze].walls
 
     @property
     def context(self) -> np.ndarray:
-        """`[4, M, M]` float32: what an agent is given."""
+        """`[4, M, M]` float32: the context that an agent would get."""
         return self.time_step.observation["context"]
 
     @property
     def landmarks(self) -> list[Cell]:
-        """The cells still to be reached before the goal, of the real maze."""
+        """The landmarks that are still to be reached before the goal, as cells of the true maze."""
         task = self.environment.task
         return [] if task.spec.task == "local" else task.route.cells[task.route.leg + 1 : -1]
 
     def title(self) -> str:
-        """Which episode this is, in words."""
+        """Returns a line that describes the episode."""
         task = self.environment.task
         maze, episode = self.task_spec.mazes[task.episode.maze], task.episode
         distance = maze.distance(episode.start, episode.goal)
         return f"maze {maze.name}, {self.task_spec.task}: the goal is {distance} cells away"
 
     def status(self) -> str:
-        """How the episode stands, in words."""
+        """Returns a line that describes the state of the episode."""
         task, physics = self.environment.task, self.environment.physics
         driven = f"{task.steps} steps, {task.path_length:.2f} m"
         if self.time_step.last():
@@ -95,5 +95,5 @@ class Game:
         return f"{where}  {driven}, {left} steps left" + (f", landmark {task.route.leg + 1}" if self.landmarks else "")
 
     def outcome(self) -> str:
-        """What came of all episodes, in words."""
+        """Returns a line that says how many episodes ended at the goal."""
         return f"{self.num_reached} of {self.num_episodes} episodes ended at the goal"

@@ -14,7 +14,7 @@ from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 
 
 class Style(enum.IntEnum):
-    """What a character stands for."""
+    """What a character shows."""
 
     TEXT, FLOOR, WALL, PATH, START, GOAL, LANDMARK, BODY = range(8)
 
@@ -22,10 +22,10 @@ class Style(enum.IntEnum):
 _GLYPHS = {Style.FLOOR: " ", Style.WALL: "#", Style.PATH: ".", Style.START: "S", Style.GOAL: "G", Style.LANDMARK: "o"}
 _ARROWS = "→↗↑↖←↙↓↘"
 _PLAIN_ARROWS = ">>^<<<v>"
-# Rows and columns of characters a cell, the largest first: a character is about twice as high as wide.
+# Rows and columns of characters for a cell, the largest first; a character is about twice as high as it is wide.
 _SCALES = ((3, 6), (2, 4), (1, 2), (1, 1))
 _GAP = 3  # columns between the world and the map
-_LINES = 5  # beside the two: title, headings, an empty line, status, help
+_LINES = 5  # of other text: title, headings, an empty line, status, help
 _MIN_WIDTH, _MIN_HEIGHT = 24, 10
 _SHADES = {
     Style.FLOOR: (255, 255, 255),
@@ -43,7 +43,7 @@ class Characters(NamedTuple):
 
 
 def draw(game: Game, width: int, height: int, plain: bool = False) -> Characters:
-    """All that a terminal of `width` columns and `height` rows shows; `plain` keeps to ASCII."""
+    """Returns what a terminal of `width` columns and `height` rows shows; with `plain`, in ASCII only."""
     screen = Characters(np.full((height, width), " "), np.full((height, width), Style.TEXT))
     if width < _MIN_WIDTH or height < _MIN_HEIGHT:
         _write(screen, 0, 0, "enlarge the terminal")
@@ -57,15 +57,15 @@ def draw(game: Game, width: int, height: int, plain: bool = False) -> Characters
     _write(screen, 1, 0, "the world")
     _write(screen, 1, right, "the map as an agent is given it")
     for panel, left in ((world, 0), (shown, right)):
-        place = slice(2, 2 + panel.glyphs.shape[0]), slice(left, left + panel.glyphs.shape[1])
-        screen.glyphs[place], screen.styles[place] = panel.glyphs, panel.styles
+        area = slice(2, 2 + panel.glyphs.shape[0]), slice(left, left + panel.glyphs.shape[1])
+        screen.glyphs[area], screen.styles[area] = panel.glyphs, panel.styles
     _write(screen, height - 2, 0, game.status())
     _write(screen, height - 1, 0, HELP)
     return screen
 
 
 def draw_world(game: Game, rows: int, columns: int, plain: bool = False) -> Characters:
-    """The real maze with the path driven, `rows` x `columns` characters a cell."""
+    """Returns the true maze with the path driven, `rows` x `columns` characters for each cell."""
     task, size = game.environment.task, game.task_spec.size
     styles = np.where(game.walls, Style.WALL, Style.FLOOR).repeat(rows, axis=0).repeat(columns, axis=1)
     path = np.array(game.path) * [columns, -rows] + [0, size * rows]
@@ -81,7 +81,7 @@ def draw_world(game: Game, rows: int, columns: int, plain: bool = False) -> Char
 
 
 def draw_map(game: Game, rows: int, columns: int) -> Characters:
-    """What an agent is shown: M x M cells, the start and the goal of the way it is on."""
+    """Returns the map that an agent is shown: M x M cells, start and goal of the current leg."""
     walls = game.context[GLOBAL_MAP] > 0.5
     styles = np.where(walls, Style.WALL, Style.FLOOR).repeat(rows, axis=0).repeat(columns, axis=1)
     for plane, style in ((START, Style.START), (GOAL, Style.GOAL)):
@@ -90,7 +90,7 @@ def draw_map(game: Game, rows: int, columns: int) -> Characters:
 
 
 def map_pixels(game: Game, side: int) -> np.ndarray:
-    """`[side, side, 3]` uint8: the map that an agent is shown, as a picture."""
+    """Returns `[side, side, 3]` uint8: a picture of the map that an agent is shown."""
     cells = draw_map(game, 1, 1).styles
     index = np.arange(side) * len(cells) // side
     shades = np.array([_SHADES.get(style, (0, 0, 0)) for style in Style], dtype=np.uint8)
@@ -98,7 +98,7 @@ def map_pixels(game: Game, side: int) -> np.ndarray:
 
 
 def _scale(game: Game, width: int, height: int) -> tuple[int, int]:
-    """The largest rows and columns a cell at which all can be seen; the smallest if none does it."""
+    """Returns the largest scale at which everything fits; the smallest one if none fits."""
     cells = max(game.task_spec.size, game.task_spec.context_size)
     for rows, columns in _SCALES:
         if rows * cells <= height - _LINES and columns * cells <= (width - _GAP) // 2:
@@ -106,17 +106,17 @@ def _scale(game: Game, width: int, height: int) -> tuple[int, int]:
     return _SCALES[-1]
 
 
-def _focus(panel: Characters, height: int, width: int, place: np.ndarray) -> Characters:
-    """As much of a panel as fits; where not all does, around `place`, (x, y) in shares of its sides, y up."""
+def _focus(panel: Characters, height: int, width: int, centre: np.ndarray) -> Characters:
+    """Returns the part of a panel around `centre` that fits; `centre` is (x, y) as shares of its sides, y up."""
     spans = []
-    for length, room, share in ((len(panel.glyphs), height, 1 - place[1]), (panel.glyphs.shape[1], width, place[0])):
+    for length, room, share in ((len(panel.glyphs), height, 1 - centre[1]), (panel.glyphs.shape[1], width, centre[0])):
         begin = int(np.clip(share * length - room / 2, 0, max(0, length - room)))
         spans.append(slice(begin, begin + room))
     return Characters(panel.glyphs[tuple(spans)], panel.styles[tuple(spans)])
 
 
 def _mark(styles: np.ndarray, cell: Cell, style: Style, rows: int, columns: int) -> None:
-    """Marks the middle of a cell, on a map of one cell the whole of it."""
+    """Marks the middle of a cell, or all of it if it is one character."""
     row, column = cell[0] * rows + (rows - 1) // 2, cell[1] * columns + (columns - 1) // 2
     styles[row, column : column + max(1, columns // 2)] = style
 

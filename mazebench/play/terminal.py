@@ -1,4 +1,4 @@
-"""The game on a terminal, with nothing but the standard library."""
+"""The game in a terminal, by Python's curses."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from mazebench.play.picture import Style, draw
 
 _ESCAPE = 27
 _ESCAPE_DELAY = 25  # ms to wait for the rest of an arrow's sequence
-_LOST = 8  # readings in a row that fail with something to read: the terminal is gone, not only interrupted
-_IDLE_SECONDS = 0.2  # between looks whether the terminal has another size
+_LOST = 8  # failed reads in a row, with input waiting, after which the terminal is taken to be gone
+_IDLE_SECONDS = 0.2  # between checks of the terminal's size
 
 
 def play(game: Game) -> None:
-    """Plays until Escape or Ctrl-C; the terminal is left as it was found, also by an error or a signal to end.
+    """Plays until Escape or Ctrl-C. The terminal is restored in any case, also after an error or SIGTERM.
 
     Raises:
-      InputError: if this is no terminal, or one that can't be drawn on.
+      InputError: if standard input or output is no terminal, or one that can't be drawn on.
     """
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise InputError("expected a terminal to play on, found a file or a pipe")
@@ -43,7 +43,7 @@ def play(game: Game) -> None:
 
 @contextlib.contextmanager
 def _ending_by_signals() -> Iterator[None]:
-    """Lets the signals that end a process end it by an exception, so that the terminal is put back first."""
+    """Turns the signals that end a process into an exception, so that the terminal is restored first."""
 
     def end(number: int, frame: Any) -> None:
         sys.exit(128 + number)
@@ -58,7 +58,7 @@ class _Screen:
     def __init__(self, curses: Any, screen: Any):
         self._curses, self._screen = curses, screen
         curses.set_escdelay(_ESCAPE_DELAY)
-        with contextlib.suppress(curses.error):  # some terminals can't hide it
+        with contextlib.suppress(curses.error):  # some terminals can't hide the cursor
             curses.curs_set(0)
         self._attributes = self._colours()
         self._plain = locale.getpreferredencoding(False).lower().replace("-", "") != "utf8"
@@ -70,7 +70,7 @@ class _Screen:
         }
 
     def _colours(self) -> dict[int, int]:
-        """The curses attribute of each style; none where the terminal has no colours."""
+        """Returns the curses attribute of each style."""
         curses = self._curses
         if not curses.has_colors():
             return {Style.BODY: curses.A_BOLD, Style.WALL: curses.A_REVERSE}
@@ -89,16 +89,16 @@ class _Screen:
         return {style: curses.color_pair(style) | (curses.A_BOLD if style in bold else 0) for style in pairs}
 
     def run(self, game: Game) -> None:
-        """Draws, waits for a key, does what it stands for; until Escape."""
+        """Draws the game and plays the keys that are pressed, until Escape."""
         self._show(game)
         while (code := self._next()) != _ESCAPE:
             game.press(self._keys.get(code) or (chr(code).lower() if code < 128 else ""))
             self._show(game)
 
     def _next(self) -> int:
-        """Waits for a key or another size; Escape when the terminal is gone."""
+        """Waits for a key or a change of size; returns its code, or Escape if the terminal is gone."""
         num_lost = 0
-        # Not in getch itself: a change of size just before it waits would stay unseen until the next key.
+        # A waiting getch would miss a change of size that came just before it, until the next key.
         self._screen.nodelay(True)
         while num_lost < _LOST:
             if (code := self._screen.getch()) >= 0:
@@ -112,9 +112,9 @@ class _Screen:
         glyphs, styles = draw(game, width, height, self._plain)
         self._screen.erase()
         for row in range(height):
-            # The last place of a line is left: writing to the last of all would scroll.
+            # The last column stays empty: writing to the last character of the screen would scroll it.
             for column in range(width - 1):
                 attribute = self._attributes.get(int(styles[row, column]), 0)
-                with contextlib.suppress(self._curses.error):  # made smaller since it was measured
+                with contextlib.suppress(self._curses.error):  # the terminal has become smaller
                     self._screen.addstr(row, column, glyphs[row, column], attribute)
         self._screen.refresh()

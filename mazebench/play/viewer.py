@@ -14,9 +14,9 @@ from mazebench.errors import InputError
 from mazebench.play.game import HELP, Game
 from mazebench.play.picture import map_pixels
 
-_ESCAPE = 256  # GLFW's codes of keys; those of letters are the capital letters'
+_ESCAPE = 256  # GLFW's key codes; those of letters are the codes of capital letters
 _ARROWS = {262: "right", 263: "left", 264: "down", 265: "up"}
-_MAP_PIXELS = 260  # side of the map in the window's corner
+_MAP_PIXELS = 260  # side of the map in the corner of the window
 _SECONDS_A_FRAME = 0.02
 
 
@@ -39,7 +39,7 @@ def play(game: Game) -> None:
     with contextlib.suppress(KeyboardInterrupt), viewer:
         viewer.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
         viewer.cam.fixedcamid = model.camera("chase").id
-        # The viewer has switches of its own on our letters: they are put back at every key.
+        # Some of these letters toggle flags of the viewer too: the flags are reset all the time.
         flags = viewer.opt.flags.copy(), viewer.user_scn.flags.copy()
         while viewer.is_running():
             with viewer.lock():
@@ -57,14 +57,18 @@ def play(game: Game) -> None:
 
 
 def _import_viewer() -> types.ModuleType:
-    """mujoco.viewer, where a window can be opened: it would wait for ever for one that can't."""
+    """Imports mujoco.viewer if a window can be opened; otherwise its launch would never return.
+
+    Raises:
+      InputError: if no window can be opened.
+    """
     try:
         import glfw
         import mujoco.viewer
     except (ImportError, RuntimeError) as error:
         raise InputError(f"can't open MuJoCo's viewer: {error}; play with --terminal") from error
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", glfw.GLFWError)  # said below, in one line
+        warnings.simplefilter("ignore", glfw.GLFWError)  # reported below, in one line
         opens = glfw.init()
     if not opens:
         raise InputError("can't open a window on this display; play with --terminal")
@@ -72,13 +76,13 @@ def _import_viewer() -> types.ModuleType:
 
 
 def _overlay(viewer: Any, game: Game) -> None:
-    """The map in the upper right corner, the episode and the keys on the left."""
+    """Draws the map in the upper right corner, and the episode and the keys on the left."""
     window = viewer.viewport
     if window is None:
         return
     side = min(_MAP_PIXELS, window.width // 3, window.height // 2)
-    place = mujoco.MjrRect(window.width - side - 10, window.height - side - 10, side, side)
-    viewer.set_images((place, map_pixels(game, side)))
+    area = mujoco.MjrRect(window.width - side - 10, window.height - side - 10, side, side)
+    viewer.set_images((area, map_pixels(game, side)))
     corner = mujoco.mjtGridPos
     viewer.set_texts(
         [

@@ -1,5 +1,5 @@
-"""The navigation task: episodes and their rules, the context, the dm_control environment."""
+"""The navigation task: options, episodes and their rules, observations, the dm_control environment."""
 
-# The version of what an episode is; docs/release.md says when it grows, and Gymnasium's ids end with it. Here, where it
-# costs no import, because `import mazebench` registers them.
+# The version of what an episode is. Gymnasium's ids end with it, and docs/release.md says when it grows. It is defined
+# here because `import mazebench` registers the ids and should load nothing else.
 TASK_VERSION = 1

@@ -1,4 +1,4 @@
-"""Actions as agents give them, checked and turned into the controls of the body's actuators."""
+"""Turns the actions of agents into controls of the body's actuators, and checks them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _CONTROLS = action_controls()
 
 
 def controls_of_action(action: int) -> np.ndarray:
-    """`[5]` float: the controls of one of the six actions.
+    """Returns `[5]` float: the controls of one of the six actions.
 
     Raises:
       ValueError: if there is no such action.
@@ -24,10 +24,10 @@ def controls_of_action(action: int) -> np.ndarray:
 
 
 def controls_of_actions(actions: np.ndarray, num_envs: int) -> np.ndarray:
-    """`[B, 5]` float: the controls of `[B]` int actions, one for each of B environments.
+    """Returns `[B, 5]` float: the controls of `[B]` int actions, one for each of B environments.
 
     Raises:
-      ValueError: if `actions` are not B of those there are.
+      ValueError: if `actions` are not B of the six actions.
     """
     actions = np.asarray(actions)
     is_integer = np.issubdtype(actions.dtype, np.integer)
@@ -39,10 +39,10 @@ def controls_of_actions(actions: np.ndarray, num_envs: int) -> np.ndarray:
 
 
 def controls_of_velocities(velocities: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """`[..., 5]` float: the controls of continuous actions `[..., 3]`, of which what lies outside [-1, 1] is clipped.
+    """Returns `[..., 5]` float: the controls of continuous actions `[..., 3]`, which are clipped to [-1, 1].
 
     Raises:
-      ValueError: if `velocities` are not numbers of that shape.
+      ValueError: if `velocities` are not finite numbers of that shape.
     """
     velocities = np.asarray(velocities)
     is_numeric = np.issubdtype(velocities.dtype, np.floating) or np.issubdtype(velocities.dtype, np.integer)

@@ -13,15 +13,16 @@ _LARGEST_DEFAULT_SIZE = 21
 
 
 def default_context_size(size: int) -> int:
-    """M for mazes of `size` cells a side: their own size, at most 21."""
+    """Returns M for mazes of `size` cells on a side: their own size, at most 21."""
     return min(size, _LARGEST_DEFAULT_SIZE)
 
 
 def build_context(walls: np.ndarray, start: Cell, goal: Cell, context_size: int) -> np.ndarray:
-    """`[4, M, M]` float32 in [0, 1], 1 is wall or mark: the context of a leg from `start` to `goal` on the shown map.
+    """Returns `[4, M, M]` float32 in [0, 1]: the context of a leg from `start` to `goal` on the shown map.
 
-    Plane 0 is the map resized to M x M, 1 the M x M cells around the start (outside is wall) with the start at
-    (M // 2, M // 2), 2 the goal and 3 the start, a cell (r, c) of N x N marked at (r M // N, c M // N).
+    Walls and marks are 1. Plane 0 is the map, resized to M x M. Plane 1 is the M x M cells around the start, with the
+    start at (M // 2, M // 2); outside of the map is wall. Plane 2 marks the goal, plane 3 the start: a cell (r, c) of
+    N x N is marked at (r M // N, c M // N).
     """
     size, half = len(walls), context_size // 2
     context = np.zeros((NUM_PLANES, context_size, context_size), dtype=np.float32)
@@ -29,7 +30,7 @@ def build_context(walls: np.ndarray, start: Cell, goal: Cell, context_size: int)
     top, bottom = max(0, start[0] - half), min(size, start[0] - half + context_size)
     left, right = max(0, start[1] - half), min(size, start[1] - half + context_size)
     context[LOCAL_MAP] = 1
-    row, column = half - start[0], half - start[1]  # from a cell of the map to its place in the crop
+    row, column = half - start[0], half - start[1]  # add these to a cell of the map to get its cell in the crop
     context[LOCAL_MAP, top + row : bottom + row, left + column : right + column] = walls[top:bottom, left:right]
     context[GOAL, goal[0] * context_size // size, goal[1] * context_size // size] = 1
     context[START, start[0] * context_size // size, start[1] * context_size // size] = 1
@@ -37,7 +38,7 @@ def build_context(walls: np.ndarray, start: Cell, goal: Cell, context_size: int)
 
 
 def resized_map(walls: np.ndarray, context_size: int) -> np.ndarray:
-    """`[M, M]` float32: the share of wall in each of M x M equal parts of the map; the nearest cell where M > N."""
+    """Returns `[M, M]` float32: the share of wall in each of M x M equal parts; the nearest cell if M > N."""
     if context_size == len(walls):
         return walls
     interpolation = cv2.INTER_AREA if context_size < len(walls) else cv2.INTER_NEAREST

@@ -1,101 +1,73 @@
-"""An episode: where it plays, what the agent is told of it, and how far along its route it is."""
+"""An episode of a task, and how episodes are drawn."""
 
 from __future__ import annotations
 
 import dataclasses
-import enum
-from collections.abc import Callable
 
 import numpy as np
 
-from mazebench.maps import perturb
-from mazebench.maps.maze import Cell
+from mazebench.errors import InputError
+from mazebench.maps.generators import corner_cells
+from mazebench.maps.maze import Cell, Maze
+from mazebench.tasks.spec import TaskSpec
 
-# What the agent's step brought about.
-Event = enum.Enum("Event", ["NONE", "LANDMARK", "REACHED", "TIMEOUT"])
+_SEEDS = 2**31
+_MAX_TRIES = 1000
+_FIXED_PAIR_SEED = 20210  # of the pairs of the extremely-low-data regime; any number, chosen once
 
 
 @dataclasses.dataclass(frozen=True)
 class Episode:
-    """What determines an episode, given the task it belongs to."""
+    """What determines an episode of a given task."""
 
     maze: int  # index among the task's mazes
     start: Cell
     goal: Cell
     yaw: float  # rad, of the body at the start
-    seed: int  # of everything else drawn in the episode: flips, warp, noise
+    seed: int  # of everything else that is drawn in the episode: perturbations, and goals after the first one
 
-    def streams(self) -> list[np.random.Generator]:
-        """Four independent streams: of the flipped cells, the warp, the position noise, the goals after the first."""
-        return [np.random.default_rng(child) for child in np.random.SeedSequence(self.seed).spawn(4)]
-
-
-@dataclasses.dataclass(frozen=True)
-class ShownMap:
-    """The map as the agent gets it: the true one, or flipped, or seen through a perspective transform."""
-
-    walls: np.ndarray  # [N, N] bool, before the transform
-    homography: np.ndarray | None = None  # [3, 3], from true cells to shown ones; None if they are the same
-
-    def seen_walls(self) -> np.ndarray:
-        """`[N, N]` bool: the walls as they lie on the map that the agent sees."""
-        return self.walls if self.homography is None else perturb.warp_walls(self.walls, self.homography)
+    def stream(self, index: int) -> np.random.Generator:
+        """Returns a new generator of random stream `index`; streams with different indices are independent."""
+        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(index,)))
 
 
-class Route:
-    """The cells an agent is sent to, one after the other, and the rules of when the next one comes and when it ends.
+def sample_episode(spec: TaskSpec, rng: np.random.Generator) -> Episode:
+    """Draws an episode of a task."""
+    index = int(rng.integers(len(spec.mazes)))
+    maze = spec.mazes[index]
+    if spec.task == "hierarchical":
+        start, goal = corner_cells(maze)
+    else:
+        pair_rng = np.random.default_rng([_FIXED_PAIR_SEED, index]) if spec.pairs == "fixed" else rng
+        start, goal = sample_pair(maze, spec.distances[pair_rng.integers(len(spec.distances))], pair_rng)
+    return Episode(index, start, goal, float(rng.uniform(-np.pi, np.pi)), int(rng.integers(_SEEDS)))
 
-    `cells` are the start, the landmarks (none in a local episode) and the goal. Leg i goes from cell i to cell i + 1.
-    With `next_goal`, a route of `num_goals` goals: where one is reached or timed out, the next leg starts in the body's
-    cell and leads to the cell that `next_goal` draws for it.
+
+def sample_pair(maze: Maze, distance: int, rng: np.random.Generator) -> tuple[Cell, Cell]:
+    """Draws a start and a goal `distance` cells apart.
+
+    The start is uniform among the cells that have such a goal, then the goal is uniform among those of the start.
+
+    Raises:
+      InputError: if no two cells of the maze are that far apart.
     """
+    for _ in range(_MAX_TRIES):
+        start = maze.free_cells[rng.integers(len(maze.free_cells))]
+        goals = maze.cells_at((int(start[0]), int(start[1])), distance)
+        if len(goals):
+            goal = goals[rng.integers(len(goals))]
+            return (int(start[0]), int(start[1])), (int(goal[0]), int(goal[1]))
+    raise InputError(f"{maze.name}: found no two cells {distance} cells apart; the farthest are {maze.diameter}")
 
-    def __init__(
-        self,
-        cells: list[Cell],
-        time_limit: int,
-        num_goals: int = 1,
-        next_goal: Callable[[Cell], Cell] | None = None,
-    ):
-        self.cells = cells
-        self.leg = 0  # counted from 0
-        self._first = 0  # the current leg starts at this place in `cells`
-        self._goals_left = num_goals - 1
-        self._next_goal = next_goal
-        self.deadline = time_limit  # the episode's step after which the current leg has timed out
-        self._time_limit = time_limit
 
-    @property
-    def start(self) -> Cell:
-        """Where the current leg starts."""
-        return self.cells[self._first]
+def check_episode(spec: TaskSpec, episode: Episode) -> Episode:
+    """Returns `episode` if it can be played in a task.
 
-    @property
-    def target(self) -> Cell:
-        """Where the current leg leads."""
-        return self.cells[self._first + 1]
-
-    @property
-    def goal(self) -> Cell:
-        """Where the episode leads."""
-        return self.cells[-1]
-
-    def advance(self, cell: Cell, step: int) -> Event:
-        """Judges the state after agent step `step` (counted from 1), the body's centre in `cell`.
-
-        Reaching the goal wins over a time limit met on the same step. After LANDMARK the leg is the next one.
-        """
-        if cell != self.target and cell != self.goal and step < self.deadline:
-            return Event.NONE
-        if self._goals_left and self._next_goal is not None:
-            self._goals_left -= 1
-            self.cells = [cell, self._next_goal(cell)]
-        elif cell == self.goal:
-            return Event.REACHED
-        elif self.target == self.goal:
-            return Event.TIMEOUT
-        else:
-            self._first += 1
-        self.leg += 1
-        self.deadline = step + self._time_limit
-        return Event.LANDMARK
+    Raises:
+      InputError: if there is no such maze, or start or goal is not free in it.
+    """
+    if not 0 <= episode.maze < len(spec.mazes):
+        raise InputError(f"expected a maze from 0 to {len(spec.mazes) - 1}, found {episode.maze}")
+    for cell in (episode.start, episode.goal):
+        spec.mazes[episode.maze].require_free(cell)
+    return episode

@@ -2,39 +2,47 @@
 
 from __future__ import annotations
 
+import math
+
 import dm_env
 import numpy as np
 from dm_control.rl import control
 from dm_env import specs
 
-from mazebench.maps.maze import cell_to_point, point_to_cell
+from mazebench.maps.maze import cell_of_point, cell_to_point
 from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_action, controls_of_velocities
-from mazebench.tasks.context import NUM_PLANES
-from mazebench.tasks.episode import Episode, Event
+from mazebench.tasks.episode import Episode, check_episode, sample_episode
+from mazebench.tasks.observation import OpenSensors, observation_specs, state_errors
+from mazebench.tasks.route import Event, plan_route
+from mazebench.tasks.sensors.base import Worlds
+from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.mjcf import ACTIONS, STEPS_PER_ACTION
-from mazebench.world.physics import STATE_SIZE, Physics
+from mazebench.world.models import models_of
+from mazebench.world.physics import Physics
 
 
 class Navigation(control.Task):
-    """Drive to the goal cell of a maze never seen before, with a map of it at hand.
+    """Drive to the goal cell of a maze that was never seen before, with a map of it.
 
     Actions: one of six, 0.16 s each: forward, backward, strafe_left, strafe_right, look_left, look_right. With
-    `continuous`, `[3]` velocities to drive at for 0.16 s, each in [-1, 1]: forward and left in shares of the top speed
-    (together no faster than it), turning to the left in shares of the turn rate.
+    `continuous`, `[3]` velocities for 0.16 s, each in [-1, 1]: forward and left as shares of the top speed (together no
+    faster than it), turning to the left as a share of the turn rate.
 
     Observations:
 
     - state: `[12]` float32: x, y, z (m); roll, pitch, yaw (rad, yaw in [-pi, pi)); velocity forward, left, up (m/s);
       angular velocity about the body's x, y, z (rad/s). With `position_noise`, x and y are noisy.
     - context: `[4, M, M]` float32, constant until the next landmark: the map, the map around the start, goal, start.
-    - is_first: bool, only where an episode has several legs: this context is new, as at the start of an episode.
-    - egocentric, top, chase: `[H, H, 3]` uint8, those of `cameras`; they show the true world, the goal's marker in it.
+    - is_first: bool, only if episodes may have several legs: whether this context is new.
+    - egocentric, top, chase: `[H, H, 3]` uint8, if `sensors` names them: pictures of the true world, with a marker at
+      the goal.
 
-    Reward: -1 a step, 0 for the step that reaches the goal cell; never discounted on the way.
+    Reward: -1 for each step, 0 for the step that reaches the goal cell; there is no discount on the way.
 
-    Termination: when the body's centre is in the goal cell after a step (discount 0), else when `time_limit` steps went
-    by, in the hierarchical task at the last landmark (discount 1: a truncation). The goal wins over the limit.
+    Termination: when the body's centre is in the goal cell after a step (discount 0). Otherwise the episode is
+    truncated (discount 1) after `time_limit` steps, in the hierarchical task of the last leg. A goal that is
+    entered on the last step is reached.
     """
 
     def __init__(self, spec: TaskSpec, rng: np.random.Generator):
@@ -44,15 +52,16 @@ class Navigation(control.Task):
         self.steps = 0  # agent steps since the start of the episode
         self._next_episode: Episode | None = None
         self._event = Event.NONE
-        self._cameras = spec.open_cameras()
+        self._models = models_of(spec.mazes)
+        self._sensors = OpenSensors(spec)
 
     def set_next_episode(self, episode: Episode) -> None:
-        """Makes the next reset play `episode` instead of one that is drawn.
+        """Makes the next reset play `episode` instead of a drawn one.
 
         Raises:
           InputError: if it can't be played in this task's mazes.
         """
-        self._next_episode = self.spec.check_episode(episode)
+        self._next_episode = check_episode(self.spec, episode)
 
     @property
     def success(self) -> bool:
@@ -61,19 +70,20 @@ class Navigation(control.Task):
 
     @property
     def is_first(self) -> bool:
-        """Whether the context is new: at the start of an episode and of each leg to a landmark."""
+        """Whether the context is new, which it is when an episode or a leg begins."""
         return self._is_first
 
     def initialize_episode(self, physics: Physics) -> None:
-        self.episode = self._next_episode or self.spec.sample_episode(self.rng)
+        self.episode = self._next_episode or sample_episode(self.spec, self.rng)
         self._next_episode = None
         episode = self.episode
-        physics.load_maze(self.spec.models[episode.maze])
-        self._position = cell_to_point(episode.start, self.spec.size)
-        physics.place_agent(self._position, episode.yaw)
-        self.shown_map = self.spec.show(episode)
-        self.route = self.spec.route(episode, self.shown_map)
-        self._noise = episode.streams()[2] if self.spec.perturbation.position_noise else None
+        physics.load_maze(self._models[episode.maze])
+        start = cell_to_point(episode.start, self.spec.size)
+        self._position: tuple[float, float] = (float(start[0]), float(start[1]))
+        physics.place_agent(start, episode.yaw)
+        self.shown_map = show_map(self.spec, episode)
+        self.route = plan_route(self.spec, episode, self.shown_map)
+        self._state_errors = state_errors(self.spec, episode)
         self.path_length, self.steps, self._event = 0.0, 0, Event.NONE
         self._begin_leg(physics)
 
@@ -84,32 +94,31 @@ class Navigation(control.Task):
             physics.set_controls(controls_of_action(action))  # type: ignore[arg-type]
 
     def after_step(self, physics: Physics) -> None:
-        position = physics.position()
-        moved = position - self._position
-        self.path_length += float(np.sqrt(moved[0] * moved[0] + moved[1] * moved[1]))
-        self._position = position
+        x, y = physics.position().tolist()
+        moved_x, moved_y = x - self._position[0], y - self._position[1]
+        self.path_length += math.sqrt(moved_x * moved_x + moved_y * moved_y)
+        self._position = (x, y)
         self.steps += 1
-        row, column = point_to_cell(position, self.spec.size).tolist()
-        self._event = self.route.advance((row, column), self.steps)
+        self._event = self.route.advance(cell_of_point(x, y, self.spec.size), self.steps)
         self._is_first = False
         if self._event is Event.LANDMARK:
             self._begin_leg(physics)
 
     def _begin_leg(self, physics: Physics) -> None:
-        self._context = self.spec.context(self.shown_map, self.route.start, self.route.target)
+        self._context = leg_context(self.spec, self.shown_map, self.route.start, self.route.target)
         self._is_first = True
         physics.place_goal(self.route.goal, self.spec.size)
 
     def get_observation(self, physics: Physics) -> dict[str, np.ndarray]:
         state = physics.state()
-        if self._noise is not None:
-            state[:2] += self._noise.normal(0.0, self.spec.perturbation.position_noise, size=2)
+        for add_error in self._state_errors:
+            add_error(state)
         observation = {"state": state.astype(np.float32), "context": self._context.copy()}
         if self.spec.has_legs:
             observation["is_first"] = np.array(self._is_first)
-        if self._cameras is not None:
-            model = self.spec.models[self.episode.maze]
-            observation |= self._cameras.take(model, physics.data.qpos, physics.data.mocap_pos[0])
+        if self.spec.sensors:
+            world = Worlds(np.array([self.episode.maze]), physics.data.qpos[None], physics.data.mocap_pos)
+            observation |= {name: values[0] for name, values in self._sensors.read(world).items()}
         return observation
 
     def get_reward(self, physics: Physics) -> float:
@@ -124,24 +133,18 @@ class Navigation(control.Task):
         return specs.DiscreteArray(len(ACTIONS), name="action")
 
     def observation_spec(self, physics: Physics) -> dict[str, specs.Array]:
-        size = self.spec.context_size
-        result = {
-            "state": specs.Array((STATE_SIZE,), np.float32, name="state"),
-            "context": specs.BoundedArray((NUM_PLANES, size, size), np.float32, 0.0, 1.0, name="context"),
-        }
+        result = observation_specs(self.spec)
         if self.spec.has_legs:
             result["is_first"] = specs.Array((), bool, name="is_first")
-        shape = (self.spec.camera_size, self.spec.camera_size, 3)
-        return result | {name: specs.BoundedArray(shape, np.uint8, 0, 255, name) for name in self.spec.cameras}
+        return result
 
     def close(self) -> None:
-        """Closes the rendering context of the cameras, if there is one."""
-        if self._cameras is not None:
-            self._cameras.close()
+        """Closes the sensors."""
+        self._sensors.close()
 
 
 class Environment(control.Environment):
-    """A dm_control Environment whose `reset` also takes a seed, or the very episode to play."""
+    """A dm_control Environment whose `reset` also takes a seed, or the episode to play."""
 
     physics: Physics
     task: Navigation
@@ -149,7 +152,7 @@ class Environment(control.Environment):
     def __init__(self, spec: TaskSpec, seed: int | None = None):
         task = Navigation(spec, np.random.default_rng(seed))
         # The task judges the time limit itself, so that a goal reached on the last step is a termination.
-        super().__init__(Physics.of_maze(spec.models[0]), task, n_sub_steps=STEPS_PER_ACTION)
+        super().__init__(Physics.of_maze(models_of(spec.mazes)[0]), task, n_sub_steps=STEPS_PER_ACTION)
 
     def reset(self, seed: int | None = None, episode: Episode | None = None) -> dm_env.TimeStep:
         """Starts an episode: the next one of the environment's stream, the first one of `seed`'s, or `episode`."""
@@ -161,7 +164,7 @@ class Environment(control.Environment):
 
     @property
     def needs_reset(self) -> bool:
-        """Whether no episode is under way, so that the next `step` would start one."""
+        """Whether no episode is under way; `step` would then start one."""
         return self._reset_next_step
 
     def close(self) -> None:

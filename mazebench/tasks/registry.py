@@ -3,96 +3,80 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, unknown
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.files import read_mazes
 from mazebench.maps.maze import Maze
+from mazebench.options import options_of
 from mazebench.tasks.navigation import Environment
-from mazebench.tasks.spec import EVAL_DISTANCES, TIME_LIMIT, TRAIN_DISTANCES, Perturbation, TaskSpec
+from mazebench.tasks.options import EVAL_DISTANCES, TaskOptions
+from mazebench.tasks.spec import TaskSpec
 
 _DEFAULT_SIZE = 13
 
+# Mazes of one's own: one or several, or the path of a file or of a folder.
+Maps = str | pathlib.Path | Maze | Iterable[Maze]
+
 
 def make_spec(
-    task: str = "local",
-    size: int | None = None,
-    split: str = "train",
-    *,
-    maps: str | pathlib.Path | Maze | Sequence[Maze] | None = None,
-    distances: Iterable[int] | None = None,
-    pairs: str = "random",
-    time_limit: int = TIME_LIMIT,
-    landmark_distance: int = 5,
-    context_size: int | None = None,
-    num_goals: int = 1,
-    map_flip: float = 0.0,
-    map_warp: float = 0.0,
-    position_noise: float = 0.0,
-    continuous: bool = False,
-    cameras: str | Iterable[str] = (),
-    camera_size: int = 64,
+    task: str = "local", size: int | None = None, split: str = "train", *, maps: Maps | None = None, **options: Any
 ) -> TaskSpec:
-    """A navigation task.
+    """Returns a navigation task.
 
     Args:
       task: "local" or "hierarchical".
-      size: N, the cells a side of the benchmark's mazes (13, 15, 17, 19 or 21; default 13); with `maps` only checked.
+      size: N, the cells on a side of the benchmark's mazes; see `load_mazes_of`.
       split: "train" or "eval" mazes of benchmark v1.
-      maps: mazes of your own instead: a `Maze`, several, or a text or image file or a folder of them.
-      distances: cells between start and goal of local episodes; by default 1-5 on train mazes, 1-15 on eval mazes.
-      pairs: "random", a new pair each episode, or "fixed", one pair a maze.
-      time_limit: agent steps to reach the goal, or each landmark.
-      landmark_distance: cells between landmarks.
-      context_size: M, the side of the context's planes; min(N, 21) by default.
-      num_goals: of a local episode, one after the other; rewards and `success` speak of the last one only.
-      map_flip: probability of each inner cell but start and goal to be shown flipped.
-      map_warp: how far each corner of the shown map may be moved, in shares of its side.
-      position_noise: m, standard deviation of the noise on x and y of each observation.
-      continuous: whether actions are velocities (forward, left, turn), `[3]` in [-1, 1], instead of one of six.
-      cameras: of "egocentric", "top" and "chase", those whose pictures are observed too.
-      camera_size: pixels a side of these pictures.
+      maps: mazes of your own instead.
+      **options: those of `mazebench.tasks.options.TaskOptions`, which docs/options.md lists; None stands for the
+        default.
 
     Raises:
-      InputError: if an option is unknown or out of range, or a map can't be read.
+      InputError: if an option is unknown or not allowed, or a map can't be read.
+    """
+    known = options_of(TaskOptions)
+    for name in options:
+        if name not in known:
+            raise unknown("option", name, known)
+    given = {name: value for name, value in options.items() if value is not None}
+    if split == "eval" and maps is None:
+        given.setdefault("distances", EVAL_DISTANCES)
+    return TaskSpec(task=task, mazes=load_mazes_of(size, split, maps), **given)
+
+
+def load_mazes_of(size: int | None = None, split: str = "train", maps: Maps | None = None) -> tuple[Maze, ...]:
+    """Returns the mazes of a task.
+
+    Args:
+      size: N, the cells on a side of benchmark v1's mazes: 13 (the default), 15, 17, 19 or 21; with `maps`, a size that
+        they must have.
+      split: "train" or "eval" mazes of benchmark v1; without effect with `maps`.
+      maps: mazes of your own instead: a `Maze`, several of one size, or a text or image file or a folder of them.
+
+    Raises:
+      InputError: if there are no such mazes, or a map can't be read.
     """
     if maps is None:
-        mazes = load_mazes(_DEFAULT_SIZE if size is None else size, split)
-    elif isinstance(maps, Maze):
-        mazes = (maps,)
-    elif isinstance(maps, (str, pathlib.Path)):
-        mazes = read_mazes(maps)
+        return load_mazes(_DEFAULT_SIZE if size is None else size, split)
+    if isinstance(maps, Maze):
+        mazes: tuple[Maze, ...] = (maps,)
     else:
-        mazes = tuple(maps)
-    if distances is None:
-        distances = TRAIN_DISTANCES if split == "train" or maps is not None else EVAL_DISTANCES
-    spec = TaskSpec(
-        task,
-        mazes,
-        tuple(distances),
-        pairs,
-        time_limit,
-        landmark_distance,
-        context_size or 0,
-        num_goals,
-        Perturbation(map_flip, map_warp, position_noise),
-        continuous,
-        (cameras,) if isinstance(cameras, str) else tuple(cameras),
-        camera_size,
-    )
-    if size is not None and spec.size != size:
-        raise InputError(f"expected mazes of size {size}, found size {spec.size}")
-    return spec
+        mazes = read_mazes(maps) if isinstance(maps, (str, pathlib.Path)) else tuple(maps)
+    for maze in mazes:
+        if size not in (None, maze.size):
+            raise InputError(f"expected mazes of size {size}, found size {maze.size}")
+    return mazes
 
 
 def load(
     task: str = "local", size: int | None = None, split: str = "train", seed: int | None = None, **options: Any
 ) -> Environment:
-    """A dm_control environment of a navigation task; `options` are those of `make_spec`.
+    """Returns a dm_control environment of a navigation task; `options` are those of `make_spec`.
 
-    Its first episode is the one of `reset(seed=seed)`; `env.physics` and `env.task` are a
+    Its first episode is the one of `reset(seed=seed)`. `env.physics` and `env.task` are a
     `mazebench.world.physics.Physics` and a `mazebench.tasks.navigation.Navigation`.
     """
     return Environment(make_spec(task, size, split, **options), seed)

@@ -1,0 +1,53 @@
+"""What an agent observes: the specs of all observations, the errors of observed states, and the open sensors."""
+
+from __future__ import annotations
+
+import numpy as np
+from dm_env import specs
+
+from mazebench.tasks.context import NUM_PLANES
+from mazebench.tasks.episode import Episode
+from mazebench.tasks.perturbations import active_perturbations
+from mazebench.tasks.perturbations.base import StateError
+from mazebench.tasks.sensors import SENSORS
+from mazebench.tasks.sensors.base import Sensor, Worlds
+from mazebench.tasks.spec import TaskSpec
+from mazebench.world.physics import STATE_SIZE
+
+
+def observation_specs(spec: TaskSpec) -> dict[str, specs.Array]:
+    """Returns shape, type and range of each observation by name: the state, the context, and that of each sensor."""
+    size = spec.context_size
+    return {
+        "state": specs.Array((STATE_SIZE,), np.float32, name="state"),
+        "context": specs.BoundedArray((NUM_PLANES, size, size), np.float32, 0.0, 1.0, name="context"),
+        **{name: SENSORS[name].observation_spec(name, spec) for name in spec.sensors},
+    }
+
+
+def state_errors(spec: TaskSpec, episode: Episode) -> list[StateError]:
+    """Returns what is wrong with the states observed in `episode`; each has a random stream of its own."""
+    errors = [
+        perturbation.state_error(level, episode.stream(perturbation.stream))
+        for perturbation, level in active_perturbations(spec)
+    ]
+    return [error for error in errors if error is not None]
+
+
+class OpenSensors:
+    """The sensors of a task, opened for one environment."""
+
+    def __init__(self, spec: TaskSpec):
+        names: dict[type[Sensor], list[str]] = {}
+        for name in spec.sensors:
+            names.setdefault(SENSORS[name], []).append(name)
+        self._sensors = [kind(tuple(of_kind), spec, spec.mazes) for kind, of_kind in names.items()]
+
+    def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
+        """Returns `[K, ...]` by the sensor's name, for K >= 1 worlds."""
+        return {name: values for sensor in self._sensors for name, values in sensor.read(worlds).items()}
+
+    def close(self) -> None:
+        """Closes all sensors."""
+        for sensor in self._sensors:
+            sensor.close()

@@ -1,0 +1,31 @@
+"""Cells of the shown map that are flipped."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+
+import numpy as np
+
+from mazebench.maps.maze import Cell
+from mazebench.tasks.perturbations.base import Perturbation, ShownMap
+
+
+class MapFlip(Perturbation):
+    """Shows free cells as walls and walls as free cells."""
+
+    help = "Probability of each inner cell of the shown map, except start and goal, to be flipped."
+    highest = 1
+    stream = 0
+
+    def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
+        return dataclasses.replace(shown, walls=flip(shown.walls, level, ends, rng))
+
+
+def flip(walls: np.ndarray, probability: float, keep: Iterable[Cell], rng: np.random.Generator) -> np.ndarray:
+    """Returns `[N, N]` bool: `walls` with each inner cell flipped with `probability`, except the cells to `keep`."""
+    flipped = rng.random(walls.shape) < probability
+    flipped[[0, -1]] = flipped[:, [0, -1]] = False
+    for cell in keep:
+        flipped[cell] = False
+    return walls ^ flipped

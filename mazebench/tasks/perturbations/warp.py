@@ -1,0 +1,36 @@
+"""The shown map seen in a wrong perspective."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import cv2
+import numpy as np
+
+from mazebench.maps.maze import Cell
+from mazebench.tasks.perturbations.base import Perturbation, ShownMap
+
+# If every corner moves by less than this share of the side, the four corners stay a convex quadrilateral.
+MAX_WARP = 0.25
+
+
+class MapWarp(Perturbation):
+    """Shows the map through a random perspective transform."""
+
+    help = "Largest shift of each corner of the shown map, as a share of its side."
+    highest = MAX_WARP
+    stream = 1
+
+    def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
+        return dataclasses.replace(shown, homography=random_homography(len(shown.walls), level, rng))
+
+
+def random_homography(size: int, share: float, rng: np.random.Generator) -> np.ndarray:
+    """Returns `[3, 3]` float: a perspective transform that moves each corner of a map at random.
+
+    A corner moves by uniform(-share, share) of the side, in x and in y. Coordinates are (column, row) in cells, with
+    the map's corners at 0 and `size`.
+    """
+    corners = np.array([[0, 0], [size, 0], [size, size], [0, size]], dtype=np.float32)
+    moved = corners + size * rng.uniform(-share, share, size=(4, 2)).astype(np.float32)
+    return cv2.getPerspectiveTransform(corners, moved)

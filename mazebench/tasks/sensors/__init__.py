@@ -1,0 +1,12 @@
+"""What may be observed besides the state and the map: one file a kind of sensor, and the table of all of them."""
+
+from __future__ import annotations
+
+from mazebench.tasks.sensors.base import Sensor
+from mazebench.tasks.sensors.cameras import CameraSensor
+
+SENSORS: dict[str, type[Sensor]] = {
+    "egocentric": CameraSensor,
+    "top": CameraSensor,
+    "chase": CameraSensor,
+}

@@ -1,0 +1,49 @@
+"""What a sensor is: it says what it observes, and reads it off the true worlds of an environment."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+from dm_env import specs
+
+from mazebench.maps.maze import Maze
+from mazebench.options import Options, option
+from mazebench.world import MAX_PIXELS
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class SensorOptions(Options):
+    """The options that sensors read."""
+
+    camera_size: int = option(64, "Pixels on a side of a camera's picture.", lowest=1, highest=MAX_PIXELS)
+
+
+class Worlds(NamedTuple):
+    """The true state of K environments at one moment, as a sensor reads it."""
+
+    maze: np.ndarray  # [K] int, index among the task's mazes
+    pose: np.ndarray  # [K, 3] float64, of the body: x, y (m), yaw (rad, not wrapped)
+    marker: np.ndarray  # [K, 3] float64, m: where the goal's marker stands
+
+
+class Sensor(abc.ABC):
+    """A kind of sensor, opened for the mazes of one environment. It may serve several names, as the cameras do."""
+
+    @classmethod
+    @abc.abstractmethod
+    def observation_spec(cls, name: str, options: SensorOptions) -> specs.BoundedArray:
+        """Returns shape, type and range of what the sensor called `name` observes of one environment."""
+
+    @abc.abstractmethod
+    def __init__(self, names: tuple[str, ...], options: SensorOptions, mazes: tuple[Maze, ...]):
+        """Opens the sensors called `names`."""
+
+    @abc.abstractmethod
+    def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
+        """Returns `[K, ...]` by name: one observation, as in `observation_spec`, for each of K >= 1 worlds."""
+
+    def close(self) -> None:  # noqa: B027 - most sensors hold nothing open
+        """Releases what the sensor holds; the next `read` opens it again."""

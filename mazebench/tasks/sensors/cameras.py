@@ -1,0 +1,40 @@
+"""Pictures of the true world, the goal's marker in it, as observations."""
+
+from __future__ import annotations
+
+import numpy as np
+from dm_env import specs
+
+from mazebench.maps.maze import Maze
+from mazebench.tasks.sensors.base import Sensor, SensorOptions, Worlds
+
+
+class CameraSensor(Sensor):
+    """The cameras of the maze's model, all of them through one rendering context, which the first picture opens."""
+
+    @classmethod
+    def observation_spec(cls, name: str, options: SensorOptions) -> specs.BoundedArray:
+        return specs.BoundedArray((options.camera_size, options.camera_size, 3), np.uint8, 0, 255, name)
+
+    def __init__(self, names: tuple[str, ...], options: SensorOptions, mazes: tuple[Maze, ...]):
+        # Imported here: who only reads a task's options, such as the command line, shall not load MuJoCo.
+        from mazebench.world.models import models_of
+        from mazebench.world.rendering import Cameras
+
+        self._names = names
+        self._models = models_of(mazes)
+        self._cameras = Cameras(self._models[0], names, options.camera_size)
+
+    def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
+        """Returns `[K, H, H, 3]` uint8 by name.
+
+        Raises:
+          RenderingError: if no rendering context can be opened.
+        """
+        pictures = [
+            self._cameras.take(self._models[maze], pose, marker) for maze, pose, marker in zip(*worlds, strict=True)
+        ]
+        return {name: np.stack([taken[name] for taken in pictures]) for name in self._names}
+
+    def close(self) -> None:
+        self._cameras.close()
