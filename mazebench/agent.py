@@ -1,214 +1,190 @@
-"""What an agent is, and how agents are found: its protocol, and the entry points `mazebench.agents`.
+"""The contract of an agent: what it is given, what it answers, and what its class may declare.
 
-`B` is the number of environments an agent acts in at once, `M` the side of the context's planes.
+`B` is the number of environments that an agent acts in at once, `N` the cells a side of their mazes and `M` the side of
+the context's planes.
 """
 
 from __future__ import annotations
 
+import copy
 import dataclasses
-import importlib
 import pathlib
-import sys
-import traceback
-from collections.abc import Mapping, Sequence
-from importlib import metadata
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from mazebench.errors import InputError, unknown
-from mazebench.maps.maze import Maze
+from mazebench.tasks.context import default_context_size
 
-if TYPE_CHECKING:
-    from mazebench.training.experience import Experience
-
-ENTRY_POINT_GROUP = "mazebench.agents"
-_IMPORTLIB = pathlib.Path(importlib.__file__).parent
-
-Observation = dict[str, np.ndarray]  # "state" [B, 12] float32, "context" [B, 4, M, M] float32
+Observation = dict[str, np.ndarray]  # "state" [B, 12] float32, "context" [B, 4, M, M] float32, sensors by name
 
 
 @dataclasses.dataclass(frozen=True)
 class Interface:
-    """What an agent is told of the environments it will act in, before it is built."""
+    """The environments that an agent is built for."""
 
     task: str  # "local" or "hierarchical"
-    size: int  # N, the cells a side of the mazes
+    size: int  # N
     context_size: int  # M
     num_actions: int = 6
+    sensors: tuple[str, ...] = ()  # whose readings are observed beside the state and the context
 
 
-@runtime_checkable
-class Agent(Protocol):
-    """Acts in `B` environments at once.
+class Truth(NamedTuple):
+    """The true state of B environments, for agents that declare `needs_truth`."""
 
-    A class named by an entry point is built by `build(interface, seed=..., checkpoint=...)`. Two more methods are
-    called where they exist: the class's `context_size(size) -> int`, for an agent that needs another M than
-    min(N, 21), and `seed_episodes(seeds, mask)`, for one that draws random numbers or must tell an episode's beginning
-    from a landmark's. It is called before each `act` in which `is_first` is set anywhere: `mask` `[B]` bool says where
-    an episode begins, `seeds` `[B]` int are the episodes', so that draws belong to the episode and not to its slot. And
-    `default_checkpoint() -> Path` of the class names the file that `build` reads if it is given none. Where the class
-    has `measure(seconds) -> dict[str, list[dict[str, Any]]]`, `mazebench bench` adds the tables that it returns: rows
-    by title, a row's values by column, the first of which is "what". Each figure should take about so many seconds.
-    """
+    walls: np.ndarray  # [B, N, N] bool, the true maze
+    pose: np.ndarray  # [B, 3] float64, x and y (m) and yaw (rad)
+    goal: np.ndarray  # [B, 2] int, the goal's cell (row, column)
+
+
+class Inputs(NamedTuple):
+    """Everything that an agent is given before one step in B environments; the caller owns the arrays."""
+
+    observation: Observation
+    new_episode: np.ndarray  # [B] bool, whether an episode begins with this step
+    new_context: np.ndarray  # [B] bool, whether the context is new: an episode, or the leg to a landmark, begins
+    seed: np.ndarray  # [B] int64, of the running episode, for the agent's own random draws
+    truth: Truth | None = None  # only for agents that declare `needs_truth`
+    # [B] bool, False where an environment rests because no episode is left; None if all of them run
+    active: np.ndarray | None = None
+
+
+class _Declarations:
+    """What the class of an agent may declare; each declaration has a default."""
+
+    needs_truth: ClassVar[bool] = False  # results of an agent that does are labelled as privileged
+    learns: ClassVar[bool] = False  # an agent that does can be given a checkpoint, even if it ships with none
 
     @classmethod
-    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Agent:
-        """A new agent; `checkpoint` is for those that learn, None stands for the trained one that ships."""
-
-    def initial_state(self, batch_size: int) -> Any:
-        """Whatever the agent carries from step to step in `batch_size` environments."""
-
-    def act(
-        self, observation: Observation, is_first: np.ndarray, state: Any, explore: bool = False
-    ) -> tuple[np.ndarray, Any]:
-        """Actions `[B]` int and the next state.
+    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
+        """Returns a new agent, here `cls()`.
 
         Args:
-          observation: "state" `[B, 12]` and "context" `[B, 4, M, M]` float32, owned by the caller.
-          is_first: `[B]` bool, where the context is new: an episode or the leg to the next landmark begins.
-          state: what the last call returned, or `initial_state`.
-          explore: whether to act as in training; evaluation never does.
+          interface: the environments that it will act in.
+          seed: of what is drawn when it is built, such as weights; draws in an episode belong to `Inputs.seed`.
+          checkpoint: the file to read instead of `default_checkpoint()`; only for agents that learn.
         """
-
-
-@runtime_checkable
-class ExploringAgent(Agent, Protocol):
-    """An agent as it collects experience to learn from, in this process or on another machine."""
-
-    def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
-        """Explores from now on as the environments `first_env` to `first_env + num_envs` of all, by a new stream."""
-
-    def parameters(self) -> dict[str, np.ndarray]:
-        """What it has learned, to be given to another by `set_parameters`."""
-
-    def set_parameters(self, parameters: dict[str, np.ndarray]) -> None:
-        """Takes over what another has learned."""
-
-
-@runtime_checkable
-class LearningAgent(Protocol):
-    """What the training loop needs beside acting. A class that has `build_learner` can be trained."""
-
-    num_envs: int  # B, environments to collect in
-    actor: ExploringAgent  # acts with what is learned so far
+        return cls()
 
     @classmethod
-    def build_learner(
-        cls, interface: Interface, mazes: Sequence[Maze], *, seed: int = 0, overrides: Mapping[str, str] | None = None
-    ) -> LearningAgent:
-        """A new learner; `overrides` are config values as text, by name, and an unknown one is an `InputError`."""
+    def context_size(cls, size: int) -> int:
+        """Returns the M that the agent needs in mazes of `size` cells a side, here min(N, 21)."""
+        return default_context_size(size)
 
-    def config(self) -> dict[str, Any]:
-        """All values that the learner was built with, as plain data."""
+    @classmethod
+    def default_checkpoint(cls) -> pathlib.Path | None:
+        """Returns the file that `build` reads if it is given none; None if the agent reads no checkpoint."""
+        return None
 
-    def description(self) -> str:
-        """One line for people: the size of the network, and of the memory that its replay will take."""
+    @classmethod
+    def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
+        """Returns tables for `mazebench bench`, here none.
 
-    def task_options(self) -> dict[str, Any]:
-        """The options of `make_spec` that it wants to collect with."""
-
-    def observe(self, experience: Experience, first_env: int = 0) -> None:
-        """Remembers one step in the environments from `first_env` on."""
-
-    def num_updates_due(self, env_steps: int) -> int:
-        """How many updates should have been made after `env_steps` agent steps: the replay ratio is fixed."""
-
-    def update(self) -> dict[str, float]:
-        """Learns from one batch; returns losses and other scalars by name."""
-
-    def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:
-        """Writes all it needs to go on exactly as it would have, and `agent.safetensors`, what acting alone needs."""
-
-    def load(self, folder: pathlib.Path) -> None:
-        """Goes on from what `save` wrote; without the replay, which may be gone, it must first be filled again."""
+        The tables are rows by title, and a row is its values by column, the first of which is "what". Each figure
+        should take about `seconds` to measure.
+        """
+        return {}
 
 
-def agent_names() -> list[str]:
-    """The names of all installed agents."""
-    return sorted(_entry_points())
+class Agent(_Declarations):
+    """Acts in B environments at once; the base class of all agents.
 
-
-def load_agent_class(name: str) -> type[Agent]:
-    """The class of an installed agent, or of `module:Class` for a module at hand (the working directory included).
-
-    Raises:
-      InputError: if there is no such agent, or it can't be imported; the message says what to install.
+    All that an agent remembers is in its state, which `initial_state` and `act` return. Between steps it keeps nothing
+    on itself, because one agent may play several batches of episodes in turn.
     """
-    if ":" in name:
-        return _class_at_hand(name)
-    entry_points = _entry_points()
-    if name not in entry_points:
-        raise unknown("agent", name, entry_points)
-    try:
-        loaded = entry_points[name].load()
-    except ModuleNotFoundError as error:
-        raise InputError(
-            f"agent {name!r} needs the module {error.name!r}, which is not installed; "
-            "the extra [agents] brings it (docs/start.md)"
-        ) from error
-    except Exception as error:  # other people's modules may raise anything
-        raise _unimportable(name, error) from error
-    return _checked(name, loaded)
+
+    def initial_state(self, batch_size: int) -> Any:
+        """Returns the state before the first step in `batch_size` environments, here None."""
+        return None
+
+    def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, Any]:
+        """Returns actions `[B]` int and the next state.
+
+        What an agent does in an episode must depend on that episode alone, and not on its position in the batch.
+
+        Args:
+          inputs: what is given before this step, not to be changed.
+          state: what the last call returned, or `initial_state`; the agent may change it in place.
+          explore: whether to act as in training; an evaluation never sets it.
+        """
+        raise NotImplementedError
 
 
-def place_of(error: BaseException) -> str:
-    """Where in an agent's own files `error` arose, as " (FILE:LINE)"; empty if the agent was not even entered."""
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if not _is_no_agents(frame.filename)]
-    if not frames:
-        return ""
-    # Below what the agent calls are libraries.
-    folder = pathlib.Path(frames[0].filename).parent
-    last = [frame for frame in frames if folder in pathlib.Path(frame.filename).parents][-1]
-    return f" ({pathlib.Path(last.filename).name}:{last.lineno})"
+class SingleAgent(_Declarations):
+    """Acts in one environment; an evaluation runs a copy of the agent in each of B environments.
+
+    Each episode is played by a fresh copy of what `build` returned, so an agent may keep on itself whatever it likes:
+    nothing carries over to another episode. The attributes below are set before each call of a method.
+    """
+
+    seed: int  # of the episode, for the agent's own random draws
+    new_episode: bool  # whether an episode begins with this step
+    truth: Truth | None = None  # without the axis B; only for agents that declare `needs_truth`
+
+    def reset(self, observation: Observation) -> None:
+        """Takes in a new context: an episode or, in the hierarchical task, the leg to a landmark begins.
+
+        `act` follows with the same observation.
+        """
+
+    def act(self, observation: Observation) -> int:
+        """Returns an action.
+
+        Args:
+          observation: "state" `[12]` and "context" `[4, M, M]`, not to be changed.
+        """
+        raise NotImplementedError
 
 
-def _is_no_agents(filename: str) -> bool:
-    ours = pathlib.Path(__file__).parent
-    return filename.startswith("<") or not {ours, _IMPORTLIB}.isdisjoint(pathlib.Path(filename).parents)
+class _SingleAgents(Agent):
+    """Runs a `SingleAgent` in each of B environments; the state is the list of their copies."""
+
+    single_class: ClassVar[type[SingleAgent]]
+
+    def __init__(self, built: SingleAgent):
+        self._built = built
+
+    @classmethod
+    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
+        return cls(cls.single_class.build(interface, seed=seed, checkpoint=checkpoint))
+
+    @classmethod
+    def context_size(cls, size: int) -> int:
+        return cls.single_class.context_size(size)
+
+    @classmethod
+    def default_checkpoint(cls) -> pathlib.Path | None:
+        return cls.single_class.default_checkpoint()
+
+    @classmethod
+    def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
+        return cls.single_class.measure(seconds)
+
+    def initial_state(self, batch_size: int) -> list[SingleAgent]:
+        return [self._built] * batch_size
+
+    def act(self, inputs: Inputs, state: list[SingleAgent], explore: bool = False) -> tuple[np.ndarray, Any]:
+        return np.array([self._act_in(slot, inputs, state) for slot in range(len(state))]), state
+
+    def _act_in(self, slot: int, inputs: Inputs, state: list[SingleAgent]) -> int:
+        if inputs.active is not None and not inputs.active[slot]:
+            return 0
+        observation = {name: values[slot] for name, values in inputs.observation.items()}
+        if inputs.new_episode[slot]:
+            state[slot] = copy.deepcopy(self._built)
+        agent = state[slot]
+        agent.seed, agent.new_episode = int(inputs.seed[slot]), bool(inputs.new_episode[slot])
+        if inputs.truth is not None:
+            agent.truth = Truth(*(values[slot] for values in inputs.truth))
+        if inputs.new_context[slot]:
+            agent.reset(observation)
+        return agent.act(observation)
 
 
-def _class_at_hand(name: str) -> type[Agent]:
-    module_name, _, class_name = name.partition(":")
-    if module_name.endswith(".py"):
-        wanted = f"{module_name.removesuffix('.py').replace('/', '.')}:{class_name}"
-        raise InputError(f"agent {name!r}: expected module:Class, such as {wanted}, found a file's name")
-    if "" not in sys.path and "." not in sys.path:
-        sys.path.insert(0, "")
-    try:
-        loaded = getattr(importlib.import_module(module_name), class_name)
-    except (ImportError, AttributeError, ValueError, TypeError) as error:
-        said = f"{error}{place_of(error)}"
-        raise InputError(f"agent {name!r}: expected module:Class that can be imported, found: {said}") from error
-    except Exception as error:
-        raise _unimportable(name, error) from error
-    return _checked(name, loaded)
-
-
-def _unimportable(name: str, error: Exception) -> InputError:
-    said = f"{type(error).__name__}: {error}{place_of(error)}"
-    return InputError(f"agent {name!r}: its module can't be imported: {said}")
-
-
-def _checked(name: str, loaded: Any) -> type[Agent]:
-    missing = [method for method in ("build", "initial_state", "act") if not callable(getattr(loaded, method, None))]
-    if missing:
-        raise InputError(f"agent {name!r}: expected a class with build, initial_state and act, found no {missing[0]}")
-    return loaded
-
-
-def _entry_points() -> dict[str, metadata.EntryPoint]:
-    """By name; two distributions that claim one name are refused."""
-    found: dict[str, metadata.EntryPoint] = {}
-    for entry_point in metadata.entry_points(group=ENTRY_POINT_GROUP):
-        known = found.setdefault(entry_point.name, entry_point)
-        if known.value != entry_point.value:
-            raise InputError(
-                f"two agents are called {entry_point.name!r}: {known.value} of {_distribution(known)} "
-                f"and {entry_point.value} of {_distribution(entry_point)}; uninstall one"
-            )
-    return found
-
-
-def _distribution(entry_point: metadata.EntryPoint) -> str:
-    return entry_point.dist.name if entry_point.dist else "an unknown distribution"
+def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
+    """Returns `declared` itself if it is an `Agent`, else an `Agent` that runs the `SingleAgent` in B environments."""
+    if issubclass(declared, Agent):
+        return declared
+    # Named as the class that it wraps, for messages and provenance.
+    attributes = {name: getattr(declared, name) for name in ("__module__", "__qualname__", "__doc__", "needs_truth")}
+    return type(declared.__name__, (_SingleAgents,), attributes | {"single_class": declared})

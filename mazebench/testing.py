@@ -2,135 +2,179 @@
 
 from __future__ import annotations
 
-import inspect
+import itertools
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from dm_env import specs
 
-from mazebench.agent import Agent, Interface, load_agent_class
-from mazebench.evaluation.contract import AgentError, CheckedAgent, calling
-from mazebench.tasks.context import default_context_size
+from mazebench.agent import Agent, Inputs, Interface, SingleAgent
+from mazebench.agent_loading import checked_agent_class, load_agent_class
+from mazebench.envs.vector import MazeVectorEnv
+from mazebench.errors import InputError
+from mazebench.evaluation.agent_inputs import agent_seed, true_state
+from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling
+from mazebench.maps.generators import generate
+from mazebench.tasks.episode import Episode, sample_episode
+from mazebench.tasks.spec import TaskSpec
 
-_SIZE = 13
-_NUM_STEPS = 5
-_EPISODES = np.arange(3)  # by their seeds
-_ADVICE = "begin anew where is_first is set, and draw an episode's random numbers by its seed, given to seed_episodes()"
+_SIZE = 7
+_NUM_MAZES = 3  # of different paths between their corners, so that episodes side by side end at different steps
+_TIME_LIMIT = 5  # steps a leg: whatever an agent does, all landmarks come up
+_ORDER = ((0, 3), (1, 4), (2, 5))  # the episodes' numbers in three slots, each slot's one after another
+_YAW = 5  # index in the state
 
 
 class ConformanceError(AssertionError):
     """An object breaks a contract; the message says which, what was expected and what was found."""
 
 
-def check_agent(agent_class: type[Agent] | str, interface: Interface | None = None, checkpoint: Any = None) -> None:
-    """Builds an agent and lets it act on made-up observations, as an evaluation would.
+def check_agent(
+    agent_class: type[Agent] | type[SingleAgent] | str, interface: Interface | None = None, checkpoint: Any = None
+) -> None:
+    """Builds an agent and lets it act in a few short episodes with landmarks, as an evaluation would.
 
-    Checks that `build` gives an agent; that `act` returns actions `[B]` of an integer type in range, and a state, in
-    three environments and in one; that it leaves what it is given as it was; and that what it does in an episode is
-    the same when built anew with the same seed, after another episode, and in another slot of the batch. Else records
-    would depend on how many environments and processes an evaluation has.
+    Checks the class, that every answer is an action for each environment and a state, and that the agent leaves its
+    inputs as they are. Then the same episodes are played again: by an agent built anew, by one agent in two batches by
+    turns, in another order, in other slots, and one at a time. The actions in an episode must be the same each time.
 
     Args:
-      agent_class: the class that an entry point of `mazebench.agents` names, or what `--agent` takes.
-      interface: what it is built for; by default local navigation in 13 x 13 mazes.
+      agent_class: the class, or what `--agent` takes.
+      interface: what the agent is built for; by default hierarchical navigation in 7 x 7 mazes.
       checkpoint: passed on to `build`.
 
     Raises:
       ConformanceError: at the first thing that is wrong.
-      InputError: the agent's own, of a checkpoint that it can't use.
+      InputError: if no agent has the given name, or the agent can't use the checkpoint.
     """
     if isinstance(agent_class, str):
         agent_class = load_agent_class(agent_class)
-    _check_class(agent_class)
     try:
-        interface = interface or _default_interface(agent_class)
-        expected = _play(agent_class, interface, checkpoint, _EPISODES)
-        for when, found in (
-            ("when built anew from the same seed", _play(agent_class, interface, checkpoint, _EPISODES)),
-            ("after another one", _play(agent_class, interface, checkpoint, _EPISODES, num_times=2)),
-            ("in another slot", _play(agent_class, interface, checkpoint, _EPISODES[::-1])[:, ::-1]),
-        ):
-            _require(
-                np.array_equal(expected, found),
-                f"agent {agent_class.__name__!r}: expected the same actions in an episode {when}, found others; "
-                + _ADVICE,
-            )
-        _play(agent_class, interface, checkpoint, _EPISODES[:1])
+        checked = checked_agent_class(getattr(agent_class, "__name__", repr(agent_class)), agent_class)
+    except InputError as error:
+        raise ConformanceError(str(error)) from error
+    try:
+        _check_acting(_Trial(checked, interface, checkpoint))
     except AgentError as error:
         raise ConformanceError(str(error)) from error
 
 
-def _default_interface(agent_class: type[Agent]) -> Interface:
-    with calling(agent_class.__name__, "context_size"):
-        return Interface("local", _SIZE, int(getattr(agent_class, "context_size", default_context_size)(_SIZE)))
+def _check_acting(trial: _Trial) -> None:
+    expected = trial.play(_ORDER)
+
+    def check(when: str, found: dict[int, list[int]], advice: str) -> None:
+        same = f"expected the same actions in an episode {when}, found others"
+        wanted = {number: expected[number] for number in found}
+        _require(found == wanted, f"agent {trial.name!r}: {same}; {advice}")
+
+    check(
+        "when built anew from the same seed",
+        trial.play(_ORDER),
+        "draw random numbers only from generators made of inputs.seed",
+    )
+    check(
+        "when another batch is played by turns",
+        trial.play_by_turns(),
+        "keep all memory, generators too, in the state that act() returns, and nothing on self",
+    )
+    check(
+        "after another episode",
+        trial.play([numbers[::-1] for numbers in _ORDER]),
+        "begin anew where inputs.new_episode is set",
+    )
+    own_slot = "let an action depend on nothing but the inputs and the state of its own slot"
+    check("in another slot of the batch", trial.play(_ORDER[::-1]), own_slot)
+    check("alone", trial.play(_ORDER[:1]), own_slot)
 
 
-def _check_class(agent_class: Any) -> None:
-    _require(isinstance(agent_class, type), f"expected a class, found {agent_class!r}")
-    name = agent_class.__name__
-    for method in ("build", "initial_state", "act"):
-        _require(
-            callable(getattr(agent_class, method, None)),
-            f"agent {name!r}: expected a class with {method}(), found none",
+class _Trial:
+    """The episodes that an agent is checked in."""
+
+    def __init__(self, agent_class: type[Agent], interface: Interface | None, checkpoint: Any):
+        self.name = agent_class.__name__
+        self._agent_class, self._checkpoint = agent_class, checkpoint
+        if interface is None:
+            with calling(self.name, "context_size"):
+                interface = Interface("hierarchical", _SIZE, int(agent_class.context_size(_SIZE)))
+        self._interface = interface
+        rng = np.random.default_rng(0)
+        mazes = tuple(generate("dfs", interface.size, rng, f"maze-{index}") for index in range(_NUM_MAZES))
+        self._task_spec = TaskSpec(
+            task="hierarchical",
+            mazes=mazes,
+            time_limit=_TIME_LIMIT,
+            landmark_distance=3,
+            context_size=interface.context_size,
         )
-    is_method = inspect.isfunction(inspect.getattr_static(agent_class, "build"))
-    _require(not is_method, f"agent {name!r}: expected build() to be a classmethod, found a method of its objects")
+        self._episodes = [sample_episode(self._task_spec, rng) for _ in itertools.chain(*_ORDER)]
 
+    def play(self, order: Sequence[Sequence[int]]) -> dict[int, list[int]]:
+        """Returns the actions of a newly built agent by episode; `order` has the episodes of each slot."""
+        actions: dict[int, list[int]] = {}
+        for _ in self._steps(self._build(), order, actions):
+            pass
+        return actions
 
-def _built(agent_class: type[Agent], interface: Interface, checkpoint: Any) -> CheckedAgent:
-    name = agent_class.__name__
-    with calling(name, "build"):
-        agent = agent_class.build(interface, seed=0, checkpoint=checkpoint)
-    for method in ("initial_state", "act"):
+    def play_by_turns(self) -> dict[int, list[int]]:
+        """As `play`, where the agent plays another batch of episodes at the same time, a step in each by turns."""
+        agent = self._build()
+        actions: dict[int, list[int]] = {}
+        for _ in itertools.zip_longest(self._steps(agent, _ORDER, actions), self._steps(agent, _ORDER[::-1], {})):
+            pass
+        return actions
+
+    def _build(self) -> CheckedAgent:
+        with calling(self.name, "build"):
+            agent = self._agent_class.build(self._interface, seed=0, checkpoint=self._checkpoint)
         _require(
-            callable(getattr(agent, method, None)),
-            f"agent {name!r}: expected build() to return an object with {method}(), found {type(agent).__name__}",
+            isinstance(agent, Agent),
+            f"agent {self.name!r}: expected build() to return an agent, found {type(agent).__name__}",
         )
-    return CheckedAgent(name, agent, interface.num_actions)
+        return CheckedAgent(self.name, agent, self._interface.num_actions)
 
+    def _steps(self, agent: Agent, order: Sequence[Sequence[int]], actions: dict[int, list[int]]) -> Iterator[None]:
+        """Plays the episodes of each slot and adds to the `actions` of each; yields after each step."""
+        num_slots = len(order)
+        waiting = [list(numbers) for numbers in order]
+        running: list[int | None] = [None] * num_slots
 
-def _play(
-    agent_class: type[Agent], interface: Interface, checkpoint: Any, episodes: np.ndarray, num_times: int = 1
-) -> np.ndarray:
-    """`[steps, B]`: a new agent's actions in made-up episodes side by side, played so many times; those of the last."""
-    agent = _built(agent_class, interface, checkpoint)
-    state = agent.initial_state(len(episodes))
-    states, context = _made_up_states(interface)[:, episodes], _made_up_context(interface)[episodes]
-    taken = np.zeros(states.shape[:2], dtype=np.int64)
-    for _ in range(num_times):
-        for step in range(_NUM_STEPS):
-            is_first = np.full(len(episodes), step == 0)
-            if step == 0:
-                agent.seed_episodes(episodes.copy(), is_first.copy())
-            given = {"state": states[step].copy(), "context": context.copy(), "is_first": is_first.copy()}
-            observation = {key: given[key] for key in ("state", "context")}
-            taken[step], state = agent.act(observation, given["is_first"], state)
-            for key, value in (("state", states[step]), ("context", context), ("is_first", is_first)):
-                what = key if key == "is_first" else f"observation[{key!r}]"
+        def next_episode(slot: int) -> Episode | None:
+            running[slot] = number = waiting[slot].pop(0) if waiting[slot] else None
+            return None if number is None else self._episodes[number]
+
+        env = MazeVectorEnv(self._task_spec, num_slots, num_threads=1, episode_source=next_episode)
+        observation, info = env.reset()
+        new_episode = np.ones(num_slots, dtype=bool)
+        state = agent.initial_state(num_slots)
+        while any(number is not None for number in running):
+            seed = np.array([agent_seed(0, number or 0) for number in running])
+            inputs = Inputs(observation, new_episode, info["is_first"], seed)
+            if self._agent_class.needs_truth:
+                truth = true_state(self._task_spec, env.episodes, info["position"], observation["state"][:, _YAW])
+                inputs = inputs._replace(truth=truth)
+            before = _arrays(inputs)
+            taken, state = agent.act(inputs, state)
+            for name, array in _arrays(inputs).items():
                 _require(
-                    np.array_equal(given[key], value), f"agent {agent.name!r}: expected act() to leave {what} as it was"
+                    np.array_equal(array, before[name]),
+                    f"agent {self.name!r}: expected act() to leave inputs.{name} as it was; change a copy",
                 )
-    return taken
+            for number, action in zip(running, taken.tolist(), strict=True):
+                if number is not None:
+                    actions.setdefault(number, []).append(action)
+            observation, _, terminated, truncated, info = env.step(taken)
+            new_episode = (terminated | truncated) & [number is not None for number in running]
+            yield
 
 
-def _made_up_context(interface: Interface) -> np.ndarray:
-    """`[B, 4, M, M]`: open fields, the start in a corner, each goal in another place."""
-    size = interface.context_size
-    context = np.zeros((len(_EPISODES), 4, size, size), dtype=np.float32)
-    context[:, :2, [0, -1]] = context[:, :2, :, [0, -1]] = 1
-    context[:, 3, 1, -2] = 1
-    context[_EPISODES, 2, -2, 1 + _EPISODES % (size - 2)] = 1
-    return context
-
-
-def _made_up_states(interface: Interface) -> np.ndarray:
-    """`[steps, B, 12]`: bodies somewhere inside."""
-    rng, shape = np.random.default_rng(0), (_NUM_STEPS, len(_EPISODES))
-    states = np.zeros((*shape, 12), dtype=np.float32)
-    states[..., :2] = rng.uniform(1.2, interface.size - 1.2, size=(*shape, 2))
-    states[..., 2] = 0.28
-    states[..., 5] = rng.uniform(-np.pi, np.pi, size=shape)
-    return states
+def _arrays(inputs: Inputs) -> dict[str, np.ndarray]:
+    """Returns copies of all arrays of `inputs`, by the names that messages call them."""
+    arrays = {f"observation[{name!r}]": values for name, values in inputs.observation.items()}
+    arrays |= {name: getattr(inputs, name) for name in ("new_episode", "new_context", "seed")}
+    if inputs.truth is not None:
+        arrays |= {f"truth.{name}": values for name, values in inputs.truth._asdict().items()}
+    return {name: np.array(values) for name, values in arrays.items()}
 
 
 def check_environment(environment: Any, num_episodes: int = 2, max_steps: int = 2000) -> None:

@@ -1,4 +1,4 @@
-"""The numbers of an Ape-X DQN with hindsight, and where each comes from."""
+"""The config of DQN and MAH, with the reason for each number."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 
 from mazebench.errors import InputError
 
-# The least and the largest value of each key that has any; what is drawn or divided by must not vanish.
+# The lowest and the highest value of each key that is bounded.
 _RANGES = {
     "channels": (1, 1024),
     "hidden": (1, 8192),
@@ -45,24 +45,24 @@ class DQNConfig:
     use_context: bool = True  # MAH with, DQN-dagger without: the paper's "no task context c provided"
     channels: int = 32  # of the map encoder
     hidden: int = 256  # units of the two layers after it
-    num_envs: int = 128  # side by side: long enough a ladder of epsilons
+    num_envs: int = 128  # side by side, each with its own rate of random actions
     n_step: int = 3  # Ape-X's; hindsight recomputes rewards and ends within the n steps
     replay_capacity: int = 1_000_000  # rows of some 100 bytes
     min_rows: int = 20_000  # before learning begins
     groups: int = 32  # contexts in a batch
-    steps: int = 16  # learned from in each: the map's convolutions are most of an update, and shared by them
-    steps_per_update: int = 256  # environment steps; fixed, so that scores do not depend on the workers' speed
+    steps: int = 16  # in each; they share the map's convolutions, which take most of an update
+    steps_per_update: int = 256  # environment steps; fixed, so that scores do not depend on the speed of workers
     learning_rate: float = 5e-4  # Adam's; twice as much learns a small maze faster
     max_gradient_norm: float = 10.0  # against the steep slopes while values are still far off
     target_rate: float = 0.01  # of the target network's moving average
-    longest_value: float = 100.0  # targets lie in [-this, 0]: a timeout's steps; bounds values of goals out of reach
-    hindsight_ratio: float = 0.8  # as HER's four relabelled samples for each that is not
+    longest_value: float = 100.0  # targets lie in [-this, 0]; bounds the values of goals out of reach by a timeout
+    hindsight_ratio: float = 0.8  # HER's four relabelled samples for each original one
     hindsight_mean_offset: float = 16.0  # steps; about eight cells
     hindsight_window: int = 60  # steps; how far ahead a goal may lie, long enough for far ones
-    relabel_start: bool = True  # beyond the paper, which keeps the start: contexts as after a landmark
+    relabel_start: bool = True  # beyond the paper, which keeps the start; gives contexts like those after a landmark
     num_goals: int = 4  # an episode, without a reset between: beyond the paper, whose episodes end at the goal
-    symmetries: bool = True  # beyond the paper: rotations and mirror images of what was experienced
-    localization_weight: float = 0.1  # beyond the paper: where a step was on the map, which hindsight knows, is learned
+    symmetries: bool = True  # beyond the paper: rotations and mirror images as training data
+    localization_weight: float = 0.1  # beyond the paper: of the loss on the estimated position on the map
     priority_exponent: float = 0.6  # Ape-X's
     importance_exponent: float = 0.4  # Ape-X's
     epsilon_base: float = 0.4  # Ape-X's ladder: environment i explores at base ** (1 + alpha i / (B - 1))

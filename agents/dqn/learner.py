@@ -1,11 +1,9 @@
-"""How a DQN learns: double n-step targets on relabelled experience, by priority.
+"""The learner of DQN and MAH: double n-step targets on relabelled experience, drawn by priority.
 
 `G` groups of `K` steps make a batch; the steps of a group share one context.
 """
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -13,24 +11,22 @@ from torch.nn import functional
 
 from mazebench.maps.maze import Maze
 
-from .. import symmetry
-from ..layers import state_features
-from ..learner import HindsightLearner
-from ..replay import Sample
-
-if TYPE_CHECKING:
-    from .dqn import DQN
+from ..common import symmetry
+from ..common.actor import NetworkAgent
+from ..common.layers import state_features
+from ..common.learner import HindsightLearner
+from ..common.replay import Sample
 
 
 class DQNLearner(HindsightLearner):
-    """Learns for a `DQN`."""
+    """Updates the Q-network of its actor."""
 
-    def __init__(self, actor: DQN, mazes: tuple[Maze, ...], seed: int):
+    def __init__(self, actor: NetworkAgent, mazes: tuple[Maze, ...], seed: int):
         optimizer = torch.optim.Adam(actor.network.parameters(), lr=actor.config.learning_rate)
         super().__init__(actor, mazes, seed, optimizer)
 
     def update(self) -> dict[str, float]:
-        """Learns from one batch."""
+        """Learns from one batch; returns its losses and other scalars by name."""
         config = self._config
         sample = self._replay.sample(
             config.groups, config.steps, config.n_step, self._hindsight, self._rng, config.importance_exponent
@@ -50,7 +46,7 @@ class DQNLearner(HindsightLearner):
             metrics["localization_error"] = self._localization_error(sample, turned, features, code)
             loss = loss + config.localization_weight * metrics["localization_error"]
         metrics["gradient_norm"] = self._descend(loss)
-        # The first step of a group is the row that was drawn; what was not learned from keeps its priority.
+        # The first step of a group is the row that was drawn. A row that was not learned from keeps its priority.
         seen = sample.valid[:, 0]
         self._replay.update_priorities(sample.row[seen], (q_tm1 - target).detach().numpy()[seen, 0])
         return {name: float(value.detach()) for name, value in metrics.items()}
@@ -60,7 +56,7 @@ class DQNLearner(HindsightLearner):
         return symmetry.turn_features(features, turned)
 
     def _codes(self, sample: Sample, turned: int) -> tuple[torch.Tensor | None, torch.Tensor | None]:
-        """The sample's contexts, turned, as the network and the target network encode them."""
+        """Returns the turned contexts of a sample, encoded by the network and by the target network."""
         if not self._config.use_context:
             return None, None
         planes = self._contexts(sample, turned)
@@ -72,7 +68,7 @@ class DQNLearner(HindsightLearner):
     def _targets(
         self, sample: Sample, turned: int, code: torch.Tensor | None, target_code: torch.Tensor | None
     ) -> torch.Tensor:
-        """`[G, K]`: n-step double-Q targets (van Hasselt et al. 2016), within the values that there are."""
+        """Returns n-step double-Q targets `[G, K]` (van Hasselt et al. 2016), clipped to the possible values."""
         features = self._features(sample.next_state, sample.origin, turned)
         q_selector, q_value = self.actor.network(features, code), self._target(features, target_code)
         reward, discount = torch.from_numpy(sample.reward), torch.from_numpy(sample.discount)
@@ -81,21 +77,21 @@ class DQNLearner(HindsightLearner):
     def _localization_error(
         self, sample: Sample, turned: int, features: torch.Tensor, code: torch.Tensor
     ) -> torch.Tensor:
-        """The mean distance, in cells, of where the network believes the steps to be from the cells they were in."""
-        places = self._places(sample, turned)
-        return (self.actor.network.locate(features[..., :2], code) - places).abs().mean()
+        """Returns the mean error, in cells, of the network's estimated positions on the map."""
+        true_position = self._positions(sample, turned)
+        return (self.actor.network.locate(features[..., :2], code) - true_position).abs().mean()
 
 
 def double_q_target(
     r_t: torch.Tensor, discount_t: torch.Tensor, q_t_value: torch.Tensor, q_t_selector: torch.Tensor
 ) -> torch.Tensor:
-    """`[...]`: r + discount * q_value(argmax q_selector) (van Hasselt et al. 2016, eq. 4).
+    """Returns r + discount * q_value(argmax q_selector), `[...]` (van Hasselt et al. 2016, eq. 4).
 
     Args:
-      r_t: `[...]` sums of rewards.
-      discount_t: `[...]` of what follows them.
-      q_t_value: `[..., 6]` action values that are believed, the target network's.
-      q_t_selector: `[..., 6]` action values that choose, the online network's.
+      r_t: `[...]`, sums of rewards.
+      discount_t: `[...]`, of the value after them.
+      q_t_value: `[..., 6]`, action values that are taken over, the target network's.
+      q_t_selector: `[..., 6]`, action values that choose the action, the online network's.
     """
     best = q_t_selector.argmax(dim=-1, keepdim=True)
     return r_t + discount_t * q_t_value.gather(-1, best)[..., 0]

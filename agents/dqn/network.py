@@ -1,4 +1,4 @@
-"""The Q-network: convolutions over the map, read where the agent believes to be, joined with its state.
+"""The Q-network: features of the map at the estimated position, joined with the state.
 
 `G` is the number of contexts, `K` of states in each, `M` the side of the context, `C` of channels.
 """
@@ -10,18 +10,18 @@ import math
 import torch
 from torch import nn
 
-from ..layers import NUM_WAVES, MapEncoder, marked_place, place_code, waves
+from ..common.layers import NUM_WAVES, MapEncoder, marked_position, position_code, waves
 
 NUM_STATE_FEATURES = 7
 NUM_ACTIONS = 6
-# Dilations of the 3 x 3 convolutions: the last one sees 19 cells far, across a 13 x 13 map.
+# Dilations of the 3 x 3 convolutions; together they see 19 cells far, across a 13 x 13 map.
 _DILATIONS = (1, 1, 2, 2, 4, 4, 2, 1, 1)
 _SCALE_RATE = 5.0  # how much faster the scale is learned than weights of order one tenth are
 _VALUE_SCALE = 10.0  # steps; outputs of order one then span the values that matter
 
 
 class QNetwork(nn.Module):
-    """Dueling action values (Wang et al. 2016); with `channels` 0 of the state alone, without any context."""
+    """Dueling action values (Wang et al. 2016); with `channels` 0 of the state alone, without context."""
 
     def __init__(self, channels: int, hidden: int):
         super().__init__()
@@ -29,7 +29,7 @@ class QNetwork(nn.Module):
         num_inputs = NUM_STATE_FEATURES
         if channels:
             self.encoder = MapEncoder(channels, _DILATIONS)
-            # Where the agent is on the map, in cells: the start, and what it moved since times a learned scale.
+            # The estimated position on the map is the start plus a learned linear map of the displacement.
             self.scale = nn.Parameter(torch.zeros(2, 2))
             self.sharpness = nn.Parameter(torch.tensor(0.0))
             num_inputs += channels + 2 + NUM_WAVES
@@ -38,14 +38,14 @@ class QNetwork(nn.Module):
         self.advantage = nn.Linear(hidden, NUM_ACTIONS)
 
     def encode(self, context: torch.Tensor) -> torch.Tensor:
-        """What a context gives to all states: `[G, C + 4, M * M]`, features of the map, places of start and goal."""
+        """Returns codes `[G, C + 4, M * M]` of contexts: features of the map, positions of start and goal."""
         planes = self.encoder(context).flatten(2)
-        places = [marked_place(context[:, plane]) for plane in (3, 2)]  # start, goal
+        positions = [marked_position(context[:, plane]) for plane in (3, 2)]  # start, goal
         size = planes.shape[-1]
-        return torch.cat([planes, torch.cat(places, dim=-1)[:, :, None].expand(-1, -1, size)], dim=1)
+        return torch.cat([planes, torch.cat(positions, dim=-1)[:, :, None].expand(-1, -1, size)], dim=1)
 
     def forward(self, state: torch.Tensor, code: torch.Tensor | None = None) -> torch.Tensor:
-        """Action values `[G, K, 6]` of states `[G, K, 9]` (see `state_features`) in contexts encoded as `code`."""
+        """Returns action values `[G, K, 6]` of states `[G, K, 9]` (see `state_features`) in encoded contexts."""
         features = state[..., 2:]
         if self.channels:
             assert code is not None
@@ -55,14 +55,14 @@ class QNetwork(nn.Module):
         return _VALUE_SCALE * (self.value(hidden) + advantage - advantage.mean(dim=-1, keepdim=True))
 
     def locate(self, moved: torch.Tensor, code: torch.Tensor) -> torch.Tensor:
-        """`[G, K, 2]`: where on the map, (row, column), the agent believes to be after having `moved` (x, y) metres."""
+        """Returns estimated positions `[G, K, 2]` (row, column) on the map after displacements `moved` (m)."""
         start = code[:, self.channels : self.channels + 2, 0]
         return start[:, None] + _SCALE_RATE * (moved @ self.scale)
 
     def read(self, moved: torch.Tensor, code: torch.Tensor) -> torch.Tensor:
-        """`[G, K, C + 18]`: the map's features around the agent, the way to the goal, and what was moved, in waves."""
-        place = self.locate(moved, code)
-        where = place_code(place, math.isqrt(code.shape[-1]), self.sharpness)
+        """Returns `[G, K, C + 18]`: features of the map around the body, the goal's offset, waves of `moved`."""
+        position = self.locate(moved, code)
+        where = position_code(position, math.isqrt(code.shape[-1]), self.sharpness)
         local = where @ code[:, : self.channels].transpose(1, 2)
-        to_goal = (code[:, self.channels + 2 :, 0][:, None] - place) / 10.0
+        to_goal = (code[:, self.channels + 2 :, 0][:, None] - position) / 10.0
         return torch.cat([local, to_goal, waves(moved)], dim=-1)

@@ -1,4 +1,4 @@
-"""The paper's own agent: planning in a latent model whose weights a hypermodel predicts from the map."""
+"""MMN: planning in a latent model, whose weights a hypermodel generates from the map."""
 
 from .mmn import MMN
 

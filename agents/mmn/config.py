@@ -1,4 +1,4 @@
-"""The numbers of MMN, where each comes from, and the presets."""
+"""The config of MMN, with the reason for each number, and the presets."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 
 from mazebench.errors import InputError
 
-# The least and the largest value of each key that has any; what is drawn or divided by must not vanish.
+# The lowest and the highest value of each key that is bounded.
 _RANGES = {
     "channels": (1, 1024),
     "num_distances": (0, 64),
@@ -67,11 +67,11 @@ class MMNConfig:
     hypermodel: str = "spatial"  # or "flat": all weights from one code of the context; "none": the code as an input
     channels: int = 32  # of the map encoder
     num_distances: int = 2  # maps of learned distances to the goal; beyond the paper; 0 for none
-    latent: int = 32  # of a latent state, beside the two metres moved
+    latent: int = 32  # numbers of a latent state that are learned
     hidden: int = 128  # units of encoder and transition
     head_hidden: int = 256  # units of the two layers of policy and value
-    longest_value: int = 100  # values lie in [-this, 0]: a timeout's steps; bounds values of goals out of reach
-    predict_reward: bool = False  # the paper's; by default -1 outside the goal is known and only its end is predicted
+    longest_value: int = 100  # values lie in [-this, 0]; bounds the values of goals out of reach by a timeout
+    predict_reward: bool = False  # as in the paper; by default the reward, -1 outside of the goal, is known
     # Search
     search: str = "gumbel"  # Gumbel MuZero; "puct": MuZero's, the paper's
     num_simulations: int = 8  # in training
@@ -80,8 +80,8 @@ class MMNConfig:
     maxvisit_init: float = 10.0  # Gumbel's c_visit
     epsilon_base: float = 0.4  # Ape-X's ladder, beside the search's own noise: environment i takes a random action
     epsilon_alpha: float = 7.0  # at base ** (1 + alpha i / (B - 1))
-    noise_ladder: bool = True  # and Gumbel noise is multiplied by 1 - i / (B - 1): some act nearly as in evaluation,
-    # and what is learned is how to go on where that gets stuck
+    noise_ladder: bool = True  # multiplies Gumbel noise by 1 - i / (B - 1): the last environments act nearly as in
+    # evaluation, so the replay holds the states in which evaluation gets stuck
     # Experience
     num_envs: int = 128  # side by side
     num_goals: int = 4  # an episode, without a reset between: beyond the paper, whose episodes end at the goal
@@ -89,16 +89,16 @@ class MMNConfig:
     min_rows: int = 20_000  # before learning begins
     priority_exponent: float = 0.0  # 0 draws uniformly
     importance_exponent: float = 0.4  # Ape-X's, where rows are drawn by priority
-    hindsight_ratio: float = 0.8  # as HER's four relabelled samples for each that is not
-    hindsight_mean_offset: float = 24.0  # steps; about twelve cells, the way gone
+    hindsight_ratio: float = 0.8  # HER's four relabelled samples for each original one
+    hindsight_mean_offset: float = 24.0  # steps; about twelve cells of the path driven
     hindsight_window: int = 100  # steps; how far ahead a goal may lie, long enough for far ones
-    relabel_start: bool = True  # beyond the paper, which keeps the start: contexts as after a landmark
-    keep_anchor: bool = True  # beyond the paper: through landmarks and relabelled starts, motion is told from the
-    # trajectory's first cell, whose centre is known, and not from wherever in its cell the body then is
-    symmetries: bool = True  # beyond the paper: rotations and mirror images of what was experienced
+    relabel_start: bool = True  # beyond the paper, which keeps the start; gives contexts like those after a landmark
+    keep_anchor: bool = True  # beyond the paper: after landmarks and relabelled starts, displacements are still
+    # measured from the centre of the trajectory's first cell; the position within a later cell is unknown
+    symmetries: bool = True  # beyond the paper: rotations and mirror images as training data
     # Learning
-    groups: int = 32  # contexts in a batch: the hypermodel is much of an update, and shared by
-    sequences: int = 3  # sequences in each
+    groups: int = 32  # contexts in a batch; the hypermodel runs once for each
+    sequences: int = 3  # sequences for each context
     sequence_steps: int = 8  # of a sequence: unrolled from its first step and every `unroll` steps on
     unroll: int = 4  # steps of the model, K
     value_target: str = "tree_backup"  # over a sequence, with the improved policy; or the paper's "n_step"
@@ -106,16 +106,16 @@ class MMNConfig:
     policy_target: str = "lookahead"  # one step of the target network's model, relabelled; "search": all of a search;
     # "paper": a search's where the goal was the real one, the network's own policy where it was relabelled
     temperature: float = 0.4  # steps; of the improved policy, softmax(q / temperature), in "lookahead"
-    steps_per_update: int = 256  # environment steps; fixed, so that scores do not depend on the workers' speed
+    steps_per_update: int = 256  # environment steps; fixed, so that scores do not depend on the speed of workers
     learning_rate: float = 3e-3  # AdamW's
     constant_updates: int = 3000  # before the learning rate falls, as one over the number of updates
     weight_decay: float = 1e-4  # AdamW's
     max_gradient_norm: float = 10.0  # against the steep slopes while values are still far off
     target_rate: float = 0.01  # of the target network's moving average
-    model_weight: float = 1.0  # of the paper's auxiliary loss; the paper adds it to the task's as it is
-    localization_weight: float = 0.1  # beyond the paper: where a step was on the map, which hindsight knows, is learned
-    distance_weight: float = 0.02  # beyond the paper: propagated distances against values
-    visit_weight: float = 0.3  # beyond the paper: which cells can be entered, from where the agent has been
+    model_weight: float = 1.0  # of the paper's auxiliary loss; 1 in the paper
+    localization_weight: float = 0.1  # beyond the paper: of the loss on the estimated position on the map
+    distance_weight: float = 0.02  # beyond the paper: of the loss on propagated distances, against values
+    visit_weight: float = 0.3  # beyond the paper: of the loss on enterable cells, against those that were visited
 
     def __post_init__(self):
         for name, (lowest, highest) in _RANGES.items():
@@ -138,7 +138,7 @@ class MMNConfig:
 
 PRESETS = {
     "default": MMNConfig(),
-    # What the paper says, and nothing that it doesn't; sizes, which it leaves open, as above.
+    # As far as these keys go, the choices of the paper; docs/agents/mmn.md lists what still differs.
     "paper": MMNConfig(
         hypermodel="flat",
         num_distances=0,
@@ -156,6 +156,6 @@ PRESETS = {
         localization_weight=0.0,
         distance_weight=0.0,
         visit_weight=0.0,
-        learning_rate=1e-3,  # of which the paper says nothing; with the default's, all weights from one code diverge
+        learning_rate=1e-3,  # not in the paper; with the default's, the weights of the hypermodel "flat" diverge
     ),
 }

@@ -1,8 +1,8 @@
-"""Hypermodels: a context becomes weights of the latent transition network, once an episode or landmark.
+"""Hypermodels: they generate weights of the latent transition network from a context, once a leg.
 
-Three behind one interface. `spatial` predicts the block of the first layer's weights that acts on where the agent is, a
-row for each cell of the map; `flat`, the paper's reading, predicts every weight from one code of the context; `none`
-gives that code to an ordinary network, for the ablation.
+There are three with one interface. `spatial` generates the weights of the first layer that act on the position, a row
+for each cell of the map. `flat`, our reading of the paper, generates every weight from one code of the context. `none`,
+for ablations, gives that code to an ordinary network as an input.
 
 `G` is the number of contexts, `K` of latent states in each, `M` the side of the context, `I` the size of a transition's
 input, `H` of its hidden layer, `O` of its output, `T` the number of task features.
@@ -17,70 +17,70 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from ..layers import NUM_PLANES, MapEncoder, marked_place
+from ..common.layers import NUM_PLANES, MapEncoder, marked_position
 from .config import MMNConfig
 
 NUM_ACTIONS = 6
 _FIRST_COST = 2.0  # steps a cell, before anything is learned
-_BARRED = 100.0  # steps, of a cell that can't be entered: longer than any detour
+_BARRED = 100.0  # steps to enter a wall: longer than any detour
 _FAR = 1000.0  # steps; farther than any path
-_SHALLOW = (1, 1, 1)  # dilations of the map's convolutions where distances are propagated,
-_DEEP = (1, 1, 2, 2, 4, 4, 2, 1, 1)  # and where the convolutions must carry them: 19 cells far
+_SHALLOW = (1, 1, 1)  # dilations of the map's convolutions, where distances are propagated
+_DEEP = (1, 1, 2, 2, 4, 4, 2, 1, 1)  # likewise, where they are not, and the convolutions must see 19 cells far
 _EMBEDDING = 256  # of a whole context in one code
 _CODE_CHANNELS = 24
 _FLAT_HIDDEN = 64  # of the transition whose weights are all predicted
-_TASK_CODE = 64  # what the heads get of that code
+_TASK_CODE = 64  # numbers of that code for the heads
 
 
 class Code(NamedTuple):
-    """What a context becomes."""
+    """The output of a hypermodel for a context."""
 
-    places: torch.Tensor  # [G, 4], anchor and goal on the map, each (row, column)
-    weights: torch.Tensor  # [G, ..., W], of the transition network, and last what the heads get; shaped as read
+    positions: torch.Tensor  # [G, 4], anchor and goal on the map, each (row, column)
+    weights: torch.Tensor  # [G, ..., W], of the transition network, followed by the features for the heads
     distance: torch.Tensor  # [G, P, M, M], learned steps to the goal; P is 0 where none are propagated
     enterable: torch.Tensor  # [G, 1, M, M], logits that cells can be entered; 0 planes where P is 0
 
     def of(self, rows: slice | torch.Tensor) -> Code:
-        """Some of the contexts."""
+        """Returns the codes of some of the contexts."""
         return Code(*(part[rows] for part in self))
 
 
 class Hypermodel(nn.Module):
-    """What the three have in common: the interface of a transition network whose weights come from a context."""
+    """The interface of a transition network whose weights come from a context."""
 
     num_task_features: int  # T
     hidden: int  # H
 
     def forward(self, context: torch.Tensor, anchor: torch.Tensor | None = None) -> Code:
-        """The code of contexts `[G, 4, M, M]`.
+        """Returns the code of contexts `[G, 4, M, M]`.
 
-        Motion is told from an anchor, a cell's centre (row, column): `[G, 2]`, by default the contexts' marked start.
+        Displacements are measured from `anchor` `[G, 2]`, a position (row, column), by default the marked start.
         """
         raise NotImplementedError
 
-    def look(self, place: torch.Tensor, code: Code) -> torch.Tensor:
-        """`[G, K, W]`: what is seen of the context at places (row, column) `[G, K, 2]`."""
+    def look(self, position: torch.Tensor, code: Code) -> torch.Tensor:
+        """Returns what is read from the context at positions (row, column) `[G, K, 2]`, `[G, K, W]`."""
         raise NotImplementedError
 
     def first_layer(self, inputs: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
-        """`[G, K, H]`: the transition's first layer, but for the action, of inputs `[G, K, I]` with what is seen."""
+        """Returns the first layer without the action, `[G, K, H]`, of inputs `[G, K, I]` and what `look` read."""
         raise NotImplementedError
 
     def later_layers(self, first: torch.Tensor, action: torch.Tensor, code: Code) -> torch.Tensor:
-        """`[G, K, O]`: the rest of it, with actions `[G, K]`."""
+        """Returns the transition's output `[G, K, O]`, with actions `[G, K]`."""
         raise NotImplementedError
 
     def task_features(self, seen: torch.Tensor, code: Code) -> torch.Tensor:
-        """`[G, K, T]`: what the heads are told of the context."""
+        """Returns features of the context `[G, K, T]` for the heads."""
         raise NotImplementedError
 
 
 class Propagation(nn.Module):
     """Distances to the goal on a map whose costs are learned: shortest paths by repeated relaxation.
 
-    Value propagation with max-pooling (Nardelli et al. 2019, MVProp), written for sums of costs in place of products
-    of discounts. What it costs to leave a cell is learned through the values that come out; whether a cell can be
-    entered at all, from where the agent has ever been.
+    Value propagation with max-pooling (Nardelli et al. 2019, MVProp), with sums of costs instead of products of
+    discounts. The cost to leave a cell is learned through the resulting distances; whether a cell can be entered is
+    learned from the cells that were visited.
     """
 
     def __init__(self, num_features: int, num_distances: int):
@@ -89,7 +89,7 @@ class Propagation(nn.Module):
         self.cost = nn.Conv2d(num_features, num_distances, 1)
 
     def forward(self, features: torch.Tensor, goal: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Distances `[G, P, M, M]`, and logits `[G, 1, M, M]` that cells can be entered.
+        """Returns distances `[G, P, M, M]`, and logits `[G, 1, M, M]` that cells can be entered.
 
         Args:
           features: `[G, C, M, M]`, of the map.
@@ -107,7 +107,7 @@ class Propagation(nn.Module):
 
     @staticmethod
     def slopes(distance: torch.Tensor) -> torch.Tensor:
-        """`[G, 5 P, M, M]`: how much farther the four neighbours of a cell are, and its distance, of order one."""
+        """Returns `[G, 5 P, M, M]`: the neighbours' distances minus a cell's own, and its own, of order one."""
         padded = functional.pad(distance, (1, 1, 1, 1), value=_FAR)
         neighbours = (padded[..., :-2, 1:-1], padded[..., 2:, 1:-1], padded[..., 1:-1, :-2], padded[..., 1:-1, 2:])
         slopes = [((neighbour - distance) / 3).clamp(-2, 2) for neighbour in neighbours]
@@ -115,13 +115,13 @@ class Propagation(nn.Module):
 
 
 class _Transition(nn.Module):
-    """The learned layers of a transition, to whose first one a hypermodel adds."""
+    """The learned layers of a transition; a hypermodel adds to the first one."""
 
     def __init__(self, num_inputs: int, hidden: int, num_outputs: int):
         super().__init__()
         self.inputs = nn.Linear(num_inputs, hidden)
         self.actions = nn.Embedding(NUM_ACTIONS, hidden)
-        nn.init.normal_(self.actions.weight, std=0.3)  # of the order of the other terms of the first layer
+        nn.init.normal_(self.actions.weight, std=0.3)  # like the other terms of the first layer
         self.later = nn.Sequential(nn.Linear(hidden, hidden), nn.ReLU(inplace=True), nn.Linear(hidden, num_outputs))
 
     def forward(self, first: torch.Tensor, action: torch.Tensor) -> torch.Tensor:
@@ -129,7 +129,7 @@ class _Transition(nn.Module):
 
 
 class SpatialHypermodel(Hypermodel):
-    """Serves contexts of any size."""
+    """Generates a row of weights for each cell, for contexts of any size."""
 
     def __init__(self, config: MMNConfig, num_inputs: int, num_outputs: int, context_size: int):
         super().__init__()
@@ -151,49 +151,49 @@ class SpatialHypermodel(Hypermodel):
             distance, enterable = self.propagation(features, context[:, 2:3])
             features = torch.cat([features, self.propagation.slopes(distance)], dim=1)
         table = torch.cat([rows, features], dim=1).flatten(2).transpose(1, 2)  # [G, M * M, H + T]
-        return Code(_places(context, anchor), table, distance, enterable)
+        return Code(_marked_positions(context, anchor), table, distance, enterable)
 
-    def look(self, place: torch.Tensor, code: Code) -> torch.Tensor:
-        """The rows around, of weights and of task features."""
-        return self.read(place, code.weights)
+    def look(self, position: torch.Tensor, code: Code) -> torch.Tensor:
+        """Returns rows of weights and of task features, interpolated."""
+        return self.read(position, code.weights)
 
-    def read(self, place: torch.Tensor, table: torch.Tensor) -> torch.Tensor:
-        """`[G, K, R]`: rows of tables `[G, M * M, R]` at cells around places `[G, K, 2]`, weighed by their nearness.
+    def read(self, position: torch.Tensor, table: torch.Tensor) -> torch.Tensor:
+        """Returns rows of tables `[G, M * M, R]`, interpolated at positions `[G, K, 2]`: `[G, K, R]`.
 
-        In each direction the cells less than two away count: at most four.
+        In each direction, the cells less than two away are weighted by their distance: at most four.
         """
         size = math.isqrt(table.shape[1])
-        place = place.clamp(0, size - 1)
+        position = position.clamp(0, size - 1)
         sharpness = functional.softplus(self.sharpness + 1.0)
-        if place.shape[1] > 1:  # one product for all places of a map
-            return _outer(_nearness(place, torch.arange(size, device=place.device), sharpness)) @ table
-        cells = place.floor()[..., None] + torch.arange(-1, 3, device=place.device)  # [G, 1, 2, 4]
+        if position.shape[1] > 1:  # one product for all positions of a map
+            return _outer(_nearness(position, torch.arange(size, device=position.device), sharpness)) @ table
+        cells = position.floor()[..., None] + torch.arange(-1, 3, device=position.device)  # [G, 1, 2, 4]
         inside = (cells >= 0) & (cells < size)
         row, column = cells.clamp(0, size - 1).long().unbind(-2)
         index = (row[..., :, None] * size + column[..., None, :]).flatten(1)  # [G, 16]
-        index = index + size**2 * torch.arange(len(place), device=place.device)[:, None]
+        index = index + size**2 * torch.arange(len(position), device=position.device)[:, None]
         rows = table.flatten(0, 1).index_select(0, index.flatten()).unflatten(0, index.shape)
-        return _outer(_nearness(place, cells, sharpness, inside)) @ rows
+        return _outer(_nearness(position, cells, sharpness, inside)) @ rows
 
     def first_layer(self, inputs: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
-        """The predicted rows are what the place code adds to the first layer."""
+        """Returns the learned layer plus the generated rows."""
         return self.transition.inputs(inputs) + seen[..., : -self.num_task_features]
 
     def later_layers(self, first: torch.Tensor, action: torch.Tensor, code: Code) -> torch.Tensor:
-        """Learned, the same in all contexts."""
+        """Returns the output of learned layers, the same in all contexts."""
         return self.transition(first, action)
 
     def task_features(self, seen: torch.Tensor, code: Code) -> torch.Tensor:
-        """Features of the map around, as read."""
+        """Returns the features of the map that were read."""
         return seen[..., -self.num_task_features :]
 
-    def distances(self, place: torch.Tensor, code: Code) -> torch.Tensor:
-        """`[G, K, P]`: learned steps to the goal from places `[G, K, 2]`."""
-        return self.read(place, code.distance.flatten(2).transpose(1, 2))
+    def distances(self, position: torch.Tensor, code: Code) -> torch.Tensor:
+        """Returns the learned steps `[G, K, P]` to the goal from positions `[G, K, 2]`."""
+        return self.read(position, code.distance.flatten(2).transpose(1, 2))
 
 
 class CodeHypermodel(Hypermodel):
-    """What `flat` and `none` share: one code of a whole context, of a fixed size M."""
+    """The parts that `flat` and `none` share: one code of a whole context, whose size M is fixed."""
 
     num_task_features = _TASK_CODE + 2
 
@@ -210,25 +210,25 @@ class CodeHypermodel(Hypermodel):
         embedding = self.embedding(self.encoder(context).flatten(1))
         nothing = context[:, :0]
         weights = torch.cat([self.weights(embedding), self.task(embedding)], dim=-1)
-        return Code(_places(context, anchor), weights, nothing, nothing)
+        return Code(_marked_positions(context, anchor), weights, nothing, nothing)
 
     def weights(self, embedding: torch.Tensor) -> torch.Tensor:
-        """What the transition gets from contexts embedded as `[G, 256]`."""
+        """Returns the weights, or inputs, for the transition from embeddings `[G, 256]` of contexts."""
         raise NotImplementedError
 
-    def look(self, place: torch.Tensor, code: Code) -> torch.Tensor:
-        """The place itself, in [-1, 1]."""
-        return (place - (self._size - 1) / 2) * (2 / self._size)  # in [-1, 1]
+    def look(self, position: torch.Tensor, code: Code) -> torch.Tensor:
+        """Returns the position itself, in [-1, 1]."""
+        return (position - (self._size - 1) / 2) * (2 / self._size)
 
     def task_features(self, seen: torch.Tensor, code: Code) -> torch.Tensor:
-        """The place, and a code of the context."""
+        """Returns the position and a code of the context."""
         return torch.cat([seen, code.weights[:, None, -_TASK_CODE:].expand(-1, seen.shape[1], -1)], dim=-1)
 
 
 class FlatHypermodel(CodeHypermodel):
-    """Predicts all weights of a transition with one hidden layer.
+    """Generates all weights of a transition with one hidden layer.
 
-    Bias-HyperInit (Beck et al. 2022): they begin as an ordinary network's, nearly the same for all contexts.
+    At first they are those of an ordinary network, nearly equal for all contexts: Bias-HyperInit (Beck et al. 2022).
     """
 
     hidden = _FLAT_HIDDEN
@@ -249,29 +249,29 @@ class FlatHypermodel(CodeHypermodel):
             self.hyper.bias.copy_(torch.cat(usual))
 
     def weights(self, embedding: torch.Tensor) -> torch.Tensor:
-        """All of the transition's, one after another."""
+        """Returns all weights of the transition, flattened."""
         return self.hyper(embedding)
 
     def first_layer(self, inputs: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
-        """By predicted weights."""
+        """Returns the layer with generated weights."""
         first, bias, _, _ = self._parts(code)
         return torch.cat([inputs, seen], dim=-1) @ first[:, : self._num_inputs] + bias
 
     def later_layers(self, first: torch.Tensor, action: torch.Tensor, code: Code) -> torch.Tensor:
-        """By predicted weights, too."""
+        """Returns the output of layers with generated weights."""
         rows, _, second, bias = self._parts(code)
         chosen = functional.one_hot(action, NUM_ACTIONS).to(first.dtype) @ rows[:, self._num_inputs :]
         hidden = functional.relu(functional.layer_norm(first + chosen, first.shape[-1:]))
         return hidden @ second + bias
 
     def _parts(self, code: Code) -> list[torch.Tensor]:
-        """The predicted weights and biases `[G, rows, columns]`."""
+        """Returns the generated weights and biases, each `[G, rows, columns]`."""
         parts = code.weights[:, :-_TASK_CODE].split([rows * columns for rows, columns in self._shapes], dim=-1)
         return [part.unflatten(-1, shape) for part, shape in zip(parts, self._shapes, strict=True)]
 
 
 class NoHypermodel(CodeHypermodel):
-    """An ordinary transition network, to which the context's code is one more input."""
+    """An ordinary transition network, of which the context's code is one more input."""
 
     def __init__(self, config: MMNConfig, num_inputs: int, num_outputs: int, context_size: int):
         super().__init__(context_size)
@@ -280,32 +280,32 @@ class NoHypermodel(CodeHypermodel):
         self.transition = _Transition(num_inputs + 2, config.hidden, num_outputs)
 
     def weights(self, embedding: torch.Tensor) -> torch.Tensor:
-        """What the context adds to the first layer."""
+        """Returns what the context adds to the first layer."""
         return self.of_context(embedding)
 
     def first_layer(self, inputs: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
-        """Learned; the context is one more input."""
+        """Returns the learned layer of the inputs, the position and the context's code."""
         return self.transition.inputs(torch.cat([inputs, seen], dim=-1)) + code.weights[:, None, :-_TASK_CODE]
 
     def later_layers(self, first: torch.Tensor, action: torch.Tensor, code: Code) -> torch.Tensor:
-        """Learned."""
+        """Returns the output of learned layers."""
         return self.transition(first, action)
 
 
 HYPERMODELS = {"spatial": SpatialHypermodel, "flat": FlatHypermodel, "none": NoHypermodel}
 
 
-def _places(context: torch.Tensor, anchor: torch.Tensor | None) -> torch.Tensor:
-    """`[G, 4]`: the anchor, which is the marked start if there is no other, and the marked goal."""
-    start, goal = (marked_place(context[:, plane]) for plane in (3, 2))
+def _marked_positions(context: torch.Tensor, anchor: torch.Tensor | None) -> torch.Tensor:
+    """Returns `[G, 4]`: the anchor, by default the marked start, and the marked goal."""
+    start, goal = (marked_position(context[:, plane]) for plane in (3, 2))
     return torch.cat([start if anchor is None else anchor, goal], dim=-1)
 
 
 def _nearness(
-    place: torch.Tensor, cells: torch.Tensor, sharpness: torch.Tensor, inside: torch.Tensor | None = None
+    position: torch.Tensor, cells: torch.Tensor, sharpness: torch.Tensor, inside: torch.Tensor | None = None
 ) -> torch.Tensor:
-    """`[G, K, 2, n]`: soft one-hots of places `[G, K, 2]` over n rows and columns; 0 where two or more away."""
-    distance = (place[..., None] - cells) ** 2
+    """Returns soft one-hots `[G, K, 2, n]` of positions `[G, K, 2]` over n rows and columns; 0 two or more away."""
+    distance = (position[..., None] - cells) ** 2
     near = distance < 4
     if inside is not None:
         near = near & inside
@@ -313,5 +313,5 @@ def _nearness(
 
 
 def _outer(weight: torch.Tensor) -> torch.Tensor:
-    """`[G, K, n * n]`: weights of cells from those of rows and columns `[G, K, 2, n]`."""
+    """Returns weights of cells `[G, K, n * n]` from those of rows and columns `[G, K, 2, n]`."""
     return (weight[..., 0, :, None] * weight[..., 1, None, :]).flatten(-2)

@@ -1,11 +1,9 @@
-"""How MMN learns: sequences with goals relabelled in hindsight, unrolled in the model from what the encoder sees.
+"""The learner of MMN: sequences with goals relabelled in hindsight, in which the model is unrolled.
 
 `G` is the number of contexts in a batch, `S` of sequences in each, `L` of steps of a sequence, so L + 1 of states.
 """
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -14,41 +12,39 @@ from mazebench.maps.maze import Maze
 from mazebench.tasks.context import resized_map
 from mazebench.training.experience import Experience
 
-from .. import symmetry
-from ..layers import state_features
-from ..learner import HindsightLearner
-from ..replay import SequenceSample
+from ..common import symmetry
+from ..common.actor import NetworkAgent
+from ..common.layers import state_features
+from ..common.learner import HindsightLearner
+from ..common.replay import SequenceSample
 from .hypermodels import Code
 from .losses import Batch, Targets, unrolled_losses
 from .network import MMNNetwork, Predictions
 from .planning import lookahead, plan
 from .targets import n_step_returns, tree_backup_returns
 
-if TYPE_CHECKING:
-    from .mmn import MMN
-
 
 class MMNLearner(HindsightLearner):
-    """Learns for an `MMN`."""
+    """Updates the network of its actor."""
 
-    def __init__(self, actor: MMN, mazes: tuple[Maze, ...], seed: int):
+    def __init__(self, actor: NetworkAgent, mazes: tuple[Maze, ...], seed: int):
         config = actor.config
         optimizer = torch.optim.AdamW(
             actor.network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
         )
         super().__init__(actor, mazes, seed, optimizer, config.keep_anchor)
         self._device = actor.network.support.device
-        self._visited = np.zeros((len(mazes), mazes[0].size ** 2), dtype=np.float32)  # 1 where the agent has ever been
+        self._visited = np.zeros((len(mazes), mazes[0].size ** 2), dtype=np.float32)  # 1 in each visited cell
         self._num_updates = np.zeros(1, dtype=np.int64)
         self._arrays |= {"visited": self._visited, "num_updates": self._num_updates}
 
     def observe(self, experience: Experience, first_env: int = 0) -> None:
-        """Remembers one step in the environments from `first_env` on, and where it was."""
+        """Stores one step in the environments from `first_env` on, and marks its cells as visited."""
         super().observe(experience, first_env)
         self._visited[experience.maze, experience.cell] = 1.0
 
     def update(self) -> dict[str, float]:
-        """Learns from one batch; returns the paper's losses by their names, and what tells early if a run will work."""
+        """Learns from one batch; returns its losses and, to judge a run early, other scalars by name."""
         config = self._config
         sample = self.sample()
         batch = self._batch(sample)
@@ -63,12 +59,12 @@ class MMNLearner(HindsightLearner):
             seen = (batch.exists & ~batch.at_goal)[:, 0, 0].cpu().numpy()
             self._replay.update_priorities(sample.row[seen], value_error.cpu().numpy()[seen])
         scalars = losses | metrics
-        # Read together: on a GPU, each reading waits for all that was launched.
+        # Copied from the device at once: on a GPU, each copy waits for all kernels launched before.
         values = torch.stack([value.detach() for value in scalars.values()]).tolist()
         return dict(zip(scalars, values, strict=True))
 
     def sample(self) -> SequenceSample:
-        """Draws what is learned from next."""
+        """Draws the sequences of the next batch."""
         config = self._config
         beta = config.importance_exponent if config.priority_exponent else 0.0
         return self._replay.sample_sequences(
@@ -77,7 +73,7 @@ class MMNLearner(HindsightLearner):
 
     def _batch(self, sample: SequenceSample) -> Batch:
         turned = self._draw_symmetry()
-        size, context_size = self._mazes[0].size, self.actor.context_size_built
+        size, context_size = self._mazes[0].size, self.actor.trained_size
         visited = [resized_map(self._visited[maze].reshape(size, size), context_size) for maze in sample.maze]
         features = state_features(torch.from_numpy(sample.state), torch.from_numpy(sample.origin)[:, None, None])
         reached = (sample.cell == sample.goal[:, None, None]) & sample.exists
@@ -88,7 +84,7 @@ class MMNLearner(HindsightLearner):
             symmetry.turn_planes(torch.from_numpy(np.stack(visited)[:, None]), turned),
             torch.from_numpy(sample.relabelled),
             symmetry.turn_features(features, turned),
-            self._places(sample, turned),
+            self._positions(sample, turned),
             torch.from_numpy(symmetry.turn_actions(sample.action, turned)),
             torch.from_numpy(sample.exists & not_before),
             torch.from_numpy(reached & not_before),
@@ -97,7 +93,7 @@ class MMNLearner(HindsightLearner):
 
     @torch.no_grad()
     def _targets(self, batch: Batch) -> Targets:
-        """By the target network, for the goals of the batch, real or relabelled."""
+        """Returns the targets of the batch by the target network; its goals are real or relabelled."""
         network, config = self._target, self._config
         code = network.hypermodel(batch.context, batch.anchor)
         latent = network.encode(batch.features.flatten(1, 2))
@@ -114,14 +110,17 @@ class MMNLearner(HindsightLearner):
         return Targets(value.clamp(-config.longest_value, 0.0), policy)
 
     def _searched(self, batch: Batch, latent: torch.Tensor, code: Code) -> torch.Tensor:
-        """`[G, S, L + 1, 6]`: policies by search; with the target "paper", by the network where it was relabelled."""
+        """Returns policies `[G, S, L + 1, 6]` by search.
+
+        With the policy target "paper", relabelled contexts get the network's own policy instead.
+        """
         network, config = self._target, self._config
         policy = torch.softmax(self._predict(network, latent, code).policy_logits, dim=-1)
-        wanted = ~batch.relabelled if config.policy_target == "paper" else torch.ones_like(batch.relabelled)
-        if wanted.any():
-            result = plan(network, config, latent[wanted], code.of(wanted), config.num_simulations, self._rng)
+        searched = ~batch.relabelled if config.policy_target == "paper" else torch.ones_like(batch.relabelled)
+        if searched.any():
+            result = plan(network, config, latent[searched], code.of(searched), config.num_simulations, self._rng)
             weights = torch.from_numpy(result.action_weights).to(policy.device)
-            policy[wanted] = weights.unflatten(0, (-1, policy.shape[1]))
+            policy[searched] = weights.unflatten(0, (-1, policy.shape[1]))
         return policy.unflatten(1, batch.features.shape[1:3])
 
     def _predict(self, network: MMNNetwork, latent: torch.Tensor, code: Code) -> Predictions:
@@ -129,7 +128,7 @@ class MMNLearner(HindsightLearner):
 
 
 def _has_fast_bfloat16(device: torch.device) -> bool:
-    """Whether products in bfloat16 are faster here; on a CPU with instructions for them, four times."""
+    """Returns whether the device has instructions for bfloat16; on a CPU, products then take a quarter of the time."""
     if device.type == "cpu":
         return torch.cpu._is_avx512_bf16_supported()
     return torch.cuda.is_bf16_supported()

@@ -1,4 +1,4 @@
-"""MMN's losses: the model is unrolled from encoded states, and held against what was experienced and planned.
+"""MMN's losses: the model is unrolled from encoded states, and compared with experience and with planned targets.
 
 `G` is the number of contexts in a batch, `S` of sequences in each, `L` of steps of a sequence, so L + 1 of states. A
 root is a state from which the model is unrolled for `K` steps; `R` roots belong to a context.
@@ -24,62 +24,62 @@ class Batch(NamedTuple):
     """A sample as tensors, rotated or mirrored."""
 
     context: torch.Tensor  # [G, 4, M, M]
-    anchor: torch.Tensor  # [G, 2], the place (row, column) from which motion is told
-    visited: torch.Tensor  # [G, 1, M, M], share of each place of the map where the agent has ever been in this maze
+    anchor: torch.Tensor  # [G, 2], the position (row, column) from which displacements are measured
+    visited: torch.Tensor  # [G, 1, M, M], the share of each cell of the map that was visited in this maze
     relabelled: torch.Tensor  # [G] bool
     features: torch.Tensor  # [G, S, L + 1, 9]
-    place: torch.Tensor  # [G, S, L + 1, 2], where on the map the body was: (row, column) of its cell
+    position: torch.Tensor  # [G, S, L + 1, 2], the true cell on the map (row, column)
     action: torch.Tensor  # [G, S, L]
-    exists: torch.Tensor  # [G, S, L + 1] bool, the sequence goes as far, and the goal was not reached before
-    at_goal: torch.Tensor  # [G, S, L + 1] bool, and is reached here; what follows does not exist
+    exists: torch.Tensor  # [G, S, L + 1] bool, whether the sequence goes as far without reaching the goal before
+    at_goal: torch.Tensor  # [G, S, L + 1] bool, whether the goal is reached here; later states do not exist
 
 
 class Targets(NamedTuple):
-    """What heads are to say of the states of a batch."""
+    """The targets of the heads for the states of a batch."""
 
     value: torch.Tensor  # [G, S, L + 1]
     policy: torch.Tensor  # [G, S, L + 1, 6]
 
 
 class Means:
-    """Weighted means, summed up step by step."""
+    """Weighted means of values that are added step by step."""
 
     def __init__(self) -> None:
         self._sums: dict[str, torch.Tensor] = {}
         self._weights: dict[str, torch.Tensor] = {}
 
     def add(self, name: str, values: torch.Tensor, weight: torch.Tensor) -> None:
-        """Adds `values` by `weight`, both of one shape."""
+        """Adds `values` with `weight`, an array of the same shape."""
         weight = weight.to(values.dtype)
         total, weights = (values * weight).sum(), weight.sum()
         self._sums[name] = self._sums[name] + total if name in self._sums else total
         self._weights[name] = self._weights[name] + weights if name in self._weights else weights
 
     def means(self) -> dict[str, torch.Tensor]:
-        """By name; 0 where nothing had weight."""
+        """Returns the means by name; 0 where all weights are 0."""
         return {name: total / self._weights[name].clamp(min=1e-6) for name, total in self._sums.items()}
 
 
 def unrolled_losses(
     network: MMNNetwork, config: MMNConfig, batch: Batch, targets: Targets, weight: torch.Tensor
 ) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor], torch.Tensor]:
-    """The losses by name, whose sum is to be descended; other scalars; and the value errors `[G]` of the first roots.
+    """Returns losses by name, to be summed; other scalars by name; and the value errors `[G]` of the first roots.
 
-    The paper's task losses (values, policies, rewards and ends) at the roots and in K unrolled states, which count
-    1 / K as much, and its auxiliary model loss in the unrolled states.
+    They are the paper's task losses (values, policies, rewards and ends) at the roots and, weighted by 1 / K, in K
+    unrolled states, and its auxiliary model loss in the unrolled states.
 
     Args:
-      network: it learns; the gradient goes through all of it.
+      network: the one that learns.
       config: the weights of the losses, and K.
-      batch: what was experienced.
-      targets: what was planned.
+      batch: the experience.
+      targets: the planned values and policies.
       weight: `[G]`, importance weights.
     """
     code = network.hypermodel(batch.context, batch.anchor)
     roots = slice(0, config.sequence_steps - config.unroll + 1, config.unroll)
 
     def at(values: torch.Tensor, step: int) -> torch.Tensor:
-        """`[G, R, ...]` of `[G, S, L + 1, ...]`: the states `step` steps after the roots."""
+        """Returns `[G, R, ...]` of `[G, S, L + 1, ...]`: the states `step` steps after the roots."""
         return values[:, :, roots.start + step : roots.stop + step : roots.step].flatten(1, 2)
 
     latent = network.encode(at(batch.features, 0))
@@ -101,7 +101,7 @@ def unrolled_losses(
             if step in (1, config.unroll):
                 watched.add(f"model_error_{step}", moved_error, exists)
         else:
-            _add_places(losses, config, network, latent, code, at(batch.place, 0), exists)
+            _add_localization(losses, config, network, latent, code, at(batch.position, 0), exists)
             _add_distances(losses, config, network, latent, code, value, going)
             _add_visits(losses, config, code, batch.visited)
             error = (network.value(out.value_logits.detach()) - value) * going
@@ -118,7 +118,7 @@ def unrolled_losses(
 def _add_outcome(
     losses: Means, config: MMNConfig, out: Predictions, at_goal: torch.Tensor, weight: torch.Tensor
 ) -> None:
-    """Of where episodes end, and with the paper of rewards: the goal's is 0, any other -1."""
+    """Adds the loss on ends of episodes and, if configured, the loss on rewards."""
     truth = at_goal.float()
     ends = functional.binary_cross_entropy_with_logits(out.goal_logit, truth, reduction="none")
     losses.add("goal_loss", ends, weight)
@@ -135,10 +135,10 @@ def _add_model(
     features: torch.Tensor,
     weight: torch.Tensor,
 ) -> torch.Tensor:
-    """The paper's model loss, of unrolled states against observed and encoded ones; returns errors `[G, R]` in metres.
+    """Adds the paper's model loss, and returns the errors `[G, R]` of unrolled displacements in metres.
 
-    The paper's log-likelihood of the next state: of the body's pose and velocities with a Laplace distribution, since
-    collisions are heavy-tailed, and of the whole latent state with a normal one.
+    It is the negative log-likelihood of the next state: of pose and velocities with a Laplace distribution, since
+    collisions are heavy-tailed, and of the whole latent state with a normal distribution.
     """
     decoded = network.decode(latent)
     with torch.no_grad():
@@ -151,17 +151,17 @@ def _add_model(
     return moved_error.detach()
 
 
-def _add_places(
+def _add_localization(
     losses: Means,
     config: MMNConfig,
     network: MMNNetwork,
     latent: torch.Tensor,
     code: Code,
-    place: torch.Tensor,
+    position: torch.Tensor,
     exists: torch.Tensor,
 ) -> None:
-    """Beyond the paper: of where on the map the network believes the steps to be, against the cells they were in."""
-    error = (network.locate(latent, code) - place).abs().mean(dim=-1)
+    """Adds the loss on estimated positions, against the true cells; beyond the paper."""
+    error = (network.locate(latent, code) - position).abs().mean(dim=-1)
     losses.add("localization_loss", config.localization_weight * error, exists)
 
 
@@ -174,7 +174,7 @@ def _add_distances(
     value: torch.Tensor,
     going: torch.Tensor,
 ) -> None:
-    """Beyond the paper: of propagated distances, against the values."""
+    """Adds the loss on propagated distances, against the values; beyond the paper."""
     if isinstance(network.hypermodel, SpatialHypermodel) and code.distance.shape[1]:
         distance = network.hypermodel.distances(network.locate(latent, code).detach(), code)  # [G, R, P]
         error = functional.smooth_l1_loss(distance, -value[..., None].expand_as(distance), reduction="none")
@@ -182,7 +182,7 @@ def _add_distances(
 
 
 def _add_visits(losses: Means, config: MMNConfig, code: Code, visited: torch.Tensor) -> None:
-    """Beyond the paper: of cells that can be entered, against those of this maze where the agent has ever been."""
+    """Adds the loss on enterable cells, against those visited in this maze; beyond the paper."""
     if code.enterable.shape[1]:
         error = functional.binary_cross_entropy_with_logits(code.enterable, visited, reduction="none")
         losses.add("visit_loss", config.visit_weight * error, torch.ones_like(error))

@@ -1,7 +1,6 @@
-"""How fast the search is, beside the network that it calls and beside mctx where that is installed, and an update.
+"""The speed of the search, compared with its network alone and with mctx if that is installed, and of an update.
 
-The search's network is a stand-in of MMN's size whose transition has other weights in each row, as a hypermodel would
-give it.
+The search's network is a stand-in of MMN's size. Its transition has other weights in each row, as a hypermodel's has.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from mazebench.maps.benchmark import load_mazes
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 
-from .mmn import MMN
+from .learner import MMNLearner
 from .search import Evaluation, Root, gumbel_muzero_policy, muzero_policy
 
 NUM_ACTIONS = 6
@@ -35,7 +34,7 @@ HIDDEN = 128
 NUM_BINS = 65  # of values in [-64, 0]
 NUM_SIMULATIONS = 16
 _CASES = (("gumbel", 1), ("gumbel", 64), ("gumbel", 256), ("puct", 64))  # policy, roots
-_ROUNDS = 7  # in which the sides take turns
+_ROUNDS = 7  # in which the search, its network and mctx are measured by turns
 # XLA would use a thread a core.
 _ONE_THREAD = {
     "JAX_PLATFORMS": "cpu",
@@ -45,7 +44,7 @@ _ONE_THREAD = {
 
 
 def weight_shapes(batch_size: int) -> dict[str, tuple[int, ...]]:
-    """What the network consists of; the transition's layers have weights of their own in each of the rows."""
+    """Returns the shapes of the network's weights; the transition's layers have weights of their own in each row."""
     return {
         "transition_1": (batch_size, LATENT + NUM_ACTIONS, LATENT),
         "transition_2": (batch_size, LATENT, LATENT),
@@ -56,7 +55,7 @@ def weight_shapes(batch_size: int) -> dict[str, tuple[int, ...]]:
 
 
 def random_weights(batch_size: int) -> dict[str, np.ndarray]:
-    """Of the same seed for all."""
+    """Returns the same random weights each time."""
     rng = np.random.default_rng(0)
     return {
         name: (rng.normal(size=shape) / shape[-2] ** 0.5).astype(np.float32)
@@ -95,14 +94,17 @@ class Network:
         return outputs[:, :NUM_ACTIONS].numpy(), value.numpy(), torch.sigmoid(outputs[:, -1]).numpy()
 
 
-def measure(seconds: float) -> dict[str, list[dict[str, Any]]]:
-    """Tables of simulations a second of a thread's own time, and of an update's; some `seconds` for a figure."""
+def measure(seconds: float, build_learner: Callable[..., MMNLearner]) -> dict[str, list[dict[str, Any]]]:
+    """Returns tables of simulations per second of CPU time, and of the time of an update.
+
+    Each figure takes about `seconds` to measure; `build_learner` is the agent's.
+    """
     num_threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
         with _mctx() as mctx:
             rows = [_row(policy, batch_size, seconds / _ROUNDS, mctx) for policy, batch_size in _CASES]
-        parts = update_rows(seconds)
+        parts = update_rows(seconds, build_learner)
     finally:
         torch.set_num_threads(num_threads)
     return {
@@ -111,10 +113,12 @@ def measure(seconds: float) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def update_rows(seconds: float, overrides: Mapping[str, str] | None = None) -> list[dict[str, Any]]:
-    """Milliseconds that the parts of an update take, once the replay holds what learning begins with."""
-    learner = MMN.build_learner(Interface("local", 13, 13), load_mazes(13, "train"), overrides=overrides)
-    collector = Collector(TaskSpec("local", load_mazes(13, "train"), **learner.task_options()), learner.num_envs, 0)
+def update_rows(
+    seconds: float, build_learner: Callable[..., MMNLearner], overrides: Mapping[str, str] | None = None
+) -> list[dict[str, Any]]:
+    """Returns the milliseconds that each part of an update takes, once the replay is filled enough to learn."""
+    learner = build_learner(Interface("local", 13, 13), load_mazes(13, "train"), overrides=overrides)
+    collector = Collector(TaskSpec(mazes=load_mazes(13, "train"), **learner.task_options()), learner.num_envs, 0)
     learner.actor.explore_from(0, learner.num_envs, seed=0)
     state = learner.actor.initial_state(learner.num_envs)
     while not learner.num_updates_due(10**9):
@@ -134,7 +138,7 @@ def update_rows(seconds: float, overrides: Mapping[str, str] | None = None) -> l
 
 
 def _timed(function: Callable[..., Any], times: dict[str, float], part: str) -> Callable[..., Any]:
-    """`function`, which adds to `times` what it takes."""
+    """Returns `function`, which adds its running time to `times[part]`."""
 
     def timed(*arguments: Any) -> Any:
         begin = time.perf_counter()
@@ -164,7 +168,7 @@ def _row(policy: str, batch_size: int, seconds: float, mctx: Callable[..., float
 
 
 def rate(step: Callable[[], Any], batch_size: int, seconds: float) -> float:
-    """Simulations a second of this process's time, where `step` does those of a whole search."""
+    """Returns simulations per second of CPU time, where `step` does those of a whole search."""
     step()
     count, begin = 0, time.process_time()
     while (elapsed := time.process_time() - begin) < seconds:
@@ -174,7 +178,7 @@ def rate(step: Callable[[], Any], batch_size: int, seconds: float) -> float:
 
 
 def _steps(policy: str, batch_size: int) -> tuple[Callable[[], Any], Callable[[], Any]]:
-    """A whole search, and as many evaluations by the network alone."""
+    """Returns a function that searches, and one that evaluates the network as often as the search does."""
     network, rng = Network(batch_size), np.random.default_rng(0)
     latent = torch.from_numpy(rng.normal(size=(batch_size, LATENT)).astype(np.float32))
     prior_logits, value, _ = network.predict(latent)
@@ -200,7 +204,7 @@ def _steps(policy: str, batch_size: int) -> tuple[Callable[[], Any], Callable[[]
 
 @contextmanager
 def _mctx() -> Iterator[Callable[[str, int, float], float] | None]:
-    """Asks a process that has JAX, kept from the threads here, for rates; None where mctx is not installed."""
+    """Yields a function that measures mctx's rate in another process; None if mctx is not installed."""
     if importlib.util.find_spec("mctx") is None:
         yield None
         return

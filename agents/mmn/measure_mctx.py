@@ -1,6 +1,6 @@
-"""The other side of `measure`: mctx's search with the same network, in JAX. Runs in a process of its own.
+"""Measures mctx's search with the network of `measure`, in JAX and in a process of its own.
 
-Each line it reads is a JSON list of policy, number of roots and seconds; each it writes is a rate.
+It reads lines of JSON, lists of policy, number of roots and seconds, and writes a rate for each.
 """
 
 from __future__ import annotations

@@ -1,27 +1,29 @@
-"""MMN, the paper's map-conditioned multi-task navigator: MuZero whose model's weights come from a map.
+"""MMN, the map-conditioned multi-task navigator: MuZero whose model's weights are generated from a map.
 
-docs/agents/mmn.md says what was trained, and how it differs from the paper.
+docs/agents/mmn.md describes the training, and how it differs from the paper.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import torch
 
-from mazebench.agent import Interface, Observation
+from mazebench.agent import Inputs, Interface, Observation
 from mazebench.errors import InputError, unknown
+from mazebench.maps.maze import Maze
 
-from ..actor import NetworkAgent
-from ..checkpoint import load_agent, load_into
-from ..layers import marked_place, state_features
-from ..overrides import override
+from ..common.actor import NetworkAgent
+from ..common.checkpoint import load_agent, load_into
+from ..common.layers import marked_position, state_features
+from ..common.overrides import override
 from .config import PRESETS, MMNConfig
 from .hypermodels import NUM_ACTIONS, Code
+from .learner import MMNLearner
 from .network import MMNNetwork
 from .planning import plan
 
@@ -30,32 +32,32 @@ _ROWS_AT_ONCE = 64  # contexts or states; always as many, since PyTorch rounds d
 
 @dataclasses.dataclass
 class ActorState:
-    """What acting carries from step to step in B environments."""
+    """The state of acting in B environments."""
 
-    origin: np.ndarray  # [B, 2] float32, x and y observed where motion is told from
-    code: Code | None  # of B contexts; None until there is one
+    origin: np.ndarray  # [B, 2] float32, x and y observed at the anchor, from which displacements are measured
+    code: Code | None  # of B contexts; None before the first step
 
 
 class MMN(NetworkAgent):
-    """Acts by tree search in a latent model whose weights the hypermodel predicts from the context, once a leg."""
+    """Acts by tree search in a latent model, whose weights a hypermodel generates from the context, once a leg."""
 
     name: ClassVar[str] = "mmn"
     default_config: ClassVar[MMNConfig] = PRESETS["default"]
+    config: MMNConfig
     network: MMNNetwork
 
     def __init__(self, config: MMNConfig, context_size: int, seed: int = 0, device: str = "cpu"):
         torch.set_num_threads(1)
         self.config = config
-        self.context_size_built = context_size
+        self.trained_size = context_size
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             self.network = MMNNetwork(config, context_size).to(device)
         self.explore_from(0, config.num_envs, seed)
-        self._begins: np.ndarray | None = None  # [B] bool, where the next step begins an episode
 
     @classmethod
-    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> MMN:
-        """The agent of a checkpoint, by default of the one that ships.
+    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
+        """Returns the agent of a checkpoint, by default of the one that ships.
 
         Raises:
           InputError: if the checkpoint can't be used here.
@@ -73,14 +75,9 @@ class MMN(NetworkAgent):
 
     @classmethod
     def build_learner(
-        cls, interface: Interface, mazes: Any, *, seed: int = 0, overrides: Mapping[str, str] | None = None
-    ) -> Any:
-        """A learner of this agent's kind; see `mazebench.agent.LearningAgent`. The key `preset` names what to override.
-
-        It learns on a GPU if there is one.
-        """
-        from .learner import MMNLearner
-
+        cls, interface: Interface, mazes: Sequence[Maze], *, seed: int = 0, overrides: Mapping[str, str] | None = None
+    ) -> MMNLearner:
+        """Returns a learner for an MMN, on a GPU if there is one. The key `preset` names the config to override."""
         values = dict(overrides or {})
         preset = values.pop("preset", "default")
         if preset not in PRESETS:
@@ -91,37 +88,31 @@ class MMN(NetworkAgent):
 
     @classmethod
     def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
-        """Tables for `mazebench bench`: how fast the search is."""
+        """Returns tables for `mazebench bench`: the speed of the search and of the parts of an update."""
         from .measure import measure
 
-        return measure(seconds)
+        return measure(seconds, cls.build_learner)
 
     def initial_state(self, batch_size: int) -> ActorState:
-        """No context encoded yet: `act` does it where one is first."""
+        """Returns a state without codes: `act` encodes a context where it is new."""
         return ActorState(np.zeros((batch_size, 2), dtype=np.float32), None)
 
     def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
-        """Takes these rungs of the ladder, on which there is less and less noise in the search, too."""
+        """Begins a new stream of exploration; the search's noise falls from the first environment to the last, too."""
         super().explore_from(first_env, num_envs, seed)
         rung = (first_env + np.arange(num_envs)) / max(1, self.config.num_envs - 1)
         self._noise_scale = 1.0 - rung if self.config.noise_ladder else np.ones(num_envs)
 
-    def seed_episodes(self, seeds: np.ndarray, mask: np.ndarray) -> None:
-        """Is told that episodes begin where `mask` `[B]`; without, every new context is taken for an episode's."""
-        self._begins = mask
-
     @torch.no_grad()
-    def act(
-        self, observation: Observation, is_first: np.ndarray, state: ActorState, explore: bool = False
-    ) -> tuple[np.ndarray, ActorState]:
-        """Actions `[B]`; the hypermodel runs once for a context, where it is new, and all searches use what it gave."""
-        new = np.flatnonzero(is_first)
+    def act(self, inputs: Inputs, state: ActorState, explore: bool = False) -> tuple[np.ndarray, ActorState]:
+        """Returns actions `[B]`; the hypermodel runs only where a context is new."""
+        new = np.flatnonzero(inputs.new_context)
         if len(new):
-            begins, self._begins = is_first if self._begins is None else self._begins, None
-            self._encode(observation, new, begins | (not self.config.keep_anchor), state)
-        assert state.code is not None, "is_first must be set in an environment's first step"
+            new_anchor = inputs.new_episode | (not self.config.keep_anchor)
+            self._encode(inputs.observation, new, new_anchor, state)
+        assert state.code is not None, "new_context must be set in an environment's first step"
         device = self.network.support.device
-        features = state_features(torch.from_numpy(observation["state"]), torch.from_numpy(state.origin))
+        features = state_features(torch.from_numpy(inputs.observation["state"]), torch.from_numpy(state.origin))
         actions = [
             self._plan(rows, features_of_rows[:, None].to(device), state.code, explore)
             for rows, features_of_rows in zip(_slices(len(features)), features.split(_ROWS_AT_ONCE), strict=True)
@@ -131,19 +122,20 @@ class MMN(NetworkAgent):
             action = self._explored(action, NUM_ACTIONS)
         return action, state
 
-    def _encode(self, observation: Observation, new: np.ndarray, begins: np.ndarray, state: ActorState) -> None:
-        """Puts the codes of the contexts at `new` into the state; where no episode `begins`, their anchors stay."""
+    def _encode(self, observation: Observation, new: np.ndarray, new_anchor: np.ndarray, state: ActorState) -> None:
+        """Writes the codes of the contexts at `new` into `state`; where no anchor is new, the old one is kept."""
         device = self.network.support.device
-        origin = np.where(begins[new, None], observation["state"][new, :2], state.origin[new])
+        origin = np.where(new_anchor[new, None], observation["state"][new, :2], state.origin[new])
         moved = torch.from_numpy(observation["state"][new, :2] - origin).to(device)
         state.origin[new] = origin
         for rows in _slices(len(new)):
             context = torch.from_numpy(observation["context"][new[rows]]).to(device)
-            start = marked_place(context[:, 3])
+            start = marked_position(context[:, 3])
             anchor = start
             if state.code is not None:
-                kept = self.network.reanchored(state.code.places[torch.from_numpy(new[rows]), :2], moved[rows], start)
-                anchor = torch.where(torch.from_numpy(begins[new[rows], None]).to(device), start, kept)
+                old = state.code.positions[torch.from_numpy(new[rows]), :2]
+                kept = self.network.reanchored(old, moved[rows], start)
+                anchor = torch.where(torch.from_numpy(new_anchor[new[rows], None]).to(device), start, kept)
             code = self.network.hypermodel(_padded(context), _padded(anchor)).of(slice(len(context)))
             if state.code is None:
                 size = len(state.origin)
@@ -152,7 +144,7 @@ class MMN(NetworkAgent):
                 whole[torch.from_numpy(new[rows]).to(device)] = part
 
     def _plan(self, rows: slice, features: torch.Tensor, code: Code, explore: bool) -> np.ndarray:
-        """Actions in some of the environments."""
+        """Returns actions in the environments `rows`, whose state features are `[K, 1, 9]`."""
         config = self.config
         latent = self.network.encode(_padded(features))
         code = Code(*(_padded(part[rows]) for part in code))
@@ -167,6 +159,6 @@ def _slices(num_rows: int) -> list[slice]:
 
 
 def _padded(rows: torch.Tensor) -> torch.Tensor:
-    """`rows` and as many rows of zeros as are missing."""
+    """Returns `rows` and zeros, `_ROWS_AT_ONCE` rows together."""
     missing = _ROWS_AT_ONCE - len(rows)
     return torch.cat([rows, rows.new_zeros(missing, *rows.shape[1:])]) if missing else rows

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import torch
 from torch import nn
 
-from ..layers import NUM_WAVES, waves
+from ..common.layers import NUM_WAVES, waves
 from .config import MMNConfig
 from .hypermodels import HYPERMODELS, NUM_ACTIONS, Code, Hypermodel
 
@@ -19,12 +19,12 @@ _NUM_BODY = 7  # and velocities forward, left and of yaw
 _NUM_FREE = 6  # of a step in the body's frame: a move, a turn, velocities forward, left and of yaw
 _NUM_STOPPED = 4  # in the map's: a move, velocities
 _NUM_CHANGES = _NUM_FREE + _NUM_STOPPED
-_SCALE_RATE = 5.0  # how much faster the map's scale is learned than weights of order one tenth are
+_SCALE_RATE = 5.0  # the scale's parameters are multiplied by it, so that they are of the order of other weights
 _RARE = -4.0  # logit of being in the goal, before anything is learned
 
 
 class Predictions(NamedTuple):
-    """What the heads say of latent states."""
+    """The outputs of the heads for latent states."""
 
     policy_logits: torch.Tensor  # [G, K, 6]
     value_logits: torch.Tensor  # [G, K, bins], of whole values from 1 - bins to 0
@@ -35,10 +35,10 @@ class Predictions(NamedTuple):
 class MMNNetwork(nn.Module):
     """The paper's e (`encode`), h (`hypermodel`), f (`first_layer`, then `step`) and g (`predict`).
 
-    A latent state is what the body's pose and velocities are believed to be, metres moved from an anchor among them,
-    and a learned code of its motion. A step adds what is linear in the body's own frame, as free motion is wherever it
-    heads, and what the transition network says of it: in that frame, and in the map's, along whose axes walls stop it.
-    Where it is on the map, is learned: the anchor plus a learned linear map of what was moved.
+    A latent state holds the displacement from an anchor (m), heading, velocities and a learned code of the motion. A
+    step adds a change that is linear in the body's own frame, as free motion is, and the output of the transition
+    network: a change in that frame, and one in the map's frame, along whose axes walls stop the body. The estimated
+    position on the map is the anchor plus a learned linear map of the displacement.
     """
 
     support: torch.Tensor  # [bins], the values that a categorical value weighs
@@ -76,35 +76,35 @@ class MMNNetwork(nn.Module):
         nn.init.constant_(self.heads.bias[-2:], _RARE)
 
     def encode(self, features: torch.Tensor) -> torch.Tensor:
-        """Latent states `[G, K, D]` of state features `[G, K, 9]`; see `state_features`."""
+        """Returns latent states `[G, K, D]` of state features `[G, K, 9]`; see `state_features`."""
         return torch.cat([features[..., :_NUM_BODY], self.encoder(features[..., _NUM_POSE:_NUM_BODY])], dim=-1)
 
     def decode(self, latent: torch.Tensor) -> torch.Tensor:
-        """`[G, K, 7]`: the first seven state features, back from latent states."""
+        """Returns the first seven state features `[G, K, 7]` of latent states."""
         return latent[..., :_NUM_BODY]
 
     def locate(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
-        """`[G, K, 2]`: where on the map, (row, column), latent states are believed to be."""
-        return code.places[:, None, :2] + self._displacement(latent[..., :2])
+        """Returns the estimated positions `[G, K, 2]` (row, column) of latent states on the map."""
+        return code.positions[:, None, :2] + self._displacement(latent[..., :2])
 
     def reanchored(self, anchor: torch.Tensor, moved: torch.Tensor, start: torch.Tensor) -> torch.Tensor:
-        """`[G, 2]`: anchors after which the body, `moved` `[G, 2]` m from them, is in the cells marked as `start`.
+        """Returns `anchor` `[G, 2]`, shifted just enough that the estimated position lies in the `start` cell.
 
-        They are those that it had, `anchor` `[G, 2]`, unless what was observed has led astray.
+        The estimated position is that of a body displaced by `moved` `[G, 2]` (m) from the anchor.
         """
-        place = anchor + self._displacement(moved)
-        return anchor + torch.clamp(place, start - 0.5, start + 0.5) - place
+        position = anchor + self._displacement(moved)
+        return anchor + torch.clamp(position, start - 0.5, start + 0.5) - position
 
     def look(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
-        """`[G, K, W]`: what latent states see of their context, there."""
+        """Returns what the hypermodel reads from the context at the positions of latent states, `[G, K, W]`."""
         return self.hypermodel.look(self.locate(latent, code), code)
 
     def first_layer(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
-        """`[G, K, H]`: the transition's first layer, but for the action."""
+        """Returns the transition's first layer without the action, `[G, K, H]`."""
         return self.hypermodel.first_layer(self._body(latent), seen, code)
 
     def step(self, latent: torch.Tensor, first: torch.Tensor, action: torch.Tensor, code: Code) -> torch.Tensor:
-        """`[G, K, D]`: the next latent states, from what `first_layer` gave and actions `[G, K]`."""
+        """Returns the next latent states `[G, K, D]`, from the output of `first_layer` and actions `[G, K]`."""
         heading, velocities = latent[..., 2:_NUM_POSE], latent[..., _NUM_POSE:_NUM_BODY]
         free = self.free(velocities) + self.free_by_action(action)
         ahead = torch.cat([rotate(free[..., :2], heading), rotate(free[..., 3:5], heading)], dim=-1)
@@ -119,33 +119,33 @@ class MMNNetwork(nn.Module):
         return torch.cat([moved, turned, planar, in_body[..., 5:], motion], dim=-1)
 
     def step_all(self, latent: torch.Tensor, first: torch.Tensor, code: Code) -> torch.Tensor:
-        """`[G, 6 K, D]`: the next latent states of every action, those of one state side by side."""
+        """Returns the next latent states `[G, 6 K, D]` of every action; those of one state are neighbours."""
         num_states = latent.shape[1]
         action = torch.arange(NUM_ACTIONS, device=latent.device).repeat(num_states).expand(len(latent), -1)
         latent, first = (values.repeat_interleave(NUM_ACTIONS, dim=1) for values in (latent, first))
         return self.step(latent, first, action, code)
 
     def predict(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> Predictions:
-        """What the heads say."""
-        to_goal = (code.places[:, None, 2:] - self.locate(latent, code)) / 10
+        """Returns the outputs of the heads."""
+        to_goal = (code.positions[:, None, 2:] - self.locate(latent, code)) / 10
         inputs = torch.cat([self._body(latent), to_goal, self.hypermodel.task_features(seen, code)], dim=-1)
         out = self.heads(self.body(inputs))
         return Predictions(out[..., :NUM_ACTIONS], out[..., NUM_ACTIONS:-2], out[..., -2], out[..., -1])
 
     def value(self, value_logits: torch.Tensor) -> torch.Tensor:
-        """`[G, K]`: means of categorical values, in steps."""
+        """Returns the means `[G, K]` of categorical values, in steps."""
         return torch.softmax(value_logits, dim=-1) @ self.support
 
     def _displacement(self, moved: torch.Tensor) -> torch.Tensor:
-        """`[..., 2]`: (row, column) on the map, of metres (x, y)."""
+        """Returns displacements `[..., 2]` on the map (row, column) of those in metres (x, y)."""
         return _SCALE_RATE * (moved[..., None] * self.scale).sum(-2)
 
     def _body(self, latent: torch.Tensor) -> torch.Tensor:
-        """`[G, K, D + 14]`: heading, velocities and motion, and where in a cell the body is."""
+        """Returns `[G, K, D + 14]`: heading, velocities, the code of the motion, and waves of the displacement."""
         return torch.cat([latent[..., 2:], waves(latent[..., :2])], dim=-1)
 
 
 def rotate(vector: torch.Tensor, heading: torch.Tensor) -> torch.Tensor:
-    """`[..., 2]` vectors, turned by the angles whose sines and cosines are `heading` `[..., 2]`."""
+    """Returns vectors `[..., 2]`, turned by the angles whose sines and cosines are `heading` `[..., 2]`."""
     (x, y), (sine, cosine) = vector.unbind(-1), heading.unbind(-1)
     return torch.stack([cosine * x - sine * y, sine * x + cosine * y], dim=-1)

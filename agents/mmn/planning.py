@@ -18,14 +18,14 @@ _DIRICHLET_FRACTION = 0.25  # MuZero's
 
 
 def outcome(predictions: Predictions, predict_reward: bool) -> tuple[torch.Tensor, torch.Tensor]:
-    """Reward and discount `[G, K]` of arriving in states: the episode ends in the goal, and any other step costs 1."""
+    """Returns reward and discount `[G, K]` of arriving in states: a goal ends the episode, any other step costs 1."""
     discount = torch.sigmoid(-predictions.goal_logit)
     reward = -torch.sigmoid(-predictions.reward_logit) if predict_reward else -discount
     return reward, discount
 
 
 def lookahead(network: MMNNetwork, latent: torch.Tensor, code: Code, predict_reward: bool) -> torch.Tensor:
-    """`[G, K, 6]`: action values of latent states `[G, K, D]` by one step of the model."""
+    """Returns action values `[G, K, 6]` of latent states `[G, K, D]` by one step of the model."""
     first = network.first_layer(latent, network.look(latent, code), code)
     after = network.step_all(latent, first, code)
     predictions = network.predict(after, network.look(after, code), code)
@@ -46,7 +46,7 @@ def plan(
 ) -> SearchResult:
     """Searches from all latent states `[G, K, D]`; the results are in the order of B.
 
-    With noise if `rng` is given; that of "gumbel" is multiplied by `noise_scale`, one number or `[B]`.
+    If `rng` is given, the search has noise. The noise of "gumbel" is multiplied by `noise_scale`, a number or `[B]`.
     """
     size = latent.shape[0] * latent.shape[1], NUM_ACTIONS
     root = _root(network, latent, code)
@@ -101,7 +101,7 @@ def _recurrent_fn(network: MMNNetwork, predict_reward: bool, shape: torch.Size, 
 
 
 def _arrive(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple[Predictions, torch.Tensor]:
-    """What the heads say of latent states, and their embeddings `[B, D + H]`: with the transition's first layer."""
+    """Returns predictions for latent states, and embeddings `[B, D + H]`: states and first layers."""
     seen = network.look(latent, code)
     embedding = torch.cat([latent, network.first_layer(latent, seen, code)], dim=-1)
     return network.predict(latent, seen, code), embedding.flatten(0, 1)

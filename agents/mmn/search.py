@@ -1,9 +1,9 @@
 """Batched tree search in a learned model: Gumbel MuZero (Danihelka et al. 2022), MuZero (Schrittwieser et al. 2020).
 
 `B` is the number of roots, `N` = num_simulations + 1 the number of nodes of a tree, `A` the number of actions and `D`
-the size of an embedding. In each simulation a kernel goes down all trees, one batch of B states is evaluated, and a
-kernel expands and backs up. The search draws no random numbers: those it needs are arguments. Among actions of exactly
-equal scores the first is taken, where mctx's MuZero adds a tiny noise.
+the size of an embedding. In each simulation a kernel descends all trees, the model evaluates one batch of B states, and
+a kernel expands and backs up. The search draws no random numbers: noise is an argument. Of actions with equal scores
+the first is taken, where mctx's MuZero adds a tiny noise.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .tree import ROOT, GumbelSettings, PUCTSettings
 
 
 class Root(NamedTuple):
-    """The states to search from, as the network sees them."""
+    """The network's outputs for the states to search from."""
 
     prior_logits: np.ndarray  # [B, A] float32
     value: np.ndarray  # [B] float32
@@ -28,7 +28,7 @@ class Root(NamedTuple):
 
 
 class Evaluation(NamedTuple):
-    """What the model predicts of one step in B states, and of the states that it leads to."""
+    """The model's predictions for one step in B states, and for the states that it leads to."""
 
     reward: np.ndarray  # [B] float32
     discount: np.ndarray  # [B] float32, of the value after the step; 0 where the episode ends in it
@@ -38,7 +38,7 @@ class Evaluation(NamedTuple):
 
 
 class SearchResult(NamedTuple):
-    """What was found out about the roots."""
+    """The results of a search for its roots."""
 
     action: np.ndarray  # [B] int64
     action_weights: np.ndarray  # [B, A] float32, the policy to learn
@@ -47,7 +47,7 @@ class SearchResult(NamedTuple):
     value: np.ndarray  # [B] float32, the mean over the root's visits
 
 
-# Goes down all trees [B, N] and attaches nodes of an index; writes actions [B] and the parents' rows of embeddings [B].
+# Descends all trees [B, N] and attaches nodes of an index; writes actions [B] and the parents' rows of embeddings [B].
 _Simulate = Callable[[np.ndarray, int, np.ndarray, np.ndarray], None]
 # Evaluates actions [B] int64 in the states of embeddings [B, D]; both are the search's, and valid during the call.
 RecurrentFn = Callable[[torch.Tensor, np.ndarray], Evaluation]
@@ -65,7 +65,7 @@ def gumbel_muzero_policy(
     rescale_values: bool = True,
     use_mixed_value: bool = True,
 ) -> SearchResult:
-    """Sequential halving at the root, deterministic visits in proportion to the improved policy below it.
+    """Searches by sequential halving at the root, deterministic visits in proportion to the improved policy below it.
 
     Args:
       root: the states to search from.
@@ -109,12 +109,12 @@ def muzero_policy(
     pb_c_base: float = 19652.0,
     temperature: float = 1.0,
 ) -> SearchResult:
-    """Upper confidence bounds (PUCT) everywhere; acts in proportion to visits ** (1 / temperature).
+    """Searches by upper confidence bounds (PUCT) everywhere; acts in proportion to visits ** (1 / temperature).
 
     Args:
       root: the states to search from.
       recurrent_fn: the model. It is called once a simulation.
-      num_simulations: 0 acts by the prior with its noise, which then takes the place of the visits.
+      num_simulations: 0 acts by the prior with its noise.
       dirichlet_noise: `[B, A]`, a distribution over actions a root.
       action_noise: `[B, A]`, standard Gumbel noise, by which the action is drawn; zeros to take the most visited.
       dirichlet_fraction: of the noise in the roots' priors.
@@ -140,10 +140,10 @@ def muzero_policy(
 
 
 def considered_visits(num_considered: int, num_simulations: int) -> list[int]:
-    """How often an action must have been visited to be considered at the root, in each simulation.
+    """Returns how often an action must have been visited to be considered at the root, for each simulation.
 
-    Sequential halving (Karnin et al. 2013): each phase visits all considered actions equally often, and the better half
-    of them goes on to the next. All with as many visits as the phase has given so far are those that still take part.
+    In sequential halving (Karnin et al. 2013), each phase visits all considered actions equally often, and the better
+    half of them is considered in the next. They are those with as many visits as the phases have given so far.
     """
     if num_considered <= 1:
         return list(range(num_simulations))
@@ -161,10 +161,10 @@ def considered_visits(num_considered: int, num_simulations: int) -> list[int]:
 
 @torch.inference_mode()
 def _search(root: Root, recurrent_fn: RecurrentFn, num_simulations: int, simulate: _Simulate) -> np.ndarray:
-    """Trees `[B, N]` after `num_simulations` simulations of all roots together."""
+    """Returns trees `[B, N]` after `num_simulations` simulations of all roots together."""
     batch_size, num_actions = root.prior_logits.shape
     tree = np.empty((batch_size, num_simulations + 1), trees.node_type(num_actions))
-    # What is given is copied into arrays of one kind; for each other kind the kernels would be compiled again.
+    # The kernels would be compiled again for another type of array, so everything is copied into arrays of one type.
     reward, discount, value = np.empty((3, batch_size), np.float32)
     prior_logits = np.empty((batch_size, num_actions), np.float32)
     prior_logits[:], value[:] = root.prior_logits, root.value
@@ -191,7 +191,7 @@ def _log(probs: np.ndarray) -> np.ndarray:
 
 
 def _tempered(probs: np.ndarray, temperature: float) -> np.ndarray:
-    """Logits of `probs ** (1 / temperature)`, up to a constant."""
+    """Returns the logits of `probs ** (1 / temperature)`, up to a constant."""
     logits = _log(probs)
     logits -= logits.max(axis=-1, keepdims=True)
     with np.errstate(over="ignore"):

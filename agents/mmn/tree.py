@@ -1,11 +1,11 @@
-"""Search trees as arrays, and the kernels that select, expand and back up in all of them.
+"""Search trees as arrays, and kernels that select, expand and back up in all trees of a batch.
 
 `B` is the number of trees, `N` the number of nodes in each, `A` the number of actions. A tree is a row of an array
 `[B, N]` of `node_type`; a node first expanded in simulation i, counted from 0, has index i + 1, the root has 0. All
 arithmetic on values is in float32.
 
-Numba renews its cache of compiled kernels when this file changes, not when one that it imports does: all that they call
-belongs here.
+Numba compiles the kernels anew when this file changes, but not when a module that it imports does. So all functions
+that the kernels call are in this file.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _LEAST_SCORE = np.float32(-1e9)  # of an action that may be visited: above that 
 
 @functools.cache
 def node_type(num_actions: int) -> np.dtype:
-    """A node. What is in it is undefined until it is expanded, and so is the q-value of an action not visited."""
+    """Returns the type of a node. Before a node is expanded, or an action visited, its numbers are undefined."""
     return np.dtype(
         [
             ("visits", np.int32),  # 1 when expanded, and one more for each visit of an action
@@ -52,7 +52,7 @@ def node_type(num_actions: int) -> np.dtype:
 
 
 class GumbelSettings(NamedTuple):
-    """How completed q-values become additions to logits."""
+    """How completed q-values are scaled before they are added to logits."""
 
     value_scale: np.float32
     maxvisit_init: np.float32
@@ -68,22 +68,22 @@ class PUCTSettings(NamedTuple):
 
 
 def compiled(function: Callable[..., Any], inline: bool = False) -> Callable[..., Any]:
-    """`function` as machine code, kept on disk where a place for it can be written to, and otherwise in memory."""
+    """Returns `function` as machine code, cached on disk if numba finds a folder that it can write to."""
     options: dict[str, Any] = {"error_model": "numpy", "forceinline": inline}
     try:
         return numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # numba found no such place
+    except RuntimeError:  # numba found no such folder
         return numba.njit(**options)(function)
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """As `compiled`, into its callers: left to LLVM, a search takes a tenth longer."""
+    """Returns `function` compiled into its callers; if LLVM decides, a search takes a tenth longer."""
     return compiled(function, inline=True)
 
 
 @compiled
 def plant(tree: np.ndarray, prior_logits: np.ndarray, values: np.ndarray) -> None:
-    """Makes the roots of `prior_logits` `[B, A]` and `values` `[B]`."""
+    """Expands the roots with `prior_logits` `[B, A]` and `values` `[B]`."""
     for b in range(len(tree)):
         _expand(tree[b, ROOT], prior_logits[b], values[b])
 
@@ -98,16 +98,16 @@ def simulate_gumbel(
     actions: np.ndarray,
     rows: np.ndarray,
 ) -> None:
-    """Goes down from each root to an action not yet tried, as Danihelka et al. (2022) do, and attaches a node there.
+    """Descends from each root to an action not yet visited (Danihelka et al. 2022), and attaches a node there.
 
     Args:
-      tree: gets the node, not yet expanded.
-      index: of the node.
+      tree: `[B, N]`.
+      index: of the new nodes, which are not expanded yet.
       gumbel: `[B, A]` float32, added to the scores of the roots' actions.
       considered_visit: only actions visited so many times are considered at the roots.
       settings: of the completed q-values.
-      actions: `[B]`, the actions are written here,
-      rows: `[B]`, and here parent * B + b: where embeddings `[N * B, D]` hold the parents'.
+      actions: `[B]`, output: the actions.
+      rows: `[B]`, output: parent * B + b, the rows of the parents in embeddings `[N * B, D]`.
     """
     scores = np.empty(gumbel.shape[1], np.float32)
     for b in range(len(tree)):
@@ -121,7 +121,7 @@ def simulate_gumbel(
 
 @compiled
 def simulate_puct(tree: np.ndarray, index: int, settings: PUCTSettings, actions: np.ndarray, rows: np.ndarray) -> None:
-    """As `simulate_gumbel`, by the upper confidence bounds of Schrittwieser et al. (2020)."""
+    """As `simulate_gumbel`, with the upper confidence bounds of Schrittwieser et al. (2020)."""
     for b in range(len(tree)):
         parent, action = ROOT, _puct_action(tree[b, ROOT], settings)
         while tree[b, parent].children[action] != UNVISITED:
@@ -140,7 +140,7 @@ def expand_and_backward(
     prior_logits: np.ndarray,
     values: np.ndarray,
 ) -> None:
-    """Expands the nodes attached last, and adds their values to the means on the way to the roots."""
+    """Expands the nodes that were attached last, and updates the mean values on their paths to the roots."""
     for b in range(len(tree)):
         node = tree[b, index]
         node.reward, node.discount = rewards[b], discounts[b]
@@ -173,7 +173,7 @@ def gumbel_decision(
 
 @compiled
 def puct_qvalues(tree: np.ndarray, qvalues: np.ndarray) -> None:
-    """Writes the roots' `qvalues` `[B, A]`, those of actions not visited the least, as PUCT takes them to be."""
+    """Writes the roots' `qvalues` `[B, A]`; as in PUCT, actions not visited have the lowest value."""
     for b in range(len(tree)):
         root = tree[b, ROOT]
         lowest, _ = _value_range(root)
@@ -245,7 +245,7 @@ def _most_visits(node: Any) -> int:
 def _gumbel_root_action(
     root: Any, gumbel: np.ndarray, considered_visit: int, settings: GumbelSettings, scores: np.ndarray
 ) -> int:
-    """The best by gumbel + logit + transformed q-value; the last are left in `scores` `[A]`."""
+    """Returns the best action by gumbel + logit + transformed q-value, and writes the last into `scores` `[A]`."""
     _complete(root, settings, scores)
     _transform(root, settings, scores)
     highest = _highest(root.prior_logits)
@@ -259,7 +259,7 @@ def _gumbel_root_action(
 
 @inlined
 def _gumbel_interior_action(node: Any, settings: GumbelSettings, scores: np.ndarray) -> int:
-    """Where the visits fall short of the improved policy the most (Danihelka et al. 2022, section 5)."""
+    """Returns the action whose visits fall most short of the improved policy (Danihelka et al. 2022, section 5)."""
     _complete(node, settings, scores)
     _transform(node, settings, scores)
     for a in range(len(node.children)):
@@ -275,7 +275,7 @@ def _gumbel_interior_action(node: Any, settings: GumbelSettings, scores: np.ndar
 
 @inlined
 def _complete(node: Any, settings: GumbelSettings, qvalues: np.ndarray) -> None:
-    """Writes the node's `qvalues` `[A]`, those of actions not visited completed by a value of the node."""
+    """Writes the node's `qvalues` `[A]`; actions not visited get the node's value."""
     value = _mixed_value(node) if settings.use_mixed_value else node.raw_value
     for a in range(len(node.qvalues)):
         qvalues[a] = node.qvalues[a] if node.child_visits[a] > 0 else value
@@ -283,7 +283,7 @@ def _complete(node: Any, settings: GumbelSettings, qvalues: np.ndarray) -> None:
 
 @inlined
 def _mixed_value(node: Any) -> np.float32:
-    """The network's value and the visited actions' in one (Danihelka et al. 2022, appendix D)."""
+    """Returns the mean of the network's value and the visited actions' (Danihelka et al. 2022, appendix D)."""
     sum_probs, weighted = _ZERO, _ZERO
     for a in range(len(node.qvalues)):
         if node.child_visits[a] > 0:
@@ -297,7 +297,7 @@ def _mixed_value(node: Any) -> np.float32:
 
 @inlined
 def _transform(node: Any, settings: GumbelSettings, qvalues: np.ndarray) -> None:
-    """Rescales completed `qvalues` `[A]` in place, if so set, and scales them by the visits of the most visited."""
+    """Scales completed `qvalues` `[A]` in place by the visits of the most visited action."""
     if settings.rescale_values:
         _rescale(qvalues)
     scale = (settings.maxvisit_init + np.float32(_most_visits(node))) * settings.value_scale
@@ -307,7 +307,7 @@ def _transform(node: Any, settings: GumbelSettings, qvalues: np.ndarray) -> None
 
 @inlined
 def _rescale(values: np.ndarray) -> None:
-    """Brings `values` `[A]` to [0, 1] in place."""
+    """Rescales `values` `[A]` to [0, 1] in place."""
     lowest = highest = values[0]
     for a in range(1, len(values)):
         lowest, highest = min(lowest, values[a]), max(highest, values[a])
@@ -318,7 +318,7 @@ def _rescale(values: np.ndarray) -> None:
 
 @inlined
 def _puct_action(node: Any, settings: PUCTSettings) -> int:
-    """The action of the highest upper confidence bound (Schrittwieser et al. 2020, appendix B)."""
+    """Returns the action of the highest upper confidence bound (Schrittwieser et al. 2020, appendix B)."""
     lowest, highest = _value_range(node)
     span = max(highest - lowest, _LEAST_RANGE)
     count = np.float32(node.visits)
@@ -336,7 +336,7 @@ def _puct_action(node: Any, settings: PUCTSettings) -> int:
 
 @inlined
 def _value_range(node: Any) -> tuple[np.float32, np.float32]:
-    """The least and the greatest among the node's value and those of its visited actions."""
+    """Returns the lowest and the highest among the node's value and those of its visited actions."""
     lowest = highest = node.value
     for a in range(len(node.qvalues)):
         if node.child_visits[a] > 0:

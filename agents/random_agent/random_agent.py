@@ -6,45 +6,28 @@ import pathlib
 
 import numpy as np
 
-from mazebench.agent import Interface, Observation
-
-_BLOCK = 128  # actions drawn at a time for one episode
+from mazebench.agent import Agent, Inputs, Interface
 
 
-class RandomAgent:
-    """Acts uniformly at random; an episode's actions depend on its seed and the agent's alone."""
+class RandomAgent(Agent):
+    """Acts uniformly at random; the actions of an episode depend on its seed alone."""
 
-    def __init__(self, num_actions: int, seed: int = 0):
+    def __init__(self, num_actions: int):
         self._num_actions = num_actions
-        self._seed = seed
-        self._rngs: list[np.random.Generator] = []
-        self._actions = np.zeros((0, _BLOCK), dtype=np.int64)
-        self._drawn = np.zeros(0, dtype=np.int64)
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> RandomAgent:
-        """`checkpoint` has no meaning here."""
-        return cls(interface.num_actions, seed)
+        """Returns a new agent; `seed` and `checkpoint` have no meaning here."""
+        return cls(interface.num_actions)
 
-    def initial_state(self, batch_size: int) -> None:
-        """Streams of the agent's own in each of `batch_size` environments, until `seed_episodes` gives better ones."""
-        self._rngs = [np.random.default_rng([self._seed, slot]) for slot in range(batch_size)]
-        self._actions = np.zeros((batch_size, _BLOCK), dtype=np.int64)
-        self._drawn = np.full(batch_size, _BLOCK)
-
-    def seed_episodes(self, seeds: np.ndarray, mask: np.ndarray) -> None:
-        """Starts a new stream where `mask` `[B]` says that an episode begins."""
-        for slot in np.flatnonzero(mask):
-            self._rngs[slot] = np.random.default_rng([self._seed, int(seeds[slot])])
-            self._drawn[slot] = _BLOCK
+    def initial_state(self, batch_size: int) -> list[np.random.Generator]:
+        """Returns a generator for each environment, which `act` replaces where an episode begins."""
+        return [np.random.default_rng(0) for _ in range(batch_size)]
 
     def act(
-        self, observation: Observation, is_first: np.ndarray, state: None, explore: bool = False
-    ) -> tuple[np.ndarray, None]:
-        """Actions `[B]`, each episode's from its own stream."""
-        for slot in np.flatnonzero(self._drawn == _BLOCK):
-            self._actions[slot] = self._rngs[slot].integers(self._num_actions, size=_BLOCK)
-            self._drawn[slot] = 0
-        actions = self._actions[np.arange(len(self._drawn)), self._drawn]
-        self._drawn += 1
-        return actions, state
+        self, inputs: Inputs, state: list[np.random.Generator], explore: bool = False
+    ) -> tuple[np.ndarray, list[np.random.Generator]]:
+        """Returns actions `[B]`, each from the generator of its episode."""
+        for slot in np.flatnonzero(inputs.new_episode):
+            state[slot] = np.random.default_rng(int(inputs.seed[slot]))
+        return np.array([rng.integers(self._num_actions) for rng in state]), state

@@ -1,7 +1,7 @@
-"""Collecting on Ray: actors that play, each with its share of the environments, and one learner that they feed.
+"""Collecting on Ray: each actor plays in its share of the environments, and one learner learns from all of them.
 
-Ape-X as published (Horgan et al. 2018), but for one thing: the learner makes a fixed number of updates for each step
-that arrives, so that scores do not depend on how fast the actors are.
+This is Ape-X (Horgan et al. 2018) with one difference: the learner makes a fixed number of updates for each step that
+arrives, so scores do not depend on how fast the actors are.
 """
 
 from __future__ import annotations
@@ -9,13 +9,13 @@ from __future__ import annotations
 import copy
 import itertools
 import sys
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from typing import Any
 
-from mazebench.agent import ExploringAgent, LearningAgent
 from mazebench.errors import InputError, RunError
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector, Experience
+from mazebench.training.protocol import Learner, LearningAgent
 
 try:
     import ray
@@ -24,21 +24,19 @@ try:
 except ModuleNotFoundError as error:
     raise InputError("--workers needs Ray, which the extra [ray] brings (docs/start.md)") from error
 
-if TYPE_CHECKING:
-    from mazebench.training.loop import TrainOptions
-
 _STEPS_PER_CALL = 16  # environment steps an actor takes before it answers
-_CALLS_PER_PUBLISH = 4  # answers of an actor between the newest networks it gets: 64 of its steps
-_MAX_FAILURES = 20  # of actors in a run, before it gives up
+_CALLS_PER_PUBLISH = 4  # answers of an actor before it gets the newest network: 64 of its steps
+_MAX_FAILURES = 20  # of actors, before the run gives up
 
 
 class _Player:
-    """Plays in its share of the environments; lives in a process of its own."""
+    """Plays in its share of the environments, in a process of its own."""
 
-    def __init__(self, task_spec: TaskSpec, actor: ExploringAgent, first_env: int, num_envs: int):
+    def __init__(self, task_spec: TaskSpec, actor: LearningAgent, first_env: int, num_envs: int):
         self._collector = Collector(task_spec, num_envs, seed=0, num_threads=1)
         self._actor = actor
         self._first_env = first_env
+        self._state: Any = actor.initial_state(num_envs)
 
     def restart(self, seed: int) -> None:
         """Begins new trajectories everywhere, and a new stream of exploration."""
@@ -60,55 +58,55 @@ class _Player:
 class RaySource:
     """Experience of Ray actors in the order in which it arrives; an actor that dies is replaced."""
 
-    def __init__(self, options: TrainOptions, task_spec: TaskSpec, learner: LearningAgent):
-        """Starts `options.workers` actors, on the cluster at `options.ray_address` or on a local one.
+    def __init__(self, task_spec: TaskSpec, learner: Learner, workers: int, address: str | None):
+        """Connects to the cluster at `address`, None starts a local one; `collect` starts the actors.
 
         Raises:
-          InputError: if the cluster can't be reached, or there are fewer environments than workers.
+          InputError: if the cluster can't be reached, or has fewer CPUs than `workers`, or the learner has fewer
+            environments.
         """
-        if options.workers > learner.num_envs:
-            raise InputError(
-                f"expected at most {learner.num_envs} workers, one an environment, found {options.workers}"
-            )
+        if workers > learner.num_envs:
+            raise InputError(f"expected at most {learner.num_envs} workers, one an environment, found {workers}")
         self._players: list[Any] = []
         self._started = not ray.is_initialized()
         if self._started:
-            connect(options.ray_address)
+            connect(address or "local")
         num_cpus = int(ray.cluster_resources().get("CPU", 0))
-        if num_cpus < options.workers:
+        if num_cpus < workers:
             self.__exit__()
-            raise InputError(f"expected at most {num_cpus} workers, one a CPU of the cluster, found {options.workers}")
+            raise InputError(f"expected at most {num_cpus} workers, one a CPU of the cluster, found {workers}")
         self._learner, self._task_spec = learner, task_spec
-        bounds = [worker * learner.num_envs // options.workers for worker in range(options.workers + 1)]
+        bounds = [worker * learner.num_envs // workers for worker in range(workers + 1)]
         self._shares = list(itertools.pairwise(bounds))
-        self._players = [None] * options.workers
-        self._calls: dict[Any, int] = {}  # the worker of each answer that is awaited
-        self._num_answers = [0] * options.workers
+        self._players = [None] * workers
+        self._calls: dict[Any, int] = {}  # the worker's index, by the awaited answer
+        self._num_answers = [0] * workers
         self._num_failures = self._seed = 0
 
-    def restart(self, seed: int) -> None:
-        """Begins new trajectories in all actors; what is under way is thrown away."""
+    def collect(self, seed: int) -> Iterator[Sequence[tuple[int, Experience]]]:
+        """Begins new trajectories in all actors, and yields the steps of one actor after another."""
         self._seed = seed
-        self._calls = {}
+        self._calls = {}  # answers still awaited are of older trajectories
         for worker in range(len(self._players)):
             if self._players[worker] is None:
                 self._start(worker)
             else:
                 self._begin(worker)
+        while True:
+            yield self._next_answer()
 
-    def collect(self) -> Iterator[tuple[int, Experience]]:
-        """Waits for one actor's steps and lets it go on."""
+    def _next_answer(self) -> Sequence[tuple[int, Experience]]:
+        """Waits for the steps of one actor, and lets that actor go on; none where the actor died and was replaced."""
         done, _ = ray.wait(list(self._calls), num_returns=1)
         worker = self._calls.pop(done[0])
         try:
             experiences = ray.get(done[0])
         except ray.exceptions.RayActorError as error:
             self._replace(worker, error)
-            return
+            return []
         self._num_answers[worker] += 1
         self._play(worker, publish=self._num_answers[worker] % _CALLS_PER_PUBLISH == 0)
-        for experience in experiences:
-            yield self._shares[worker][0], experience
+        return [(self._shares[worker][0], experience) for experience in experiences]
 
     def _start(self, worker: int) -> None:
         first_env, end = self._shares[worker]

@@ -1,4 +1,4 @@
-"""What the learners of DQN and MMN share: the replay and its hindsight, descending, and files to go on from exactly."""
+"""The parts that the learners of DQN and MMN share: replay with hindsight, gradient steps, saving and loading."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ import torch
 
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze
-from mazebench.records import read_json
+from mazebench.storage.json_files import read_json
 from mazebench.tasks.context import build_context
 from mazebench.training.experience import Experience
 from mazebench.world.mjcf import ACTIONS
 
 from . import symmetry
+from .actor import NetworkAgent
 from .checkpoint import AGENT_FILE, load_checkpoint, load_into, save_checkpoint
 from .replay import Hindsight, Replay, Sample, SequenceSample
 
@@ -30,20 +31,17 @@ _MOMENTS = {"step", "exp_avg", "exp_avg_sq"}  # Adam's
 
 
 class HindsightLearner:
-    """Remembers and learns for an agent, which acts with what is learned so far; `update` is its children's."""
+    """Stores experience and updates the network of `actor`; subclasses define `update`."""
 
     def __init__(
         self,
-        actor: Any,
+        actor: NetworkAgent,
         mazes: tuple[Maze, ...],
         seed: int,
         optimizer: torch.optim.Optimizer,
         keep_anchor: bool = False,
     ):
-        """`optimizer` is of the actor's network; the actor has name, config, network and context_size_built.
-
-        `keep_anchor` is a `Hindsight`'s.
-        """
+        """`optimizer` is of the actor's network; `keep_anchor` is passed on to `Hindsight`."""
         self.actor = actor
         config = self._config = actor.config
         self.num_envs = config.num_envs
@@ -59,39 +57,39 @@ class HindsightLearner:
             config.relabel_start,
             keep_anchor,
         )
-        self._arrays: dict[str, np.ndarray] = {}  # what a child wants to find again when it goes on
+        self._arrays: dict[str, np.ndarray] = {}  # of a subclass, saved and loaded with the rest
 
     def config(self) -> dict[str, Any]:
-        """All values of the config."""
+        """Returns all values of the config."""
         return dataclasses.asdict(self._config)
 
     def description(self) -> str:
-        """The size of the network and of the replay, and where it learns."""
+        """Returns the size of the network and of the replay, and the device, in one line."""
         parameters = list(self.actor.network.parameters())
         weights = sum(parameter.numel() for parameter in parameters)
         rows, megabytes = self._config.replay_capacity, self._replay.num_bytes / 2**20
         return f"{weights:,} weights on {parameters[0].device}; replay of {rows:,} rows, {megabytes:.0f} MiB"
 
     def task_options(self) -> dict[str, Any]:
-        """Episodes of several goals, as the config has it."""
+        """Returns the number of goals of an episode, as configured."""
         return {"num_goals": self._config.num_goals}
 
     def observe(self, experience: Experience, first_env: int = 0) -> None:
-        """Remembers one step in the environments from `first_env` on."""
+        """Stores one step in the environments from `first_env` on."""
         self._replay.add(experience, first_env)
 
     def num_updates_due(self, env_steps: int) -> int:
-        """One update every `steps_per_update` steps after the first `min_rows`; none while the replay is not filled."""
+        """Returns one a `steps_per_update` steps after the first `min_rows`; 0 until the replay holds as many rows."""
         if self._replay.num_rows < self._config.min_rows:
             return 0
         return max(0, env_steps - self._config.min_rows) // self._config.steps_per_update
 
     def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:
-        """Writes the agent, the target network and optimizer, the random stream and the replay."""
+        """Writes the agent, the target network, the optimizer, the random generator and the replay."""
         metadata = {
             "agent": self.actor.name,
             "config": self.config(),
-            "context_size": self.actor.context_size_built,
+            "context_size": self.actor.trained_size,
             "provenance": dict(provenance),
         }
         save_checkpoint(folder / AGENT_FILE, self.actor.network.state_dict(), metadata)
@@ -104,7 +102,7 @@ class HindsightLearner:
         self._replay.save(folder / _REPLAY_FILE)
 
     def load(self, folder: pathlib.Path) -> None:
-        """Goes on from what `save` wrote; where the replay is gone, learning waits until it is filled again.
+        """Restores what `save` wrote; without the replay file, learning waits until the replay is filled again.
 
         Raises:
           InputError: if a file is damaged, or another agent's.
@@ -158,34 +156,32 @@ class HindsightLearner:
             raise InputError(f"{path}: expected the state of a random stream, found {str(error)[:120]}") from error
 
     def _draw_symmetry(self) -> int:
-        """How a batch is rotated or mirrored."""
+        """Returns the index of the symmetry that a batch is turned by; 0 leaves it as it is."""
         return int(self._rng.integers(symmetry.NUM_SYMMETRIES)) if self._config.symmetries else 0
 
     def _contexts(self, sample: Sample | SequenceSample, turned: int) -> torch.Tensor:
-        """`[G, 4, M, M]`: the contexts of a sample's groups, turned."""
+        """Returns the turned contexts `[G, 4, M, M]` of a sample's groups."""
         size = self._mazes[0].size
         contexts = [
-            build_context(
-                self._mazes[maze].walls, divmod(start, size), divmod(goal, size), self.actor.context_size_built
-            )
+            build_context(self._mazes[maze].walls, divmod(start, size), divmod(goal, size), self.actor.trained_size)
             for maze, start, goal in zip(sample.maze.tolist(), sample.start.tolist(), sample.goal.tolist(), strict=True)
         ]
         return symmetry.turn_planes(torch.from_numpy(np.stack(contexts)), turned)
 
     def _marks(self, cell: np.ndarray, turned: int) -> torch.Tensor:
-        """`[G, 2]`: where (row, column) contexts mark cells `[G]`, on the turned map."""
-        size, context_size = self._mazes[0].size, self.actor.context_size_built
+        """Returns the positions `[G, 2]` at which turned contexts mark the cells `[G]`."""
+        size, context_size = self._mazes[0].size, self.actor.trained_size
         marks = torch.from_numpy(np.stack(np.divmod(cell, size), axis=-1) * context_size // size).float()
         return symmetry.turn_cells(marks, context_size, turned)
 
-    def _places(self, sample: Sample | SequenceSample, turned: int) -> torch.Tensor:
-        """`[..., 2]`: where on the turned map, (row, column), the cells of a sample's steps are."""
+    def _positions(self, sample: Sample | SequenceSample, turned: int) -> torch.Tensor:
+        """Returns the positions `[..., 2]` of a sample's true cells on the turned map."""
         size = self._mazes[0].size
         cells = torch.from_numpy(np.stack(np.divmod(sample.cell, size), axis=-1)).float()
-        return symmetry.turn_cells(cells, size, turned) * (self.actor.context_size_built / size)
+        return symmetry.turn_cells(cells, size, turned) * (self.actor.trained_size / size)
 
     def _descend(self, loss: torch.Tensor) -> torch.Tensor:
-        """One step of the optimizer, and the target network's after it; returns the gradient's norm."""
+        """Takes one step of the optimizer, moves the target network along, and returns the gradient's norm."""
         self._optimizer.zero_grad()
         loss.backward()
         network = self.actor.network
@@ -198,5 +194,5 @@ class HindsightLearner:
 
 
 def _below(prefix: str, tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
-    """Those whose names begin with `prefix`, by the rest of the name."""
+    """Returns the tensors whose names begin with `prefix`, by the rest of the name."""
     return {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}

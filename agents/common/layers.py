@@ -1,4 +1,4 @@
-"""What the networks of DQN and MMN share: features of states and maps, and reading a map at a place.
+"""Layers that the networks of DQN and MMN share: features of states and of maps, and codes of positions.
 
 `G` is the number of contexts, `K` of states in each, `M` the side of the context, `C` of channels.
 """
@@ -14,14 +14,14 @@ from torch.nn import functional
 
 NUM_PLANES = 4
 NUM_WAVES = 16
-_FREQUENCIES = (0.25, 0.5, 1.0, 2.0)  # per metre; octaves in which what was moved is given
+_FREQUENCIES = (0.25, 0.5, 1.0, 2.0)  # per metre, octaves
 
 
 class MapEncoder(nn.Module):
-    """Features of every cell of the map, each of which knows of walls and goal around it."""
+    """Features of every cell of the map, of the walls and the goal around that cell."""
 
     def __init__(self, channels: int, dilations: tuple[int, ...]):
-        """One residual 3 x 3 convolution for each of `dilations`; a feature sees their sum and one cell more far."""
+        """Stacks one residual 3 x 3 convolution for each of `dilations`; a feature sees their sum and one cell more."""
         super().__init__()
         self.inputs = nn.Conv2d(NUM_PLANES, channels, 3, padding=1)
         self.layers = nn.ModuleList(
@@ -29,39 +29,40 @@ class MapEncoder(nn.Module):
         )
 
     def forward(self, context: torch.Tensor) -> torch.Tensor:
-        """`[G, C, M, M]` from `[G, 4, M, M]`."""
+        """Returns `[G, C, M, M]` of contexts `[G, 4, M, M]`."""
         features = functional.relu(self.inputs(context))
         for layer in self.layers:
             features = features + functional.relu(layer(features))
         return features
 
 
-def marked_place(plane: torch.Tensor) -> torch.Tensor:
-    """`[G, 2]` float: row and column of the mark in one-hot planes `[G, M, M]`."""
+def marked_position(plane: torch.Tensor) -> torch.Tensor:
+    """Returns the row and column `[G, 2]` float of the mark in one-hot planes `[G, M, M]`."""
     size = plane.shape[-1]
     index = plane.flatten(1).argmax(dim=1)
     return torch.stack([index // size, index % size], dim=-1).to(plane.dtype)
 
 
-def place_code(place: torch.Tensor, size: int, sharpness: torch.Tensor) -> torch.Tensor:
-    """`[G, K, M * M]`: places (row, column) `[G, K, 2]` as soft one-hots over the cells of a map of `size` M."""
-    cells = torch.arange(size, device=place.device)
-    distance = (place[..., None] - cells) ** 2  # [G, K, 2, M]
+def position_code(position: torch.Tensor, size: int, sharpness: torch.Tensor) -> torch.Tensor:
+    """Returns positions `[G, K, 2]` (row, column) as soft one-hots `[G, K, M * M]` over the cells of a map."""
+    cells = torch.arange(size, device=position.device)
+    distance = (position[..., None] - cells) ** 2  # [G, K, 2, M]
     weight = torch.softmax(-distance * functional.softplus(sharpness + 1.0), dim=-1)
-    # A soft one-hot of the row times one of the column
+    # A soft one-hot of the row times one of the column.
     return (weight[..., 0, :, None] * weight[..., 1, None, :]).flatten(-2)
 
 
 def waves(moved: torch.Tensor) -> torch.Tensor:
-    """`[..., 16]`: metres `[..., 2]` as sines and cosines, which tell where in a cell they end."""
+    """Returns sines and cosines `[..., 16]` of displacements `[..., 2]` (m), codes of the position within a cell."""
     phase = 2 * math.pi * moved[..., None] * torch.tensor(_FREQUENCIES, device=moved.device)
     return torch.cat([torch.sin(phase), torch.cos(phase)], dim=-1).flatten(-2)
 
 
 def state_features(state: torch.Tensor, origin: torch.Tensor) -> torch.Tensor:
-    """`[..., 9]`: x, y since `origin` `[..., 2]` (m), sine and cosine of yaw, three velocities, a fifth of x and y.
+    """Returns features `[..., 9]` of states `[..., 12]`.
 
-    Of the twelve numbers of a state, only these vary: see docs/tasks.md.
+    They are x and y since `origin` `[..., 2]` (m), the sine and cosine of yaw, three velocities, and x and y again,
+    divided by five. The other numbers of a state never vary (docs/tasks.md).
     """
     yaw = state[..., 5]
     return torch.cat(
@@ -78,9 +79,9 @@ def state_features(state: torch.Tensor, origin: torch.Tensor) -> torch.Tensor:
 
 
 def in_batches(function: Callable[..., torch.Tensor], size: int, *inputs: torch.Tensor) -> torch.Tensor:
-    """`function` of `inputs` `[B, ...]`, computed on `size` rows at a time, the last ones padded by zeros.
+    """Returns `function` of `inputs` `[B, ...]`, computed on `size` rows at a time, the last ones padded by zeros.
 
-    PyTorch rounds differently at another batch size; so a row's result depends on the row alone.
+    PyTorch rounds differently at another batch size. With a fixed one, a row's result depends on the row alone.
     """
     num_rows = len(inputs[0])
     padding = -num_rows % size

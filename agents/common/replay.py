@@ -1,7 +1,7 @@
-"""Trajectories, stored once and compactly, and the hindsight that is sampled from them; shared by the learning agents.
+"""A replay of trajectories, and samples of it whose goals are relabelled in hindsight.
 
 `B` is the number of environments, `G` the number of groups in a sample, `K` of steps in a group, `n` of the return's
-steps. Cells are numbers, row * N + column. A row is one observation; the context of a row is never stored, but built
+steps. A cell is given by its index, row * N + column. A row is one observation; its context is not stored, but built
 again from maze, start and goal.
 """
 
@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mazebench.arrays import read_arrays
 from mazebench.errors import InputError
-from mazebench.files import open_file
+from mazebench.storage.arrays import read_arrays
+from mazebench.storage.files import open_file
 from mazebench.training.experience import Experience
 
 from .sum_tree import SumTree
@@ -35,15 +35,15 @@ _ROW_FIELDS = (
     "leg",
 )
 _ENV_FIELDS = ("next", "current", "current_leg", "leg_origin", "current_anchor", "current_anchor_origin")
-_NO_ACTION = -1  # of the row after a trajectory's last step
+_NO_ACTION = -1  # in the row after a trajectory's last step
 _STATE_SIZE = 12
 _PRIORITY_TYPE = np.dtype(np.float64)
-_MAX_PRIORITY = 1e30  # sums of them stay finite
-_MAX_WRITTEN = 2**62  # rows; more could not be counted on from
+_MAX_PRIORITY = 1e30  # so that sums stay finite
+_MAX_WRITTEN = 2**62  # rows, so that counting on does not overflow
 
 
 class Sample(NamedTuple):
-    """G groups of K steps; the steps of a group share one context, which makes learning from many of them cheap."""
+    """G groups of K steps; the steps of a group share one context, so it is encoded once for all of them."""
 
     row: np.ndarray  # [G] int, the rows whose priorities the groups were drawn by
     weight: np.ndarray  # [G] float32, importance weights, at most 1
@@ -57,7 +57,7 @@ class Sample(NamedTuple):
     reward: np.ndarray  # [G, K] float32, the sum of up to n rewards towards `goal`
     discount: np.ndarray  # [G, K] float32, of `next_state`: 0 where the goal was reached within the n steps, else 1
     next_state: np.ndarray  # [G, K, 12] float32, after up to n steps; a trajectory's last one where it ends before
-    valid: np.ndarray  # [G, K] bool, the step was taken outside the goal
+    valid: np.ndarray  # [G, K] bool, whether the step was taken outside of the goal
 
 
 class SequenceSample(NamedTuple):
@@ -68,32 +68,32 @@ class SequenceSample(NamedTuple):
     maze: np.ndarray  # [G] int
     start: np.ndarray  # [G] int, cell
     goal: np.ndarray  # [G] int, cell
-    relabelled: np.ndarray  # [G] bool, the goal is one of hindsight
+    relabelled: np.ndarray  # [G] bool, whether the goal was relabelled
     anchor: np.ndarray  # [G] int, the cell where `origin` was observed
     origin: np.ndarray  # [G, 2] float32, x and y observed where the context's leg started, or the trajectory
     state: np.ndarray  # [G, S, L + 1, 12] float32
     cell: np.ndarray  # [G, S, L + 1] int, the body's true cell at `state`
     action: np.ndarray  # [G, S, L] int, taken in the first L states
-    exists: np.ndarray  # [G, S, L + 1] bool, the trajectory goes as far; the rest repeats its last state
+    exists: np.ndarray  # [G, S, L + 1] bool, whether the trajectory goes as far; then its last state is repeated
 
 
 @dataclasses.dataclass(frozen=True)
 class Hindsight:
-    """Which goals a sample is relabelled with."""
+    """How the goals of a sample are relabelled."""
 
     ratio: float = 0.8  # share of relabelled groups
     mean_offset: float = 16.0  # steps ahead of the row at which the goal was reached; geometric
-    window: int = 60  # steps; no goal lies farther ahead, no step of a group farther before it
-    relabel_start: bool = False  # whether the context's start moves along, to the group's first step
-    keep_anchor: bool = False  # whether motion is told from the trajectory's start, a cell's centre, and not the leg's
+    window: int = 60  # steps; a goal lies at most as far ahead, and a group's steps at most as far before the goal
+    relabel_start: bool = False  # whether the context's start becomes the cell of the group's first step
+    keep_anchor: bool = False  # whether displacements are measured from the trajectory's start, not from the leg's
 
 
 class _Groups(NamedTuple):
-    """What `Replay` draws before it looks at what happened: see `Sample`."""
+    """The rows of a sample's groups and their contexts: see `Sample`."""
 
     row: np.ndarray  # [G]
     env: np.ndarray  # [G]
-    steps: np.ndarray  # [G, K], places in the ring
+    steps: np.ndarray  # [G, K], indices in the ring
     maze: np.ndarray  # [G]
     start: np.ndarray  # [G]
     goal: np.ndarray  # [G]
@@ -134,7 +134,7 @@ class Replay:
 
     @property
     def num_rows(self) -> int:
-        """Rows stored now."""
+        """The number of rows that are stored."""
         return int(np.minimum(self._next, self._length).sum())
 
     def save(self, path: pathlib.Path) -> None:
@@ -146,10 +146,10 @@ class Replay:
         np.savez(path, **rows, **envs, priorities=leaves, largest_priority=self._largest_priority)
 
     def load(self, path: pathlib.Path) -> None:
-        """Goes on from what `save` wrote.
+        """Restores what `save` wrote.
 
         Raises:
-          InputError: if the file is damaged or of another shape, and nothing is changed then.
+          InputError: if the file is damaged or of another shape; the replay is then unchanged.
         """
         own = {name: getattr(self, f"_{name}") for name in (*_ROW_FIELDS, *_ENV_FIELDS)}
         dtypes = {name: array.dtype for name, array in own.items()}
@@ -179,7 +179,7 @@ class Replay:
         self._largest_priority = float(loaded["largest_priority"])
 
     def fits(self, num_mazes: int, num_cells: int, num_actions: int) -> bool:
-        """Whether all it holds is of so many mazes, of so many cells each, and of so many actions."""
+        """Returns whether all mazes, cells and actions in it are below these numbers."""
         cells = (self._cell, self._start, self._anchor, self._goal)
         return (
             int(self._maze.max()) < num_mazes
@@ -189,50 +189,50 @@ class Replay:
 
     @property
     def num_bytes(self) -> int:
-        """Memory of all rows, used or not."""
+        """The memory of all rows, used or not."""
         arrays = [getattr(self, f"_{name}") for name in _ROW_FIELDS]
         return sum(array.nbytes for array in arrays)
 
     def add(self, experience: Experience, first_env: int = 0) -> None:
         """Stores one step of each of the environments from `first_env` on."""
-        indices = np.arange(len(experience.action))
-        envs = first_env + indices
-        self._current[envs] += experience.begins
-        self._current_leg[envs] += experience.is_first
-        self._leg_origin[envs[experience.is_first]] = experience.state[experience.is_first, :2]
-        begins = experience.begins
+        columns = np.arange(len(experience.action))
+        envs = first_env + columns
+        self._current[envs] += experience.new_episode
+        self._current_leg[envs] += experience.new_context
+        self._leg_origin[envs[experience.new_context]] = experience.state[experience.new_context, :2]
+        begins = experience.new_episode
         self._current_anchor[envs[begins]] = experience.start[begins]
         self._current_anchor_origin[envs[begins]] = experience.state[begins, :2]
-        self._write(envs, indices, experience, experience.state, experience.cell, experience.action)
+        self._write(envs, columns, experience, experience.state, experience.cell, experience.action)
         ended = np.flatnonzero(experience.ended)
         if len(ended):
-            no_action = np.full(len(indices), _NO_ACTION)
+            no_action = np.full(len(columns), _NO_ACTION)
             self._write(envs[ended], ended, experience, experience.final_state, experience.final_cell, no_action)
 
     def _write(
         self,
         envs: np.ndarray,
-        indices: np.ndarray,
+        columns: np.ndarray,
         experience: Experience,
         state: np.ndarray,
         cell: np.ndarray,
         action: np.ndarray,
     ) -> None:
-        """Writes a row of each of `envs`, which are the experience's `indices`."""
-        place = (envs, self._next[envs] % self._length)
-        self._state[place] = state[indices]
-        self._cell[place] = cell[indices]
-        self._action[place] = action[indices]
-        self._origin[place] = self._leg_origin[envs]
-        self._anchor[place] = self._current_anchor[envs]
-        self._anchor_origin[place] = self._current_anchor_origin[envs]
-        self._start[place] = experience.start[indices]
-        self._goal[place] = experience.goal[indices]
-        self._maze[place] = experience.maze[indices]
-        self._trajectory[place] = self._current[envs]
-        self._leg[place] = self._current_leg[envs]
-        priority = np.where(action[indices] == _NO_ACTION, 0.0, self._largest_priority)
-        self._tree.set(place[0] * self._length + place[1], priority)
+        """Writes a row for each of `envs`, from the `columns` of the experience."""
+        at = (envs, self._next[envs] % self._length)
+        self._state[at] = state[columns]
+        self._cell[at] = cell[columns]
+        self._action[at] = action[columns]
+        self._origin[at] = self._leg_origin[envs]
+        self._anchor[at] = self._current_anchor[envs]
+        self._anchor_origin[at] = self._current_anchor_origin[envs]
+        self._start[at] = experience.start[columns]
+        self._goal[at] = experience.goal[columns]
+        self._maze[at] = experience.maze[columns]
+        self._trajectory[at] = self._current[envs]
+        self._leg[at] = self._current_leg[envs]
+        priority = np.where(action[columns] == _NO_ACTION, 0.0, self._largest_priority)
+        self._tree.set(at[0] * self._length + at[1], priority)
         self._next[envs] += 1
 
     def sample(
@@ -240,8 +240,9 @@ class Replay:
     ) -> Sample:
         """Draws groups by priority and relabels a share of them with goals that were reached later in the trajectory.
 
-        The goal of a relabelled group is the cell that the body was in some steps after the drawn row. Rewards, ends
-        and the context's goal follow from it; map and start stay, unless `hindsight.relabel_start`.
+        The goal of a relabelled group is the cell in which the body was some steps after the drawn row. Rewards, ends
+        and the context's goal follow from that. The map stays as it was; so does the start, unless
+        `hindsight.relabel_start` is set.
 
         Args:
           num_groups, num_steps: G and K.
@@ -278,17 +279,17 @@ class Replay:
         rng: np.random.Generator,
         beta: float = 0.0,
     ) -> SequenceSample:
-        """Draws groups as `sample` does, of sequences that go on for `num_steps` L or to their trajectory's end."""
+        """Draws groups as `sample` does, of sequences of `num_steps` L, or fewer where their trajectory ends."""
         group = self._draw_groups(num_groups, num_sequences, hindsight, rng)
         env = group.env[:, None]
-        place, going = group.steps, np.ones(group.steps.shape, dtype=bool)
-        places, exists = [place], [going]
+        index, going = group.steps, np.ones(group.steps.shape, dtype=bool)
+        indices, exists = [index], [going]
         for _ in range(num_steps):
-            going = going & self._has_next(env, place)
-            place = np.where(going, (place + 1) % self._length, place)
-            places.append(place)
+            going = going & self._has_next(env, index)
+            index = np.where(going, (index + 1) % self._length, index)
+            indices.append(index)
             exists.append(going)
-        env, places_at = env[..., None], np.stack(places, axis=-1)
+        env, steps = env[..., None], np.stack(indices, axis=-1)
         return SequenceSample(
             group.row,
             self._weights(group.row, beta),
@@ -298,41 +299,41 @@ class Replay:
             group.relabelled,
             group.anchor,
             group.origin,
-            self._state[env, places_at],
-            self._cell[env, places_at].astype(np.int64),
-            np.maximum(self._action[env, places_at[..., :-1]], 0).astype(np.int64),
+            self._state[env, steps],
+            self._cell[env, steps].astype(np.int64),
+            np.maximum(self._action[env, steps[..., :-1]], 0).astype(np.int64),
             np.stack(exists, axis=-1),
         )
 
     def _draw_groups(self, num_groups: int, num_steps: int, hindsight: Hindsight, rng: np.random.Generator) -> _Groups:
-        """Draws the rows of groups and relabels a share of them."""
+        """Draws the rows of groups, and relabels a share of them."""
         row = self._tree.sample(num_groups, rng)
-        env, place = np.divmod(row, self._length)
+        env, index = np.divmod(row, self._length)
         offset = np.minimum(rng.geometric(1 / hindsight.mean_offset, size=num_groups), hindsight.window)
-        reached = self._forward(env, place, offset)
+        reached = self._forward(env, index, offset)
         relabelled = rng.random(num_groups) < hindsight.ratio
-        goal = np.where(relabelled, self._cell[env, reached], self._goal[env, place]).astype(np.int64)
-        end = np.where(relabelled, reached, self._forward(env, place, np.full_like(place, hindsight.window // 2)))
+        goal = np.where(relabelled, self._cell[env, reached], self._goal[env, index]).astype(np.int64)
+        end = np.where(relabelled, reached, self._forward(env, index, np.full_like(index, hindsight.window // 2)))
         part = self._trajectory if hindsight.relabel_start else self._leg
-        steps = self._draw_steps(env, place, end, part, num_steps, hindsight.window, rng)
-        start, origin = self._start[env, place].astype(np.int64), self._origin[env, place]
+        steps = self._draw_steps(env, index, end, part, num_steps, hindsight.window, rng)
+        start, origin = self._start[env, index].astype(np.int64), self._origin[env, index]
         if hindsight.relabel_start:
-            first = self._earliest(env, place, steps)
+            first = self._earliest(env, index, steps)
             moved = relabelled[:, None]
             start = np.where(relabelled, self._cell[env, first], start)
             origin = np.where(moved, self._state[env, first, :2], origin)
         anchor = start
         if hindsight.keep_anchor:
-            anchor, origin = self._anchor[env, place].astype(np.int64), self._anchor_origin[env, place]
-        maze = self._maze[env, place].astype(np.int64)
+            anchor, origin = self._anchor[env, index].astype(np.int64), self._anchor_origin[env, index]
+        maze = self._maze[env, index].astype(np.int64)
         return _Groups(row, env, steps, maze, start, goal, relabelled, anchor, origin)
 
     def update_priorities(self, row: np.ndarray, error: np.ndarray) -> None:
-        """Gives `row` `[K]`, of a sample, priorities by the errors `[K]` that learning found there."""
+        """Sets the priorities of `row` `[K]`, of a sample, by the errors `[K]` of learning."""
         if self._exponent == 0 or not len(row):
             return
         priority = (np.abs(error) + 1e-3) ** self._exponent
-        # A row may have been overwritten by a trajectory's last one since, which is never to be drawn.
+        # Meanwhile a trajectory's last row, which must not be drawn, may have overwritten a row.
         priority[self._action.reshape(-1)[row] == _NO_ACTION] = 0.0
         self._largest_priority = max(self._largest_priority, float(priority.max()))
         self._tree.set(row, priority)
@@ -341,10 +342,10 @@ class Replay:
         priority = self._tree.priorities(row)
         return ((priority.min() / priority) ** beta).astype(np.float32)
 
-    def _forward(self, env: np.ndarray, place: np.ndarray, offset: np.ndarray) -> np.ndarray:
-        """The place up to `offset` rows on from `place`, within the trajectory: it is walked by doubling jumps."""
-        trajectory = self._trajectory[env, place]
-        here = place
+    def _forward(self, env: np.ndarray, index: np.ndarray, offset: np.ndarray) -> np.ndarray:
+        """Returns the index up to `offset` rows after `index` in its trajectory, found by jumps of halving length."""
+        trajectory = self._trajectory[env, index]
+        here = index
         jump = 1 << int(offset.max()).bit_length()
         left = offset.copy()
         while jump:
@@ -357,7 +358,7 @@ class Replay:
         return here
 
     def _is_later(self, env: np.ndarray, here: np.ndarray, there: np.ndarray) -> np.ndarray:
-        """Whether the row at `there` was written after the one at `here` (or is it)."""
+        """Returns whether the row at `there` was written after the one at `here`, or is the same."""
         newest = self._next[env] - 1
         age_here, age_there = (newest - here) % self._length, (newest - there) % self._length
         return age_there <= age_here
@@ -365,36 +366,36 @@ class Replay:
     def _draw_steps(
         self,
         env: np.ndarray,
-        place: np.ndarray,
+        index: np.ndarray,
         end: np.ndarray,
         part: np.ndarray,
         num_steps: int,
         window: int,
         rng: np.random.Generator,
     ) -> np.ndarray:
-        """`[G, K]` places: the drawn row, then others of the same `part`, at most `window` rows before `end`.
+        """Returns indices `[G, K]`: the drawn row, then others of the same `part`, at most `window` rows before `end`.
 
-        What would lie outside is the drawn row again.
+        A row that would lie outside of its part is replaced by the drawn row.
         """
         back = rng.integers(1, window + 1, size=(len(env), num_steps))
-        back[:, 0] = (end - place) % self._length
+        back[:, 0] = (end - index) % self._length
         steps = (end[:, None] - back) % self._length
-        same = part[env[:, None], steps] == part[env, place][:, None]
+        same = part[env[:, None], steps] == part[env, index][:, None]
         inside = same & self._is_later(env[:, None], steps, end[:, None])
-        return np.where(inside, steps, place[:, None])
+        return np.where(inside, steps, index[:, None])
 
-    def _earliest(self, env: np.ndarray, place: np.ndarray, steps: np.ndarray) -> np.ndarray:
-        """`[G]`: the place of each group's first step."""
+    def _earliest(self, env: np.ndarray, index: np.ndarray, steps: np.ndarray) -> np.ndarray:
+        """Returns the index `[G]` of each group's earliest step."""
         age = (self._next[env, None] - 1 - steps) % self._length
         return np.take_along_axis(steps, age.argmax(axis=1)[:, None], axis=1)[:, 0]
 
     def _returns(
         self, env: np.ndarray, steps: np.ndarray, goal: np.ndarray, n: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Sums of rewards, discounts and last places `[G, K]` of returns of up to n steps from `steps` towards `goal`.
+        """Returns reward sums, discounts and last indices `[G, K]` of returns of up to n steps towards `goal`.
 
-        A step that ends in the goal is rewarded 0 and ends the return with discount 0; every other one is rewarded -1.
-        A trajectory that ends before was cut short, not finished: the return then goes on from its last state.
+        A step that ends in the goal is rewarded 0 and ends the return with discount 0; any other step is rewarded -1.
+        A trajectory that ends earlier was cut short: its return bootstraps from its last state.
         """
         reward = np.zeros(steps.shape, dtype=np.float32)
         going, hit = np.ones(steps.shape, dtype=bool), np.zeros(steps.shape, dtype=bool)
@@ -407,17 +408,17 @@ class Replay:
             going &= ~hit
         return reward, (~hit).astype(np.float32), last
 
-    def _has_next(self, env: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Whether the trajectory at `place` goes on by a row."""
-        after = (place + 1) % self._length
-        # The newest row has no next one yet, and where collecting began anew, the next one is another trajectory's.
-        newest = place == (self._next[env] - 1) % self._length
-        same = self._trajectory[env, after] == self._trajectory[env, place]
-        return (self._action[env, place] != _NO_ACTION) & ~newest & same
+    def _has_next(self, env: np.ndarray, index: np.ndarray) -> np.ndarray:
+        """Returns whether the row after `index` belongs to the same trajectory."""
+        after = (index + 1) % self._length
+        # The newest row has no next one yet; where collecting began anew, the next row is of another trajectory.
+        newest = index == (self._next[env] - 1) % self._length
+        same = self._trajectory[env, after] == self._trajectory[env, index]
+        return (self._action[env, index] != _NO_ACTION) & ~newest & same
 
 
 def _fault(arrays: Mapping[str, np.ndarray]) -> str | None:
-    """What was expected of a replay's arrays, in words, if they are not so."""
+    """Returns what was expected of a replay's arrays, in words; None if they are right."""
     for name, array in arrays.items():
         if np.issubdtype(array.dtype, np.floating) and not np.isfinite(array).all():
             return f"finite numbers in {name}"

@@ -1,4 +1,4 @@
-"""Config values given as text: typed by the config, unknown names refused."""
+"""Config values that are given as text."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ Config = TypeVar("Config")
 
 
 def override(config: Config, values: Mapping[str, Any]) -> Config:
-    """`config`, a frozen dataclass, with `values` in place of its own, each text turned into its field's type.
+    """Returns `config`, a frozen dataclass, with its values replaced by `values`, each converted to its field's type.
 
     Raises:
-      InputError: if a name is unknown, with the list of those there are, or a value is not of its field's type.
+      InputError: if a name is unknown, or a value is not of its field's type.
     """
     types = {field.name: field.type for field in dataclasses.fields(config)}  # type: ignore[arg-type]
     known = {name: {"bool": bool, "int": int, "float": float, "str": str}[str(kind)] for name, kind in types.items()}

@@ -1,10 +1,9 @@
-"""Checkpoints: safetensors with JSON metadata, never pickle; written whole or not at all, read with suspicion."""
+"""Checkpoints: safetensors with JSON metadata, never pickle; written whole or not at all."""
 
 from __future__ import annotations
 
 import json
 import pathlib
-import struct
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -13,9 +12,9 @@ import safetensors.torch
 import torch
 
 from mazebench.errors import InputError
-from mazebench.files import open_whole, read_at_most
 from mazebench.maps.maze import MAX_SIZE
-from mazebench.records import parse_json
+from mazebench.storage.files import open_whole, read_at_most
+from mazebench.storage.json_files import parse_json
 
 from .overrides import Config, override
 
@@ -23,12 +22,11 @@ FORMAT = "mazebench-agent-1"
 AGENT_FILE = "agent.safetensors"
 
 _MAX_BYTES = 256 * 2**20
-_MAX_HEADER_BYTES = 2**20
 
 
 def save_checkpoint(path: pathlib.Path, tensors: Mapping[str, torch.Tensor], metadata: Mapping[str, Any]) -> None:
-    """Writes `tensors` and `metadata`; a reader finds the file from before or the whole new one."""
-    # One key only: the order of several in the file would be left to chance.
+    """Writes `tensors` and `metadata` all or nothing."""
+    # Under one key, because the order of several in the file is not defined.
     header = {FORMAT: json.dumps(metadata, sort_keys=True)}
     content = safetensors.torch.save({name: tensor.detach().contiguous() for name, tensor in tensors.items()}, header)
     with open_whole(path) as file:
@@ -36,20 +34,18 @@ def save_checkpoint(path: pathlib.Path, tensors: Mapping[str, torch.Tensor], met
 
 
 def load_checkpoint(path: pathlib.Path, agent: str) -> tuple[dict[str, torch.Tensor], dict[str, Any]]:
-    """The tensors and the metadata of a checkpoint of `agent`.
+    """Returns the tensors and the metadata of a checkpoint of `agent`.
 
     Raises:
-      InputError: if the file can't be read, is no such checkpoint, or another agent's.
+      InputError: if the file can't be read, is damaged or larger than 256 MiB, or is another agent's checkpoint.
     """
-    content = _read(path)
-    _check_header(path, content)
+    content = read_at_most(path, _MAX_BYTES, "checkpoint")
     try:
         tensors = safetensors.torch.load(content)
-        metadata = parse_json(parse_json(content[8 : 8 + _header_length(content)])["__metadata__"][FORMAT])
-    # RuntimeError is torch's, of shapes that no tensor can have.
-    except (safetensors.SafetensorError, ValueError, KeyError, TypeError, RuntimeError) as error:
-        said = str(error)[:120]
-        raise InputError(f"{path}: expected a checkpoint of {FORMAT}, found a damaged one: {said}") from error
+        metadata = _metadata(content)
+    except (safetensors.SafetensorError, ValueError, KeyError) as error:
+        fault = str(error)[:120]
+        raise InputError(f"{path}: expected a checkpoint of {FORMAT}, found a damaged one: {fault}") from error
     if not isinstance(metadata, dict) or metadata.get("agent") != agent:
         found = metadata.get("agent") if isinstance(metadata, dict) else metadata
         raise InputError(f"{path}: expected a checkpoint of agent {agent!r}, found one of {str(found)[:80]!r}")
@@ -57,10 +53,10 @@ def load_checkpoint(path: pathlib.Path, agent: str) -> tuple[dict[str, torch.Ten
 
 
 def load_agent(path: pathlib.Path, agent: str, default: Config) -> tuple[dict[str, torch.Tensor], Config, int]:
-    """The tensors of a checkpoint of `agent`, its config, in the kind of `default`, and the context size M it is for.
+    """Returns the tensors of a checkpoint of `agent`, its config, of the type of `default`, and its context size M.
 
     Raises:
-      InputError: if the file can't be read, is no such checkpoint, another agent's, or lacks any of them.
+      InputError: as `load_checkpoint`, or if config or context size are missing or illegal.
     """
     tensors, metadata = load_checkpoint(path, agent)
     try:
@@ -74,12 +70,10 @@ def load_agent(path: pathlib.Path, agent: str, default: Config) -> tuple[dict[st
 
 
 def check_shapes(path: pathlib.Path, make: Callable[[], torch.nn.Module], tensors: Mapping[str, torch.Tensor]) -> None:
-    """Does nothing if `tensors` are of the network that `make` makes, which takes no memory here.
-
-    For before it is made: a config from outside may name sizes that no machine has room for.
+    """Checks that `tensors` are those of the network that `make` makes, without memory for the network.
 
     Raises:
-      InputError: if a name or a shape doesn't fit; the message names the first.
+      InputError: if a name or a shape differs; the message names the first.
     """
     with torch.device("meta"):
         wanted = make().state_dict()
@@ -87,10 +81,10 @@ def check_shapes(path: pathlib.Path, make: Callable[[], torch.nn.Module], tensor
 
 
 def load_into(path: pathlib.Path, module: torch.nn.Module, tensors: Mapping[str, torch.Tensor]) -> None:
-    """Puts `tensors` into `module`.
+    """Copies `tensors` into `module`.
 
     Raises:
-      InputError: if a name, a shape or a type doesn't fit, or a number is not finite; the message names the first.
+      InputError: if a name, a shape or a type differs, or a number is not finite; the message names the first.
     """
     _check_kinds(path, module.state_dict(), tensors)
     for name, tensor in tensors.items():
@@ -108,26 +102,12 @@ def _check_kinds(path: pathlib.Path, wanted: Mapping[str, torch.Tensor], tensors
 
 
 def _kind(tensor: torch.Tensor) -> str:
-    """Its shape, and its type where that is not the usual one."""
+    """Returns the shape of `tensor`, and its type unless that is float32, as text."""
     kind = "" if tensor.dtype == torch.float32 else f" {tensor.dtype}"
     return f"{tuple(tensor.shape)}{kind}"
 
 
-def _read(path: pathlib.Path) -> bytes:
-    content = read_at_most(path, _MAX_BYTES, "checkpoint")
-    if len(content) > _MAX_BYTES:
-        raise InputError(f"{path}: expected a checkpoint of at most {_MAX_BYTES} bytes, found more")
-    return content
-
-
-def _check_header(path: pathlib.Path, content: bytes) -> None:
-    """Refuses what the parser need not see: other formats (pickle) and headers of absurd length."""
-    length = _header_length(content)
-    if not 2 <= length <= min(_MAX_HEADER_BYTES, len(content) - 8) or content[8:9] != b"{":
-        raise InputError(
-            f"{path}: expected a safetensors file with a header of at most {_MAX_HEADER_BYTES} bytes, found none"
-        )
-
-
-def _header_length(content: bytes) -> int:
-    return struct.unpack("<Q", content[:8])[0] if len(content) >= 8 else 0
+def _metadata(content: bytes) -> Any:
+    """Returns the metadata of a whole safetensors file: the header is JSON, after eight bytes with its length."""
+    header_bytes = int.from_bytes(content[:8], "little")
+    return parse_json(parse_json(content[8 : 8 + header_bytes])["__metadata__"][FORMAT])

@@ -1,4 +1,4 @@
-"""Sampling in proportion to priorities, in array code."""
+"""Sampling in proportion to priorities."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class SumTree:
         return float(self._sums[1])
 
     def priorities(self, items: np.ndarray) -> np.ndarray:
-        """`[K]` float: the priorities of `items` `[K]`."""
+        """Returns the priorities `[K]` float of `items` `[K]`."""
         return self._sums[self._num_leaves + items]
 
     def set(self, items: np.ndarray, priorities: np.ndarray) -> None:
-        """Gives `items` `[K]` new `priorities` `[K]`, not negative; of an item named twice, the last counts."""
+        """Gives `items` `[K]` new `priorities` `[K]`, not negative; an item that occurs twice gets the last one."""
         nodes = self._num_leaves + np.asarray(items)
         self._sums[nodes] = priorities
         while nodes.size and nodes[0] > 1:
@@ -32,7 +32,7 @@ class SumTree:
             self._sums[nodes] = self._sums[2 * nodes] + self._sums[2 * nodes + 1]
 
     def sample(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """`[count]` int: items, one from each of `count` equal parts of the total (as Schaul et al. 2016)."""
+        """Returns items `[count]`, one from each of `count` equal parts of the total (as Schaul et al. 2016)."""
         left = (np.arange(count) + rng.random(count)) * (self.total / count)
         nodes = np.ones(count, dtype=np.int64)
         while nodes[0] < self._num_leaves:

@@ -1,0 +1,74 @@
+"""Pure pursuit: drives along a path by aiming at a point a fixed distance ahead of the body."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+from mazebench.maps.maze import Cell
+
+from . import observation
+from .observation import Body, Point
+
+_LOOKAHEAD = 0.8  # m along the path to the point aimed at
+_SEGMENTS_AHEAD = 3  # searched for the nearest one; with more, the nearest could be one of a parallel corridor
+_LARGEST_MISALIGNMENT = math.radians(20)  # between a drive and the aim, before the body turns
+# The headings of the four drives, in the order of their actions.
+_DRIVES = (
+    (observation.FORWARD, 0.0),
+    (observation.BACKWARD, math.pi),
+    (observation.STRAFE_LEFT, math.pi / 2),
+    (observation.STRAFE_RIGHT, -math.pi / 2),
+)
+
+
+@dataclasses.dataclass
+class Pilot:
+    """A path that is followed, and how far along it the body is."""
+
+    points: list[Point]  # centres of the path's cells
+    segment: int = 0  # the body is on the way from points[segment] to the next
+
+    @classmethod
+    def along(cls, path: Sequence[Cell], size: int) -> Pilot:
+        """Returns a pilot at the beginning of a path of cells."""
+        return cls([observation.centre(cell, size) for cell in path])
+
+    def action(self, body: Body) -> int:
+        """Returns the drive nearest to the direction of the aim, or a turn if even that one is too far off."""
+        # Aimed from where the body would come to rest: aimed from where it is, it would overshoot and turn back.
+        coast_x, coast_y = body.coasting()
+        x, y = body.x + coast_x, body.y + coast_y
+        aim_x, aim_y = self._aim(x, y)
+        bearing = math.atan2(aim_y - y, aim_x - x) - body.yaw
+        drive, heading = min(_DRIVES, key=lambda drive: abs(observation.wrap(bearing - drive[1])))
+        misalignment = observation.wrap(bearing - heading)
+        if abs(misalignment) <= _LARGEST_MISALIGNMENT:
+            return drive
+        return observation.LOOK_LEFT if misalignment > 0 else observation.LOOK_RIGHT
+
+    def _aim(self, x: float, y: float) -> Point:
+        """Returns the point `_LOOKAHEAD` metres ahead of (x, y) on the path, or the path's end if that is nearer."""
+        along = self._advance(x, y) + _LOOKAHEAD
+        for start, end in zip(self.points[self.segment :], self.points[self.segment + 1 :], strict=False):
+            if along <= 1:  # centres of neighbouring cells are 1 m apart
+                return start[0] + along * (end[0] - start[0]), start[1] + along * (end[1] - start[1])
+            along -= 1
+        return self.points[-1]
+
+    def _advance(self, x: float, y: float) -> float:
+        """Moves on to the segment nearest to (x, y), this one or one of the next; returns how far along it that is."""
+        ahead = range(self.segment, min(self.segment + _SEGMENTS_AHEAD, len(self.points) - 1))
+        nearest = [(*_project(x, y, *self.points[segment : segment + 2]), segment) for segment in ahead]
+        if not nearest:
+            return 0.0
+        _, along, self.segment = min(nearest, key=lambda candidate: (candidate[0], -candidate[2]))
+        return along
+
+
+def _project(x: float, y: float, start: Point, end: Point) -> tuple[float, float]:
+    """Returns (x, y)'s squared distance from the segment between neighbouring centres, and how far along it that is."""
+    step_x, step_y = end[0] - start[0], end[1] - start[1]
+    along = min(max((x - start[0]) * step_x + (y - start[1]) * step_y, 0.0), 1.0)
+    return (x - start[0] - along * step_x) ** 2 + (y - start[1] - along * step_y) ** 2, along
