@@ -1,29 +1,29 @@
-"""Runs evaluations' episodes on a Ray cluster."""
+"""Runs chunks as tasks of a Ray cluster."""
 
 from __future__ import annotations
 
-import dataclasses
 import signal
-import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from mazebench.errors import InputError, RunError
-from mazebench.evaluation.workers import Ended, Job, run_job
+from mazebench.evaluation.chunk import Chunk, Ended, run_whole_chunk
 
 try:
     import ray
 except ModuleNotFoundError as error:
     raise InputError("--ray needs Ray, which the extra [ray] brings (docs/start.md)") from error
 
-_MAX_LOST = 20  # of tasks in a run, before it gives up
+_MAX_RETRIES = 5  # of a chunk whose worker died
 
 
 class Cluster:
-    """A connection to a Ray cluster; a context manager."""
+    """A `Pool` on a Ray cluster; a context manager."""
 
-    def __init__(self, address: str):
+    num_threads = 1
+
+    def __init__(self, address: str, workers: int):
         """Connects to the cluster at `address`; "local" starts one on this machine, "auto" finds one that runs here.
 
         Raises:
@@ -32,38 +32,31 @@ class Cluster:
         self._started = not ray.is_initialized()
         if self._started:
             connect(address)
-        self.num_cpus = max(1, int(ray.cluster_resources().get("CPU", 0)))
+        self.num_workers = workers or max(1, int(ray.cluster_resources().get("CPU", 0)))
 
-    def run(self, jobs: Iterator[Job], num_envs: int, workers: int) -> Iterator[Ended]:
-        """Runs the jobs as tasks of one CPU, `workers` at a time; what a lost task had left to do is given out again.
+    def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Ended]]:
+        """Yields the episodes of each chunk when it has ended; Ray runs the chunk of a worker that died again.
 
         Raises:
-          InputError, RunError: what a job raised.
-          RunError: if too many tasks were lost.
+          InputError, RunError: what a chunk raised.
+          RunError: if a chunk's workers died again and again.
         """
-        running: dict[Any, Job] = {}
-        num_lost = 0
-        while True:
-            while len(running) < workers and (job := next(jobs, None)):
-                running[_start(job, num_envs)] = job
-            if not running:
-                return
-            task = ray.wait(list(running), num_returns=1)[0][0]
-            job = running.pop(task)
+        task = ray.remote(num_cpus=1, max_retries=_MAX_RETRIES)(run_whole_chunk)
+        waiting = list(chunks)
+        running: list[Any] = []
+        while waiting or running:
+            while waiting and len(running) < self.num_workers:
+                running.append(task.remote(waiting.pop(0)))
+            (ended,), running = ray.wait(running, num_returns=1)
             try:
-                ended = _next_of(task)
+                yield ray.get(ended)
+            except ray.exceptions.RayTaskError as error:
+                cause = error.cause
+                if isinstance(cause, (InputError, RunError)):
+                    raise cause from error
+                raise RunError(f"a Ray task failed: {_first_line(cause)}") from error
             except ray.exceptions.RayError as error:
-                num_lost += 1
-                if num_lost > _MAX_LOST:
-                    raise RunError(f"{num_lost} Ray tasks were lost, the last by: {_first_line(error)}") from error
-                print("mazebench: a Ray task was lost; it is run again", file=sys.stderr)
-                running[_start(job, num_envs)] = job
-                continue
-            if ended is not None:
-                ran = {record["episode"] for record in ended.records}
-                left = tuple(trial for trial in job.trials if trial[0] not in ran)
-                running[task] = dataclasses.replace(job, trials=left)
-                yield ended
+                raise RunError(f"a Ray task was lost: {_first_line(error)}; go on with --resume") from error
 
     def __enter__(self) -> Cluster:
         return self
@@ -73,49 +66,26 @@ class Cluster:
             ray.shutdown()
 
 
-def connect(address: str | None) -> None:
-    """Connects this process to the cluster at `address`, as `Cluster` does; None starts one, too.
+def connect(address: str) -> None:
+    """Connects this process to the cluster at `address`, as `Cluster` does.
 
     Raises:
       InputError: if there is none.
     """
-    at_end, terminated = signal.getsignal(signal.SIGTERM), False
+    handler, terminated = signal.getsignal(signal.SIGTERM), False
     try:
         ray.init(address=address, log_to_driver=False, include_dashboard=False)
     except SystemExit:  # Ray's answer to SIGTERM
         ray.shutdown()
         terminated = True
     except (ConnectionError, ValueError, RuntimeError) as error:
-        said = " ".join(str(error).split())[:200]
-        raise InputError(f"can't reach a Ray cluster at {address!r}: {said}") from error
+        reason = " ".join(str(error).split())[:200]
+        raise InputError(f"can't reach a Ray cluster at {address!r}: {reason}") from error
     finally:
         if threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGTERM, at_end)  # which Ray takes
+            signal.signal(signal.SIGTERM, handler)  # Ray replaces the handler
     if terminated:
         signal.raise_signal(signal.SIGTERM)
-
-
-def _start(job: Job, num_envs: int) -> Any:
-    """A task that gives what ended, step by step."""
-    play = ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")(_play)
-    return play.remote(dataclasses.replace(job, task_spec=None), num_envs)
-
-
-def _play(job: Job, num_envs: int) -> Iterator[Ended]:
-    yield from run_job(job, num_envs, num_threads=1)
-
-
-def _next_of(task: Any) -> Ended | None:
-    """What ended next in a task, None where it is over; raises what the job raised, without Ray's account of it."""
-    try:
-        return ray.get(next(task))
-    except StopIteration:
-        return None
-    except ray.exceptions.RayTaskError as error:
-        cause = error.cause
-        if isinstance(cause, (InputError, RunError)):
-            raise cause from error
-        raise RunError(f"a Ray task failed: {_first_line(cause)}") from error
 
 
 def _first_line(error: object) -> str:

@@ -1,36 +1,60 @@
-"""Two agents on the same episodes, and several training runs of one agent. docs/metrics.md has the definitions.
+"""Two agents on the same episodes. docs/metrics.md has the definitions.
 
-`E` is the number of episodes, `R` of training runs, `T` of tasks, which are mazes.
+`E` is the number of episodes.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from mazebench.errors import InputError
-from mazebench.evaluation.metrics import CONFIDENCE, bootstrap_interval, by_distance, wilson_interval
+from mazebench.evaluation.intervals import Estimate, difference_interval
+from mazebench.evaluation.metrics import METRICS, by_distance
+from mazebench.evaluation.records import Record, Summary, column
 from mazebench.evaluation.results import Result, find_parts, load_result
-from mazebench.records import Record
 
-_METRICS = {"success_rate": "success", "spl": "spl", "spl_grid": "spl_grid"}  # and the records' names for them
-_TRIMMED = 0.25  # of the scores at either end, of an interquartile mean
-_NUM_RESAMPLES = 2000
-_BOOTSTRAP_SEED = 0
+_SAME_EPISODE = ("maze", "start", "goal", "seed", "distance")  # fields of records that must be equal
+
+
+@dataclasses.dataclass(frozen=True)
+class Paired:
+    """One metric of both agents."""
+
+    a: float
+    b: float
+    difference: Estimate  # a - b
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """Two agents on the same episodes."""
+
+    num_episodes: int
+    metrics: dict[str, Paired]  # by the names of `METRICS`
+    win_share: Estimate  # of episodes in which A's SPL is higher than B's; a tie counts half
+
+
+@dataclasses.dataclass(frozen=True)
+class PairedResults:
+    """Two evaluations on the same episodes."""
+
+    overall: Row
+    by_distance: dict[int, Row]  # by distance from start to goal in cells
 
 
 @dataclasses.dataclass(frozen=True)
 class Comparison:
-    """Two folders of results held against each other."""
+    """Two folders of results."""
 
-    title: str  # who is A and who is B, in words
-    parts: dict[str, dict[str, Any]]  # what `compare_results` returns, by part; by "" for two single evaluations
-    has_distances: bool  # whether the episodes of a distance are worth a line
-    notes: list[str]  # on what could not be compared
+    title: str  # who is A and who is B
+    parts: dict[str, PairedResults]  # by part of a suite; two single evaluations have the one part ""
+    has_distances: bool  # whether a table by distance makes sense
+    notes: list[str]  # on parts that only one folder has
 
 
 def compare_folders(a: pathlib.Path, b: pathlib.Path) -> Comparison:
@@ -52,137 +76,87 @@ def compare_folders(a: pathlib.Path, b: pathlib.Path) -> Comparison:
     ]
     pairs = {name: (load_result(a_parts[name]), load_result(b_parts[name])) for name in common}
     ours, theirs = (result.summary for result in pairs[common[0]])
-    task, size = ours["task"], ours["size"]
     title = f"A is {_who(ours, common)} in {a}, B is {_who(theirs, common)} in {b}"
-    title += f"; {task}, {ours['split']} mazes {size} x {size}" if common == [""] else ""
-    return Comparison(title, {name: compare_results(*pair) for name, pair in pairs.items()}, task == "local", notes)
+    title += f"; {ours.task}, {ours.split} mazes {ours.size} x {ours.size}" if common == [""] else ""
+    return Comparison(
+        title, {name: compare_results(*pair) for name, pair in pairs.items()}, ours.task == "local", notes
+    )
 
 
-def compare_results(a: Result, b: Result) -> dict[str, Any]:
-    """Where A is better than B, over all episodes and by distance.
-
-    Returns:
-      dict: {"overall": {"n", and of each metric M of success_rate, spl and spl_grid "M_a", "M_b", "M_difference" (A's
-       minus B's) and "M_difference_ci95", "probability_of_improvement", "probability_of_improvement_ci95"},
-       "by_distance": {"1": {the same}, ...}}
+def compare_results(a: Result, b: Result) -> PairedResults:
+    """Compares two evaluations over all episodes and by distance.
 
     Raises:
       InputError: if the two are not of the same episodes of one version of the benchmark.
     """
     _check_pairs(a, b)
     ours, theirs = by_distance(a.records), by_distance(b.records)
-    return {
-        "overall": _compare(a.records, b.records),
-        "by_distance": {str(distance): _compare(ours[distance], theirs[distance]) for distance in ours},
-    }
+    return PairedResults(
+        overall=_compare(a.records, b.records),
+        by_distance={distance: _compare(ours[distance], theirs[distance]) for distance in ours},
+    )
 
 
-def paired_difference(a: np.ndarray, b: np.ndarray, mazes: np.ndarray) -> tuple[float, tuple[float, float]]:
-    """The mean of `a - b` `[E]` and its 95 % interval by a bootstrap over mazes."""
-    difference = a.astype(np.float64) - b
-    return float(difference.mean()), bootstrap_interval(difference, mazes)
-
-
-def success_difference(a: np.ndarray, b: np.ndarray, mazes: np.ndarray) -> tuple[float, tuple[float, float]]:
-    """The same of successes `[E]` bool.
-
-    Where all episodes are ties, or all are won by one side, a bootstrap learns nothing, and Wilson's interval of that
-    share, 0 or 1, stands in for it.
-    """
-    difference, interval = paired_difference(a, b, mazes)
-    if np.ptp(a.astype(np.int64) - b) == 0:
-        low, high = wilson_interval(int(abs(difference)) * len(a), len(a))
-        interval = {0: (-high, high), 1: (low, high), -1: (-high, -low)}[int(difference)]
-    return difference, interval
-
-
-def probability_of_improvement(a: np.ndarray, b: np.ndarray, mazes: np.ndarray) -> tuple[float, tuple[float, float]]:
-    """The share of episodes in which `a` `[E]` is above `b` `[E]`, a tie counting half; its interval as above."""
-    wins = (a > b) + 0.5 * (a == b)
-    return float(wins.mean()), bootstrap_interval(wins, mazes)
-
-
-def interquartile_mean(scores: np.ndarray) -> float:
-    """The mean of the middle half of all `scores` (Agarwal et al. 2021)."""
-    ordered = np.sort(scores, axis=None)
-    cut = int(_TRIMMED * len(ordered))
-    return float(ordered[cut : len(ordered) - cut].mean())
-
-
-def stratified_bootstrap_interval(
-    scores: np.ndarray, statistic: Callable[[np.ndarray], float], confidence: float = CONFIDENCE
-) -> tuple[float, float]:
-    """Percentile interval of `statistic` of `scores` `[R, T]`: each task draws its own R runs, with replacement.
-
-    As in rliable (Agarwal et al. 2021). It speaks of other training runs on the same mazes, not of other mazes.
-    """
-    num_runs, num_tasks = scores.shape
-    rng = np.random.default_rng(_BOOTSTRAP_SEED)
-    draws = (rng.integers(num_runs, size=scores.shape) for _ in range(_NUM_RESAMPLES))
-    values = [statistic(scores[runs, np.arange(num_tasks)]) for runs in draws]
-    low, high = np.quantile(values, [(1 - confidence) / 2, (1 + confidence) / 2])
-    return float(low), float(high)
-
-
-def pool_runs(runs: Sequence[Sequence[Record]], metric: str = "success_rate") -> dict[str, Any]:
-    """Mean and interquartile mean of a metric over training runs of one agent, each evaluated on the same episodes.
-
-    Args:
-      runs: the records of each; at least two.
-      metric: "success_rate", "spl" or "spl_grid".
+def to_json(comparison: Comparison) -> dict[str, Any]:
+    """Returns what `mazebench compare --json` prints: of a suite by part, of two single evaluations without a part.
 
     Returns:
-      {"runs", "mean", "mean_ci95", "iqm", "iqm_ci95"}
-
-    Raises:
-      InputError: if there are fewer than two, or they differ in their episodes.
+      dict: {"overall": {"n", "win_share", "win_share_ci95", and of each metric M of success_rate, spl and spl_grid
+       "M_a", "M_b", "M_difference" and "M_difference_ci95"}, "by_distance": {"1": {the same}, ...}}
     """
-    if len(runs) < 2:
-        raise InputError(f"expected at least two training runs to pool, found {len(runs)}")
-    for number, run in enumerate(runs[1:], 2):
-        fault = _other_episode(runs[0], run)
-        if fault:
-            raise InputError(f"expected training runs evaluated on the same episodes, found in run {number} {fault}")
-    scores = np.array([_maze_scores(run, _METRICS[metric]) for run in runs])
-    return {
-        "runs": len(runs),
-        "mean": float(scores.mean()),
-        "mean_ci95": list(stratified_bootstrap_interval(scores, lambda values: float(values.mean()))),
-        "iqm": interquartile_mean(scores),
-        "iqm_ci95": list(stratified_bootstrap_interval(scores, interquartile_mean)),
+    parts = {
+        name: {
+            "overall": _row_to_json(part.overall),
+            "by_distance": {str(distance): _row_to_json(row) for distance, row in part.by_distance.items()},
+        }
+        for name, part in comparison.parts.items()
     }
+    return parts.get("", parts)
 
 
-def _compare(a: Sequence[Record], b: Sequence[Record]) -> dict[str, Any]:
-    mazes = np.array([record["maze"] for record in a])
-    row: dict[str, Any] = {"n": len(a)}
-    for metric, name in _METRICS.items():
-        ours, theirs = (np.array([record[name] for record in records]) for records in (a, b))
-        measure = success_difference if metric == "success_rate" else paired_difference
-        difference, interval = measure(ours, theirs, mazes)
-        row |= {f"{metric}_a": float(ours.mean()), f"{metric}_b": float(theirs.mean())}
-        row |= {f"{metric}_difference": difference, f"{metric}_difference_ci95": list(interval)}
-        if metric == "spl":
-            probability, interval = probability_of_improvement(ours, theirs, mazes)
-            row |= {"probability_of_improvement": probability, "probability_of_improvement_ci95": list(interval)}
-    return row
+def _compare(a: Sequence[Record], b: Sequence[Record]) -> Row:
+    mazes = column(a, "maze")
+    ours, theirs = ({metric: column(r, name).astype(float) for metric, name in METRICS.items()} for r in (a, b))
+    metrics = {
+        metric: Paired(
+            a=float(ours[metric].mean()),
+            b=float(theirs[metric].mean()),
+            difference=difference_interval(ours[metric] - theirs[metric], mazes),
+        )
+        for metric in METRICS
+    }
+    # Won is 1, lost is -1 and a tie 0: the share of wins is half of their mean, and a half.
+    outcome = difference_interval(np.sign(ours["spl"] - theirs["spl"]), mazes)
+    win_share = Estimate(*(0.5 + share / 2 for share in (outcome.value, outcome.low, outcome.high)))
+    return Row(len(a), metrics, win_share)
+
+
+def _row_to_json(row: Row) -> dict[str, Any]:
+    content: dict[str, Any] = {"n": row.num_episodes}
+    for metric, paired in row.metrics.items():
+        difference = paired.difference
+        content |= {f"{metric}_a": paired.a, f"{metric}_b": paired.b}
+        content |= {f"{metric}_difference": difference.value}
+        content |= {f"{metric}_difference_ci95": [difference.low, difference.high]}
+    win_share = row.win_share
+    return content | {"win_share": win_share.value, "win_share_ci95": [win_share.low, win_share.high]}
 
 
 def _named(parts: dict[str, pathlib.Path]) -> str:
     return ", ".join(name or "a single evaluation" for name in parts)
 
 
-def _who(summary: dict[str, Any], parts: list[str]) -> str:
-    """The agent and, of a single evaluation, the perturbation."""
-    perturbed = [f"{key} {value}" for key, value in summary["perturbation"].items() if value and parts == [""]]
-    return f"{summary['agent']}{' (' + ', '.join(perturbed) + ')' if perturbed else ''}"
+def _who(summary: Summary, parts: list[str]) -> str:
+    """Returns the agent and, for a single evaluation, the perturbation."""
+    perturbed = [f"{key} {value}" for key, value in summary.perturbation.items() if value and parts == [""]]
+    return f"{summary.agent}{' (' + ', '.join(perturbed) + ')' if perturbed else ''}"
 
 
 def _check_pairs(a: Result, b: Result) -> None:
     for key, ours, theirs in (
-        *((key, a.summary[key], b.summary[key]) for key in ("benchmark", "task", "size", "split")),
+        *((key, getattr(a.summary, key), getattr(b.summary, key)) for key in ("benchmark", "task", "size", "split")),
         *(
-            (key, a.summary["provenance"].get(key), b.summary["provenance"].get(key))
+            (key, getattr(a.summary.provenance, key), getattr(b.summary.provenance, key))
             for key in ("benchmark_manifest_sha256", "mazes_sha256")
         ),
     ):
@@ -197,17 +171,13 @@ def _check_pairs(a: Result, b: Result) -> None:
 
 
 def _other_episode(a: Sequence[Record], b: Sequence[Record]) -> str | None:
-    """The first episode in which the two differ, in words."""
-    for ours, theirs in zip(a, b, strict=False):
-        for key in ("maze", "start", "goal", "seed", "distance"):
-            if ours[key] != theirs[key]:
-                return f"episode {ours['episode']} with {key} {ours[key]} and {theirs[key]}"
-    return None if len(a) == len(b) else f"{len(a)} and {len(b)} of them"
-
-
-def _maze_scores(records: Sequence[Record], name: str) -> list[float]:
-    """`[T]`: the mean of each maze's episodes."""
-    scores: dict[str, list[float]] = {}
-    for record in records:
-        scores.setdefault(record["maze"], []).append(float(record[name]))
-    return [float(np.mean(values)) for values in scores.values()]
+    """Returns what the first episode is in which the two differ, in words."""
+    if len(a) != len(b):
+        return f"{len(a)} and {len(b)} of them"
+    for name in _SAME_EPISODE:
+        ours, theirs = column(a, name), column(b, name)
+        differs = (ours != theirs).reshape(len(a), -1).any(axis=1)
+        if differs.any():
+            first = int(differs.argmax())
+            return f"episode {first} with {name} {ours[first].tolist()} and {theirs[first].tolist()}"
+    return None

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-import struct
 import tempfile
 from collections.abc import Callable
 
 import cv2
 import numpy as np
 
-from mazebench.agent import load_agent_class
+from mazebench.agent import Inputs
 from mazebench.errors import InputError, unknown
-from mazebench.evaluation.options import EvalOptions, build_agent, is_frozen, make_task_spec, resolve_checkpoint
-from mazebench.evaluation.protocol import select_trials
-from mazebench.files import open_whole, writing_to
-from mazebench.maps import perturb
+from mazebench.evaluation.agent_inputs import agent_seed, true_state
+from mazebench.evaluation.chunk import YAW
+from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.plan import make_plan
 from mazebench.maps.image import draw_grid, write_image
+from mazebench.storage.files import open_whole, writing_to
 from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.rendering import CAMERAS, Renderer
@@ -27,7 +27,7 @@ _FRAMES_PER_SECOND = 1 / 0.16  # one an agent step: the film runs in real time
 
 
 def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int) -> str:
-    """Runs one episode of the protocol, the one that `options.seed` counts to, and writes it to `out`.
+    """Runs the episode number `options.seed` of the protocol and writes it to `out`.
 
     Args:
       options: who drives where, as for an evaluation.
@@ -57,34 +57,35 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
 
 
 def _run(options: EvalOptions, views: tuple[str, ...], pixels: int) -> tuple[list[np.ndarray], str]:
-    agent_class = load_agent_class(options.agent)
-    options = resolve_checkpoint(options, agent_class)
-    task_spec = make_task_spec(options, agent_class)
-    trials = select_trials(options.task, task_spec.mazes, is_frozen(options), options.distances)
-    trial = trials[options.seed % len(trials)]
-    agent = build_agent(options, agent_class, task_spec)
-    environment = Environment(task_spec)
-    time_step = environment.reset(episode=trial.episode)
+    plan = make_plan(options)
+    number = options.seed % len(plan.trials)
+    trial, episode = plan.trials[number], plan.trials[number].episode
+    maze = plan.task.mazes[episode.maze]
+    agent = plan.build_agent()
+    environment = Environment(plan.task)
+    task = environment.task
+    time_step = environment.reset(episode=episode)
     state = agent.initial_state(1)
-    scene = _Scene(environment, task_spec, views, pixels)
+    seed = np.array([agent_seed(options.seed, number)])
+    scene = _Scene(environment, plan.task, views, pixels)
     try:
         frames = [scene.draw()]
         while not time_step.last():
-            observation = {key: time_step.observation[key][None] for key in ("state", "context")}
-            is_first = np.array([environment.task.is_first])
-            if is_first[0]:
-                agent.seed_episodes(np.array([trial.episode.seed]), np.array([time_step.first()]))
-            actions, state = agent.act(observation, is_first, state)
+            observation = {name: value[None] for name, value in time_step.observation.items() if name != "is_first"}
+            truth = None
+            if plan.agent_class.needs_truth:
+                position, yaw = environment.physics.position()[None], observation["state"][:, YAW]
+                truth = true_state(plan.task, [episode], position, yaw)
+            new_episode, new_context = np.array([time_step.first()]), np.array([task.is_first])
+            actions, state = agent.act(Inputs(observation, new_episode, new_context, seed, truth), state)
             time_step = environment.step(int(actions[0]))
             frames.append(scene.draw())
     finally:
         scene.close()
-    task = environment.task
     ending = "reached the goal" if task.success else "ran out of time"
-    maze = task_spec.mazes[trial.episode.maze].name
     return frames, (
         f"{options.agent} {ending} after {task.steps} steps and {task.path_length:.2f} m "
-        f"(shortest {trial.shortest_path:.2f} m) in maze {maze}, from {trial.episode.start} to {trial.episode.goal}"
+        f"(shortest {trial.shortest_path:.2f} m) in maze {maze.name}, from {episode.start} to {episode.goal}"
     )
 
 
@@ -103,7 +104,7 @@ class _Scene:
         self._renderer = Renderer(self.environment.physics.model.ptr, self.pixels, self.pixels) if cameras else None
 
     def draw(self) -> np.ndarray:
-        """`[H, W, 3]` uint8 of the state now; the map, as the agent is shown it, has the path driven up to now."""
+        """Returns a picture `[H, W, 3]` uint8 of the current state; the shown map has the path driven up to now."""
         self._path.append(self.environment.physics.position())
         return np.concatenate([self._view(view) for view in self.views], axis=1)
 
@@ -116,11 +117,8 @@ class _Scene:
             assert self._renderer is not None
             return self._renderer.render(self.environment.physics.data.ptr, view)
         task, size = self.environment.task, self.task_spec.size
-        start, goal, path = task.episode.start, task.episode.goal, np.array(self._path)
-        homography = task.shown_map.homography
-        if homography is not None:
-            start, goal = (perturb.warp_cell(cell, homography, size) for cell in (start, goal))
-            path = perturb.warp_points(path, homography, size)
+        start, goal = (task.shown_map.seen_cell(cell) for cell in (task.episode.start, task.episode.goal))
+        path = task.shown_map.seen_points(np.array(self._path))
         picture = draw_grid(task.shown_map.seen_walls(), 2 * self.pixels // size + 1, start, goal, path)
         return cv2.resize(picture, (self.pixels, self.pixels), interpolation=cv2.INTER_AREA)
 
@@ -148,23 +146,13 @@ def _write_mp4(frames: list[np.ndarray], out: pathlib.Path) -> None:
         for frame in frames:
             writer.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
         writer.release()
-        # OpenCV says nothing of a disk that is full. The index of the frames, b"moov", is written last.
         content = film.read_bytes() if film.exists() else b""
-        if b"moov" not in _whole_boxes(content):
+        # OpenCV reports no error if the disk is full. A whole film ends with its index: a size, "moov" and the rest.
+        index = content.rfind(b"moov") - 4
+        if index < 0 or index + int.from_bytes(content[index : index + 4], "big") != len(content):
             raise InputError(f"{film}: can't make the film there: the disk is full, or this OpenCV can't write MP4")
     with writing_to(out), open_whole(out) as file:
         file.write(content)
-
-
-def _whole_boxes(content: bytes) -> list[bytes]:
-    """The names of the boxes that an MP4 file is made of, up to one that is cut off."""
-    names, start = [], 0
-    while start + 8 <= len(content):
-        size, name = struct.unpack_from(">I4s", content, start)
-        start += max(size, 8)
-        if start <= len(content):
-            names.append(name)
-    return names
 
 
 _WRITERS: dict[str, Callable[[list[np.ndarray], pathlib.Path], None]] = {

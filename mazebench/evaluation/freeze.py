@@ -11,7 +11,7 @@ import sys
 
 import numpy as np
 
-from mazebench.evaluation.protocol import COLUMNS, Trial, benchmark_task_sizes, episodes_file, select_trials
+from mazebench.evaluation.trials import COLUMNS, Trial, benchmark_task_sizes, episodes_file, select_trials
 from mazebench.maps.benchmark import MANIFEST, MAZES_PER_SPLIT, SIZES, SPLITS, VERSION, mazes_file
 from mazebench.maps.generators import DFS_OPENINGS, dfs_walls
 from mazebench.maps.maze import Maze, canonical_bytes
@@ -39,7 +39,7 @@ def freeze(folder: pathlib.Path) -> None:
 
 
 def draw_mazes(size: int) -> list[Maze]:
-    """The train mazes, then the eval mazes of one size, no two of them alike under rotations and mirror images."""
+    """Returns the train mazes, then the eval mazes of one size; no two are alike under rotations and mirror images."""
     rng = np.random.default_rng([_MAZE_SEED, size])
     unique: dict[bytes, np.ndarray] = {}
     while len(unique) < len(SPLITS) * MAZES_PER_SPLIT:

@@ -1,96 +1,66 @@
-"""What is evaluated: from options to the task, the agent and the checkpoint that they name."""
+"""What is evaluated: the agent, the episodes and the task."""
 
 from __future__ import annotations
 
 import dataclasses
 import pathlib
 
-from mazebench.agent import Agent, Interface
 from mazebench.errors import InputError
-from mazebench.evaluation.contract import CheckedAgent, calling
-from mazebench.evaluation.protocol import EPISODES_PER_DISTANCE
-from mazebench.tasks.context import default_context_size
-from mazebench.tasks.registry import make_spec
-from mazebench.tasks.spec import EVAL_DISTANCES, TaskSpec
+from mazebench.maps.benchmark import SPLITS
+from mazebench.options import option, options_of
+from mazebench.tasks.options import EVAL_DISTANCES, TaskOptions
+from mazebench.tasks.registry import load_mazes_of
+from mazebench.tasks.spec import TaskSpec
+
+EPISODES_PER_DISTANCE = 5
+# Options of a task for which evaluations have one value only.
+_FIXED = {"pairs": "random", "num_goals": 1, "continuous": False, "context_size": 0}
 
 
-@dataclasses.dataclass(frozen=True)
-class EvalOptions:
-    """What is evaluated. Two runs with equal options give the same `episodes.jsonl`."""
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class EvalOptions(TaskOptions):
+    """What is evaluated. Two runs with equal options give the same `episodes.jsonl`.
 
-    agent: str
-    task: str = "local"
-    size: int | None = None  # of benchmark v1's mazes, 13 if not given; with `maps` only checked
-    split: str = "eval"
-    maps: str | None = None  # a file or folder of mazes of one's own
-    distances: tuple[int, ...] = EVAL_DISTANCES
-    episodes_per_distance: int = EPISODES_PER_DISTANCE
-    landmark_distance: int = 5
-    map_flip: float = 0.0
-    map_warp: float = 0.0
-    position_noise: float = 0.0
-    checkpoint: str | None = None
-    seed: int = 0
+    Raises:
+      InputError: if a value is out of its range.
+    """
 
-
-def is_frozen(options: EvalOptions) -> bool:
-    """Whether the benchmark's eval mazes are asked for, which have frozen episodes."""
-    return options.maps is None and options.split == "eval"
-
-
-def make_task_spec(options: EvalOptions, agent_class: type[Agent]) -> TaskSpec:
-    """The task that `options` name, with the context size that the agent wants."""
-    spec = make_spec(
-        options.task,
-        options.size,
-        options.split,
-        maps=options.maps,
-        distances=options.distances,
-        landmark_distance=options.landmark_distance,
-        map_flip=options.map_flip,
-        map_warp=options.map_warp,
-        position_noise=options.position_noise,
+    agent: str = dataclasses.field(kw_only=False)
+    size: int | None = option(None, "Cells a side of the benchmark's mazes: 13 (if not given), 15, 17, 19 or 21.")
+    split: str = option("eval", "The benchmark's unseen mazes, or its training mazes.", choices=SPLITS)
+    maps: str | None = option(None, "Mazes of your own: a text or image file, or a folder of them.")
+    distances: tuple[int, ...] = option(EVAL_DISTANCES, "Cells from start to goal, as 1-5,8,10 (local task).")
+    episodes_per_distance: int = option(
+        EPISODES_PER_DISTANCE, "Episodes for each maze and distance (local task).", lowest=1
     )
-    with calling(options.agent, "context_size"):
-        wanted = int(getattr(agent_class, "context_size", default_context_size)(spec.size))
-    return dataclasses.replace(spec, context_size=wanted)
+    checkpoint: str | None = option(None, "A learned agent's checkpoint or run folder; the shipped one if not given.")
+    seed: int = option(0, "Seed of what the agent draws, and of episodes that are not frozen.", lowest=0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, value in _FIXED.items():
+            if getattr(self, name) != value:
+                raise InputError(f"expected {name} {value!r} in an evaluation, found {getattr(self, name)!r}")
+
+    @property
+    def is_frozen(self) -> bool:
+        """Whether the benchmark's eval mazes are asked for, which have frozen episodes."""
+        return self.maps is None and self.split == "eval"
 
 
-def build_agent(options: EvalOptions, agent_class: type[Agent], task_spec: TaskSpec) -> CheckedAgent:
-    """The agent for a task, held to its contract."""
-    interface = Interface(options.task, task_spec.size, task_spec.context_size)
-    checkpoint = None if options.checkpoint is None else pathlib.Path(options.checkpoint)
-    with calling(options.agent, "build"):
-        agent = agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)
-    return CheckedAgent(options.agent, agent, interface.num_actions)
+# What is played, as the command line has it: all but the fixed options, the agent's own and the seed.
+TASK_CHOICES = tuple(name for name in options_of(EvalOptions) if name not in (*_FIXED, "checkpoint", "seed"))
 
 
-def resolve_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:
-    """`options` with the very file that the agent is read from, None for one that reads none.
+def make_task(options: EvalOptions, context_size: int | None = None) -> TaskSpec:
+    """Returns the task that `options` name.
 
-    A run's folder may gain a newer checkpoint any time, so it is looked into once, before anything is hashed or built.
-
-    Raises:
-      InputError: if a checkpoint is given to an agent that reads none.
+    Args:
+      options: of the evaluation.
+      context_size: M; by default the options' own.
     """
-    default = getattr(agent_class, "default_checkpoint", None)
-    if options.checkpoint is None:
-        return options if default is None else dataclasses.replace(options, checkpoint=str(default()))
-    if default is None and not hasattr(agent_class, "build_learner") and ":" not in options.agent:
-        raise InputError(f"agent {options.agent!r} reads no checkpoint; found --checkpoint {options.checkpoint}")
-    return dataclasses.replace(options, checkpoint=str(_newest_checkpoint(pathlib.Path(options.checkpoint))))
-
-
-def _newest_checkpoint(path: pathlib.Path) -> pathlib.Path:
-    """`path` itself, or of a training run's folder, or a checkpoint's, the newest agent in it.
-
-    Raises:
-      InputError: if a folder holds none.
-    """
-    if not path.is_dir():
-        return path
-    complete = (folder for folder in path.glob("checkpoints/*") if folder.name.isdecimal())
-    found = [file for folder in (path, *sorted(complete)) if (file := folder / "agent.safetensors").exists()]
-    if not found:
-        raise InputError(f"{path}: expected a checkpoint or the folder of a training run, found neither")
-    return found[-1]
+    values = {field.name: getattr(options, field.name) for field in dataclasses.fields(TaskOptions)}
+    if context_size is not None:
+        values["context_size"] = context_size
+    maps = None if options.maps is None else pathlib.Path(options.maps)
+    return TaskSpec(mazes=load_mazes_of(options.size, options.split, maps), **values)

@@ -7,20 +7,22 @@ import json
 from importlib import resources
 from typing import Any
 
+from mazebench.evaluation.records import Summary
+
 
 @functools.cache
 def reference() -> dict[str, Any]:
-    """The paper's title, authors and tables."""
+    """Returns the paper's title, authors and tables."""
     return json.loads(resources.files("mazebench_assets").joinpath("paper", "reference.json").read_text("utf-8"))
 
 
 def citation() -> str:
-    """The paper in one line."""
+    """Returns authors and title in one line."""
     return f"{reference()['authors']}, {reference()['title']}"
 
 
 def printed(task: str, size: int, warped: bool = False) -> dict[str, dict[str, dict[int, float]]]:
-    """What the paper printed of a task in mazes of `size`: by agent, metric and distance (or landmark distance)."""
+    """Returns the numbers printed for a task and size, by agent, metric and distance (or landmark distance)."""
     found: dict[str, dict[str, dict[int, float]]] = {}
     for table in reference()["tables"]:
         if (table["task"], table["size"], table["warped"]) == (task, size, warped):
@@ -29,11 +31,11 @@ def printed(task: str, size: int, warped: bool = False) -> dict[str, dict[str, d
     return found
 
 
-def printed_mmn(summary: dict[str, Any]) -> dict[int, float]:
+def printed_mmn(summary: Summary) -> dict[int, float]:
     """Success rates of the paper's MMN by distance, or landmark distance, where `summary` can be held against them.
 
     That is where it is of unseen mazes and nothing was perturbed.
     """
-    if summary["split"] != "eval" or any(summary["perturbation"].values()):
+    if summary.split != "eval" or any(summary.perturbation.values()):
         return {}
-    return printed(summary["task"], summary["size"]).get("MMN", {}).get("success_rate", {})
+    return printed(summary.task, summary.size).get("MMN", {}).get("success_rate", {})

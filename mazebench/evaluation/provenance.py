@@ -1,4 +1,4 @@
-"""What a result came from: versions, benchmark, checkpoint, options, command and machine."""
+"""Where a result came from: versions, benchmark, checkpoint, options, command and machine."""
 
 from __future__ import annotations
 
@@ -6,21 +6,24 @@ import dataclasses
 import functools
 import hashlib
 import inspect
+import json
 import os
 import pathlib
 import platform
 import struct
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import metadata
 from typing import Any
 
 from mazebench.agent import Agent
 from mazebench.errors import InputError
 from mazebench.evaluation.options import EvalOptions
-from mazebench.files import open_file
+from mazebench.evaluation.records import Provenance
 from mazebench.maps.benchmark import VERSION, manifest_hash
-from mazebench.records import parse_json
+from mazebench.maps.maze import Maze
+from mazebench.storage.files import open_file
+from mazebench.storage.json_files import parse_json
 from mazebench.tasks import TASK_VERSION
 
 _PACKAGES = (
@@ -28,12 +31,12 @@ _PACKAGES = (
     *("opencv-python-headless", "torch", "ray"),
 )
 # Of a checkpoint. What they hold must leave a summary that can be read again, where it takes up to ten times the bytes.
-_MAX_HEADER_BYTES, _MAX_METADATA_DEPTH = 2**18, 16
+_MAX_HEADER_BYTES = 2**18
 
 
-def provenance(options: EvalOptions, agent_class: type[Agent]) -> dict[str, Any]:
-    """The part of a summary that lets someone else repeat the run; versions are None where nothing is installed."""
-    return {
+def provenance(options: EvalOptions, agent_class: type[Agent], mazes: Sequence[Maze]) -> Provenance:
+    """Returns what lets someone else repeat the run; the version of a package that is not installed is None."""
+    content = {
         "benchmark": VERSION,
         "benchmark_manifest_sha256": manifest_hash(),
         "task_version": TASK_VERSION,
@@ -53,16 +56,24 @@ def provenance(options: EvalOptions, agent_class: type[Agent]) -> dict[str, Any]
             "processor": platform.machine(),
             "cores": os.cpu_count(),
         },
+        "mazes_sha256": hashlib.sha256(b"".join(maze.walls.tobytes() for maze in mazes)).hexdigest(),
     }
+    return Provenance.model_validate_json(json.dumps(content))  # as a reader will find it
 
 
 def code_hash(options: EvalOptions, agent_class: type[Agent]) -> str | None:
-    """Of the file of an agent at hand, which may be edited between two sittings of a run; None for installed ones."""
-    return file_hash(inspect.getfile(agent_class)) if ":" in options.agent else None
+    """Returns the SHA-256 of the file of a `module:Class`, which may be edited between two sittings of a run.
+
+    None for installed agents, and for classes of no file, as in a notebook.
+    """
+    try:
+        return file_hash(inspect.getfile(agent_class)) if ":" in options.agent else None
+    except (TypeError, OSError):
+        return None
 
 
 def file_hash(path: str | None) -> str | None:
-    """SHA-256 of a file; None for none."""
+    """Returns the SHA-256 of a file; None for None."""
     if path is None:
         return None
     with open_file(path, "checkpoint") as file:
@@ -73,9 +84,9 @@ def file_hash(path: str | None) -> str | None:
 
 
 def checkpoint_metadata(path: str | None) -> dict[str, Any] | None:
-    """The agent's config and training as its checkpoint tells them; None if it is no safetensors file with JSON in it.
+    """Returns a checkpoint's metadata, the config and training; None if it is no safetensors file with JSON.
 
-    The file's header alone is read: whether the checkpoint is any good is for the agent to say.
+    Only the file's header is read; the agent itself checks the rest.
     """
     if path is None:
         return None
@@ -85,13 +96,13 @@ def checkpoint_metadata(path: str | None) -> dict[str, Any] | None:
         header = file.read(length) if length <= _MAX_HEADER_BYTES else b""
     try:
         texts = parse_json(header)["__metadata__"]
-        return {key: parse_json(text, _MAX_METADATA_DEPTH) for key, text in texts.items()}
+        return {key: parse_json(text) for key, text in texts.items()}
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
 
 
 def _package_of(agent_class: type[Agent]) -> str | None:
-    """Name and version of the distribution that an installed agent belongs to."""
+    """Returns name and version of the distribution that an installed agent belongs to."""
     names = _distributions().get(agent_class.__module__.partition(".")[0])
     return f"{names[0]} {_version(names[0])}" if names else None
 

@@ -11,12 +11,17 @@ from collections.abc import Sequence
 from typing import Any
 
 from mazebench.errors import InputError, unknown
-from mazebench.evaluation.harness import Evaluation, Progress, run_evaluations
+from mazebench.evaluation.evaluate import NUM_ENVS, Progress, run_plan
 from mazebench.evaluation.options import EvalOptions
-from mazebench.evaluation.results import SUITE, is_safe_name, load_result, read_suite
-from mazebench.files import make_folder, refuse_links, writing_to
+from mazebench.evaluation.plan import Plan, make_plan
+from mazebench.evaluation.pool import open_pool
+from mazebench.evaluation.records import Summary
+from mazebench.evaluation.results import CONFIG, SUITE, Suite, read_suite
+from mazebench.evaluation.store import check_same_run, is_finished
 from mazebench.maps.benchmark import SIZES, VERSION, manifest_hash
-from mazebench.records import CONFIG, FolderLock, write_json
+from mazebench.storage.files import make_folder, writing_to
+from mazebench.storage.json_files import write_json
+from mazebench.storage.locks import FolderLock
 
 _TABLE_DISTANCES = (2, 4, 6, 8, 10)  # those that the paper prints
 
@@ -58,120 +63,106 @@ SUITES: dict[str, tuple[Part, ...]] = {
 }
 
 
-class SuiteRun:
-    """A suite for some agents in a folder; made without writing anything."""
+def run_suite(
+    suite: str,
+    agents: Sequence[str],
+    out: pathlib.Path,
+    *,
+    checkpoint: str | None = None,
+    seed: int = 0,
+    record: bool | None = None,
+    resume: bool = False,
+    num_envs: int = NUM_ENVS,
+    workers: int = 0,
+    ray_address: str | None = None,
+    progress: Progress = lambda ended, of: None,
+) -> list[Summary]:
+    """Runs what is left of a suite for some agents; returns the summaries by agent and then in the suite's order.
 
-    def __init__(
-        self,
-        suite: str,
-        agents: Sequence[str],
-        out: pathlib.Path,
-        *,
-        checkpoint: str | None = None,
-        seed: int = 0,
-        record: bool = True,
-    ):
-        """Reads what all parts need; `checkpoint` is for a single agent.
+    Args:
+      suite: a name in `SUITES`.
+      agents: whom to evaluate.
+      out: the suite's folder; with `resume`, agents that it does not have yet are added.
+      checkpoint: of a single agent.
+      seed: of what the agents draw.
+      record: write trajectories; None writes them, but does not run finished parts again that have none.
+      resume, num_envs, workers, ray_address, progress: as for `evaluate`.
 
-        Raises:
-          InputError: if a name is unknown, an agent named twice, or a checkpoint given to several agents.
-        """
-        if suite not in SUITES:
-            raise unknown("suite", suite, SUITES)
-        if checkpoint is not None and len(agents) > 1:
-            raise InputError(f"expected one agent with --checkpoint, found {len(agents)}")
-        self.out = out
-        self._suite, self._seed = suite, seed
-        self._folders = _folders(agents)
-        self.evaluations = [
-            Evaluation(
-                EvalOptions(agent=agent, checkpoint=checkpoint, seed=seed, **part.changes),
-                out / folder / part.name,
-                record,
-                {"suite": suite, "part": part.name},
-            )
-            for agent, folder in self._folders.items()
-            for part in SUITES[suite]
-        ]
-
-    @property
-    def is_finished(self) -> bool:
-        """Whether its folder holds the results of all parts."""
-        return all(evaluation.is_finished for evaluation in self.evaluations)
-
-    def run(
-        self,
-        *,
-        resume: bool = False,
-        num_envs: int = 256,
-        workers: int = 0,
-        ray_address: str | None = None,
-        progress: Progress = lambda done, of: None,
-    ) -> None:
-        """Runs what is left of all parts; the arguments are those of `evaluate`.
-
-        Raises:
-          InputError: if the folder holds something else, or a part can't be run.
-          RunError: if an agent or a worker failed; what ended until then is kept.
-        """
-        make_folder(self.out)
-        with FolderLock(self.out):
-            content = self._prepare(resume)
-            for evaluation in self.evaluations:
-                refuse_links(evaluation.out, within=self.out)
-                if (evaluation.out / CONFIG).exists():
-                    evaluation.check_same_run()
-            with writing_to(self.out):
-                write_json(self.out / SUITE, content)
-            left = [evaluation for evaluation in self.evaluations if not evaluation.is_finished]
-            finished = sum(len(evaluation.trials) for evaluation in self.evaluations if evaluation.is_finished)
-            run_evaluations(
-                left,
+    Raises:
+      InputError: if a name is unknown, an agent named twice, a checkpoint given to several agents, or the folder holds
+        something else.
+      RunError: if an agent or a worker failed; what ended until then is kept.
+    """
+    if suite not in SUITES:
+        raise unknown("suite", suite, SUITES)
+    if checkpoint is not None and len(agents) > 1:
+        raise InputError(f"expected one agent with --checkpoint, found {len(agents)}")
+    plans = {
+        (folder, part.name): make_plan(EvalOptions(agent, checkpoint=checkpoint, seed=seed, **part.changes))
+        for agent, folder in _folders(agents).items()
+        for part in SUITES[suite]
+    }
+    make_folder(out)
+    with FolderLock(out), open_pool(workers, ray_address) as pool:
+        _prepare(out, suite, agents, seed, plans, resume)
+        total = sum(len(plan.trials) for plan in plans.values())
+        summaries, before = [], 0
+        for (folder, part), plan in plans.items():
+            summary = run_plan(
+                plan,
+                out / folder / part,
+                pool,
                 resume=True,
+                record=not is_finished(out / folder / part) if record is None else record,
                 num_envs=num_envs,
-                workers=workers,
-                ray_address=ray_address,
-                smallest_job=num_envs,
-                progress=lambda done, of: progress(finished + done, finished + of),
+                progress=lambda ended, of, before=before: progress(before + ended, total),  # type: ignore[misc]
+                suite=suite,
+                part=part,
             )
+            summaries.append(summary)
+            before += len(plan.trials)
+    return summaries
 
-    def summaries(self) -> list[dict[str, Any]]:
-        """Of all parts, by agent and then in the suite's order; all must be finished.
 
-        Raises:
-          InputError: if one is damaged.
-        """
-        return [{**load_result(evaluation.out).summary, **evaluation.labels} for evaluation in self.evaluations]
-
-    def _prepare(self, resume: bool) -> dict[str, Any]:
-        """What is to be said of the folder, or a refusal; agents that it does not have yet are added to it."""
-        content = {
-            "suite": self._suite,
-            "parts": [part.name for part in SUITES[self._suite]],
-            "benchmark": VERSION,
-            "benchmark_manifest_sha256": manifest_hash(),
-            "seed": self._seed,
-        }
-        found = sorted(path.name for path in self.out.iterdir())
-        agents: dict[str, str] = {}
-        if set(found) - {f"{SUITE}.tmp"}:
-            if SUITE not in found:
-                raise InputError(f"{self.out}: expected an empty folder or a suite's, found {found[0]!r} in it")
-            if not resume:
-                raise InputError(f"{self.out}: holds a run already; go on with --resume or name another folder")
-            before = read_suite(self.out)
-            for key, value in content.items():
-                if before.get(key) != value:
-                    raise InputError(
-                        f"{self.out}: holds another run: its {key} is {str(before.get(key))[:200]}, this one's {value}"
-                    )
-            agents = before["folders"]
-        agents = _folders([*agents, *(agent for agent in self._folders if agent not in agents)])
-        return {**content, "agents": list(agents), "folders": agents}
+def _prepare(
+    out: pathlib.Path, suite: str, agents: Sequence[str], seed: int, plans: dict[tuple[str, str], Plan], resume: bool
+) -> None:
+    """Makes `out` ready to hold the suite, or refuses before anything is run."""
+    found = sorted(path.name for path in out.iterdir() if path.suffix != ".tmp")
+    known: dict[str, str] = {}
+    if found:
+        if SUITE not in found:
+            raise InputError(f"{out}: expected an empty folder or a suite's, found {found[0]!r} in it")
+        if not resume:
+            raise InputError(f"{out}: holds a run already; go on with --resume or name another folder")
+        known = read_suite(out).folders
+    folders = _folders(list(dict.fromkeys([*known, *agents])))
+    content = Suite(
+        suite=suite,
+        parts=tuple(part.name for part in SUITES[suite]),
+        benchmark=VERSION,
+        benchmark_manifest_sha256=manifest_hash(),
+        seed=seed,
+        agents=tuple(folders),
+        folders=folders,
+    )
+    if found:
+        before = read_suite(out)
+        for key in ("suite", "parts", "benchmark", "benchmark_manifest_sha256", "seed"):
+            if getattr(before, key) != getattr(content, key):
+                raise InputError(
+                    f"{out}: holds another run: its {key} is {str(getattr(before, key))[:200]}, "
+                    f"this one's {getattr(content, key)}"
+                )
+    for (folder, part), plan in plans.items():
+        if (out / folder / part / CONFIG).exists():
+            check_same_run(out / folder / part, plan)
+    with writing_to(out):
+        write_json(out / SUITE, content.model_dump())
 
 
 def _folders(agents: Sequence[str]) -> dict[str, str]:
-    """The name of each agent's folder.
+    """Returns the name of each agent's folder.
 
     Raises:
       InputError: if two would have the same one.
@@ -186,6 +177,6 @@ def _folders(agents: Sequence[str]) -> dict[str, str]:
 
 
 def folder_name(agent: str) -> str:
-    """An agent's name as a folder's: letters, digits, dots, dashes and underscores, `module-Class` for module:Class."""
+    """Returns the name of an agent's folder: letters, digits, dots, dashes and underscores."""
     name = "".join(letter if letter.isalnum() or letter in "._-" else "-" for letter in agent)
-    return name if is_safe_name(name) else f"agent{name}"
+    return f"agent{name}" if name.startswith(".") else name

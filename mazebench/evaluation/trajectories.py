@@ -1,29 +1,30 @@
-"""The trajectories of an evaluation on disk: where the body was, what the agent was shown, where it was sent.
+"""The trajectories of an evaluation: where the body was, what the agent was shown, where it was sent.
 
-`trajectories.npz` holds all episodes in the order of `episodes.jsonl`, and is written whole or not at all. Until then
-they wait in `trajectories.journal`, each in a block with a checksum, so that a kill costs at most the last block.
+`trajectories.npz` holds all episodes in the order of `episodes.jsonl`.
 
 `E` is the number of episodes, `N` the cells a side of the mazes, `L` the poses of an episode, its steps and the start.
 """
 
 from __future__ import annotations
 
-import contextlib
+import base64
 import dataclasses
 import functools
 import math
 import pathlib
-import struct
-import zlib
+from typing import Any
 
 import numpy as np
 
-from mazebench.arrays import read_arrays
 from mazebench.errors import InputError
-from mazebench.files import open_file, open_to_write, open_whole, read_at_most
+from mazebench.storage.arrays import read_arrays
+from mazebench.storage.files import open_file, open_whole
+from mazebench.tasks.episode import Episode
+from mazebench.tasks.route import plan_route
+from mazebench.tasks.shown_map import show_map
+from mazebench.tasks.spec import TaskSpec
 
 TRAJECTORIES = "trajectories.npz"
-JOURNAL = "trajectories.journal"
 FORMAT = "mazebench-trajectories-1"
 
 _MAX_BYTES = 2**28  # of all arrays together; the 1,500 local episodes of a benchmark's size take at most 1 MB
@@ -34,7 +35,7 @@ _DTYPES: dict[str, np.dtype] = {
     "num_landmarks": np.dtype("<i4"),
     "landmark": np.dtype("<i4"),
 }
-_BLOCK = struct.Struct("<IIIII")  # episode, L, bytes of the map, landmarks, CRC-32 of the rest of the block
+_NUM_POSES = 128  # room for a local episode; more is made where it is needed
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,7 +83,7 @@ class Trajectories:
 
 
 def load_trajectories(path: pathlib.Path, num_episodes: int) -> Trajectories:
-    """The trajectories of an evaluation of `num_episodes` episodes.
+    """Returns the trajectories of an evaluation of `num_episodes` episodes.
 
     Raises:
       InputError: if the file can't be read, is damaged, too large or of other episodes.
@@ -109,7 +110,7 @@ def save_trajectories(path: pathlib.Path, trajectories: Trajectories) -> None:
 
 
 def pack_trajectories(episodes: list[Trajectory]) -> Trajectories:
-    """The episodes in one value, in their order; at least one, all of mazes of one size."""
+    """Returns the trajectories of at least one episode, all in mazes of one size, in their order."""
     return Trajectories(
         length=np.array([len(episode.pose) for episode in episodes], dtype=np.int32),
         pose=np.concatenate([episode.pose for episode in episodes]).astype(np.float16, copy=False),
@@ -119,57 +120,62 @@ def pack_trajectories(episodes: list[Trajectory]) -> Trajectories:
     )
 
 
-class TrajectoryLog:
-    """The trajectories of `num_episodes` episodes in `folder`, those already there included; a context manager."""
+class PoseRecorder:
+    """The poses in each of B environments since its episode began."""
 
-    def __init__(self, folder: pathlib.Path, num_episodes: int, size: int):
-        """Reads what is there, of mazes of `size` cells a side.
+    def __init__(self, num_envs: int):
+        self._pose = np.empty((num_envs, _NUM_POSES, 3), dtype=np.float16)
+        self._count = np.zeros(num_envs, dtype=np.int64)
 
-        A block of the journal that is not whole is cut off, with all behind it.
+    def add(self, position: np.ndarray, yaw: np.ndarray, active: np.ndarray) -> None:
+        """Notes true positions `[B, 2]` (m) and yaws `[B]` (rad) of the environments that are `active` `[B]`."""
+        if self._count.max() == self._pose.shape[1]:
+            self._pose = np.concatenate([self._pose, np.empty_like(self._pose)], axis=1)
+        slots = np.arange(len(position))
+        self._pose[slots, self._count, :2] = position
+        self._pose[slots, self._count, 2] = yaw
+        self._count += active
 
-        Raises:
-          InputError: if the folder's trajectories are damaged or of other episodes.
-        """
-        self._folder, self._num_episodes = folder, num_episodes
-        self._episodes: dict[int, Trajectory] = {}
-        if (folder / TRAJECTORIES).exists():
-            whole = load_trajectories(folder / TRAJECTORIES, num_episodes)
-            if whole.size != size:
-                raise InputError(f"{folder / TRAJECTORIES}: expected maps of {size} cells a side, found {whole.size}")
-            self._episodes = {index: whole[index] for index in range(num_episodes)}
-        waiting = _repair_and_read(folder / JOURNAL, size)
-        self._episodes |= {index: episode for index, episode in waiting.items() if index < num_episodes}
-        self._journal = open_to_write(folder / JOURNAL, "ab")  # closed by __exit__
+    def take(self, slot: int, position: np.ndarray, yaw: float, task: TaskSpec, episode: Episode) -> Trajectory:
+        """Returns the trajectory of the episode that ended in `slot` in this pose, and forgets its poses."""
+        last = np.array([[*position, yaw]], dtype=np.float16)
+        pose = np.concatenate([self._pose[slot, : self._count[slot]], last])
+        self._count[slot] = 0
+        shown = show_map(task, episode)
+        cells = plan_route(task, episode, shown).cells[1:]
+        landmarks = np.array([row * task.size + column for row, column in cells], dtype=np.int32)
+        return Trajectory(pose, shown.seen_walls(), landmarks)
 
-    @property
-    def missing(self) -> list[int]:
-        """The indices of the episodes that have no trajectory yet."""
-        return [index for index in range(self._num_episodes) if index not in self._episodes]
 
-    def add(self, episodes: dict[int, Trajectory]) -> None:
-        """Stores the trajectories of episodes that just ended, by their indices; before their records are."""
-        for index, episode in episodes.items():
-            self._episodes[index] = episode
-            self._journal.write(_to_block(index, episode))
-        self._journal.flush()
+def to_json(trajectory: Trajectory) -> dict[str, Any]:
+    """Returns a trajectory as plain values, little-endian whatever the machine."""
+    return {
+        "pose": base64.b64encode(trajectory.pose.astype(_DTYPES["pose"]).tobytes()).decode("ascii"),
+        "shown": base64.b64encode(np.packbits(trajectory.shown).tobytes()).decode("ascii"),
+        "landmarks": trajectory.landmarks.tolist(),
+    }
 
-    def finish(self) -> None:
-        """Writes all trajectories in order and removes the journal; none may be missing."""
-        episodes = [self._episodes[index] for index in range(self._num_episodes)]
-        save_trajectories(self._folder / TRAJECTORIES, pack_trajectories(episodes))
-        self._journal.close()
-        (self._folder / JOURNAL).unlink()
 
-    def __enter__(self) -> TrajectoryLog:
-        return self
+def from_json(content: dict[str, Any], size: int) -> Trajectory:
+    """Returns the trajectory that `to_json` made, in a maze of `size` cells a side.
 
-    def __exit__(self, *exception: object) -> None:
-        with contextlib.suppress(OSError):  # what could not be written was told before
-            self._journal.close()
+    Raises:
+      ValueError: if it is none.
+    """
+    try:
+        pose = np.frombuffer(base64.b64decode(content["pose"]), _DTYPES["pose"]).reshape(-1, 3)
+        shown = _unpack(np.frombuffer(base64.b64decode(content["shown"]), np.uint8), size)
+        trajectory = Trajectory(pose, shown, np.array(content["landmarks"], dtype=_DTYPES["landmark"]))
+    except (KeyError, TypeError, OverflowError) as error:
+        raise ValueError(f"no trajectory: {error}") from error
+    fault = _fault(pack_trajectories([trajectory]), 1)
+    if fault:
+        raise ValueError(fault)
+    return trajectory
 
 
 def _fault(trajectories: Trajectories, num_episodes: int) -> str | None:
-    """What is wrong, in words."""
+    """Returns what is wrong with them, in words; None if nothing is."""
     length, num_landmarks = trajectories.length, trajectories.num_landmarks
     if length.shape != (num_episodes,) or num_landmarks.shape != (num_episodes,):
         found = length.shape[0] if length.ndim == 1 else length.shape
@@ -191,61 +197,10 @@ def _fault(trajectories: Trajectories, num_episodes: int) -> str | None:
     return None
 
 
-def _to_block(index: int, episode: Trajectory) -> bytes:
-    """Little-endian whatever the machine, as the journal may be resumed on another."""
-    pose = episode.pose.astype(_DTYPES["pose"]).tobytes()
-    shown = np.packbits(episode.shown).tobytes()
-    landmarks = episode.landmarks.astype(_DTYPES["landmark"]).tobytes()
-    body = pose + shown + landmarks
-    counts = (index, len(episode.pose), len(shown), len(episode.landmarks))
-    return _BLOCK.pack(*counts, zlib.crc32(body, zlib.crc32(_BLOCK.pack(*counts, 0)))) + body
-
-
-def _repair_and_read(path: pathlib.Path, size: int) -> dict[int, Trajectory]:
-    """The episodes of a journal by index; what follows its last whole block is removed from it.
-
-    Raises:
-      InputError: if a whole block holds no trajectory in a maze of `size` cells a side.
-    """
-    if not path.exists():
-        return {}
-    content = read_at_most(path, _MAX_BYTES, "trajectories")
-    if len(content) > _MAX_BYTES:
-        raise InputError(f"{path}: expected at most {_MAX_BYTES} bytes, found more")
-    episodes, start = {}, 0
-    while start + _BLOCK.size <= len(content):
-        *counts, checksum = _BLOCK.unpack_from(content, start)
-        index, num_poses, num_map_bytes, num_landmarks = counts
-        end = start + _BLOCK.size + 6 * num_poses + num_map_bytes + 4 * num_landmarks
-        body = content[start + _BLOCK.size : end]
-        if end > len(content) or zlib.crc32(body, zlib.crc32(_BLOCK.pack(*counts, 0))) != checksum:
-            break
-        if num_map_bytes != -(-size * size // 8) or min(num_poses, num_landmarks) < 1:
-            raise InputError(f"{path}: expected a pose, a goal and a map of {size} cells a side, found episode {index}")
-        episodes[index] = _from_body(body, num_poses, num_map_bytes)
-        fault = _fault(pack_trajectories([episodes[index]]), 1)
-        if fault:
-            raise InputError(f"{path}: episode {index}: {fault}")
-        start = end
-    if start < len(content):
-        with open_to_write(path, "r+b") as file:
-            file.truncate(start)
-    return episodes
-
-
-def _from_body(body: bytes, num_poses: int, num_map_bytes: int) -> Trajectory:
-    packed = np.frombuffer(body, np.uint8, num_map_bytes, 6 * num_poses)
-    return Trajectory(
-        np.frombuffer(body, _DTYPES["pose"], 3 * num_poses).reshape(-1, 3),
-        _unpack(packed, math.isqrt(8 * num_map_bytes)),
-        np.frombuffer(body, _DTYPES["landmark"], offset=6 * num_poses + num_map_bytes),
-    )
-
-
 def _unpack(packed: np.ndarray, size: int) -> np.ndarray:
     return np.unpackbits(packed, count=size * size).reshape(size, size).astype(bool)
 
 
 def _bounds(counts: np.ndarray) -> np.ndarray:
-    """`[E + 1]`: where each episode's entries begin, and where the last one's end."""
+    """Returns `[E + 1]`: the indices where each episode's entries begin, and where the last one's end."""
     return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])

@@ -1,4 +1,4 @@
-"""Holds an agent to its contract: whatever it gets wrong becomes one line that names it."""
+"""Validates an agent's answers, and turns its exceptions into one-line `AgentError`s."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.agent import Agent, Observation, place_of
+from mazebench.agent import Agent, Inputs
+from mazebench.agent_loading import source_line
 from mazebench.errors import InputError, RunError
 
 
@@ -18,52 +19,46 @@ class AgentError(RunError):
 
 @contextmanager
 def calling(name: str, method: str) -> Iterator[None]:
-    """Around a call of the agent called `name`: turns what it raises into an `AgentError` that says where.
+    """Turns an exception of the agent `name` in `method` into an `AgentError` that names the line.
 
-    An agent's own `InputError`, of a checkpoint that it can't use, stays as it is.
+    An `InputError`, which an agent raises for a checkpoint that it can't use, stays as it is.
     """
     try:
         yield
     except (InputError, RunError):
         raise
     except (Exception, SystemExit) as error:  # other people's code may raise anything
-        said = " ".join(f"{type(error).__name__}: {error}".split())[:300].removesuffix(":")
-        raise AgentError(f"agent {name!r}: {method}() raised {said}{place_of(error)}") from error
+        found = " ".join(f"{type(error).__name__}: {error}".split())[:300].removesuffix(":")
+        raise AgentError(f"agent {name!r}: {method}() raised {found}{source_line(error)}") from error
 
 
-class CheckedAgent:
-    """An agent as the runner calls it; a wrong answer is an `AgentError`."""
+class CheckedAgent(Agent):
+    """An agent whose wrong answers are `AgentError`s."""
 
     def __init__(self, name: str, agent: Agent, num_actions: int):
-        """`name` is what messages call it."""
+        """Messages call the agent `name`."""
         self.name, self._agent, self._num_actions = name, agent, num_actions
-        self._seed_episodes = getattr(agent, "seed_episodes", None)
 
     def initial_state(self, batch_size: int) -> Any:
-        """The agent's state at the beginning."""
+        """Returns the agent's state before the first step."""
         with calling(self.name, "initial_state"):
             return self._agent.initial_state(batch_size)
 
-    def seed_episodes(self, seeds: np.ndarray, mask: np.ndarray) -> None:
-        """Tells the agent, if it wants to know, which episodes begin."""
-        if self._seed_episodes is not None:
-            with calling(self.name, "seed_episodes"):
-                self._seed_episodes(seeds, mask)
-
-    def act(self, observation: Observation, is_first: np.ndarray, state: Any) -> tuple[np.ndarray, Any]:
-        """Actions `[B]` int in range, without exploring, and the next state."""
+    def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, Any]:
+        """Returns the agent's actions, `[B]` int in range, and its next state."""
         with calling(self.name, "act"):
-            answer = self._agent.act(observation, is_first, state)
+            answer = self._agent.act(inputs, state, explore)
         if not isinstance(answer, tuple) or len(answer) != 2:
             raise AgentError(f"agent {self.name!r}: expected act() to return (actions, state), found {_short(answer)}")
         with calling(self.name, "act"):
             actions = np.asarray(answer[0])
-        fault = self._fault(actions, len(is_first))
+        fault = self._fault(actions, len(inputs.new_episode))
         if fault:
             raise AgentError(f"agent {self.name!r}: expected act() to return {fault}")
         return actions, answer[1]
 
     def _fault(self, actions: np.ndarray, batch_size: int) -> str | None:
+        """Returns what was expected of `actions` and what was found; None if they are right."""
         if actions.shape != (batch_size,):
             return f"{batch_size} actions, one an environment, found shape {actions.shape}"
         if not np.issubdtype(actions.dtype, np.integer):

@@ -13,8 +13,8 @@ from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, read_asset
 from mazebench.maps.generators import corner_cells
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.maze import Cell, Maze, cell_to_point
-from mazebench.tasks.episode import Episode
-from mazebench.tasks.spec import EVAL_DISTANCES, sample_pair
+from mazebench.tasks.episode import Episode, sample_pair
+from mazebench.tasks.options import EVAL_DISTANCES
 from mazebench.world.mjcf import BODY_RADIUS
 
 EPISODES_PER_DISTANCE = 5
@@ -34,12 +34,12 @@ class Trial:
 
 
 def episodes_file(task: str, size: int) -> str:
-    """The name of the file with the frozen eval episodes of one task and size."""
+    """Returns the name of the file with the frozen eval episodes of one task and size."""
     return f"episodes-{task}-{size}-eval.csv"
 
 
 def frozen_trials(task: str, size: int) -> tuple[Trial, ...]:
-    """The eval episodes of benchmark v1: 1,500 a size of the local task, 20 of the hierarchical one."""
+    """Returns the eval episodes of benchmark v1: 1,500 a size of the local task, 20 of the hierarchical one."""
     rows = csv.DictReader(read_asset(episodes_file(task, size)).splitlines())
     return tuple(
         Trial(
@@ -65,7 +65,7 @@ def select_trials(
     episodes_per_distance: int = EPISODES_PER_DISTANCE,
     seed: int = 0,
 ) -> list[Trial]:
-    """The episodes to evaluate, by maze and then by distance.
+    """Returns the episodes to evaluate, by maze and then by distance.
 
     Args:
       task: "local" or "hierarchical".
@@ -100,7 +100,7 @@ def select_trials(
 
 
 def _local_trials(maze: Maze, index: int, distance: int, count: int, seed: int) -> list[Trial]:
-    """`count` episodes of different pairs, as far as there are so many; the first ones do not depend on `count`."""
+    """Returns `count` episodes, of different pairs if there are so many; the first ones do not depend on `count`."""
     rng = np.random.default_rng([seed, maze.size, index, distance])
     seen: set[tuple[Cell, Cell]] = set()
     trials = []
@@ -132,7 +132,7 @@ def _disc_paths(maze: Maze) -> DiscPaths:
 
 
 def benchmark_task_sizes() -> list[tuple[str, int, int]]:
-    """(task, size, number of frozen episodes) of everything in benchmark v1."""
+    """Returns (task, size, number of frozen episodes) for all of benchmark v1."""
     local = MAZES_PER_SPLIT * len(EVAL_DISTANCES) * EPISODES_PER_DISTANCE
     return [
         (task, size, count) for size in SIZES for task, count in (("local", local), ("hierarchical", MAZES_PER_SPLIT))

@@ -23,7 +23,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from mazebench.agent import Interface, agent_names, load_agent_class
+from mazebench.agent import Interface
+from mazebench.agent_loading import agent_names, load_agent_class
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
@@ -32,7 +33,9 @@ from mazebench.maps.generators import generate
 from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
+from mazebench.training.protocol import LearningAgent
 from mazebench.world.mjcf import ACTIONS, PHYSICS_TIMESTEP, STEPS_PER_ACTION, action_controls
+from mazebench.world.models import models_of
 from mazebench.world.rendering import RenderingError
 
 _SIZES = (13, 21, 51, 101)
@@ -63,7 +66,7 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
     """
     seconds, rounds = (_QUICK_SECONDS, _QUICK_ROUNDS) if quick else (_SECONDS, _ROUNDS)
     results: dict[str, Any] = {"machine": {"cores": os.cpu_count(), "mujoco": mujoco.__version__}}
-    spec = TaskSpec("local", load_mazes(13, "train"))
+    spec = TaskSpec(mazes=load_mazes(13, "train"))
     say("environments beside the bare simulation")
     results["environments"] = [
         _ratio("vector, 256 environments, all threads", 256, *_vector_pair(spec, 256, 0), seconds, rounds),
@@ -105,7 +108,7 @@ def print_tables(results: dict[str, Any]) -> None:
 
 
 def _ratio(what: str, num_envs: int, step: Step, bare: Step, seconds: float, rounds: int) -> dict[str, Any]:
-    """Agent steps a second of `step` and of `bare`, and their ratio."""
+    """Returns the agent steps per second of `step` and of `bare`, and their ratio."""
     pairs = [(_rate(step, num_envs, seconds), _rate(bare, num_envs, seconds)) for _ in range(rounds)]
     return {
         "what": what,
@@ -128,12 +131,13 @@ def _random_actions(num_envs: int, num_steps: int = 512) -> np.ndarray:
 
 
 def _vector_pair(spec: TaskSpec, num_envs: int, num_threads: int) -> tuple[Step, Step]:
-    """The vector environment, resets in other mazes included, and a batch of the same models that only steps."""
+    """Returns a step of the vector environment, resets included, and one of a batch that only steps."""
     actions, controls = _random_actions(num_envs), action_controls()
     env = MazeVectorEnv(spec, num_envs, seed=0, num_threads=num_threads)
     env.reset()
-    batch = mujoco.batch.Batch(spec.models[0], num_envs, num_threads)
-    batch.set_models([spec.models[i % len(spec.mazes)] for i in range(num_envs)])
+    models = models_of(spec.mazes)
+    batch = mujoco.batch.Batch(models[0], num_envs, num_threads)
+    batch.set_models([models[i % len(models)] for i in range(num_envs)])
     batch.reset(keyframe=0)
     ctrl = batch.bind("ctrl")
 
@@ -150,8 +154,8 @@ def _stepping(env: MazeVectorEnv) -> Step:
 
 
 def _bare_loop(spec: TaskSpec, actions: list[int]) -> Step:
-    """mj_step in one maze, and nothing else."""
-    model = spec.models[0]
+    """Returns a step of one maze by mj_step, and nothing else."""
+    model = models_of(spec.mazes)[0]
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     controls = action_controls()
@@ -214,26 +218,25 @@ def _random_maze_row(spec: TaskSpec, seconds: float, rounds: int) -> dict[str, A
 
 
 def _training_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
-    """Where a learner's time goes, for each learning agent that is installed, in 256 environments where it can."""
+    """Returns where a learner's time goes, for each installed learning agent, in 256 environments where it can."""
     return [
         _training_row(name, agent_class, spec, seconds)
         for name, agent_class in _installed_agents()
-        if hasattr(agent_class, "build_learner")
+        if issubclass(agent_class, LearningAgent)
     ]
 
 
 def _agents_tables(seconds: float) -> dict[str, list[dict[str, Any]]]:
-    """By title, the tables of the agents that have a speed of their own to measure."""
+    """Returns the tables of the agents that measure themselves, by title."""
     return {
         f"{name}: {title}": rows
         for name, agent_class in _installed_agents()
-        if hasattr(agent_class, "measure")
         for title, rows in agent_class.measure(seconds).items()
     }
 
 
 def _installed_agents() -> Iterator[tuple[str, Any]]:
-    """The names and classes of those whose dependencies are installed too."""
+    """Yields the names and classes of the agents whose dependencies are installed."""
     for name in agent_names():
         try:
             yield name, load_agent_class(name)
@@ -254,7 +257,7 @@ def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -
     count = 0
     while sum(times.values()) < seconds or not learner.num_updates_due(10**9):  # until it may learn
         marks = [time.perf_counter()]
-        actions, state = learner.actor.act(collector.observation, collector.is_first, state, explore=True)
+        actions, state = learner.actor.act(collector.inputs, state, explore=True)
         marks.append(time.perf_counter())
         experience = collector.step(actions)
         marks.append(time.perf_counter())
@@ -283,10 +286,9 @@ def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -
 
 def _resets(spec: TaskSpec, count: int) -> list[dict[str, Any]]:
     """Milliseconds a reset; models are compiled before, as after the first episodes of a run."""
-    for index in range(len(spec.mazes)):
-        spec.models[index]
+    _compile(spec)
     environment = Environment(spec, 0)
-    one_maze = Environment(TaskSpec("local", spec.mazes[:1]), 0)
+    one_maze = Environment(TaskSpec(mazes=spec.mazes[:1]), 0)
     env = MazeVectorEnv(spec, 256, seed=0)
     rows = [
         ("dm_env, another maze", _milliseconds(lambda: environment.reset(), count)),
@@ -296,11 +298,18 @@ def _resets(spec: TaskSpec, count: int) -> list[dict[str, Any]]:
     return [{"what": what, "ms": value} for what, value in rows]
 
 
+def _compile(spec: TaskSpec) -> None:
+    """Compiles all models of a task, which environments otherwise do one by one."""
+    models = models_of(spec.mazes)
+    for index in range(len(models)):
+        models[index]
+
+
 def _picture_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
-    """What a step costs in the vector environment with each camera, and with none."""
+    """Returns the cost of a step of the vector environment with each camera, and with none."""
     rows = []
     for cameras in ((), ("egocentric",), ("top",), ("egocentric", "top")):
-        env = MazeVectorEnv(dataclasses.replace(spec, cameras=cameras), _PICTURE_ENVS, seed=0)
+        env = MazeVectorEnv(dataclasses.replace(spec, sensors=cameras), _PICTURE_ENVS, seed=0)
         try:
             env.reset()
         except RenderingError:
@@ -322,16 +331,15 @@ def _milliseconds(call: Callable[[], Any], count: int) -> float:
 
 
 def _size_row(size: int, seconds: float, rounds: int) -> dict[str, Any]:
-    """The vector environment in mazes of `size` cells a side; its context keeps the default size."""
+    """Returns the speed of the vector environment in mazes of `size` cells a side; the context has the default size."""
     mazes = [generate("dfs", size, np.random.default_rng([size, index])) for index in range(_MAZES_PER_SIZE)]
-    spec = TaskSpec("local", tuple(mazes))
+    spec = TaskSpec(mazes=tuple(mazes))
     begin = time.perf_counter()
-    for index in range(len(mazes)):
-        spec.models[index]
+    _compile(spec)
     compiled = (time.perf_counter() - begin) / len(mazes)
     row = _ratio(f"{size} x {size}", 256, *_vector_pair(spec, 256, 0), seconds, rounds)
     # Padding included; floor and body are the two other geoms.
-    return {**row, "compile ms": 1e3 * compiled, "walls": spec.models[0].ngeom - 2}
+    return {**row, "compile ms": 1e3 * compiled, "walls": models_of(spec.mazes)[0].ngeom - 2}
 
 
 def _num_envs_row(spec: TaskSpec, num_envs: int, seconds: float, rounds: int) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""How far a long command is: a bar on a terminal, lines elsewhere; where it can be stopped."""
+"""Progress display for long commands: a bar on a terminal, lines elsewhere."""
 
 from __future__ import annotations
 
@@ -7,29 +7,26 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-from mazebench import stopping
-
 
 @dataclasses.dataclass
 class Kept:
     """How many episodes are on disk."""
 
-    done: int = 0
+    ended: int = 0
     of: int | None = None  # None before the first is run
 
     def __str__(self) -> str:
-        return "no further episode is kept" if self.of is None else f"{self.done:,} of {self.of:,} episodes are kept"
+        return "no episode has ended" if self.of is None else f"{self.ended:,} of {self.of:,} episodes are kept"
 
 
 @contextmanager
 def evaluating(title: str, kept: Kept) -> Iterator[Callable[[int, int], None]]:
-    """Yields a function (done, of) that notes what is `kept` and shows it."""
+    """Yields a function (ended, of) that updates `kept` and shows it."""
     with _episodes_shown(title) as show:
 
-        def advance(done: int, of: int) -> None:
-            kept.done, kept.of = done, of
-            stopping.check()
-            show(done, of)
+        def advance(ended: int, of: int) -> None:
+            kept.ended, kept.of = ended, of
+            show(ended, of)
 
         yield advance
 
@@ -74,17 +71,6 @@ def _episodes_shown(title: str) -> Iterator[Callable[[int, int], None]]:
 @contextmanager
 def training() -> Iterator[Callable[[float, str | None], None]]:
     """Yields a function (share, line) that prints the line, on a terminal above a bar of the share."""
-    with _share_shown() as show:
-
-        def report(share: float, line: str | None) -> None:
-            stopping.check()
-            show(share, line)
-
-        yield report
-
-
-@contextmanager
-def _share_shown() -> Iterator[Callable[[float, str | None], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TimeElapsedColumn
 

@@ -1,0 +1,1 @@
+"""Speed of the simulation, the environments and the learners, for `mazebench bench`."""

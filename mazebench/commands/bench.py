@@ -1,0 +1,26 @@
+"""`mazebench bench`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Annotated
+
+import typer
+
+from mazebench.commands.display import choose_rendering_backend
+
+
+def bench(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Shorter runs, noisier figures.")] = False,
+) -> None:
+    """Measure speed on this machine, as ratios to the bare simulation taken in the same run."""
+    choose_rendering_backend()
+    from mazebench.bench import measure
+
+    results = measure.run(quick=quick, say=lambda line: print(line, file=sys.stderr))
+    if as_json:
+        print(json.dumps(results, indent=1))
+    else:
+        measure.print_tables(results)

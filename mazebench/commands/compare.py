@@ -1,0 +1,37 @@
+"""`mazebench compare`."""
+
+from __future__ import annotations
+
+import json
+import pathlib
+from typing import Annotated
+
+import typer
+
+from mazebench.errors import remark
+
+
+def compare(
+    a: Annotated[pathlib.Path, typer.Argument(metavar="A", help="The folder of an evaluation, or of a suite's agent.")],
+    b: Annotated[
+        pathlib.Path, typer.Argument(metavar="B", help="The evaluation of another agent on the same episodes.")
+    ],
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print JSON, with all intervals, instead of a table.")
+    ] = False,
+) -> None:
+    """Compare two agents on the same episodes: what A has more than B, with 95 % intervals over mazes."""
+    from mazebench.evaluation import comparison, table
+
+    found = comparison.compare_folders(a, b)
+    for line in found.notes:
+        remark(line)
+    if as_json:
+        print(json.dumps(comparison.to_json(found), indent=1))
+        return
+    if "" in found.parts:
+        rows = found.parts[""].by_distance if found.has_distances else {}
+        named = {str(distance): row for distance, row in rows.items()}
+        table.print_comparison(found.title, "distance", {**named, "all": found.parts[""].overall})
+    else:
+        table.print_comparison(found.title, "part", {name: part.overall for name, part in found.parts.items()})

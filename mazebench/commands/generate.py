@@ -1,0 +1,69 @@
+"""`mazebench generate`."""
+
+from __future__ import annotations
+
+import pathlib
+from contextlib import ExitStack
+from typing import Annotated, Any
+
+import typer
+
+from mazebench.commands.options import refuse_ignored
+
+
+def generate(
+    context: typer.Context,
+    size: Annotated[
+        int | None,
+        typer.Option(help="Cells a side, 5 to 255; 13 if not given. With --from-image, what the picture shows."),
+    ] = None,
+    count: Annotated[int, typer.Option(min=1, help="How many mazes.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same mazes.")] = 0,
+    style: Annotated[str, typer.Option(help="dfs, rooms or obstacles.")] = "dfs",
+    out: Annotated[pathlib.Path, typer.Option(help="Folder to fill with NAME.txt, NAME.xml, ...")] = pathlib.Path(
+        "mazes"
+    ),
+    formats: Annotated[
+        str, typer.Option("--format", help="Files to write: any of mjcf, txt, png, glb, obj, stl, separated by commas.")
+    ] = "txt,mjcf,png,glb",
+    from_image: Annotated[
+        pathlib.Path | None, typer.Option(help="Read the maze off a picture of a floor plan, or a text map, instead.")
+    ] = None,
+) -> None:
+    """Make mazes: MJCF for MuJoCo, text, picture, mesh."""
+    from mazebench.storage.files import make_folder
+    from mazebench.storage.locks import FolderLock
+    from mazebench.world.formats import make_mazes, parse_formats, write_maze
+
+    refuse_ignored(context, (from_image is not None, "the picture shows one maze", ("count", "seed", "style")))
+    mazes = make_mazes(size, count, seed, style, from_image)
+    chosen = parse_formats(formats)
+    with ExitStack() as opened:
+        for index, maze in enumerate(mazes):
+            if index == 0:  # nothing is made for bad input
+                make_folder(out)
+                opened.enter_context(FolderLock(out))
+            for path in write_maze(maze, out, chosen, from_image):
+                print(path)
+            if index == 0:
+                _preview(maze)
+
+
+def _preview(maze: Any) -> None:
+    """Draws a maze that fits the terminal; where output is no terminal, in the text form of maps."""
+    from rich.console import Console
+    from rich.text import Text
+
+    from mazebench.maps.text import format_maze
+
+    console = Console()
+    if console.width < 2 * maze.size:
+        return
+    if not console.is_terminal:
+        print(format_maze(maze), end="")
+        return
+    for row in maze.walls:
+        line = Text()
+        for wall in row:
+            line.append("  ", style="on grey27" if wall else "on grey93")
+        console.print(line)

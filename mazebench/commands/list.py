@@ -1,0 +1,29 @@
+"""`mazebench list`."""
+
+from __future__ import annotations
+
+
+def list_() -> None:
+    """List tasks, agents, sizes, maze styles and Gymnasium ids."""
+    from mazebench.agent_loading import agent_names
+    from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS, VERSION
+    from mazebench.maps.generators import STYLES
+    from mazebench.options import options_of
+    from mazebench.tasks import TASK_VERSION
+    from mazebench.tasks.options import TASKS
+    from mazebench.tasks.perturbations import Perturbations
+    from mazebench.tasks.sensors import SENSORS
+
+    ids = (f"mazebench/{kind}-{SIZES[0]}-v{TASK_VERSION}" for kind in ("Local", "Hierarchical", "LocalGoal"))
+    rows = {
+        "agents": ", ".join(agent_names()),
+        "tasks": f"{', '.join(TASKS)} (version {TASK_VERSION})",
+        "sizes": f"{', '.join(map(str, SIZES))} "
+        f"(benchmark {VERSION}, {MAZES_PER_SPLIT} mazes in each of {', '.join(SPLITS)})",
+        "styles": ", ".join(sorted(STYLES)),
+        "perturbed": ", ".join(options_of(Perturbations)),
+        "sensors": ", ".join(SENSORS),
+        "Gymnasium": f"{', '.join(ids)} and the other sizes",
+    }
+    for name, text in rows.items():
+        print(f"{name + ':':<12} {text}")

@@ -1,0 +1,137 @@
+"""Options of the command line that follow from the fields of option classes."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import functools
+import inspect
+import typing
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import typer
+
+from mazebench.errors import InputError
+from mazebench.options import Option, Options, options_of
+
+# Options that another one leaves without effect, and why.
+LOCAL_ONLY = ("distances", "episodes_per_distance")
+HIERARCHICAL = ("the hierarchical task leads from corner to corner", LOCAL_ONLY)
+LOCAL = ("the local task has no landmarks", ("landmark_distance",))
+OWN_MAPS = ("with --maps the mazes are your own", ("split",))
+
+
+def takes_options(
+    options_class: type[Options], names: tuple[str, ...], **defaults: Any
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Gives a command an option for each field `names` of a class.
+
+    The command has a parameter `values`, which receives the values by name.
+
+    Args:
+      options_class: such as `EvalOptions`.
+      names: of the fields.
+      **defaults: of fields whose default differs in this command.
+    """
+    options, kinds = options_of(options_class), typing.get_type_hints(options_class)
+    defaults = {field.name: field.default for field in dataclasses.fields(options_class)} | defaults
+    added = [_parameter(name, options[name], kinds[name], defaults[name]) for name in names]
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        own = inspect.signature(command, eval_str=True)
+        kept = [parameter for name, parameter in own.parameters.items() if name != "values"]
+
+        @functools.wraps(command)
+        def run(**given: Any) -> None:
+            values = {name: _to_value(kinds[name], given.pop(name)) for name in names}
+            command(**given, values=values)
+
+        parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in [*kept, *added]]
+        run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+        return run
+
+    return decorate
+
+
+def refuse_ignored(context: typer.Context, *rules: tuple[bool, str, tuple[str, ...]]) -> None:
+    """Refuses options that were given and would make no difference.
+
+    Args:
+      context: of the command.
+      *rules: whether it applies, the reason, and the options' names.
+
+    Raises:
+      InputError: naming the first such option.
+    """
+    for applies, reason, names in rules:
+        for name in names if applies else ():
+            source = context.get_parameter_source(name)
+            if source is not None and source.name != "DEFAULT":
+                (option,) = (parameter.opts[0] for parameter in context.command.params if parameter.name == name)
+                raise InputError(f"{reason}; found {option}, which would be ignored")
+
+
+def refuse_ignored_by_task(context: typer.Context, values: dict[str, Any]) -> None:
+    """Refuses options without effect in the task, or on the maps, that `values` name."""
+    refuse_ignored(
+        context,
+        (values["task"] == "hierarchical", *HIERARCHICAL),
+        (values["task"] == "local", *LOCAL),
+        (values["maps"] is not None, *OWN_MAPS),
+    )
+
+
+def parse_distances(text: str) -> tuple[int, ...]:
+    """Returns sorted distances from ranges and commas: "1-5,8,10".
+
+    Raises:
+      InputError: if `text` is anything else.
+    """
+    distances: set[int] = set()
+    for part in text.split(","):
+        low, dash, high = part.strip().partition("-")
+        if not low.isdecimal() or (dash and not high.isdecimal()) or len(low) > 5 or len(high) > 5:
+            raise InputError(f"expected distances like 1-5,8,10, found {text!r}")
+        if int(low) > int(high or low):
+            raise InputError(f"expected distances from low to high, found {part.strip()!r}")
+        distances.update(range(int(low), int(high or low) + 1))
+    if not distances or min(distances) < 1:
+        raise InputError(f"expected distances of 1 cell or more, found {text!r}")
+    return tuple(sorted(distances))
+
+
+def format_distances(distances: tuple[int, ...]) -> str:
+    """Returns the text of which `parse_distances` makes sorted `distances`."""
+    first, last = distances[0], distances[-1]
+    if len(distances) > 1 and distances == tuple(range(first, last + 1)):
+        return f"{first}-{last}"
+    return ",".join(map(str, distances))
+
+
+def _parameter(name: str, option: Option, kind: Any, default: Any) -> inspect.Parameter:
+    """Returns the parameter from which typer makes the option."""
+    shown = kind
+    if kind == tuple[int, ...]:
+        shown, default = str, format_distances(default)
+    elif kind == tuple[str, ...]:
+        shown, default = list[str], list(default)
+    elif option.choices:
+        shown = _choice(name, option.choices)
+        default = shown(default)
+    annotation = Annotated[shown, typer.Option(help=option.help)]  # type: ignore[valid-type]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def _choice(name: str, choices: tuple[str, ...]) -> Any:
+    """Returns the enumeration that typer wants for a choice."""
+    return enum.StrEnum(name, {choice: choice for choice in choices})
+
+
+def _to_value(kind: Any, given: Any) -> Any:
+    if isinstance(given, enum.Enum):
+        return given.value
+    if kind == tuple[int, ...]:
+        return parse_distances(given)
+    return tuple(given) if kind == tuple[str, ...] else given

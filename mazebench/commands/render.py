@@ -1,0 +1,34 @@
+"""`mazebench render`."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Annotated, Any
+
+import typer
+
+from mazebench.commands.display import choose_rendering_backend
+from mazebench.commands.options import refuse_ignored_by_task, takes_options
+from mazebench.evaluation.options import TASK_CHOICES, EvalOptions
+
+_CHOICES = tuple(name for name in TASK_CHOICES if name != "episodes_per_distance")
+
+
+@takes_options(EvalOptions, (*_CHOICES, "checkpoint", "seed"), distances=(10,))
+def render(
+    context: typer.Context,
+    out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
+    values: dict[str, Any],
+    agent: Annotated[str, typer.Option(help="Who drives.")] = "planner-closed-loop",
+    view: Annotated[
+        str, typer.Option(help="top, egocentric, chase, map (shown map and driven path), or all four side by side.")
+    ] = "all",
+    pixels: Annotated[int, typer.Option(min=64, max=1280, help="Side of a view.")] = 360,
+) -> None:
+    """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
+    refuse_ignored_by_task(context, values)
+    choose_rendering_backend()
+    from mazebench.evaluation import film
+
+    outcome = film.film_episode(EvalOptions(agent, **values), out, view, pixels)
+    print(f"{out}: {outcome}")

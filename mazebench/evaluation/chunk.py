@@ -1,0 +1,189 @@
+"""Runs some of an evaluation's episodes, as many side by side as there are environments.
+
+`B` is the number of environments.
+"""
+
+from __future__ import annotations
+
+import collections
+import contextlib
+import dataclasses
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mazebench.agent import Agent, Inputs
+from mazebench.envs.vector import MazeVectorEnv
+from mazebench.errors import InputError, RunError
+from mazebench.evaluation.agent_inputs import agent_seed, true_state
+from mazebench.evaluation.checked_agent import AgentError
+from mazebench.evaluation.metrics import spl
+from mazebench.evaluation.plan import Plan
+from mazebench.evaluation.records import Record
+from mazebench.evaluation.trajectories import PoseRecorder, Trajectory
+from mazebench.evaluation.trials import Trial
+from mazebench.tasks.episode import Episode
+from mazebench.tasks.spec import TaskSpec
+
+YAW = 5  # index in the state
+
+
+@dataclasses.dataclass(frozen=True)
+class Chunk:
+    """Some episodes of an evaluation, for one process to run."""
+
+    plan: Plan
+    episodes: tuple[int, ...]  # their indices in the plan
+    record: bool  # whether trajectories are wanted
+    num_envs: int  # environments side by side
+    num_threads: int  # of the simulation; 0 for all cores
+
+
+class Ended(NamedTuple):
+    """An episode that ended."""
+
+    record: Record
+    trajectory: Trajectory | None  # None where none is wanted
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """What came of a trial."""
+
+    index: int  # of the trial
+    trial: Trial
+    success: bool
+    steps: int
+    path_length: float  # m
+    trajectory: Trajectory | None
+
+
+def run_chunk(chunk: Chunk) -> Iterator[list[Ended]]:
+    """Yields the episodes that ended, step by step; each once, in no fixed order."""
+    plan = chunk.plan
+    trials = [(index, plan.trials[index]) for index in chunk.episodes]
+    agent = plan.build_agent()
+    for outcomes in run_trials(
+        agent,
+        plan.task,
+        trials,
+        chunk.num_envs,
+        chunk.num_threads,
+        seed=plan.options.seed,
+        needs_truth=plan.agent_class.needs_truth,
+        record=chunk.record,
+    ):
+        yield [Ended(_to_record(plan, outcome), outcome.trajectory) for outcome in outcomes]
+
+
+def run_whole_chunk(chunk: Chunk) -> list[Ended]:
+    """Returns all episodes of a chunk.
+
+    Raises:
+      InputError, RunError: of the plain kinds, since what caused them need not survive the way to another process.
+    """
+    try:
+        return [ended for step in run_chunk(chunk) for ended in step]
+    except (InputError, RunError) as error:
+        kinds = (InputError, AgentError, RunError)
+        raise next(kind for kind in kinds if isinstance(error, kind))(str(error)) from None
+
+
+def run_trials(
+    agent: Agent,
+    task: TaskSpec,
+    trials: Sequence[tuple[int, Trial]],
+    num_envs: int,
+    num_threads: int = 0,
+    *,
+    seed: int = 0,
+    needs_truth: bool = False,
+    record: bool = False,
+) -> Iterator[list[Outcome]]:
+    """Yields what came of the trials that ended, step by step; each once, in no fixed order.
+
+    Args:
+      agent: acts without exploring.
+      task: the task, with the mazes that the trials index.
+      trials: the episodes to run, each with its index.
+      num_envs: environments side by side, at most; outcomes of an agent that keeps its contract do not depend on it.
+      num_threads: of the simulation; 0 for all cores.
+      seed: of what the agent draws; with a trial's index it gives the seed of the episode's draws.
+      needs_truth: whether the agent is given the true maze and pose.
+      record: whether outcomes have trajectories.
+    """
+    if not trials:
+        return
+    num_envs = min(num_envs, len(trials))
+    # The longest ways first, so that no environment is left alone with one at the end.
+    queue = collections.deque(sorted(trials, key=lambda numbered: -numbered[1].shortest_path))
+    slots: list[tuple[int, Trial] | None] = [None] * num_envs
+
+    def next_episode(slot: int) -> Episode | None:
+        slots[slot] = numbered = queue.popleft() if queue else None
+        return None if numbered is None else numbered[1].episode
+
+    state = agent.initial_state(num_envs)
+    active = new_episode = np.ones(num_envs, dtype=bool)
+    seeds = np.zeros(num_envs, dtype=np.int64)
+    poses = PoseRecorder(num_envs) if record else None
+    env = MazeVectorEnv(task, num_envs, num_threads=num_threads, episode_source=next_episode)
+    with contextlib.closing(env):
+        observation, info = env.reset()
+        while active.any():
+            for slot in np.flatnonzero(new_episode):
+                seeds[slot] = agent_seed(seed, _present(slots[slot])[0])
+            yaw = observation["state"][:, YAW]
+            if poses:
+                poses.add(info["position"], yaw, active)
+            truth = true_state(task, env.episodes, info["position"], yaw) if needs_truth else None
+            actions, state = agent.act(Inputs(observation, new_episode, info["is_first"], seeds, truth, active), state)
+            running = list(slots)
+            observation, _, terminated, truncated, info = env.step(actions)
+            ended = terminated | truncated
+            active = np.array([numbered is not None for numbered in slots])
+            new_episode = ended & active
+            if ended.any():
+                yield [
+                    _outcome(task, *_present(running[slot]), info, slot, poses)
+                    for slot in np.flatnonzero(ended).tolist()
+                ]
+
+
+def _present(numbered: tuple[int, Trial] | None) -> tuple[int, Trial]:
+    assert numbered is not None
+    return numbered
+
+
+def _outcome(
+    task: TaskSpec, index: int, trial: Trial, info: dict[str, Any], slot: int, poses: PoseRecorder | None
+) -> Outcome:
+    final = info["final_info"]
+    trajectory = None
+    if poses:
+        yaw = info["final_obs"][slot]["state"][YAW]
+        trajectory = poses.take(slot, final["position"][slot], yaw, task, trial.episode)
+    success, steps = bool(final["success"][slot]), int(final["steps"][slot])
+    return Outcome(index, trial, success, steps, float(final["path_length"][slot]), trajectory)
+
+
+def _to_record(plan: Plan, outcome: Outcome) -> Record:
+    episode, trial = outcome.trial.episode, outcome.trial
+    shortest = np.array([trial.shortest_path, float(trial.distance)])
+    both = spl(np.array([outcome.success] * 2), shortest, np.array([outcome.path_length] * 2))
+    values = {
+        "episode": outcome.index,
+        "maze": plan.task.mazes[episode.maze].name,
+        "start": episode.start,
+        "goal": episode.goal,
+        "distance": trial.distance,
+        "success": outcome.success,
+        "steps": outcome.steps,
+        "path_length": outcome.path_length,
+        "shortest_path": trial.shortest_path,
+        "spl": float(both[0]),
+        "spl_grid": float(both[1]),
+        "seed": episode.seed,
+    }
+    return Record.model_validate(plan.labels | values | plan.levels)

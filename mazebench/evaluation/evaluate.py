@@ -1,0 +1,141 @@
+"""Evaluations from options to a summary: `make_plan`, `Pool.run`, `Store.append`, `summarize`, `Store.finish`."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import pathlib
+import tempfile
+from collections.abc import Callable
+from typing import Any
+
+from mazebench import stopping
+from mazebench.agent import Agent, SingleAgent
+from mazebench.agent_loading import checked_agent_class, load_agent_class
+from mazebench.errors import InputError, unknown
+from mazebench.evaluation import metrics
+from mazebench.evaluation.chunk import Chunk
+from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.plan import Plan, make_plan
+from mazebench.evaluation.pool import Pool, open_pool
+from mazebench.evaluation.records import Summary
+from mazebench.evaluation.results import load_result
+from mazebench.evaluation.store import Store, check_same_run, is_finished
+from mazebench.maps.benchmark import VERSION
+
+NUM_ENVS = 256
+_CHUNKS_PER_WORKER = 4  # so that no worker waits long for the last one,
+_LEAST_CHUNK = 64  # but not so many that their environments are few: agents act on all of them at once
+_EPISODES_PER_ENV = 4  # at least, in a worker's chunk: environments that have ended an episode take another
+
+# Called with the number of episodes that have ended and of all.
+Progress = Callable[[int, int], None]
+
+
+def evaluate(
+    agent: str | type[Agent] | type[SingleAgent],
+    out: str | pathlib.Path | None = None,
+    *,
+    resume: bool = False,
+    record: bool = False,
+    num_envs: int = NUM_ENVS,
+    workers: int = 0,
+    ray_address: str | None = None,
+    progress: Progress = lambda ended, of: None,
+    **options: Any,
+) -> Summary:
+    """Evaluates an agent and returns the summary.
+
+    Args:
+      agent: the name of an installed agent, "module:Class", or a class.
+      out: the folder for records, summary and options; None keeps the summary alone.
+      resume: go on with the run that `out` holds; an empty or missing folder starts one.
+      record: write trajectories too.
+      num_envs: environments side by side in each process, at most.
+      workers: processes; 0 runs in this one, on all cores.
+      ray_address: of a Ray cluster to run the workers on; 0 of them then are as many as it has CPUs.
+      progress: called as episodes end.
+      **options: fields of `EvalOptions`: `task`, `size`, `split`, `maps`, `distances`, `map_flip`, `seed` and so on.
+
+    Raises:
+      InputError: if an option can't be met, or `out` can't be written or holds another run.
+      RunError: if the agent or a worker failed; what ended until then is kept.
+    """
+    name = agent if isinstance(agent, str) else f"{agent.__module__}:{agent.__qualname__}"
+    agent_class = load_agent_class(name) if isinstance(agent, str) else checked_agent_class(name, agent)
+    known = [field.name for field in dataclasses.fields(EvalOptions) if field.name != "agent"]
+    for option in options:
+        if option not in known:
+            raise unknown("option", option, known)
+    if (workers or ray_address) and (name.startswith("__main__:") or load_agent_class(name) is not agent_class):
+        raise InputError(f"expected a class that other processes can import by its name, found {name}")
+    plan = make_plan(EvalOptions(name, **options), agent_class)
+    with open_pool(workers, ray_address) as pool, tempfile.TemporaryDirectory() as temporary:
+        folder = pathlib.Path(temporary if out is None else out)
+        return run_plan(plan, folder, pool, resume=resume, record=record, num_envs=num_envs, progress=progress)
+
+
+def run_plan(
+    plan: Plan,
+    folder: pathlib.Path,
+    pool: Pool,
+    *,
+    resume: bool = False,
+    record: bool = False,
+    num_envs: int = NUM_ENVS,
+    progress: Progress = lambda ended, of: None,
+    suite: str | None = None,
+    part: str | None = None,
+) -> Summary:
+    """Runs what is left of a plan in `folder` and returns its summary; a finished run is not run again.
+
+    Raises:
+      InputError, RunError: as `evaluate`.
+    """
+    if num_envs < 1:
+        raise InputError(f"expected num_envs of at least 1, found {num_envs}")
+    num_trials = len(plan.trials)
+    if resume and is_finished(folder, record):
+        check_same_run(folder, plan)
+        progress(num_trials, num_trials)
+        return load_result(folder).summary
+    with Store(folder, plan, resume=resume, record=record) as store:
+        progress(store.num_ended, num_trials)
+        for ended in pool.run(_cut(plan, store, pool, num_envs)):
+            stopping.check()
+            store.append(ended)
+            progress(store.num_ended, num_trials)
+        overall, by_distance = metrics.summarize(store.records, plan.oracle_spl)
+        summary = Summary(
+            **plan.labels,
+            privileged=plan.agent_class.needs_truth,
+            suite=suite,
+            part=part,
+            benchmark=VERSION,
+            episodes=num_trials,
+            perturbation=plan.levels,
+            provenance=plan.provenance,
+            overall=overall,
+            by_distance=by_distance,
+        )
+        store.finish(summary)
+    return summary
+
+
+def _cut(plan: Plan, store: Store, pool: Pool, num_envs: int) -> list[Chunk]:
+    """Returns what is left to run as chunks of one size and mixture."""
+    missing = tuple(store.missing)
+    if not pool.num_workers:
+        return [Chunk(plan, missing, store.record, num_envs, pool.num_threads)] if missing else []
+    wanted = min(_CHUNKS_PER_WORKER * pool.num_workers, len(missing) // _LEAST_CHUNK)
+    pieces = min(len(missing), max(pool.num_workers, wanted))
+    return [
+        Chunk(
+            plan,
+            missing[piece::pieces],
+            store.record,
+            min(num_envs, math.ceil(len(missing) / pieces / _EPISODES_PER_ENV)),
+            pool.num_threads,
+        )
+        for piece in range(pieces)
+    ]

@@ -1,0 +1,170 @@
+"""95 % intervals of means over episodes, of paired differences, and of scores pooled over training runs.
+
+`E` is the number of episodes, `R` of training runs, `T` of tasks; a task is a maze. docs/metrics.md has worked examples
+and a simulation of the coverage.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from scipy import special, stats
+
+CONFIDENCE = 0.95
+
+# How much alike the outcomes of one maze's episodes are taken to be where the data do not say: the correlation of two.
+DEFAULT_CORRELATION = 0.1
+# The weight of that default, in independent episodes. Wilson's interval itself adds z^2 = 3.8 of them, half of either
+# kind. With 2 or more, the lower bound never falls when a last failure becomes a success (docs/metrics.md).
+_DEFAULT_WEIGHT = 2.0
+_UPPER_TAIL = (1 + CONFIDENCE) / 2
+_NUM_RESAMPLES = 2000
+_BOOTSTRAP_SEED = 0
+
+
+@dataclasses.dataclass(frozen=True)
+class Estimate:
+    """A figure and its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+def wilson_interval(rate: float, num_trials: float) -> tuple[float, float]:
+    """Returns Wilson's score interval of a rate in [0, 1] (Wilson 1927); `num_trials` > 0 need not be whole."""
+    z = special.ndtri(_UPPER_TAIL)
+    centre = rate + z**2 / (2 * num_trials)
+    half_width = z * np.sqrt(rate * (1 - rate) / num_trials + z**2 / (4 * num_trials**2))
+    scale = 1 + z**2 / num_trials
+    # Rounding must not take the interval past its ends, or past the rate at 0 and 1.
+    low, high = (centre - half_width) / scale, (centre + half_width) / scale
+    return float(np.clip(low, 0, rate)), float(np.clip(high, rate, 1))
+
+
+def mean_interval(values: np.ndarray, mazes: np.ndarray) -> Estimate:
+    """Returns the mean of values in [0, 1], successes or SPL, with Wilson's interval at the effective sample size.
+
+    The effective sample size is E / d (Korn and Graubard 1998; Dean and Pagano 2015), with the design effect
+
+        d = (S + w d0^2) / (E p (1 - p) + w d0),    at most m,    w = 2.
+
+    p is the mean, S the sum over mazes of the squared deviations of the mazes' sums (`_squares_by_maze`), m the mean
+    number of episodes that an episode shares its maze with, itself included, and d0 = 1 + (m - 1) 0.1 the design effect
+    for the default correlation (Kish 1965). E p (1 - p) is S as it is expected for independent successes. The data
+    prevail where failures and successes are many, the default where either is rare.
+
+    With one maze the episodes are taken as independent, and the interval speaks of that maze only.
+
+    Args:
+      values: `[E]` in [0, 1].
+      mazes: `[E]`, any names or numbers.
+    """
+    mean, clusters = float(np.mean(values)), _clusters(mazes)
+    squares = _squares_by_maze(values - mean, clusters)
+    default, largest = _default_effect(clusters), _mean_size(clusters)
+    weight = _DEFAULT_WEIGHT * default
+    effect = min((squares + weight * default) / (len(values) * mean * (1 - mean) + weight), largest)
+    return Estimate(mean, *wilson_interval(mean, len(values) / effect))
+
+
+def difference_interval(differences: np.ndarray, mazes: np.ndarray) -> Estimate:
+    """Returns the mean of paired differences in [-1, 1] with the adjusted interval of Bonett and Price (2012).
+
+    They add a pair that is won and one that is lost before they compute the usual interval. Here both count for d0
+    episodes, the default design effect of `mean_interval`, and S is over mazes as there:
+
+        mean~ = sum / (E + 2 d0),    variance = (S + d0^2 ((1 - mean~)^2 + (1 + mean~)^2)) / (E + 2 d0)^2.
+
+    With one episode a maze, or a single maze, this is Bonett and Price's interval.
+
+    Args:
+      differences: `[E]` in [-1, 1], of one episode each.
+      mazes: `[E]`, any names or numbers.
+    """
+    clusters = _clusters(mazes)
+    default = _default_effect(clusters)
+    count = len(differences) + 2 * default
+    mean, centre = float(np.mean(differences)), float(np.sum(differences)) / count
+    squares = _squares_by_maze(differences - centre, clusters)
+    squares += default**2 * ((1 - centre) ** 2 + (1 + centre) ** 2)
+    half_width = special.ndtri(_UPPER_TAIL) * np.sqrt(squares) / count
+    return Estimate(mean, float(max(centre - half_width, -1)), float(min(centre + half_width, 1)))
+
+
+def interquartile_mean(scores: np.ndarray) -> float:
+    """Returns the mean of the middle half of all scores (Agarwal et al. 2021): a quarter goes at either end."""
+    return float(stats.trim_mean(scores, 0.25, axis=None))
+
+
+def pool_runs(scores: np.ndarray) -> tuple[Estimate, Estimate]:
+    """Returns the mean and the interquartile mean of `scores` `[R, T]`, R >= 2, with bootstrap intervals over runs.
+
+    A resample draws R whole runs with replacement, each with its scores in all mazes, because one network plays them
+    all. The intervals speak of other training runs on the same mazes.
+    """
+    runs = _resampled(len(scores))
+    means = scores.mean(axis=1)[runs].mean(axis=1)
+    trimmed = stats.trim_mean(scores[runs].reshape(len(runs), -1), 0.25, axis=1)
+    return _percentiles(float(scores.mean()), means), _percentiles(interquartile_mean(scores), trimmed)
+
+
+def probability_of_improvement(a: np.ndarray, b: np.ndarray) -> Estimate:
+    """Returns P(A > B) over training runs (Agarwal et al. 2021) with a bootstrap interval over the runs of both.
+
+    In each maze it is the share of pairs of a run of A and a run of B in which A's score is higher, ties counting
+    half; the mean over mazes is returned.
+
+    Args:
+      a: `[R_a, T]`, scores of A's runs, R_a >= 2.
+      b: `[R_b, T]`, scores of B's runs on the same mazes, R_b >= 2.
+    """
+    wins = (np.sign(a[:, None] - b) / 2 + 0.5).mean(axis=2)  # [R_a, R_b]
+    rng = np.random.default_rng(_BOOTSTRAP_SEED)
+    ours, theirs = (rng.integers(len(wins_of), size=(_NUM_RESAMPLES, len(wins_of))) for wins_of in (a, b))
+    resampled = wins[ours[:, :, None], theirs[:, None, :]].mean(axis=(1, 2))
+    return _percentiles(float(wins.mean()), resampled)
+
+
+def _clusters(mazes: np.ndarray) -> np.ndarray:
+    """Returns `[E]` int, which episodes hang together: those of a maze; none where there is only one maze."""
+    _, clusters = np.unique(mazes, return_inverse=True)
+    return clusters if clusters.any() else np.arange(len(mazes))
+
+
+def _mean_size(clusters: np.ndarray) -> float:
+    """Returns m: the number of episodes in an episode's cluster, averaged over episodes (Kish 1965)."""
+    return float((np.bincount(clusters) ** 2).sum() / len(clusters))
+
+
+def _default_effect(clusters: np.ndarray) -> float:
+    return 1 + (_mean_size(clusters) - 1) * DEFAULT_CORRELATION
+
+
+def _squares_by_maze(residuals: np.ndarray, clusters: np.ndarray) -> float:
+    """Returns S, the sum of squares of the clusters' sums of `residuals` `[E]`: E^2 times the mean's variance.
+
+    It is the linearised variance of a ratio with K clusters, K / (K - 1) times the sum of squares, inflated by the
+    squared ratio of the t quantiles with K - 1 and E - 1 degrees of freedom (Korn and Graubard 1998). It lies between
+    the sum of squares of single episodes, if the clusters told nothing, and m times that, if the episodes of each were
+    all alike.
+    """
+    independent = float((residuals**2).sum())
+    num_clusters = clusters.max() + 1
+    if num_clusters == len(clusters):
+        return independent
+    few = special.stdtrit(num_clusters - 1, _UPPER_TAIL) / special.stdtrit(len(clusters) - 1, _UPPER_TAIL)
+    sums = np.bincount(clusters, weights=residuals)
+    squares = few**2 * num_clusters / (num_clusters - 1) * (sums**2).sum()
+    return float(np.clip(squares, independent, _mean_size(clusters) * independent))
+
+
+def _resampled(num_runs: int) -> np.ndarray:
+    """Returns `[resamples, R]` int, runs drawn with replacement."""
+    return np.random.default_rng(_BOOTSTRAP_SEED).integers(num_runs, size=(_NUM_RESAMPLES, num_runs))
+
+
+def _percentiles(value: float, resampled: np.ndarray) -> Estimate:
+    low, high = np.quantile(resampled, [1 - _UPPER_TAIL, _UPPER_TAIL])
+    return Estimate(value, float(low), float(high))

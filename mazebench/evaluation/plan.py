@@ -1,0 +1,139 @@
+"""The plan of an evaluation: agent, task, episodes and identity, complete before anything is run or written."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import pathlib
+from typing import Any
+
+from mazebench.agent import Agent, Interface
+from mazebench.agent_loading import load_agent_class
+from mazebench.errors import InputError
+from mazebench.evaluation.checked_agent import CheckedAgent, calling
+from mazebench.evaluation.options import EvalOptions, make_task
+from mazebench.evaluation.oracle import oracle_spl
+from mazebench.evaluation.provenance import provenance
+from mazebench.evaluation.records import Provenance
+from mazebench.evaluation.trials import Trial, select_trials
+from mazebench.tasks.perturbations import perturbation_levels
+from mazebench.tasks.spec import TaskSpec
+from mazebench.world.mjcf import maze_spec
+
+_FORMAT = 2  # of a folder of results while the run goes on
+# Of a provenance: what must be the same in all sittings of a run.
+_IDENTIFYING = (
+    *("task_version", "benchmark_manifest_sha256", "mazes_sha256"),
+    *("agent_package", "agent_code_sha256", "checkpoint_sha256"),
+)
+# Options that the rest of an identity covers, or that have one value in all evaluations.
+_COVERED = ("agent", "task", "size", "split", "maps", "checkpoint", "context_size", "pairs", "num_goals", "continuous")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Plan:
+    """Everything that one evaluation will run. A pickled plan is its options; unpickling makes the plan anew."""
+
+    options: EvalOptions  # with the very file of the checkpoint
+    agent_class: type[Agent]
+    task: TaskSpec
+    trials: tuple[Trial, ...]  # in the protocol's order, by which they are numbered
+    labels: dict[str, Any]  # agent, task, size and split: what every record begins with
+    levels: dict[str, float]  # of the perturbations: what every record ends with
+    identity: dict[str, Any]  # the content of config.json; only runs of equal identity are resumed
+    provenance: Provenance  # where the result will come from
+    oracle_spl: dict[int, float] | None  # the oracle's SPL by the trial's index; None if it is not known
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _make_plan_once, (self.options,)
+
+    def build_agent(self) -> CheckedAgent:
+        """Returns a new agent for the task, held to its contract."""
+        options = self.options
+        interface = Interface(options.task, self.task.size, self.task.context_size, sensors=self.task.sensors)
+        checkpoint = None if options.checkpoint is None else pathlib.Path(options.checkpoint)
+        with calling(options.agent, "build"):
+            agent = self.agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)
+        return CheckedAgent(options.agent, agent, interface.num_actions)
+
+
+def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> Plan:
+    """Returns the plan of an evaluation; reads what is needed and writes nothing.
+
+    Args:
+      options: what to evaluate.
+      agent_class: the class that `options.agent` names, if it is loaded already.
+
+    Raises:
+      InputError: if an option can't be met.
+    """
+    agent_class = agent_class or load_agent_class(options.agent)
+    options = _with_checkpoint(options, agent_class)
+    size = make_task(options).size
+    with calling(options.agent, "context_size"):
+        context_size = int(agent_class.context_size(size))
+    task = make_task(options, context_size)
+    trials = select_trials(
+        options.task, task.mazes, options.is_frozen, options.distances, options.episodes_per_distance, options.seed
+    )
+    split = options.split if options.maps is None else "custom"
+    labels = {"agent": options.agent, "task": options.task, "size": size, "split": split}
+    levels = perturbation_levels(options)
+    origin = provenance(options, agent_class, task.mazes)
+    identity = {
+        "format": _FORMAT,
+        **labels,
+        **{name: getattr(origin, name) for name in _IDENTIFYING},
+        "mujoco": origin.packages.get("mujoco"),
+        "world_sha256": hashlib.sha256(maze_spec(task.mazes[0]).to_xml().encode("utf-8")).hexdigest(),
+        **{name: value for name, value in dataclasses.asdict(options).items() if name not in _COVERED},
+    }
+    return Plan(
+        options=options,
+        agent_class=agent_class,
+        task=task,
+        trials=tuple(trials),
+        labels=labels,
+        levels=levels,
+        identity=identity,
+        provenance=origin,
+        oracle_spl=oracle_spl(options.task, size, trials) if options.is_frozen else None,
+    )
+
+
+@functools.lru_cache(maxsize=1)
+def _make_plan_once(options: EvalOptions) -> Plan:
+    """Returns the plan of `options`, the same one for all chunks of an evaluation that a process runs."""
+    return make_plan(options)
+
+
+def _with_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:
+    """Returns `options` with the very file that the agent is read from, None for an agent that reads none.
+
+    A run's folder may gain a newer checkpoint any time, so it is looked into once, before anything is hashed or built.
+
+    Raises:
+      InputError: if a checkpoint is given to an agent that reads none.
+    """
+    default = agent_class.default_checkpoint()
+    if options.checkpoint is None:
+        return options if default is None else dataclasses.replace(options, checkpoint=str(default))
+    if default is None and not agent_class.learns and ":" not in options.agent:
+        raise InputError(f"agent {options.agent!r} reads no checkpoint; found --checkpoint {options.checkpoint}")
+    return dataclasses.replace(options, checkpoint=str(_newest_checkpoint(pathlib.Path(options.checkpoint))))
+
+
+def _newest_checkpoint(path: pathlib.Path) -> pathlib.Path:
+    """Returns `path` itself, or the newest agent in the folder of a training run or of a checkpoint.
+
+    Raises:
+      InputError: if a folder holds none.
+    """
+    if not path.is_dir():
+        return path
+    complete = (folder for folder in path.glob("checkpoints/*") if folder.name.isdecimal())
+    found = [file for folder in (path, *sorted(complete)) if (file := folder / "agent.safetensors").exists()]
+    if not found:
+        raise InputError(f"{path}: expected a checkpoint or the folder of a training run, found neither")
+    return found[-1]
