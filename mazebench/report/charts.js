@@ -20,7 +20,7 @@ function shape(tag, attributes = {}, ...children) {
   return node;
 }
 
-// The paper's agents share the colours of their namesakes here.
+// The paper's agents have the colours of our agents with the same names.
 function colorOf(label) {
   const name = label.endsWith(" (paper)") ? label.slice(0, -" (paper)".length).toLowerCase() : label;
   const place = data.labels.indexOf(name);
@@ -42,13 +42,17 @@ function formatCell(cell) {
   return value.toFixed(2) + interval + (runs ? `, ${runs} runs` : "");
 }
 
-// Columns that hold a figure of the chosen metric and are not switched off.
+// Columns that have a value of the chosen metric and are not switched off.
 function visibleColumns(table) {
-  return table.columns.filter((column) => !chosen.hidden.has(column.label) && column.cells[chosen.metric].some(Boolean));
+  return table.columns.filter((column) => !chosen.hidden.has(column.label) && hasValues(column));
+}
+
+function hasValues(column) {
+  return (column.cells[chosen.metric] || []).some(Boolean);
 }
 
 function tableElement(table) {
-  const columns = table.columns.filter((column) => column.cells[chosen.metric].some(Boolean));
+  const columns = table.columns.filter((column) => hasValues(column));
   const head = element("tr", {}, element("th", { scope: "col" }, table.rowName));
   for (const column of columns) head.append(element("th", { scope: "col" }, column.label));
   const body = element("tbody");
@@ -103,7 +107,8 @@ function pointsOf(table, column, shift) {
 function drawColumn({ svg, across, up }, column, points, isCurve) {
   const color = colorOf(column.label);
   const line = points.map(([x, value]) => `${across(x).toFixed(1)},${up(value).toFixed(1)}`).join(" ");
-  if (!column.paper && isCurve) {
+  const hasIntervals = points.every((point) => point[2] !== null);
+  if (hasIntervals && isCurve) {
     const edge = [...points.map((p) => [p[0], p[3]]), ...points.map((p) => [p[0], p[2]]).reverse()];
     const corners = edge.map(([x, y]) => `${across(x).toFixed(1)},${up(y).toFixed(1)}`).join(" ");
     svg.append(shape("polygon", { points: corners, fill: color, opacity: 0.16 }));
@@ -115,7 +120,7 @@ function drawColumn({ svg, across, up }, column, points, isCurve) {
   svg.append(shape("polyline", { points: line, fill: "none", stroke: color, "stroke-width": width, ...dash }));
   const kind = column.paper ? "cross" : MARKERS[rank % MARKERS.length];
   for (const [x, value, low, high] of points) {
-    if (!column.paper && !isCurve) {
+    if (hasIntervals && !isCurve) {
       svg.append(shape("line", { x1: across(x), x2: across(x), y1: up(low), y2: up(high), stroke: color, "stroke-width": 1.5 }));
     }
     svg.append(marker(kind, across(x), up(value), color, column.paper ? 3.5 : 4.6 - 0.3 * rank));
@@ -139,12 +144,12 @@ function drawChart(host, table) {
   const metric = data.metrics[chosen.metric];
   view.svg.setAttribute("role", "img");
   view.svg.setAttribute("tabindex", "0");
-  view.svg.setAttribute("aria-label", `${table.title}: ${metric} by ${table.rowName}. Arrow keys read it; the table below has all figures.`);
+  view.svg.setAttribute("aria-label", `${table.title}: ${metric} by ${table.rowName}. Use the arrow keys to read it; the table below has all values.`);
   host.replaceChildren(view.svg);
   addReader(host, view, table, columns);
 }
 
-// A cursor over the rows, moved by pointer and arrow keys, with all agents' figures there.
+// A cursor over the rows, moved by pointer and arrow keys, with the values of all agents at its row.
 function addReader(host, { svg, across, box }, table, columns) {
   const tip = element("div", { class: "tip", "aria-live": "polite", hidden: "" });
   const cursor = shape("line", { class: "cursor", y1: box.top, y2: box.bottom, visibility: "hidden" });
@@ -231,7 +236,7 @@ function drawViolins(host, distribution, panel) {
 
 function chartFigure(table) {
   const host = element("div");
-  const details = element("details", {}, element("summary", {}, "The figures as a table"), element("div"));
+  const details = element("details", {}, element("summary", {}, "The values as a table"), element("div"));
   const figure = element("section", { class: "chart" }, element("h3", {}, table.title), host);
   if (table.note) figure.append(element("p", { class: "note" }, table.note));
   if (table.x.length === 0) {
@@ -248,7 +253,7 @@ function chartFigure(table) {
 
 function violinFigure(distribution) {
   const panels = element("div", { class: "panels" });
-  const note = `${distribution.note} Width: how many episodes; dot and line: mean and 95 % interval.`.trim();
+  const note = `${distribution.note} The width shows the share of episodes; dot and line are the mean and its 95 % interval.`.trim();
   const figure = element("section", { class: "chart wide" }, element("h3", {}, distribution.title), panels, element("p", { class: "note" }, note));
   figure.redraw = () => {
     panels.replaceChildren();
@@ -312,7 +317,7 @@ function buildHead() {
   if (data.warnings.length) {
     const warnings = document.getElementById("warnings");
     warnings.hidden = false;
-    warnings.querySelector("summary").textContent = `${data.warnings.length} remarks on the input`;
+    warnings.querySelector("summary").textContent = `Notes on the results (${data.warnings.length})`;
     warnings.querySelector("ul").append(...data.warnings.map((warning) => element("li", {}, warning)));
   }
 }

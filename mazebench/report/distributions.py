@@ -1,4 +1,4 @@
-"""How SPL is spread over episodes, as the strength of a perturbation grows: what the violin plots show."""
+"""Distributions of SPL over episodes at each level of a perturbation: what the violin plots show."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mazebench.report.results import Result
+from mazebench.report.measures import measure
+from mazebench.report.results import ReportedResult
+from mazebench.report.rows import chosen_episodes, common_distances, note_on_distances
+from mazebench.report.settings import Setting, level_help, level_name, short_name
 from mazebench.report.table import Cell
-from mazebench.report.tables import LEVEL_NAMES, chosen_episodes, common_distances, format_distances, levels_of, measure
+from mazebench.report.tables import perturbed_groups
 
-METRIC = "spl"
 GRID = np.linspace(0, 1, 41)  # where densities are given
 _BANDWIDTH = 0.04  # of the Gaussian kernel, in SPL; fixed, so that 20 equal values are a narrow bump and no spike
 
@@ -33,48 +35,42 @@ class Distribution:
     note: str
     level_name: str
     levels: tuple[float, ...]
-    panels: tuple[tuple[str, tuple[Violin | None, ...]], ...]  # by agent, a violin a level
+    panels: tuple[tuple[str, tuple[Violin | None, ...]], ...]  # by agent, one violin for each level
 
 
-def build_distributions(results: Sequence[Result], labels: Sequence[str]) -> list[Distribution]:
-    """A distribution for each flip and noise experiment on the benchmark's eval mazes."""
+def build_distributions(results: Sequence[ReportedResult], labels: Sequence[str]) -> list[Distribution]:
+    """Returns a distribution for each perturbation and setting on the benchmark's eval mazes."""
     of_benchmark = [result for result in results if result.setting.split == "eval"]
-    return [
-        _distribution(perturbation, str(base), f"{base.task}-{base.size}-k{base.landmark_distance}", group, labels)
-        for perturbation in ("map_flip", "position_noise")
-        for base, group in levels_of(of_benchmark, perturbation)
-    ]
+    return [_distribution(*group, labels) for group in perturbed_groups(of_benchmark)]
 
 
 def density(values: np.ndarray) -> np.ndarray:
-    """`[len(GRID)]` with a peak of 1: a kernel estimate of the spread of `values` in [0, 1], reflected."""
+    """Returns `[len(GRID)]`: a kernel density estimate of `values` in [0, 1], with a peak of 1."""
     mirrored = np.concatenate([values, -values, 2 - values])
     estimate = np.exp(-(((GRID[:, None] - mirrored) / _BANDWIDTH) ** 2) / 2).sum(axis=1)
     return estimate / estimate.max()
 
 
 def _distribution(
-    perturbation: str, base: str, place: str, results: Sequence[Result], labels: Sequence[str]
+    perturbation: str, base: Setting, results: Sequence[ReportedResult], labels: Sequence[str]
 ) -> Distribution:
-    levels = sorted({getattr(result.setting, perturbation) for result in results})
+    levels = sorted({result.setting.level(perturbation) for result in results})
     distances = common_distances(results)
     panels = []
     for label in labels:
-        at_level = {getattr(result.setting, perturbation): result for result in results if result.label == label}
-        if at_level:
-            violins = [_violin(at_level[level], distances) if level in at_level else None for level in levels]
-            panels.append((label, tuple(violins)))
-    kind = perturbation.removeprefix("map_").removeprefix("position_")
+        own = {result.setting.level(perturbation): result for result in results if result.label == label}
+        if own:
+            panels.append((label, tuple(_violin(own[level], distances) if level in own else None for level in levels)))
     return Distribution(
-        name=f"violins-{kind}-{place.removesuffix('-k0').removesuffix('-k5')}",
-        title=f"SPL by {LEVEL_NAMES[perturbation].partition(' (')[0]}: {base}",
-        note=f"Distances {format_distances(distances)}." if distances else "",
-        level_name=LEVEL_NAMES[perturbation],
+        name=f"violins-{short_name(perturbation)}-{base.place}",
+        title=f"SPL by {level_name(perturbation)}: {base}",
+        note=f"{level_help(perturbation)} {note_on_distances(results)}".strip(),
+        level_name=level_name(perturbation),
         levels=tuple(levels),
         panels=tuple(panels),
     )
 
 
-def _violin(result: Result, distances: Sequence[int]) -> Violin:
+def _violin(result: ReportedResult, distances: Sequence[int]) -> Violin:
     chosen = chosen_episodes(result, distances)
-    return Violin(density(result.episodes.values(METRIC)[chosen]), measure(result, chosen)[METRIC])
+    return Violin(density(result.episodes.spl[chosen]), measure(result, chosen)["spl"])

@@ -95,7 +95,7 @@ function episodeOf(packed, number, index) {
     size: result.size,
     maze: maze.name,
     real,
-    shown: ownMap ? wallsOf(map, result.size) : result.perturbedMap ? null : real,
+    shown: ownMap ? wallsOf(map, result.size) : result.perturbed ? null : real,
     start: columns.start[index],
     goal: columns.goal[index],
     shownStart: columns.shownStart ? columns.shownStart[index] : columns.start[index],
@@ -398,10 +398,10 @@ function markDifferences(pen, current, color) {
 
 function describe(shown, driven) {
   const { current } = view;
-  byId("shown-caption").textContent = current.shown ? "The map as the agent was shown it" : "The map as shown was not recorded";
+  byId("shown-caption").textContent = current.shown ? "The map that the agent was shown" : "The map that the agent was shown was not recorded";
   byId("driven-caption").textContent = !current.x.length
     ? "The maze; the path was not recorded (eval --record)"
-    : current.real ? "The maze, and the path driven in it" : "The real maze is not in the results; the path driven on its map";
+    : current.real ? "The maze, and the path driven in it" : "The true maze is not in the results; the path driven, on the map";
   shown.setAttribute("aria-label", `Map of ${current.size} by ${current.size} cells as shown to the agent`);
   driven.setAttribute("aria-label", `Maze ${current.maze} with the path driven up to step ${view.time} of ${current.steps}`);
 }
@@ -487,7 +487,7 @@ function listen() {
 
 function startExplorer() {
   if (typeof DecompressionStream === "undefined") {
-    byId("explorer").replaceChildren(byId("explorer-title"), element("p", { class: "notice" }, "This browser is too old to unpack the episodes: it has no DecompressionStream (Chrome 80, Firefox 113, Safari 16.4 have). The figures and tables are complete."));
+    byId("explorer").replaceChildren(byId("explorer-title"), element("p", { class: "notice" }, "This browser is too old for the episode explorer, which needs DecompressionStream (Chrome 80, Firefox 113, Safari 16.4). The charts and tables are complete."));
     return;
   }
   const linked = linkedEpisode();

@@ -5,15 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-from mazebench.report.results import Result
+from mazebench.report.results import ReportedResult
 
 HEAD = ("agent", "results", "episodes", "in", "checkpoint", "seed", "versions", "machine", "command")
 _PACKAGES = ("mazebench-mujoco", "mujoco", "numpy", "torch")
 
 
-def provenance_rows(results: Sequence[Result]) -> list[tuple[str, ...]]:
-    """Rows of texts under `HEAD`; results that differ in nothing but what was played share one."""
-    groups: dict[tuple[str, ...], list[Result]] = {}
+def provenance_rows(results: Sequence[ReportedResult]) -> list[tuple[str, ...]]:
+    """Returns rows of texts under `HEAD`; results that differ only in what was played share a row."""
+    groups: dict[tuple[str, ...], list[ReportedResult]] = {}
     for result in results:
         groups.setdefault((result.label, *_origin(result)), []).append(result)
     return [
@@ -21,7 +21,7 @@ def provenance_rows(results: Sequence[Result]) -> list[tuple[str, ...]]:
             label,
             str(len(group)),
             f"{sum(len(result.episodes) for result in group):,}",
-            _common_folder([str(result.path) for result in group]),
+            _common_folder([str(result.folder) for result in group]),
             *origin,
         )
         for (label, *origin), group in groups.items()
@@ -35,14 +35,15 @@ def _common_folder(paths: Sequence[str]) -> str:
         return os.path.commonpath([os.path.abspath(path) for path in paths])
 
 
-def _origin(result: Result) -> tuple[str, ...]:
-    """Checkpoint, seed, versions, machine and command; empty what a result does not say."""
-    packages, machine, command = (result.provenance.get(key) for key in ("packages", "machine", "command"))
+def _origin(result: ReportedResult) -> tuple[str, ...]:
+    """Returns checkpoint, seed, versions, machine and command; empty texts for what the result does not say."""
+    said = result.summary.provenance.model_extra or {}
+    packages, machine, command = (said.get(key) for key in ("packages", "machine", "command"))
     versions = [f"{name} {packages[name]}" for name in _PACKAGES if isinstance(packages, dict) and packages.get(name)]
     return (
         result.checkpoint[:12] if result.checkpoint else "none",
         str(result.seed),
-        ", ".join([*versions, *([f"Python {result.provenance['python']}"] if "python" in result.provenance else [])]),
+        ", ".join([*versions, *([f"Python {said['python']}"] if "python" in said else [])]),
         ", ".join(f"{key} {value}" for key, value in machine.items()) if isinstance(machine, dict) else "",
         " ".join(map(str, command)) if isinstance(command, list) else "",
     )

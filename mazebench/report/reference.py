@@ -1,4 +1,4 @@
-"""What the paper printed, as columns of our tables."""
+"""The values that the paper printed, as columns of tables."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from mazebench.report.table import Cell, Column
 
 
 def paper_columns(task: str, size: int, rows: Sequence[float], num_rows: int, warped: bool = False) -> list[Column]:
-    """A column for each agent of which the paper prints any of `rows` (distances, or landmark distances).
+    """Returns a column for each agent for which the paper prints any of `rows`.
 
     Args:
       task: the task.
       size: cells a side.
-      rows: of the table that the columns are for, in cells.
-      num_rows: with rows that the paper has not, behind `rows`.
+      rows: distances or landmark distances in cells, of the first rows of the table.
+      num_rows: all rows of the table.
       warped: whether the maps were warped.
     """
     cells: dict[str, dict[str, list[Cell | None]]] = {}

@@ -1,4 +1,4 @@
-"""Results as the report uses them, told apart.
+"""Results as the report uses them: the records in columns, the setting, and a label for each agent.
 
 `E` is the number of episodes of a result.
 """
@@ -7,47 +7,20 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 
 from mazebench.errors import InputError
-from mazebench.evaluation.trajectories import Trajectories
+from mazebench.evaluation.records import Record, Summary, column
+from mazebench.evaluation.results import load_result
+from mazebench.evaluation.trajectories import TRAJECTORIES, Trajectories, load_trajectories
+from mazebench.maps.benchmark import VERSION, manifest_hash
+from mazebench.report.folders import Warn, find_folders
+from mazebench.report.settings import Setting, make_setting
 
+# Of each episode.
 METRICS = {"success_rate": "success rate", "spl": "SPL", "spl_grid": "SPL by grid distance"}
-PERTURBATIONS = ("map_flip", "map_warp", "position_noise")
-
-# Called with a line of text about something that was skipped or mended.
-Warn = Callable[[str], None]
-
-
-@dataclasses.dataclass(frozen=True, order=True)
-class Setting:
-    """What was played. Results of one setting are of the same kind of episodes."""
-
-    task: str
-    size: int  # N
-    split: str
-    landmark_distance: int  # cells; 0 in the local task
-    map_flip: float
-    map_warp: float
-    position_noise: float  # m
-    mazes: tuple[str, ...] = ()  # of the split "custom", whose mazes are not the benchmark's
-
-    @property
-    def perturbed(self) -> tuple[str, ...]:
-        """The names of the perturbations in force."""
-        return tuple(name for name in PERTURBATIONS if getattr(self, name))
-
-    def __str__(self) -> str:
-        parts = [self.task, f"{self.size} × {self.size}"]
-        if self.split != "eval":
-            parts.append(f"{self.split} mazes")
-        if self.task == "hierarchical":
-            parts.append(f"landmarks every {self.landmark_distance}")
-        parts += [f"{name.replace('_', ' ')} {getattr(self, name):g}" for name in self.perturbed]
-        return ", ".join(parts)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,32 +44,103 @@ class Episodes:
         return len(self.success)
 
     def values(self, metric: str) -> np.ndarray:
-        """`[E]` float: what a metric is the mean of."""
+        """Returns `[E]` float: the values of which a metric is the mean."""
         return self.success.astype(np.float64) if metric == "success_rate" else getattr(self, metric)
 
 
 @dataclasses.dataclass(frozen=True)
-class Result:
-    """One evaluation folder that held what it should."""
+class ReportedResult:
+    """A finished evaluation that a report is made from."""
 
-    path: pathlib.Path
-    agent: str
+    folder: pathlib.Path
+    summary: Summary
     label: str  # the agent's name in the report, with more where the name alone is ambiguous
     setting: Setting
-    seed: int
-    checkpoint: str | None  # SHA-256
-    benchmark: tuple[str, str]  # version and SHA-256 of the manifest
     episodes: Episodes
-    trajectories: Trajectories | None
-    provenance: dict[str, Any]
+    trajectories: Trajectories | None  # None if none were recorded
+
+    @property
+    def name(self) -> str:
+        """The agent's name, marked if the agent is privileged."""
+        return self.summary.agent + (" (privileged)" if self.summary.privileged else "")
+
+    @property
+    def checkpoint(self) -> str | None:
+        """The SHA-256 of the checkpoint."""
+        return self.summary.provenance.checkpoint_sha256
+
+    @property
+    def seed(self) -> int:
+        """The seed of the run."""
+        return self.summary.provenance.options.seed
+
+    @property
+    def benchmark(self) -> tuple[str, str]:
+        """The benchmark's version and the SHA-256 of its manifest."""
+        return self.summary.benchmark, self.summary.provenance.benchmark_manifest_sha256 or ""
 
 
-def label_results(results: list[Result]) -> list[Result]:
-    """The results with labels under which no two agents go: where names are equal, with checkpoint or seed."""
+def read_results(paths: Iterable[pathlib.Path], warn: Warn) -> list[ReportedResult]:
+    """Returns all results at or below `paths`, one for each agent and setting, with labels; at least one.
+
+    Calls `warn` with one line about each thing that is skipped.
+
+    Raises:
+      InputError: if there is no result, or some are not of the installed benchmark.
+    """
+    results = []
+    for folder in find_folders(paths, warn):
+        try:
+            results.append(_read_result(folder, warn))
+        except InputError as error:
+            warn(f"{error}; skipped")
+    if not results:
+        raise InputError(f"expected results of `mazebench eval` in {', '.join(map(str, paths))}, found none to report")
+    _require_installed_benchmark(results)
+    return _drop_repeats(_label(results), warn)
+
+
+def _read_result(folder: pathlib.Path, warn: Warn) -> ReportedResult:
+    result = load_result(folder)
+    try:
+        setting = make_setting(result.summary, result.records)
+    except InputError as error:
+        raise InputError(f"{folder}: {error}") from error
+    episodes = _to_columns(result.records)
+    trajectories = _read_trajectories(folder, episodes, setting, warn)
+    return ReportedResult(folder, result.summary, result.summary.agent, setting, episodes, trajectories)
+
+
+def _to_columns(records: tuple[Record, ...]) -> Episodes:
+    names = [field.name for field in dataclasses.fields(Episodes) if field.name not in ("maze", "mazes")]
+    mazes = tuple(dict.fromkeys(record.maze for record in records))
+    index = {name: number for number, name in enumerate(mazes)}
+    columns = {name: column(records, name) for name in names}
+    return Episodes(maze=np.array([index[record.maze] for record in records]), mazes=mazes, **columns)
+
+
+def _read_trajectories(folder: pathlib.Path, episodes: Episodes, setting: Setting, warn: Warn) -> Trajectories | None:
+    """Returns the trajectories if the folder has some that fit the records."""
+    path = folder / TRAJECTORIES
+    if not path.exists():
+        return None
+    try:
+        trajectories = load_trajectories(path, len(episodes))
+    except InputError as error:
+        warn(f"{error}; reported without paths")
+        return None
+    if trajectories.size != setting.size or not np.array_equal(trajectories.length, episodes.steps + 1):
+        warn(f"{path}: expected a pose for the start and for each step, found others; reported without paths")
+        return None
+    return trajectories
+
+
+def _label(results: list[ReportedResult]) -> list[ReportedResult]:
+    """Returns the results with labels that tell all agents apart: by checkpoint and seed where names are equal."""
     labelled = []
     for result in results:
-        namesakes = [other for other in results if other.agent == result.agent]
-        label = result.agent
+        namesakes = [other for other in results if other.name == result.name]
+        label = result.name
         if len({other.checkpoint for other in namesakes}) > 1:
             label += f" {result.checkpoint[:6]}" if result.checkpoint else " without checkpoint"
         if len({other.seed for other in namesakes}) > 1:
@@ -105,39 +149,33 @@ def label_results(results: list[Result]) -> list[Result]:
     return labelled
 
 
-def drop_repeats(results: list[Result], warn: Warn) -> list[Result]:
-    """One result for each agent and setting: of several the one with the most episodes, the first of equals."""
-    kept: dict[tuple[str, Setting], Result] = {}
+def _drop_repeats(results: list[ReportedResult], warn: Warn) -> list[ReportedResult]:
+    """Returns one result for each agent and setting: the one with the most episodes, the first of equals."""
+    kept: dict[tuple[str, Setting], ReportedResult] = {}
     for result in results:
         other = kept.setdefault((result.label, result.setting), result)
         if other is result:
             continue
         more, less = (result, other) if len(result.episodes) > len(other.episodes) else (other, result)
-        warn(f"{less.path}: {less.label}, {less.setting} again, as in {more.path}; skipped")
+        warn(f"{less.folder}: {less.label}, {less.setting} again, as in {more.folder}; skipped")
         kept[result.label, result.setting] = more
     return list(kept.values())
 
 
-def require_one_benchmark(results: list[Result], installed: tuple[str, str]) -> None:
-    """Does nothing if all results are of the installed benchmark (version and SHA-256 of its manifest).
-
-    Raises:
-      InputError: if they are not; the message says which is which.
-    """
+def _require_installed_benchmark(results: list[ReportedResult]) -> None:
+    installed = (VERSION, manifest_hash())
     folders: dict[tuple[str, str], list[str]] = {}
     for result in results:
-        folders.setdefault(result.benchmark, []).append(str(result.path))
-    foreign = [version for version in folders if version != installed]
-    if not foreign:
+        folders.setdefault(result.benchmark, []).append(str(result.folder))
+    if set(folders) == {installed}:
         return
-    which = "; ".join(f"{_name(version)}: {_listing(folders[version])}" for version in sorted(folders))
-    kind = "results of different benchmarks can't be reported together" if len(folders) > 1 else "another benchmark"
-    raise InputError(f"{kind}: expected {_name(installed)}, found {which}")
+    which = "; ".join(f"{_name(benchmark)} in {_some(folders[benchmark])}" for benchmark in sorted(folders))
+    raise InputError(f"expected results of benchmark {_name(installed)}, found {which}")
 
 
-def _name(version: tuple[str, str]) -> str:
-    return f"{version[0][:40]!r} (manifest {version[1][:8] or 'unknown'})"
+def _name(benchmark: tuple[str, str]) -> str:
+    return f"{benchmark[0][:40]!r} (manifest {benchmark[1][:8] or 'unknown'})"
 
 
-def _listing(names: list[str], most: int = 5) -> str:
+def _some(names: list[str], most: int = 5) -> str:
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

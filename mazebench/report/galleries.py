@@ -1,0 +1,138 @@
+"""Galleries: the same episodes driven by several agents, side by side."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from mazebench.maps.maze import Cell
+from mazebench.report.mazes import real_walls, shown_ends
+from mazebench.report.results import ReportedResult
+from mazebench.report.settings import Setting, short_name
+from mazebench.report.tables import perturbed_groups
+
+_MAX_COLUMNS = 5  # episodes of a gallery
+_MAX_ROWS = 8  # agents
+_DISTANCE = 10  # cells, of local episodes: the farthest that the paper prints; less where there is none
+
+# An episode, whoever drives: maze, start, goal, seed.
+Key = tuple[str, int, int, int, int, int]
+
+
+@dataclasses.dataclass(frozen=True)
+class Drive:
+    """One episode of one agent."""
+
+    maze: str
+    walls: np.ndarray  # [N, N] bool, of the true maze
+    shown: np.ndarray | None  # [N, N] bool, the shown map; None if it has another frame than the maze
+    start: Cell
+    goal: Cell
+    landmarks: np.ndarray  # [K, 2] int, cells, without the goal
+    points: np.ndarray  # [L, 2] m, where the body was
+    success: bool
+    steps: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Gallery:
+    """The same episodes of several agents."""
+
+    name: str  # of its files
+    title: str
+    note: str
+    drives: tuple[tuple[str, tuple[Drive, ...]], ...]  # by agent, in the order of the episodes
+
+
+def build_galleries(results: Sequence[ReportedResult], labels: Sequence[str]) -> list[Gallery]:
+    """Returns galleries of the eval mazes: of each task, and of each perturbation at a middle level.
+
+    Of several sizes, the smallest is taken.
+    """
+    drawn = [result for result in results if result.trajectories is not None and result.setting.split == "eval"]
+    galleries = [_gallery(setting, drawn, labels) for setting in _settings(drawn)]
+    return [gallery for gallery in galleries if gallery is not None]
+
+
+def _settings(results: Sequence[ReportedResult]) -> Iterator[Setting]:
+    for task in ("hierarchical", "local"):
+        plain = [r.setting for r in results if r.setting.task == task and not r.setting.levels]
+        if plain:
+            yield min(plain, key=lambda setting: (setting.size, -setting.landmark_distance))
+    for _, base, group in perturbed_groups(results):
+        levels = sorted({result.setting for result in group} - {base})
+        yield levels[(len(levels) - 1) // 2]
+
+
+def _gallery(setting: Setting, results: Sequence[ReportedResult], labels: Sequence[str]) -> Gallery | None:
+    here = sorted((r for r in results if r.setting == setting), key=lambda result: labels.index(result.label))
+    here = here[:_MAX_ROWS]
+    found = [{key: number for number, key in enumerate(_keys(result))} for result in here]
+    common = [key for key in found[0] if all(key in other for other in found)]
+    place = ""
+    if setting.task == "local" and common:
+        distances = {key: int(here[0].episodes.distance[found[0][key]]) for key in common}
+        distance = max((d for d in distances.values() if d <= _DISTANCE), default=min(distances.values()))
+        common = [key for key in common if distances[key] == distance]
+        place = f", start and goal {distance} cells apart"
+    chosen = _most_telling(here, found, common)
+    if not chosen:
+        return None
+    levels = "".join(f"-{short_name(name)}-{level:g}" for name, level in setting.levels)
+    return Gallery(
+        name=f"trajectories-{setting.task}-{setting.size}{levels}",
+        title=f"Trajectories: {setting}{place}",
+        note="The episodes in which the agents' outcomes differ most, at most one of each maze: a choice, no sample.",
+        drives=tuple(
+            (result.label, _drives(result, [numbers[key] for key in chosen], results))
+            for result, numbers in zip(here, found, strict=True)
+        ),
+    )
+
+
+def _keys(result: ReportedResult) -> list[Key]:
+    """Returns what identifies each episode, in the order of the records."""
+    episodes = result.episodes
+    columns = np.column_stack([episodes.start, episodes.goal, episodes.seed]).tolist()
+    return [(episodes.mazes[maze], *row) for maze, row in zip(episodes.maze.tolist(), columns, strict=True)]
+
+
+def _most_telling(
+    results: Sequence[ReportedResult], found: Sequence[dict[Key, int]], common: Sequence[Key]
+) -> list[Key]:
+    """Returns an episode of each of some mazes, those in which the agents' outcomes differ most, in protocol order."""
+
+    def evenness(key: Key) -> int:
+        failures = [not result.episodes.success[numbers[key]] for result, numbers in zip(results, found, strict=True)]
+        return -min(sum(failures), len(failures) - sum(failures))
+
+    by_maze: dict[str, Key] = {}
+    for key in sorted(common, key=evenness):
+        by_maze.setdefault(key[0], key)
+    return sorted(list(by_maze.values())[:_MAX_COLUMNS])
+
+
+def _drives(result: ReportedResult, numbers: Sequence[int], results: Sequence[ReportedResult]) -> tuple[Drive, ...]:
+    episodes, trajectories = result.episodes, result.trajectories
+    assert trajectories is not None
+    has_own_frame = shown_ends(result, results) is not None
+    drives = []
+    for number in numbers:
+        maze, trajectory = episodes.mazes[episodes.maze[number]], trajectories[number]
+        walls = real_walls(result, maze, results)
+        drives.append(
+            Drive(
+                maze=maze,
+                walls=trajectory.shown if walls is None else walls,
+                shown=None if has_own_frame else trajectory.shown,
+                start=tuple(episodes.start[number].tolist()),
+                goal=tuple(episodes.goal[number].tolist()),
+                landmarks=np.stack(np.divmod(trajectory.landmarks[:-1], result.setting.size), axis=-1),
+                points=trajectory.pose[:, :2].astype(np.float64),
+                success=bool(episodes.success[number]),
+                steps=int(episodes.steps[number]),
+            )
+        )
+    return tuple(drives)

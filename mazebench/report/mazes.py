@@ -1,0 +1,66 @@
+"""The mazes of results as they really were, and where start and goal lie on the maps that agents were shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mazebench.maps.benchmark import load_mazes
+from mazebench.maps.maze import Cell, Maze
+from mazebench.report.results import ReportedResult
+from mazebench.report.settings import known_levels
+from mazebench.tasks.episode import Episode
+from mazebench.tasks.shown_map import show_map
+from mazebench.tasks.spec import TaskSpec
+
+
+def real_walls(result: ReportedResult, maze: str, results: Sequence[ReportedResult]) -> np.ndarray | None:
+    """Returns `[N, N]` bool: the true maze.
+
+    None for a maze that is not the benchmark's, unless one of `results` recorded it with no map perturbed.
+    """
+    setting = result.setting
+    if setting.split != "custom":
+        return next((known.walls for known in load_mazes(setting.size, setting.split) if known.name == maze), None)
+    for other in results:
+        if other.setting.mazes == setting.mazes and not other.setting.levels and other.trajectories is not None:
+            episode = np.flatnonzero(other.episodes.maze == other.episodes.mazes.index(maze))[0]
+            return other.trajectories[int(episode)].shown
+    return None
+
+
+def shown_ends(result: ReportedResult, results: Sequence[ReportedResult]) -> tuple[list[Cell], list[Cell]] | None:
+    """Returns the cells of the shown map in which each episode's start and goal lie.
+
+    None where the shown map has the true maze's frame, so that a cell of one is the same cell of the other.
+    """
+    setting = result.setting
+    if not setting.levels:
+        return None
+    mazes = []
+    for name in result.episodes.mazes:
+        walls = real_walls(result, name, results)
+        mazes.append(Maze(_open_room(setting.size) if walls is None else walls, name))
+    task = TaskSpec(task=setting.task, mazes=tuple(mazes), distances=(1,), **known_levels(dict(setting.levels)))
+    starts, goals = [], []
+    is_same = True
+    for maze, start, goal, seed in zip(*_columns(result), strict=True):
+        shown = show_map(task, Episode(maze, start, goal, 0.0, seed))
+        is_same &= shown.homography is None
+        starts.append(shown.seen_cell(start))
+        goals.append(shown.seen_cell(goal))
+    return None if is_same else (starts, goals)
+
+
+def _columns(result: ReportedResult) -> tuple[list[int], list[Cell], list[Cell], list[int]]:
+    episodes = result.episodes
+    start, goal = ([(row, column) for row, column in cells.tolist()] for cells in (episodes.start, episodes.goal))
+    return episodes.maze.tolist(), start, goal, episodes.seed.tolist()
+
+
+def _open_room(size: int) -> np.ndarray:
+    """Returns `[N, N]` bool: a maze whose walls are not known; where a cell is shown does not depend on them."""
+    walls = np.ones((size, size), dtype=bool)
+    walls[1:-1, 1:-1] = False
+    return walls
