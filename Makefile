@@ -3,7 +3,7 @@ PYTHON ?= python3.11
 BIN := .venv/bin
 AGENT ?= mmn
 
-.PHONY: eval test docs check check-full release pythons fuzz bench clean
+.PHONY: eval test docs check check-full release pythons bench clean
 
 # Made anew where what is installed may have changed.
 .venv/installed: pyproject.toml constraints.txt
@@ -39,13 +39,6 @@ release: .venv/installed
 # On every Python found; needs wheels of all dependencies.
 pythons: release
 	.ci/pythons "$$(ls -t dist/*.whl | head -n 1)"
-
-# Needs atheris, which no extra brings; SECONDS for each reader.
-SECONDS ?= 60
-fuzz: .venv/installed
-	for reader in text image records summary trajectories checkpoint; do \
-	  $(BIN)/python tests/fuzz/readers.py $$reader -max_total_time=$(SECONDS) || exit 1; \
-	done
 
 bench: .venv/installed
 	$(BIN)/mazebench bench

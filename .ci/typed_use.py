@@ -11,35 +11,31 @@ import gymnasium
 import numpy as np
 
 import mazebench
-from mazebench.agent import Agent, Interface, Observation
+from mazebench.agent import Agent, Inputs
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.evaluation.harness import evaluate
 from mazebench.evaluation.options import EvalOptions
 from mazebench.testing import check_agent
 
 
-class Forward:
+class Forward(Agent):
     """An agent that drives forward."""
 
-    @classmethod
-    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Forward:
-        return cls()
+    def act(self, inputs: Inputs, state: None, explore: bool = False) -> tuple[np.ndarray, None]:
+        return np.zeros(len(inputs.seed), dtype=int), state
 
-    def initial_state(self, batch_size: int) -> None:
-        return None
 
-    def act(
-        self, observation: Observation, is_first: np.ndarray, state: None, explore: bool = False
-    ) -> tuple[np.ndarray, None]:
-        return np.zeros(len(is_first), dtype=int), state
+class Backward(mazebench.SingleAgent):
+    """An agent that drives backward, in one environment."""
+
+    def act(self, observation: dict[str, np.ndarray]) -> int:
+        return 1
 
 
 class Sideways:
-    """Not an agent: it has no `act`."""
+    """Not an agent: it subclasses none."""
 
-    @classmethod
-    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Sideways:
-        return cls()
+    def act(self, inputs: Inputs, state: None, explore: bool = False) -> tuple[np.ndarray, None]:
+        return np.full(len(inputs.seed), 2), state
 
 
 def right_use() -> None:
@@ -52,16 +48,19 @@ def right_use() -> None:
     observations, infos = envs.reset(seed=[1, 2, 3, 4])
     agent: Agent = Forward()
     check_agent(Forward)
-    summary = evaluate(EvalOptions("planner", size=13), pathlib.Path("results"))
-    print(success, position, observations["state"], infos, agent, summary["overall"])
+    check_agent(Backward)
+    summary = mazebench.evaluate("planner", pathlib.Path("results"), size=13, map_flip=0.1)
+    rate: float = summary.overall.success_rate
+    print(success, position, observations["state"], infos, agent, rate)
     gymnasium.make("mazebench/Local-13-v1")
 
 
 def wrong_use() -> None:
     mazebench.load("local", size="13")  # type: ignore[arg-type]
-    mazebench.make_spec("local", flip=0.1)  # type: ignore[call-arg]
+    mazebench.TaskSpec(mazes=(), flip=0.1)  # type: ignore[call-arg]
     mazebench.generate("dfs", 15)  # type: ignore[call-arg]
     print(mazebench.make_vec("local", 4).task_spec.sise)  # type: ignore[attr-defined]
     print(mazebench.nothing)  # type: ignore[attr-defined]
     EvalOptions(agent=Forward)  # type: ignore[arg-type]
+    print(mazebench.evaluate("planner").overal)  # type: ignore[attr-defined]
     check_agent(Sideways)  # type: ignore[arg-type]

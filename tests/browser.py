@@ -96,10 +96,6 @@ class Browser:
         """Makes the window another size."""
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
 
-    def prefer(self, scheme: str) -> None:
-        """Prefers "light" or "dark"."""
-        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
-
     def screenshot(self, path: pathlib.Path, whole: bool = False) -> None:
         """Writes a PNG of the window, or of the whole page."""
         content = self.call("Page.captureScreenshot", captureBeyondViewport=whole)["data"]

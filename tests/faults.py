@@ -1,7 +1,8 @@
-"""Real processes of the installed command, and what befalls them: kills, full disks, a clock that goes back."""
+"""Processes of the installed command, killed at random moments, and disks that fill."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pathlib
 import shutil
@@ -67,7 +68,7 @@ def run(*words: str | pathlib.Path, **options) -> tuple[int, str, str]:
 
 
 def said(errors: str) -> list[str]:
-    """The lines of standard error but those of progress."""
+    """The lines of standard error without those of progress."""
     return [line for line in errors.splitlines() if not line.endswith(" episodes")]
 
 
@@ -79,7 +80,7 @@ def wait_until(condition: Callable[[], object], process: subprocess.Popen | None
 
 
 def waiting() -> Iterator[None]:
-    """Yields a hundred times a second until nobody would wait any longer."""
+    """Yields a hundred times a second, for `PATIENCE` seconds."""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
         yield
@@ -87,15 +88,18 @@ def waiting() -> Iterator[None]:
     raise TimeoutError(f"waited for {PATIENCE} s")
 
 
-def num_lines(folder: pathlib.Path) -> int:
-    """How many lines of records or metrics a run has written: those that wait in a journal count, too."""
+def num_bytes(folder: pathlib.Path) -> int:
+    """Bytes of results that evaluations below `folder` have written, in whatever files."""
     count = 0
-    for path in folder.rglob("*.jsonl"):
-        try:
-            count += path.read_bytes().count(b"\n")
-        except FileNotFoundError:  # a journal that has just gone
-            continue
+    for path in folder.rglob("*"):
+        with contextlib.suppress(FileNotFoundError):  # a file that has just been removed
+            count += path.stat().st_size if path.is_file() and path.suffix != ".json" else 0
     return count
+
+
+def num_metrics(folder: pathlib.Path) -> int:
+    """Lines of metrics that trainings below `folder` have written."""
+    return sum(path.read_bytes().count(b"\n") for path in folder.rglob("metrics.jsonl"))
 
 
 def run_through_kills(
@@ -103,24 +107,24 @@ def run_through_kills(
     folder: pathlib.Path,
     words: list[str],
     num_kills: int,
-    most_lines: int,
+    most_bytes: int,
     victim: Callable[[subprocess.Popen, np.random.Generator], int] = lambda process, rng: process.pid,
 ) -> list[str]:
     """Runs a command that writes to `folder`, killed and resumed `num_kills` times, and then to its end.
 
     Args:
-      rng: draws the moments: when so many more lines are written, and up to 50 ms later.
-      most_lines: that are written between two kills.
-      victim: the process to kill, the command's own if not said otherwise.
+      rng: draws the moments of the kills: after so many more bytes of results, and up to 50 ms later.
+      most_bytes: of results between two kills.
+      victim: returns the process to kill, by default the command's own.
 
     Returns:
-      What each sitting that was killed said on standard error.
+      The standard error of each sitting that was killed.
     """
     errors = []
     for sitting in range(num_kills):
         process = start(*words, "--out", folder, *(["--resume"] if sitting else []))
-        wanted = num_lines(folder) + int(rng.integers(1, most_lines + 1))
-        wait_until(lambda wanted=wanted: num_lines(folder) >= wanted, process)
+        wanted = num_bytes(folder) + int(rng.integers(1, most_bytes + 1))
+        wait_until(lambda wanted=wanted: num_bytes(folder) >= wanted, process)
         time.sleep(rng.uniform(0, 0.05))
         if process.poll() is None:
             os.kill(victim(process, rng), signal.SIGKILL)
@@ -138,7 +142,7 @@ def workers_of(process: subprocess.Popen) -> list[int]:
 
 
 def descendants(pid: int) -> list[int]:
-    """All processes that a process started, and those that they started."""
+    """All processes below a process."""
     found = []
     for task in pathlib.Path(f"/proc/{pid}/task").glob("*/children"):
         try:
@@ -159,7 +163,7 @@ def command_line(pid: int) -> str:
 
 
 def is_running(pid: int) -> bool:
-    """Whether a process is there, and no zombie."""
+    """Whether a process exists and is not a zombie."""
     try:
         return pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -167,14 +171,14 @@ def is_running(pid: int) -> bool:
 
 
 class Disk:
-    """A small file system of its own."""
+    """A small file system."""
 
     def __init__(self, path: pathlib.Path):
         self.path = path
         self._filler = path / "filler"
 
     def leave(self, kilobytes: int) -> None:
-        """Fills it until so much is free."""
+        """Fills it until `kilobytes` KiB are free."""
         free = os.statvfs(self.path)
         self._filler.write_bytes(bytes(free.f_bavail * free.f_frsize - 1024 * kilobytes))
 
@@ -200,31 +204,3 @@ def disk(nothing_left: None, tmp_path: pathlib.Path) -> Iterator[Disk]:
         pytest.skip(f"a small disk needs the right to mount it: {mounted.stderr.strip()}")
     yield Disk(folder)
     subprocess.run(["umount", str(folder)], check=True)
-
-
-# Each look at the clock finds it a minute earlier than the look before.
-BACKWARDS = """
-import datetime, itertools, time
-
-_now, _looks = time.time(), itertools.count(1)
-
-def _earlier():
-    return _now - 60.0 * next(_looks)
-
-class _Datetime(datetime.datetime):
-    @classmethod
-    def now(cls, tz=None):
-        return cls.fromtimestamp(_earlier(), tz)
-
-time.time = _earlier
-time.time_ns = lambda: int(1e9 * _earlier())
-datetime.datetime = _Datetime
-"""
-
-
-def clock_that_goes_back(folder: pathlib.Path) -> dict[str, str]:
-    """The environment of a process for which time goes backwards; a module for it is put into `folder`."""
-    folder.mkdir()
-    (folder / "sitecustomize.py").write_text(BACKWARDS)
-    paths = [str(folder), os.environ.get("PYTHONPATH", "")]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}

@@ -9,14 +9,37 @@ from typing import Any
 import numpy as np
 
 from mazebench.evaluation.metrics import spl, summarize
-from mazebench.evaluation.protocol import Trial, select_trials
+from mazebench.evaluation.records import Record
+from mazebench.evaluation.results import EPISODES, SUMMARY
 from mazebench.evaluation.trajectories import TRAJECTORIES, Trajectory, pack_trajectories, save_trajectories
+from mazebench.evaluation.trials import Trial, select_trials
 from mazebench.maps.benchmark import VERSION, load_mazes, manifest_hash
-from mazebench.maps.maze import Maze, cell_to_point, path_through_walls
-from mazebench.records import EPISODES, SUMMARY, to_line, write_json
-from mazebench.tasks.spec import Perturbation, TaskSpec
+from mazebench.maps.maze import cell_to_point, path_through_walls
+from mazebench.storage.json_files import write_json
+from mazebench.tasks.perturbations import perturbation_levels
+from mazebench.tasks.route import plan_route
+from mazebench.tasks.shown_map import show_map
+from mazebench.tasks.spec import TaskSpec
 
 _STEP = 0.3  # m
+
+
+def make_record(index: int, **values: Any) -> Record:
+    """Returns the record of an episode of which only some values matter."""
+    cells = {"start": (1, 1), "goal": (1, 1 + values.get("distance", 1))}
+    identity = {
+        "agent": "x",
+        "task": "local",
+        "size": 13,
+        "split": "eval",
+        "episode": index,
+        "maze": "m",
+        "seed": index,
+    }
+    outcome = {"distance": 1, "success": True, "steps": 5, "path_length": 2.0, "shortest_path": 1.0, "spl": 1.0}
+    return Record.model_validate(
+        identity | cells | outcome | {"episode": index, "seed": index, "spl_grid": 1.0} | values
+    )
 
 
 def make_result(
@@ -32,29 +55,25 @@ def make_result(
     record: bool = True,
     seed: int = 0,
     checkpoint: str | None = None,
-    **perturbation: float,
+    split: str = "eval",
+    privileged: bool = False,
+    **levels: float,
 ) -> pathlib.Path:
     """Writes the result of an agent that follows the shown map and gives up on the way with probability 1 - skill."""
-    mazes = load_mazes(size, "eval")
-    spec = TaskSpec(
-        task, mazes, distances, landmark_distance=landmark_distance, perturbation=Perturbation(**perturbation)
-    )
+    mazes = load_mazes(size, split)
+    spec = TaskSpec(task=task, mazes=mazes, distances=distances, landmark_distance=landmark_distance, **levels)
     rng = np.random.default_rng([len(agent), size, landmark_distance, seed])
-    trials = [
-        trial
-        for trial in select_trials(task, mazes, True, distances, episodes_per_distance)
-        if trial.episode.maze < num_mazes
-    ]
-    all_perturbations = {"map_flip": 0.0, "map_warp": 0.0, "position_noise": 0.0} | perturbation
-    head = {"agent": agent, "task": task, "size": size, "split": "eval"}
+    trials = select_trials(task, mazes, split == "eval", distances, episodes_per_distance)
+    labels = {"agent": agent, "task": task, "size": size, "split": split}
     records, drives = [], []
-    for number, trial in enumerate(trials):
-        success = bool(rng.random() < skill ** (trial.distance / 4))
-        drive = _drive(spec, trial, success, rng)
-        drives.append(drive)
-        records.append(head | _record(number, trial, mazes[trial.episode.maze], success, drive) | all_perturbations)
+    for trial in trials:
+        if trial.episode.maze < num_mazes:
+            success = bool(rng.random() < skill ** (trial.distance / 4))
+            drives.append(_drive(spec, trial, success, rng))
+            content = labels | _outcome(len(records), trial, spec, success, drives[-1]) | perturbation_levels(spec)
+            records.append(Record(**content))
     folder.mkdir(parents=True)
-    (folder / EPISODES).write_text("".join(map(to_line, records)))
+    (folder / EPISODES).write_text("".join(each.to_line() for each in records))
     if record:
         save_trajectories(folder / TRAJECTORIES, pack_trajectories(drives))
     provenance = {
@@ -64,45 +83,47 @@ def make_result(
         "command": ["mazebench", "eval", "--agent", agent],
         "packages": {"mazebench-mujoco": "0.1.0", "numpy": np.__version__},
     }
-    content = {"benchmark": VERSION, "episodes": len(records), "perturbation": all_perturbations}
-    write_json(folder / SUMMARY, head | content | {"provenance": provenance} | summarize(records))
-    return folder
+    content = {"benchmark": VERSION, "episodes": len(records), "perturbation": perturbation_levels(spec)}
+    write_json(folder / SUMMARY, labels | content | {"provenance": provenance, "privileged": privileged})
+    return _set_means(folder, records)
+
+
+def read_summary(folder: pathlib.Path) -> dict[str, Any]:
+    """Returns the content of the summary."""
+    return json.loads((folder / SUMMARY).read_text())
 
 
 def edit_summary(folder: pathlib.Path, **changes: Any) -> pathlib.Path:
-    """Puts other values into a summary."""
-    write_json(folder / SUMMARY, json.loads((folder / SUMMARY).read_text()) | changes)
+    """Puts other values into the summary."""
+    write_json(folder / SUMMARY, read_summary(folder) | changes)
     return folder
 
 
-def make_paper_suite(folder: pathlib.Path, agent: str, skill: float) -> None:
-    """What the paper evaluates, some 4,000 episodes, as a run of a suite lays it out."""
-    everything = tuple(range(1, 16))
-    make_result(folder / "local-13", agent, skill=skill, distances=everything, episodes_per_distance=5)
-    for size in (15, 17, 19, 21):
-        make_result(folder / f"local-{size}", agent, size=size, skill=skill, distances=everything)
-    for landmark_distance in range(1, 6):
-        part = folder / f"hierarchical-13-k{landmark_distance}"
-        make_result(part, agent, "hierarchical", skill=skill, landmark_distance=landmark_distance)
-    for flip in (0.05, 0.1, 0.2, 0.3):
-        part = folder / f"flip-{flip:g}"
-        make_result(part, agent, "hierarchical", skill=skill * (1 - flip), map_flip=flip)
-    for warp in (0.1, 0.2):
-        part = folder / f"warp-{warp:g}"
-        make_result(part, agent, skill=skill * (1 - warp), distances=(2, 4, 6, 8, 10), map_warp=warp)
-    for tenth in range(1, 11):
-        part = folder / f"noise-{tenth / 10:g}"
-        skill_left = skill * (1 - 0.05 * tenth)
-        make_result(part, agent, skill=skill_left, distances=(2, 4, 6, 8, 10), position_noise=tenth / 10)
+def edit_records(folder: pathlib.Path, edit: Any) -> pathlib.Path:
+    """Replaces each record by what `edit` makes of its fields, and the summary's means by theirs."""
+    lines = (folder / EPISODES).read_text().splitlines()
+    records = [Record(**edit(Record.model_validate_json(line).model_dump())) for line in lines]
+    (folder / EPISODES).write_text("".join(record.to_line() for record in records))
+    return _set_means(folder, records)
+
+
+def of_own_mazes(folder: pathlib.Path, name: str) -> pathlib.Path:
+    """Makes the result one of mazes that are not the benchmark's, called `name`-00 and so on."""
+    edit_records(folder, lambda record: record | {"split": "custom", "maze": f"{name}{record['maze'][-3:]}"})
+    return edit_summary(folder, split="custom")
+
+
+def _set_means(folder: pathlib.Path, records: list[Record]) -> pathlib.Path:
+    overall, by_distance = summarize(records)
+    means = {distance: figures.model_dump() for distance, figures in by_distance.items()}
+    return edit_summary(folder, overall=overall.model_dump(), by_distance=means)
 
 
 def _drive(spec: TaskSpec, trial: Trial, success: bool, rng: np.random.Generator) -> Trajectory:
-    """Along the shortest path with some jitter, a part of the way if it fails."""
+    """Drives along the shortest path with some jitter, only a part of it without success."""
     episode, maze = trial.episode, spec.mazes[trial.episode.maze]
-    shown = spec.show(episode)
-    route = spec.route(episode, shown)
-    cells = np.array(path_through_walls(maze.walls, episode.start, episode.goal))
-    points = cell_to_point(cells, spec.size)
+    shown = show_map(spec, episode)
+    points = cell_to_point(np.array(path_through_walls(maze.walls, episode.start, episode.goal)), spec.size)
     distances = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1]), axis=1).cumsum()
     end = distances[-1] - 0.5 if success else distances[-1] * rng.uniform(0.1, 0.8)
     at = np.arange(0, max(end, _STEP) + _STEP, _STEP)
@@ -111,34 +132,26 @@ def _drive(spec: TaskSpec, trial: Trial, success: bool, rng: np.random.Generator
     if not success:
         place = np.concatenate([place, place[-1] + rng.normal(0, 0.05, (100, 2))])
     heading = np.arctan2(*np.diff(place, axis=0, prepend=place[:1] - [[1e-3, 0]]).T[::-1])
-    walls = getattr(shown, "seen_walls", lambda: shown.walls)()
-    landmarks = np.array([row * spec.size + column for row, column in route.cells[1:]], dtype=np.int32)
-    return Trajectory(np.column_stack([place, heading]).astype(np.float16), walls, landmarks)
+    cells = plan_route(spec, episode, shown).cells[1:]
+    landmarks = np.array([row * spec.size + column for row, column in cells], dtype=np.int32)
+    return Trajectory(np.column_stack([place, heading]).astype(np.float16), shown.seen_walls(), landmarks)
 
 
-def of_own_mazes(folder: pathlib.Path, name: str) -> pathlib.Path:
-    """Makes a result one of mazes that are not the benchmark's, called `name`-00 and so on."""
-    text = (folder / EPISODES).read_text()
-    (folder / EPISODES).write_text(text.replace('"split":"eval"', '"split":"custom"').replace("13-eval", name))
-    edit_summary(folder, split="custom")
-    return folder
-
-
-def _record(number: int, trial: Trial, maze: Maze, success: bool, drive: Trajectory) -> dict[str, Any]:
+def _outcome(number: int, trial: Trial, spec: TaskSpec, success: bool, drive: Trajectory) -> dict[str, Any]:
     driven = float(np.linalg.norm(np.diff(drive.pose[:, :2].astype(float), axis=0), axis=1).sum())
     shortest = np.array([trial.shortest_path, float(trial.distance)])
-    scores = spl(np.array([success] * 2), shortest, np.array([driven] * 2))
+    scores = spl(np.array([success] * 2), shortest, np.array([driven] * 2)).tolist()
     return {
         "episode": number,
-        "maze": maze.name,
-        "start": list(trial.episode.start),
-        "goal": list(trial.episode.goal),
+        "maze": spec.mazes[trial.episode.maze].name,
+        "start": trial.episode.start,
+        "goal": trial.episode.goal,
         "distance": trial.distance,
         "success": success,
         "steps": len(drive.pose) - 1,
         "path_length": driven,
         "shortest_path": trial.shortest_path,
-        "spl": float(scores[0]),
-        "spl_grid": float(scores[1]),
+        "spl": scores[0],
+        "spl_grid": scores[1],
         "seed": trial.episode.seed,
     }

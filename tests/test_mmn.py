@@ -1,22 +1,17 @@
 """MMN: its hypermodels, how its model reads the map, its learner and the agent."""
 
-import ast
 import dataclasses
-import inspect
-import re
 
 import numpy as np
 import pytest
 import torch
+from acting import inputs_of
 from mazebench_agents.mmn import MMN
-from mazebench_agents.mmn import config as config_module
-from mazebench_agents.mmn.config import PRESETS, MMNConfig
+from mazebench_agents.mmn.config import PRESETS
 from mazebench_agents.mmn.hypermodels import HYPERMODELS, Propagation
 from mazebench_agents.mmn.losses import unrolled_losses
 from mazebench_agents.mmn.network import MMNNetwork, rotate
-from mazebench_agents.mmn.planning import lookahead, plan
-from mazebench_agents.mmn.shown import beliefs, distances_learned_from
-from mazebench_agents.overrides import override
+from mazebench_agents.mmn.planning import lookahead
 from small_world import learn
 
 from mazebench.agent import Interface
@@ -47,7 +42,7 @@ def make_learner(mazes, preset="default", seed=0, steps=100, **values):
     overrides = {"preset": preset} | {name: str(value) for name, value in {**SMALL, **values}.items()}
     size = mazes[0].size
     learner = MMN.build_learner(Interface("local", size, size), mazes, seed=seed, overrides=overrides)
-    spec = TaskSpec("local", mazes, (1, 2, 3), **learner.task_options())
+    spec = TaskSpec(mazes=mazes, distances=(1, 2, 3), **learner.task_options())
     collector = Collector(spec, learner.num_envs, seed=seed)
     rng = np.random.default_rng(seed)
     for _ in range(steps):
@@ -82,26 +77,6 @@ def test_propagation_with_equal_costs_is_the_distance_on_the_grid():
     torch.testing.assert_close(slopes[:, 0, 1], torch.tensor([2.0, 2.0, 1 / 3, -1 / 3, 5 / 30]))
 
 
-def test_propagation_passes_gradients_to_the_costs_along_the_path_only():
-    propagation = make_propagation()
-    features = torch.zeros(1, 1, 1, 6, requires_grad=True)
-    with torch.no_grad():
-        propagation.cost.weight.fill_(1.0)
-    goal = torch.zeros(1, 1, 1, 6)
-    goal[..., 1] = 1
-    propagation(features, goal)[0][0, 0, 0, 3].backward()
-    assert (features.grad[0, 0, 0] != 0).tolist() == [False, False, True, True, False, False]
-
-
-def test_cells_that_were_visited_are_what_can_be_entered(mazes):
-    learner = make_learner(mazes, steps=300, learning_rate=1e-2)
-    free = np.stack([~maze.walls.ravel() for maze in mazes])
-    assert not learner._visited[~free].any()
-    assert learner._visited[free].mean() > 0.9
-    losses = [learner.update()["visit_loss"] for _ in range(60)]
-    assert losses[-1] < 0.7 * losses[0]
-
-
 def test_network_with_the_true_scale_looks_where_the_agent_is():
     network = MMNNetwork(small_config(), 7)
     with torch.no_grad():
@@ -113,14 +88,6 @@ def test_network_with_the_true_scale_looks_where_the_agent_is():
     seen = network.look(latent, code)
     for k, (row, column) in enumerate([(5, 1), (5, 3), (2, 2)]):
         torch.testing.assert_close(seen[0, k], code.weights[0, row * 7 + column])
-
-
-def test_reading_one_place_a_map_is_reading_one_of_many():
-    hypermodel = MMNNetwork(small_config(), 7).hypermodel
-    place = torch.rand(40, 1, 2) * 9 - 1.5  # some of them outside
-    table = torch.randn(40, 49, 5)
-    many = hypermodel.read(place.expand(-1, 2, -1), table)[:, :1]
-    torch.testing.assert_close(hypermodel.read(place, table), many)
 
 
 def test_free_motion_is_the_same_wherever_the_body_heads():
@@ -214,23 +181,6 @@ def test_lookahead_is_every_action_of_the_model_by_itself(name):
         torch.testing.assert_close(qvalues[..., action], expected)
 
 
-@pytest.mark.parametrize("preset", PRESETS)
-def test_plan_of_a_permuted_batch_is_permuted(preset):
-    config = small_config(preset)
-    torch.manual_seed(0)
-    network = MMNNetwork(config, 7)
-    torch.nn.init.normal_(network.heads.weight)
-    context, features = a_context(batch=6), torch.randn(6, 1, 9)
-    order = torch.tensor([3, 1, 0, 5, 4, 2])
-
-    def actions(rows):
-        with torch.no_grad():
-            code, latent = network.hypermodel(context[rows]), network.encode(features[rows])
-        return plan(network, config, latent, code, 8).action
-
-    np.testing.assert_array_equal(actions(torch.arange(6))[order], actions(order))
-
-
 @pytest.mark.parametrize(
     ("preset", "values"), [("default", {}), ("paper", {}), ("default", {"policy_target": "search"})]
 )
@@ -247,14 +197,6 @@ def test_what_tells_early_whether_a_run_will_work_is_logged(mazes):
     assert {"goal_loss", "localization_loss", "value_error", "value", "model_error_1", "model_error_4"} <= set(metrics)
     assert {"value_loss", "policy_loss", "model_loss", "gradient_norm"} <= set(metrics)
     assert "reward_loss" in make_learner(mazes, "paper").update()
-
-
-def test_priorities_follow_the_errors(mazes):
-    learner = make_learner(mazes, priority_exponent=0.6, replay_capacity=1000)
-    before = learner._replay._tree.priorities(np.arange(1000)).copy()
-    learner.update()
-    changed = learner._replay._tree.priorities(np.arange(1000)) != before
-    assert 1 <= changed.sum() <= SMALL["groups"]
 
 
 def test_learner_goes_on_as_if_it_had_not_been_saved(tmp_path, mazes):
@@ -276,8 +218,8 @@ def test_saved_and_built_agent_acts_identically(name, tmp_path, mazes):
     agent = MMN.build(Interface("local", 7, 7), checkpoint=tmp_path / "agent.safetensors")
     observation = an_observation(40)
     first = np.ones(40, dtype=bool)
-    expected, _ = learner.actor.act(observation, first, learner.actor.initial_state(40))
-    actions, _ = agent.act(observation, first, agent.initial_state(40))
+    expected, _ = learner.actor.act(inputs_of(observation, first), learner.actor.initial_state(40))
+    actions, _ = agent.act(inputs_of(observation, first), agent.initial_state(40))
     np.testing.assert_array_equal(actions, expected)
 
 
@@ -289,14 +231,15 @@ def an_observation(batch, size=7):
     }
 
 
-def test_actions_do_not_depend_on_what_else_is_in_the_batch():
-    agent = MMN(small_config(), 7, seed=2)
+@pytest.mark.parametrize("preset", PRESETS)
+def test_actions_do_not_depend_on_what_else_is_in_the_batch(preset):
+    agent = MMN(small_config(preset), 7, seed=2)
     torch.nn.init.normal_(agent.network.heads.weight)
     observation = an_observation(77)
 
     def actions(rows):
         part = {key: value[rows] for key, value in observation.items()}
-        return agent.act(part, np.ones(len(rows), dtype=bool), agent.initial_state(len(rows)))[0]
+        return agent.act(inputs_of(part, np.ones(len(rows), dtype=bool)), agent.initial_state(len(rows)))[0]
 
     together = actions(np.arange(77))
     for rows in (np.array([76]), np.arange(40, 77), np.random.default_rng(0).permutation(77)):
@@ -306,10 +249,10 @@ def test_actions_do_not_depend_on_what_else_is_in_the_batch():
 def test_context_is_encoded_where_it_is_new_and_only_there():
     agent = MMN(small_config(), 7)
     observation = an_observation(3)
-    _, state = agent.act(observation, np.ones(3, dtype=bool), agent.initial_state(3))
+    _, state = agent.act(inputs_of(observation, np.ones(3, dtype=bool)), agent.initial_state(3))
     before = [part.clone() for part in state.code]
     observation["context"] = a_context(seed=9, batch=3).numpy()
-    _, state = agent.act(observation, np.array([False, True, False]), state)
+    _, state = agent.act(inputs_of(observation, np.array([False, True, False])), state)
     for old, new in zip(before, state.code, strict=True):
         assert torch.equal(old[[0, 2]], new[[0, 2]])
     assert not torch.equal(before[1][1], state.code.weights[1])
@@ -323,64 +266,22 @@ def test_motion_is_told_from_where_the_episode_began_through_its_landmarks(keep_
     observation = an_observation(2)  # the start marked in (5, 1)
     observation["state"][:, :2] = 0.0
     every = np.ones(2, dtype=bool)
-    agent.seed_episodes(np.zeros(2, dtype=int), every)
-    _, state = agent.act(observation, every, agent.initial_state(2))
-    observation["state"][:, :2] = (
-        0.8,
-        1.1,
-    )  # in (4, 2), a landmark in the first environment, another episode in the second
+    _, state = agent.act(inputs_of(observation, every), agent.initial_state(2))
+    # In (4, 2): a landmark in the first environment, another episode in the second.
+    observation["state"][:, :2] = (0.8, 1.1)
     observation["context"][:, 3] = 0
     observation["context"][:, 3, 4, 2] = 1
-    agent.seed_episodes(np.zeros(2, dtype=int), np.array([False, True]))
-    _, state = agent.act(observation, every, state)
+    _, state = agent.act(inputs_of(observation, every, np.array([False, True])), state)
     anew = [[0.8, 1.1], [4, 2]]
     for env, (origin, anchor) in enumerate([[[0, 0], [5, 1]] if keep_anchor else anew, anew]):
         np.testing.assert_allclose(state.origin[env], origin)
-        torch.testing.assert_close(state.code.places[env, :2], torch.tensor(anchor, dtype=torch.float32))
-
-
-def test_learner_tells_motion_from_the_trajectorys_start(mazes):
-    learner = make_learner(mazes, localization_weight=1.0)
-    sample = learner._replay.sample_sequences(64, 3, 8, learner._hindsight, learner._rng)
-    for _ in range(4):  # each under a symmetry of its own
-        turned = learner._batch(sample)
-        moved = turned.features[..., :2]
-        place = turned.anchor[:, None, None] + torch.stack([-moved[..., 1], moved[..., 0]], dim=-1)
-        assert ((place - turned.place).abs() <= 0.5 + 1e-4).all()  # the place that the true scale gives is in its cell
-
-
-def test_what_a_run_has_shown_is_told_in_cells(mazes):
-    learner = make_learner(mazes, hindsight_ratio=0.0)
-    shown = distances_learned_from(learner, mazes, num_batches=2)
-    assert shown.min() >= 0
-    assert shown.max() > 1
-    found = beliefs(learner.actor.network, mazes, np.random.default_rng(0))
-    assert sum(len(values) for values in found.values()) == sum(int((~maze.walls).sum()) for maze in mazes)
-    np.testing.assert_allclose(found[0][:, 1], 0.0)  # the learned distance of the goal itself
-    assert all((values[:, 0] <= 0).all() for values in found.values())
-
-
-def test_environments_up_the_ladder_search_with_less_noise():
-    agent = MMN(small_config(), 7)
-    agent.explore_from(4, 4, seed=0)
-    np.testing.assert_allclose(agent._noise_scale, [3 / 7, 2 / 7, 1 / 7, 0])
-    agent = MMN(small_config(noise_ladder=False), 7)
-    np.testing.assert_array_equal(agent._noise_scale, np.ones(8))
-
-
-def test_learning_rate_falls_after_the_constant_updates(mazes):
-    learner = make_learner(mazes, constant_updates=2, learning_rate=0.01)
-    rates = []
-    for _ in range(4):
-        learner.update()
-        rates.append(learner._optimizer.param_groups[0]["lr"])
-    assert rates == pytest.approx([0.01, 0.01, 0.02 / 3, 0.005])
+        torch.testing.assert_close(state.code.positions[env, :2], torch.tensor(anchor, dtype=torch.float32))
 
 
 def test_spatial_agent_serves_maps_of_any_size(tmp_path, mazes):
     make_learner(mazes).save(tmp_path, {})
     agent = MMN.build(Interface("local", 21, 21), checkpoint=tmp_path / "agent.safetensors")
-    actions, _ = agent.act(an_observation(2, size=21), np.ones(2, dtype=bool), agent.initial_state(2))
+    actions, _ = agent.act(inputs_of(an_observation(2, size=21), np.ones(2, dtype=bool)), agent.initial_state(2))
     assert actions.shape == (2,)
 
 
@@ -397,49 +298,11 @@ def test_unknown_preset_is_refused(mazes):
 
 def test_paper_preset_has_nothing_beyond_the_paper():
     paper = PRESETS["paper"]
-    assert (paper.hypermodel, paper.search, paper.policy_target, paper.value_target) == (
-        "flat",
-        "puct",
-        "paper",
-        "n_step",
-    )
-    for beyond in (
-        paper.relabel_start,
-        paper.keep_anchor,
-        paper.symmetries,
-        paper.num_distances,
-        paper.localization_weight,
-    ):
-        assert not beyond
+    assert (paper.hypermodel, paper.search, paper.policy_target) == ("flat", "puct", "paper")
+    assert paper.value_target == "n_step"
+    beyond = (paper.relabel_start, paper.keep_anchor, paper.symmetries, paper.num_distances, paper.localization_weight)
+    assert not any(beyond)
     assert (paper.num_goals, paper.epsilon_base, paper.predict_reward) == (1, 0.0, True)
-
-
-def test_every_config_key_has_a_comment_with_its_reason():
-    source = inspect.getsource(config_module)
-    fields = {field.name for field in dataclasses.fields(MMNConfig)}
-    assert {node.target.id for node in ast.walk(ast.parse(source)) if isinstance(node, ast.AnnAssign)} == fields
-    for name in fields:
-        assert re.search(rf"^    {name}: .*  # .+", source, re.MULTILINE), name
-
-
-def test_every_number_and_choice_of_the_config_has_a_range():
-    kinds = {field.name: field.type for field in dataclasses.fields(MMNConfig)}
-    assert set(config_module._RANGES) == {name for name, kind in kinds.items() if kind in ("int", "float")}
-    assert set(config_module._CHOICES) == {name for name, kind in kinds.items() if kind == "str"}
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"hypermodel": "deep"}, "expected config key 'hypermodel' as one of spatial, flat, none, found 'deep'"),
-        ({"temperature": "0"}, "expected config key 'temperature' from 0.001"),
-        ({"unroll": "9"}, "expected sequence_steps of at least unroll 9, found 8"),
-        ({"replay_capacity": "1000"}, "expected a replay_capacity of at least min_rows 20000"),
-    ],
-)
-def test_config_out_of_range_is_refused(values, message):
-    with pytest.raises(InputError, match=message):
-        override(MMNConfig(), values)
 
 
 def test_mmn_after_a_minute_beats_random_in_a_small_maze():

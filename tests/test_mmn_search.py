@@ -6,8 +6,7 @@ import pathlib
 import numpy as np
 import pytest
 import torch
-from mazebench_agents.mmn import measure, search
-from mazebench_agents.mmn.tree import compiled
+from mazebench_agents.mmn import MMN, measure, search
 
 torch.set_num_threads(1)  # two that share a core with other tests wait for each other
 
@@ -182,14 +181,6 @@ def random_searches(states, order=slice(None), num_simulations=16):
     ]
 
 
-def test_search_of_a_permuted_batch_is_permuted():
-    states = np.arange(20)
-    order = np.random.default_rng(0).permutation(20)
-    for result, permuted in zip(random_searches(states), random_searches(states, order), strict=True):
-        for field, other in zip(result, permuted, strict=True):
-            np.testing.assert_array_equal(field[order], other)
-
-
 def test_search_of_a_batch_equals_that_of_each_root_alone():
     states = np.arange(20)
     together = random_searches(states)
@@ -227,58 +218,8 @@ def test_considered_visits_by_hand():
     assert search.considered_visits(6, 4) == [0] * 4
 
 
-def test_search_of_other_kinds_of_arrays_is_the_same():
-    roots, recurrent_fn = table_model(golden_arrays("problem/steps/"))
-    root = roots(np.arange(20))
-
-    def strided(embedding, action):
-        evaluation = recurrent_fn(embedding, action)
-        arrays = (np.repeat(np.asarray(array, np.float64), 2, axis=-1)[..., ::2] for array in evaluation[:4])
-        return search.Evaluation(*arrays, evaluation.embedding)
-
-    noise = np.random.default_rng(0).gumbel(size=(20, 6)).astype(np.float32)
-    expected = search.gumbel_muzero_policy(root, recurrent_fn, 8, noise)
-    result = search.gumbel_muzero_policy(root, strided, 8, np.asfortranarray(noise, np.float64))
-    for field, other in zip(result, expected, strict=True):
-        np.testing.assert_array_equal(field, other)
-
-
-@pytest.mark.parametrize("shape", [(19, 6), (20, 5)])
-def test_search_with_noise_of_another_shape_is_refused(shape):
-    roots, recurrent_fn = table_model(golden_arrays("problem/steps/"))
-    with pytest.raises(ValueError, match="broadcast"):
-        search.gumbel_muzero_policy(roots(np.arange(20)), recurrent_fn, 1, np.zeros(shape))
-
-
-def test_kernel_that_can_not_be_kept_on_disk_is_compiled_in_memory():
-    namespace = {}
-    exec("def increased(x):\n    return x + 1", namespace)  # numba keeps nothing of code without a file
-    assert compiled(namespace["increased"])(2) == 3
-
-
-def test_speed_of_the_search_beside_its_network_is_measured():
-    row = measure._row("gumbel", 64, 0.01, None)
-    assert row["what"] == "gumbel, 64 roots"
-    assert 0 < row["/ network"] < 2
-
-
-def test_parts_of_an_update_are_measured():
-    tiny = {
-        "channels": "4",
-        "hidden": "16",
-        "num_envs": "8",
-        "min_rows": "400",
-        "groups": "2",
-        "replay_capacity": "4000",
-    }
-    rows = measure.update_rows(0.1, tiny)
-    assert [row["what"] for row in rows] == ["sampling", "its tensors", "targets", "losses", "backward, optimizer"]
-    assert all(row["ms"] > 0 for row in rows)
-    assert abs(sum(row["%"] for row in rows) - 100) < 1e-6
-
-
 @pytest.mark.slow
 def test_speed_of_the_search_beside_mctx_is_measured():
     pytest.importorskip("mctx")
-    rows, _ = measure.measure(0.1).values()
+    rows, _ = measure.measure(0.1, MMN.build_learner).values()
     assert all(row["mctx sims/s"] > 0 for row in rows)

@@ -6,12 +6,11 @@ import math
 import pytest
 import torch
 from mazebench_agents.mmn.config import PRESETS
-from mazebench_agents.mmn.losses import Batch, Means, Targets, unrolled_losses
+from mazebench_agents.mmn.losses import Batch, Targets, unrolled_losses
 from mazebench_agents.mmn.network import MMNNetwork
 from mazebench_agents.mmn.targets import (
     cross_entropy,
     n_step_returns,
-    scale_gradient,
     tree_backup_returns,
     two_hot,
 )
@@ -76,22 +75,6 @@ def test_cross_entropy_by_hand():
     logits = torch.log(torch.tensor([[0.5, 0.25, 0.25]]))
     target = torch.tensor([[0.5, 0.5, 0.0]])
     assert cross_entropy(target, logits).item() == pytest.approx(0.5 * math.log(2) + 0.5 * math.log(4))
-
-
-def test_scale_gradient_keeps_the_value():
-    x = torch.tensor(3.0, requires_grad=True)
-    y = scale_gradient(x, 0.5)
-    y.backward()
-    assert (y.item(), x.grad.item()) == (3.0, 0.5)
-
-
-def test_means_are_weighted():
-    means = Means()
-    means.add("a", torch.tensor([2.0, 100.0]), torch.tensor([True, False]))
-    means.add("a", torch.tensor([5.0, 5.0]), torch.tensor([0.25, 0.25]))
-    means.add("nothing", torch.tensor([1.0]), torch.tensor([0.0]))
-    # (2 + 0.5 * 5) / (1 + 0.5)
-    assert {name: value.item() for name, value in means.means().items()} == {"a": 3.0, "nothing": 0.0}
 
 
 def make_batch(config, at_goal_step=None):
@@ -169,14 +152,3 @@ def test_model_loss_by_hand():
     # others are zero, and so they are.
     squares = 0.1 * (1 + 4 + 9 + 16) / 4 / 11
     assert losses["model_loss"].item() == pytest.approx(2.0 + squares, rel=1e-4)
-
-
-def test_group_without_weight_counts_nothing():
-    batch, targets = make_batch(SMALL)
-    targets.value[1] = -9.0
-    network = MMNNetwork(SMALL, 7)
-    with torch.no_grad():
-        network.heads.bias[6:16] = torch.arange(10.0)  # values near 0 are likely
-    both, _, _ = unrolled_losses(network, SMALL, batch, targets, torch.ones(2))
-    first, _, _ = unrolled_losses(network, SMALL, batch, targets, torch.tensor([1.0, 0.0]))
-    assert first["value_loss"] < both["value_loss"]

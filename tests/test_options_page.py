@@ -1,8 +1,9 @@
-"""The tables of docs/options.md name every option, with its default."""
+"""The tables of docs/options.md; `python tests/test_options_page.py` rewrites the one that follows from the code."""
 
 from __future__ import annotations
 
 import ast
+import dataclasses
 import inspect
 import pathlib
 import re
@@ -10,50 +11,65 @@ import re
 import pytest
 
 from mazebench.envs import registration
+from mazebench.options import Option
 from mazebench.tasks import registry
+from mazebench.tasks.options import TaskOptions
 
-PAGE = (pathlib.Path(__file__).parent.parent / "docs" / "options.md").read_text(encoding="utf-8")
-TABLES = re.findall(r"^\| option.*\n\|[-|]+\n((?:\|.*\n)+)", PAGE, re.MULTILINE)
+PAGE = pathlib.Path(__file__).parent.parent / "docs" / "options.md"
+DERIVED_TABLE = re.compile(r"\| option \| default \| values \| what \|\n(?:\|.*\n)+")
+TABLE = re.compile(r"^\| option.*\n\|[-|]+\n((?:\|.*\n)+)", re.MULTILINE)
+
+
+def derived_table() -> str:
+    """Returns the table of the fields of `TaskOptions`: its own first, then those of perturbations and sensors."""
+    fields = sorted(dataclasses.fields(TaskOptions), key=lambda field: field.name not in TaskOptions.__annotations__)
+    lines = ["| option | default | values | what |\n", "|---|---|---|---|\n"]
+    for field in fields:
+        option = field.metadata["option"]
+        lines.append(f"| `{field.name}` | `{field.default!r}` | {values(option)} | {option.help} |\n")
+    return "".join(lines)
+
+
+def values(option: Option) -> str:
+    return option.range_text if option.choices is None else ", ".join(f"`{choice!r}`" for choice in option.choices)
 
 
 def documented(table: str) -> dict[str, object]:
-    """The names and defaults in the first two columns."""
+    """Returns the names and defaults in the first two columns."""
     cells = [row.split("|")[1:3] for row in table.splitlines()]
     return {name.strip(" `"): ast.literal_eval(default.strip(" `")) for name, default in cells}
 
 
-def options(function) -> dict[str, object]:
-    """The named parameters and their defaults."""
-    parameters = inspect.signature(function).parameters.values()
-    return {each.name: each.default for each in parameters if each.kind is not each.VAR_KEYWORD}
+def parameters(function) -> dict[str, object]:
+    """Returns the named parameters and their defaults, except the options of a task."""
+    found = inspect.signature(function).parameters.values()
+    return {each.name: each.default for each in found if each.kind is not each.VAR_KEYWORD and each.name != "task"}
 
 
-def test_task_options_when_compared_with_make_spec():
-    assert list(documented(TABLES[0]).items()) == list(options(registry.make_spec).items())
+def test_the_table_of_task_options_follows_from_the_code():
+    assert derived_table() in PAGE.read_text(encoding="utf-8"), "python tests/test_options_page.py rewrites it"
 
 
 @pytest.mark.parametrize(
-    ("table", "function"),
+    ("index", "function", "others"),
     [
-        (1, registry.load),
-        (2, registration.make_env),
-        (2, registration.make_goal_env),
-        (3, registration.make_vec),
+        (0, registry.make_spec, None),
+        (2, registry.load, registry.make_spec),
+        (3, registration.make_env, None),
+        (3, registration.make_goal_env, None),
+        (4, registration.make_vec, None),
     ],
-    ids=["load", "gymnasium.make", "goal", "make_vec"],
+    ids=["mazes", "load", "gymnasium.make", "goal", "make_vec"],
 )
-def test_environment_options_when_compared_with_their_function(table, function):
-    of_task = options(registry.make_spec)
-    found = {name: default for name, default in options(function).items() if name not in of_task}
-    assert documented(TABLES[table]) == found
-    for name in set(options(function)) & set(of_task):
-        assert options(function)[name] == of_task[name]
+def test_the_other_tables_name_the_parameters_of_their_function(index, function, others):
+    tables = TABLE.findall(PAGE.read_text(encoding="utf-8"))
+    assert len(tables) == 5
+    found = parameters(function)
+    for name in parameters(others) if others else ():
+        found.pop(name, None)
+    assert documented(tables[index]) == found
 
 
-def test_tables_when_counted():
-    assert len(TABLES) == 4
-
-
-@pytest.mark.parametrize("row", TABLES[0].splitlines(), ids=lambda row: row.split("|")[1].strip(" `"))
-def test_task_option_when_its_task_is_looked_up(row):
-    assert row.split("|")[4].strip() in ("", "both", "local", "hierarchical")
+if __name__ == "__main__":
+    text = PAGE.read_text(encoding="utf-8")
+    PAGE.write_text(DERIVED_TABLE.sub(lambda _: derived_table(), text), encoding="utf-8")

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from mazebench_agents.replay import Hindsight, Replay
+from mazebench_agents.common.replay import Hindsight, Replay
 
-from mazebench.errors import InputError
 from mazebench.training.experience import Experience
 
 NO_HINDSIGHT = Hindsight(ratio=0.0)
@@ -17,8 +16,8 @@ def make_experience(**values):
         "state": np.zeros((1, 12), dtype=np.float32),
         "action": np.array([0]),
         "cell": np.array([0]),
-        "begins": np.array([False]),
-        "is_first": np.array([False]),
+        "new_episode": np.array([False]),
+        "new_context": np.array([False]),
         "maze": np.array([0]),
         "start": np.array([0]),
         "goal": np.array([99]),
@@ -44,8 +43,8 @@ def fill(replay, cells, goal=99, final_cell=None, first_x=0):
                 state=state(first_x + step),
                 action=np.array([step % 6]),
                 cell=np.array([cell]),
-                begins=np.array([step == 0]),
-                is_first=np.array([step == 0]),
+                new_episode=np.array([step == 0]),
+                new_context=np.array([step == 0]),
                 start=np.array([cells[0]]),
                 goal=np.array([goal]),
                 ended=np.array([last]),
@@ -222,19 +221,6 @@ def test_saved_and_loaded_replay_samples_the_same(tmp_path):
         strict=True,
     ):
         np.testing.assert_array_equal(mine, theirs)
-
-
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 truncated", b"\x80\x04pickle"])
-def test_damaged_replay_is_refused(tmp_path, content):
-    path = tmp_path / "replay.npz"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match="expected a replay"):
-        Replay(1, 50).load(path)
-
-
-def test_memory_is_bounded_by_the_capacity():
-    replay = Replay(4, 1000)
-    assert replay.num_bytes == 1000 * (12 * 4 + 2 * 8 + 1 + 5 * 2 + 2 * 8)
 
 
 def test_sequences_are_consecutive_and_stop_with_their_trajectory():

@@ -3,11 +3,11 @@
 import json
 
 import pytest
-from mazebench_agents.checkpoint import load_checkpoint
+from mazebench_agents.common.checkpoint import load_checkpoint
 
 from mazebench import testing
-from mazebench.agent import load_agent_class
-from mazebench.evaluation.harness import EvalOptions, evaluate
+from mazebench.agent_loading import load_agent_class
+from mazebench.evaluation.evaluate import evaluate
 
 SHIPPED = ("mmn", "mah", "dqn")
 
@@ -29,10 +29,10 @@ def test_shipped_checkpoint_has_its_config_and_curve_beside_it(name):
 
 @pytest.mark.parametrize("name", ["mmn", "mah"])
 def test_shipped_agent_with_a_map_reaches_near_goals_in_its_training_mazes(tmp_path, name):
-    options = EvalOptions(agent=name, split="train", distances=(2, 4), episodes_per_distance=2)
-    assert evaluate(options, tmp_path / name)["overall"]["success_rate"] > 0.9
+    summary = evaluate(name, tmp_path / name, split="train", distances=(2, 4), episodes_per_distance=2)
+    assert summary.overall.success_rate > 0.9
 
 
 def test_shipped_dqn_without_a_map_does_not(tmp_path):
-    options = EvalOptions(agent="dqn", split="train", distances=(4,), episodes_per_distance=2)
-    assert evaluate(options, tmp_path / "dqn")["overall"]["success_rate"] < 0.6
+    summary = evaluate("dqn", tmp_path / "dqn", split="train", distances=(4,), episodes_per_distance=2)
+    assert summary.overall.success_rate < 0.6

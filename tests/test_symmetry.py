@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import torch
-from mazebench_agents import symmetry
-from mazebench_agents.layers import state_features
+from mazebench_agents.common import symmetry
+from mazebench_agents.common.layers import state_features
+from simple_mazes import field
 
 from mazebench.maps.generators import generate
-from mazebench.maps.maze import Maze
 from mazebench.tasks.context import build_context
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.navigation import Environment
@@ -53,11 +53,8 @@ def test_turned_context_is_the_context_of_the_turned_maze(turned):
     np.testing.assert_array_equal(symmetry.turn_planes(context, turned), expected)
 
 
-FIELD = Maze(np.pad(np.zeros((11, 11), dtype=bool), 1, constant_values=True), "field")
-
-
 def drive(episode, actions):
-    env = Environment(TaskSpec("local", (FIELD,), (1,), time_limit=1000))
+    env = Environment(TaskSpec(mazes=(field(13),), distances=(1,), time_limit=1000))
     states = [env.reset(episode=episode).observation["state"]]
     for action in actions:
         states.append(env.step(int(action)).observation["state"])

@@ -87,7 +87,7 @@ def test_version_when_environments_are_asked():
 
 
 def test_version_when_a_result_says_what_it_came_from():
-    assert provenance(EvalOptions("random"), RandomAgent)["task_version"] == TASK_VERSION
+    assert provenance(EvalOptions("random"), RandomAgent, ()).task_version == TASK_VERSION
 
 
 if __name__ == "__main__":

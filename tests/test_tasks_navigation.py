@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
-import subprocess
-import sys
 
 import dm_env
 import gymnasium
@@ -13,6 +10,8 @@ import numpy as np
 import pytest
 from absl.testing import absltest
 from dm_env import test_utils
+from rendering import run_with_egl
+from simple_mazes import field
 
 import mazebench
 from mazebench.maps.generators import generate
@@ -20,13 +19,12 @@ from mazebench.maps.maze import Maze
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.navigation import Environment
 from mazebench.testing import ConformanceError, check_environment
-from mazebench.world.mjcf import ACTIONS, TURN_RATE
+from mazebench.world.mjcf import TURN_RATE
 
 FORWARD, BACKWARD, STRAFE_LEFT, STRAFE_RIGHT, LOOK_LEFT, LOOK_RIGHT = range(6)
 EAST, NORTH, WEST = 0.0, np.pi / 2, np.pi
 SIZE, ROW, Y = 9, 4, 4.5  # the corridor is the row 4, with y = 9 - 4 - 0.5
 STEPS_TO_GOAL = 6  # from rest at (4, 1) to the cell (4, 4), 2.5 m on: 1 m in 24 frames, 1.5 m at 3.2 m/s
-PROBE_FAILED = 77
 
 
 def corridor() -> Maze:
@@ -34,10 +32,6 @@ def corridor() -> Maze:
     walls = np.ones((SIZE, SIZE), dtype=bool)
     walls[ROW, 1:8] = False
     return Maze(walls, "corridor")
-
-
-def room() -> Maze:
-    return Maze(np.pad(np.zeros((SIZE - 2, SIZE - 2), dtype=bool), 1, constant_values=True), "room")
 
 
 def dfs_mazes(count: int = 3) -> list[Maze]:
@@ -88,7 +82,7 @@ class PerturbedContractTest(test_utils.EnvironmentTestMixin, absltest.TestCase):
 
 
 class TestRewardsAndEndings:
-    def test_time_steps_when_goal_is_reached(self):
+    def test_an_episode_ends_with_reward_0_when_the_goal_is_reached(self):
         env = mazebench.load(maps=corridor())
         time_steps = play(env, [FORWARD] * 20, episode=eastwards())
         assert time_steps[0].step_type is dm_env.StepType.FIRST
@@ -103,7 +97,7 @@ class TestRewardsAndEndings:
         assert env.task.success
         assert env.task.steps == STEPS_TO_GOAL
 
-    def test_time_steps_when_time_is_out(self):
+    def test_an_episode_is_cut_short_when_time_is_out(self):
         env = mazebench.load(maps=corridor(), time_limit=STEPS_TO_GOAL - 1)
         time_steps = play(env, [FORWARD] * 20, episode=eastwards())
         assert len(time_steps) == STEPS_TO_GOAL
@@ -111,31 +105,31 @@ class TestRewardsAndEndings:
         assert (last.step_type, last.reward, last.discount) == (dm_env.StepType.LAST, -1.0, 1.0)
         assert not env.task.success
 
-    def test_time_steps_when_goal_is_reached_on_the_last_step(self):
+    def test_a_goal_reached_on_the_last_step_counts(self):
         env = mazebench.load(maps=corridor(), time_limit=STEPS_TO_GOAL)
         last = play(env, [FORWARD] * 20, episode=eastwards())[-1]
         assert (last.step_type, last.reward, last.discount) == (dm_env.StepType.LAST, 0.0, 0.0)
 
-    def test_time_limit_when_not_given(self):
+    def test_an_episode_has_100_steps_by_default(self):
         time_steps = play(mazebench.load(maps=corridor()), [LOOK_LEFT] * 200, episode=eastwards())
         assert len(time_steps) == 101
         assert time_steps[-1].discount == 1.0
 
-    def test_episode_when_stepped_after_its_end(self):
+    def test_a_step_after_the_end_begins_a_new_episode(self):
         env = mazebench.load(maps=corridor(), time_limit=1)
         play(env, [FORWARD], episode=eastwards())
         assert env.needs_reset
         assert env.step(FORWARD).first()
         assert not env.needs_reset
 
-    def test_goal_when_only_its_neighbour_was_reached(self):
+    def test_passing_close_to_the_goal_does_not_reach_it(self):
         # Along the corridor's south wall the goal's cell is never entered, however near it is.
-        env = mazebench.load(maps=room())
+        env = mazebench.load(maps=field(SIZE))
         episode = Episode(0, (6, 1), (5, 4), EAST, 0)
         assert not any(time_step.last() for time_step in play(env, [FORWARD] * 20, episode=episode))
 
-    def test_path_length_when_driving_to_and_fro(self):
-        env = mazebench.load(maps=room())
+    def test_the_path_length_is_that_of_the_whole_way(self):
+        env = mazebench.load(maps=field(SIZE))
         env.reset(episode=Episode(0, (4, 2), (1, 1), EAST, 0))
         driven = 0.0
         for action in [FORWARD] * 4 + [BACKWARD] * 6:
@@ -145,15 +139,11 @@ class TestRewardsAndEndings:
         assert env.task.path_length == pytest.approx(driven, abs=1e-12)
         assert driven > np.hypot(*(env.physics.position() - (2.5, 4.5))) + 0.5
 
-    def test_reward_spec_when_asked_for(self):
-        spec = mazebench.load(maps=corridor()).reward_spec()
-        assert (spec.minimum, spec.maximum) == (-1, 0)
-
 
 class TestState:
-    def test_state_when_episode_begins(self):
+    def test_an_episode_begins_at_rest_in_the_middle_of_its_start(self):
         # The centre of (4, 3) of 9 x 9 is (3.5, 4.5).
-        state = play(mazebench.load(maps=room()), [], episode=eastwards(start=3, yaw=0.5))[0].observation["state"]
+        state = play(mazebench.load(maps=field(SIZE)), [], episode=eastwards(start=3, yaw=0.5))[0].observation["state"]
         assert state.dtype == np.float32
         np.testing.assert_allclose(state, [3.5, Y, 0.28, 0, 0, 0.5] + [0] * 6, atol=1e-6)
 
@@ -162,8 +152,8 @@ class TestState:
         [(FORWARD, 1, 0), (BACKWARD, -1, 0), (STRAFE_LEFT, 0, 1), (STRAFE_RIGHT, 0, -1)],
     )
     @pytest.mark.parametrize("yaw", [EAST, NORTH, 2.0, -1.0])
-    def test_velocity_when_driving(self, action, forward, left, yaw):
-        env = mazebench.load(maps=room())
+    def test_velocities_are_given_in_the_bodys_frame(self, action, forward, left, yaw):
+        env = mazebench.load(maps=field(SIZE))
         state = play(env, [action], episode=Episode(0, (4, 4), (1, 1), yaw, 0))[-1].observation["state"]
         speed = 3.0  # m/s after 10 frames
         np.testing.assert_allclose(state[6:9], [forward * speed, left * speed, 0], atol=0.05)
@@ -174,51 +164,25 @@ class TestState:
         assert state[5] == pytest.approx(yaw, abs=1e-6)
 
     @pytest.mark.parametrize(("action", "sign"), [(LOOK_LEFT, 1), (LOOK_RIGHT, -1)])
-    def test_angular_velocity_when_turning(self, action, sign):
-        env = mazebench.load(maps=room())
+    def test_a_body_turns_on_the_spot(self, action, sign):
+        env = mazebench.load(maps=field(SIZE))
         state = play(env, [action], episode=Episode(0, (4, 4), (1, 1), 0.0, 0))[-1].observation["state"]
         np.testing.assert_allclose(state[9:], [0, 0, sign * TURN_RATE], atol=1e-3)
         assert state[5] == pytest.approx(sign * np.deg2rad(21.12), rel=0.01)
         np.testing.assert_allclose(state[6:9], 0, atol=1e-6)
 
-    @pytest.mark.parametrize(("action", "yaw", "sign"), [(LOOK_LEFT, 3.1, 1), (LOOK_RIGHT, -3.1, -1)])
-    def test_yaw_when_passing_half_a_turn(self, action, yaw, sign):
-        env = mazebench.load(maps=room())
-        first, second = play(env, [action], episode=Episode(0, (4, 4), (1, 1), yaw, 0))
-        assert first.observation["state"][5] == pytest.approx(yaw, abs=1e-6)
-        expected = yaw + sign * (np.deg2rad(21.12) - 2 * np.pi)
-        assert second.observation["state"][5] == pytest.approx(expected, abs=0.005)
-
     @pytest.mark.parametrize("action", [LOOK_LEFT, LOOK_RIGHT])
-    def test_yaw_when_turning_round_and_round(self, action):
-        env = mazebench.load(maps=room())
+    def test_the_yaw_stays_between_minus_pi_and_pi(self, action):
+        env = mazebench.load(maps=field(SIZE))
         time_steps = play(env, [action] * 60, episode=Episode(0, (4, 4), (1, 1), 3.0, 0))
         yaws = np.array([time_step.observation["state"][5] for time_step in time_steps])
         assert np.all((yaws >= -np.pi) & (yaws < np.pi))
         turns = np.diff(np.unwrap(yaws)) / np.deg2rad(21.12)
         np.testing.assert_allclose(turns, 1 if action == LOOK_LEFT else -1, rtol=0.01)
 
-    def test_measurements_when_compared_with_state(self):
-        env = mazebench.load(maps=room())
-        time_step = play(env, [STRAFE_LEFT, LOOK_LEFT], episode=Episode(0, (4, 4), (1, 1), 3.0, 0))[-1]
-        state, physics = time_step.observation["state"], env.physics
-        np.testing.assert_allclose(physics.position(), state[:2], atol=1e-6)
-        assert physics.yaw() == pytest.approx(state[5], abs=1e-6)
-        assert physics.speed() == pytest.approx(np.hypot(state[6], state[7]), abs=1e-6)
-        assert physics.turn_rate() == pytest.approx(state[11], abs=1e-6)
-
 
 class TestContext:
-    def test_context_when_episode_goes_on(self):
-        env = mazebench.load(maps=dfs_mazes(), seed=0)
-        rng = np.random.default_rng(0)
-        for _ in range(3):
-            first, *others = contexts(play(env, rng.integers(6, size=30)))
-            assert others
-            for context in others:
-                np.testing.assert_array_equal(context, first)
-
-    def test_planes_when_maze_is_a_corridor(self):
+    def test_the_context_shows_the_walls_the_goal_and_the_start(self):
         context = contexts(play(mazebench.load(maps=corridor()), [], episode=eastwards()))[0]
         assert context.shape == (4, SIZE, SIZE)
         assert context.dtype == np.float32
@@ -226,7 +190,7 @@ class TestContext:
         np.testing.assert_array_equal(np.argwhere(context[2]), [[ROW, 4]])
         np.testing.assert_array_equal(np.argwhere(context[3]), [[ROW, 1]])
 
-    def test_context_when_an_agent_writes_to_it(self):
+    def test_an_agent_may_write_to_its_observation(self):
         env = mazebench.load(maps=corridor())
         first = env.reset(episode=eastwards())
         kept = {key: value.copy() for key, value in first.observation.items()}
@@ -236,14 +200,11 @@ class TestContext:
         np.testing.assert_array_equal(second.observation["context"], kept["context"])
         np.testing.assert_allclose(second.observation["state"][:2], kept["state"][:2], atol=1e-6)
 
-    def test_observation_when_task_is_local(self):
-        assert mazebench.load(maps=corridor()).reset().observation.keys() == {"state", "context"}
-
 
 class TestPositionNoise:
-    def test_state_when_noisy(self):
+    def test_noise_changes_the_observed_position_only(self):
         episode = Episode(0, (4, 4), (1, 1), 0.3, seed=11)
-        clean, noisy = (mazebench.load(maps=room(), position_noise=scale) for scale in (0.0, 0.5))
+        clean, noisy = (mazebench.load(maps=field(SIZE), position_noise=scale) for scale in (0.0, 0.5))
         actions = np.random.default_rng(0).integers(6, size=90)
         clean_states, noisy_states = (self.states(env, actions, episode) for env in (clean, noisy))
         np.testing.assert_array_equal(noisy_states[:, 2:], clean_states[:, 2:])
@@ -254,15 +215,7 @@ class TestPositionNoise:
         np.testing.assert_array_equal(noisy.physics.position(), clean.physics.position())
         assert noisy.task.path_length == clean.task.path_length
 
-    def test_noise_when_episode_is_played_again(self):
-        env = mazebench.load(maps=room(), position_noise=0.5)
-        episode = Episode(0, (4, 4), (1, 1), 0.3, seed=11)
-        first, again = (self.states(env, [LOOK_LEFT] * 10, episode) for _ in range(2))
-        np.testing.assert_array_equal(first, again)
-        other = self.states(env, [LOOK_LEFT] * 10, Episode(0, (4, 4), (1, 1), 0.3, seed=12))
-        assert np.all(other[:, :2] != first[:, :2])
-
-    def test_goal_when_position_reads_wrong(self):
+    def test_the_true_position_decides_whether_the_goal_is_reached(self):
         # Reward and end speak of the true position.
         env = mazebench.load(maps=corridor(), position_noise=3.0)
         time_steps = play(env, [FORWARD] * 20, episode=eastwards())
@@ -274,7 +227,7 @@ class TestPositionNoise:
 
 
 class TestHierarchical:
-    def test_switches_when_landmarks_time_out(self):
+    def test_a_landmark_that_is_not_reached_in_time_is_given_up(self):
         # From (4, 7) to (4, 1), 6 cells: landmarks at columns 5 and 3, then the goal at 1.
         env = mazebench.load("hierarchical", maps=corridor(), landmark_distance=2, time_limit=3)
         time_steps = play(env, [LOOK_LEFT] * 20, seed=0)
@@ -287,7 +240,7 @@ class TestHierarchical:
         assert time_steps[-1].last()
         assert time_steps[-1].discount == 1.0
 
-    def test_switches_when_landmarks_are_reached(self):
+    def test_the_next_landmark_comes_when_one_is_reached(self):
         env = mazebench.load("hierarchical", maps=corridor(), landmark_distance=2)
         time_steps = play(env, [FORWARD] * 50, episode=eastwards(start=7, goal=1, yaw=WEST))
         columns = [int(time_step.observation["state"][0]) for time_step in time_steps]
@@ -298,7 +251,7 @@ class TestHierarchical:
         assert all(time_step.reward == -1.0 for time_step in time_steps[1:-1])
         assert env.task.success
 
-    def test_local_map_when_landmark_switches(self):
+    def test_the_local_map_is_centred_on_the_legs_start(self):
         env = mazebench.load("hierarchical", maps=corridor(), landmark_distance=2, time_limit=3)
         for time_step in play(env, [LOOK_LEFT] * 20, seed=0):
             column = int(np.argwhere(time_step.observation["context"][3])[0, 1])
@@ -308,7 +261,7 @@ class TestHierarchical:
             np.testing.assert_array_equal(np.flatnonzero(local_map[4] == 0), free)
             assert local_map[[0, 1, 2, 3, 5, 6, 7, 8]].all()
 
-    def test_context_when_no_switch_is_marked(self):
+    def test_the_context_changes_only_where_is_first_says_so(self):
         env = mazebench.load("hierarchical", maps=dfs_mazes(), landmark_distance=1, time_limit=7, seed=0)
         rng = np.random.default_rng(1)
         time_steps = play(env, rng.integers(6, size=100))
@@ -319,9 +272,9 @@ class TestHierarchical:
             switches += changed
         assert switches > 5
 
-    def test_episode_when_goal_is_entered_before_the_landmarks(self):
+    def test_a_goal_entered_before_the_landmarks_ends_the_episode(self):
         # The landmarks lie along two sides of the room, the body drives along its diagonal.
-        env = mazebench.load("hierarchical", maps=room(), landmark_distance=5)
+        env = mazebench.load("hierarchical", maps=field(SIZE), landmark_distance=5)
         time_steps = play(env, [FORWARD] * 50, episode=Episode(0, (1, 7), (7, 1), -3 * np.pi / 4, 0))
         assert env.task.route.cells == [(1, 7), (1, 2), (5, 1), (7, 1)]
         assert env.task.route.leg == 0
@@ -350,7 +303,7 @@ class TestSeeds:
     ACTIONS = tuple(int(action) for action in np.random.default_rng(5).integers(6, size=20))
 
     @OPTIONS
-    def test_episode_when_seed_is_given_again(self, options):
+    def test_the_same_seed_gives_the_same_episode(self, options):
         env = mazebench.load(maps=dfs_mazes(), seed=0, **options)
         first = play(env, self.ACTIONS, seed=4)
         play(env, [FORWARD] * 7)  # breaks off in the middle
@@ -358,13 +311,13 @@ class TestSeeds:
         assert_equal(first, play(env, self.ACTIONS, seed=4))
 
     @OPTIONS
-    def test_episode_when_environment_is_loaded_with_seed(self, options):
+    def test_a_seed_given_at_loading_is_that_of_the_first_reset(self, options):
         loaded = mazebench.load(maps=dfs_mazes(), seed=4, **options)
         reset = mazebench.load(maps=dfs_mazes(), seed=99, **options)
         assert_equal(play(loaded, self.ACTIONS), play(reset, self.ACTIONS, seed=4))
 
     @OPTIONS
-    def test_stream_when_reset_without_seed(self, options):
+    def test_later_episodes_follow_from_the_seed_and_are_others(self, options):
         # The next episodes follow from the seed too, and are others.
         first, second = (mazebench.load(maps=dfs_mazes(), seed=4, **options) for _ in range(2))
         episodes = []
@@ -373,82 +326,26 @@ class TestSeeds:
             episodes.append(first.task.episode)
         assert len({episode.seed for episode in episodes}) == 3
 
-    def test_episode_when_seeds_differ(self):
-        env = mazebench.load(maps=dfs_mazes())
-        starts = [env.reset(seed=seed).observation["state"] for seed in range(5)]
-        assert len({state.tobytes() for state in starts}) == 5
-
-    def test_stream_when_an_episode_is_given(self):
-        # Playing a given episode draws nothing.
-        one, other = (mazebench.load(maps=dfs_mazes(), seed=4) for _ in range(2))
-        one.reset(episode=Episode(1, tuple(dfs_mazes()[1].free_cells[0]), tuple(dfs_mazes()[1].free_cells[-1]), 0.0, 0))
-        assert_equal([one.reset()], [other.reset()])
-
 
 class TestActions:
     @pytest.mark.parametrize("action", [-1, 6, 2.5])
-    def test_action_when_out_of_range(self, action):
-        env = mazebench.load(maps=corridor())
-        env.reset(episode=eastwards())
-        with pytest.raises(ValueError, match=r"expected an action from 0 to 5 \(forward, .*, look_right\), found"):
-            env.step(action)
-
-    @pytest.mark.parametrize("action", [float("nan"), "jump"])
-    def test_action_when_no_number(self, action):
-        env = mazebench.load(maps=corridor())
-        env.reset(episode=eastwards())
-        with pytest.raises(ValueError, match=r"jump|NaN"):
-            env.step(action)
-
-    def test_episode_when_an_action_was_refused(self):
+    def test_an_action_out_of_range_is_refused_and_the_episode_goes_on(self, action):
         env = mazebench.load(maps=corridor())
         expected = play(env, [FORWARD] * 3, episode=eastwards())
         env.reset(episode=eastwards())
-        with pytest.raises(ValueError, match="expected an action"):
-            env.step(6)
+        with pytest.raises(ValueError, match=r"expected an action from 0 to 5 \(forward, .*, look_right\), found"):
+            env.step(action)
         assert_equal(expected[1:], [env.step(FORWARD) for _ in range(3)])
-
-    @pytest.mark.parametrize("action", [0, 0.0, np.int64(0), np.uint8(0), np.array(0)])
-    def test_action_when_of_another_type(self, action):
-        env = mazebench.load(maps=corridor())
-        assert_equal(play(env, [FORWARD], episode=eastwards()), play(env, [action], episode=eastwards()))
-
-    def test_spec_when_asked_for(self):
-        spec = mazebench.load(maps=corridor()).action_spec()
-        assert spec.num_values == len(ACTIONS) == 6
 
 
 class TestPhysics:
-    def test_physics_when_reset_to_another_maze(self):
-        mazes = dfs_mazes()
-        env = mazebench.load(maps=mazes)
-        physics, model, data = env.physics, env.physics.model.ptr, env.physics.data.ptr
-        for index in (0, 2, 1):
-            first, last = (tuple(map(int, mazes[index].free_cells[end])) for end in (0, -1))
-            env.reset(episode=Episode(index, first, last, 0.0, 0))
-            assert (env.physics, env.physics.model.ptr, env.physics.data.ptr) == (physics, model, data)
-            np.testing.assert_array_equal(model.geom_pos, env.task.spec.models[index].geom_pos)
-            for action in [FORWARD, STRAFE_LEFT] * 10:
-                if env.step(action).last():
-                    break
-            x, y = env.physics.position()
-            assert not mazes[index].walls[SIZE - 1 - int(y), int(x)]
-
-    def test_goal_marker_when_episode_begins(self):
+    def test_the_goals_marker_stands_in_the_goal(self):
         env = mazebench.load(maps=corridor())
         env.reset(episode=eastwards(goal=6))
         np.testing.assert_allclose(env.physics.named.data.xpos["goal"], (6.5, Y, 0))
 
-    def test_picture_when_rendered(self):
-        program = f"""
-import sys
-import numpy as np
-try:
-    import mujoco
-    mujoco.GLContext(64, 64).free()
-except (RuntimeError, ImportError, AttributeError):
-    sys.exit({PROBE_FAILED})
-import mazebench
+    def test_each_camera_renders_the_episode(self):
+        run_with_egl("""
 env = mazebench.load(size=13, seed=0)
 pictures = []
 for _ in range(2):
@@ -457,12 +354,7 @@ for _ in range(2):
 assert all(picture.shape == (64, 96, 3) and picture.dtype == np.uint8 for picture in pictures)
 assert all(picture.std() > 5 for picture in pictures)
 assert not np.array_equal(pictures[0], pictures[2])
-"""
-        environment = os.environ | {"MUJOCO_GL": "egl"}
-        result = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
-        if result.returncode == PROBE_FAILED:
-            pytest.skip("EGL is not usable here")
-        assert result.returncode == 0, result.stderr
+""")
 
 
 class TestConformance:

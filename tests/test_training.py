@@ -1,20 +1,24 @@
 """The training loop: run folders, resuming, faults, and collecting on Ray."""
 
-import dataclasses
+import contextlib
 import itertools
 import json
 import math
+import signal
 import time
 
 import numpy as np
 import pytest
 from faults import TINY
+from simple_mazes import field
 
+from mazebench import stopping
+from mazebench.agent import Agent
 from mazebench.errors import InputError
-from mazebench.maps.maze import Maze
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
-from mazebench.training.loop import TrainingError, TrainOptions, train
+from mazebench.training.loop import TrainingError, train
+from mazebench.training.options import TrainOptions
 from mazebench.training.run_folder import RunFolder
 
 
@@ -87,38 +91,10 @@ def test_folder_of_a_run_is_refused_without_resume_and_for_another_config(unbrok
         train(tiny_options(env_steps=2400, overrides=tuple(other.items())), unbroken, resume=True)
 
 
-def test_folder_in_use_by_another_process_is_refused(tmp_path):
-    with RunFolder(tmp_path), pytest.raises(InputError, match="in use by another process"):
-        RunFolder(tmp_path)
-
-
-def test_folder_that_was_refused_is_free_again(tmp_path):
-    (tmp_path / "checkpoints" / f"{800:012d}").mkdir(parents=True)
-    with pytest.raises(InputError, match=r"expected config\.json beside the checkpoints"):
-        RunFolder(tmp_path)
-    (tmp_path / "config.json").touch()
-    with RunFolder(tmp_path) as folder:
-        assert len(folder.checkpoints()) == 1
-
-
-def test_folder_whose_checkpoints_are_a_link_is_refused(tmp_path):
-    others = tmp_path / "other" / "checkpoints" / f"{800:012d}.tmp"
-    others.mkdir(parents=True)
-    (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "config.json").touch()
-    (tmp_path / "run" / "checkpoints").symlink_to(others.parent)
-    with pytest.raises(InputError, match="checkpoints: can't write there: it is a link"):
-        RunFolder(tmp_path / "run")
-    assert others.exists()
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"agent": "planner"}, "doesn't learn"),
-        ({"agent": "nobody"}, "unknown agent"),
-        ({"env_steps": None}, "expected --minutes or --env-steps"),
-        ({"size": 14}, "unknown size"),
         ({"pairs": "some"}, "unknown pairs"),
         ({"overrides": (("colour", "red"),)}, "unknown config key 'colour'"),
     ],
@@ -126,6 +102,28 @@ def test_folder_whose_checkpoints_are_a_link_is_refused(tmp_path):
 def test_wrong_option_is_refused(tmp_path, changes, message):
     with pytest.raises(InputError, match=message):
         train(tiny_options(**{"env_steps": 100, **changes}), tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [({}, "expected --minutes or --env-steps"), ({"env_steps": 100, "ray_address": "auto"}, "--ray needs --workers")],
+)
+def test_options_that_contradict_each_other_are_refused(changes, message):
+    with pytest.raises(InputError, match=message):
+        tiny_options(**changes)
+
+
+def test_interrupt_that_a_library_swallowed_ends_the_run_with_its_last_checkpoint(tmp_path):
+    def report(share, line):
+        if line and line.startswith("800 steps"):
+            with contextlib.suppress(stopping.Terminated):
+                signal.raise_signal(signal.SIGTERM)
+
+    with stopping.listening(), pytest.raises(stopping.Terminated):
+        train(tiny_options(env_steps=2400), tmp_path, report=report)
+    assert [line["env_steps"] for line in metrics(tmp_path)] == [800]
+    with RunFolder(tmp_path) as folder:
+        assert [path.name for path in folder.checkpoints()] == [f"{0:012d}", f"{800:012d}"]
 
 
 def test_loss_that_is_not_finite_stops_the_run_with_the_last_checkpoint(tmp_path):
@@ -146,16 +144,14 @@ def test_minutes_limit_a_sitting(tmp_path):
 
 def test_collector_gives_trajectories_that_hang_together():
     """Each next state follows the one before it, and cells, legs and ends are those of the environments."""
-    walls = np.ones((7, 7), dtype=bool)
-    walls[1:-1, 1:-1] = False
-    spec = TaskSpec("local", (Maze(walls, "field"),), (1, 2), time_limit=10, num_goals=3)
+    spec = TaskSpec(mazes=(field(7),), distances=(1, 2), time_limit=10, num_goals=3)
     collector = Collector(spec, 4, seed=1)
     rng = np.random.default_rng(0)
     steps = [collector.step(rng.integers(6, size=4)) for _ in range(80)]
     for before, after in itertools.pairwise(steps):
-        np.testing.assert_array_equal(after.begins, before.ended)
-        assert (after.is_first | ~after.begins).all()
-        unchanged = ~after.is_first
+        np.testing.assert_array_equal(after.new_episode, before.ended)
+        assert (after.new_context | ~after.new_episode).all()
+        unchanged = ~after.new_context
         np.testing.assert_array_equal(after.goal[unchanged], before.goal[unchanged])
     for step in steps:
         x, y = step.state[:, 0], step.state[:, 1]
@@ -163,37 +159,47 @@ def test_collector_gives_trajectories_that_hang_together():
         ended = step.ended
         x, y = step.final_state[ended, 0], step.final_state[ended, 1]
         np.testing.assert_array_equal(step.final_cell[ended], (6 - np.floor(y)) * 7 + np.floor(x))
-    legs = sum(int(step.is_first.sum()) for step in steps)
-    assert legs > sum(int(step.begins.sum()) for step in steps) > 4, "several goals an episode, several episodes"
+    legs = sum(int(step.new_context.sum()) for step in steps)
+    assert legs > sum(int(step.new_episode.sum()) for step in steps) > 4, "several goals an episode, several episodes"
 
 
-class Rolling:
-    """Goes forward, and notes what it is told of episodes."""
+class Rolling(Agent):
+    """Goes forward, and returns the inputs it was given as its state."""
 
-    def __init__(self):
-        self.told = []
+    def initial_state(self, batch_size):
+        return []
 
-    def seed_episodes(self, seeds, mask):
-        self.told.append((seeds.copy(), mask.copy()))
-
-    def act(self, observation, is_first, state, explore=False):
-        return np.zeros(len(is_first), dtype=np.int64), state + is_first
+    def act(self, inputs, state, explore=False):
+        return np.zeros(len(inputs.seed), dtype=np.int64), [*state, inputs]
 
 
-def test_collector_tells_actors_which_new_contexts_begin_episodes():
-    walls = np.ones((7, 7), dtype=bool)
-    walls[1:-1, 1:-1] = False
-    spec = TaskSpec("local", (Maze(walls, "field"),), (1, 2), time_limit=6, num_goals=3)
-    collector, actor, state = Collector(spec, 4, seed=1), Rolling(), np.zeros(4, dtype=int)
-    steps = []
+def roll(seed):
+    """The inputs of 40 steps in four environments, the steps, and the seeds of the environments' first episodes."""
+    spec = TaskSpec(mazes=(field(7),), distances=(1, 2), time_limit=6, num_goals=3)
+    collector, state, steps = Collector(spec, 4, seed=seed), [], []
+    first = [episode.seed for episode in collector._env.episodes]
     for _ in range(40):
-        step, state = collector.play(actor, state)
+        step, state = collector.play(Rolling(), state)
         steps.append(step)
-    news = [step for step in steps if step.is_first.any()]
-    np.testing.assert_array_equal(np.array([mask for _, mask in actor.told]), np.array([step.begins for step in news]))
-    begun = [seed for seeds, mask in actor.told for seed in seeds[mask].tolist()]
-    assert len(begun) > 4
-    assert len(set(begun)) == len(begun), "no two episodes share a seed"
+    return state, steps, first
+
+
+def test_collector_gives_every_episode_a_seed_of_its_own_that_is_not_the_episodes():
+    given, steps, first = roll(seed=1)
+    for inputs, step in zip(given, steps, strict=True):
+        np.testing.assert_array_equal(inputs.new_episode, step.new_episode)
+        np.testing.assert_array_equal(inputs.new_context, step.new_context)
+    seeds = [seed for inputs in given for seed in inputs.seed[inputs.new_episode].tolist()]
+    assert len(set(seeds)) == len(seeds) > 4
+    assert not set(seeds) & set(first)
+    for before, after in itertools.pairwise(given):
+        np.testing.assert_array_equal(before.seed != after.seed, after.new_episode)
+
+
+def test_collector_gives_the_same_seeds_again_when_it_begins_anew():
+    (given, _, _), (again, _, _), (others, _, _) = roll(seed=1), roll(seed=1), roll(seed=2)
+    np.testing.assert_array_equal([inputs.seed for inputs in given], [inputs.seed for inputs in again])
+    assert not np.array_equal(given[0].seed, others[0].seed)
 
 
 ray = pytest.importorskip("ray")
@@ -214,30 +220,6 @@ def test_training_on_ray_keeps_the_replay_ratio(cluster, tmp_path):
     assert last["env_steps"] >= 1600
     assert last["updates"] == (last["env_steps"] - 400) // 32
     assert math.isfinite(last["td_loss"])
-
-
-@pytest.mark.filterwarnings("ignore")
-def test_ray_actor_that_dies_is_replaced(cluster):
-    from mazebench_agents.dqn import MAH
-
-    from mazebench.agent import Interface
-    from mazebench.tasks.registry import make_spec
-    from mazebench.training.distributed import RaySource
-
-    spec = make_spec("local", 13, num_goals=2)
-    learner = MAH.build_learner(Interface("local", 13, 13), spec.mazes, overrides=TINY)
-    with RaySource(dataclasses.replace(tiny_options(), workers=2), spec, learner) as source:
-        source.restart(0)
-        seen: set[int] = set()
-        while seen != {0, 4}:
-            seen |= {env for env, _ in source.collect()}
-        ray.kill(source._players[1])
-        counts = {0: 0, 4: 0}
-        while counts[4] < 20:
-            for env, experience in source.collect():
-                counts[env] += 1
-                assert len(experience.action) == 4
-        assert source._num_failures == 1
 
 
 def test_more_workers_than_environments_are_refused(cluster, tmp_path):

@@ -1,0 +1,149 @@
+"""An agent that breaks its contract: one line that names it and says what it did."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from acting import inputs_of
+
+from mazebench.agent import Agent
+from mazebench.evaluation.checked_agent import AgentError, CheckedAgent
+from mazebench.evaluation.evaluate import evaluate
+
+
+def evaluate_at_hand(name, out, **running):
+    return evaluate(f"contract_at_hand:{name}", out, distances=(1,), episodes_per_distance=1, **running)
+
+
+AGENTS = """
+import numpy as np
+from mazebench.agent import Agent
+
+
+class Good(Agent):
+    def act(self, inputs, state, explore=False):
+        return self.answer(len(inputs.seed)), state
+
+    def answer(self, batch_size):
+        return np.zeros(batch_size, dtype=np.uint8)
+
+
+class TooHigh(Good):
+    def answer(self, batch_size):
+        return np.full(batch_size, 6)
+
+
+class Divides(Good):
+    def answer(self, batch_size):
+        return 1 // 0  # line 21
+
+
+class NoSeed(Good):
+    @classmethod
+    def build(cls, interface):
+        return cls()
+
+
+class NoState(Good):
+    def initial_state(self, batch_size):
+        raise OSError("two\\nlines")
+
+
+class Vague(Good):
+    @classmethod
+    def context_size(cls, size):
+        return "large"
+
+
+class InLibrary(Good):
+    def answer(self, batch_size):
+        import json
+
+        return json.loads("{")  # line 45
+
+
+class Exits(Good):
+    def answer(self, batch_size):
+        raise SystemExit(3)
+
+
+class Late(Good):
+    def initial_state(self, batch_size):
+        return 0
+
+    def act(self, inputs, state, explore=False):
+        assert state < 120
+        return np.full(len(inputs.seed), 4), state + 1
+"""
+
+
+@pytest.fixture(autouse=True)
+def _agents_at_hand(tmp_path, monkeypatch):
+    (tmp_path / "contract_at_hand.py").write_text(AGENTS)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "contract_at_hand", raising=False)
+
+
+BROKEN = [
+    ("TooHigh", "expected act() to return actions from 0 to 5, found 6"),
+    ("Divides", "act() raised ZeroDivisionError: integer division or modulo by zero (contract_at_hand.py:21)"),
+    ("NoSeed", "build() raised TypeError: NoSeed.build() got an unexpected keyword argument 'seed'"),
+    ("NoState", "initial_state() raised OSError: two lines (contract_at_hand.py:"),
+    ("InLibrary", "act() raised JSONDecodeError: Expecting property name enclosed in double quotes"),
+    ("Exits", "act() raised SystemExit: 3 (contract_at_hand.py:"),
+    ("Vague", "context_size() raised ValueError: invalid literal for int()"),
+]
+
+
+class TestEvaluation:
+    @pytest.mark.parametrize(("name", "said"), BROKEN, ids=[name for name, _ in BROKEN])
+    def test_an_agent_that_breaks_its_contract_is_named_in_one_line(self, tmp_path, name, said):
+        with pytest.raises(AgentError) as caught:
+            evaluate_at_hand(name, tmp_path / "out")
+        assert str(caught.value).startswith(f"agent 'contract_at_hand:{name}': {said}")
+        assert "\n" not in str(caught.value)
+
+    def test_where_a_library_raised_the_agents_line_is_named(self, tmp_path):
+        with pytest.raises(AgentError, match=r"\(contract_at_hand\.py:45\)$"):
+            evaluate_at_hand("InLibrary", tmp_path / "out")
+
+    def test_a_folder_without_episodes_can_be_used_again(self, tmp_path):
+        with pytest.raises(AgentError):
+            evaluate_at_hand("Divides", tmp_path / "out", record=True)
+        assert evaluate_at_hand("Good", tmp_path / "out").episodes == 20
+        assert not (tmp_path / "out" / "trajectories.npz").exists()
+
+
+def test_the_command_says_what_is_kept_and_shows_a_traceback_if_asked(tmp_path):
+    # With one environment at a time, so that some episodes end before the agent breaks.
+    command = [sys.executable, "-m", "mazebench", "eval", "--distances", "1", "--episodes-per-distance", "1"]
+    command += ["--num-envs", "1", "--agent", "contract_at_hand:Late", "--out", "run"]
+    plain, loud = (
+        subprocess.run([*command, *words], cwd=tmp_path, capture_output=True, text=True)
+        for words in ([], ["--resume", "--traceback"])
+    )
+    assert (plain.returncode, loud.returncode) == (1, 1)
+    *_, line = plain.stderr.splitlines()
+    said = r"mazebench: agent 'contract_at_hand:Late': act\(\) raised AssertionError \(contract_at_hand.py:\d+\)"
+    assert re.fullmatch(said + "; 1 of 20 episodes are kept in run", line)
+    assert "Traceback" not in plain.stderr
+    assert "assert state < 120" in loud.stderr
+    assert loud.stderr.splitlines()[-1] == line.replace("1 of 20", "2 of 20")
+
+
+class TestCheckedAgent:
+    def test_actions_in_a_list_become_an_array(self):
+        class Still(Agent):
+            def initial_state(self, batch_size):
+                return batch_size
+
+            def act(self, inputs, state, explore=False):
+                return [0] * len(inputs.seed), state + 1
+
+        agent = CheckedAgent("still", Still(), 6)
+        actions, state = agent.act(inputs_of({}, np.ones(2, dtype=bool)), agent.initial_state(2))
+        assert (actions.tolist(), state) == ([0, 0], 3)

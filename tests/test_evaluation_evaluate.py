@@ -1,0 +1,358 @@
+"""Evaluations from options to files: what they write, how they go on, and what they refuse."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from run_folders import FEW, FILES, IMPORTS, RECORDED, Killed, files_of, kill_after, records_of, results_of, summary_of
+
+from mazebench.agent import Agent, SingleAgent
+from mazebench.errors import InputError
+from mazebench.evaluation.chunk import Chunk, run_chunk
+from mazebench.evaluation.evaluate import evaluate
+from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.plan import make_plan
+from mazebench.evaluation.results import load_result
+from mazebench.evaluation.trials import frozen_trials
+from mazebench.maps.benchmark import load_mazes
+from mazebench.maps.generators import generate
+from mazebench.maps.text import write_text_maze
+
+PERTURBATIONS = ("map_flip", "map_warp", "position_noise")
+LEVELS = [{"position_noise": 0.5}, {"map_flip": 0.3}, {"map_warp": 0.2}]
+
+
+@pytest.fixture(scope="module")
+def random_run(tmp_path_factory) -> pathlib.Path:
+    folder = tmp_path_factory.mktemp("runs") / "random"
+    evaluate("random", folder, **FEW)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def planner_run(tmp_path_factory) -> pathlib.Path:
+    folder = tmp_path_factory.mktemp("runs") / "planner"
+    evaluate("planner", folder, **FEW)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def map_folder(tmp_path_factory) -> pathlib.Path:
+    folder = tmp_path_factory.mktemp("maps")
+    rng = np.random.default_rng(0)
+    for name in "ab":
+        write_text_maze(generate("dfs", 9, rng), folder / f"{name}.txt")
+    return folder
+
+
+class Ahead(SingleAgent):
+    """Drives ahead."""
+
+    def act(self, observation):
+        return 0
+
+
+class Witness(Agent):
+    """Drives ahead and notes what it is given."""
+
+    inputs: ClassVar[list] = []
+
+    def initial_state(self, batch_size):
+        return 0
+
+    def act(self, inputs, state, explore=False):
+        assert not explore
+        copied = {name: np.array(getattr(inputs, name)) for name in ("new_episode", "new_context", "seed")}
+        shapes = {key: (value.shape, value.dtype.name) for key, value in inputs.observation.items()}
+        self.inputs.append((shapes, copied, inputs.truth, state))
+        return np.zeros(len(inputs.seed), dtype=int), state + 1
+
+
+class TestResults:
+    def test_the_summary_tells_what_was_run_and_what_came_of_it(self, planner_run):
+        summary = summary_of(planner_run)
+        assert {path.name for path in planner_run.iterdir()} == FILES
+        expected = {"agent": "planner", "task": "local", "size": 13, "split": "eval", "benchmark": "v1", "episodes": 40}
+        assert expected.items() <= summary.items()
+        assert summary["perturbation"] == dict.fromkeys(PERTURBATIONS, 0.0)
+        assert list(summary["by_distance"]) == ["1", "2"]
+        for row in (summary["overall"], *summary["by_distance"].values()):
+            assert row["success_rate"] == 1.0
+            assert 0 < row["spl"] <= row["spl_grid"] <= 1
+        assert (summary["overall"]["n"], summary["by_distance"]["2"]["n"]) == (40, 20)
+
+    def test_without_a_folder_the_summary_alone_is_left(self, planner_run, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+        summary = evaluate("planner", **FEW)
+        assert summary.overall == load_result(planner_run).summary.overall
+        assert list(tmp_path.iterdir()) == []
+
+    def test_records_are_of_the_frozen_episodes_in_the_protocols_order(self, planner_run):
+        trials = [trial for trial in frozen_trials("local", 13) if trial.distance <= 2][::5]
+        names = [maze.name for maze in load_mazes(13, "eval")]
+        records = records_of(planner_run)
+        assert list(records[0]) == [
+            *("agent", "task", "size", "split", "episode", "maze", "start", "goal", "distance", "success", "steps"),
+            *("path_length", "shortest_path", "spl", "spl_grid", "seed", *PERTURBATIONS),
+        ]
+        for index, (record, trial) in enumerate(zip(records, trials, strict=True)):
+            episode = trial.episode
+            expected = {"episode": index, "maze": names[episode.maze], "seed": episode.seed}
+            expected |= {"start": list(episode.start), "goal": list(episode.goal)}
+            expected |= {"distance": trial.distance, "shortest_path": trial.shortest_path}
+            assert expected.items() <= record.items()
+
+    @pytest.mark.parametrize("run", ["random_run", "planner_run"])
+    def test_spl_follows_from_the_lengths_in_a_record(self, run, request):
+        for record in records_of(request.getfixturevalue(run)):
+            for key, shortest in (("spl", record["shortest_path"]), ("spl_grid", record["distance"])):
+                expected = record["success"] * shortest / max(shortest, record["path_length"])
+                assert record[key] == pytest.approx(expected, abs=1e-12)
+            # Nobody is faster than 3.2 m/s, 0.16 s a step, and only success ends an episode early.
+            assert record["path_length"] <= 0.512 * record["steps"] + 1e-6
+            assert record["success"] or record["steps"] == 100
+            assert not record["success"] or record["path_length"] >= record["shortest_path"] - 1e-6
+
+    def test_hierarchical_episodes_lead_from_corner_to_corner(self, tmp_path):
+        summary = evaluate("planner", tmp_path, task="hierarchical")
+        assert (summary.task, summary.episodes, summary.overall.success_rate) == ("hierarchical", 20, 1.0)
+        records = records_of(tmp_path)
+        assert {tuple(record["start"] + record["goal"]) for record in records} == {(1, 11, 11, 1)}
+        assert max(record["steps"] for record in records) > 100  # each landmark restarts the clock
+
+    def test_training_mazes_are_evaluated_if_asked_for(self, tmp_path):
+        summary = evaluate("planner", tmp_path, split="train", distances=(3,))
+        assert (summary.split, summary.episodes, summary.overall.success_rate) == ("train", 100, 1.0)
+        assert records_of(tmp_path)[0]["maze"] == "13-train-00"
+
+
+class TestAgents:
+    def test_a_class_and_its_name_give_the_same_records(self, tmp_path):
+        for out, agent in (("class", Ahead), ("name", f"{__name__}:Ahead")):
+            assert evaluate(agent, tmp_path / out, **FEW).agent == f"{__name__}:Ahead"
+        assert results_of(tmp_path / "class") == results_of(tmp_path / "name")
+
+    def test_a_class_of_a_script_is_evaluated_in_this_process_only(self, tmp_path):
+        script = f"{IMPORTS}from mazebench.evaluation.evaluate import evaluate\n"
+        script += "class Mine(SingleAgent):\n    def act(self, observation):\n        return 0\n"
+        script += "options = {'distances': (1,), 'episodes_per_distance': 1}\n"
+        script += "print(evaluate(Mine, **options).agent, flush=True)\nevaluate(Mine, workers=2, **options)\n"
+        done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True)
+        assert done.stdout == "__main__:Mine\n", done.stderr
+        assert (
+            "InputError: expected a class that other processes can import by its name, found __main__:Mine"
+            in done.stderr
+        )
+
+    def test_an_agent_is_given_what_the_contract_promises(self, monkeypatch):
+        monkeypatch.setattr(Witness, "inputs", [])
+        evaluate(Witness, num_envs=7, distances=(4,), episodes_per_distance=2)
+        shapes, first, truth, state = Witness.inputs[0]
+        assert shapes == {"state": ((7, 12), "float32"), "context": ((7, 4, 13, 13), "float32")}
+        assert first["new_episode"].all()
+        assert (truth, state) == (None, 0)
+        assert [state for *_, state in Witness.inputs] == list(range(len(Witness.inputs)))
+        assert sum(given["new_episode"].sum() for _, given, *_ in Witness.inputs) == 40
+        for (_, before, *_), (_, given, *_) in zip(Witness.inputs, Witness.inputs[1:], strict=False):
+            # The seed belongs to an episode, whose beginning is a new context.
+            np.testing.assert_array_equal(before["seed"] != given["seed"], given["new_episode"])
+            assert not (given["new_episode"] & ~given["new_context"]).any()
+
+    def test_an_agent_that_needs_the_truth_is_given_it_and_labelled(self, monkeypatch):
+        monkeypatch.setattr(Witness, "inputs", [])
+        monkeypatch.setattr(Witness, "needs_truth", True)
+        summary = evaluate(Witness, map_flip=0.3, position_noise=0.5, **FEW)
+        assert summary.privileged
+        assert not evaluate("random", **FEW).privileged
+        truth = Witness.inputs[0][2]
+        assert {tuple(walls.ravel()) for walls in truth.walls} == {
+            tuple(maze.walls.ravel()) for maze in load_mazes(13, "eval")
+        }
+        trials = [trial.episode for trial in frozen_trials("local", 13) if trial.distance <= 2][::5]
+        assert sorted(map(tuple, truth.goal.tolist())) == sorted(episode.goal for episode in trials)
+        starts = {(column + 0.5, 13 - row - 0.5) for row, column in (episode.start for episode in trials)}
+        assert set(map(tuple, truth.pose[:, :2].tolist())) == starts
+
+
+class TestSeeds:
+    def test_agents_draw_otherwise_with_another_seed(self, random_run, tmp_path):
+        evaluate("random", tmp_path, seed=1, **FEW)
+        again, before = records_of(tmp_path), records_of(random_run)
+        assert [record["seed"] for record in again] == [record["seed"] for record in before]
+        assert [record["path_length"] for record in again] != [record["path_length"] for record in before]
+
+    def test_agents_seeds_do_not_depend_on_the_episodes_seeds(self, monkeypatch):
+        plan = make_plan(EvalOptions(f"{__name__}:Witness", **FEW))
+        others = tuple(
+            dataclasses.replace(trial, episode=dataclasses.replace(trial.episode, seed=1000 + index))
+            for index, trial in enumerate(plan.trials)
+        )
+        found = []
+        for trials in (plan.trials, others):
+            monkeypatch.setattr(Witness, "inputs", [])
+            chunk = Chunk(
+                dataclasses.replace(plan, trials=trials), tuple(range(40)), record=False, num_envs=1, num_threads=1
+            )
+            list(run_chunk(chunk))
+            found.append([int(given["seed"][0]) for _, given, *_ in Witness.inputs if given["new_episode"][0]])
+        assert found[0] == found[1]
+        assert len(set(found[0])) == 40
+        assert not set(found[0]) & {trial.episode.seed for trial in plan.trials}
+
+
+class TestResume:
+    @pytest.mark.parametrize("seed", range(6))
+    def test_a_run_goes_on_wherever_it_was_killed(self, random_run, tmp_path, seed):
+        rng = np.random.default_rng(seed)
+        for _ in range(2):
+            progress = kill_after(int(rng.integers(41)))
+            with pytest.raises(Killed):
+                evaluate("random", tmp_path, resume=True, num_envs=int(rng.integers(1, 41)), progress=progress, **FEW)
+            with (tmp_path / "journal.jsonl").open("r+b") as journal:
+                size = journal.seek(0, os.SEEK_END)
+                journal.truncate(max(0, size - int(rng.integers(500))))
+        evaluate("random", tmp_path, resume=True, **FEW)
+        assert {path.name for path in tmp_path.iterdir()} == FILES
+        assert results_of(tmp_path) == results_of(random_run)
+        assert summary_of(tmp_path)["overall"] == summary_of(random_run)["overall"]
+
+    @pytest.mark.parametrize("record", [False, True])
+    @pytest.mark.parametrize("num_files", range(4))
+    def test_a_run_goes_on_wherever_its_end_was_killed(self, random_run, tmp_path, record, num_files):
+        evaluate("random", tmp_path / "whole", record=record, **FEW)
+        out = tmp_path / "out"
+        with pytest.raises(Killed):
+            evaluate("random", out, record=record, progress=kill_after(40), **FEW)
+        for name in ("episodes.jsonl", "trajectories.npz", "summary.json")[:num_files]:
+            if (tmp_path / "whole" / name).exists():
+                shutil.copy(tmp_path / "whole" / name, out)
+        (out / "summary.json.tmp").write_text('{"agent')
+        calls = []
+        evaluate("random", out, resume=True, progress=lambda ended, of: calls.append((ended, of)), **FEW)
+        assert calls == [(40, 40)]
+        assert results_of(out) == results_of(tmp_path / "whole")
+        assert {path.name for path in out.iterdir()} == (RECORDED if record else FILES)
+
+    def test_a_finished_run_is_not_run_again(self, random_run):
+        before = files_of(random_run)
+        evaluate("random", random_run, resume=True, **FEW)
+        assert files_of(random_run) == before
+
+    def test_a_run_without_episodes_begins(self, random_run, tmp_path):
+        (tmp_path / "config.json.tmp").write_text('{"rec')
+        evaluate("random", tmp_path, resume=True, **FEW)
+        assert results_of(tmp_path) == results_of(random_run)
+
+    def test_trajectories_that_are_wanted_later_are_recorded(self, random_run, tmp_path):
+        shutil.copytree(random_run, tmp_path / "out")
+        with pytest.raises(Killed):
+            evaluate("random", tmp_path / "out", resume=True, record=True, num_envs=3, progress=kill_after(5), **FEW)
+        evaluate("random", tmp_path / "out", resume=True, record=True, **FEW)
+        evaluate("random", tmp_path / "whole", record=True, **FEW)
+        assert results_of(tmp_path / "out") == results_of(tmp_path / "whole")
+
+
+class TestRefused:
+    def test_a_folder_that_holds_a_run_is_refused_without_resume(self, random_run):
+        before = files_of(random_run)
+        with pytest.raises(InputError, match=r"holds a run already; go on with --resume or name another folder$"):
+            evaluate("random", random_run, **FEW)
+        assert files_of(random_run) == before
+
+    @pytest.mark.parametrize("unfinished", [False, True])
+    @pytest.mark.parametrize(
+        ("agent", "changes", "named"),
+        [
+            ("planner", {}, "agent"),
+            ("random", {"size": 15}, "size"),
+            ("random", {"split": "train"}, "split"),
+            ("random", {"task": "hierarchical"}, "task"),
+            *(("random", level, next(iter(level))) for level in LEVELS),
+            ("random", {"distances": (1, 2, 3)}, "distances"),
+            ("random", {"episodes_per_distance": 2}, "episodes_per_distance"),
+            ("random", {"time_limit": 50}, "time_limit"),
+            ("random", {"seed": 1}, "seed"),
+        ],
+    )
+    def test_a_folder_that_holds_another_run_is_refused(self, random_run, tmp_path, agent, changes, named, unfinished):
+        shutil.copytree(random_run, tmp_path / "run")
+        if unfinished:
+            (tmp_path / "run" / "summary.json").unlink()
+        before = files_of(tmp_path)
+        with pytest.raises(InputError, match=rf"run: holds another run: its {named} is .*, this one's "):
+            evaluate(agent, tmp_path / "run", resume=True, **FEW | changes)
+        assert files_of(tmp_path) == before
+
+    @pytest.mark.parametrize("resume", [False, True])
+    def test_a_folder_that_holds_other_things_is_refused(self, tmp_path, resume):
+        (tmp_path / "thesis.tex").touch()
+        with pytest.raises(InputError, match=r"expected an empty folder or an evaluation's, found 'thesis\.tex' in"):
+            evaluate("random", tmp_path, resume=resume, **FEW)
+        assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+    def test_an_agent_whose_file_was_changed_is_refused(self, tmp_path, monkeypatch):
+        monkeypatch.syspath_prepend(tmp_path)
+        module = tmp_path / "changing_at_hand.py"
+        module.write_text(f"{IMPORTS}class Mine(SingleAgent):\n    def act(self, observation):\n        return 0\n")
+        evaluate("changing_at_hand:Mine", tmp_path / "out", **FEW)
+        module.write_text(module.read_text().replace("return 0", "return 1"))
+        with pytest.raises(InputError, match=r"out: holds another run: its agent's file was changed since"):
+            evaluate("changing_at_hand:Mine", tmp_path / "out", resume=True, **FEW)
+
+    @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            ({"pairs": "fixed"}, "expected pairs 'random' in an evaluation, found 'fixed'"),
+            ({"speed": 2}, "unknown option 'speed'; available: .*distances.*map_flip"),
+            ({"num_envs": 0}, "expected num_envs of at least 1, found 0"),
+            ({"workers": -1}, "expected workers of at least 0, found -1"),
+        ],
+    )
+    def test_options_that_cannot_be_met_are_refused_and_nothing_is_written(self, tmp_path, options, message):
+        with pytest.raises(InputError, match=f"{message}") as refused:
+            evaluate(**{"agent": "random", "out": tmp_path / "out", **FEW, **options})
+        assert "\n" not in str(refused.value)
+        assert list(tmp_path.iterdir()) == []
+
+
+class TestMaps:
+    def test_mazes_of_ones_own_come_from_a_folder_or_a_file(self, map_folder, tmp_path):
+        options = {"distances": (3, 9), "episodes_per_distance": 4}
+        summary = evaluate("planner", tmp_path / "out", maps=str(map_folder), **options)
+        assert (summary.split, summary.size, summary.episodes) == ("custom", 9, 16)
+        assert summary.overall.success_rate == 1.0
+        assert [record["maze"] for record in records_of(tmp_path / "out")] == ["a"] * 8 + ["b"] * 8
+        assert evaluate("planner", maps=str(map_folder / "b.txt"), size=9, **options).episodes == 8
+
+    def test_a_run_does_not_go_on_in_mazes_that_were_changed(self, map_folder, tmp_path):
+        maps = shutil.copytree(map_folder, tmp_path / "maps")
+        evaluate("random", tmp_path / "out", maps=str(maps), **FEW)
+        shutil.copy(maps / "a.txt", maps / "b.txt")
+        with pytest.raises(InputError, match="holds another run: its mazes_sha256 is"):
+            evaluate("random", tmp_path / "out", maps=str(maps), resume=True, **FEW)
+
+    def test_the_seed_draws_episodes_that_are_not_frozen(self, map_folder, tmp_path):
+        for seed, name in ((0, "first"), (0, "again"), (1, "other")):
+            evaluate("planner", tmp_path / name, maps=str(map_folder), distances=(5,), seed=seed)
+        first, again, other = (records_of(tmp_path / name) for name in ("first", "again", "other"))
+        assert first == again
+        assert [record["start"] for record in first] != [record["start"] for record in other]
+
+
+class TestPerturbations:
+    @pytest.mark.parametrize("level", LEVELS, ids=lambda level: next(iter(level)))
+    def test_the_world_stays_as_it_is(self, random_run, tmp_path, level):
+        # The random agent looks at nothing, so that it drives the same ways.
+        summary = evaluate("random", tmp_path, **level, **FEW)
+        assert summary.perturbation == dict.fromkeys(PERTURBATIONS, 0.0) | level
+        expected = [record | summary.perturbation for record in records_of(random_run)]
+        assert records_of(tmp_path) == expected

@@ -1,0 +1,201 @@
+"""Intervals: numbers done by hand or published, and what must hold whatever the episodes."""
+
+from __future__ import annotations
+
+import hypothesis
+import numpy as np
+import pytest
+from hypothesis import strategies
+from scipy import stats
+
+from mazebench.evaluation.intervals import (
+    difference_interval,
+    interquartile_mean,
+    mean_interval,
+    pool_runs,
+    probability_of_improvement,
+    wilson_interval,
+)
+
+Z = stats.norm.ppf(0.975)
+MAZES = np.arange(100) // 5  # 20 mazes of 5 episodes
+
+
+def outcomes(successes: list[int], size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Episodes and their mazes: `size` of each maze, of which so many succeed."""
+    values = np.arange(size) < np.array(successes)[:, None]
+    return values.ravel().astype(float), np.arange(len(successes)).repeat(size)
+
+
+class TestWilson:
+    @pytest.mark.parametrize(
+        ("successes", "trials", "expected"),
+        [
+            # Newcombe 1998 (Statistics in Medicine 17, 857-872), table I, method 3: score without correction.
+            (81, 263, (0.2553, 0.3662)),
+            (15, 148, (0.0624, 0.1605)),
+            (0, 20, (0.0000, 0.1611)),
+            (1, 29, (0.0061, 0.1718)),
+        ],
+    )
+    def test_interval_is_the_published_one(self, successes, trials, expected):
+        assert wilson_interval(successes / trials, trials) == pytest.approx(expected, abs=5e-5)
+
+    def test_interval_agrees_with_scipy(self):
+        for trials in (1, 7, 100):
+            for successes in range(trials + 1):
+                expected = stats.binomtest(successes, trials).proportion_ci(0.95, method="wilson")
+                assert wilson_interval(successes / trials, trials) == pytest.approx(tuple(expected), abs=1e-12)
+
+
+class TestMeans:
+    # The numbers of docs/metrics.md. Of n effective episodes that all succeed the lower end is n / (n + z^2).
+    @pytest.mark.parametrize(
+        ("size", "effective", "low"), [(1, 20, 0.839), (5, 100 / 1.4, 0.949), (75, 1500 / 8.4, 0.979)]
+    )
+    def test_all_successes_use_the_default_correlation(self, size, effective, low):
+        found = mean_interval(*outcomes([size] * 20, size))
+        assert (found.value, found.high) == (1.0, 1.0)
+        assert found.low == pytest.approx(effective / (effective + Z**2))
+        assert found.low == pytest.approx(low, abs=5e-4)
+
+    def test_mazes_of_five_and_three_successes(self):
+        # Residual sums are +1 and -1 in 20 mazes: 20 x 20 / 19, and the squared ratio of the t quantiles.
+        few = stats.t.ppf(0.975, 19) / stats.t.ppf(0.975, 99)
+        squares = few**2 * 20 * 20 / 19
+        effect = (squares + 2.8 * 1.4) / (100 * 0.8 * 0.2 + 2.8)
+        assert effect == pytest.approx(1.45, abs=5e-3)
+        found = mean_interval(*outcomes([5, 3] * 10, 5))
+        assert (found.low, found.high) == pytest.approx(wilson_interval(0.8, 100 / effect))
+        assert (found.low, found.high) == pytest.approx((0.691, 0.877), abs=6e-4)
+
+    def test_one_episode_a_maze_is_plain_wilson(self):
+        success = (np.arange(20) < 17).astype(float)
+        found = mean_interval(success, np.arange(20))
+        assert (found.low, found.high) == pytest.approx(wilson_interval(0.85, 20))
+
+    def test_episodes_of_a_single_maze_count_as_independent(self):
+        success = (np.arange(20) < 17).astype(float)
+        assert mean_interval(success, np.full(20, "m")) == mean_interval(success, np.arange(20))
+
+    def test_equal_spl_does_not_collapse_to_a_point(self):
+        # S = 0, so the default alone: d = 2.8 x 1.4 / (16 + 2.8).
+        found = mean_interval(np.full(100, 0.8), MAZES)
+        assert found.value == pytest.approx(0.8)
+        assert (found.low, found.high) == pytest.approx(wilson_interval(0.8, 100 * 18.8 / 3.92))
+        assert (found.low, found.high) == pytest.approx((0.762, 0.833), abs=6e-4)
+
+    @hypothesis.settings(max_examples=200, deadline=None)
+    @hypothesis.given(
+        strategies.lists(strategies.tuples(strategies.integers(0, 3), strategies.floats(0, 1)), min_size=1, max_size=60)
+    )
+    def test_interval_contains_the_mean_and_mirrors(self, episodes):
+        mazes, values = (np.array(column) for column in zip(*episodes, strict=True))
+        found, mirrored = mean_interval(values, mazes), mean_interval(1 - values, mazes)
+        assert 0 <= found.low <= found.value <= found.high <= 1
+        assert found.high - found.low > 0
+        assert (found.low, found.high) == pytest.approx((1 - mirrored.high, 1 - mirrored.low), abs=1e-9)
+
+
+class TestMonotone:
+    @pytest.mark.parametrize("scattered", [True, False])
+    @pytest.mark.parametrize("size", [5, 75])
+    def test_failures_lower_both_bounds_from_the_first_on(self, size, scattered):
+        intervals = []
+        for failures in range(min(10, size) + 1):
+            successes = np.full(20, size)
+            if scattered:
+                successes[:failures] -= 1
+            else:
+                successes[0] -= failures
+            intervals.append(mean_interval(*outcomes(successes, size)))
+        assert (np.diff([interval.low for interval in intervals]) < 0).all()
+        assert (np.diff([interval.high for interval in intervals]) < 0).all()
+
+    @hypothesis.settings(max_examples=200, deadline=None)
+    @hypothesis.given(
+        strategies.sampled_from([1, 5, 75]),
+        strategies.floats(0.02, 3),
+        strategies.floats(0.02, 3),
+        strategies.integers(0, 2**32 - 1),
+    )
+    def test_one_more_success_in_20_mazes_lowers_no_bound(self, size, a, b, seed):
+        # Where it also makes the mazes more alike, the interval narrows a little: by less than 0.002.
+        rng = np.random.default_rng(seed)
+        values, mazes = outcomes(rng.binomial(size, rng.beta(a, b, 20)), size)
+        hypothesis.assume(not values.all())
+        more = values.copy()
+        more[rng.choice(np.flatnonzero(values == 0))] = 1
+        before, after = mean_interval(values, mazes), mean_interval(more, mazes)
+        assert after.low >= before.low - 0.002
+        assert after.high >= before.high - 0.002
+
+
+class TestDifferences:
+    def test_ties_alone_give_an_interval_about_0(self):
+        # One episode a maze, Bonett and Price: two pairs more, one won and one lost.
+        found = difference_interval(np.zeros(20), np.arange(20))
+        half_width = Z * np.sqrt(2) / 22
+        assert (found.value, found.low, found.high) == pytest.approx((0, -half_width, half_width))
+        assert half_width == pytest.approx(0.126, abs=5e-4)
+        # Five episodes a maze: each of the two counts for 1.4.
+        assert difference_interval(np.zeros(100), MAZES).high == pytest.approx(1.4 * Z * np.sqrt(2) / 102.8)
+
+    def test_wins_and_losses_agree_with_bonett_and_price(self):
+        # p1 = 9 / 32 and p2 = 3 / 32 with the added pairs; p1 - p2 +- z sqrt((p1 + p2 - (p1 - p2)^2) / 32).
+        differences = np.array([1.0] * 8 + [-1.0] * 2 + [0.0] * 20)
+        half_width = Z * np.sqrt((12 / 32 - (6 / 32) ** 2) / 32)
+        found = difference_interval(differences, np.arange(30))
+        assert (found.value, found.low, found.high) == pytest.approx((0.2, 6 / 32 - half_width, 6 / 32 + half_width))
+        assert difference_interval(differences, np.zeros(30)) == found  # a single maze
+
+    def test_mazes_that_decide_together_widen_the_interval(self):
+        alone = np.tile([1.0, -1.0, 0.0, 0.0, 0.0], 20)
+        together = np.repeat([1.0, -1.0, 0.0, 0.0, 0.0], 20)
+        assert difference_interval(together, MAZES).high > 1.5 * difference_interval(alone, MAZES).high
+
+    @hypothesis.settings(max_examples=200, deadline=None)
+    @hypothesis.given(
+        strategies.lists(
+            strategies.tuples(strategies.integers(0, 3), strategies.floats(-1, 1)), min_size=1, max_size=60
+        )
+    )
+    def test_interval_contains_the_difference_and_mirrors(self, episodes):
+        mazes, values = (np.array(column) for column in zip(*episodes, strict=True))
+        found, mirrored = difference_interval(values, mazes), difference_interval(-values, mazes)
+        assert -1 <= found.low <= found.value <= found.high <= 1
+        assert found.high - found.low > 0
+        assert (found.low, found.high) == pytest.approx((-mirrored.high, -mirrored.low), abs=1e-9)
+
+
+class TestRuns:
+    def test_interquartile_mean_by_hand(self):
+        # Of 8 scores the two lowest and the two highest go.
+        assert interquartile_mean(np.array([[0.0, 0.1, 0.4, 0.5], [0.6, 0.7, 0.9, 1.0]])) == pytest.approx(2.2 / 4)
+        # Of 6 one at either end, as rliable has it: a quarter of 6, rounded down.
+        assert interquartile_mean(np.array([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])) == pytest.approx(0.5)
+
+    def test_two_runs_of_two_mazes(self):
+        # The example of docs/metrics.md. A quarter of the resamples are the first run twice, a quarter the second.
+        mean, trimmed = pool_runs(np.array([[0.5, 1.0], [1.0, 1.0]]))
+        assert (mean.value, mean.low, mean.high) == (0.875, 0.75, 1.0)
+        assert (trimmed.value, trimmed.low, trimmed.high) == (1.0, 0.75, 1.0)
+
+    def test_whole_runs_are_drawn(self):
+        # Each run has 0 in one maze and 1 in the other: were the mazes drawn by themselves, means would differ.
+        mean, _ = pool_runs(np.array([[0.0, 1.0], [1.0, 0.0]]))
+        assert (mean.low, mean.high) == (0.5, 0.5)
+        # One run is better in all mazes, and this is not averaged away.
+        mean, trimmed = pool_runs(np.array([[0.0] * 20, [1.0] * 20]))
+        assert (mean.low, mean.high, trimmed.low, trimmed.high) == (0.0, 1.0, 0.0, 1.0)
+
+    def test_probability_of_improvement_by_hand(self):
+        # The example of docs/metrics.md: maze 1 has a tie, a loss and two wins, maze 2 two wins and two ties.
+        found = probability_of_improvement(np.array([[0.5, 1.0], [1.0, 1.0]]), np.array([[0.5, 0.9], [0.6, 1.0]]))
+        assert found.value == (2.5 / 4 + 3 / 4) / 2
+        assert 0 <= found.low < found.value < found.high <= 1
+
+    def test_equal_agents_improve_on_each_other_half_of_the_time(self):
+        scores = np.full((3, 4), 0.7)
+        found = probability_of_improvement(scores, scores)
+        assert (found.value, found.low, found.high) == (0.5, 0.5, 0.5)

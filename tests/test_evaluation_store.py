@@ -1,0 +1,168 @@
+"""The folder of a running evaluation: in order whatever the order of arrival, and whole after a kill at any byte."""
+
+from __future__ import annotations
+
+import contextlib
+import pathlib
+import resource
+import shutil
+from collections.abc import Iterator
+
+import hypothesis
+import numpy as np
+import pytest
+from hypothesis import strategies
+from run_folders import FEW, files_of, results_of
+
+from mazebench.errors import InputError, RunError
+from mazebench.evaluation.chunk import Chunk, Ended, run_chunk
+from mazebench.evaluation.evaluate import evaluate
+from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.plan import Plan, make_plan
+from mazebench.evaluation.records import Summary
+from mazebench.evaluation.results import load_result
+from mazebench.evaluation.store import Store
+
+# A run of an earlier version in the maze below: `mazebench eval --agent planner --distances 1,2,3`.
+EARLIER = pathlib.Path(__file__).with_name("golden") / "results-1"
+RING = "#####\n#...#\n#.#.#\n#...#\n#####\n"
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    return make_plan(EvalOptions("random", **FEW))
+
+
+@pytest.fixture(scope="module")
+def episodes(plan) -> list[Ended]:
+    """All episodes of the plan, in its order."""
+    chunk = Chunk(plan, tuple(range(40)), record=True, num_envs=40, num_threads=0)
+    return sorted((ended for step in run_chunk(chunk) for ended in step), key=lambda ended: ended.record.episode)
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory) -> pathlib.Path:
+    folder = tmp_path_factory.mktemp("unbroken") / "run"
+    evaluate("random", folder, record=True, **FEW)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def summary(unbroken) -> Summary:
+    return load_result(unbroken).summary
+
+
+@contextlib.contextmanager
+def files_of_at_most(num_bytes: int) -> Iterator[None]:
+    """Lets no file of this process grow any further, as on a full disk."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (num_bytes, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def test_episodes_that_end_in_any_order_are_written_in_the_protocols(plan, episodes, summary, unbroken, tmp_path):
+    order = np.random.default_rng(0).permutation(40).tolist()
+    with Store(tmp_path / "run", plan, resume=False, record=True) as store:
+        for index in order:
+            store.append([episodes[index]])
+        assert store.missing == []
+        assert store.records == [ended.record for ended in episodes]
+        store.finish(summary)
+    assert files_of(tmp_path / "run") == files_of(unbroken)
+
+
+@hypothesis.settings(max_examples=40, deadline=None)
+@hypothesis.given(strategies.integers(0, 2**32 - 1))
+def test_a_journal_that_was_cut_anywhere_is_gone_on_with(plan, episodes, summary, unbroken, tmp_path_factory, seed):
+    rng = np.random.default_rng(seed)
+    folder, record = tmp_path_factory.getbasetemp() / "cut", bool(seed % 2)
+    shutil.rmtree(folder, ignore_errors=True)
+    order = rng.permutation(40).tolist()
+    with Store(folder, plan, resume=False, record=record) as store:
+        for index in order:
+            store.append([episodes[index] if record else episodes[index]._replace(trajectory=None)])
+    journal = folder / "journal.jsonl"
+    journal.write_bytes(journal.read_bytes()[: int(rng.integers(journal.stat().st_size + 1))])
+    with Store(folder, plan, resume=True, record=record) as store:
+        # What was appended last is lost.
+        assert set(store.missing) == set(order[store.num_ended :])
+        store.append([episodes[index] for index in store.missing])
+        store.finish(summary)
+    names = ["config.json", "episodes.jsonl"] + ["trajectories.npz"] * record
+    assert results_of(folder) == {name: (unbroken / name).read_bytes() for name in names}
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda line: "{}",
+        lambda line: line[:200],
+        lambda line: line.replace('"success":false', '"success":0'),
+        lambda line: line.replace('"episode":', '"episode":4'),
+        lambda line: line.replace('"pose":"', '"pose":"A'),
+        lambda line: line.replace('"landmarks":[', '"landmarks":[169,'),
+    ],
+)
+def test_a_damaged_line_is_named_and_nothing_is_changed(plan, episodes, tmp_path, damage):
+    with Store(tmp_path, plan, resume=False, record=True) as store:
+        store.append([ended for ended in episodes if not ended.record.success][:3])
+    lines = (tmp_path / "journal.jsonl").read_text().splitlines()
+    changed = damage(lines[1])
+    assert changed != lines[1]
+    (tmp_path / "journal.jsonl").write_text("\n".join([lines[0], changed, lines[2]]) + "\n")
+    before = files_of(tmp_path)
+    with pytest.raises(InputError, match=r"journal\.jsonl: expected .* in line 2, found ") as refused:
+        Store(tmp_path, plan, resume=True, record=True)
+    assert "\n" not in str(refused.value)
+    assert files_of(tmp_path) == before
+
+
+@pytest.mark.parametrize("record", [False, True])
+def test_what_was_written_before_the_disk_is_full_is_kept(plan, episodes, summary, unbroken, tmp_path, record):
+    ended = [each if record else each._replace(trajectory=None) for each in episodes]
+    said = r"can't write there: File too large; what was written is kept, go on with --resume$"
+    with Store(tmp_path, plan, resume=False, record=record) as store, files_of_at_most(6000):
+        for each in ended[:3]:
+            store.append([each])
+        with pytest.raises(RunError, match=said):
+            store.append(ended[3:])
+    with Store(tmp_path, plan, resume=True, record=record) as store:
+        assert store.num_ended >= 3
+        store.append([ended[index] for index in store.missing])
+        with files_of_at_most(6000), pytest.raises(RunError, match=said):
+            store.finish(summary)
+        # No file that a reader would take for a whole one.
+        assert set(files_of(tmp_path)) == {"config.json", "journal.jsonl"}
+    evaluate("random", tmp_path, resume=True, **FEW)
+    names = ["config.json", "episodes.jsonl"] + ["trajectories.npz"] * record
+    assert results_of(tmp_path) == {name: (unbroken / name).read_bytes() for name in names}
+
+
+def test_a_finished_run_of_an_earlier_version_is_read():
+    result = load_result(EARLIER)
+    assert [record.maze for record in result.records] == ["ring"] * 3
+    assert (result.summary.overall.success_rate, result.summary.privileged) == (1.0, False)
+
+
+def test_an_unfinished_run_of_an_earlier_version_is_refused(tmp_path):
+    (tmp_path / "ring.txt").write_text(RING)
+    shutil.copytree(EARLIER, tmp_path / "run")
+    (tmp_path / "run" / "summary.json").unlink()
+    before = files_of(tmp_path)
+    for resume, said in (
+        (False, "holds a run already; go on with --resume"),
+        (True, "holds another run: its format is"),
+    ):
+        with pytest.raises(InputError, match=f"run: {said}") as refused:
+            evaluate(
+                *("planner", tmp_path / "run"),
+                maps=str(tmp_path / "ring.txt"),
+                distances=(1, 2, 3),
+                episodes_per_distance=1,
+                resume=resume,
+            )
+        assert "\n" not in str(refused.value)
+    assert files_of(tmp_path) == before

@@ -1,0 +1,22 @@
+"""The simulation of docs/metrics.md: it runs, and prints the tables that stand there."""
+
+from __future__ import annotations
+
+import pathlib
+import runpy
+
+ROOT = pathlib.Path(__file__).parents[1]
+
+
+def test_simulation_prints_the_tables_of_the_docs(capsys):
+    script = runpy.run_path(str(ROOT / "benchmarks" / "interval_coverage.py"))
+    few = {"NUM_EVALUATIONS": 20, "NUM_RESAMPLES": 100}
+    script["main"].__globals__.update(few)
+    script["main"]()
+    printed = capsys.readouterr().out.splitlines()
+    shown = (ROOT / "docs" / "metrics.md").read_text().splitlines()
+    heads = [line for line in printed if line.startswith("| mazes x episodes")]
+    assert len(heads) == 6
+    assert set(heads) <= set(shown)
+    rows = {tuple(line.split(" | ")[:3]) for line in printed if line.startswith("| 20 x")}
+    assert rows == {tuple(line.split(" | ")[:3]) for line in shown if line.startswith("| 20 x") and line.count("|") > 8}
