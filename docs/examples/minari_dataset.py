@@ -10,7 +10,8 @@ import minari
 import numpy as np
 
 import mazebench  # noqa: F401  (registers the ids)
-from mazebench.agent import Interface, load_agent_class
+from mazebench.agent import Inputs, Interface
+from mazebench.agent_loading import load_agent_class
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--episodes", type=int, default=100)
@@ -22,11 +23,13 @@ planner = load_agent_class("planner").build(Interface("local", 13, 13))
 state = planner.initial_state(1)
 for episode in range(arguments.episodes):
     observation, info = env.reset(seed=episode)
-    terminated = truncated = False
+    new_episode, terminated, truncated = True, False, False
     while not (terminated or truncated):
         batch = {key: value[None] for key, value in observation.items()}  # agents act in a batch of environments
-        actions, state = planner.act(batch, np.array([info["is_first"]]), state)
+        inputs = Inputs(batch, np.array([new_episode]), np.array([info["is_first"]]), np.array([episode]))
+        actions, state = planner.act(inputs, state)
         observation, _, terminated, truncated, info = env.step(int(actions[0]))
+        new_episode = False
 env.create_dataset(
     arguments.dataset,
     eval_env="mazebench/Local-13-v1",

@@ -18,7 +18,7 @@ parser.add_argument("--steps", type=int, default=10)
 parser.add_argument("--out", default="pixels.png")
 arguments = parser.parse_args()
 
-envs = mazebench.make_vec("local", arguments.num_envs, size=13, cameras=["egocentric", "top"], camera_size=84)
+envs = mazebench.make_vec("local", arguments.num_envs, size=13, sensors=["egocentric", "top"], camera_size=84)
 policy = nn.Sequential(
     nn.Conv2d(3, 16, 8, stride=4), nn.ReLU(), nn.Conv2d(16, 32, 4, stride=2), nn.ReLU(), nn.Flatten(), nn.LazyLinear(6)
 )

@@ -1,9 +1,11 @@
-"""An agent that heads for the goal as the crow flies, and follows whatever walls it meets."""
+"""An agent that heads for the goal as the crow flies, and slides along whatever walls it meets."""
 
 import numpy as np
 
+import mazebench
 
-class Crow:
+
+class Crow(mazebench.Agent):
     @classmethod
     def build(cls, interface, *, seed=0, checkpoint=None):
         return cls(interface.size)
@@ -11,11 +13,8 @@ class Crow:
     def __init__(self, size):
         self.size = size  # cells a side of the maze
 
-    def initial_state(self, batch_size):
-        return None  # it remembers nothing
-
-    def act(self, observation, is_first, state, explore=False):
-        body, goals = observation["state"], observation["context"][:, 2]  # [B, 12], [B, M, M]
+    def act(self, inputs, state, explore=False):
+        body, goals = inputs.observation["state"], inputs.observation["context"][:, 2]  # [B, 12], [B, M, M]
         num_cells = goals.shape[-1]
         row, column = np.divmod(goals.reshape(len(goals), -1).argmax(axis=1), num_cells)
         x, y = (column + 0.5) * self.size / num_cells, self.size - (row + 0.5) * self.size / num_cells
