@@ -150,6 +150,12 @@ class TestImports:
         output = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
         assert json.loads(output) == [True, []]
 
+    def test_the_command_line_starts_without_mujoco(self):
+        # `render` and `bench` choose a backend before MuJoCo reads it.
+        program = "import sys, mazebench.cli; print({'mujoco', 'dm_control', 'torch'} & set(sys.modules))"
+        output = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+        assert output == "set()\n"
+
     def test_rendering_backend_when_everything_is_imported(self):
         program = (
             "import importlib, os\n"

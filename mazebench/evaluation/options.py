@@ -7,9 +7,9 @@ import pathlib
 
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import SPLITS
+from mazebench.maps.selection import load_mazes_of
 from mazebench.options import option, options_of
 from mazebench.tasks.options import EVAL_DISTANCES, TaskOptions
-from mazebench.tasks.registry import load_mazes_of
 from mazebench.tasks.spec import TaskSpec
 
 EPISODES_PER_DISTANCE = 5

@@ -14,7 +14,8 @@ from mazebench import stopping
 from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.errors import InputError, RunError
-from mazebench.tasks.registry import load_mazes_of, make_spec
+from mazebench.maps.selection import load_mazes_of
+from mazebench.tasks.registry import make_spec
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.options import TrainOptions
