@@ -14,7 +14,7 @@ from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.options import refuse_ignored, refuse_ignored_by_task, takes_options
 from mazebench.errors import InputError, RunError
-from mazebench.evaluation.options import TASK_CHOICES, EvalOptions
+from mazebench.evaluation.options import NUM_ENVS, TASK_CHOICES, EvalOptions
 
 
 @takes_options(EvalOptions, (*TASK_CHOICES, "checkpoint", "seed"))
@@ -42,7 +42,9 @@ def evaluate(
     show_traceback: Annotated[
         bool, typer.Option("--traceback", help="If the agent raises, show where; not with --workers or --ray.")
     ] = False,
-    num_envs: Annotated[int, typer.Option(min=1, help="Environments side by side in each process, at most.")] = 256,
+    num_envs: Annotated[
+        int, typer.Option(min=1, help="Environments side by side in each process, at most.")
+    ] = NUM_ENVS,
     workers: Annotated[
         int, typer.Option(min=0, help="Processes; 0 runs in this one, and with --ray on all its CPUs.")
     ] = 0,

@@ -15,7 +15,7 @@ from mazebench.agent_loading import checked_agent_class, load_agent_class
 from mazebench.errors import InputError, unknown
 from mazebench.evaluation import metrics
 from mazebench.evaluation.chunk import Chunk
-from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.options import NUM_ENVS, EvalOptions
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import Pool, open_pool
 from mazebench.evaluation.records import Summary
@@ -23,7 +23,6 @@ from mazebench.evaluation.results import load_result
 from mazebench.evaluation.store import Store, check_same_run, is_finished
 from mazebench.maps.benchmark import VERSION
 
-NUM_ENVS = 256
 _CHUNKS_PER_WORKER = 4  # so that no worker waits long for the last one,
 _LEAST_CHUNK = 64  # but not so many that their environments are few: agents act on all of them at once
 _EPISODES_PER_ENV = 4  # at least, in a worker's chunk: environments that have ended an episode take another

@@ -12,9 +12,10 @@ from mazebench.options import option, options_of
 from mazebench.tasks.options import EVAL_DISTANCES, TaskOptions
 from mazebench.tasks.spec import TaskSpec
 
+NUM_ENVS = 256  # environments side by side in a process, unless another number is asked for
 EPISODES_PER_DISTANCE = 5
 # Options of a task for which evaluations have one value only.
-_FIXED = {"pairs": "random", "num_goals": 1, "continuous": False, "context_size": 0}
+FIXED = {"pairs": "random", "num_goals": 1, "continuous": False, "context_size": 0}
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -38,7 +39,7 @@ class EvalOptions(TaskOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name, value in _FIXED.items():
+        for name, value in FIXED.items():
             if getattr(self, name) != value:
                 raise InputError(f"expected {name} {value!r} in an evaluation, found {getattr(self, name)!r}")
 
@@ -49,18 +50,11 @@ class EvalOptions(TaskOptions):
 
 
 # What is played, as the command line has it: all but the fixed options, the agent's own and the seed.
-TASK_CHOICES = tuple(name for name in options_of(EvalOptions) if name not in (*_FIXED, "checkpoint", "seed"))
+TASK_CHOICES = tuple(name for name in options_of(EvalOptions) if name not in (*FIXED, "checkpoint", "seed"))
 
 
-def make_task(options: EvalOptions, context_size: int | None = None) -> TaskSpec:
-    """Returns the task that `options` name.
-
-    Args:
-      options: of the evaluation.
-      context_size: M; by default the options' own.
-    """
+def make_task(options: EvalOptions) -> TaskSpec:
+    """Returns the task that `options` name; reads its mazes."""
     values = {field.name: getattr(options, field.name) for field in dataclasses.fields(TaskOptions)}
-    if context_size is not None:
-        values["context_size"] = context_size
     maps = None if options.maps is None else pathlib.Path(options.maps)
     return TaskSpec(mazes=load_mazes_of(options.size, options.split, maps), **values)

@@ -12,7 +12,7 @@ from mazebench.agent import Agent, Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.errors import InputError
 from mazebench.evaluation.checked_agent import CheckedAgent, calling
-from mazebench.evaluation.options import EvalOptions, make_task
+from mazebench.evaluation.options import FIXED, EvalOptions, make_task
 from mazebench.evaluation.oracle import oracle_spl
 from mazebench.evaluation.provenance import provenance
 from mazebench.evaluation.records import Provenance
@@ -28,7 +28,7 @@ _IDENTIFYING = (
     *("agent_package", "agent_code_sha256", "checkpoint_sha256"),
 )
 # Options that the rest of an identity covers, or that have one value in all evaluations.
-_COVERED = ("agent", "task", "size", "split", "maps", "checkpoint", "context_size", "pairs", "num_goals", "continuous")
+_COVERED = ("agent", "task", "size", "split", "maps", "checkpoint", *FIXED)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -70,15 +70,15 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
     """
     agent_class = agent_class or load_agent_class(options.agent)
     options = _with_checkpoint(options, agent_class)
-    size = make_task(options).size
+    task = make_task(options)
     with calling(options.agent, "context_size"):
-        context_size = int(agent_class.context_size(size))
-    task = make_task(options, context_size)
+        context_size = int(agent_class.context_size(task.size))
+    task = dataclasses.replace(task, context_size=context_size)
     trials = select_trials(
         options.task, task.mazes, options.is_frozen, options.distances, options.episodes_per_distance, options.seed
     )
     split = options.split if options.maps is None else "custom"
-    labels = {"agent": options.agent, "task": options.task, "size": size, "split": split}
+    labels = {"agent": options.agent, "task": options.task, "size": task.size, "split": split}
     levels = perturbation_levels(options)
     origin = provenance(options, agent_class, task.mazes)
     identity = {
@@ -98,7 +98,7 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
         levels=levels,
         identity=identity,
         provenance=origin,
-        oracle_spl=oracle_spl(options.task, size, trials) if options.is_frozen else None,
+        oracle_spl=oracle_spl(options.task, task.size, trials) if options.is_frozen else None,
     )
 
 

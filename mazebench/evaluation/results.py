@@ -10,7 +10,7 @@ import numpy as np
 import pydantic
 
 from mazebench.errors import InputError
-from mazebench.evaluation.metrics import spl
+from mazebench.evaluation.metrics import METRICS, spl
 from mazebench.evaluation.records import Record, Summary, column, describe_fault
 from mazebench.storage.files import read_at_most
 from mazebench.storage.json_files import read_lines
@@ -154,7 +154,7 @@ def _wrong_mean(summary: Summary, records: tuple[Record, ...]) -> str | None:
             return f"expected figures of distance {key}, found none"
         groups[f"distance {key}"] = summary.by_distance[str(key)], distance == key
     for name, (figures, chosen) in groups.items():
-        for metric, field in (("success_rate", "success"), ("spl", "spl"), ("spl_grid", "spl_grid")):
+        for metric, field in METRICS.items():
             mean = float(column(records, field)[chosen].mean())
             if abs(getattr(figures, metric) - mean) > _TOLERANCE:
                 return f"{metric} of {name} is {getattr(figures, metric):.6f}, by the records {mean:.6f}"

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from mazebench.errors import InputError, unknown
-from mazebench.evaluation.evaluate import NUM_ENVS, Progress, run_plan
-from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.evaluate import Progress, run_plan
+from mazebench.evaluation.options import NUM_ENVS, EvalOptions
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import open_pool
 from mazebench.evaluation.records import Summary
@@ -129,14 +129,14 @@ def _prepare(
 ) -> None:
     """Makes `out` ready to hold the suite, or refuses before anything is run."""
     found = sorted(path.name for path in out.iterdir() if path.suffix != ".tmp")
-    known: dict[str, str] = {}
+    before = None
     if found:
         if SUITE not in found:
             raise InputError(f"{out}: expected an empty folder or a suite's, found {found[0]!r} in it")
         if not resume:
             raise InputError(f"{out}: holds a run already; go on with --resume or name another folder")
-        known = read_suite(out).folders
-    folders = _folders(list(dict.fromkeys([*known, *agents])))
+        before = read_suite(out)
+    folders = _folders(list(dict.fromkeys([*(before.folders if before else ()), *agents])))
     content = Suite(
         suite=suite,
         parts=tuple(part.name for part in SUITES[suite]),
@@ -146,8 +146,7 @@ def _prepare(
         agents=tuple(folders),
         folders=folders,
     )
-    if found:
-        before = read_suite(out)
+    if before:
         for key in ("suite", "parts", "benchmark", "benchmark_manifest_sha256", "seed"):
             if getattr(before, key) != getattr(content, key):
                 raise InputError(

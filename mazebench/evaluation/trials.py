@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from mazebench.evaluation.options import EPISODES_PER_DISTANCE
 from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, read_asset
 from mazebench.maps.generators import corner_cells
 from mazebench.maps.geodesic import DiscPaths
@@ -17,7 +18,6 @@ from mazebench.tasks.episode import Episode, sample_pair
 from mazebench.tasks.options import EVAL_DISTANCES
 from mazebench.world.mjcf import BODY_RADIUS
 
-EPISODES_PER_DISTANCE = 5
 COLUMNS = ("maze", "start_row", "start_column", "goal_row", "goal_column", "distance", "yaw", "seed", "shortest_path")
 
 _MAX_DRAWS = 100  # for a pair not drawn before
