@@ -25,6 +25,12 @@ def test_resets_are_measured():
     assert all(row["ms"] > 0 for row in rows)
 
 
+def test_the_range_sensor_is_measured():
+    row = bench._lidar_row(SPEC, 2, seconds=0.05, rounds=2)
+    assert row["what"] == "2 environments"
+    assert 0 < row["ratio"] < 2
+
+
 @pytest.mark.slow
 def test_bench_command_prints_json():
     command = [sys.executable, "-m", "mazebench", "bench", "--quick", "--json"]

@@ -40,6 +40,7 @@ from mazebench.world.rendering import RenderingError
 
 _SIZES = (13, 21, 51, 101)
 _NUM_ENVS = (1, 16, 256, 1024, 4096)
+_LIDAR_NUM_ENVS = (1, 16, 256)
 _MAZES_PER_SIZE = 8
 _PICTURE_ENVS = 16
 _TITLES = {
@@ -47,6 +48,7 @@ _TITLES = {
     "training": "training, and where its time goes",
     "resets": "resets",
     "pictures": "pictures as observations, 64 pixels a side",
+    "lidar": "the range sensor, against the number of environments",
     "sizes": "against the size of the maze",
     "num_envs": "against the number of environments",
 }
@@ -84,6 +86,8 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
     results["resets"] = _resets(spec, 20 if quick else 200)
     say("pictures")
     results["pictures"] = _picture_rows(spec, seconds * rounds)
+    say("the range sensor")
+    results["lidar"] = [_lidar_row(spec, num_envs, seconds, rounds) for num_envs in _LIDAR_NUM_ENVS]
     say("cost against size")
     results["sizes"] = [_size_row(size, seconds, rounds) for size in _SIZES]
     say("cost against the number of environments")
@@ -318,6 +322,12 @@ def _picture_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
         env.close()
         rows.append({"what": " and ".join(cameras) or "no camera", "steps/s": round(rate), "ms a step": 1e3 / rate})
     return rows
+
+
+def _lidar_row(spec: TaskSpec, num_envs: int, seconds: float, rounds: int) -> dict[str, Any]:
+    """Returns the speed of the vector environment with the range sensor, beside a simulation that observes nothing."""
+    sensing = dataclasses.replace(spec, sensors=("lidar",))
+    return _ratio(f"{num_envs} environments", num_envs, *_vector_pair(sensing, num_envs, 0), seconds, rounds)
 
 
 def _milliseconds(call: Callable[[], Any], count: int) -> float:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from mazebench.tasks.sensors.base import Sensor
 from mazebench.tasks.sensors.cameras import CameraSensor
+from mazebench.tasks.sensors.lidar import LidarSensor
 
 SENSORS: dict[str, type[Sensor]] = {
     "egocentric": CameraSensor,
     "top": CameraSensor,
     "chase": CameraSensor,
+    "lidar": LidarSensor,
 }

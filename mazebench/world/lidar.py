@@ -1,0 +1,120 @@
+"""Distances from the body to the walls around it: an exact traversal of the maze's cells.
+
+`K` is the number of bodies, `R = 32 K` the number of their rays, `N` the cells on a side of a maze.
+
+Every ray is followed in a copy of its maze that is turned, clockwise by quarters, so that the ray points to the right
+and upwards. Eight rays of a body share a copy. Arrays of rays are `[4, 8, K]`: quarter turn, ray, body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mazebench.maps.maze import Maze
+
+NUM_RAYS = 32
+MAX_RANGE = 5.0  # m
+
+_STEP = 2 * np.pi / NUM_RAYS  # rad, from one ray to the next
+_PER_TURN = NUM_RAYS // 4
+_COS, _SIN = np.cos(np.arange(_PER_TURN) * _STEP), np.sin(np.arange(_PER_TURN) * _STEP)
+_RAYS = np.stack([_COS, _SIN])[..., None]  # [2, 8, 1]: x and y of the rays that point to the right and upwards
+_RAYS_TURNED = np.stack([-_SIN, _COS])[..., None]  # the same rays, turned by a quarter counter-clockwise
+_PARALLEL = 1e-300  # the least component of a ray, so that the lines it is parallel to are far away but not at infinity
+# Which of (right, up, left, down) are x and y in the maze that is turned by 0, 1, 2 and 3 quarters.
+_TURNED_AXES = np.array([[0, 1, 2, 3], [1, 2, 3, 0]])
+
+
+def ray_ends(pose: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+    """Returns where rays of the lengths `ranges` (`[32]` m) end: `[32, 2]` float64, x and y in metres.
+
+    The first ray of a body with the pose x, y (m) and yaw (rad), `[3]`, points straight ahead. The others follow
+    counter-clockwise at equal angles.
+    """
+    angles = pose[2] + np.arange(NUM_RAYS) * _STEP
+    return pose[:2] + ranges[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+
+class Lidar:
+    """The range sensor in some mazes of one size."""
+
+    def __init__(self, mazes: Sequence[Maze]):
+        self._size = mazes[0].size
+        # Rows from the bottom to the top, so that row and column are the integer parts of y and x.
+        free = np.stack([~maze.walls[::-1] for maze in mazes])
+        self._free = np.stack([np.rot90(free, turns, axes=(1, 2)) for turns in range(4)]).ravel()
+        self._first_maze = np.arange(4)[:, None] * len(mazes)  # [4, 1], among the turned ones
+
+    def ranges(self, maze: np.ndarray, pose: np.ndarray) -> np.ndarray:
+        """Returns the distances to the nearest walls along the rays of K bodies: `[K, 32]` float32, m, at most 5.
+
+        `ray_ends` says where the rays point. The other bodies change no bit of a body's ranges.
+
+        Args:
+          maze: `[K]` int, the index of the maze that each body is in.
+          pose: `[K, 3]` float64, the bodies' x, y (m) and yaw (rad, not wrapped).
+        """
+        num_bodies = len(pose)
+        heading = np.floor(pose[:, 2] / _STEP)  # in steps, rounded down
+        spacing = _line_spacing(pose[:, 2] - heading * _STEP)
+        cell, gap = self._turned_places(maze, pose[:, :2].T)
+        crossing = gap[:, :, None] * spacing[:, None]  # [2, 4, 8, K]
+        cells = cell.repeat(_PER_TURN, axis=0).ravel()
+        distances = self._traverse(cells, crossing.reshape(2, -1), spacing.reshape(2, -1))
+        ranges = np.minimum(distances, MAX_RANGE).astype(np.float32)
+        # The first of `ranges` is less than a step from +x, the first that is returned is straight ahead. With "wrap",
+        # ray 0 follows ray 31.
+        ray = (heading % NUM_RAYS).astype(np.int64)[:, None] + np.arange(NUM_RAYS)  # [K, 32]
+        return ranges.take(ray * num_bodies + np.arange(num_bodies)[:, None], mode="wrap")
+
+    def _turned_places(self, maze: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns where the points (`[2, K]`, m) lie in the mazes turned by 0, 1, 2 and 3 quarters.
+
+        That is the number of the cell in `_free` (`[4, K]` int), and the distances to the next lines on the right and
+        above (`[2, 4, K]`, m).
+        """
+        corner = np.floor(point)
+        offset = point - corner
+        gap = np.concatenate([1.0 - offset, offset]).take(_TURNED_AXES, axis=0)
+        place = np.concatenate([corner, self._size - 1 - corner]).astype(np.int64)
+        column, row = place.take(_TURNED_AXES, axis=0)
+        return ((self._first_maze + maze) * self._size + row) * self._size + column, gap
+
+    def _traverse(self, cell: np.ndarray, crossing: np.ndarray, spacing: np.ndarray) -> np.ndarray:
+        """Returns the distance at which each ray enters a wall, or one of at least `MAX_RANGE`: `[R]` float64, m.
+
+        A ray goes from cell to cell, over the nearer of the next lines of constant x and of constant y (Amanatides and
+        Woo, A Fast Voxel Traversal Algorithm for Ray Tracing, 1987).
+
+        Args:
+          cell: `[R]` int, which the rays begin in; overwritten.
+          crossing: `[2, R]` m along each ray, to the next line of constant x and to the next one of constant y.
+          spacing: `[2, R / 4]` m along each ray, between two such lines; the same for all four turns.
+        """
+        distances = np.empty(len(cell))
+        ray = np.arange(len(cell))  # those that have met no wall
+        while len(ray):
+            is_x = crossing[0] < crossing[1]
+            distance = np.minimum(crossing[0], crossing[1])
+            distances[ray] = distance
+            cell += np.where(is_x, 1, self._size)
+            # With "clip", a body that was never placed and stands outside the free cells does no harm.
+            going_on = (self._free.take(cell, mode="clip") & (distance < MAX_RANGE)).nonzero()[0]
+            ray, cell, is_x = ray.take(going_on), cell.take(going_on), is_x.take(going_on)
+            step = spacing.take(ray, axis=1, mode="wrap")
+            step[0] *= is_x
+            step[1] *= ~is_x
+            crossing = crossing.take(going_on, axis=1) + step
+        return distances
+
+
+def _line_spacing(heading: np.ndarray) -> np.ndarray:
+    """Returns the distances along rays between two lines of constant x, and of constant y: `[2, 8, K]`, m.
+
+    The rays are those that point to the right and upwards, the first of them at an angle of `heading` (`[K]` rad, less
+    than a step) from +x.
+    """
+    direction = np.cos(heading) * _RAYS + np.sin(heading) * _RAYS_TURNED
+    return 1.0 / np.maximum(direction, _PARALLEL)
