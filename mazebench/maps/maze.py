@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from typing import Any
 
 import numpy as np
 from scipy import ndimage, sparse
@@ -58,6 +59,12 @@ class Maze:
 
     def __hash__(self) -> int:
         return hash(self.walls.tobytes())
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Maze:
+        return self  # it never changes
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Maze, (self.walls, self.name)  # without what is cached
 
     @property
     def size(self) -> int:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import copy
 import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import dm_env
 import numpy as np
 from dm_control.rl import control
 from dm_env import specs
 
-from mazebench.maps.maze import cell_of_point, cell_to_point
+from mazebench.errors import InputError
+from mazebench.maps.maze import Maze, cell_of_point, cell_to_point
 from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_action, controls_of_velocities
 from mazebench.tasks.episode import Episode, check_episode, sample_episode
 from mazebench.tasks.observation import OpenSensors, observation_specs, state_errors
@@ -20,6 +24,11 @@ from mazebench.tasks.spec import TaskSpec
 from mazebench.world.mjcf import ACTIONS, STEPS_PER_ACTION
 from mazebench.world.models import models_of
 from mazebench.world.physics import Physics
+
+# Attributes of a `Navigation` that are not part of its state, and others that are replaced but never changed. Copying
+# the generator takes as long as copying all the rest, so its state is kept instead.
+_NO_STATE = ("spec", "rng", "_models", "_sensors")
+_REPLACED = ("episode", "shown_map", "_context")
 
 
 class Navigation(control.Task):
@@ -37,6 +46,8 @@ class Navigation(control.Task):
     - is_first: bool, only if episodes may have several legs: whether this context is new.
     - egocentric, top, chase: `[H, H, 3]` uint8, if `sensors` names them: pictures of the true world, with a marker at
       the goal.
+    - lidar: `[32]` float32, if `sensors` names it: metres from the body's centre to the nearest wall of the true maze,
+      at most 5, along horizontal rays; the first straight ahead, then counter-clockwise every 360 / 32 degrees.
 
     Reward: -1 for each step, 0 for the step that reaches the goal cell; there is no discount on the way.
 
@@ -51,6 +62,7 @@ class Navigation(control.Task):
         self.path_length = 0.0  # m, driven since the start of the episode
         self.steps = 0  # agent steps since the start of the episode
         self._next_episode: Episode | None = None
+        self._maze = 0  # index of the maze that the physics has
         self._event = Event.NONE
         self._models = models_of(spec.mazes)
         self._sensors = OpenSensors(spec)
@@ -77,7 +89,7 @@ class Navigation(control.Task):
         self.episode = self._next_episode or sample_episode(self.spec, self.rng)
         self._next_episode = None
         episode = self.episode
-        physics.load_maze(self._models[episode.maze])
+        self._load_maze(physics, episode.maze)
         start = cell_to_point(episode.start, self.spec.size)
         self._position: tuple[float, float] = (float(start[0]), float(start[1]))
         physics.place_agent(start, episode.yaw)
@@ -86,6 +98,10 @@ class Navigation(control.Task):
         self._state_errors = state_errors(self.spec, episode)
         self.path_length, self.steps, self._event = 0.0, 0, Event.NONE
         self._begin_leg(physics)
+
+    def _load_maze(self, physics: Physics, index: int) -> None:
+        physics.load_maze(self._models[index])
+        self._maze = index
 
     def before_step(self, action: int | np.ndarray, physics: Physics) -> None:
         if self.spec.continuous:
@@ -138,9 +154,45 @@ class Navigation(control.Task):
             result["is_first"] = specs.Array((), bool, name="is_first")
         return result
 
+    def get_state(self, physics: Physics) -> EnvironmentState:
+        """Returns all that the future of the task and its physics depends on."""
+        changing = {name: value for name, value in vars(self).items() if name not in _NO_STATE}
+        maze, rng_state = self.spec.mazes[self._maze], self.rng.bit_generator.state
+        return EnvironmentState(maze, physics.full_state(), rng_state, _copied(changing))
+
+    def set_state(self, state: EnvironmentState, physics: Physics) -> None:
+        """Goes back to a state.
+
+        Raises:
+          InputError: if it is of an environment with other mazes.
+        """
+        index = state.task["_maze"]
+        if self.spec.mazes[index : index + 1] != (state.maze,):
+            raise InputError(f"expected a state of an environment with the same mazes, found one of {state.maze.name}")
+        self._load_maze(physics, index)
+        physics.set_full_state(state.physics)
+        self.rng.bit_generator.state = state.rng
+        self.__dict__.update(_copied(state.task))
+
     def close(self) -> None:
         """Closes the sensors."""
         self._sensors.close()
+
+
+class EnvironmentState(NamedTuple):
+    """A moment of an environment. Its content is the environment's own matter; it can be pickled."""
+
+    maze: Maze
+    physics: np.ndarray  # [S], see `Physics.full_state`
+    rng: Mapping[str, Any]  # of NumPy's bit generator that draws episodes
+    task: dict[str, Any]  # attributes of the `Navigation`
+    needs_reset: bool = False
+
+
+def _copied(attributes: dict[str, Any]) -> dict[str, Any]:
+    """Returns a copy of attributes of a `Navigation` that shares what is never changed."""
+    shared = {id(attributes[name]): attributes[name] for name in _REPLACED if name in attributes}
+    return copy.deepcopy(attributes, shared)
 
 
 class Environment(control.Environment):
@@ -166,6 +218,22 @@ class Environment(control.Environment):
     def needs_reset(self) -> bool:
         """Whether no episode is under way; `step` would then start one."""
         return self._reset_next_step
+
+    def get_state(self) -> EnvironmentState:
+        """Returns this moment of the environment, to go back to with `set_state` as often as you like."""
+        return self.task.get_state(self.physics)._replace(needs_reset=self.needs_reset)
+
+    def set_state(self, state: EnvironmentState) -> None:
+        """Goes back to a state of this environment, or of another one of the same task.
+
+        From there, the same actions lead to the same time steps bit for bit, and so do the episodes that follow. The
+        observation at the state itself is the one that was returned before `get_state`.
+
+        Raises:
+          InputError: if it is a state of an environment with other mazes.
+        """
+        self.task.set_state(state, self.physics)
+        self._reset_next_step = state.needs_reset
 
     def close(self) -> None:
         self.task.close()

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import enum
 from collections.abc import Callable
 
-from mazebench.maps.maze import Cell, path_through_walls
+import numpy as np
+
+from mazebench.maps.maze import Cell, Maze, path_through_walls
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.imperfections import time_limit
 from mazebench.tasks.perturbations.base import ShownMap
 from mazebench.tasks.spec import TaskSpec
 
@@ -80,21 +84,25 @@ def plan_route(spec: TaskSpec, episode: Episode, shown: ShownMap) -> Route:
     Landmarks are cells of the maze, so they are planned before the change of perspective.
     """
     if spec.task == "local":
-        next_goal = _draws_of_goals(spec, episode) if spec.num_goals > 1 else None
-        return Route([episode.start, episode.goal], spec.time_limit, spec.num_goals, next_goal)
+        later_goals = _LaterGoals(spec.mazes[episode.maze], spec.distances, episode.stream(LATER_GOALS_STREAM))
+        next_goal = later_goals if spec.num_goals > 1 else None
+        return Route([episode.start, episode.goal], time_limit(spec, episode), spec.num_goals, next_goal)
     path = path_through_walls(shown.walls, episode.start, episode.goal)
     return Route([*path[: -1 : spec.landmark_distance], path[-1]], spec.time_limit)
 
 
-def _draws_of_goals(spec: TaskSpec, episode: Episode) -> Callable[[Cell], Cell]:
-    """Returns a function that draws a goal at a wanted distance from a cell, or as near to it as the maze has one."""
-    maze, rng = spec.mazes[episode.maze], episode.stream(LATER_GOALS_STREAM)
+@dataclasses.dataclass
+class _LaterGoals:
+    """Draws the goals of one episode after the first one."""
 
-    def draw(start: Cell) -> Cell:
-        farthest = int(maze.distances(start).max())
-        distance = min(spec.distances[rng.integers(len(spec.distances))], farthest)
-        goals = maze.cells_at(start, distance)
-        row, column = goals[rng.integers(len(goals))]
+    maze: Maze
+    distances: tuple[int, ...]  # in cells, one of which is drawn for each goal
+    rng: np.random.Generator
+
+    def __call__(self, start: Cell) -> Cell:
+        """Draws a goal at one of the distances from `start`, or as near to it as the maze has one."""
+        farthest = int(self.maze.distances(start).max())
+        distance = min(self.distances[self.rng.integers(len(self.distances))], farthest)
+        goals = self.maze.cells_at(start, distance)
+        row, column = goals[self.rng.integers(len(goals))]
         return int(row), int(column)
-
-    return draw

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -41,6 +42,10 @@ class MazeModels:
 
     def __len__(self) -> int:
         return len(self._mazes)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Makes copies share the models, and pickles hold the mazes only."""
+        return models_of, (tuple(self._mazes),)
 
     def __getitem__(self, index: int) -> mujoco.MjModel:
         model = self._models[index]

@@ -18,6 +18,7 @@ from mazebench.world.mjcf import NUM_SENSORS
 from mazebench.world.models import copy_maze
 
 STATE_SIZE = 12
+_FULL_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
 class Physics(engine.Physics):
@@ -30,6 +31,11 @@ class Physics(engine.Physics):
         with physics.reset_context():
             physics.data.qpos[:] = physics.model.key_qpos[0]
         return physics
+
+    def after_reset(self) -> None:
+        """Computes what follows from positions and velocities, after a reset and in a new copy."""
+        super().after_reset()
+        self._update()  # dm_control leaves the actuators' velocities at 0, which is wrong in a copy of a moving body
 
     def load_maze(self, model: mujoco.MjModel) -> None:
         """Changes to the maze of `model`, which must come from the same `MazeModels`."""
@@ -58,6 +64,19 @@ class Physics(engine.Physics):
     def speed(self) -> float:
         """Returns the body's speed in the plane in m/s."""
         return float(np.hypot(self.data.qvel[0], self.data.qvel[1]))
+
+    def full_state(self) -> np.ndarray:
+        """Returns all that the simulation's future depends on, except the maze: `[S]` float64, MuJoCo's own vector."""
+        return self.get_state(_FULL_STATE)
+
+    def set_full_state(self, state: np.ndarray) -> None:
+        """Goes back to what `full_state` returned, exactly, in the same maze."""
+        self.set_state(state, _FULL_STATE)
+        self._update()
+
+    def _update(self) -> None:
+        """Computes what follows from positions and velocities, as dm_control does at the end of a step."""
+        mujoco.mj_step1(self.model.ptr, self.data.ptr)
 
     def state(self) -> np.ndarray:
         """Returns the state, `[12]` float64; see `states_from_sensors`."""

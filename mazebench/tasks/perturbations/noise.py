@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from mazebench.tasks.perturbations.base import Perturbation, StateError
@@ -15,7 +17,15 @@ class PositionNoise(Perturbation):
     stream = 2
 
     def state_error(self, level: float, rng: np.random.Generator) -> StateError:
-        def add_noise(state: np.ndarray) -> None:
-            state[:2] += rng.normal(0.0, level, size=2)
+        return NormalNoise(level, rng)
 
-        return add_noise
+
+@dataclasses.dataclass
+class NormalNoise:
+    """Noise of one episode, independent from one observation to the next."""
+
+    deviation: float  # m, the standard deviation in x and in y
+    rng: np.random.Generator
+
+    def __call__(self, state: np.ndarray) -> None:
+        state[:2] += self.rng.normal(0.0, self.deviation, size=2)

@@ -1,0 +1,230 @@
+"""Copies of environments in the middle of an episode, and states to go back to: they go on bit for bit."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+import dm_env
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium import wrappers
+from rendering import run_with_egl
+
+import mazebench
+from mazebench.envs.gym import MazeEnv
+from mazebench.envs.vector import MazeVectorEnv
+from mazebench.errors import InputError
+from mazebench.maps.generators import generate
+from mazebench.tasks.navigation import Environment
+from mazebench.tasks.registry import make_spec
+
+TASKS: dict[str, dict[str, Any]] = {
+    "local": {"time_limit": 60},
+    "hierarchical": {"task": "hierarchical", "landmark_distance": 2, "time_limit": 9},
+    "several goals": {"num_goals": 3, "time_limit": 20, "position_noise": 0.3},
+    "perturbed": {"map_flip": 0.2, "map_warp": 0.1, "position_noise": 0.3, "time_limit": 40},
+    "continuous": {"continuous": True, "time_limit": 40},
+    "lidar": {"sensors": "lidar", "time_limit": 40},
+    "stale": {"task": "stale", "level": (1, 2, 3)},
+    "lost": {"task": "lost", "level": 3},
+    "lost, any level": {"task": "lost", "level": (1, 2, 3)},
+    "sketch": {"task": "sketch", "level": (1, 2, 3)},
+}
+SEEDS = range(3)
+EVERYWHERE = pytest.mark.parametrize("seed", SEEDS)
+OF_ALL_TASKS = pytest.mark.parametrize("options", TASKS.values(), ids=TASKS)
+
+
+def through_pickle(value: Any) -> Any:
+    return pickle.loads(pickle.dumps(value))  # noqa: S301
+
+
+DUPLICATE = pytest.mark.parametrize("duplicate", [copy.deepcopy, through_pickle])
+
+
+def actions_of(env: Environment, seed: int, count: int = 150) -> list[Any]:
+    """Each one is repeated some times, so that the body meets walls at speed."""
+    rng = np.random.default_rng(seed)
+    spec = env.action_spec()
+    if isinstance(spec, dm_env.specs.DiscreteArray):
+        drawn = rng.choice(6, p=[0.5, 0.1, 0.1, 0.1, 0.1, 0.1], size=count)
+    else:
+        drawn = rng.uniform(-1, 1, size=(count, 3))
+    return list(np.repeat(drawn, 3, axis=0)[:count])
+
+
+def play(env: Environment, actions: list[Any]) -> list[dm_env.TimeStep]:
+    """Steps through the episodes; after the end of one, a step begins the next."""
+    return [env.step(action) for action in actions]
+
+
+def in_the_middle(options: dict[str, Any], seed: int) -> tuple[Environment, list[Any]]:
+    """An environment in the middle of an episode, and actions for it."""
+    env = mazebench.load(size=13, seed=seed, **options)
+    env.reset()
+    actions = actions_of(env, seed)
+    play(env, actions[: 20 + 7 * seed])
+    return env, actions[60:]
+
+
+def assert_equal(first: list[dm_env.TimeStep], second: list[dm_env.TimeStep]) -> None:
+    for one, other in zip(first, second, strict=True):
+        assert one[:3] == other[:3]
+        assert one.observation.keys() == other.observation.keys()
+        for name, value in one.observation.items():
+            np.testing.assert_array_equal(value, other.observation[name], err_msg=name)
+
+
+class TestCopies:
+    @DUPLICATE
+    @EVERYWHERE
+    @OF_ALL_TASKS
+    def test_a_copy_goes_on_as_the_original_does(self, options, seed, duplicate):
+        env, actions = in_the_middle(options, seed)
+        copied = duplicate(env)
+        expected = play(env, actions)
+        assert_equal(expected, play(copied, actions))
+        np.testing.assert_array_equal(env.physics.full_state(), copied.physics.full_state())
+        # What follows after another seed is the same, too.
+        assert_equal([env.reset(seed=7)], [copied.reset(seed=7)])
+        assert_equal(play(env, actions[:9]), play(copied, actions[:9]))
+
+    @DUPLICATE
+    def test_original_and_copy_do_not_disturb_each_other(self, duplicate):
+        env, actions = in_the_middle(TASKS["several goals"], seed=0)
+        alone, copied = duplicate(env), duplicate(env)
+        expected = play(alone, actions)
+        found = []
+        for action in actions:
+            found.append(env.step(action))
+            copied.step(5 - action)
+        assert_equal(expected, found)
+
+    def test_a_copy_of_the_physics_in_motion_steps_as_the_original_does(self):
+        env, _ = in_the_middle(TASKS["local"], seed=0)
+        copied = env.physics.copy()
+        for physics in (env.physics, copied):
+            physics.step(20)
+        np.testing.assert_array_equal(env.physics.full_state(), copied.full_state())
+
+    @DUPLICATE
+    @pytest.mark.parametrize("name", ["mazebench/Local-13-v1", "mazebench/LocalGoal-13-v1"])
+    def test_a_gymnasium_environment_is_copied_with_its_wrappers(self, name, duplicate):
+        env = wrappers.RecordEpisodeStatistics(gymnasium.make(name, position_noise=0.2, time_limit=30))
+        env.reset(seed=4)
+        actions = [int(action) for action in actions_of(mazebench.load(), seed=4)]
+        for action in actions[:20]:
+            env.step(action)
+        copied = duplicate(env)
+        for action in actions[20:29]:
+            assert_same_gym_step(env.step(action), copied.step(action))
+        for first, second in zip(env.reset(), copied.reset(), strict=True):
+            assert_same_tree(first, second)
+        for action in actions[29:40]:
+            assert_same_gym_step(env.step(action), copied.step(action))
+
+    def test_renderers_and_cameras_are_not_copied_and_open_anew(self):
+        run_with_egl("""
+import copy, pickle
+from mazebench.envs.gym import MazeEnv
+from mazebench.tasks.registry import make_spec
+env = MazeEnv(make_spec(size=13, sensors=("egocentric",)), seed=0, render_mode="rgb_array")
+env.reset(seed=0)
+picture = env.render()
+for copied in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
+    assert np.array_equal(copied.render(), picture)
+    other = MazeEnv(env.task_spec, seed=0)
+    other.reset(seed=0)
+    seen = [each.step(0)[0]["egocentric"] for each in (copied, other)]
+    assert np.array_equal(*seen)
+    copied.close()
+""")
+
+    @pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, pickle.dumps])
+    def test_the_vector_environment_refuses(self, duplicate):
+        envs = MazeVectorEnv(make_spec(size=13), 2)
+        with pytest.raises(TypeError, match="MazeVectorEnv can't be copied or pickled; copy dm_env or Gymnasium"):
+            duplicate(envs)
+
+
+class TestStates:
+    @EVERYWHERE
+    @OF_ALL_TASKS
+    def test_an_environment_goes_back_to_a_state_as_often_as_asked(self, options, seed):
+        env, actions = in_the_middle(options, seed)
+        state = env.get_state()
+        expected = play(env, actions)
+        for _ in range(2):
+            env.set_state(state)
+            assert_equal(expected, play(env, actions))
+
+    @EVERYWHERE
+    @OF_ALL_TASKS
+    def test_another_environment_of_the_task_goes_on_from_a_pickled_state(self, options, seed):
+        env, actions = in_the_middle(options, seed)
+        state = pickle.dumps(env.get_state())
+        other = mazebench.load(size=13, seed=99, **options)
+        play(other, actions[:31])
+        other.set_state(pickle.loads(state))  # noqa: S301
+        assert_equal(play(env, actions), play(other, actions))
+
+    def test_going_back_to_an_earlier_episode_brings_back_its_maze(self):
+        env, actions = in_the_middle(TASKS["local"], seed=0)
+        state, maze = env.get_state(), env.task.episode.maze
+        expected = play(env, actions)
+        while env.task.episode.maze == maze:
+            env.reset()
+        env.set_state(state)
+        assert env.task.episode.maze == maze
+        assert_equal(expected, play(env, actions))
+
+    @pytest.mark.parametrize("moment", ["before the first reset", "at the first step", "after the end"])
+    def test_states_at_the_edges_of_an_episode(self, moment):
+        env = mazebench.load(size=13, seed=0, time_limit=4, position_noise=0.1)
+        actions = actions_of(env, seed=0)
+        if moment != "before the first reset":
+            env.reset()
+        if moment == "after the end":
+            while not env.needs_reset:
+                env.step(4)
+        state = env.get_state()
+        expected = play(env, actions)
+        env.set_state(state)
+        assert env.needs_reset == (moment != "at the first step")
+        assert_equal(expected, play(env, actions))
+
+    def test_gymnasium_goes_back_to_a_state(self):
+        env = MazeEnv(make_spec("lost", size=13, level=3), seed=1)
+        env.reset()
+        actions = [int(action) for action in actions_of(env.environment, seed=1)]
+        for action in actions[:30]:
+            env.step(action)
+        state = env.get_state()
+        expected = [env.step(action) for action in actions[30:60]]
+        env.reset()
+        env.set_state(state)
+        for step, action in zip(expected, actions[30:60], strict=True):
+            assert_same_gym_step(step, env.step(action))
+
+    def test_a_state_of_other_mazes_is_refused(self):
+        mazes = [generate("dfs", 13, np.random.default_rng(seed), f"maze-{seed}") for seed in range(2)]
+        env, other = (mazebench.load(maps=maze, seed=0) for maze in mazes)
+        env.reset()
+        with pytest.raises(InputError, match=r"^expected a state of .* with the same mazes, found one of maze-0$"):
+            other.set_state(env.get_state())
+
+
+def assert_same_gym_step(first: tuple[Any, ...], second: tuple[Any, ...]) -> None:
+    assert first[1:4] == second[1:4]
+    assert_same_tree(first[0], second[0])
+    timed = ("episode",)  # of the wrapper, with the seconds that passed
+    assert_same_tree(*({name: info[name] for name in info if name not in timed} for info in (first[4], second[4])))
+
+
+def assert_same_tree(first: dict[str, Any], second: dict[str, Any]) -> None:
+    assert first.keys() == second.keys()
+    for name, value in first.items():
+        np.testing.assert_array_equal(value, second[name], err_msg=name)
