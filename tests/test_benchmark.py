@@ -117,7 +117,7 @@ class TestRefusal:
     def test_asset_when_tampered_with(self, shipped, tmp_path, monkeypatch, name):
         copy = tmp_path / "v1"
         shutil.copytree(shipped, copy)
-        monkeypatch.setattr(benchmark, "_folder", lambda: copy)
+        monkeypatch.setattr(benchmark, "_folder", lambda version: copy)
         untouched = read_asset(name)
         (copy / name).write_text(untouched.replace("1", "2", 1).replace("#.", ".#", 1))
         with pytest.raises(InputError, match=rf"^benchmark v1: {name} was changed: expected SHA-256 \w+, found \w+$"):

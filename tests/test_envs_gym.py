@@ -19,9 +19,13 @@ from mazebench.envs.registration import register_environments
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.registry import make_spec
+from mazebench.tasks.tracks import TRACKS
 
 TITLES = ("Local", "Hierarchical", "LocalGoal")
 IDS = [f"mazebench/{title}-{size}-v1" for title in TITLES for size in (13, 15, 17, 19, 21)]
+TRACK_IDS = [
+    f"mazebench/{name.title()}-{size}-v2" for name, track in TRACKS.items() for size in sorted(set(track.sizes))
+]
 FORWARD, LOOK_LEFT = 0, 4
 
 
@@ -48,8 +52,17 @@ class TestRegistration:
     def test_an_environment_is_made_by_its_name_in_a_fresh_process(self, program):
         subprocess.run([sys.executable, "-c", program], check=True)
 
-    def test_each_task_and_size_has_an_id(self):
-        assert {name for name in registration.registry if name.startswith("mazebench/")} == set(IDS)
+    def test_each_task_track_and_size_has_an_id(self):
+        assert {name for name in registration.registry if name.startswith("mazebench/")} == {*IDS, *TRACK_IDS}
+
+    @pytest.mark.parametrize("name", TRACK_IDS)
+    def test_an_id_leads_to_its_track_and_size(self, name):
+        title, size = name.removeprefix("mazebench/").split("-")[:2]
+        task_spec = gymnasium.make(name).unwrapped.task_spec
+        assert (task_spec.track, task_spec.size) == (title.lower(), int(size))
+
+    def test_a_level_is_a_keyword(self):
+        assert gymnasium.make("mazebench/Far-51-v2", level=3).unwrapped.task_spec.context_size == 21
 
     @pytest.mark.parametrize("name", IDS)
     def test_an_id_leads_to_its_task_and_size(self, name):
@@ -120,7 +133,7 @@ class TestSteps:
     def test_the_info_tells_what_was_driven(self):
         env = corridor_env()
         _, info = env.reset(options={"episode": Episode(0, (1, 1), (1, 4), 0.0, 0)})
-        assert info.keys() == {"is_first", "success", "steps", "path_length", "position", "maze", "landmark"}
+        assert info.keys() == {"is_first", "success", "steps", "path_length", "position", "yaw", "maze", "landmark"}
         assert (info["is_first"], info["steps"], info["path_length"], info["landmark"]) == (True, 0, 0.0, 0)
         np.testing.assert_allclose(info["position"], (1.5, 7.5))
         _, _, _, _, info = env.step(FORWARD)

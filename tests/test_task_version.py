@@ -15,9 +15,9 @@ import pytest
 from mazebench_agents.random_agent import RandomAgent
 
 import mazebench
-from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.options import EvalOptions, make_task
 from mazebench.evaluation.provenance import provenance
-from mazebench.tasks import TASK_VERSION
+from mazebench.tasks import TASK_VERSION, TRACKS_VERSION
 from mazebench.tasks.navigation import Environment
 
 GOLDEN = pathlib.Path(__file__).parent / "golden" / "episodes-v1.json"
@@ -82,12 +82,14 @@ def test_version_when_environments_are_asked():
     environment = gymnasium.make("mazebench/Local-13-v1")
     assert environment.spec.version == environment.unwrapped.task_spec.version == TASK_VERSION
     assert mazebench.make_vec("local", 1).task_spec.version == TASK_VERSION
-    registered = [spec.version for name, spec in gymnasium.registry.items() if name.startswith("mazebench/")]
-    assert registered == [TASK_VERSION] * 15  # five sizes of Local, Hierarchical and LocalGoal
+    track = gymnasium.make("mazebench/Far-31-v2")
+    assert track.spec.version == track.unwrapped.task_spec.version == TRACKS_VERSION
 
 
-def test_version_when_a_result_says_what_it_came_from():
-    assert provenance(EvalOptions("random"), RandomAgent, ()).task_version == TASK_VERSION
+@pytest.mark.parametrize(("track", "version"), [(None, TASK_VERSION), ("far", TRACKS_VERSION)])
+def test_version_when_a_result_says_what_it_came_from(track, version):
+    options = EvalOptions("random", track=track)
+    assert provenance(options, RandomAgent, make_task(options)).task_version == version
 
 
 if __name__ == "__main__":

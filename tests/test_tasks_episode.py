@@ -8,6 +8,7 @@ from simple_mazes import corridor
 
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations.base import ShownMap
+from mazebench.tasks.perturbations.warp import Perspective
 from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.spec import TaskSpec
@@ -146,7 +147,7 @@ class TestShownMap:
         walls = np.zeros((5, 5), dtype=bool)
         walls[1, 2] = True
         right_and_down = np.array([[1, 0, 1], [0, 1, 1], [0, 0, 1]], dtype=float)  # of (column, row)
-        seen = ShownMap(walls, right_and_down).seen_walls()
+        seen = ShownMap(walls, Perspective(right_and_down)).seen_walls()
         expected = np.zeros((5, 5), dtype=bool)
         expected[0] = expected[:, 0] = expected[2, 3] = True  # outside is wall
         np.testing.assert_array_equal(seen, expected)

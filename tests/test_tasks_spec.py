@@ -5,6 +5,7 @@ from __future__ import annotations
 import collections
 import dataclasses
 import itertools
+import re
 import subprocess
 import sys
 
@@ -93,7 +94,7 @@ class TestOptions:
     @pytest.mark.parametrize(
         ("options", "message"),
         [
-            ({"task": "locl"}, r"unknown task 'locl'; available: hierarchical, local"),
+            ({"task": "locl"}, r"unknown task 'locl'; available: far, hierarchical, local, lost, sketch, stale"),
             ({"split": "test", "maps": None}, r"unknown split 'test'; available: eval, train"),
             ({"size": 14, "maps": None}, r"unknown size '14'; available: 13, 15, 17, 19, 21"),
             ({"size": 13}, r"expected mazes of size 13, found size 9"),
@@ -118,6 +119,40 @@ class TestOptions:
         with pytest.raises(InputError, match=message):
             make_spec(**({"maps": CORRIDOR} | options))
 
+    @pytest.mark.parametrize(
+        ("task", "options", "message"),
+        [
+            (
+                "local",
+                {"level": 2},
+                "level 2: expected a track beside it, found none; tracks: stale, lost, sketch, far",
+            ),
+            ("local", {"track": "stail"}, "unknown track 'stail'; available: far, lost, sketch, stale"),
+            ("lost", {"track": "far"}, "expected one track, found 'lost' and 'far'"),
+            ("hierarchical", {"track": "far"}, "track 'far': expected task 'local', found 'hierarchical'"),
+            ("far", {"level": 0}, "expected level from 1 to 3, found 0"),
+            ("far", {"level": ()}, "expected at least one level, found none"),
+            ("far", {"level": (3, 3)}, "expected each level once, found 3, 3"),
+            ("far", {"level": (1, 2)}, "expected levels in mazes of one size, found levels 1, 2 with sizes 31, 51"),
+            ("far", {"level": (2, 3)}, "expected levels with one context_size, found levels 2, 3 with 51, 21"),
+            ("far", {"size": 51}, "'far', level 1: expected size 31, found 51; levels 1 to 3 have sizes 31, 51, 51"),
+            ("far", {"level": 3, "context_size": 51}, "track 'far': expected context_size 21, found 51"),
+            ("far", {"time_limit": 50}, "track 'far': has its own time limit, found time_limit 50"),
+            ("far", {"num_goals": 2}, "track 'far': expected num_goals 1, found 2"),
+            ("far", {"pairs": "fixed"}, "track 'far': expected pairs 'random', found 'fixed'"),
+            ("far", {"map_warp": 0.1}, "track 'far': expected no perturbation, found map_warp 0.1"),
+            ("lost", {"sensors": ("chase",)}, "'lost': expected sensors without 'chase', which shows where the body"),
+            (
+                "far",
+                {"maps": CORRIDOR},
+                "corridor: no two cells are 40 cells apart; the farthest are 6; choose smaller",
+            ),
+        ],
+    )
+    def test_an_option_that_contradicts_a_track_is_refused(self, task, options, message):
+        with pytest.raises(InputError, match=re.escape(message)):
+            make_spec(task, **options)
+
     def test_reading_the_options_does_not_load_mujoco(self):
         # The command line reads them before it chooses MuJoCo's rendering backend.
         program = "import sys, mazebench.tasks.options; sys.exit('mujoco' in sys.modules)"
@@ -140,7 +175,7 @@ class TestShownMap:
         episode = episodes(spec, 1)[0]
         shown = show_map(spec, episode)
         np.testing.assert_array_equal(shown.walls, spec.mazes[episode.maze].walls)
-        assert shown.homography is None
+        assert shown.drawing is None
 
     def test_an_episodes_map_follows_from_its_seed(self):
         for options in ({"map_flip": 0.3}, {"map_warp": 0.2}):

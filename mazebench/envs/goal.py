@@ -43,6 +43,8 @@ class GoalMazeEnv(MazeEnv):
     ):
         if task_spec.has_legs:
             raise InputError("expected the local task with one goal for a goal-conditioned environment, found several")
+        if task_spec.track is not None:  # which may hide where the body is, and has time limits of its own
+            raise InputError(f"expected no track for a goal-conditioned environment, found {task_spec.track!r}")
         super().__init__(task_spec, seed, render_mode, camera)
         size, num_values = task_spec.size, STATE_SIZE + len(_SHOWN_PLANES) * task_spec.context_size**2
         sensed = {name: spaces.observation_space(task_spec)[name] for name in task_spec.sensors}

@@ -10,7 +10,7 @@ import numpy as np
 
 from mazebench.envs import spaces
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.navigation import Environment
+from mazebench.tasks.navigation import Environment, EnvironmentState
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.rendering import Renderer
 
@@ -19,8 +19,8 @@ class MazeEnv(gymnasium.Env):
     """One environment; observations, rewards and endings are those of `mazebench.tasks.navigation.Navigation`.
 
     `info` has `is_first` (whether the context is new: an episode or the leg to the next landmark began), `success`,
-    `steps`, `path_length` (m), `position` (`[2]` m, the true one, for records and hindsight; agents must not use it),
-    `maze` (index among the task's mazes) and `landmark` (number of legs done).
+    `steps`, `path_length` (m), `position` (`[2]` m) and `yaw` (rad; both are the true ones, for records and hindsight;
+    agents must not use them), `maze` (index among the task's mazes) and `landmark` (number of legs done).
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 6.25}  # noqa: RUF012
@@ -75,6 +75,17 @@ class MazeEnv(gymnasium.Env):
             self._renderer = None
         self.environment.close()
 
+    def get_state(self) -> EnvironmentState:
+        """Returns the state that `set_state` goes back to; see `Environment.get_state`."""
+        return self.environment.get_state()
+
+    def set_state(self, state: EnvironmentState) -> None:
+        """Goes back to a state, bit for bit; see `Environment.set_state`."""
+        self.environment.set_state(state)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_renderer": None}  # a copy opens one of its own
+
     def _observation(self, time_step: dm_env.TimeStep) -> dict[str, np.ndarray]:
         return {key: time_step.observation[key] for key in ("state", "context", *self.task_spec.sensors)}
 
@@ -86,6 +97,7 @@ class MazeEnv(gymnasium.Env):
             "steps": task.steps,
             "path_length": task.path_length,
             "position": self.environment.physics.position(),
+            "yaw": self.environment.physics.yaw(),
             "maze": task.episode.maze,
             "landmark": task.route.leg,
         }

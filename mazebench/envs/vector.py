@@ -28,7 +28,7 @@ from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.mjcf import STEPS_PER_ACTION
 from mazebench.world.models import models_of
-from mazebench.world.physics import states_from_sensors
+from mazebench.world.physics import states_from_sensors, wrap_angle
 from mazebench.world.rendering import Cameras
 
 # Returns the next episode of environment i, or None: then the environment rests, which means that it is not stepped any
@@ -45,8 +45,8 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
     Autoreset is SAME_STEP: where an episode ends, `step` returns the first observation of the next episode, and
     `info["final_obs"]` and `info["final_info"]` hold the last ones of the ended episode. `info` has arrays `[B]`:
     `is_first` (whether the context is new: an episode or the leg to the next landmark began), `success`, `steps`,
-    `path_length` (m), `position` (`[B, 2]` m, the true one, for records and hindsight; agents must not use it), `maze`
-    (index among the task's mazes) and `landmark` (number of legs done).
+    `path_length` (m), `position` (`[B, 2]` m) and `yaw` (rad; both are the true ones, for records and hindsight; agents
+    must not use them), `maze` (index among the task's mazes) and `landmark` (number of legs done).
     """
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": ["rgb_array"], "render_fps": 6.25}  # noqa: RUF012
@@ -92,6 +92,12 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         self._marker = self._batch.bind("mocap_pos")
         self._sensors = OpenSensors(task_spec)
         self._top_camera: Cameras | None = None  # of `render`
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        raise TypeError(
+            f"{type(self).__name__} can't be copied or pickled; copy dm_env or Gymnasium environments, or make another "
+            "one with the same task_spec and seed"
+        )
 
     def _allocate(self) -> None:
         num_envs, size = self.num_envs, self.task_spec.context_size
@@ -267,6 +273,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
             "steps": self._steps.copy(),
             "path_length": self._path_length.copy(),
             "position": self._positions.copy(),
+            "yaw": wrap_angle(self._qpos[:, 2]),
             "maze": self._maze.copy(),
             "landmark": self._landmark.copy(),
         }

@@ -8,6 +8,7 @@ import io
 import json
 import pathlib
 import sys
+from typing import Any
 
 import numpy as np
 
@@ -32,8 +33,9 @@ def freeze(folder: pathlib.Path) -> None:
             files[mazes_file(size, split)] = "\n".join(map(format_maze, chosen))
     for task, size, _ in benchmark_task_sizes():
         trials = select_trials(task, mazes[size][MAZES_PER_SPLIT:], frozen=False, seed=_EPISODE_SEED)
-        files[episodes_file(task, size)] = _to_csv(trials)
-    files[MANIFEST] = _manifest(files)
+        files[episodes_file(task, size)] = format_trials(trials)
+    generator = {"style": "dfs", "openings": DFS_OPENINGS, "seed": _MAZE_SEED, "episode_seed": _EPISODE_SEED}
+    files[MANIFEST] = format_manifest(VERSION, generator, files)
     for name, text in files.items():
         folder.joinpath(name).write_bytes(text.encode("ascii"))
 
@@ -48,7 +50,8 @@ def draw_mazes(size: int) -> list[Maze]:
     return [Maze(walls, f"{size}-{index}") for index, walls in enumerate(unique.values())]
 
 
-def _to_csv(trials: list[Trial]) -> str:
+def format_trials(trials: list[Trial]) -> str:
+    """Returns the text of a file of frozen episodes."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -61,10 +64,11 @@ def _to_csv(trials: list[Trial]) -> str:
     return text.getvalue()
 
 
-def _manifest(files: dict[str, str]) -> str:
+def format_manifest(version: str, generator: dict[str, Any], files: dict[str, str]) -> str:
+    """Returns the text of a manifest."""
     content = {
-        "version": VERSION,
-        "generator": {"style": "dfs", "openings": DFS_OPENINGS, "seed": _MAZE_SEED, "episode_seed": _EPISODE_SEED},
+        "version": version,
+        "generator": generator,
         "files": {name: hashlib.sha256(text.encode("ascii")).hexdigest() for name, text in sorted(files.items())},
     }
     return json.dumps(content, indent=1) + "\n"

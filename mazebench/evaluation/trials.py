@@ -1,4 +1,4 @@
-"""The episodes of an evaluation: the frozen ones of benchmark v1, or ones drawn in the same way."""
+"""The episodes of an evaluation: the benchmark's frozen ones, or ones drawn in the same way."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from mazebench.evaluation.options import EPISODES_PER_DISTANCE
-from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, read_asset
+from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, TRACKS_VERSION, VERSION, read_asset
 from mazebench.maps.generators import corner_cells
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.maze import Cell, Maze, cell_to_point
@@ -38,9 +38,12 @@ def episodes_file(task: str, size: int) -> str:
     return f"episodes-{task}-{size}-eval.csv"
 
 
-def frozen_trials(task: str, size: int) -> tuple[Trial, ...]:
-    """Returns the eval episodes of benchmark v1: 1,500 a size of the local task, 20 of the hierarchical one."""
-    rows = csv.DictReader(read_asset(episodes_file(task, size)).splitlines())
+def frozen_trials(task: str, size: int, version: str = VERSION) -> tuple[Trial, ...]:
+    """Returns the eval episodes of one task and size.
+
+    v1 has 1,500 of the local task and 20 of the hierarchical one; v2 has 200, which tracks share.
+    """
+    rows = csv.DictReader(read_asset(episodes_file(task, size), version).splitlines())
     return tuple(
         Trial(
             Episode(
@@ -111,15 +114,26 @@ def _local_trials(maze: Maze, index: int, distance: int, count: int, seed: int) 
                 break
             pair = sample_pair(maze, distance, rng)
         seen.add(pair)
-        trials.append(_trial(maze, index, pair, rng))
+        trials.append(make_trial(maze, index, pair, rng))
     return trials
 
 
+def select_track_trials(
+    mazes: Sequence[Maze], frozen: bool, distances: Iterable[int], episodes_per_distance: int, seed: int = 0
+) -> list[Trial]:
+    """Returns the episodes of a track to evaluate, as `select_trials` does; of frozen ones, all at these distances."""
+    if not frozen:
+        return select_trials("local", mazes, False, distances, episodes_per_distance, seed)
+    wanted = set(distances)
+    return [trial for trial in frozen_trials("local", mazes[0].size, TRACKS_VERSION) if trial.distance in wanted]
+
+
 def _hierarchical_trial(maze: Maze, index: int, seed: int) -> Trial:
-    return _trial(maze, index, corner_cells(maze), np.random.default_rng([seed, maze.size, index]))
+    return make_trial(maze, index, corner_cells(maze), np.random.default_rng([seed, maze.size, index]))
 
 
-def _trial(maze: Maze, index: int, pair: tuple[Cell, Cell], rng: np.random.Generator) -> Trial:
+def make_trial(maze: Maze, index: int, pair: tuple[Cell, Cell], rng: np.random.Generator) -> Trial:
+    """Returns the trial of a start and a goal in maze number `index`; draws the first heading and the seed."""
     start, goal = pair
     episode = Episode(index, start, goal, float(rng.uniform(-np.pi, np.pi)), int(rng.integers(_SEEDS)))
     shortest = _disc_paths(maze).length(cell_to_point(start, maze.size), goal)

@@ -1,4 +1,8 @@
-"""The frozen mazes of benchmark v1: read from the package's assets and checked against their manifest."""
+"""The frozen mazes of the benchmark: read from the package's assets and checked against their manifests.
+
+Version v1 is the paper's protocol. Version v2 holds the mazes of the tracks: eval mazes of size 13, whose train mazes
+are v1's, and train and eval mazes of sizes 31 and 51.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +18,9 @@ from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 
 VERSION = "v1"
+TRACKS_VERSION = "v2"
 SIZES = BENCHMARK_SIZES
+TRACK_SIZES = (13, 31, 51)
 SPLITS = ("train", "eval")
 MAZES_PER_SPLIT = 20
 MANIFEST = "manifest.json"
@@ -26,7 +32,7 @@ def mazes_file(size: int, split: str) -> str:
 
 
 def load_mazes(size: int, split: str) -> tuple[Maze, ...]:
-    """Returns the 20 mazes of one size and split.
+    """Returns the 20 mazes of one size and split of v1.
 
     Raises:
       InputError: if there is no such size or split.
@@ -35,38 +41,53 @@ def load_mazes(size: int, split: str) -> tuple[Maze, ...]:
         raise unknown("size", size, SIZES)
     if split not in SPLITS:
         raise unknown("split", split, SPLITS)
-    return _load_mazes(size, split)
+    return _load_mazes(size, split, VERSION)
+
+
+def load_track_mazes(size: int, split: str) -> tuple[Maze, ...]:
+    """Returns the 20 mazes of one size and split in which tracks are played.
+
+    Raises:
+      InputError: if there is no such size or split.
+    """
+    if size not in TRACK_SIZES:
+        raise unknown("size", size, TRACK_SIZES)
+    if split not in SPLITS:
+        raise unknown("split", split, SPLITS)
+    has_train_mazes = mazes_file(size, split) in manifest(TRACKS_VERSION)["files"]
+    return _load_mazes(size, split, TRACKS_VERSION if has_train_mazes else VERSION)
 
 
 @functools.cache
-def _load_mazes(size: int, split: str) -> tuple[Maze, ...]:
-    blocks = read_asset(mazes_file(size, split)).split("\n\n")
-    return tuple(parse_maze(block, f"{size}-{split}-{index:02d}") for index, block in enumerate(blocks))
+def _load_mazes(size: int, split: str, version: str) -> tuple[Maze, ...]:
+    blocks = read_asset(mazes_file(size, split), version).split("\n\n")
+    prefix = "" if version == VERSION else f"{version}-"
+    return tuple(parse_maze(block, f"{prefix}{size}-{split}-{index:02d}") for index, block in enumerate(blocks))
 
 
-def read_asset(name: str) -> str:
+def read_asset(name: str, version: str = VERSION) -> str:
     """Returns the text of a file of the benchmark.
 
     Raises:
       InputError: if its SHA-256 differs from the manifest's. A changed benchmark must be a new version.
     """
-    content = _folder().joinpath(name).read_bytes()
-    expected, found = manifest()["files"][name], hashlib.sha256(content).hexdigest()
+    content = _folder(version).joinpath(name).read_bytes()
+    expected, found = manifest(version)["files"][name], hashlib.sha256(content).hexdigest()
     if found != expected:
-        raise InputError(f"benchmark {VERSION}: {name} was changed: expected SHA-256 {expected}, found {found}")
+        raise InputError(f"benchmark {version}: {name} was changed: expected SHA-256 {expected}, found {found}")
     return content.decode("ascii")
 
 
 @functools.cache
-def manifest() -> dict[str, Any]:
+def manifest(version: str = VERSION) -> dict[str, Any]:
     """Returns the manifest: the benchmark's version, how it was made, and the SHA-256 of each of its files."""
-    return json.loads(_folder().joinpath(MANIFEST).read_text(encoding="ascii"))
+    return json.loads(_folder(version).joinpath(MANIFEST).read_text(encoding="ascii"))
 
 
-def manifest_hash() -> str:
+def manifest_hash(version: str = VERSION) -> str:
     """Returns the SHA-256 of the manifest, which identifies the benchmark in results."""
-    return hashlib.sha256(_folder().joinpath(MANIFEST).read_bytes()).hexdigest()
+    return hashlib.sha256(_folder(version).joinpath(MANIFEST).read_bytes()).hexdigest()
 
 
-def _folder() -> resources.abc.Traversable:
-    return resources.files("mazebench_assets").joinpath(VERSION)
+def _folder(version: str) -> resources.abc.Traversable:
+    return resources.files("mazebench_assets").joinpath(version)

@@ -25,6 +25,7 @@ _WALL_SHADES = np.array([[30, 32, 38], [34, 36, 42]], dtype=np.uint8)
 _START_SHADE = (64, 160, 100)
 _GOAL_SHADE = (214, 60, 60)
 _PATH_SHADES = np.array([[70, 90, 200], [200, 80, 160], [250, 160, 50]])  # at the path's start, middle and end
+_RAY_SHADE = (40, 150, 190)
 _SUBPIXEL_BITS = 4  # cv2 draws at sixteenths of a pixel
 
 _MAX_MAP_SHADES = 8  # of a map of one pixel a cell: walls, floor, marks; a photograph has more
@@ -61,13 +62,15 @@ def draw_grid(
     goal: Cell | None = None,
     path: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Draws any walls (`[N, N]` bool), such as those of a perturbed map, as `draw_maze` draws a maze.
+    """Draws any walls, such as those of a perturbed map, as `draw_maze` draws a maze.
+
+    Cells of `walls` (`[N, N]`) are bool, or shares of wall in [0, 1], which are drawn in shades between floor and wall.
 
     Raises:
       InputError: if `path` is not finite points.
     """
     chequered = _WALL_SHADES[np.indices(walls.shape).sum(axis=0) % 2]
-    cells = np.where(walls[..., None], chequered, np.uint8(255))
+    cells = np.rint(255.0 - walls[..., None] * (255.0 - chequered)).astype(np.uint8)
     image = np.ascontiguousarray(cells.repeat(cell_pixels, axis=0).repeat(cell_pixels, axis=1))
     if path is not None:
         _draw_path(image, path, cell_pixels)
@@ -77,6 +80,27 @@ def draw_grid(
             radius = round(0.36 * cell_pixels * 2**_SUBPIXEL_BITS)
             cv2.circle(image, centre.tolist(), radius, shade, cv2.FILLED, cv2.LINE_AA, _SUBPIXEL_BITS)
     return image
+
+
+def draw_rays(image: np.ndarray, cell_pixels: int, centre: np.ndarray, ends: np.ndarray) -> None:
+    """Draws rays over a picture that `draw_grid` made, in place; the first one is thicker.
+
+    Args:
+      image: `[H, W, 3]` uint8 RGB.
+      cell_pixels: of the picture.
+      centre: `[2]` m (x, y), where all rays begin.
+      ends: `[R, 2]` m, in the order of their directions.
+    """
+    points = np.concatenate([[centre], ends]) * [cell_pixels, -cell_pixels] + [0, len(image)]
+    begin, *corners = _to_subpixels(points).tolist()
+    area = image.copy()
+    cv2.fillPoly(area, [np.array(corners)], _RAY_SHADE, cv2.LINE_AA, _SUBPIXEL_BITS)
+    cv2.addWeighted(area, 0.25, image, 0.75, 0, dst=image)
+    for number, corner in enumerate(corners):
+        thickness = max(1, round(cell_pixels / (10 if number == 0 else 30)))
+        cv2.line(image, begin, corner, _RAY_SHADE, thickness, cv2.LINE_AA, _SUBPIXEL_BITS)
+        radius = round(cell_pixels * 2**_SUBPIXEL_BITS / 12)
+        cv2.circle(image, corner, radius, _RAY_SHADE, cv2.FILLED, cv2.LINE_AA, _SUBPIXEL_BITS)
 
 
 def write_image(image: np.ndarray, path: str | pathlib.Path) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from dm_env import specs
 
 from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.perturbations import active_perturbations
+from mazebench.tasks.imperfections import imperfections
 from mazebench.tasks.perturbations.base import StateError
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.base import Sensor, Worlds
@@ -27,10 +29,7 @@ def observation_specs(spec: TaskSpec) -> dict[str, specs.Array]:
 
 def state_errors(spec: TaskSpec, episode: Episode) -> list[StateError]:
     """Returns what is wrong with the states observed in `episode`; each has a random stream of its own."""
-    errors = [
-        perturbation.state_error(level, episode.stream(perturbation.stream))
-        for perturbation, level in active_perturbations(spec)
-    ]
+    errors = [perturbation.state_error(level, rng) for perturbation, level, rng in imperfections(spec, episode)]
     return [error for error in errors if error is not None]
 
 
@@ -38,10 +37,15 @@ class OpenSensors:
     """The sensors of a task, opened for one environment."""
 
     def __init__(self, spec: TaskSpec):
+        self._spec = spec
         names: dict[type[Sensor], list[str]] = {}
         for name in spec.sensors:
             names.setdefault(SENSORS[name], []).append(name)
         self._sensors = [kind(tuple(of_kind), spec, spec.mazes) for kind, of_kind in names.items()]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Makes copies open sensors of their own."""
+        return OpenSensors, (self._spec,)
 
     def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
         """Returns `[K, ...]` by the sensor's name, for K >= 1 worlds."""

@@ -7,14 +7,18 @@ import dataclasses
 from mazebench.errors import InputError
 from mazebench.maps.maze import MAX_SIZE
 from mazebench.options import option
-from mazebench.tasks.perturbations import Perturbations
+from mazebench.tasks.perturbations import Perturbations, perturbation_levels
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.base import SensorOptions
+from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks.base import LEVELS
 
 TASKS = ("local", "hierarchical")
 TRAIN_DISTANCES = tuple(range(1, 6))
 EVAL_DISTANCES = tuple(range(1, 16))
 PAIRS = ("random", "fixed")
+TIME_LIMIT = 100  # agent steps
+_FIRST_LEVEL = LEVELS[:1]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -26,9 +30,19 @@ class TaskOptions(Perturbations, SensorOptions):
     """
 
     task: str = option("local", "Kind of navigation.", choices=TASKS)
+    track: str | None = option(
+        None, "A named way in which the map or the senses are imperfect (local task).", choices=TRACKS
+    )
+    level: tuple[int, ...] = option(
+        _FIRST_LEVEL,
+        "Level of the track; of several levels, each episode draws one.",
+        lowest=LEVELS[0],
+        highest=LEVELS[-1],
+    )
     distances: tuple[int, ...] = option(
         TRAIN_DISTANCES,
-        "Distances between start and goal in cells (local task); on the benchmark's eval mazes, 1 to 15 by default.",
+        "Distances between start and goal in cells (local task); on the benchmark's eval mazes, 1 to 15 by default; "
+        "a track has its own default.",
         lowest=1,
     )
     pairs: str = option(
@@ -37,13 +51,17 @@ class TaskOptions(Perturbations, SensorOptions):
         "regime (local task).",
         choices=PAIRS,
     )
-    time_limit: int = option(100, "Agent steps to the goal, in the hierarchical task to each landmark.", lowest=1)
+    time_limit: int = option(
+        TIME_LIMIT,
+        "Agent steps to the goal, in the hierarchical task to each landmark; a track has its own.",
+        lowest=1,
+    )
     landmark_distance: int = option(
         5, "Cells between landmarks, along a shortest path on the shown map (hierarchical task).", lowest=1
     )
     context_size: int = option(
         0,
-        "M, the cells on a side of the context's planes, at least 3; 0 stands for min(N, 21).",
+        "M, the cells on a side of the context's planes, at least 3; 0 stands for min(N, 21); a track has its own.",
         lowest=0,
         highest=MAX_SIZE,
     )
@@ -62,7 +80,31 @@ class TaskOptions(Perturbations, SensorOptions):
         super().__post_init__()
         if len(set(self.sensors)) < len(self.sensors):
             raise InputError(f"expected each sensor once, found {', '.join(self.sensors)}")
+        if len(set(self.level)) < len(self.level):
+            raise InputError(f"expected each level once, found {', '.join(map(str, self.level))}")
         if self.num_goals > 1 and (self.task != "local" or self.pairs != "random"):
             raise InputError(
                 f"expected num_goals 1 unless the task is local and pairs are random, found {self.num_goals}"
             )
+        if not self.level:
+            raise InputError("expected at least one level, found none")
+        if self.track is not None:
+            self._check_track(self.track)
+        elif self.level != _FIRST_LEVEL:
+            levels = ", ".join(map(str, self.level))
+            raise InputError(f"level {levels}: expected a track beside it, found none; tracks: {', '.join(TRACKS)}")
+
+    def _check_track(self, name: str) -> None:
+        """Raises `InputError` if an option contradicts the track called `name`."""
+        if self.time_limit != TIME_LIMIT:
+            raise InputError(f"track {name!r}: has its own time limit, found time_limit {self.time_limit}")
+        for option_name, value in {"task": "local", "pairs": "random", "num_goals": 1}.items():
+            found = getattr(self, option_name)
+            if found != value:
+                raise InputError(f"track {name!r}: expected {option_name} {value!r}, found {found!r}")
+        for perturbation, strength in perturbation_levels(self).items():
+            if strength:
+                raise InputError(f"track {name!r}: expected no perturbation, found {perturbation} {strength}")
+        for sensor in TRACKS[name].refused_sensors:
+            if sensor in self.sensors:
+                raise InputError(f"track {name!r}: expected sensors without {sensor!r}, which shows where the body is")

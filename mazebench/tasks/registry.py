@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from mazebench.errors import unknown
-from mazebench.maps.selection import Maps, load_mazes_of
+from mazebench.errors import InputError, unknown
+from mazebench.maps.selection import Maps
 from mazebench.options import options_of
+from mazebench.tasks.mazes import load_task_mazes
 from mazebench.tasks.navigation import Environment
-from mazebench.tasks.options import EVAL_DISTANCES, TaskOptions
+from mazebench.tasks.options import EVAL_DISTANCES, TASKS, TaskOptions
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.tracks import TRACKS
 
 
 def make_spec(
@@ -18,9 +20,9 @@ def make_spec(
     """Returns a navigation task.
 
     Args:
-      task: "local" or "hierarchical".
-      size: N, the cells on a side of the benchmark's mazes; see `load_mazes_of`.
-      split: "train" or "eval" mazes of benchmark v1.
+      task: "local", "hierarchical" or the name of a track.
+      size: N, the cells on a side of the benchmark's mazes; see `load_mazes_of`. A track has its own.
+      split: "train" or "eval" mazes of the benchmark.
       maps: mazes of your own instead.
       **options: those of `mazebench.tasks.options.TaskOptions`, which docs/options.md lists; None stands for the
         default.
@@ -33,9 +35,18 @@ def make_spec(
         if name not in known:
             raise unknown("option", name, known)
     given = {name: value for name, value in options.items() if value is not None}
-    if split == "eval" and maps is None:
+    if task not in (*TASKS, *TRACKS):
+        raise unknown("task", task, (*TASKS, *TRACKS))
+    if task in TRACKS:
+        if given.setdefault("track", task) != task:
+            raise InputError(f"expected one track, found {task!r} and {given['track']!r}")
+        task = "local"
+    chosen = TaskOptions(task=task, **given)
+    if chosen.track is not None:
+        given.setdefault("distances", TRACKS[chosen.track].distances(min(chosen.level)))
+    elif split == "eval" and maps is None:
         given.setdefault("distances", EVAL_DISTANCES)
-    return TaskSpec(task=task, mazes=load_mazes_of(size, split, maps), **given)
+    return TaskSpec(task=task, mazes=load_task_mazes(chosen, size, split, maps), **given)
 
 
 def load(

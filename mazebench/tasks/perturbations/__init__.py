@@ -16,7 +16,7 @@ class Perturbations(Options):
     """The table of perturbations, as options of a task; they are applied in this order. Level 0 switches one off.
 
     Each draws from a random stream of its own. Streams 0 to 2 are taken by these, stream 3 by the goals after the first
-    one (`mazebench.tasks.route`); a new perturbation takes 4, 5, ...
+    one (`mazebench.tasks.route`), streams 4 to 8 by the tracks; a new perturbation takes 9, 10, ...
     """
 
     map_flip: float = level(MapFlip())

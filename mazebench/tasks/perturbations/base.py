@@ -2,40 +2,64 @@
 
 from __future__ import annotations
 
+import abc
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
 
-from mazebench.maps.homography import warp_cell, warp_points, warp_walls
 from mazebench.maps.maze import Cell
 from mazebench.options import option
 
-# Changes an observed state `[12]` float64 in place. It is called once for each observation of one episode.
+# Changes an observed state `[12]` float64 in place. It is called once for each observation of one episode. It is an
+# object that can be copied and pickled in the middle of an episode, so a function inside of another one will not do.
 StateError = Callable[[np.ndarray], None]
+
+
+class Drawing(abc.ABC):
+    """How a map of N x N cells is drawn: as a picture of P x P pixels, in which cells need not lie on a grid."""
+
+    @abc.abstractmethod
+    def picture(self, walls: np.ndarray) -> np.ndarray:
+        """Returns `[P, P]`: the picture of `walls` (`[N, N]` bool); bool, or the share of wall in [0, 1] as float32."""
+
+    @abc.abstractmethod
+    def pixel(self, cell: Cell, picture: np.ndarray) -> Cell:
+        """Returns the pixel (row, column) of `picture` (`[P, P]`, of `picture`) in which a free cell is marked."""
+
+    @abc.abstractmethod
+    def points(self, points: np.ndarray, size: int) -> np.ndarray:
+        """Returns `[T, 2]` float: where points (x, y) in metres of a maze of `size` cells a side lie in the picture.
+
+        They are counted in pixels, x to the right and y up from the picture's lower left corner.
+        """
 
 
 @dataclasses.dataclass(frozen=True)
 class ShownMap:
-    """The map that the agent is shown: the true one, or one with wrong cells, or one seen in a wrong perspective."""
+    """The map that the agent is shown: the true one, or one with wrong cells, or one that is drawn in its own way."""
 
-    walls: np.ndarray  # [N, N] bool, before the change of perspective
-    homography: np.ndarray | None = None  # [3, 3], from cells of `walls` to seen cells; None if they are the same
+    walls: np.ndarray  # [N, N] bool, the cells that are shown
+    drawing: Drawing | None = None  # None: a pixel for each cell
+    hidden: tuple[int, ...] = ()  # planes of the context that the agent is not given: they are zero
 
     def seen_walls(self) -> np.ndarray:
-        """Returns `[N, N]` bool: the walls as the agent sees them."""
-        return self.walls if self.homography is None else warp_walls(self.walls, self.homography)
+        """Returns `[P, P]` bool or float32: the walls as the agent sees them; P is N where the map is not drawn."""
+        return self._picture
+
+    @functools.cached_property
+    def _picture(self) -> np.ndarray:
+        return self.walls if self.drawing is None else self.drawing.picture(self.walls)
 
     def seen_cell(self, cell: Cell) -> Cell:
-        """Returns the cell of the seen map in which the centre of a cell of the maze lies."""
-        return cell if self.homography is None else warp_cell(cell, self.homography, len(self.walls))
+        """Returns the pixel of the seen map in which a free cell of the maze is marked."""
+        return cell if self.drawing is None else self.drawing.pixel(cell, self._picture)
 
     def seen_points(self, points: np.ndarray) -> np.ndarray:
-        """Returns `[T, 2]` float: where points (x, y) of the maze, in metres, lie on the seen map."""
-        if self.homography is None:
-            return points
-        return warp_points(points, self.homography, len(self.walls))
+        """Returns `[T, 2]` float: where points (x, y) of the maze, in metres, lie on the seen map, in pixels."""
+        return points if self.drawing is None else self.drawing.points(points, len(self.walls))
 
 
 class Perturbation:

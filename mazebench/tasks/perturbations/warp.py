@@ -7,8 +7,9 @@ import dataclasses
 import cv2
 import numpy as np
 
+from mazebench.maps.homography import warp_cell, warp_points, warp_walls
 from mazebench.maps.maze import Cell
-from mazebench.tasks.perturbations.base import Perturbation, ShownMap
+from mazebench.tasks.perturbations.base import Drawing, Perturbation, ShownMap
 
 # If every corner moves by less than this share of the side, the four corners stay a convex quadrilateral.
 MAX_WARP = 0.25
@@ -22,7 +23,23 @@ class MapWarp(Perturbation):
     stream = 1
 
     def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
-        return dataclasses.replace(shown, homography=random_homography(len(shown.walls), level, rng))
+        return dataclasses.replace(shown, drawing=Perspective(random_homography(len(shown.walls), level, rng)))
+
+
+@dataclasses.dataclass(frozen=True)
+class Perspective(Drawing):
+    """A map seen in a wrong perspective, at the resolution of its cells."""
+
+    homography: np.ndarray  # [3, 3], from cells of the map to seen cells
+
+    def picture(self, walls: np.ndarray) -> np.ndarray:
+        return warp_walls(walls, self.homography)
+
+    def pixel(self, cell: Cell, picture: np.ndarray) -> Cell:
+        return warp_cell(cell, self.homography, len(picture))
+
+    def points(self, points: np.ndarray, size: int) -> np.ndarray:
+        return warp_points(points, self.homography, size)
 
 
 def random_homography(size: int, share: float, rng: np.random.Generator) -> np.ndarray:

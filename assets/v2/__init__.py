@@ -1,0 +1,1 @@
+"""Frozen mazes and episodes of benchmark v2, in which tracks are played."""

@@ -1,0 +1,217 @@
+"""The track `sketch`: the map as it is drawn by hand, bent, stretched along each axis, with thick or thin walls."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from mazebench.maps.maze import Cell
+from mazebench.tasks.perturbations.base import Drawing, ShownMap
+from mazebench.tasks.tracks.base import Track
+
+DISPLACEMENTS = (0.5, 1.0, 1.5)  # cells, the largest one at each level
+PIXELS = 2  # pixels of the picture per cell of the maze, along each axis
+LARGEST_STRETCH = 0.15  # each axis is scaled by 1 - this to 1 + this
+LARGEST_THICKENING = 0.5  # cells, one pixel where a cell is PIXELS of them; negative for thin walls
+SIGMA = 3.0  # cells; the displacement is white noise on cells that is smoothed by a Gaussian of this deviation
+
+_REACH = 3 * SIGMA  # cells outside of the maze whose noise is still smoothed into it
+_SAMPLES = 12  # sample points per cell along each axis that are drawn; more than 5 a pixel at any stretch
+_NODES = 4  # points per cell along each axis where the displacement's size and folds are looked at
+_WHITE = 255  # the largest of the grey values, which are multiples of 1 / 255
+
+
+class Sketch(Track):
+    """Shows a grey picture of 2 N x 2 N pixels in which the maze is bent, stretched, and its walls thick or thin.
+
+    - A smooth displacement bends the maze. Its largest value is the level's.
+    - Each axis is scaled by 0.85 to 1.15, where 1.15 fills the sheet. The drawing lies anywhere on the sheet.
+    - Walls are drawn up to a pixel thicker or thinner, where a cell is two pixels.
+    - A pixel has the share of wall in it, to 8 bits. The paper around the maze is wall.
+    - Marks are displaced as the maze is, and are never inside a wall.
+    """
+
+    help = "The map is drawn by hand: bent, stretched, with thick or thin walls."
+    stream = 7
+    levels = (
+        "displaced by up to 0.5 cells, each axis scaled by .85 to 1.15",
+        "displaced by up to 1 cell, each axis scaled by .85 to 1.15",
+        "displaced by up to 1.5 cells, each axis scaled by .85 to 1.15",
+    )
+
+    def _context_size(self, level: int, size: int) -> int:
+        return PIXELS * size
+
+    def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
+        drawing = draw_by_hand(len(shown.walls), DISPLACEMENTS[int(level) - 1], rng)
+        return dataclasses.replace(shown, drawing=drawing)
+
+
+@dataclasses.dataclass(frozen=True)
+class Displacement:
+    """A smooth displacement of the points of an N x N maze: Gaussian-smoothed white noise (Simard et al. 2003).
+
+    Points here are (row, column) in cells, with the maze's corners at 0 and N; `K` is N + 18, the cells with noise.
+    """
+
+    noise: np.ndarray  # [2, K, K] float64: along rows and columns; cell (i, j) has its centre at i - 8.5, j - 8.5
+    mean: np.ndarray  # [2] float64, over the maze, in cells; subtracted, for a shift of the whole is no distortion
+
+    def on_grid(self, coordinates: np.ndarray) -> np.ndarray:
+        """Returns `[2, T, T]` float64: the displacements at all points of `coordinates` x `coordinates` (`[T]`)."""
+        smooth = _gaussians(coordinates, self.noise.shape[-1])
+        return _weighted(smooth, self.noise, smooth) - self.mean[:, None, None]
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """Returns `[T, 2]` float64: the displacements at `points` `[T, 2]`."""
+        rows, columns = (_gaussians(coordinate, self.noise.shape[-1]) for coordinate in points.T)
+        return np.einsum("ti, kij, tj -> tk", rows, self.noise, columns) - self.mean
+
+    def scaled(self, factor: float) -> Displacement:
+        """Returns the displacement times `factor`."""
+        return Displacement(factor * self.noise, factor * self.mean)
+
+    def largest(self, size: int) -> float:
+        """Returns the length in cells of the largest displacement in a maze of `size` cells a side."""
+        return float(np.sqrt((self.on_grid(_nodes(size)) ** 2).sum(axis=0)).max())
+
+    def folds(self, size: int) -> bool:
+        """Returns whether the displaced sheet lies over itself somewhere, or one of its axes runs backwards."""
+        nodes, count = _nodes(size), self.noise.shape[-1]
+        smooth, slope = _gaussians(nodes, count), _gaussian_slopes(nodes, count)
+        (row_row, column_row), (row_column, column_column) = (
+            _weighted(slope, self.noise, smooth),
+            _weighted(smooth, self.noise, slope),
+        )
+        jacobian = (1 + row_row) * (1 + column_column) - row_column * column_row
+        return bool(min(jacobian.min(), 1 + row_row.min(), 1 + column_column.min()) <= 0)
+
+
+def draw_displacement(size: int, rng: np.random.Generator) -> Displacement:
+    """Draws a displacement whose largest value in a maze of `size` cells is 1 cell.
+
+    It folds at none of the levels, so that `rng` gives the same one for all of them. Of 20,000 draws, none folded.
+    """
+    count = size + 2 * int(_REACH)
+    while True:
+        noise = Displacement(rng.standard_normal((2, count, count)), np.zeros(2))
+        centred = dataclasses.replace(noise, mean=noise.on_grid(_nodes(size)).mean(axis=(1, 2)))
+        displacement = centred.scaled(1 / centred.largest(size))
+        if not displacement.scaled(max(DISPLACEMENTS)).folds(size):
+            return displacement
+
+
+@dataclasses.dataclass(frozen=True)
+class HandDrawing(Drawing):
+    """How a maze of N x N cells is drawn on a sheet of P x P pixels, P = 2 N.
+
+    A point (row, column) of the maze, in cells, is displaced, and is then drawn at `origin + scale * point`, in pixels.
+    """
+
+    displacement: Displacement
+    scale: np.ndarray  # [2] float64, pixels per cell along rows and columns
+    origin: np.ndarray  # [2] float64, pixels
+    thickening: float  # cells; how much thicker walls are drawn, half of it on each side
+
+    def picture(self, walls: np.ndarray) -> np.ndarray:
+        """Returns `[P, P]` float32: the share of wall in each pixel, a multiple of 1 / 255; bare paper is wall."""
+        size, pixels = len(walls), PIXELS * len(walls)
+        samples = (np.arange(_SAMPLES * size) + 0.5) / _SAMPLES
+        row, column = np.clip(self._drawn_grid(samples), 0, pixels - 1).astype(np.intp)
+        pixel = row * pixels + column
+        drawn = np.bincount(pixel.ravel(), minlength=pixels**2)
+        wall = np.bincount(pixel[self._thick_walls(walls, samples)], minlength=pixels**2)
+        # In whole numbers, so that every machine draws the same picture. Paper is `_WHITE` of `_WHITE`.
+        grey = np.where(drawn > 0, (2 * _WHITE * wall + drawn) // np.maximum(2 * drawn, 1), _WHITE)
+        return (grey / np.float32(_WHITE)).astype(np.float32).reshape(pixels, pixels)
+
+    def pixel(self, cell: Cell, picture: np.ndarray) -> Cell:
+        """Returns the pixel of the centre of `cell`; if that is more wall than free, the nearest free one.
+
+        Of several, it is the first in reading order. If no pixel is free, those with the least wall count as free.
+        """
+        centre = self._drawn(np.array([cell]) + 0.5)[0]
+        row, column = np.clip(np.floor(centre), 0, len(picture) - 1).astype(int)
+        if picture[row, column] > 0.5:
+            free = np.argwhere(picture <= max(0.5, picture.min()))
+            row, column = free[np.argmin(((free + 0.5 - centre) ** 2).sum(axis=1))]
+        return int(row), int(column)
+
+    def points(self, points: np.ndarray, size: int) -> np.ndarray:
+        drawn = self._drawn(np.column_stack([size - points[:, 1], points[:, 0]]))
+        return np.column_stack([drawn[:, 1], PIXELS * size - drawn[:, 0]])
+
+    def _drawn(self, points: np.ndarray) -> np.ndarray:  # [T, 2] to [T, 2]: points of the maze to pixels
+        return self.origin + self.scale * (points + self.displacement.at(points))
+
+    def _drawn_grid(self, coordinates: np.ndarray) -> np.ndarray:  # [T] to [2, T, T], rows and columns in pixels
+        points = np.stack(np.meshgrid(coordinates, coordinates, indexing="ij"))
+        points += self.displacement.on_grid(coordinates)
+        return self.origin[:, None, None] + self.scale[:, None, None] * points
+
+    def _thick_walls(self, walls: np.ndarray, samples: np.ndarray) -> np.ndarray:
+        """Returns `[T, T]` bool: which points of `samples` x `samples` (`[T]`) are drawn as wall.
+
+        A square around the point, as wide as the change, meets a wall (thickened) or nothing but walls (thinned). The
+        square is smaller than a cell, so that its corners meet all that it meets.
+        """
+        half = abs(self.thickening) / 2
+        before, after = (np.clip(np.floor(samples + side), 0, len(walls) - 1).astype(np.intp) for side in (-half, half))
+        if self.thickening > 0:
+            by_rows = walls[before] | walls[after]
+            return by_rows[:, before] | by_rows[:, after]
+        by_rows = walls[before] & walls[after]
+        return by_rows[:, before] & by_rows[:, after]
+
+
+def draw_by_hand(size: int, level: float, rng: np.random.Generator) -> HandDrawing:
+    """Draws how a maze of `size` cells a side is drawn by hand; the largest displacement is `level`, in cells.
+
+    Each axis is scaled by uniform(0.85, 1.15). At the largest scale the drawing is as long as the sheet, else it lies
+    anywhere on it. `rng` gives the same draws at all levels.
+    """
+    displacement = draw_displacement(size, rng).scaled(level)
+    stretch = rng.uniform(1 - LARGEST_STRETCH, 1 + LARGEST_STRETCH, size=2)
+    place = rng.uniform(size=2)  # share of the paper that is left over which lies above, and on the left
+    thickening = float(rng.uniform(-LARGEST_THICKENING, LARGEST_THICKENING))
+    return fitted_drawing(size, displacement, stretch / (1 + LARGEST_STRETCH), place, thickening)
+
+
+def fitted_drawing(
+    size: int, displacement: Displacement, share: np.ndarray, place: np.ndarray, thickening: float
+) -> HandDrawing:
+    """Returns a drawing that takes `share` `[2]` of the sheet along rows and columns.
+
+    `place` `[2]` is the share of what is left that lies above the drawing, and on its left.
+    """
+    nodes, pixels = _nodes(size), PIXELS * size
+    points = np.stack(np.meshgrid(nodes, nodes, indexing="ij")) + displacement.on_grid(nodes)
+    first, last = points.min(axis=(1, 2)), points.max(axis=(1, 2))
+    scale = share * pixels / (last - first)
+    return HandDrawing(displacement, scale, place * (1 - share) * pixels - scale * first, thickening)
+
+
+def _nodes(size: int) -> np.ndarray:
+    return np.arange(_NODES * size + 1) / _NODES
+
+
+def _gaussians(coordinates: np.ndarray, count: int) -> np.ndarray:
+    """Returns `[T, count]` float64: the weight of each cell's noise at `coordinates` `[T]` along one axis."""
+    return np.exp(-(((coordinates[:, None] - _noise_centres(count)) / SIGMA) ** 2) / 2)
+
+
+def _gaussian_slopes(coordinates: np.ndarray, count: int) -> np.ndarray:
+    return -(coordinates[:, None] - _noise_centres(count)) / SIGMA**2 * _gaussians(coordinates, count)
+
+
+def _weighted(rows: np.ndarray, noise: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Returns `[2, T, T]`: the noise `[2, K, K]` weighted by `[T, K]` along rows and columns.
+
+    It does not call BLAS, whose threads take ten times as long where other work keeps the cores busy.
+    """
+    return np.einsum("ktj, uj -> ktu", np.einsum("ti, kij -> ktj", rows, noise), columns)
+
+
+def _noise_centres(count: int) -> np.ndarray:
+    return np.arange(count) - _REACH + 0.5

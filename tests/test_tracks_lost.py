@@ -1,0 +1,249 @@
+"""The track `lost`: what odometry observes, and that nothing observed beats it."""
+
+from __future__ import annotations
+
+import copy
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+import mazebench
+from mazebench.envs.goal import GoalMazeEnv
+from mazebench.envs.gym import MazeEnv
+from mazebench.envs.vector import MazeVectorEnv
+from mazebench.errors import InputError
+from mazebench.tasks.registry import make_spec
+from mazebench.tasks.tracks.lost import STEP_TIME, Odometry, corrupted_odometry
+
+X, Y, YAW, FORWARD, LEFT, YAW_RATE = 0, 1, 5, 6, 7, 11  # indices in the state
+
+
+def state_at(x: float, y: float, yaw: float, forward: float = 0.0, left: float = 0.0) -> np.ndarray:
+    return np.array([x, y, 0.28, 0, 0, yaw, forward, left, 0, 0, 0, 0], dtype=float)
+
+
+def observed(odometry: Odometry, states: np.ndarray) -> np.ndarray:
+    """`[T, 12]`: what odometry makes of true states in turn."""
+    states = states.copy()
+    for state in states:
+        odometry(state)
+    return states
+
+
+def exact(scale: float = 1.0) -> Odometry:
+    return Odometry(np.random.default_rng(0), scale)
+
+
+def driven(seed: int, num_steps: int = 100) -> np.ndarray:
+    """`[T, 12]` true states of a body that drives and turns at random in a maze, and often meets its walls."""
+    env = mazebench.load(size=13, time_limit=num_steps + 1, distances=(15,), seed=seed)
+    env.reset()
+    rng = np.random.default_rng(seed)
+    states = [env.physics.state()]
+    action = 0
+    while len(states) <= num_steps:
+        if rng.random() < 0.5:
+            action = int(rng.choice(6, p=[0.4, 0.1, 0.1, 0.1, 0.15, 0.15]))
+        env.step(action)
+        states.append(env.physics.state())
+    return np.array(states)
+
+
+@pytest.fixture(scope="module")
+def drives() -> list[np.ndarray]:
+    return [driven(seed) for seed in range(40)]
+
+
+def relative_poses(states: np.ndarray) -> np.ndarray:
+    """`[T, 3]`: true poses (x, y, yaw) as seen from the first one, whose x axis lies along the heading."""
+    yaw = states[0, YAW]
+    x, y = (states[:, :2] - states[0, :2]).T
+    turned = np.stack([np.cos(yaw) * x + np.sin(yaw) * y, np.cos(yaw) * y - np.sin(yaw) * x], axis=-1)
+    return np.column_stack([turned, wrap(states[:, YAW] - yaw)])
+
+
+def wrap(angle: np.ndarray) -> np.ndarray:
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+class TestExactOdometry:
+    def test_the_pose_is_zero_at_the_first_observation(self):
+        np.testing.assert_array_equal(observed(exact(), state_at(3.5, 4.5, 2.0)[None])[0, [X, Y, YAW]], 0.0)
+
+    def test_the_first_axis_lies_along_the_initial_heading(self):
+        # Northwards from (3.5, 4.5), 2 m ahead and then 1 m to the left, which is west.
+        states = np.array([state_at(3.5, 4.5, math.pi / 2), state_at(3.5, 6.5, math.pi / 2), state_at(2.5, 6.5, 2.0)])
+        poses = observed(exact(), states)[:, [X, Y, YAW]]
+        np.testing.assert_allclose(poses, [[0, 0, 0], [2, 0, 0], [2, 1, 2.0 - math.pi / 2]], atol=1e-12)
+
+    def test_the_pose_is_the_true_one_as_seen_from_the_first(self, drives):
+        for states in drives[:5]:
+            poses = observed(exact(), states)[:, [X, Y, YAW]]
+            np.testing.assert_allclose(poses[:, :2], relative_poses(states)[:, :2], atol=1e-10)
+            np.testing.assert_allclose(wrap(poses[:, 2] - relative_poses(states)[:, 2]), 0, atol=1e-10)
+
+    def test_the_yaw_is_wrapped(self):
+        states = np.array([state_at(1.5, 1.5, wrap(turn * 0.36)) for turn in range(40)])
+        yaws = observed(exact(), states)[:, YAW]
+        assert yaws.min() >= -math.pi
+        assert yaws.max() < math.pi
+        np.testing.assert_allclose(np.diff(np.unwrap(yaws)), 0.36)
+
+    def test_everything_else_stays_true(self, drives):
+        others = [2, 3, 4, 6, 7, 8, 9, 10, 11]
+        np.testing.assert_array_equal(observed(exact(), drives[0])[:, others], drives[0][:, others])
+
+
+class TestCorruptedOdometry:
+    def test_the_scale_is_that_of_translation_and_linear_velocity(self):
+        states = np.array([state_at(3.5, 4.5, 0.0, 1.0, 2.0), state_at(5.5, 5.5, 0.0, 3.0, -1.0)])
+        values = observed(exact(scale=1.1), states)[:, [X, Y, YAW, FORWARD, LEFT]]
+        np.testing.assert_allclose(values, [[0, 0, 0, 1.1, 2.2], [2.2, 1.1, 0, 3.3, -1.1]], atol=1e-12)
+
+    def test_the_scale_of_an_episode_is_uniform(self):
+        scales = np.array([corrupted_odometry(np.random.default_rng(seed)).scale for seed in range(2000)])
+        assert scales.min() >= 0.9
+        assert scales.max() <= 1.1
+        # Of 2000 draws, with a standard deviation of 0.2 / sqrt(12).
+        assert abs(scales.mean() - 1) < 4 * 0.0577 / np.sqrt(2000)
+        assert scales.std() == pytest.approx(0.0577, rel=0.05)
+
+    def test_the_heading_walks_by_2_degrees_per_root_second(self):
+        still = np.tile(state_at(3.5, 4.5, 1.0), (101, 1))  # 16 s
+        yaws = np.array([observed(corrupted_odometry(np.random.default_rng(i)), still)[-1, YAW] for i in range(1000)])
+        assert abs(yaws.mean()) < 4 * math.radians(8) / math.sqrt(1000)
+        assert yaws.std() == pytest.approx(math.radians(8), rel=0.1)  # 2 degrees times the root of 16
+
+    def test_the_yaw_rate_carries_the_walk_of_the_heading(self, drives):
+        for seed, states in enumerate(drives[:5]):
+            values = observed(corrupted_odometry(np.random.default_rng(seed)), states)
+            error = wrap(values[:, YAW] - relative_poses(states)[:, 2])
+            rate_error = values[:, YAW_RATE] - states[:, YAW_RATE]
+            np.testing.assert_allclose(wrap(error - STEP_TIME * np.cumsum(rate_error)), 0, atol=1e-10)
+            assert np.abs(error[1:]).min() > 0
+
+    def test_the_pose_adds_up_scaled_moves_of_the_body_along_the_observed_heading(self, drives):
+        for seed, states in enumerate(drives[:5]):
+            odometry = corrupted_odometry(np.random.default_rng(seed))
+            values = observed(odometry, states)
+            true_yaw, heading = states[:-1, YAW], values[:-1, YAW]
+            move = np.diff(states[:, :2], axis=0)
+            ahead = np.cos(true_yaw) * move[:, 0] + np.sin(true_yaw) * move[:, 1]
+            left = np.cos(true_yaw) * move[:, 1] - np.sin(true_yaw) * move[:, 0]
+            moved = odometry.scale * np.stack(
+                [np.cos(heading) * ahead - np.sin(heading) * left, np.sin(heading) * ahead + np.cos(heading) * left]
+            )
+            np.testing.assert_allclose(np.diff(values[:, :2], axis=0), moved.T, atol=1e-12)
+
+    @pytest.mark.parametrize("heading", ["observed", "integrated"])
+    def test_integrated_velocities_are_no_better_than_the_observed_pose(self, drives, heading):
+        errors = []
+        for seed, states in enumerate(drives):
+            values = observed(corrupted_odometry(np.random.default_rng(seed)), states)
+            true = relative_poses(states)
+            integrated = integrate(values, values[:, YAW] if heading == "observed" else None)
+            errors.append([position_error(integrated, true), position_error(values[:, [X, Y, YAW]], true)])
+        by_velocities, by_pose = np.mean(errors, axis=0)
+        assert by_velocities > by_pose > 0.1  # m, on average over 16 s
+
+    @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])  # noqa: S301
+    def test_a_copy_goes_on_as_the_original_does(self, drives, duplicate):
+        original = corrupted_odometry(np.random.default_rng(0))
+        observed(original, drives[0][:50])
+        copied = duplicate(original)
+        np.testing.assert_array_equal(observed(original, drives[0][50:]), observed(copied, drives[0][50:]))
+
+
+def integrate(values: np.ndarray, headings: np.ndarray | None) -> np.ndarray:
+    """`[T, 3]` poses from the observed velocities by the trapezoid rule; headings from the yaw rate if not given."""
+    if headings is None:
+        headings = np.concatenate([[0.0], STEP_TIME * np.cumsum(values[1:, YAW_RATE])])
+    headings = np.unwrap(headings)
+    forward, left = values[:, FORWARD], values[:, LEFT]
+    velocity = np.stack(
+        [np.cos(headings) * forward - np.sin(headings) * left, np.sin(headings) * forward + np.cos(headings) * left]
+    ).T
+    moves = STEP_TIME * (velocity[1:] + velocity[:-1]) / 2
+    return np.column_stack([np.concatenate([np.zeros((1, 2)), np.cumsum(moves, axis=0)]), headings])
+
+
+def position_error(poses: np.ndarray, true: np.ndarray) -> float:
+    """The mean distance in metres."""
+    return float(np.hypot(*(poses[:, :2] - true[:, :2]).T).mean())
+
+
+class TestTrack:
+    ACTIONS = tuple(np.random.default_rng(0).integers(6, size=60).tolist())
+
+    def observations(self, level: int, seed: int = 3) -> list[dict[str, np.ndarray]]:
+        env = mazebench.load("lost", level=level, seed=seed)
+        return [env.reset().observation, *(env.step(action).observation for action in self.ACTIONS)]
+
+    def test_the_start_is_marked_at_level_1_only(self):
+        marked, hidden, drifting = (self.observations(level)[0]["context"] for level in (1, 2, 3))
+        assert marked[1].any()
+        assert marked[3].sum() == 1
+        for context in (hidden, drifting):
+            assert not context[[1, 3]].any()
+            np.testing.assert_array_equal(context[[0, 2]], marked[[0, 2]])
+
+    def test_only_the_odometry_differs_at_level_3(self):
+        for exact_one, drifting in zip(self.observations(2), self.observations(3), strict=True):
+            np.testing.assert_array_equal(exact_one["lidar"], drifting["lidar"])
+            np.testing.assert_allclose(drifting["state"][6:8], exact_one["state"][6:8], rtol=0.1001)
+        assert np.abs(drifting["state"][[X, Y, YAW]] - exact_one["state"][[X, Y, YAW]]).min() > 1e-4
+
+    def test_scans_along_the_odometry_meet_the_walls(self):
+        env = mazebench.load("lost", seed=3)
+        time_step = env.reset()
+        (x, y), yaw = env.physics.position(), env.physics.yaw()
+        walls = env.task.spec.mazes[env.task.episode.maze].walls
+        for action in self.ACTIONS:
+            own_x, own_y, own_yaw = time_step.observation["state"][[X, Y, YAW]].astype(float)
+            # Where the rays end in the frame of odometry, turned and shifted into the maze by the pose at the start.
+            lidar = time_step.observation["lidar"]
+            angle = own_yaw + np.arange(32) * (2 * np.pi / 32)
+            end_x, end_y = own_x + (lidar + 1e-3) * np.cos(angle), own_y + (lidar + 1e-3) * np.sin(angle)
+            column = np.floor(x + np.cos(yaw) * end_x - np.sin(yaw) * end_y).astype(int)
+            row = 12 - np.floor(y + np.sin(yaw) * end_x + np.cos(yaw) * end_y).astype(int)
+            within_reach = lidar < 5
+            assert walls[row[within_reach], column[within_reach]].mean() > 0.95  # but for rays that graze a corner
+            time_step = env.step(action)
+
+    @pytest.mark.parametrize("level", [1, 2, 3])
+    def test_all_environments_observe_the_same(self, level):
+        spec = make_spec("lost", level=level)
+        env, envs = MazeEnv(spec), MazeVectorEnv(spec, 2, num_threads=1)
+        observation, info = env.reset(seed=3)
+        found, infos = envs.reset(seed=(8, 3))
+        for expected, action in zip(self.observations(level), self.ACTIONS, strict=False):
+            for name, values in expected.items():
+                np.testing.assert_array_equal(observation[name], values, err_msg=name)
+                np.testing.assert_array_equal(found[name][1], values, err_msg=name)
+            np.testing.assert_array_equal([*info["position"], info["yaw"]], [*infos["position"][1], infos["yaw"][1]])
+            observation, _, _, _, info = env.step(action)
+            found, _, _, _, infos = envs.step(np.array([0, action]))
+
+    @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            ({"sensors": "top"}, r"^track 'lost': expected sensors without 'top', which shows where the body is$"),
+            ({"sensors": ("lidar", "chase")}, r"^track 'lost': expected sensors without 'chase'"),
+            ({"position_noise": 0.1}, r"^track 'lost': expected no perturbation, found position_noise 0\.1$"),
+            ({"map_flip": 0.1}, r"^track 'lost': expected no perturbation, found map_flip 0\.1$"),
+            ({"map_warp": 0.1}, r"^track 'lost': expected no perturbation, found map_warp 0\.1$"),
+        ],
+    )
+    def test_what_contradicts_the_track_is_refused(self, options, message):
+        with pytest.raises(InputError, match=message):
+            make_spec("lost", **options)
+
+    def test_the_goal_conditioned_environment_is_refused(self):
+        with pytest.raises(InputError, match=r"^expected no track for a goal-conditioned environment, found 'lost'$"):
+            GoalMazeEnv(make_spec("lost"))
+
+
+def test_a_step_takes_as_long_as_in_the_simulation():
+    assert mazebench.load(size=13, seed=0).control_timestep() == pytest.approx(STEP_TIME)

@@ -1,0 +1,198 @@
+"""The track `sketch`: what a map drawn by hand keeps of the maze, and what it changes."""
+
+from __future__ import annotations
+
+import hypothesis
+import numpy as np
+import pytest
+from hypothesis import strategies
+
+from mazebench.maps.generators import dfs_walls
+from mazebench.maps.maze import cell_to_point
+from mazebench.tasks.perturbations.base import ShownMap
+from mazebench.tasks.tracks.sketch import (
+    DISPLACEMENTS,
+    LARGEST_STRETCH,
+    LARGEST_THICKENING,
+    PIXELS,
+    Displacement,
+    Sketch,
+    draw_by_hand,
+    draw_displacement,
+    fitted_drawing,
+)
+
+SIZE = 13
+SHEET = PIXELS * SIZE
+NONE = Displacement(np.zeros((2, SIZE + 18, SIZE + 18)), np.zeros(2))
+
+seeds = strategies.integers(0, 2**32 - 1)
+levels = strategies.sampled_from(DISPLACEMENTS)
+few = hypothesis.settings(max_examples=25, deadline=None)
+
+
+def maze(seed):
+    return dfs_walls(SIZE, np.random.default_rng(seed))
+
+
+def drawing(level, seed):
+    return draw_by_hand(SIZE, level, np.random.default_rng(seed))
+
+
+def plain(share=(1.0, 1.0), place=(0.0, 0.0), thickening=0.0):
+    return fitted_drawing(SIZE, NONE, np.array(share), np.array(place), thickening)
+
+
+def grid(step):
+    """Points (row, column) of the maze, `[2, T, T]`, every `step` cells."""
+    coordinates = np.linspace(0, SIZE, round(SIZE / step) + 1)
+    return coordinates, np.stack(np.meshgrid(coordinates, coordinates, indexing="ij"))
+
+
+class TestDisplacement:
+    @few
+    @hypothesis.given(levels, seeds)
+    def test_largest_displacement_is_the_level(self, level, seed):
+        displacement = draw_displacement(SIZE, np.random.default_rng(seed)).scaled(level)
+        lengths = np.sqrt((displacement.on_grid(grid(0.05)[0]) ** 2).sum(axis=0))
+        assert lengths.max() == pytest.approx(level, rel=0.005)
+
+    @few
+    @hypothesis.given(levels, seeds)
+    def test_sheet_does_not_fold(self, level, seed):
+        coordinates, points = grid(0.1)
+        displaced = points + draw_displacement(SIZE, np.random.default_rng(seed)).scaled(level).on_grid(coordinates)
+        down, right = np.diff(displaced, axis=1)[:, :, :-1], np.diff(displaced, axis=2)[:, :-1]
+        assert (down[0] > 0).all()
+        assert (right[1] > 0).all()
+        assert (down[0] * right[1] - down[1] * right[0] > 0).all()
+
+    def test_fold_is_noticed(self):
+        displacement = draw_displacement(SIZE, np.random.default_rng(0))
+        assert not displacement.folds(SIZE)
+        assert displacement.scaled(30).folds(SIZE)
+
+    def test_neighbouring_points_move_alike_and_far_ones_do_not(self):
+        # White noise smoothed by a Gaussian of deviation 3 has the correlation exp(-distance^2 / 36).
+        rows, rng = np.array([2.0, 3.0, 8.0]), np.random.default_rng(0)
+        noise = [Displacement(rng.standard_normal((2, SIZE + 18, SIZE + 18)), np.zeros(2)) for _ in range(2000)]
+        values = np.array([displacement.on_grid(rows)[0, :, 0] for displacement in noise])
+        np.testing.assert_allclose(np.corrcoef(values.T)[0], np.exp([0, -1 / 36, -1]), atol=0.08)
+
+    def test_points_move_as_the_grid_does(self):
+        displacement = draw_displacement(SIZE, np.random.default_rng(0))
+        coordinates, points = grid(0.5)
+        at_points = displacement.at(points.reshape(2, -1).T)
+        np.testing.assert_allclose(at_points.T.reshape(points.shape), displacement.on_grid(coordinates), atol=1e-12)
+
+
+class TestPicture:
+    def test_maze_without_distortions_is_drawn_as_it_is(self):
+        np.testing.assert_array_equal(plain().picture(maze(0)), np.kron(maze(0), np.ones((PIXELS, PIXELS))))
+
+    @few
+    @hypothesis.given(levels, seeds)
+    def test_values_have_8_bits(self, level, seed):
+        picture = drawing(level, seed).picture(maze(seed))
+        assert picture.dtype == np.float32
+        assert picture.shape == (SHEET, SHEET)
+        grey = np.round(picture * 255)
+        np.testing.assert_array_equal(picture, (grey / np.float32(255)).astype(np.float32))
+        assert grey.min() >= 0
+        assert grey.max() == 255
+
+    def test_same_generator_draws_the_same_field_at_all_levels(self):
+        first, *others = (drawing(level, 3) for level in DISPLACEMENTS)
+        for level, other in zip(DISPLACEMENTS[1:], others, strict=True):
+            np.testing.assert_allclose(other.displacement.noise / level, first.displacement.noise / DISPLACEMENTS[0])
+            assert other.thickening == first.thickening
+
+    def test_same_generator_draws_the_same_picture(self):
+        np.testing.assert_array_equal(drawing(1.0, 3).picture(maze(0)), drawing(1.0, 3).picture(maze(0)))
+        assert (drawing(1.0, 3).picture(maze(0)) != drawing(1.0, 4).picture(maze(0))).any()
+
+    def test_pixel_across_an_edge_shows_its_share_of_wall(self):
+        # 13 cells of 1.5 pixels, from 3.25 on: the first free cell's left edge lies at 4.75.
+        picture = plain(share=(0.75, 0.75), place=(0.5, 0.5)).picture(
+            np.pad(np.zeros((11, 11), bool), 1, constant_values=True)
+        )
+        np.testing.assert_allclose(picture[13, :7], [1, 1, 1, 1, 0.75, 0, 0], atol=0.05)
+
+    def test_paper_around_the_drawing_is_wall(self):
+        picture = plain(share=(0.75, 1.0)).picture(maze(0))
+        assert (picture[20:] == 1).all()
+
+    @pytest.mark.parametrize("thickening", [-0.5, -0.25, 0.25, 0.5])
+    def test_walls_are_thickened_on_both_sides(self, thickening):
+        walls = np.zeros((SIZE, SIZE), bool)
+        walls[:, 6] = True
+        shares = plain(thickening=thickening).picture(walls)[13, 11:15]
+        inside = min(1.0, 1 + thickening)  # of the wall's own pixels, 12 and 13
+        np.testing.assert_allclose(shares, [max(0, thickening), inside, inside, max(0, thickening)], atol=0.1)
+
+    @few
+    @hypothesis.given(levels, seeds)
+    def test_drawing_lies_on_the_sheet_in_the_size_that_was_drawn(self, level, seed):
+        drawn = drawing(level, seed)
+        outline = drawn.points(grid(0.05)[1].reshape(2, -1).T, SIZE)
+        np.testing.assert_array_less(-0.02, outline)
+        np.testing.assert_array_less(outline, SHEET + 0.02)
+        share = np.ptp(outline, axis=0) / SHEET
+        assert (share >= (1 - LARGEST_STRETCH) / (1 + LARGEST_STRETCH) - 0.005).all()
+        assert (share <= 1.005).all()
+
+    def test_draws_cover_their_ranges(self):
+        drawings = [drawing(1.0, seed) for seed in range(200)]
+        thickenings = [drawn.thickening for drawn in drawings]
+        assert min(thickenings) < -0.9 * LARGEST_THICKENING
+        assert max(thickenings) > 0.9 * LARGEST_THICKENING
+
+
+class TestMarks:
+    @few
+    @hypothesis.given(levels, seeds)
+    def test_marks_are_never_inside_a_wall(self, level, seed):
+        walls, drawn = maze(seed), drawing(level, seed)
+        picture = drawn.picture(walls)
+        for cell in np.argwhere(~walls)[::7]:
+            assert picture[drawn.pixel(tuple(cell), picture)] <= 0.5
+
+    @few
+    @hypothesis.given(levels, seeds)
+    def test_marks_lie_where_the_points_lie_that_they_mark(self, level, seed):
+        walls, drawn = maze(seed), drawing(level, seed)
+        picture, cells = drawn.picture(walls), np.argwhere(~walls)[::7]
+        points = drawn.points(cell_to_point(cells, SIZE), SIZE)
+        for cell, (x, y) in zip(cells, points, strict=True):
+            pixel = int(SHEET - y), int(x)
+            if picture[pixel] <= 0.5:
+                assert drawn.pixel(tuple(cell), picture) == pixel
+
+    def test_mark_in_a_wall_moves_to_the_nearest_free_pixel(self):
+        walls = np.ones((SIZE, SIZE), bool)
+        walls[1, 5] = walls[4, 1] = False
+        assert plain().pixel((1, 1), plain().picture(walls)) == (8, 2)  # the centre of the cell is at (3, 3)
+
+    def test_mark_on_a_sheet_without_free_pixels_lies_on_the_least_wall(self):
+        walls = np.ones((SIZE, SIZE), bool)
+        walls[3, 4] = False
+        drawn = plain(share=(0.3, 0.3), place=(0.5, 0.5))
+        picture = drawn.picture(walls)
+        assert 0.5 < picture.min() < 1
+        assert picture[drawn.pixel((3, 4), picture)] == picture.min()
+
+    def test_mark_of_a_cell_without_distortions_is_at_its_centre(self):
+        assert plain().pixel((2, 5), np.zeros((2 * SIZE, 2 * SIZE))) == (5, 11)
+
+
+class TestTrack:
+    @pytest.mark.parametrize("level", [1, 2, 3])
+    def test_shown_map_is_drawn_with_the_displacement_of_the_level(self, level):
+        walls, rng = maze(0), np.random.default_rng(3)
+        shown = Sketch().show(ShownMap(walls), level, ((1, 1), (1, 3)), rng)
+        expected = drawing(DISPLACEMENTS[level - 1], 3).picture(walls)
+        np.testing.assert_array_equal(shown.seen_walls(), expected)
+        np.testing.assert_array_equal(shown.walls, walls)
+
+    def test_context_has_the_size_of_the_picture(self):
+        assert Sketch().context_size((1, 2, 3), SIZE) == SHEET
