@@ -106,6 +106,7 @@ class _Trial:
             time_limit=_TIME_LIMIT,
             landmark_distance=3,
             context_size=interface.context_size,
+            sensors=interface.sensors,
         )
         self._episodes = [sample_episode(self._task_spec, rng) for _ in itertools.chain(*_ORDER)]
 

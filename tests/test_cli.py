@@ -16,7 +16,7 @@ from run_folders import FILES, IMPORTS, RECORDED, files_of
 
 from mazebench import __version__, cli
 from mazebench.agent_loading import agent_names
-from mazebench.commands.options import parse_distances
+from mazebench.commands.options import parse_numbers
 from mazebench.errors import InputError
 from mazebench.evaluation.suites import SUITES
 from mazebench.maps.files import read_maze
@@ -24,7 +24,8 @@ from mazebench.maps.text import format_maze
 
 COMMANDS = typer.main.get_command(cli.app).commands
 FEW = ("--distances", "1,2", "--episodes-per-distance", "1")
-TINY = ("eval", "--agent", "random", *FEW)
+RANDOM = ("eval", "--agent", "random")
+TINY = (*RANDOM, *FEW)
 QUICK = ("eval", "--suite", "quick", "--agent", "random")
 PLAN = "#####\n#...#\n#.#.#\n#...#\n#####\n"
 
@@ -80,15 +81,48 @@ BAD_INPUT = [
     ((*TINY, "--size", "14"), "unknown size '14'; available: 13, 15, 17, 19, 21"),
     ((*TINY, "--checkpoint", "none"), "agent 'random' reads no checkpoint; found --checkpoint none"),
     ((*TINY, "--map-warp", "0.3"), "expected map_warp from 0 to 0.25, found 0.3"),
-    ((*TINY, "--distances", "one"), "expected distances like 1-5,8,10, found 'one'"),
+    ((*TINY, "--distances", "one"), "expected distances like 1-3 or 2,3, found 'one'"),
     ((*TINY, "--distances", "500"), "13-eval-00: no two cells are 500 cells apart; the farthest are 50"),
     # eval: options that don't go together
     ((*TINY, "--agent", "planner"), "expected one --agent without --suite, found 2"),
     ((*TINY, "--resume"), "--resume needs --out"),
     ((*TINY, "--workers", "2", "--traceback"), "the agent acts in other processes; found --traceback, which would be"),
-    ((*QUICK, "--suite", "papr"), "unknown suite 'papr'; available: paper, quick"),
+    ((*QUICK, "--suite", "papr"), "unknown suite 'papr'; available: paper, quick, tracks"),
     ((*QUICK, "--task", "local"), "the suite 'quick' has evaluations of its own; found --task, which would be ignored"),
     ((*QUICK, "--agent", "random"), "expected agents with folders of their own, found two for 'random'"),
+    # eval: tracks
+    ((*RANDOM, "--track", "stail"), "'--track': 'stail' is not one of 'stale', 'lost', 'sketch', 'far'"),
+    ((*RANDOM, "--track", "far", "--level", "4"), "expected level from 1 to 3, found 4"),
+    ((*RANDOM, "--track", "far", "--level", "two"), "expected level like 1-3 or 2,3, found 'two'"),
+    (
+        (*RANDOM, "--track", "lost", "--level", "1-3"),
+        "expected one level in an evaluation, found 1, 2, 3; the suite 'tracks' plays all levels",
+    ),
+    ((*RANDOM, "--track", "lost", "--task", "hierarchical"), "'lost': expected task 'local', found 'hierarchical'"),
+    ((*RANDOM, "--track", "lost", "--map-flip", "0.1"), "'lost': expected no perturbation, found map_flip 0.1"),
+    ((*RANDOM, "--track", "lost", "--sensors", "top"), "'lost': expected sensors without 'top', which shows where"),
+    (
+        (*RANDOM, "--track", "far", "--level", "2", "--size", "31"),
+        "track 'far', level 2: expected size 51, found 31; levels 1 to 3 have sizes 31, 51, 51",
+    ),
+    (
+        (*RANDOM, "--track", "far", "--distances", "3,20,41"),
+        "track 'far', level 1: expected distances from 20 to 40, those of the frozen episodes, found 3, 41",
+    ),
+    (
+        (*RANDOM, "--track", "far", "--maps", "{bad}/good.txt"),
+        "good: no two cells are 40 cells apart; the farthest are 4; choose smaller distances",
+    ),
+    (
+        (*RANDOM, "--track", "stale", "--maps", "{bad}/good.txt"),
+        "good: track 'stale' needs 3 doors that can move, found",
+    ),
+    (
+        (*RANDOM, "--track", "far", "--episodes-per-distance", "1"),
+        "a track's eval episodes are frozen; found --episodes-per-distance, which would be ignored",
+    ),
+    ((*RANDOM, "--suite", "tracks", "--track", "far"), "has evaluations of its own; found --track, which would be"),
+    (("train", "--agent", "mah", "--track", "far"), "No such option: --track"),
     # eval: files
     ((*TINY, "--out", "{bad}/file/out"), "file/out: can't write there: Not a directory"),
     ((*TINY, "--out", "{bad}/used"), "expected an empty folder or an evaluation's, found 'thesis.tex' in it"),
@@ -116,6 +150,8 @@ BAD_INPUT = [
                 ("--landmark-distance", "3"),
                 "has no landmarks; found --landmark-distance, which would be",
             ),
+            (("--level", "2"), "a level belongs to a track; found --level, which would be"),
+            (("--track", "far", "--time-limit", "9"), "has its own time limit; found --time-limit, which would be"),
             (("--maps", "{bad}/good.txt", "--split", "eval"), "the mazes are your own; found --split, which would be"),
         )
     ),
@@ -152,7 +188,7 @@ class TestBadInput:
 
 
 @pytest.mark.parametrize(
-    ("text", "distances"),
+    ("text", "numbers"),
     [
         ("7", (7,)),
         ("1-5,8,10", (1, 2, 3, 4, 5, 8, 10)),
@@ -160,14 +196,14 @@ class TestBadInput:
         (" 3 , 1-2 ", (1, 2, 3)),
     ],
 )
-def test_ranges_and_commas_give_sorted_distances(text, distances):
-    assert parse_distances(text) == distances
+def test_ranges_and_commas_give_sorted_numbers(text, numbers):
+    assert parse_numbers("distances", text) == numbers
 
 
 @pytest.mark.parametrize("text", ["", ",", "1,", "1-", "-1", "1-2-3", "1.5", "1e2", "²", "0-3", "5-1", "123456", "1:5"])
-def test_other_texts_are_no_distances(text):
+def test_other_texts_are_no_numbers(text):
     with pytest.raises(InputError, match=r"^expected distances "):
-        parse_distances(text)
+        parse_numbers("distances", text)
 
 
 class TestHelp:
@@ -326,6 +362,21 @@ class TestRender:
             pictures.append(cv2.imread(str(tmp_path / "map.png"))[10::20, 10::20].mean(axis=2) < 60)
         assert pictures[0].shape == (13, 13)
         assert 0 < (pictures[0] != pictures[1]).mean() < 0.6  # another map, drawn cell by cell
+
+    def test_rays_are_drawn_on_the_true_maze(self, command, tmp_path):
+        pictures = []
+        for options in (("--view", "map"), ("--view", "lidar", "--sensors", "lidar", "--map-flip", "0.2")):
+            assert command(*self.ARGUMENTS[:-2], *options, "--pixels", "260", "--out", "x.png")[0] == 0
+            pictures.append(cv2.imread(str(tmp_path / "x.png")).astype(int))
+        without, rays = pictures
+        centres = np.s_[10::20, 10::20]
+        np.testing.assert_array_equal((without < 60).all(axis=2)[centres], (rays < 60).all(axis=2)[centres])
+        blue_on_floor = (rays[..., 0] > rays[..., 2] + 20) & (without.min(axis=2) > 250)
+        assert 0 < blue_on_floor.mean() < 0.5
+
+    def test_a_view_of_a_sensor_that_the_task_lacks_is_refused(self, command):
+        said = one_line(command(*self.ARGUMENTS, "--view", "lidar", "--out", "x.png"))
+        assert said == "mazebench: view 'lidar': expected a task with this sensor; add --sensors lidar\n"
 
     @pytest.mark.parametrize(("suffix", "magic"), [("gif", b"GIF89a"), ("mp4", b"ftyp")])
     def test_films_are_gif_or_mp4(self, command, tmp_path, suffix, magic):

@@ -16,6 +16,7 @@ import termios
 import time
 from collections.abc import Iterator
 
+import mujoco
 import numpy as np
 import pytest
 from acting import inputs_of
@@ -25,6 +26,7 @@ from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import write_text_maze
+from mazebench.play import viewer
 from mazebench.play.game import LETTERS, Game
 from mazebench.play.picture import Style, draw, draw_map, draw_world
 from mazebench.tasks.episode import Episode
@@ -113,6 +115,15 @@ class TestPictures:
         np.testing.assert_array_equal(seen, game.environment.task.shown_map.walls)
         assert (seen != game.walls).any()
         np.testing.assert_array_equal(draw_world(game, 1, 1).styles == Style.WALL, game.walls)
+
+    def test_rays_of_the_range_sensor_are_drawn_up_to_the_walls(self, corridor):
+        game = Game(make_spec(maps=corridor, distances=[2], sensors="lidar"), seed=0)
+        game.environment.task.set_next_episode(Episode(0, (1, 1), (1, 3), 0.0, 0))
+        game.next_episode()
+        assert text(draw_world(game, 1, 2).glyphs) == ["##########", "##:→::G:##", *["##########"] * 3]
+        assert ":" not in "".join(text(draw_map(game, 1, 2).glyphs))
+        game.press("q")
+        np.testing.assert_allclose(np.hypot(*(game.rays - game.path[-1]).T), game.time_step.observation["lidar"])
 
     @pytest.mark.parametrize(("width", "height"), [(100, 40), (56, 18), (24, 10), (1, 1)])
     @pytest.mark.parametrize("size", [13, 21, 101])
@@ -253,6 +264,21 @@ class TestTerminal:
 
 
 class TestViewer:
+    def test_rays_of_the_range_sensor_are_drawn_in_the_world(self, corridor):
+        game = Game(make_spec(maps=corridor, distances=[2], sensors="lidar"), seed=0)
+        scene = mujoco.MjvScene(game.environment.physics.model.ptr, maxgeom=40)
+        viewer._draw_rays(scene, game)
+        assert scene.ngeom == 32
+        middles = [geom.pos[:2] for geom in scene.geoms[:32]]
+        np.testing.assert_allclose(middles, (game.path[-1] + game.rays) / 2, atol=1e-5)
+
+    def test_only_the_range_sensor_is_shown(self):
+        command = [sys.executable, "-m", "mazebench", "play", "--sensors", "top"]
+        result = subprocess.run(command, capture_output=True, text=True)
+        assert result.returncode == 2
+        said = "mazebench: expected sensors lidar or none, found top, which is not shown while you drive\n"
+        assert result.stderr == said
+
     def test_a_display_that_does_not_open_is_named_in_one_line(self):
         command = [sys.executable, "-m", "mazebench", "play"]
         environment = os.environ | {"DISPLAY": ":9876"}
@@ -273,7 +299,7 @@ class TestViewer:
         )
         try:
             display = os.environ | {"DISPLAY": f":{os.read(read, 16).decode().strip()}"}
-            command = [sys.executable, "-m", "mazebench", "play", "--seed", "1"]
+            command = [sys.executable, "-m", "mazebench", "play", "--seed", "1", "--sensors", "lidar"]
             game = subprocess.Popen(command, env=display, stdout=subprocess.PIPE, text=True)
             find = ["xdotool", "search", "--sync", "--onlyvisible", "--name", "MuJoCo"]
             window = subprocess.run(find, env=display, capture_output=True, text=True, check=True).stdout.split()[0]

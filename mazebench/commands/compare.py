@@ -14,13 +14,19 @@ from mazebench.errors import remark
 def compare(
     a: Annotated[pathlib.Path, typer.Argument(metavar="A", help="The folder of an evaluation, or of a suite's agent.")],
     b: Annotated[
-        pathlib.Path, typer.Argument(metavar="B", help="The evaluation of another agent on the same episodes.")
+        pathlib.Path,
+        typer.Argument(
+            metavar="B", help="The evaluation of another agent, or of the agent at another level, on the same episodes."
+        ),
     ],
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON, with all intervals, instead of a table.")
     ] = False,
 ) -> None:
-    """Compare two agents on the same episodes: what A has more than B, with 95 % intervals over mazes."""
+    """Compare two evaluations on the same episodes: what A has more than B, with 95 % intervals over mazes.
+
+    They are of two agents, or of one agent at two levels of a track.
+    """
     from mazebench.evaluation import comparison, table
 
     found = comparison.compare_folders(a, b)

@@ -9,10 +9,11 @@ def list_() -> None:
     from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS, VERSION
     from mazebench.maps.generators import STYLES
     from mazebench.options import options_of
-    from mazebench.tasks import TASK_VERSION
+    from mazebench.tasks import TASK_VERSION, TRACKS_VERSION
     from mazebench.tasks.options import TASKS
     from mazebench.tasks.perturbations import Perturbations
     from mazebench.tasks.sensors import SENSORS
+    from mazebench.tasks.tracks import TRACKS
 
     ids = (f"mazebench/{kind}-{SIZES[0]}-v{TASK_VERSION}" for kind in ("Local", "Hierarchical", "LocalGoal"))
     rows = {
@@ -23,7 +24,12 @@ def list_() -> None:
         "styles": ", ".join(sorted(STYLES)),
         "perturbed": ", ".join(options_of(Perturbations)),
         "sensors": ", ".join(SENSORS),
-        "Gymnasium": f"{', '.join(ids)} and the other sizes",
+        "Gymnasium": f"{', '.join(ids)} and the other sizes; mazebench/Stale-13-v{TRACKS_VERSION} and the other tracks",
     }
     for name, text in rows.items():
         print(f"{name + ':':<12} {text}")
+    print(f"\ntracks (version {TRACKS_VERSION}), each with levels 1 to 3 and the sensor lidar:")
+    for name, track in TRACKS.items():
+        print(f"{name + ':':<12} {track.help}")
+        for level, meaning in enumerate(track.levels, 1):
+            print(f"{'':<12} {level}: {meaning}")

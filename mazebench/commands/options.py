@@ -20,6 +20,10 @@ LOCAL_ONLY = ("distances", "episodes_per_distance")
 HIERARCHICAL = ("the hierarchical task leads from corner to corner", LOCAL_ONLY)
 LOCAL = ("the local task has no landmarks", ("landmark_distance",))
 OWN_MAPS = ("with --maps the mazes are your own", ("split",))
+_WORTH_WATCHING = 10  # cells from start to goal
+NO_TRACK = ("a level belongs to a track", ("level",))
+TRACK = ("a track has its own time limit", ("time_limit",))
+FROZEN_TRACK = ("a track's eval episodes are frozen", ("episodes_per_distance",))
 
 
 def takes_options(
@@ -44,7 +48,7 @@ def takes_options(
 
         @functools.wraps(command)
         def run(**given: Any) -> None:
-            values = {name: _to_value(kinds[name], given.pop(name)) for name in names}
+            values = {name: _to_value(name, kinds[name], given.pop(name)) for name in names}
             command(**given, values=values)
 
         parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in [*kept, *added]]
@@ -80,46 +84,46 @@ def refuse_ignored_by_task(context: typer.Context, values: dict[str, Any]) -> No
         (values["task"] == "hierarchical", *HIERARCHICAL),
         (values["task"] == "local", *LOCAL),
         (values["maps"] is not None, *OWN_MAPS),
+        (values["track"] is None, *NO_TRACK),
+        (values["track"] is not None, *TRACK),
+        (values["track"] is not None and values["maps"] is None and values["split"] == "eval", *FROZEN_TRACK),
     )
 
 
-def parse_distances(text: str) -> tuple[int, ...]:
-    """Returns sorted distances from ranges and commas: "1-5,8,10".
+def default_distances(track: str | None) -> tuple[int, ...]:
+    """Returns the distances of an episode that is to be looked at; none for a track, which has its own."""
+    return (_WORTH_WATCHING,) if track is None else ()
+
+
+def parse_numbers(name: str, text: str) -> tuple[int, ...]:
+    """Returns sorted numbers from ranges and commas, as "1-5,8,10"; `name` is the option's, for messages.
 
     Raises:
       InputError: if `text` is anything else.
     """
-    distances: set[int] = set()
+    numbers: set[int] = set()
     for part in text.split(","):
         low, dash, high = part.strip().partition("-")
         if not low.isdecimal() or (dash and not high.isdecimal()) or len(low) > 5 or len(high) > 5:
-            raise InputError(f"expected distances like 1-5,8,10, found {text!r}")
+            raise InputError(f"expected {name} like 1-3 or 2,3, found {text!r}")
         if int(low) > int(high or low):
-            raise InputError(f"expected distances from low to high, found {part.strip()!r}")
-        distances.update(range(int(low), int(high or low) + 1))
-    if not distances or min(distances) < 1:
-        raise InputError(f"expected distances of 1 cell or more, found {text!r}")
-    return tuple(sorted(distances))
-
-
-def format_distances(distances: tuple[int, ...]) -> str:
-    """Returns the text of which `parse_distances` makes sorted `distances`."""
-    first, last = distances[0], distances[-1]
-    if len(distances) > 1 and distances == tuple(range(first, last + 1)):
-        return f"{first}-{last}"
-    return ",".join(map(str, distances))
+            raise InputError(f"expected {name} from low to high, found {part.strip()!r}")
+        numbers.update(range(int(low), int(high or low) + 1))
+    if not numbers or min(numbers) < 1:
+        raise InputError(f"expected {name} of 1 or more, found {text!r}")
+    return tuple(sorted(numbers))
 
 
 def _parameter(name: str, option: Option, kind: Any, default: Any) -> inspect.Parameter:
     """Returns the parameter from which typer makes the option."""
     shown = kind
     if kind == tuple[int, ...]:
-        shown, default = str, format_distances(default)
+        shown, default = str | None, ",".join(map(str, default)) or None
     elif kind == tuple[str, ...]:
         shown, default = list[str], list(default)
     elif option.choices:
-        shown = _choice(name, option.choices)
-        default = shown(default)
+        choice = _choice(name, option.choices)
+        shown, default = (choice | None, None) if default is None else (choice, choice(default))
     annotation = Annotated[shown, typer.Option(help=option.help)]  # type: ignore[valid-type]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
@@ -129,9 +133,9 @@ def _choice(name: str, choices: tuple[str, ...]) -> Any:
     return enum.StrEnum(name, {choice: choice for choice in choices})
 
 
-def _to_value(kind: Any, given: Any) -> Any:
+def _to_value(name: str, kind: Any, given: Any) -> Any:
     if isinstance(given, enum.Enum):
         return given.value
     if kind == tuple[int, ...]:
-        return parse_distances(given)
+        return () if given is None else parse_numbers(name, given)
     return tuple(given) if kind == tuple[str, ...] else given

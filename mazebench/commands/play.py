@@ -7,14 +7,14 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import has_display
-from mazebench.commands.options import refuse_ignored_by_task, takes_options
+from mazebench.commands.options import default_distances, refuse_ignored_by_task, takes_options
+from mazebench.errors import InputError
 from mazebench.evaluation.options import TASK_CHOICES, EvalOptions
 
-# The episode to play; sensors are for agents that were made for them.
-_CHOICES = tuple(name for name in TASK_CHOICES if name not in ("episodes_per_distance", "sensors", "camera_size"))
+_CHOICES = tuple(name for name in TASK_CHOICES if name not in ("episodes_per_distance", "camera_size"))
 
 
-@takes_options(EvalOptions, _CHOICES, distances=(10,))
+@takes_options(EvalOptions, _CHOICES)
 def play(
     context: typer.Context,
     values: dict[str, Any],
@@ -25,9 +25,13 @@ def play(
 ) -> None:
     """Drive yourself, with the keyboard: in MuJoCo's viewer, or without a display in the terminal."""
     refuse_ignored_by_task(context, values)
-    from mazebench.play.game import Game
+    values["distances"] = values["distances"] or default_distances(values["track"]) or None
+    from mazebench.play.game import LIDAR, Game
     from mazebench.tasks.registry import make_spec
 
+    for sensor in values["sensors"]:
+        if sensor != LIDAR:
+            raise InputError(f"expected sensors {LIDAR} or none, found {sensor}, which is not shown while you drive")
     game = Game(make_spec(**values), seed)
     if terminal or not has_display():
         from mazebench.play import terminal as screen

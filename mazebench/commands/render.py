@@ -8,25 +8,30 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import choose_rendering_backend
-from mazebench.commands.options import refuse_ignored_by_task, takes_options
+from mazebench.commands.options import default_distances, refuse_ignored_by_task, takes_options
 from mazebench.evaluation.options import TASK_CHOICES, EvalOptions
 
 _CHOICES = tuple(name for name in TASK_CHOICES if name != "episodes_per_distance")
 
 
-@takes_options(EvalOptions, (*_CHOICES, "checkpoint", "seed"), distances=(10,))
+@takes_options(EvalOptions, (*_CHOICES, "checkpoint", "seed"))
 def render(
     context: typer.Context,
     out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
     values: dict[str, Any],
     agent: Annotated[str, typer.Option(help="Who drives.")] = "planner-closed-loop",
     view: Annotated[
-        str, typer.Option(help="top, egocentric, chase, map (shown map and driven path), or all four side by side.")
+        str,
+        typer.Option(
+            help="top, egocentric, chase, map (shown map and driven path), lidar (true maze and rays, with --sensors "
+            "lidar), or all of them side by side."
+        ),
     ] = "all",
     pixels: Annotated[int, typer.Option(min=64, max=1280, help="Side of a view.")] = 360,
 ) -> None:
     """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
     refuse_ignored_by_task(context, values)
+    values["distances"] = values["distances"] or default_distances(values["track"])
     choose_rendering_backend()
     from mazebench.evaluation import film
 

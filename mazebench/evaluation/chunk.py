@@ -20,13 +20,14 @@ from mazebench.evaluation.agent_inputs import agent_seed, true_state
 from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.metrics import spl
 from mazebench.evaluation.plan import Plan
+from mazebench.evaluation.recorder import Recorder
 from mazebench.evaluation.records import Record
-from mazebench.evaluation.trajectories import PoseRecorder, Trajectory
+from mazebench.evaluation.trajectories import Trajectory
 from mazebench.evaluation.trials import Trial
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.spec import TaskSpec
-
-YAW = 5  # index in the state
+from mazebench.tasks.tracks import TRACKS
 
 
 @dataclasses.dataclass(frozen=True)
@@ -127,17 +128,16 @@ def run_trials(
     state = agent.initial_state(num_envs)
     active = new_episode = np.ones(num_envs, dtype=bool)
     seeds = np.zeros(num_envs, dtype=np.int64)
-    poses = PoseRecorder(num_envs) if record else None
+    recorder = Recorder(task, num_envs) if record else None
     env = MazeVectorEnv(task, num_envs, num_threads=num_threads, episode_source=next_episode)
     with contextlib.closing(env):
         observation, info = env.reset()
         while active.any():
             for slot in np.flatnonzero(new_episode):
                 seeds[slot] = agent_seed(seed, _present(slots[slot])[0])
-            yaw = observation["state"][:, YAW]
-            if poses:
-                poses.add(info["position"], yaw, active)
-            truth = true_state(task, env.episodes, info["position"], yaw) if needs_truth else None
+            if recorder:
+                recorder.add(info["position"], info["yaw"], observation["state"], active)
+            truth = true_state(task, env.episodes, info["position"], info["yaw"]) if needs_truth else None
             actions, state = agent.act(Inputs(observation, new_episode, info["is_first"], seeds, truth, active), state)
             running = list(slots)
             observation, _, terminated, truncated, info = env.step(actions)
@@ -146,8 +146,7 @@ def run_trials(
             new_episode = ended & active
             if ended.any():
                 yield [
-                    _outcome(task, *_present(running[slot]), info, slot, poses)
-                    for slot in np.flatnonzero(ended).tolist()
+                    _outcome(*_present(running[slot]), info, slot, recorder) for slot in np.flatnonzero(ended).tolist()
                 ]
 
 
@@ -156,14 +155,11 @@ def _present(numbered: tuple[int, Trial] | None) -> tuple[int, Trial]:
     return numbered
 
 
-def _outcome(
-    task: TaskSpec, index: int, trial: Trial, info: dict[str, Any], slot: int, poses: PoseRecorder | None
-) -> Outcome:
-    final = info["final_info"]
-    trajectory = None
-    if poses:
-        yaw = info["final_obs"][slot]["state"][YAW]
-        trajectory = poses.take(slot, final["position"][slot], yaw, task, trial.episode)
+def _outcome(index: int, trial: Trial, info: dict[str, Any], slot: int, recorder: Recorder | None) -> Outcome:
+    final, trajectory = info["final_info"], None
+    if recorder:
+        pose = final["position"][slot], final["yaw"][slot]
+        trajectory = recorder.take(slot, *pose, info["final_obs"][slot], trial.episode)
     success, steps = bool(final["success"][slot]), int(final["steps"][slot])
     return Outcome(index, trial, success, steps, float(final["path_length"][slot]), trajectory)
 
@@ -186,4 +182,12 @@ def _to_record(plan: Plan, outcome: Outcome) -> Record:
         "spl_grid": float(both[1]),
         "seed": episode.seed,
     }
-    return Record.model_validate(plan.labels | values | plan.levels)
+    return Record.model_validate(plan.labels | values | plan.levels | _facts(plan.task, episode))
+
+
+def _facts(task: TaskSpec, episode: Episode) -> dict[str, bool]:
+    """Returns what the task's track says of an episode."""
+    if task.track is None:
+        return {}
+    walls, shown = task.mazes[episode.maze].walls, show_map(task, episode)
+    return TRACKS[task.track].facts(walls, shown, (episode.start, episode.goal))

@@ -1,4 +1,6 @@
-"""Two agents on the same episodes. docs/metrics.md has the definitions.
+"""Two evaluations on the same episodes: of two agents, or of one agent at two levels of a track.
+
+docs/metrics.md has the definitions.
 
 `E` is the number of episodes.
 """
@@ -23,7 +25,7 @@ _SAME_EPISODE = ("maze", "start", "goal", "seed", "distance")  # fields of recor
 
 @dataclasses.dataclass(frozen=True)
 class Paired:
-    """One metric of both agents."""
+    """One metric of both evaluations."""
 
     a: float
     b: float
@@ -32,7 +34,7 @@ class Paired:
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """Two agents on the same episodes."""
+    """Two evaluations on the same episodes."""
 
     num_episodes: int
     metrics: dict[str, Paired]  # by the names of `METRICS`
@@ -147,9 +149,11 @@ def _named(parts: dict[str, pathlib.Path]) -> str:
 
 
 def _who(summary: Summary, parts: list[str]) -> str:
-    """Returns the agent and, for a single evaluation, the perturbation."""
-    perturbed = [f"{key} {value}" for key, value in summary.perturbation.items() if value and parts == [""]]
-    return f"{summary.agent}{' (' + ', '.join(perturbed) + ')' if perturbed else ''}"
+    """Returns the agent and, for a single evaluation, its track and level or its perturbations."""
+    wrong = [f"{key} {value}" for key, value in summary.perturbation.items() if value]
+    if summary.track is not None:
+        wrong.insert(0, f"track {summary.track}, level {summary.level}")
+    return summary.agent + (f" ({', '.join(wrong)})" if wrong and parts == [""] else "")
 
 
 def _check_pairs(a: Result, b: Result) -> None:

@@ -21,7 +21,6 @@ from mazebench.evaluation.pool import Pool, open_pool
 from mazebench.evaluation.records import Summary
 from mazebench.evaluation.results import load_result
 from mazebench.evaluation.store import Store, check_same_run, is_finished
-from mazebench.maps.benchmark import VERSION
 
 _CHUNKS_PER_WORKER = 4  # so that no worker waits long for the last one,
 _LEAST_CHUNK = 64  # but not so many that their environments are few: agents act on all of them at once
@@ -108,14 +107,16 @@ def run_plan(
         summary = Summary(
             **plan.labels,
             privileged=plan.agent_class.needs_truth,
+            untrained_scale=plan.untrained_scale,
             suite=suite,
             part=part,
-            benchmark=VERSION,
+            benchmark=plan.options.benchmark,
             episodes=num_trials,
             perturbation=plan.levels,
             provenance=plan.provenance,
             overall=overall,
             by_distance=by_distance,
+            by_fact=metrics.summarize_facts(store.records, plan.oracle_spl),
         )
         store.finish(summary)
     return summary

@@ -1,11 +1,11 @@
-"""An episode as a film or a picture: from above, through the agent's eyes, and on the map it was shown."""
+"""An episode as a film or a picture: from above, through the agent's eyes, with its rays, on the map it was shown."""
 
 from __future__ import annotations
 
 import dataclasses
 import pathlib
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import cv2
 import numpy as np
@@ -13,16 +13,16 @@ import numpy as np
 from mazebench.agent import Inputs
 from mazebench.errors import InputError, unknown
 from mazebench.evaluation.agent_inputs import agent_seed, true_state
-from mazebench.evaluation.chunk import YAW
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
-from mazebench.maps.image import draw_grid, write_image
+from mazebench.maps.image import draw_grid, draw_rays, write_image
 from mazebench.storage.files import open_whole, writing_to
 from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
+from mazebench.world.lidar import ray_ends
 from mazebench.world.rendering import CAMERAS, Renderer
 
-MAP = "map"
+MAP, LIDAR = "map", "lidar"
 _FRAMES_PER_SECOND = 1 / 0.16  # one an agent step: the film runs in real time
 
 
@@ -32,7 +32,7 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
     Args:
       options: who drives where, as for an evaluation.
       out: an .mp4 or .gif of the episode, or a .png of its last moment, with the whole path on the map.
-      view: a camera, "map", or "all" for all of them side by side.
+      view: a camera, "map", "lidar" where that is a sensor of the task, or "all" for all of them side by side.
       pixels: side of a view.
 
     Returns:
@@ -42,12 +42,11 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
       InputError: if a name is unknown or `out` can't be written.
       RenderingError: if this machine can't render.
     """
-    views = (MAP, *CAMERAS) if view == "all" else (view,)
-    if views[0] not in (MAP, *CAMERAS):
-        raise unknown("view", view, (MAP, *CAMERAS, "all"))
+    if view not in (MAP, *CAMERAS, LIDAR, "all"):
+        raise unknown("view", view, (MAP, *CAMERAS, LIDAR, "all"))
     if out.suffix not in _WRITERS:
         raise unknown("suffix", out.suffix, _WRITERS)
-    frames, outcome = _run(options, views, pixels)
+    frames, outcome = _run(options, view, pixels)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         _WRITERS[out.suffix](frames, out)
@@ -56,8 +55,9 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
     return outcome
 
 
-def _run(options: EvalOptions, views: tuple[str, ...], pixels: int) -> tuple[list[np.ndarray], str]:
+def _run(options: EvalOptions, view: str, pixels: int) -> tuple[list[np.ndarray], str]:
     plan = make_plan(options)
+    views = _views(view, plan.task)
     number = options.seed % len(plan.trials)
     trial, episode = plan.trials[number], plan.trials[number].episode
     maze = plan.task.mazes[episode.maze]
@@ -69,17 +69,17 @@ def _run(options: EvalOptions, views: tuple[str, ...], pixels: int) -> tuple[lis
     seed = np.array([agent_seed(options.seed, number)])
     scene = _Scene(environment, plan.task, views, pixels)
     try:
-        frames = [scene.draw()]
+        frames = [scene.draw(time_step.observation)]
         while not time_step.last():
             observation = {name: value[None] for name, value in time_step.observation.items() if name != "is_first"}
             truth = None
             if plan.agent_class.needs_truth:
-                position, yaw = environment.physics.position()[None], observation["state"][:, YAW]
-                truth = true_state(plan.task, [episode], position, yaw)
+                physics = environment.physics
+                truth = true_state(plan.task, [episode], physics.position()[None], np.array([physics.yaw()]))
             new_episode, new_context = np.array([time_step.first()]), np.array([task.is_first])
             actions, state = agent.act(Inputs(observation, new_episode, new_context, seed, truth), state)
             time_step = environment.step(int(actions[0]))
-            frames.append(scene.draw())
+            frames.append(scene.draw(time_step.observation))
     finally:
         scene.close()
     ending = "reached the goal" if task.success else "ran out of time"
@@ -87,6 +87,19 @@ def _run(options: EvalOptions, views: tuple[str, ...], pixels: int) -> tuple[lis
         f"{options.agent} {ending} after {task.steps} steps and {task.path_length:.2f} m "
         f"(shortest {trial.shortest_path:.2f} m) in maze {maze.name}, from {episode.start} to {episode.goal}"
     )
+
+
+def _views(view: str, task_spec: TaskSpec) -> tuple[str, ...]:
+    """Returns the views that `view` stands for.
+
+    Raises:
+      InputError: if the task lacks the sensor that it shows.
+    """
+    if view == LIDAR and LIDAR not in task_spec.sensors:
+        raise InputError(f"view {LIDAR!r}: expected a task with this sensor; add --sensors {LIDAR}")
+    if view != "all":
+        return (view,)
+    return (MAP, *CAMERAS, *([LIDAR] if LIDAR in task_spec.sensors else []))
 
 
 @dataclasses.dataclass
@@ -100,27 +113,48 @@ class _Scene:
 
     def __post_init__(self) -> None:
         self._path: list[np.ndarray] = []
-        cameras = [view for view in self.views if view != MAP]
+        cameras = [view for view in self.views if view in CAMERAS]
         self._renderer = Renderer(self.environment.physics.model.ptr, self.pixels, self.pixels) if cameras else None
 
-    def draw(self) -> np.ndarray:
-        """Returns a picture `[H, W, 3]` uint8 of the current state; the shown map has the path driven up to now."""
+    def draw(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Returns a picture `[H, W, 3]` uint8 of the current state, in which `observation` was made.
+
+        The shown map, and the maze in the view of the range sensor, have the path driven up to now.
+        """
         self._path.append(self.environment.physics.position())
-        return np.concatenate([self._view(view) for view in self.views], axis=1)
+        return np.concatenate([self._view(view, observation) for view in self.views], axis=1)
 
     def close(self) -> None:
         if self._renderer is not None:
             self._renderer.close()
 
-    def _view(self, view: str) -> np.ndarray:
-        if view != MAP:
+    def _view(self, view: str, observation: Mapping[str, np.ndarray]) -> np.ndarray:
+        if view in CAMERAS:
             assert self._renderer is not None
             return self._renderer.render(self.environment.physics.data.ptr, view)
-        task, size = self.environment.task, self.task_spec.size
+        picture = self._map() if view == MAP else self._rays(observation[LIDAR])
+        return cv2.resize(picture, (self.pixels, self.pixels), interpolation=cv2.INTER_AREA)
+
+    def _map(self) -> np.ndarray:
+        """Returns a picture of the map that the agent is shown, some two times as large as a view."""
+        task = self.environment.task
+        walls = task.shown_map.seen_walls()
         start, goal = (task.shown_map.seen_cell(cell) for cell in (task.episode.start, task.episode.goal))
         path = task.shown_map.seen_points(np.array(self._path))
-        picture = draw_grid(task.shown_map.seen_walls(), 2 * self.pixels // size + 1, start, goal, path)
-        return cv2.resize(picture, (self.pixels, self.pixels), interpolation=cv2.INTER_AREA)
+        return draw_grid(walls, self._cell_pixels(walls), start, goal, path)
+
+    def _rays(self, ranges: np.ndarray) -> np.ndarray:
+        """Returns a picture of the true maze with the rays of the range sensor, some two times as large as a view."""
+        physics, episode = self.environment.physics, self.environment.task.episode
+        walls = self.task_spec.mazes[episode.maze].walls
+        cell_pixels = self._cell_pixels(walls)
+        picture = draw_grid(walls, cell_pixels, episode.start, episode.goal, np.array(self._path))
+        pose = np.array([*physics.position(), physics.yaw()])
+        draw_rays(picture, cell_pixels, pose[:2], ray_ends(pose, ranges))
+        return picture
+
+    def _cell_pixels(self, walls: np.ndarray) -> int:
+        return 2 * self.pixels // len(walls) + 1
 
 
 def _write_png(frames: list[np.ndarray], out: pathlib.Path) -> None:

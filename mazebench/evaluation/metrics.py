@@ -53,6 +53,27 @@ def summarize(
     return _figures(records, oracle_spl), groups
 
 
+def summarize_facts(records: Sequence[Record], oracle_spl: Mapping[int, float] | None = None) -> dict[str, Figures]:
+    """Returns the figures of the records in which a fact holds, such as "blocked", and where it does not.
+
+    Args:
+      records, oracle_spl: as for `summarize`; on some tracks, records tell facts.
+    """
+    return {
+        name: _figures([records[index] for index in np.flatnonzero(holds).tolist()], oracle_spl)
+        for name, holds in by_fact(records).items()
+        if holds.any()
+    }
+
+
+def by_fact(records: Sequence[Record]) -> dict[str, np.ndarray]:
+    """Returns `[E]` bool for each fact of the records ("blocked") and its contrary ("not blocked"): where it holds."""
+    facts = [name for name, value in (records[0].model_extra or {}).items() if isinstance(value, bool)]
+    return {
+        f"{'' if holds else 'not '}{fact}": column(records, fact) == holds for fact in facts for holds in (True, False)
+    }
+
+
 def _figures(records: Sequence[Record], oracle_spl: Mapping[int, float] | None) -> Figures:
     mazes = column(records, "maze")
     values: dict[str, Any] = {"n": len(records), "spl_relative": None}

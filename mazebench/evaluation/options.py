@@ -6,11 +6,12 @@ import dataclasses
 import pathlib
 
 from mazebench.errors import InputError
-from mazebench.maps.benchmark import SPLITS
-from mazebench.maps.selection import load_mazes_of
+from mazebench.maps.benchmark import SPLITS, TRACKS_VERSION, VERSION
 from mazebench.options import option, options_of
+from mazebench.tasks.mazes import load_task_mazes
 from mazebench.tasks.options import EVAL_DISTANCES, TaskOptions
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.tracks import TRACKS
 
 NUM_ENVS = 256  # environments side by side in a process, unless another number is asked for
 EPISODES_PER_DISTANCE = 5
@@ -27,10 +28,14 @@ class EvalOptions(TaskOptions):
     """
 
     agent: str = dataclasses.field(kw_only=False)
-    size: int | None = option(None, "Cells a side of the benchmark's mazes: 13 (if not given), 15, 17, 19 or 21.")
+    size: int | None = option(
+        None, "Cells a side of the benchmark's mazes: 13 (if not given), 15, 17, 19 or 21; a track has its own."
+    )
     split: str = option("eval", "The benchmark's unseen mazes, or its training mazes.", choices=SPLITS)
     maps: str | None = option(None, "Mazes of your own: a text or image file, or a folder of them.")
-    distances: tuple[int, ...] = option(EVAL_DISTANCES, "Cells from start to goal, as 1-5,8,10 (local task).")
+    distances: tuple[int, ...] = option(
+        (), "Cells from start to goal, as 1-5,8,10 (local task); if not given, 1-15 or those of the track.", lowest=1
+    )
     episodes_per_distance: int = option(
         EPISODES_PER_DISTANCE, "Episodes for each maze and distance (local task).", lowest=1
     )
@@ -42,11 +47,28 @@ class EvalOptions(TaskOptions):
         for name, value in FIXED.items():
             if getattr(self, name) != value:
                 raise InputError(f"expected {name} {value!r} in an evaluation, found {getattr(self, name)!r}")
+        if len(self.level) > 1:
+            found = ", ".join(map(str, self.level))
+            raise InputError(f"expected one level in an evaluation, found {found}; the suite 'tracks' plays all levels")
+        own = EVAL_DISTANCES if self.track is None else TRACKS[self.track].distances(self.level[0])
+        if not self.distances:
+            object.__setattr__(self, "distances", own)
+        elif self.track is not None and self.is_frozen and not set(self.distances) <= set(own):
+            other = ", ".join(str(distance) for distance in self.distances if distance not in own)
+            raise InputError(
+                f"track {self.track!r}, level {self.level[0]}: expected distances from {own[0]} to {own[-1]}, "
+                f"those of the frozen episodes, found {other}"
+            )
 
     @property
     def is_frozen(self) -> bool:
         """Whether the benchmark's eval mazes are asked for, which have frozen episodes."""
         return self.maps is None and self.split == "eval"
+
+    @property
+    def benchmark(self) -> str:
+        """The version of the benchmark that the evaluation belongs to."""
+        return VERSION if self.track is None else TRACKS_VERSION
 
 
 # What is played, as the command line has it: all but the fixed options, the agent's own and the seed.
@@ -57,4 +79,4 @@ def make_task(options: EvalOptions) -> TaskSpec:
     """Returns the task that `options` name; reads its mazes."""
     values = {field.name: getattr(options, field.name) for field in dataclasses.fields(TaskOptions)}
     maps = None if options.maps is None else pathlib.Path(options.maps)
-    return TaskSpec(mazes=load_mazes_of(options.size, options.split, maps), **values)
+    return TaskSpec(mazes=load_task_mazes(options, options.size, options.split, maps), **values)

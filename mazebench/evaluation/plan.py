@@ -16,7 +16,7 @@ from mazebench.evaluation.options import FIXED, EvalOptions, make_task
 from mazebench.evaluation.oracle import oracle_spl
 from mazebench.evaluation.provenance import provenance
 from mazebench.evaluation.records import Provenance
-from mazebench.evaluation.trials import Trial, select_trials
+from mazebench.evaluation.trials import Trial, select_track_trials, select_trials
 from mazebench.tasks.perturbations import perturbation_levels
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.mjcf import maze_spec
@@ -28,7 +28,7 @@ _IDENTIFYING = (
     *("agent_package", "agent_code_sha256", "checkpoint_sha256"),
 )
 # Options that the rest of an identity covers, or that have one value in all evaluations.
-_COVERED = ("agent", "task", "size", "split", "maps", "checkpoint", *FIXED)
+_COVERED = ("agent", "task", "track", "level", "size", "split", "maps", "checkpoint", *FIXED)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -47,6 +47,18 @@ class Plan:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _make_plan_once, (self.options,)
+
+    @property
+    def untrained_scale(self) -> bool:
+        """Whether the checkpoint says that the agent learned on maps of another scale, in metres a cell of the context.
+
+        Only checkpoints of the kind that `mazebench train` writes say on which maps they learned.
+        """
+        for told in ((self.provenance.model_extra or {}).get("checkpoint_metadata") or {}).values():
+            if isinstance(told, dict) and "context_size" in told:
+                size = told.get("provenance", {}).get("size")
+                return size is not None and size * self.task.context_size != told["context_size"] * self.task.size
+        return False
 
     def build_agent(self) -> CheckedAgent:
         """Returns a new agent for the task, held to its contract."""
@@ -71,16 +83,17 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
     agent_class = agent_class or load_agent_class(options.agent)
     options = _with_checkpoint(options, agent_class)
     task = make_task(options)
-    with calling(options.agent, "context_size"):
-        context_size = int(agent_class.context_size(task.size))
-    task = dataclasses.replace(task, context_size=context_size)
-    trials = select_trials(
-        options.task, task.mazes, options.is_frozen, options.distances, options.episodes_per_distance, options.seed
-    )
+    if task.track is None:
+        with calling(options.agent, "context_size"):
+            context_size = int(agent_class.context_size(task.size))
+        task = dataclasses.replace(task, context_size=context_size)
     split = options.split if options.maps is None else "custom"
     labels = {"agent": options.agent, "task": options.task, "size": task.size, "split": split}
+    if task.track is not None:
+        labels |= {"track": task.track, "level": task.level[0]}
+    trials = _select_trials(options, task)
     levels = perturbation_levels(options)
-    origin = provenance(options, agent_class, task.mazes)
+    origin = provenance(options, agent_class, task)
     identity = {
         "format": _FORMAT,
         **labels,
@@ -98,8 +111,15 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
         levels=levels,
         identity=identity,
         provenance=origin,
-        oracle_spl=oracle_spl(options.task, task.size, trials) if options.is_frozen else None,
+        oracle_spl=oracle_spl(options.benchmark, options.task, task.size, trials) if options.is_frozen else None,
     )
+
+
+def _select_trials(options: EvalOptions, task: TaskSpec) -> list[Trial]:
+    what = (options.is_frozen, options.distances, options.episodes_per_distance, options.seed)
+    if task.track is not None:
+        return select_track_trials(task.mazes, *what)
+    return select_trials(options.task, task.mazes, *what)
 
 
 @functools.lru_cache(maxsize=1)

@@ -12,7 +12,7 @@ import pathlib
 import platform
 import struct
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib import metadata
 from typing import Any
 
@@ -20,11 +20,10 @@ from mazebench.agent import Agent
 from mazebench.errors import InputError
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.records import Provenance
-from mazebench.maps.benchmark import VERSION, manifest_hash
-from mazebench.maps.maze import Maze
+from mazebench.maps.benchmark import manifest_hash
 from mazebench.storage.files import open_file
 from mazebench.storage.json_files import parse_json
-from mazebench.tasks import TASK_VERSION
+from mazebench.tasks.spec import TaskSpec
 
 _PACKAGES = (
     *("mazebench-mujoco", "mujoco", "dm-control", "dm-env", "gymnasium", "numpy", "scipy"),
@@ -34,12 +33,12 @@ _PACKAGES = (
 _MAX_HEADER_BYTES = 2**18
 
 
-def provenance(options: EvalOptions, agent_class: type[Agent], mazes: Sequence[Maze]) -> Provenance:
+def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -> Provenance:
     """Returns what lets someone else repeat the run; the version of a package that is not installed is None."""
     content = {
-        "benchmark": VERSION,
-        "benchmark_manifest_sha256": manifest_hash(),
-        "task_version": TASK_VERSION,
+        "benchmark": options.benchmark,
+        "benchmark_manifest_sha256": manifest_hash(options.benchmark),
+        "task_version": task.version,
         "checkpoint_sha256": file_hash(options.checkpoint),
         "checkpoint_metadata": checkpoint_metadata(options.checkpoint),
         "agent_class": f"{agent_class.__module__}:{agent_class.__qualname__}",
@@ -56,7 +55,7 @@ def provenance(options: EvalOptions, agent_class: type[Agent], mazes: Sequence[M
             "processor": platform.machine(),
             "cores": os.cpu_count(),
         },
-        "mazes_sha256": hashlib.sha256(b"".join(maze.walls.tobytes() for maze in mazes)).hexdigest(),
+        "mazes_sha256": hashlib.sha256(b"".join(maze.walls.tobytes() for maze in task.mazes)).hexdigest(),
     }
     return Provenance.model_validate_json(json.dumps(content))  # as a reader will find it
 

@@ -28,7 +28,11 @@ class _Stored(pydantic.BaseModel):
 
 
 class Record(_Stored):
-    """What came of one episode. The levels of the perturbations follow as further keys."""
+    """What came of one episode.
+
+    The levels of the perturbations follow as further keys; on a track also `track`, `level` and its facts, such as
+    `blocked`.
+    """
 
     agent: Name
     task: Name
@@ -90,9 +94,12 @@ class Summary(_Stored):
 
     agent: Name
     privileged: bool = False  # whether the agent was given the true maze and pose
+    untrained_scale: bool = False  # whether the agent learned on maps of another scale, in metres a cell of the context
     task: Name
     size: Size
     split: Name
+    track: str | None = None
+    level: int | None = None  # of the track
     suite: str | None = None  # of a part of a suite, with the part's name
     part: str | None = None
     benchmark: Name
@@ -101,10 +108,12 @@ class Summary(_Stored):
     provenance: Provenance
     overall: Figures
     by_distance: dict[str, Figures]
+    by_fact: dict[str, Figures] = {}  # of what the track says of each episode, as "blocked" and "not blocked"
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the content of `summary.json`."""
-        return {key: value for key, value in self.model_dump().items() if not (key in ("suite", "part") and not value)}
+        optional = ("untrained_scale", "suite", "part", "track", "level", "by_fact")
+        return {key: value for key, value in self.model_dump().items() if not (key in optional and not value)}
 
 
 def column(records: Sequence[Record], name: str) -> np.ndarray:

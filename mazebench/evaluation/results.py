@@ -132,7 +132,8 @@ def _contradiction(summary: Summary, records: tuple[Record, ...]) -> str | None:
     """Returns the first way in which records are not those that a summary was made from, in words."""
     if len(records) != summary.episodes:
         return f"expected {summary.episodes} records, found {len(records)}"
-    expected = {key: getattr(summary, key) for key in ("agent", "task", "size", "split")} | summary.perturbation
+    same = ("agent", "task", "size", "split", "track", "level")
+    expected = {key: getattr(summary, key) for key in same} | summary.perturbation
     for record in records:
         for key, value in expected.items():
             if getattr(record, key, None) != value:

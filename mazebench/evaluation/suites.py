@@ -18,10 +18,12 @@ from mazebench.evaluation.pool import open_pool
 from mazebench.evaluation.records import Summary
 from mazebench.evaluation.results import CONFIG, SUITE, Suite, read_suite
 from mazebench.evaluation.store import check_same_run, is_finished
-from mazebench.maps.benchmark import SIZES, VERSION, manifest_hash
+from mazebench.maps.benchmark import SIZES, manifest_hash
 from mazebench.storage.files import make_folder, writing_to
 from mazebench.storage.json_files import write_json
 from mazebench.storage.locks import FolderLock
+from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks.base import LEVELS
 
 _TABLE_DISTANCES = (2, 4, 6, 8, 10)  # those that the paper prints
 
@@ -60,6 +62,7 @@ SUITES: dict[str, tuple[Part, ...]] = {
         _local("warp-0.1", (2, 6, 10), map_warp=0.1, episodes_per_distance=1),
         _local("noise-0.5", (2, 6, 10), position_noise=0.5, episodes_per_distance=1),
     ),
+    "tracks": tuple(Part(f"{track}-{level}", {"track": track, "level": level}) for track in TRACKS for level in LEVELS),
 }
 
 
@@ -137,11 +140,12 @@ def _prepare(
             raise InputError(f"{out}: holds a run already; go on with --resume or name another folder")
         before = read_suite(out)
     folders = _folders(list(dict.fromkeys([*(before.folders if before else ()), *agents])))
+    benchmark = next(iter(plans.values())).options.benchmark  # the parts of a suite belong to one
     content = Suite(
         suite=suite,
         parts=tuple(part.name for part in SUITES[suite]),
-        benchmark=VERSION,
-        benchmark_manifest_sha256=manifest_hash(),
+        benchmark=benchmark,
+        benchmark_manifest_sha256=manifest_hash(benchmark),
         seed=seed,
         agents=tuple(folders),
         folders=folders,

@@ -19,7 +19,8 @@ def print_summary(summary: Summary) -> None:
     What the paper's MMN reached stands beside it where it can be compared.
     """
     agent = f"{summary.agent} (privileged)" if summary.privileged else summary.agent
-    title = f"{agent}: {summary.task}, {summary.split} mazes {summary.size} x {summary.size}"
+    task = f"{summary.track} {summary.level}" if summary.track else summary.task
+    title = f"{agent}: {task}, {summary.split} mazes {summary.size} x {summary.size}"
     perturbed = ", ".join(f"{name} {value}" for name, value in summary.perturbation.items() if value)
     table = _table(f"{title}{', ' + perturbed if perturbed else ''}")
     paper = printed_mmn(summary)
@@ -29,7 +30,8 @@ def print_summary(summary: Summary) -> None:
         for distance, row in summary.by_distance.items():
             table.add_row(distance, *_with_paper(row, paper, int(distance)))
         table.add_section()
-        table.add_row("all", *_with_paper(summary.overall, paper))
+        for name, row in [*summary.by_fact.items(), ("all", summary.overall)]:
+            table.add_row(name, *_with_paper(row, paper))
     else:
         _add_columns(table, columns)
         landmark_distance = summary.provenance.options.landmark_distance
@@ -47,11 +49,14 @@ def print_suite(summaries: Sequence[Summary]) -> None:
     for agent in dict.fromkeys(summary.agent for summary in summaries):
         table = _table(f"{agent}: suite {summaries[0].suite}", narrow=True)
         table.add_column("part", no_wrap=True)
-        _add_columns(table, ("n", "success rate", "SPL", "SPL by grid"))
+        _add_columns(table, ("n", "success rate", "SPL", "SPL by grid", "relative"))
         for summary in summaries:
             if summary.agent == agent:
-                table.add_row(str(summary.part), *_cells(summary.overall))
+                overall = summary.overall
+                relative = "" if overall.spl_relative is None else f"{overall.spl_relative:.2f}"
+                table.add_row(str(summary.part), *_cells(overall)[:-1], f"{overall.spl_grid:.2f}", relative)
         Console(markup=False).print(table)
+    print("relative: SPL divided by the oracle's on the same episodes")
 
 
 def print_comparison(title: str, name: str, rows: Mapping[str, Row]) -> None:

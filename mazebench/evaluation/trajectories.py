@@ -2,7 +2,8 @@
 
 `trajectories.npz` holds all episodes in the order of `episodes.jsonl`.
 
-`E` is the number of episodes, `N` the cells a side of the mazes, `L` the poses of an episode, its steps and the start.
+`E` is the number of episodes, `N` the cells a side of the mazes, `M` the pixels a side of the maps that the agent is
+given, `L` the poses of an episode, its steps and the start.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import dataclasses
 import functools
 import math
 import pathlib
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,10 +21,6 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.storage.arrays import read_arrays
 from mazebench.storage.files import open_file, open_whole
-from mazebench.tasks.episode import Episode
-from mazebench.tasks.route import plan_route
-from mazebench.tasks.shown_map import show_map
-from mazebench.tasks.spec import TaskSpec
 
 TRAJECTORIES = "trajectories.npz"
 FORMAT = "mazebench-trajectories-1"
@@ -35,7 +33,12 @@ _DTYPES: dict[str, np.dtype] = {
     "num_landmarks": np.dtype("<i4"),
     "landmark": np.dtype("<i4"),
 }
-_NUM_POSES = 128  # room for a local episode; more is made where it is needed
+# In results of tracks.
+_OPTIONAL_DTYPES: dict[str, np.dtype] = {
+    "marks": np.dtype("<i4"),
+    "picture": np.dtype("u1"),
+    "observed": np.dtype("<f2"),
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,6 +48,11 @@ class Trajectory:
     pose: np.ndarray  # [L, 3] float16: x, y in metres in the maze's frame, yaw in rad, as they truly were
     shown: np.ndarray  # [N, N] bool, the walls as the agent was shown them
     landmarks: np.ndarray  # [K] int32, cells of the world as row * N + column, in order, the goal last
+    # Of tracks only, None elsewhere.
+    marks: np.ndarray | None = None  # [2] int32, the marked start and goal as row * M + column; -1: not marked
+    # [M, M] uint8, the map that the agent was given, where its pixels are not the cells that are shown; 255 is wall.
+    picture: np.ndarray | None = None
+    observed: np.ndarray | None = None  # [L, 3] float16: the observed pose, where it is not the true one by design
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,16 +64,23 @@ class Trajectories:
     shown: np.ndarray  # [E, ceil(N * N / 8)] uint8, maps row by row as np.packbits packs them
     num_landmarks: np.ndarray  # [E] int32
     landmark: np.ndarray  # [sum(num_landmarks)] int32
+    marks: np.ndarray | None = None  # [E, 2] int32
+    picture: np.ndarray | None = None  # [E, M, M] uint8
+    observed: np.ndarray | None = None  # [sum(length), 3] float16
 
     def __len__(self) -> int:
         return len(self.length)
 
     def __getitem__(self, episode: int) -> Trajectory:
-        poses, landmarks = self._pose_bounds, self._landmark_bounds
+        landmarks = self._landmark_bounds
+        steps = slice(*self._pose_bounds[episode : episode + 2])
         return Trajectory(
-            self.pose[poses[episode] : poses[episode + 1]],
+            self.pose[steps],
             _unpack(self.shown[episode], self.size),
             self.landmark[landmarks[episode] : landmarks[episode + 1]],
+            None if self.marks is None else self.marks[episode],
+            None if self.picture is None else self.picture[episode],
+            None if self.observed is None else self.observed[steps],
         )
 
     @property
@@ -90,7 +105,7 @@ def load_trajectories(path: pathlib.Path, num_episodes: int) -> Trajectories:
     """
     with open_file(path, "trajectories") as file:
         try:
-            arrays = read_arrays(file, {"format": None, **_DTYPES}, _MAX_BYTES)
+            arrays = read_arrays(file, {"format": None, **_DTYPES}, _MAX_BYTES, _OPTIONAL_DTYPES)
             if str(arrays.pop("format")) != FORMAT:
                 raise ValueError("another format")
         except ValueError as error:
@@ -104,56 +119,41 @@ def load_trajectories(path: pathlib.Path, num_episodes: int) -> Trajectories:
 
 def save_trajectories(path: pathlib.Path, trajectories: Trajectories) -> None:
     """Writes them all or nothing: a reader finds the old file or the new one. The same content gives the same bytes."""
-    arrays = {name: np.ascontiguousarray(getattr(trajectories, name), dtype=dtype) for name, dtype in _DTYPES.items()}
+    arrays = {
+        name: np.ascontiguousarray(values, dtype=dtype)
+        for name, dtype in (_DTYPES | _OPTIONAL_DTYPES).items()
+        if (values := getattr(trajectories, name)) is not None
+    }
     with open_whole(path) as file:
         np.savez_compressed(file, allow_pickle=False, format=np.array(FORMAT), **arrays)
 
 
 def pack_trajectories(episodes: list[Trajectory]) -> Trajectories:
-    """Returns the trajectories of at least one episode, all in mazes of one size, in their order."""
+    """Returns the trajectories of at least one episode, all of one task and in mazes of one size, in their order."""
     return Trajectories(
         length=np.array([len(episode.pose) for episode in episodes], dtype=np.int32),
         pose=np.concatenate([episode.pose for episode in episodes]).astype(np.float16, copy=False),
         shown=np.stack([np.packbits(episode.shown) for episode in episodes]),
         num_landmarks=np.array([len(episode.landmarks) for episode in episodes], dtype=np.int32),
         landmark=np.concatenate([episode.landmarks for episode in episodes]).astype(np.int32, copy=False),
+        marks=_join_present(np.stack, [episode.marks for episode in episodes]),
+        picture=_join_present(np.stack, [episode.picture for episode in episodes]),
+        observed=_join_present(np.concatenate, [episode.observed for episode in episodes]),
     )
-
-
-class PoseRecorder:
-    """The poses in each of B environments since its episode began."""
-
-    def __init__(self, num_envs: int):
-        self._pose = np.empty((num_envs, _NUM_POSES, 3), dtype=np.float16)
-        self._count = np.zeros(num_envs, dtype=np.int64)
-
-    def add(self, position: np.ndarray, yaw: np.ndarray, active: np.ndarray) -> None:
-        """Notes true positions `[B, 2]` (m) and yaws `[B]` (rad) of the environments that are `active` `[B]`."""
-        if self._count.max() == self._pose.shape[1]:
-            self._pose = np.concatenate([self._pose, np.empty_like(self._pose)], axis=1)
-        slots = np.arange(len(position))
-        self._pose[slots, self._count, :2] = position
-        self._pose[slots, self._count, 2] = yaw
-        self._count += active
-
-    def take(self, slot: int, position: np.ndarray, yaw: float, task: TaskSpec, episode: Episode) -> Trajectory:
-        """Returns the trajectory of the episode that ended in `slot` in this pose, and forgets its poses."""
-        last = np.array([[*position, yaw]], dtype=np.float16)
-        pose = np.concatenate([self._pose[slot, : self._count[slot]], last])
-        self._count[slot] = 0
-        shown = show_map(task, episode)
-        cells = plan_route(task, episode, shown).cells[1:]
-        landmarks = np.array([row * task.size + column for row, column in cells], dtype=np.int32)
-        return Trajectory(pose, shown.seen_walls(), landmarks)
 
 
 def to_json(trajectory: Trajectory) -> dict[str, Any]:
     """Returns a trajectory as plain values, little-endian whatever the machine."""
-    return {
-        "pose": base64.b64encode(trajectory.pose.astype(_DTYPES["pose"]).tobytes()).decode("ascii"),
-        "shown": base64.b64encode(np.packbits(trajectory.shown).tobytes()).decode("ascii"),
+    content = {
+        "pose": _to_base64(trajectory.pose, _DTYPES["pose"]),
+        "shown": _to_base64(np.packbits(trajectory.shown), _DTYPES["shown"]),
         "landmarks": trajectory.landmarks.tolist(),
     }
+    for name, dtype in _OPTIONAL_DTYPES.items():
+        values = getattr(trajectory, name)
+        if values is not None:
+            content[name] = _to_base64(values, dtype)
+    return content
 
 
 def from_json(content: dict[str, Any], size: int) -> Trajectory:
@@ -163,11 +163,19 @@ def from_json(content: dict[str, Any], size: int) -> Trajectory:
       ValueError: if it is none.
     """
     try:
-        pose = np.frombuffer(base64.b64decode(content["pose"]), _DTYPES["pose"]).reshape(-1, 3)
-        shown = _unpack(np.frombuffer(base64.b64decode(content["shown"]), np.uint8), size)
-        trajectory = Trajectory(pose, shown, np.array(content["landmarks"], dtype=_DTYPES["landmark"]))
+        found = {name: _from_base64(content[name], _DTYPES[name]) for name in ("pose", "shown")}
+        optional = {
+            name: _from_base64(content[name], dtype) for name, dtype in _OPTIONAL_DTYPES.items() if name in content
+        }
+        landmarks = np.array(content["landmarks"], dtype=_DTYPES["landmark"])
     except (KeyError, TypeError, OverflowError) as error:
         raise ValueError(f"no trajectory: {error}") from error
+    if "picture" in optional:
+        side = math.isqrt(len(optional["picture"]))
+        optional["picture"] = optional["picture"].reshape(side, side)
+    if "observed" in optional:
+        optional["observed"] = optional["observed"].reshape(-1, 3)
+    trajectory = Trajectory(found["pose"].reshape(-1, 3), _unpack(found["shown"], size), landmarks, **optional)
     fault = _fault(pack_trajectories([trajectory]), 1)
     if fault:
         raise ValueError(fault)
@@ -194,7 +202,39 @@ def _fault(trajectories: Trajectories, num_episodes: int) -> str | None:
         return f"expected landmarks from 0 to {size * size - 1}, found others"
     if not np.isfinite(trajectories.pose).all():
         return "expected finite poses, found others"
+    return _fault_of_optional(trajectories)
+
+
+def _fault_of_optional(trajectories: Trajectories) -> str | None:
+    """Returns what is wrong with the arrays that only tracks have, in words; None if nothing is."""
+    num_episodes, pose = len(trajectories), trajectories.pose
+    marks, picture, observed = trajectories.marks, trajectories.picture, trajectories.observed
+    side = trajectories.size if picture is None else picture.shape[-1]
+    if picture is not None and picture.shape != (num_episodes, side, side):
+        return f"expected {num_episodes} pictures of M x M pixels, found shape {picture.shape}"
+    if marks is not None and marks.shape != (num_episodes, 2):
+        return f"expected marks of shape {(num_episodes, 2)}, found {marks.shape}"
+    if marks is not None and (marks.min() < -1 or marks.max() >= side * side):
+        return f"expected marks from -1 to {side * side - 1}, found others"
+    if observed is not None and (observed.shape != pose.shape or not np.isfinite(observed).all()):
+        return f"expected {len(pose)} finite observed poses, found others"
     return None
+
+
+def _join_present(
+    join: Callable[[Sequence[np.ndarray]], np.ndarray], arrays: Sequence[np.ndarray | None]
+) -> np.ndarray | None:
+    """Returns the arrays in one; None if there are none."""
+    present = [array for array in arrays if array is not None]
+    return join(present) if present else None
+
+
+def _to_base64(values: np.ndarray, dtype: np.dtype) -> str:
+    return base64.b64encode(values.astype(dtype).tobytes()).decode("ascii")
+
+
+def _from_base64(text: str, dtype: np.dtype) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), dtype)
 
 
 def _unpack(packed: np.ndarray, size: int) -> np.ndarray:

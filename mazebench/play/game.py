@@ -10,10 +10,12 @@ import numpy as np
 from mazebench.maps.maze import Cell
 from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
+from mazebench.world.lidar import ray_ends
 
 # The actions of letters and of arrow keys.
 LETTERS = {"w": 0, "s": 1, "a": 2, "d": 3, "q": 4, "e": 5}
 ARROWS = {"up": 0, "down": 1, "left": 4, "right": 5}
+LIDAR = "lidar"  # the only sensor whose readings are shown
 RESTART, NEXT = "r", "n"
 HELP = "w s a d  drive   q e  turn   arrows too   r  again   n  next   Esc  quit"
 
@@ -68,6 +70,14 @@ class Game:
     def context(self) -> np.ndarray:
         """`[4, M, M]` float32: the context that an agent would get."""
         return self.time_step.observation["context"]
+
+    @property
+    def rays(self) -> np.ndarray | None:
+        """`[32, 2]` m: where the rays of the range sensor end; None if the task does not have it."""
+        if LIDAR not in self.task_spec.sensors:
+            return None
+        pose = np.array([*self.path[-1], self.environment.physics.yaw()])
+        return ray_ends(pose, self.time_step.observation[LIDAR])
 
     @property
     def landmarks(self) -> list[Cell]:

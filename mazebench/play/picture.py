@@ -16,16 +16,25 @@ from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 class Style(enum.IntEnum):
     """What a character shows."""
 
-    TEXT, FLOOR, WALL, PATH, START, GOAL, LANDMARK, BODY = range(8)
+    TEXT, FLOOR, WALL, PATH, START, GOAL, LANDMARK, BODY, RAY = range(9)
 
 
-_GLYPHS = {Style.FLOOR: " ", Style.WALL: "#", Style.PATH: ".", Style.START: "S", Style.GOAL: "G", Style.LANDMARK: "o"}
+_GLYPHS = {
+    Style.FLOOR: " ",
+    Style.WALL: "#",
+    Style.PATH: ".",
+    Style.START: "S",
+    Style.GOAL: "G",
+    Style.LANDMARK: "o",
+    Style.RAY: ":",
+}
 _ARROWS = "→↗↑↖←↙↓↘"
 _PLAIN_ARROWS = ">>^<<<v>"
 # Rows and columns of characters for a cell, the largest first; a character is about twice as high as it is wide.
 _SCALES = ((3, 6), (2, 4), (1, 2), (1, 1))
 _GAP = 3  # columns between the world and the map
 _LINES = 5  # of other text: title, headings, an empty line, status, help
+_RAY_POINTS = 128  # at which a ray is drawn; 4 cm apart on the longest one
 _MIN_WIDTH, _MIN_HEIGHT = 24, 10
 _SHADES = {
     Style.FLOOR: (255, 255, 255),
@@ -65,10 +74,14 @@ def draw(game: Game, width: int, height: int, plain: bool = False) -> Characters
 
 
 def draw_world(game: Game, rows: int, columns: int, plain: bool = False) -> Characters:
-    """Returns the true maze with the path driven, `rows` x `columns` characters for each cell."""
+    """Returns the true maze with the path and the rays of the range sensor, `rows` x `columns` characters a cell."""
     task, size = game.environment.task, game.task_spec.size
     styles = np.where(game.walls, Style.WALL, Style.FLOOR).repeat(rows, axis=0).repeat(columns, axis=1)
     path = np.array(game.path) * [columns, -rows] + [0, size * rows]
+    if game.rays is not None:
+        ends = game.rays * [columns, -rows] + [0, size * rows]
+        points = np.linspace(path[-1], ends, _RAY_POINTS, endpoint=False).astype(int)  # [_RAY_POINTS, 32, 2]
+        styles[points[..., 1], points[..., 0]] = Style.RAY
     styles[path[:, 1].astype(int), path[:, 0].astype(int)] = Style.PATH
     for cells, style in ((game.landmarks, Style.LANDMARK), ([task.route.goal], Style.GOAL)):
         for cell in cells:

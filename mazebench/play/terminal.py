@@ -82,6 +82,7 @@ class _Screen:
             Style.GOAL: (curses.COLOR_WHITE, curses.COLOR_RED),
             Style.LANDMARK: (curses.COLOR_BLACK, curses.COLOR_YELLOW),
             Style.BODY: (curses.COLOR_WHITE, curses.COLOR_BLACK),
+            Style.RAY: (curses.COLOR_CYAN, curses.COLOR_WHITE),
         }
         for style, (ink, paper) in pairs.items():
             curses.init_pair(style, ink, paper)

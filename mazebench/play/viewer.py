@@ -9,15 +9,19 @@ import warnings
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from mazebench.errors import InputError
 from mazebench.play.game import HELP, Game
 from mazebench.play.picture import map_pixels
+from mazebench.world.mjcf import BODY_HEIGHT
 
 _ESCAPE = 256  # GLFW's key codes; those of letters are the codes of capital letters
 _ARROWS = {262: "right", 263: "left", 264: "down", 265: "up"}
 _MAP_PIXELS = 260  # side of the map in the corner of the window
 _SECONDS_A_FRAME = 0.02
+_RAY_COLOUR = np.array([0.16, 0.6, 0.75, 1], dtype=np.float32)
+_RAY_RADIUS = 0.008  # m
 
 
 def play(game: Game) -> None:
@@ -44,6 +48,7 @@ def play(game: Game) -> None:
         while viewer.is_running():
             with viewer.lock():
                 viewer.opt.flags[:], viewer.user_scn.flags[:] = flags
+                _draw_rays(viewer.user_scn, game)
             _overlay(viewer, game)
             viewer.sync()
             try:
@@ -73,6 +78,19 @@ def _import_viewer() -> types.ModuleType:
     if not opens:
         raise InputError("can't open a window on this display; play with --terminal")
     return mujoco.viewer
+
+
+def _draw_rays(scene: mujoco.MjvScene, game: Game) -> None:
+    """Draws the rays of the range sensor in the world, from the body's centre to the walls, if the task has it."""
+    ends = game.rays
+    if ends is None:
+        return
+    height = BODY_HEIGHT / 2
+    for geom, end in zip(scene.geoms, ends, strict=False):
+        capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
+        mujoco.mjv_initGeom(geom, capsule, np.zeros(3), np.zeros(3), np.zeros(9), _RAY_COLOUR)
+        mujoco.mjv_connector(geom, capsule, _RAY_RADIUS, np.array([*game.path[-1], height]), np.array([*end, height]))
+    scene.ngeom = len(ends)
 
 
 def _overlay(viewer: Any, game: Game) -> None:
