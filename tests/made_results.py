@@ -8,17 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.evaluation.metrics import spl, summarize
+from mazebench.evaluation.metrics import spl, summarize, summarize_facts
+from mazebench.evaluation.recorder import Recorder
 from mazebench.evaluation.records import Record
 from mazebench.evaluation.results import EPISODES, SUMMARY
 from mazebench.evaluation.trajectories import TRAJECTORIES, Trajectory, pack_trajectories, save_trajectories
-from mazebench.evaluation.trials import Trial, select_trials
-from mazebench.maps.benchmark import VERSION, load_mazes, manifest_hash
+from mazebench.evaluation.trials import Trial, select_track_trials, select_trials
+from mazebench.maps.benchmark import TRACKS_VERSION, VERSION, load_mazes, manifest_hash
 from mazebench.maps.maze import cell_to_point, path_through_walls
 from mazebench.storage.json_files import write_json
+from mazebench.tasks.observation import state_errors
 from mazebench.tasks.perturbations import perturbation_levels
-from mazebench.tasks.route import plan_route
-from mazebench.tasks.shown_map import show_map
+from mazebench.tasks.registry import make_spec
+from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 
 _STEP = 0.3  # m
@@ -57,14 +59,24 @@ def make_result(
     checkpoint: str | None = None,
     split: str = "eval",
     privileged: bool = False,
+    track: str | None = None,
+    level: int = 1,
     **levels: float,
 ) -> pathlib.Path:
-    """Writes the result of an agent that follows the shown map and gives up on the way with probability 1 - skill."""
-    mazes = load_mazes(size, split)
-    spec = TaskSpec(task=task, mazes=mazes, distances=distances, landmark_distance=landmark_distance, **levels)
+    """Writes the result of an agent that follows the true path and gives up on the way with probability 1 - skill.
+
+    On a track, all frozen episodes of the first `num_mazes` mazes are played.
+    """
+    if track is not None:
+        spec = make_spec(track, split=split, level=level)
+        size, version, labels = spec.size, TRACKS_VERSION, {"track": track, "level": level}
+        trials = select_track_trials(spec.mazes, split == "eval", spec.distances, episodes_per_distance)
+    else:
+        mazes, version, labels = load_mazes(size, split), VERSION, {}
+        spec = TaskSpec(task=task, mazes=mazes, distances=distances, landmark_distance=landmark_distance, **levels)
+        trials = select_trials(task, mazes, split == "eval", distances, episodes_per_distance)
     rng = np.random.default_rng([len(agent), size, landmark_distance, seed])
-    trials = select_trials(task, mazes, split == "eval", distances, episodes_per_distance)
-    labels = {"agent": agent, "task": task, "size": size, "split": split}
+    labels = {"agent": agent, "task": task, "size": size, "split": split} | labels
     records, drives = [], []
     for trial in trials:
         if trial.episode.maze < num_mazes:
@@ -77,13 +89,13 @@ def make_result(
     if record:
         save_trajectories(folder / TRAJECTORIES, pack_trajectories(drives))
     provenance = {
-        "benchmark_manifest_sha256": manifest_hash(),
+        "benchmark_manifest_sha256": manifest_hash(version),
         "checkpoint_sha256": checkpoint,
         "options": {"landmark_distance": landmark_distance, "seed": seed},
         "command": ["mazebench", "eval", "--agent", agent],
         "packages": {"mazebench-mujoco": "0.1.0", "numpy": np.__version__},
     }
-    content = {"benchmark": VERSION, "episodes": len(records), "perturbation": perturbation_levels(spec)}
+    content = {"benchmark": version, "episodes": len(records), "perturbation": perturbation_levels(spec)}
     write_json(folder / SUMMARY, labels | content | {"provenance": provenance, "privileged": privileged})
     return _set_means(folder, records)
 
@@ -116,13 +128,13 @@ def of_own_mazes(folder: pathlib.Path, name: str) -> pathlib.Path:
 def _set_means(folder: pathlib.Path, records: list[Record]) -> pathlib.Path:
     overall, by_distance = summarize(records)
     means = {distance: figures.model_dump() for distance, figures in by_distance.items()}
-    return edit_summary(folder, overall=overall.model_dump(), by_distance=means)
+    by_fact = {fact: figures.model_dump() for fact, figures in summarize_facts(records).items()}
+    return edit_summary(folder, overall=overall.model_dump(), by_distance=means, by_fact=by_fact)
 
 
 def _drive(spec: TaskSpec, trial: Trial, success: bool, rng: np.random.Generator) -> Trajectory:
     """Drives along the shortest path with some jitter, only a part of it without success."""
     episode, maze = trial.episode, spec.mazes[trial.episode.maze]
-    shown = show_map(spec, episode)
     points = cell_to_point(np.array(path_through_walls(maze.walls, episode.start, episode.goal)), spec.size)
     distances = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1]), axis=1).cumsum()
     end = distances[-1] - 0.5 if success else distances[-1] * rng.uniform(0.1, 0.8)
@@ -132,9 +144,16 @@ def _drive(spec: TaskSpec, trial: Trial, success: bool, rng: np.random.Generator
     if not success:
         place = np.concatenate([place, place[-1] + rng.normal(0, 0.05, (100, 2))])
     heading = np.arctan2(*np.diff(place, axis=0, prepend=place[:1] - [[1e-3, 0]]).T[::-1])
-    cells = plan_route(spec, episode, shown).cells[1:]
-    landmarks = np.array([row * spec.size + column for row, column in cells], dtype=np.int32)
-    return Trajectory(np.column_stack([place, heading]).astype(np.float16), shown.seen_walls(), landmarks)
+    states = np.zeros((len(place), 12))
+    states[:, [0, 1, 5]] = np.column_stack([place, heading])
+    for error in state_errors(spec, episode):
+        for state in states:
+            error(state)
+    recorder = Recorder(spec, 1)
+    for at, yaw, state in zip(place[:-1, None], heading[:-1, None], states[:-1, None], strict=True):
+        recorder.add(at, yaw, state, np.array([True]))
+    context = leg_context(spec, show_map(spec, episode), episode.start, episode.goal)
+    return recorder.take(0, place[-1], heading[-1], {"state": states[-1], "context": context}, episode)
 
 
 def _outcome(number: int, trial: Trial, spec: TaskSpec, success: bool, drive: Trajectory) -> dict[str, Any]:

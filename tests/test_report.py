@@ -41,7 +41,7 @@ def set_outcomes(folder, outcomes):
     def edit(record):
         success = next(left)
         outcome = {"success": bool(success), "path_length": 4.0, "shortest_path": 1.0}
-        return record | outcome | {"spl": success * 0.25, "spl_grid": success * record["distance"] / 4}
+        return record | outcome | {"spl": success * 0.25, "spl_grid": success * min(record["distance"] / 4, 1.0)}
 
     return edit_records(folder, edit)
 
@@ -159,6 +159,71 @@ class TestValues:
 
     def test_distances_are_written_as_ranges(self):
         assert format_distances([1, 2, 3, 5, 8, 9]) == "1–3, 5, 8–9"
+
+
+class TestTracks:
+    def test_a_row_for_each_track_and_level_and_a_column_for_each_agent(self, tmp_path):
+        for agent in ("mah", "random"):
+            make_result(tmp_path / agent / "lost-1", agent, track="lost", level=1, num_mazes=2, record=False)
+            make_result(tmp_path / agent / "v1", agent, num_mazes=2, record=False)
+        for level in (1, 2):
+            make_result(tmp_path / f"stale-{level}", "mah", track="stale", level=level, num_mazes=2, record=False)
+        tables = tables_of(tmp_path)
+        assert tables["tracks"].rows == ("stale 1", "stale 2", "lost 1")
+        columns = tables["tracks"].columns
+        episodes = {column.label: [cell and cell.episodes for cell in column.cells["spl"]] for column in columns}
+        assert episodes == {"mah": [20, 20, 20], "random": [None, None, 20]}
+        assert tables["track-stale"].x == (1.0, 2.0)
+        rows = [f"{name}, 13 × 13" for name in ("local", "lost, level 1", "stale, level 1", "stale, level 2")]
+        assert tables["all"].rows == tuple(rows)
+        assert tables["local-13"].columns[0].cells["spl"][0].episodes == 2
+
+    def test_levels_are_not_cut_to_the_distances_that_they_share(self, tmp_path):
+        for level in (1, 2):
+            make_result(tmp_path / f"far-{level}", "mah", track="far", level=level, num_mazes=1, record=False)
+        assert [cell.episodes for cell in tables_of(tmp_path)["track-far"].columns[0].cells["spl"]] == [10, 10]
+
+    def test_episodes_with_a_blocked_path_and_others_have_rows(self, tmp_path):
+        folder = make_result(tmp_path / "a", "mah", track="stale", level=2, num_mazes=2, record=False)
+        edit_records(folder, lambda record: record | {"blocked": record["episode"] % 4 == 0})
+        set_outcomes(folder, [index % 4 > 0 for index in range(20)])
+        summary = read_summary(folder)
+        for figures, relative in ((summary["overall"], 0.25), *zip(summary["by_fact"].values(), (0, 0.5), strict=True)):
+            figures["spl_relative"] = relative
+        edit_summary(folder, by_fact=summary["by_fact"], overall=summary["overall"])
+        table = tables_of(folder)["track-stale"]
+        assert table.rows == ("2", "2, blocked", "2, not blocked")
+        cells = table.columns[0].cells
+        assert [(cell.value, cell.episodes) for cell in cells["success_rate"]] == [(0.75, 20), (0.0, 5), (1.0, 15)]
+        assert [cell.value for cell in cells["spl_relative"]] == [0.25, 0.0, 0.5]
+
+    def test_a_map_scale_that_an_agent_was_never_trained_on_is_marked(self, tmp_path):
+        folder = make_result(tmp_path / "a", "mah", track="lost", num_mazes=2, record=False)
+        edit_summary(folder, untrained_scale=True)
+        make_result(tmp_path / "b", "random", track="lost", num_mazes=2, record=False)
+        table = tables_of(tmp_path)["tracks"]
+        assert re.search(r"\| lost 1 \| \d\.\d\d\* \[.*\] \| \d\.\d\d \[", to_markdown(table))
+        assert table.note.endswith("* The agent was never trained on maps of this scale.")
+        assert [line["mark"] for line in csv.DictReader(io.StringIO(to_csv(table)))][:2] == ["*", ""]
+
+    def test_they_have_a_figure_and_trajectories(self, tmp_path):
+        for track in ("lost", "sketch"):
+            make_result(tmp_path / "results" / track, "mah", track=track, num_mazes=1, record=track == "sketch")
+        write_report([tmp_path / "results"], tmp_path / "report", silent)
+        figures = {path.name for path in (tmp_path / "report" / "figures").iterdir()}
+        assert {"tracks.png", "track-lost.pdf", "trajectories-sketch-1.png"} <= figures
+        assert "![Tracks: success rate by level](figures/tracks.png)" in (tmp_path / "report" / "report.md").read_text()
+
+    def test_training_runs_are_pooled_by_level(self, tmp_path):
+        for checkpoint in "ab":
+            options = {"track": "lost", "num_mazes": 2, "record": False, "checkpoint": 64 * checkpoint}
+            make_result(tmp_path / checkpoint, "mah", **options)
+        pooled = tables_of(tmp_path)["pooled-lost"]
+        assert (pooled.row_name, pooled.rows, pooled.title) == (
+            "level",
+            ("1",),
+            "Track lost, pooled over training runs",
+        )
 
 
 class TestPooledRuns:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import re
 
+import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
-from made_results import make_result
+from made_results import edit_records, make_result
 
+from mazebench.maps.benchmark import load_track_mazes
 from mazebench.report.report import write_report
+from mazebench.world.lidar import Lidar
 
 NASTY = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=1>"
 
@@ -80,6 +83,106 @@ def set_value(name, value, event="change"):
 def choose_setting(browser, ending):
     options = "[...document.getElementById('setting').options]"
     browser.run(set_value("setting", browser.run(f"{options}.find(o => o.text.endsWith('{ending}')).value")))
+
+
+@pytest.fixture(scope="module")
+def track_page(tmp_path_factory):
+    """The page over results on tracks, and one of the benchmark's first version without lidar."""
+    folder = tmp_path_factory.mktemp("tracks")
+    for agent in ("mah", "random"):
+        here = folder / "results" / agent
+        for level in (1, 2):
+            make_result(here / f"lost-{level}", agent, skill=0.8, track="lost", level=level, num_mazes=2)
+        make_result(here / "sketch", agent, skill=0.8, track="sketch", num_mazes=1)
+        make_result(here / "local", agent, num_mazes=2)
+        stale = make_result(here / "stale", agent, skill=0.5, track="stale", num_mazes=2)
+        edit_records(stale, lambda record: record | {"blocked": record["episode"] % 4 == 0})
+    write_report([folder / "results"], folder / "report", lambda line: None)
+    return folder / "report" / "report.html"
+
+
+@pytest.fixture
+def on_tracks(browser, track_page):
+    """The browser with the page of tracks loaded anew."""
+    browser.errors.clear()
+    browser.open(track_page)
+    browser.wait_for("document.getElementById('clock').value.startsWith('step')")
+    yield browser
+    assert browser.errors == []
+
+
+def is_seen(name):
+    return f"document.getElementById('{name}').checkVisibility()"
+
+
+class TestTracks:
+    def test_failures_are_found_by_track_level_and_group(self, on_tracks):
+        choose_setting(on_tracks, "track stale")
+        on_tracks.wait_for(is_seen("group"))
+        on_tracks.run(set_value("group", "blocked"))
+        assert on_tracks.run("document.getElementById('count').textContent") == "5 of 20 episodes"
+        on_tracks.run("document.getElementById('failures').click()")
+        texts = on_tracks.run("[...document.getElementById('episodes').options].map(o => o.text)")
+        assert all(text.startswith("✗") for text in texts)
+        assert len(texts) < 5
+
+    def test_the_level_changes_what_is_shown_of_the_same_episode(self, on_tracks):
+        choose_setting(on_tracks, "track lost")
+        on_tracks.wait_for(is_seen("odometry"))
+        on_tracks.run(set_value("episodes", 7))
+        shown = "document.getElementById('shown').toDataURL()"
+        with_start = on_tracks.run(shown)
+        levels = on_tracks.run("[...document.getElementById('level').options].map(o => [o.text, o.value])")
+        assert [text for text, _ in levels] == ["1", "2"]
+        on_tracks.run(set_value("level", levels[1][1]))
+        on_tracks.wait_for(f"{shown} !== '{with_start}'")  # without the start
+        assert on_tracks.run("document.getElementById('episodes').value") == "7"
+
+    def test_the_path_by_odometry_stands_beside_the_true_one(self, on_tracks):
+        choose_setting(on_tracks, "track lost")
+        on_tracks.wait_for(is_seen("odometry"))
+        assert "odometry" in on_tracks.run("document.getElementById('key').textContent")
+        # Level 1 has no drift: laid on the first pose, odometry is the true path.
+        apart = on_tracks.run(
+            "['x', 'y'].flatMap(axis => Array.from(view.current.path[axis],"
+            "(at, index) => at - view.current.observed[axis][index]))"
+        )
+        assert max(map(abs, apart)) <= 2  # 32 are a metre
+        choose_setting(on_tracks, "track stale")
+        on_tracks.wait_for(f"!{is_seen('odometry')}")
+
+    def test_a_drawn_map_is_shown_as_it_was_given(self, on_tracks):
+        choose_setting(on_tracks, "track sketch")
+        on_tracks.wait_for("view.current.side === 26")
+        greys = on_tracks.run("[...new Set(view.current.shown)]")
+        assert len(greys) > 10
+        assert not on_tracks.run("differs(view.current)")
+
+    def test_the_rays_are_those_of_the_sensor(self, on_tracks):
+        choose_setting(on_tracks, "track stale")
+        on_tracks.wait_for(is_seen("lidar"))
+        with_rays = on_tracks.run(PIXELS)
+        maze, x, y, yaw, *ranges = on_tracks.run(
+            "[view.current.maze, ...['x', 'y', 'yaw'].map(name => view.current.path[name][view.time]),"
+            "...rangesOf(view.current.real, view.current.size, view.current.path, view.time, data.lidar)]"
+        )
+        mazes = load_track_mazes(13, "eval")
+        index = [known.name for known in mazes].index(maze)
+        pose = np.array([[x / 32, y / 32, yaw * 2 * np.pi / 256]])
+        np.testing.assert_allclose(ranges, Lidar(mazes).ranges(np.array([index]), pose)[0], atol=1e-4)
+        on_tracks.run("document.getElementById('lidar').click()")
+        assert on_tracks.run(PIXELS) != with_rays
+
+    def test_without_lidar_there_are_no_rays(self, on_tracks):
+        choose_setting(on_tracks, "local, 13 × 13")
+        on_tracks.wait_for(f"!{is_seen('lidar')} && !{is_seen('level')} && !{is_seen('group')}")
+
+    @pytest.mark.parametrize("width", [360, 1200])
+    def test_it_fits_narrow_and_wide_windows(self, on_tracks, width):
+        choose_setting(on_tracks, "track lost")
+        on_tracks.resize(width, 800)
+        on_tracks.wait_for(f"document.documentElement.clientWidth === {width}")
+        assert on_tracks.run("document.documentElement.scrollWidth") <= width
 
 
 class TestReading:

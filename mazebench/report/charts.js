@@ -37,9 +37,9 @@ function swatch(label) {
 
 function formatCell(cell) {
   if (!cell) return "";
-  const [value, low, high, , runs] = cell;
+  const [value, low, high, , runs, untrainedScale] = cell;
   const interval = low === null ? "" : ` [${low.toFixed(2)}, ${high.toFixed(2)}]`;
-  return value.toFixed(2) + interval + (runs ? `, ${runs} runs` : "");
+  return value.toFixed(2) + (untrainedScale ? "*" : "") + interval + (runs ? `, ${runs} runs` : "");
 }
 
 // Columns that have a value of the chosen metric and are not switched off.
@@ -119,11 +119,12 @@ function drawColumn({ svg, across, up }, column, points, isCurve) {
   const width = column.paper ? 1.2 : 2.8 - 0.25 * rank;
   svg.append(shape("polyline", { points: line, fill: "none", stroke: color, "stroke-width": width, ...dash }));
   const kind = column.paper ? "cross" : MARKERS[rank % MARKERS.length];
-  for (const [x, value, low, high] of points) {
+  for (const [x, value, low, high, , , untrainedScale] of points) {
     if (hasIntervals && !isCurve) {
       svg.append(shape("line", { x1: across(x), x2: across(x), y1: up(low), y2: up(high), stroke: color, "stroke-width": 1.5 }));
     }
     svg.append(marker(kind, across(x), up(value), color, column.paper ? 3.5 : 4.6 - 0.3 * rank));
+    if (untrainedScale) svg.append(shape("text", { x: across(x) + 6, y: up(value) + 2 }, "*"));
   }
 }
 

@@ -54,11 +54,11 @@ def density(values: np.ndarray) -> np.ndarray:
 def _distribution(
     perturbation: str, base: Setting, results: Sequence[ReportedResult], labels: Sequence[str]
 ) -> Distribution:
-    levels = sorted({result.setting.level(perturbation) for result in results})
+    levels = sorted({result.setting.level_of(perturbation) for result in results})
     distances = common_distances(results)
     panels = []
     for label in labels:
-        own = {result.setting.level(perturbation): result for result in results if result.label == label}
+        own = {result.setting.level_of(perturbation): result for result in results if result.label == label}
         if own:
             panels.append((label, tuple(_violin(own[level], distances) if level in own else None for level in levels)))
     return Distribution(

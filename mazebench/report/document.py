@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from mazebench.evaluation.paper import citation, reference
-from mazebench.report.provenance import HEAD, provenance_rows
+from mazebench.report.provenance import HEAD, benchmark_versions, provenance_rows
 from mazebench.report.results import ReportedResult
 from mazebench.report.table import Table
 from mazebench.report.table_forms import escape_markdown, to_markdown
@@ -33,7 +33,7 @@ def build_document(
     count = sum(len(result.episodes) for result in results)
     lines = [
         "# mazebench report",
-        f"Benchmark {results[0].summary.benchmark}; {escape_markdown(', '.join(labels))}; "
+        f"Benchmark {benchmark_versions(results)}; {escape_markdown(', '.join(labels))}; "
         f"{count:,} episodes in {len(results)} results. [{PAGE}]({PAGE}) has interactive charts and every episode.",
         "Means with 95 % intervals, which allow for the likeness of episodes in one maze. Columns marked (paper) are "
         f"the values printed in {escape_markdown(citation())}. {reference()['note']}",

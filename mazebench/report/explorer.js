@@ -1,11 +1,8 @@
 "use strict";
 // The episode explorer. A result's episodes and paths are packed and unpacked only when picked.
 
-const POSITION_UNITS = 32; // a metre
-const YAW_UNITS = 256; // a turn
 const STEP_SECONDS = 0.16;
 const MAX_LISTED = 2000;
-const PLASMA = [[13, 8, 135], [126, 3, 168], [204, 71, 120], [248, 149, 64], [240, 220, 50]];
 
 const byId = (id) => document.getElementById(id);
 const inCells = (count) => `${count} ${count === 1 ? "cell" : "cells"}`;
@@ -43,7 +40,8 @@ function unpack(number) {
     const columns = { ...trial, ...drive };
     columns.spl = columns.success.map((_, index) => splOf(columns, index, columns.shortest[index]));
     columns.splGrid = columns.success.map((_, index) => splOf(columns, index, columns.distance[index]));
-    return { columns, maps, ...unpackPoses(bytes, result.poses) };
+    const observed = result.odometry ? unpackPoses(bytes.subarray(5 * result.poses), result.poses) : null;
+    return { columns, maps, path: unpackPoses(bytes, result.poses), observed };
   });
 }
 
@@ -73,6 +71,10 @@ function wallsOf(bytes, size) {
   return Array.from({ length: size * size }, (_, cell) => (bytes[cell >> 3] >> (7 - (cell & 7))) & 1);
 }
 
+function partOf(path, first, count) {
+  return { x: path.x.subarray(first, first + count), y: path.y.subarray(first, first + count), yaw: path.yaw.subarray(first, first + count) };
+}
+
 function sumBefore(counts, index) {
   let sum = 0;
   for (let other = 0; other < index; other++) sum += counts[other];
@@ -87,24 +89,19 @@ function episodeOf(packed, number, index) {
   const first = columns.steps.slice(0, index).reduce((sum, steps) => sum + steps + 1, 0);
   const poses = result.poses ? columns.steps[index] + 1 : 0;
   const firstLandmark = sumBefore(columns.landmarkCounts, index);
-  const ownMap = packed.maps.length > 0;
-  const mapBytes = Math.ceil((result.size * result.size) / 8);
-  const map = packed.maps.subarray(index * mapBytes, (index + 1) * mapBytes);
   const real = maze.walls ? wallsOf(bytesOfBase64(maze.walls), result.size) : null;
   return {
     size: result.size,
     maze: maze.name,
     real,
-    shown: ownMap ? wallsOf(map, result.size) : result.perturbed ? null : real,
+    ...shownMap(packed, result, index, real),
     start: columns.start[index],
     goal: columns.goal[index],
-    shownStart: columns.shownStart ? columns.shownStart[index] : columns.start[index],
-    shownGoal: columns.shownGoal ? columns.shownGoal[index] : columns.goal[index],
-    isWarped: Boolean(columns.shownStart),
     landmarks: columns.landmarks.slice(firstLandmark, firstLandmark + (columns.landmarkCounts[index] || 0)),
-    x: packed.x.subarray(first, first + poses),
-    y: packed.y.subarray(first, first + poses),
-    yaw: packed.yaw.subarray(first, first + poses),
+    path: partOf(packed.path, first, poses),
+    observed: packed.observed && partOf(packed.observed, first, poses),
+    lidar: result.lidar && real !== null,
+    groups: result.groups.filter((group) => columns.groups[group][index]),
     distance: columns.distance[index],
     success: Boolean(columns.success[index]),
     steps: columns.steps[index],
@@ -113,6 +110,23 @@ function episodeOf(packed, number, index) {
     spl: columns.spl[index],
     splGrid: columns.splGrid[index],
     seed: columns.seed[index],
+  };
+}
+
+// The map as the agent was shown it: the share of wall in each of `side` x `side` pixels, where start and goal are marked
+// (-1: not marked), and whether the pixels are not the maze's cells.
+function shownMap({ columns, maps }, result, index, real) {
+  const side = result.picture || result.size;
+  const count = result.picture ? side * side : Math.ceil((side * side) / 8);
+  const map = maps.subarray(index * count, (index + 1) * count);
+  const recorded = () => (result.picture ? Array.from(map, (value) => value / 255) : wallsOf(map, side));
+  const isTrack = data.settings[result.setting].level > 0;
+  return {
+    side,
+    shown: maps.length ? recorded() : result.exact ? real : null,
+    shownStart: (columns.shownStart || columns.start)[index],
+    shownGoal: (columns.shownGoal || columns.goal)[index],
+    isDrawn: isTrack ? result.picture > 0 : Boolean(columns.shownStart),
   };
 }
 
@@ -128,9 +142,18 @@ function resultsOf(setting) {
   return data.results.flatMap((result, number) => (result.setting === setting ? [number] : []));
 }
 
+// The settings that differ from one only in the level of its track, and that one.
+function levelsOf(setting) {
+  const isLike = (other) => other === setting || (data.settings[other].level && data.settings[other].name === data.settings[setting].name);
+  return data.settings.map((_, other) => other).filter(isLike);
+}
+
 function chooseResult(number) {
   const { setting } = data.results[number];
-  byId("setting").value = String(setting);
+  const levels = levelsOf(setting);
+  byId("setting").value = String(levels[0]);
+  fill(byId("level"), levels.map((other) => [other, data.settings[other].level]), setting);
+  byId("level-label").hidden = !data.settings[setting].level;
   fill(byId("agent"), resultsOf(setting).map((other) => [other, data.results[other].label]), number);
 }
 
@@ -145,8 +168,10 @@ async function openResult(number, episode = null) {
   fill(byId("maze"), [["", "all"], ...result.mazes.map((maze, index) => [index, data.mazes[maze].name])], byId("maze").value);
   const distances = [...new Set(columns.distance)].sort((a, b) => a - b);
   fill(byId("distance"), [["", "all"], ...distances.map((distance) => [distance, inCells(distance)])], byId("distance").value);
+  fill(byId("group"), [["", "all"], ...result.groups.map((group) => [group, group])], byId("group").value);
+  byId("group-label").hidden = !result.groups.length;
   if (episode !== null && !listed().includes(episode)) {
-    for (const id of ["maze", "distance"]) byId(id).value = "";
+    for (const id of ["maze", "distance", "group"]) byId(id).value = "";
     byId("failures").checked = false;
   }
   listEpisodes(episode);
@@ -156,9 +181,11 @@ function listed() {
   const { columns } = view.packed;
   const maze = byId("maze").value;
   const distance = byId("distance").value;
+  const group = byId("group").value;
   const failures = byId("failures").checked;
   return columns.success.flatMap((success, index) => {
-    const fits = (maze === "" || columns.maze[index] === Number(maze)) && (distance === "" || columns.distance[index] === Number(distance));
+    const isHere = (maze === "" || columns.maze[index] === Number(maze)) && (distance === "" || columns.distance[index] === Number(distance));
+    const fits = isHere && (group === "" || columns.groups[group][index]);
     return fits && !(failures && success) ? [index] : [];
   });
 }
@@ -186,7 +213,7 @@ function showNothing(text) {
   byId("clock").value = "";
   byId("time").disabled = byId("play").disabled = true;
   for (const id of ["numbers", "others"]) byId(id).hidden = true;
-  for (const id of ["shown", "driven"]) byId(id).hidden = true;
+  for (const id of ["shown", "driven", "odometry-figure", "lidar-label"]) byId(id).hidden = true;
   byId("key").replaceChildren();
 }
 
@@ -195,10 +222,12 @@ function openEpisode(index) {
   view.episode = index;
   view.current = episodeOf(view.packed, view.result, index);
   const { current } = view;
-  const poses = current.x.length;
+  const poses = current.path.x.length;
   byId("time").max = String(Math.max(poses - 1, 0));
   byId("time").disabled = byId("play").disabled = poses < 2;
   for (const id of ["numbers", "others", "shown", "driven"]) byId(id).hidden = false;
+  byId("odometry-figure").hidden = !current.observed;
+  byId("lidar-label").hidden = !current.lidar || !poses;
   writeOutcome();
   writeNumbers();
   writeKey();
@@ -236,6 +265,7 @@ function writeNumbers() {
     ["SPL", current.spl.toFixed(2)],
     ["SPL by grid distance", current.splGrid.toFixed(2)],
     ["seed", String(current.seed)],
+    ...current.groups.map((group) => ["group", group]),
   ];
   byId("numbers").tBodies[0].replaceChildren(
     ...rows.map(([name, value]) => element("tr", {}, element("th", { scope: "row" }, name), element("td", { class: "number" }, value))),
@@ -276,6 +306,7 @@ function otherRow(number, index, columns) {
 function writeKey() {
   const { current } = view;
   const entries = [["--start", "start"], ["--goal", "goal"]];
+  if (current.observed) entries.push(["--odometry", "odometry, laid on the first pose"]);
   if (current.landmarks.length) entries.push(["--landmark", "landmarks"]);
   if (differs(current)) entries.push(["--false-wall", "wall on the map only"], ["--lost-wall", "wall missing on the map"]);
   const items = entries.map(([color, text]) => {
@@ -287,103 +318,63 @@ function writeKey() {
 }
 
 function differs(current) {
-  return !current.isWarped && current.shown && current.real && current.shown.some((wall, cell) => wall !== current.real[cell]);
+  return !current.isDrawn && current.shown && current.real && current.shown.some((wall, cell) => wall !== current.real[cell]);
 }
 
 // --- drawing ---
-
-function colors() {
-  const style = getComputedStyle(document.documentElement);
-  return (name) => style.getPropertyValue(`--${name}`).trim();
-}
-
-// On a dark floor the ramp begins brighter.
-function plasma(share) {
-  const darkest = matchMedia("(prefers-color-scheme: dark)").matches ? 0.3 : 0;
-  const at = Math.min(darkest + (1 - darkest) * share, 0.9999) * (PLASMA.length - 1);
-  const [low, high] = [PLASMA[Math.floor(at)], PLASMA[Math.floor(at) + 1]];
-  return `rgb(${low.map((value, index) => Math.round(value + (at % 1) * (high[index] - value))).join(",")})`;
-}
-
-function prepare(canvas, size) {
-  const cellPixels = Math.max(1, Math.round((canvas.clientWidth * (window.devicePixelRatio || 1)) / size));
-  const side = cellPixels * size; // whole pixels, so that no seams show between cells
-  if (canvas.width !== side) canvas.width = canvas.height = side;
-  const pen = canvas.getContext("2d");
-  pen.setTransform(side / size, 0, 0, side / size, 0, 0);
-  return pen;
-}
-
-function fillCell(pen, cell, size, color) {
-  pen.fillStyle = color;
-  pen.fillRect(cell % size, Math.floor(cell / size), 1, 1);
-}
-
-function drawMap(pen, walls, other, current, color, ends) {
-  const { size } = current;
-  for (let cell = 0; cell < size * size; cell++) {
-    const isWall = walls ? walls[cell] : 0;
-    const differing = other && walls && other[cell] !== isWall;
-    fillCell(pen, cell, size, differing ? color(isWall ? "false-wall" : "lost-wall") : color(isWall ? "wall" : "floor"));
-  }
-  if (!current.isWarped || walls === current.real) {
-    for (const cell of current.landmarks) fillCell(pen, cell, size, color("landmark"));
-  }
-  for (const [cell, name] of ends) {
-    pen.beginPath();
-    pen.arc((cell % size) + 0.5, Math.floor(cell / size) + 0.5, 0.36, 0, 2 * Math.PI);
-    pen.fillStyle = color(name);
-    pen.fill();
-  }
-}
-
-function drawPath(pen, current, color) {
-  const { size, x, y, yaw } = current;
-  const place = (index) => [x[index] / POSITION_UNITS, size - y[index] / POSITION_UNITS];
-  pen.lineCap = "round";
-  pen.lineWidth = 0.05;
-  pen.strokeStyle = color("ahead");
-  pen.beginPath();
-  for (let index = view.time; index < x.length; index++) pen.lineTo(...place(index));
-  pen.stroke();
-  pen.lineWidth = 0.14;
-  for (let index = 1; index <= view.time; index++) {
-    pen.strokeStyle = plasma(index / Math.max(x.length - 1, 1));
-    pen.beginPath();
-    pen.moveTo(...place(index - 1));
-    pen.lineTo(...place(index));
-    pen.stroke();
-  }
-  drawBody(pen, ...place(view.time), (-2 * Math.PI * yaw[view.time]) / YAW_UNITS, color);
-}
-
-// A disc of the body's radius and its nose; the canvas has y down, so the angle comes negated.
-function drawBody(pen, x, y, angle, color) {
-  pen.beginPath();
-  pen.arc(x, y, 0.15, 0, 2 * Math.PI);
-  pen.fillStyle = color("body");
-  pen.fill();
-  pen.lineWidth = 0.08;
-  pen.strokeStyle = color("body");
-  pen.beginPath();
-  pen.moveTo(x, y);
-  pen.lineTo(x + 0.36 * Math.cos(angle), y + 0.36 * Math.sin(angle));
-  pen.stroke();
-}
 
 function draw() {
   const { current } = view;
   if (view.episode < 0) return;
   const color = colors();
-  const shown = byId("shown");
-  const driven = byId("driven");
-  const known = current.real || (current.isWarped ? null : current.shown);
-  drawMap(prepare(shown, current.size), current.shown, null, current, color, [[current.shownStart, "start"], [current.shownGoal, "goal"]]);
-  const pen = prepare(driven, current.size);
-  drawMap(pen, known, null, current, color, [[current.start, "start"], [current.goal, "goal"]]);
+  const ranges = current.lidar && current.path.x.length && byId("lidar").checked ? rangesOf(current.real, current.size, current.path, view.time, data.lidar) : [];
+  drawShown(current, color);
+  drawDriven(current, ranges, color);
+  if (current.observed) drawOdometry(current, ranges, color);
+  describe();
+}
+
+function drawShown(current, color) {
+  const { side } = current;
+  const pen = prepare(byId("shown"), side);
+  drawMap(pen, current.shown, side, color);
+  if (!current.isDrawn) current.landmarks.forEach((cell) => fillCell(pen, cell, side, color("landmark")));
+  const radius = (0.36 * thickness(current.size) * side) / current.size;
+  drawMark(pen, current.shownStart, side, radius, color("start"));
+  drawMark(pen, current.shownGoal, side, radius, color("goal"));
+}
+
+function drawDriven(current, ranges, color) {
+  const { size, path } = current;
+  const pen = prepare(byId("driven"), size);
+  drawMap(pen, current.real || (current.isDrawn ? null : current.shown), size, color);
+  for (const cell of current.landmarks) fillCell(pen, cell, size, color("landmark"));
+  for (const name of ["start", "goal"]) drawMark(pen, current[name], size, 0.36 * thickness(size), color(name));
   if (differs(current)) markDifferences(pen, current, color);
-  if (current.x.length) drawPath(pen, current, color);
-  describe(shown, driven);
+  if (!path.x.length) return;
+  drawRays(pen, path, view.time, size, ranges, data.lidar.range, color);
+  drawPath(pen, path, view.time, size, color);
+  if (current.observed) drawDashed(pen, current.observed, view.time, size, color("odometry"));
+}
+
+// The path that was observed, turned so that the first heading points to the right, in the middle of the canvas.
+function drawOdometry(current, ranges, color) {
+  const { size, observed: path } = current;
+  const turn = angleOf(path, 0);
+  const [cosine, sine] = [Math.cos(turn), Math.sin(turn)];
+  const points = Array.from(path.x, (_, index) => {
+    const [x, y] = placeOf(path, index, size);
+    return [cosine * x - sine * y, sine * x + cosine * y];
+  });
+  const [low, high] = [Math.min, Math.max].map((pick) => [0, 1].map((axis) => pick(...points.map((point) => point[axis]))));
+  const extent = Math.ceil(Math.max(size, high[0] - low[0] + 2, high[1] - low[1] + 2));
+  const pen = prepare(byId("odometry"), extent);
+  pen.fillStyle = color("floor");
+  pen.fillRect(0, 0, extent, extent);
+  pen.translate(...[0, 1].map((axis) => (extent - low[axis] - high[axis]) / 2));
+  pen.rotate(turn);
+  drawRays(pen, path, view.time, size, ranges, data.lidar.range, color);
+  drawPath(pen, path, view.time, size, color);
 }
 
 // Small squares where map and maze disagree; the map itself is drawn beside it as it was shown.
@@ -396,26 +387,28 @@ function markDifferences(pen, current, color) {
   });
 }
 
-function describe(shown, driven) {
+function describe() {
   const { current } = view;
   byId("shown-caption").textContent = current.shown ? "The map that the agent was shown" : "The map that the agent was shown was not recorded";
-  byId("driven-caption").textContent = !current.x.length
+  byId("driven-caption").textContent = !current.path.x.length
     ? "The maze; the path was not recorded (eval --record)"
     : current.real ? "The maze, and the path driven in it" : "The true maze is not in the results; the path driven, on the map";
-  shown.setAttribute("aria-label", `Map of ${current.size} by ${current.size} cells as shown to the agent`);
-  driven.setAttribute("aria-label", `Maze ${current.maze} with the path driven up to step ${view.time} of ${current.steps}`);
+  byId("shown").setAttribute("aria-label", `Map of ${current.side} by ${current.side} pixels as shown to the agent`);
+  byId("odometry").setAttribute("aria-label", `The path by the agent's odometry up to step ${view.time} of ${current.steps}`);
+  byId("driven").setAttribute("aria-label", `Maze ${current.maze} with the path driven up to step ${view.time} of ${current.steps}`);
 }
 
 // --- time ---
 
 function moveTo(time) {
   const { current } = view;
-  view.time = Math.max(0, Math.min(current.x.length - 1, time));
+  const { x, y, yaw } = current.path;
+  view.time = Math.max(0, Math.min(x.length - 1, time));
   byId("time").value = String(view.time);
   const metres = (value) => (value / POSITION_UNITS).toFixed(2);
-  const degrees = ((Math.round((360 * (current.yaw[view.time] || 0)) / YAW_UNITS) + 180) % 360) - 180;
-  const text = current.x.length
-    ? `step ${view.time} of ${current.steps}, ${(view.time * STEP_SECONDS).toFixed(2)} s, x ${metres(current.x[view.time])} y ${metres(current.y[view.time])} m, heading ${degrees}°`
+  const degrees = ((Math.round((360 * (yaw[view.time] || 0)) / YAW_UNITS) + 180) % 360) - 180;
+  const text = x.length
+    ? `step ${view.time} of ${current.steps}, ${(view.time * STEP_SECONDS).toFixed(2)} s, x ${metres(x[view.time])} y ${metres(y[view.time])} m, heading ${degrees}°`
     : "no path recorded";
   byId("clock").value = text;
   byId("time").setAttribute("aria-valuetext", text);
@@ -433,13 +426,13 @@ function play() {
     stop();
     return;
   }
-  const from = view.time >= view.current.x.length - 1 ? 0 : view.time;
+  const from = view.time >= view.current.path.x.length - 1 ? 0 : view.time;
   const began = performance.now();
   byId("play").textContent = "Pause";
   const frame = (now) => {
     const steps = ((now - began) / 1000 / STEP_SECONDS) * Number(byId("speed").value);
     moveTo(from + Math.floor(Math.max(steps, 0)));
-    if (view.time < view.current.x.length - 1) view.timer = requestAnimationFrame(frame);
+    if (view.time < view.current.path.x.length - 1) view.timer = requestAnimationFrame(frame);
     else stop();
   };
   view.timer = requestAnimationFrame(frame);
@@ -463,16 +456,20 @@ function linkedEpisode() {
 
 function listen() {
   const on = (id, event, action) => byId(id).addEventListener(event, action);
-  on("setting", "change", () => {
-    const numbers = resultsOf(Number(byId("setting").value));
+  const openSetting = (setting) => {
+    const numbers = resultsOf(setting);
     const sameAgent = numbers.find((number) => data.results[number].label === data.results[view.result].label);
     const number = sameAgent === undefined ? numbers[0] : sameAgent;
-    for (const id of ["maze", "distance"]) byId(id).value = "";
     chooseResult(number);
     openResult(number);
+  };
+  on("setting", "change", () => {
+    for (const id of ["maze", "distance", "group"]) byId(id).value = "";
+    openSetting(Number(byId("setting").value));
   });
+  on("level", "change", () => openSetting(Number(byId("level").value)));
   on("agent", "change", () => openResult(Number(byId("agent").value)));
-  for (const id of ["maze", "distance", "failures"]) on(id, "change", () => listEpisodes(null));
+  for (const id of ["maze", "distance", "group", "failures"]) on(id, "change", () => listEpisodes(null));
   on("episodes", "change", () => openEpisode(Number(byId("episodes").value)));
   on("previous", "click", () => step(-1));
   on("next", "click", () => step(1));
@@ -481,6 +478,7 @@ function listen() {
     moveTo(Number(byId("time").value));
   });
   on("play", "click", play);
+  on("lidar", "change", draw);
   new ResizeObserver(draw).observe(byId("driven"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 }
@@ -492,8 +490,8 @@ function startExplorer() {
   }
   const linked = linkedEpisode();
   const [result, episode] = linked || [data.first, null];
-  const settings = [...new Set(data.results.map(({ setting }) => setting))].sort((a, b) => a - b);
-  fill(byId("setting"), settings.map((setting) => [setting, data.settings[setting]]), data.results[result].setting);
+  const settings = data.settings.map((_, setting) => setting).filter((setting) => levelsOf(setting)[0] === setting);
+  fill(byId("setting"), settings.map((setting) => [setting, data.settings[setting].name]), levelsOf(data.results[result].setting)[0]);
   listen();
   chooseResult(result);
   openResult(result, episode).then(() => linked && byId("explorer").scrollIntoView());

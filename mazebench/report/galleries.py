@@ -10,8 +10,9 @@ import numpy as np
 from mazebench.maps.maze import Cell
 from mazebench.report.mazes import real_walls, shown_ends
 from mazebench.report.results import ReportedResult
-from mazebench.report.settings import Setting, short_name
+from mazebench.report.settings import Setting
 from mazebench.report.tables import perturbed_groups
+from mazebench.tasks.tracks import TRACKS
 
 _MAX_COLUMNS = 5  # episodes of a gallery
 _MAX_ROWS = 8  # agents
@@ -47,7 +48,7 @@ class Gallery:
 
 
 def build_galleries(results: Sequence[ReportedResult], labels: Sequence[str]) -> list[Gallery]:
-    """Returns galleries of the eval mazes: of each task, and of each perturbation at a middle level.
+    """Returns galleries of the eval mazes: of each task, and of each perturbation and track at a middle level.
 
     Of several sizes, the smallest is taken.
     """
@@ -58,12 +59,18 @@ def build_galleries(results: Sequence[ReportedResult], labels: Sequence[str]) ->
 
 def _settings(results: Sequence[ReportedResult]) -> Iterator[Setting]:
     for task in ("hierarchical", "local"):
-        plain = [r.setting for r in results if r.setting.task == task and not r.setting.levels]
+        plain = [r.setting for r in results if r.setting.task == task and r.setting.is_exact]
         if plain:
             yield min(plain, key=lambda setting: (setting.size, -setting.landmark_distance))
     for _, base, group in perturbed_groups(results):
-        levels = sorted({result.setting for result in group} - {base})
-        yield levels[(len(levels) - 1) // 2]
+        yield _middle({result.setting for result in group} - {base})
+    for track in TRACKS:
+        if played := {result.setting for result in results if result.setting.track == track}:
+            yield _middle(played)
+
+
+def _middle(settings: set[Setting]) -> Setting:
+    return sorted(settings)[(len(settings) - 1) // 2]
 
 
 def _gallery(setting: Setting, results: Sequence[ReportedResult], labels: Sequence[str]) -> Gallery | None:
@@ -72,17 +79,18 @@ def _gallery(setting: Setting, results: Sequence[ReportedResult], labels: Sequen
     found = [{key: number for number, key in enumerate(_keys(result))} for result in here]
     common = [key for key in found[0] if all(key in other for other in found)]
     place = ""
-    if setting.task == "local" and common:
-        distances = {key: int(here[0].episodes.distance[found[0][key]]) for key in common}
+    distances = {key: int(here[0].episodes.distance[found[0][key]]) for key in common}
+    if setting.track:  # which has few episodes of each distance: the longest of those that tell as much
+        common.sort(key=lambda key: -distances[key])
+    elif setting.task == "local" and common:
         distance = max((d for d in distances.values() if d <= _DISTANCE), default=min(distances.values()))
         common = [key for key in common if distances[key] == distance]
         place = f", start and goal {distance} cells apart"
     chosen = _most_telling(here, found, common)
     if not chosen:
         return None
-    levels = "".join(f"-{short_name(name)}-{level:g}" for name, level in setting.levels)
     return Gallery(
-        name=f"trajectories-{setting.task}-{setting.size}{levels}",
+        name=f"trajectories-{setting.name}",
         title=f"Trajectories: {setting}{place}",
         note="The episodes in which the agents' outcomes differ most, at most one of each maze: a choice, no sample.",
         drives=tuple(
@@ -117,7 +125,7 @@ def _most_telling(
 def _drives(result: ReportedResult, numbers: Sequence[int], results: Sequence[ReportedResult]) -> tuple[Drive, ...]:
     episodes, trajectories = result.episodes, result.trajectories
     assert trajectories is not None
-    has_own_frame = shown_ends(result, results) is not None
+    has_own_frame = shown_ends(result, results) is not None  # a drawn map's cells are recorded in the maze's frame
     drives = []
     for number in numbers:
         maze, trajectory = episodes.mazes[episodes.maze[number]], trajectories[number]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mazebench.maps.benchmark import load_mazes
+from mazebench.maps.benchmark import load_mazes, load_track_mazes
 from mazebench.maps.maze import Cell, Maze
 from mazebench.report.results import ReportedResult
 from mazebench.report.settings import known_levels
@@ -18,36 +18,40 @@ from mazebench.tasks.spec import TaskSpec
 def real_walls(result: ReportedResult, maze: str, results: Sequence[ReportedResult]) -> np.ndarray | None:
     """Returns `[N, N]` bool: the true maze.
 
-    None for a maze that is not the benchmark's, unless one of `results` recorded it with no map perturbed.
+    None for a maze that is not the benchmark's, unless one of `results` recorded its cells: with an exact map, or with
+    one that was drawn.
     """
     setting = result.setting
     if setting.split != "custom":
-        return next((known.walls for known in load_mazes(setting.size, setting.split) if known.name == maze), None)
+        mazes = (load_track_mazes if setting.track else load_mazes)(setting.size, setting.split)
+        return next((known.walls for known in mazes if known.name == maze), None)
     for other in results:
-        if other.setting.mazes == setting.mazes and not other.setting.levels and other.trajectories is not None:
+        if other.setting.mazes != setting.mazes or other.trajectories is None:
+            continue
+        if other.setting.is_exact or other.trajectories.picture is not None:
             episode = np.flatnonzero(other.episodes.maze == other.episodes.mazes.index(maze))[0]
             return other.trajectories[int(episode)].shown
     return None
 
 
 def shown_ends(result: ReportedResult, results: Sequence[ReportedResult]) -> tuple[list[Cell], list[Cell]] | None:
-    """Returns the cells of the shown map in which each episode's start and goal lie.
+    """Returns the cells of the recorded shown maps in which each episode's start and goal lie.
 
-    None where the shown map has the true maze's frame, so that a cell of one is the same cell of the other.
+    None where the shown maps have the true maze's frame, so that a cell of one is the same cell of the other.
     """
     setting = result.setting
-    if not setting.levels:
+    if not setting.perturbations:
         return None
     mazes = []
     for name in result.episodes.mazes:
         walls = real_walls(result, name, results)
         mazes.append(Maze(_open_room(setting.size) if walls is None else walls, name))
-    task = TaskSpec(task=setting.task, mazes=tuple(mazes), distances=(1,), **known_levels(dict(setting.levels)))
+    task = TaskSpec(task=setting.task, mazes=tuple(mazes), distances=(1,), **known_levels(dict(setting.perturbations)))
     starts, goals = [], []
     is_same = True
     for maze, start, goal, seed in zip(*_columns(result), strict=True):
         shown = show_map(task, Episode(maze, start, goal, 0.0, seed))
-        is_same &= shown.homography is None
+        is_same &= shown.drawing is None
         starts.append(shown.seen_cell(start))
         goals.append(shown.seen_cell(goal))
     return None if is_same else (starts, goals)

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from mazebench.evaluation.intervals import mean_interval
 from mazebench.report.results import METRICS, ReportedResult
 from mazebench.report.rows import Row
-from mazebench.report.table import METRIC_NAMES, SPL_RELATIVE, Cell, Column, Table
+from mazebench.report.table import METRIC_NAMES, SPL_RELATIVE, UNTRAINED_NOTE, Cell, Column, Table
 
 
 def make_table(
@@ -32,6 +33,8 @@ def make_table(
     if not all(SPL_RELATIVE in row for column in cells.values() for row in column if row):
         for row in (row for column in cells.values() for row in column):
             row.pop(SPL_RELATIVE, None)
+    if any(cell.is_untrained_scale for column in cells.values() for row in column for cell in row.values()):
+        note = f"{note} {UNTRAINED_NOTE}".strip()
     measured = [
         Column(label, False, {metric: tuple(row.get(metric) for row in column) for metric in METRIC_NAMES})
         for label, column in cells.items()
@@ -50,7 +53,10 @@ def measure(result: ReportedResult, chosen: np.ndarray) -> dict[str, Cell]:
         estimate = mean_interval(episodes.values(metric)[chosen], episodes.maze[chosen])
         cells[metric] = Cell(estimate.value, estimate.low, estimate.high, count)
     relative = _spl_relative(result, chosen)
-    return cells if relative is None else cells | {SPL_RELATIVE: Cell(relative, episodes=count)}
+    if relative is not None:
+        cells[SPL_RELATIVE] = Cell(relative, episodes=count)
+    is_marked = result.summary.untrained_scale
+    return {metric: dataclasses.replace(cell, is_untrained_scale=is_marked) for metric, cell in cells.items()}
 
 
 def _measure_row(row: Row, results: Sequence[ReportedResult]) -> dict[str, Cell]:
@@ -59,12 +65,15 @@ def _measure_row(row: Row, results: Sequence[ReportedResult]) -> dict[str, Cell]
 
 
 def _spl_relative(result: ReportedResult, chosen: np.ndarray) -> float | None:
-    """Returns the SPL divided by the oracle's, by what the summary says of all episodes and of each distance.
+    """Returns the SPL divided by the oracle's, by what the summary says of all episodes, each fact and each distance.
 
     None if the summary does not say it of these episodes.
     """
     if chosen.all():
         return result.summary.overall.spl_relative
+    for fact, holds in result.episodes.facts.items():
+        if fact in result.summary.by_fact and np.array_equal(chosen, holds):
+            return result.summary.by_fact[fact].spl_relative
     figures = [result.summary.by_distance[str(d)] for d in np.unique(result.episodes.distance[chosen]).tolist()]
     if sum(each.n for each in figures) != chosen.sum():
         return None

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from mazebench.report.measures import make_table
 from mazebench.report.results import ReportedResult
-from mazebench.report.rows import Row, chosen_episodes, common_distances, format_distances
+from mazebench.report.rows import Row, common_distances, format_distances, setting_row
 from mazebench.report.settings import Setting
 from mazebench.report.table import Table
 
@@ -18,7 +18,7 @@ def overview(results: Sequence[ReportedResult], labels: Sequence[str]) -> Table:
     for setting in settings:
         group = [result for result in results if result.setting == setting]
         has_namesake = sum(str(other) == str(setting) for other in settings) > 1
-        rows[_name(setting, group, has_namesake)] = _of_setting(setting, common_distances(group))
+        rows[_name(setting, group, has_namesake)] = setting_row(setting, group)
     note = "All episodes of each result; where results have other distances, those at the distances that all have."
     return make_table("all", "All results", note, "setting", rows, (), results, labels)
 
@@ -34,7 +34,3 @@ def _name(setting: Setting, results: Sequence[ReportedResult], has_namesake: boo
     elif setting.task == "local" and not common:
         parts.append("no distances in common")
     return ", ".join(parts)
-
-
-def _of_setting(setting: Setting, distances: Sequence[int]) -> Row:
-    return lambda result: chosen_episodes(result, distances) & (result.setting == setting)

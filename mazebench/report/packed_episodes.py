@@ -7,6 +7,7 @@ import json
 import math
 import zlib
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -18,36 +19,54 @@ from mazebench.report.results import ReportedResult
 # explorer.js counts in the same units.
 _POSITION_UNITS = 32  # a metre; one unit is about a pixel on the screen
 _YAW_UNITS = 256  # a turn
+_LARGEST = 2**14 - 1  # units, of a coordinate: a difference of two has 16 bits
 
 
 def pack_trials(result: ReportedResult, results: Sequence[ReportedResult]) -> str:
-    """Packs what is the same for all agents: the episodes, and the maps where they are perturbed."""
-    setting, trajectories = result.setting, result.trajectories
-    maps = trajectories.shown.tobytes() if trajectories is not None and setting.levels else b""
+    """Packs what is the same for all agents: the episodes, and the shown maps where they need not be the mazes."""
+    trajectories, maps = result.trajectories, b""
+    if trajectories is not None and not result.setting.is_exact:
+        maps = (trajectories.shown if trajectories.picture is None else trajectories.picture).tobytes()
     return _pack(_trial_columns(result, results), maps)
 
 
 def pack_drives(result: ReportedResult) -> str:
-    """Packs the outcomes of the episodes, and the paths."""
+    """Packs the outcomes of the episodes, and the paths; behind the true ones those that the agent observed."""
     episodes, trajectories = result.episodes, result.trajectories
+    paths = [] if trajectories is None else [trajectories.pose.astype(np.float64), lay_on_first_poses(trajectories)]
     columns = {
         "success": episodes.success.astype(int).tolist(),
         "steps": episodes.steps.tolist(),
         "driven": np.round(episodes.path_length, 2).tolist(),
     }
-    return _pack(columns, b"" if trajectories is None else pack_poses(trajectories, result.setting.size))
+    return _pack(columns, b"".join(pack_poses(poses) for poses in paths if poses is not None))
 
 
-def pack_poses(trajectories: Trajectories, size: int) -> bytes:
-    """Packs poses in five planes with one byte of each pose: x low, x high, y low, y high, yaw.
+def lay_on_first_poses(trajectories: Trajectories) -> np.ndarray | None:
+    """Returns `[sum(length), 3]` float64: the observed paths, each turned and moved so that it begins in the true pose.
+
+    None where no observed poses were recorded.
+    """
+    if trajectories.observed is None:
+        return None
+    true, observed = trajectories.pose.astype(np.float64), trajectories.observed.astype(np.float64)
+    first = np.repeat(np.cumsum(trajectories.length) - trajectories.length, trajectories.length)
+    turn = true[first, 2] - observed[first, 2]
+    x, y = (observed - observed[first])[:, :2].T
+    moved = np.column_stack([np.cos(turn) * x - np.sin(turn) * y, np.sin(turn) * x + np.cos(turn) * y])
+    return np.column_stack([true[first, :2] + moved, observed[:, 2] + turn])
+
+
+def pack_poses(poses: np.ndarray) -> bytes:
+    """Packs poses `[sum(length), 3]` in five planes with one byte of each pose: x low, x high, y low, y high, yaw.
 
     All values are differences from the pose before; those of x and y are zigzag-encoded.
     """
-    units = np.round(trajectories.pose[:, :2].astype(np.float64) * _POSITION_UNITS)
-    place = np.clip(units, -_POSITION_UNITS, (size + 1) * _POSITION_UNITS).astype(np.int32)
+    units = np.round(poses[:, :2] * _POSITION_UNITS)
+    place = np.clip(units, -_LARGEST, _LARGEST).astype(np.int32)
     change = np.diff(place, axis=0, prepend=0)
     zigzag = ((change << 1) ^ (change >> 31)).astype("<u2")
-    turns = np.round(trajectories.pose[:, 2].astype(np.float64) * (_YAW_UNITS / (2 * math.pi))).astype(np.int64)
+    turns = np.round(poses[:, 2] * (_YAW_UNITS / (2 * math.pi))).astype(np.int64)
     yaw = np.diff(turns, prepend=0) % _YAW_UNITS
     planes = [(zigzag[:, axis] >> shift) & 255 for axis in (0, 1) for shift in (0, 8)]
     return np.stack([*planes, yaw]).astype(np.uint8).tobytes()
@@ -58,15 +77,15 @@ def to_base64(content: bytes) -> str:
     return base64.b64encode(content).decode("ascii")
 
 
-def _pack(columns: Mapping[str, Sequence[float]], content: bytes) -> str:
+def _pack(columns: Mapping[str, Any], content: bytes) -> str:
     """Returns columns and the bytes behind them, deflated, in base64."""
     text = json.dumps(columns, separators=(",", ":")).encode("ascii")
     return to_base64(zlib.compress(len(text).to_bytes(4, "little") + text + content, 9))
 
 
-def _trial_columns(result: ReportedResult, results: Sequence[ReportedResult]) -> dict[str, list[float]]:
+def _trial_columns(result: ReportedResult, results: Sequence[ReportedResult]) -> dict[str, Any]:
     episodes, trajectories, size = result.episodes, result.trajectories, result.setting.size
-    columns: dict[str, list[float]] = {
+    columns: dict[str, Any] = {
         "maze": episodes.maze.tolist(),
         "start": (episodes.start @ [size, 1]).tolist(),
         "goal": (episodes.goal @ [size, 1]).tolist(),
@@ -75,11 +94,14 @@ def _trial_columns(result: ReportedResult, results: Sequence[ReportedResult]) ->
         "seed": episodes.seed.tolist(),
         "landmarks": [],
         "landmarkCounts": [],
+        "groups": {fact: holds.astype(int).tolist() for fact, holds in episodes.facts.items()},
     }
     if trajectories is not None:
         ends = np.cumsum(trajectories.num_landmarks) - 1  # the last one of an episode is its goal
         columns["landmarks"] = np.delete(trajectories.landmark, ends).tolist()
         columns["landmarkCounts"] = (trajectories.num_landmarks - 1).tolist()
+        if trajectories.marks is not None:
+            columns["shownStart"], columns["shownGoal"] = trajectories.marks.T.tolist()
     shown = shown_ends(result, results)
     if shown is not None:
         columns["shownStart"], columns["shownGoal"] = (_indices(cells, size) for cells in shown)

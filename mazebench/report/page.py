@@ -15,9 +15,11 @@ from mazebench.evaluation.paper import citation, reference
 from mazebench.report.distributions import Distribution, Violin
 from mazebench.report.mazes import real_walls
 from mazebench.report.packed_episodes import pack_drives, pack_trials, to_base64
-from mazebench.report.provenance import HEAD, provenance_rows
+from mazebench.report.provenance import HEAD, benchmark_versions, provenance_rows
 from mazebench.report.results import ReportedResult
+from mazebench.report.settings import Setting
 from mazebench.report.table import METRIC_NAMES, Cell, Table
+from mazebench.world.lidar import MAX_RANGE, NUM_RAYS
 
 
 def build_page(
@@ -42,7 +44,7 @@ def build_page(
         for result, here, of_result in zip(results, places, trials, strict=True)
     ]
     content = {
-        "benchmark": results[0].summary.benchmark,
+        "benchmark": benchmark_versions(results),
         "citation": citation(),
         "paperNote": reference()["note"],
         "labels": list(labels),
@@ -52,13 +54,14 @@ def build_page(
         "warnings": list(warnings),
         "tables": [_table(table) for table in tables],
         "violins": [_distribution(distribution) for distribution in distributions],
-        "settings": [str(setting) for setting in settings],
+        "settings": [_names(setting) for setting in settings],
+        "lidar": {"rays": NUM_RAYS, "range": MAX_RANGE},
         "mazes": mazes,
         "results": listed,
         "provenance": [HEAD, *provenance_rows(results)],
         "first": _first(results),
     }
-    style, script = _read("page.css"), _read("charts.js") + _read("explorer.js")
+    style, script = _read("page.css"), "".join(map(_read, ("charts.js", "drawing.js", "explorer.js")))
     policy = f"default-src 'none'; style-src '{_hash(style)}'; script-src '{_hash(script)}'"
     packed = [f'<script type="text/plain" id="trials-{n}">{text}</script>' for n, text in enumerate(packed_trials)]
     packed += [
@@ -94,7 +97,7 @@ def _cell(cell: Cell | None) -> list[float | int | None] | None:
     if cell is None:
         return None
     low, high = (None if value is None else round(value, 4) for value in (cell.low, cell.high))
-    return [round(cell.value, 4), low, high, cell.episodes, *([] if cell.runs is None else [cell.runs])]
+    return [round(cell.value, 4), low, high, cell.episodes, cell.runs, int(cell.is_untrained_scale)]
 
 
 def _table(table: Table) -> dict[str, Any]:
@@ -156,13 +159,26 @@ def _mazes(results: Sequence[ReportedResult]) -> tuple[list[dict[str, Any]], lis
     return mazes, places
 
 
+def _names(setting: Setting) -> dict[str, Any]:
+    """Returns what the explorer calls a setting: the levels of a track share a name."""
+    of_split = "" if setting.split == "eval" else f", {setting.split} mazes"
+    return {"name": f"track {setting.track}{of_split}" if setting.track else str(setting), "level": setting.level}
+
+
 def _describe(result: ReportedResult) -> dict[str, Any]:
+    setting, trajectories = result.setting, result.trajectories
+    picture = None if trajectories is None else trajectories.picture
+    sensors = (result.summary.provenance.options.model_extra or {}).get("sensors", ())
     return {
         "label": result.label,
-        "size": result.setting.size,
+        "size": setting.size,
         "episodes": len(result.episodes),
-        "poses": 0 if result.trajectories is None else len(result.trajectories.pose),
-        "perturbed": bool(result.setting.levels),
+        "poses": 0 if trajectories is None else len(trajectories.pose),
+        "exact": setting.is_exact,
+        "picture": 0 if picture is None else picture.shape[-1],
+        "odometry": trajectories is not None and trajectories.observed is not None,
+        "lidar": bool(setting.track) or "lidar" in sensors,
+        "groups": list(result.episodes.facts),
     }
 
 
@@ -172,7 +188,7 @@ def _first(results: Sequence[ReportedResult]) -> int:
         range(len(results)),
         key=lambda number: (
             results[number].trajectories is None,
-            bool(results[number].setting.levels),
+            not results[number].setting.is_exact,
             results[number].setting.task != "hierarchical",
             results[number].setting.size,
             -results[number].setting.landmark_distance,

@@ -13,8 +13,8 @@ import numpy as np
 
 from mazebench.evaluation.intervals import Estimate, pool_runs, probability_of_improvement
 from mazebench.report.results import METRICS, ReportedResult
-from mazebench.report.rows import Row, distance_rows, setting_rows
-from mazebench.report.settings import Setting, level_name, short_name
+from mazebench.report.rows import Row, distance_rows, level_rows, setting_rows
+from mazebench.report.settings import Setting, level_name
 from mazebench.report.table import Cell, Column, Table
 
 NOTE = (
@@ -27,16 +27,16 @@ NOTE = (
 
 def pooled_tables(results: Sequence[ReportedResult]) -> Iterator[Table]:
     """Yields a table for each task, size and perturbation of which an agent has several training runs."""
-    for kind in sorted({_any_landmarks(result.setting) for result in results}):
-        agents = training_runs([result for result in results if _any_landmarks(result.setting) == kind])
-        row_name, rows = _rows([result for runs in agents.values() for result in runs], kind.task)
+    for kind in sorted({_kind(result.setting) for result in results}):
+        agents = training_runs([result for result in results if _kind(result.setting) == kind])
+        row_name, rows = _rows([result for runs in agents.values() for result in runs], kind)
         columns = tuple(pool_columns(agents, [*rows.values()]))
         if any(any(column.cells["success_rate"]) for column in columns):
-            parts = [f"{kind.task.capitalize()} navigation, {kind.size} × {kind.size}"]
-            parts += [f"{level_name(name)} {level:g}" for name, level in kind.levels]
-            levels = "".join(f"-{short_name(name)}-{level:g}" for name, level in kind.levels)
+            what = f"{kind.task.capitalize()} navigation, {kind.size} × {kind.size}"
+            parts = [f"Track {kind.track}" if kind.track else what]
+            parts += [f"{level_name(name)} {level:g}" for name, level in kind.perturbations]
             title = ", ".join([*parts, "pooled over training runs"])
-            yield Table(f"pooled-{kind.task}-{kind.size}{levels}", title, NOTE, row_name, tuple(rows), (), columns)
+            yield Table(f"pooled-{kind.track or kind.name}", title, NOTE, row_name, tuple(rows), (), columns)
 
 
 def training_runs(results: Sequence[ReportedResult]) -> dict[str, list[ReportedResult]]:
@@ -58,13 +58,17 @@ def pool_columns(agents: Mapping[str, Sequence[ReportedResult]], rows: Sequence[
         yield _column(f"P({a} > {b})", [agents[a], agents[b]], rows, probability_of_improvement)
 
 
-def _any_landmarks(setting: Setting) -> Setting:
-    return dataclasses.replace(setting, landmark_distance=0)
+def _kind(setting: Setting) -> Setting:
+    """Returns what all rows of a table have in common."""
+    kind = dataclasses.replace(setting, landmark_distance=0)
+    return dataclasses.replace(kind, size=0, level=0) if kind.track else kind
 
 
-def _rows(results: Sequence[ReportedResult], task: str) -> tuple[str, dict[str, Row]]:
+def _rows(results: Sequence[ReportedResult], kind: Setting) -> tuple[str, dict[str, Row]]:
     """Returns what the rows differ in, and the rows."""
-    if task == "local":
+    if kind.track:
+        return "level", level_rows(results)
+    if kind.task == "local":
         return "distance", distance_rows(results)
     levels = sorted({result.setting.landmark_distance for result in results})
     rows = setting_rows(results, {level: str(level) for level in levels}, lambda setting: setting.landmark_distance)

@@ -11,6 +11,11 @@ HEAD = ("agent", "results", "episodes", "in", "checkpoint", "seed", "versions", 
 _PACKAGES = ("mazebench-mujoco", "mujoco", "numpy", "torch")
 
 
+def benchmark_versions(results: Sequence[ReportedResult]) -> str:
+    """Returns the versions of the benchmark that results are of, in words."""
+    return " and ".join(sorted({result.summary.benchmark for result in results}))
+
+
 def provenance_rows(results: Sequence[ReportedResult]) -> list[tuple[str, ...]]:
     """Returns rows of texts under `HEAD`; results that differ only in what was played share a row."""
     groups: dict[tuple[str, ...], list[ReportedResult]] = {}

@@ -12,10 +12,11 @@ from collections.abc import Iterable
 import numpy as np
 
 from mazebench.errors import InputError
+from mazebench.evaluation.metrics import by_fact
 from mazebench.evaluation.records import Record, Summary, column
 from mazebench.evaluation.results import load_result
 from mazebench.evaluation.trajectories import TRAJECTORIES, Trajectories, load_trajectories
-from mazebench.maps.benchmark import VERSION, manifest_hash
+from mazebench.maps.benchmark import TRACKS_VERSION, VERSION, manifest_hash
 from mazebench.report.folders import Warn, find_folders
 from mazebench.report.settings import Setting, make_setting
 
@@ -39,6 +40,7 @@ class Episodes:
     spl: np.ndarray  # [E]
     spl_grid: np.ndarray  # [E]
     seed: np.ndarray  # [E] int
+    facts: dict[str, np.ndarray]  # [E] bool by what holds in these episodes of a track, as "blocked" and "not blocked"
 
     def __len__(self) -> int:
         return len(self.success)
@@ -112,11 +114,12 @@ def _read_result(folder: pathlib.Path, warn: Warn) -> ReportedResult:
 
 
 def _to_columns(records: tuple[Record, ...]) -> Episodes:
-    names = [field.name for field in dataclasses.fields(Episodes) if field.name not in ("maze", "mazes")]
+    names = [field.name for field in dataclasses.fields(Episodes) if field.name not in ("maze", "mazes", "facts")]
     mazes = tuple(dict.fromkeys(record.maze for record in records))
     index = {name: number for number, name in enumerate(mazes)}
     columns = {name: column(records, name) for name in names}
-    return Episodes(maze=np.array([index[record.maze] for record in records]), mazes=mazes, **columns)
+    maze = np.array([index[record.maze] for record in records])
+    return Episodes(maze=maze, mazes=mazes, facts=by_fact(records), **columns)
 
 
 def _read_trajectories(folder: pathlib.Path, episodes: Episodes, setting: Setting, warn: Warn) -> Trajectories | None:
@@ -163,14 +166,14 @@ def _drop_repeats(results: list[ReportedResult], warn: Warn) -> list[ReportedRes
 
 
 def _require_installed_benchmark(results: list[ReportedResult]) -> None:
-    installed = (VERSION, manifest_hash())
+    installed = [(version, manifest_hash(version)) for version in (VERSION, TRACKS_VERSION)]
     folders: dict[tuple[str, str], list[str]] = {}
     for result in results:
         folders.setdefault(result.benchmark, []).append(str(result.folder))
-    if set(folders) == {installed}:
+    if set(folders) <= set(installed):
         return
     which = "; ".join(f"{_name(benchmark)} in {_some(folders[benchmark])}" for benchmark in sorted(folders))
-    raise InputError(f"expected results of benchmark {_name(installed)}, found {which}")
+    raise InputError(f"expected results of benchmark {' or '.join(map(_name, installed))}, found {which}")
 
 
 def _name(benchmark: tuple[str, str]) -> str:

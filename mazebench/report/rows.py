@@ -44,6 +44,18 @@ def setting_rows(
     return {name: row(wanted) for wanted, name in names.items()}
 
 
+def setting_row(setting: Setting, results: Sequence[ReportedResult]) -> Row:
+    """Returns the row of one setting, with the distances that all results of this setting have in common."""
+    distances = common_distances([result for result in results if result.setting == setting])
+    return lambda result: chosen_episodes(result, distances) & (result.setting == setting)
+
+
+def level_rows(results: Sequence[ReportedResult]) -> dict[str, Row]:
+    """Returns a row for each level of the track that all results are of."""
+    settings = sorted({result.setting for result in results})
+    return {str(setting.level): setting_row(setting, results) for setting in settings}
+
+
 def common_distances(results: Sequence[ReportedResult]) -> list[int]:
     """Returns the distances from start to goal that every result has, in cells; none for the hierarchical task."""
     if not results or results[0].setting.task == "hierarchical":

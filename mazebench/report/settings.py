@@ -12,6 +12,7 @@ from mazebench.maps.benchmark import SIZES, SPLITS
 from mazebench.options import options_of
 from mazebench.tasks.options import TaskOptions
 from mazebench.tasks.perturbations import Perturbations
+from mazebench.tasks.tracks import TRACKS
 
 DEFAULT_LANDMARK_DISTANCE = 5  # cells; the paper's choice wherever it varies something else
 _CUSTOM = "custom"  # the split of mazes that are not the benchmark's
@@ -25,35 +26,44 @@ class Setting:
     size: int  # N
     split: str  # "train", "eval" or "custom"
     landmark_distance: int  # cells; 0 in the local task
-    levels: tuple[tuple[str, float], ...] = ()  # of the perturbations that are switched on, by name
+    perturbations: tuple[tuple[str, float], ...] = ()  # those that are switched on, with their levels
     mazes: tuple[str, ...] = ()  # names, of the split "custom"
+    track: str = ""  # "" where the benchmark's first version is played
+    level: int = 0  # of the track
 
     @property
-    def perturbed(self) -> tuple[str, ...]:
-        """The names of the perturbations that are switched on."""
-        return tuple(name for name, _ in self.levels)
+    def is_exact(self) -> bool:
+        """Whether nothing is wrong with the map and the observed states."""
+        return not self.perturbations and not self.track
+
+    @property
+    def name(self) -> str:
+        """Task and size, or track and level, and the perturbations, as names of files have them."""
+        levels = "".join(f"-{short_name(name)}-{level:g}" for name, level in self.perturbations)
+        return (f"{self.track}-{self.level}" if self.track else f"{self.task}-{self.size}") + levels
 
     @property
     def place(self) -> str:
-        """Task, size and an unusual landmark distance, as names of files have them."""
+        """The name with an unusual landmark distance."""
         is_default = self.landmark_distance in (0, DEFAULT_LANDMARK_DISTANCE)
-        return f"{self.task}-{self.size}" + ("" if is_default else f"-k{self.landmark_distance}")
+        return self.name + ("" if is_default else f"-k{self.landmark_distance}")
 
-    def level(self, perturbation: str) -> float:
+    def level_of(self, perturbation: str) -> float:
         """Returns the level of a perturbation; 0 if it is switched off."""
-        return dict(self.levels).get(perturbation, 0.0)
+        return dict(self.perturbations).get(perturbation, 0.0)
 
     def without(self, perturbation: str) -> Setting:
         """Returns the setting with a perturbation switched off."""
-        return dataclasses.replace(self, levels=tuple(pair for pair in self.levels if pair[0] != perturbation))
+        left = tuple(pair for pair in self.perturbations if pair[0] != perturbation)
+        return dataclasses.replace(self, perturbations=left)
 
     def __str__(self) -> str:
-        parts = [self.task, f"{self.size} × {self.size}"]
+        parts = [*([self.track, f"level {self.level}"] if self.track else [self.task]), f"{self.size} × {self.size}"]
         if self.split != "eval":
             parts.append(f"{self.split} mazes")
         if self.task == "hierarchical":
             parts.append(f"landmarks every {self.landmark_distance}")
-        parts += [f"{level_name(name)} {level:g}" for name, level in self.levels]
+        parts += [f"{level_name(name)} {level:g}" for name, level in self.perturbations]
         return ", ".join(parts)
 
 
@@ -61,20 +71,25 @@ def make_setting(summary: Summary, records: tuple[Record, ...]) -> Setting:
     """Returns the setting of an evaluation.
 
     Raises:
-      InputError: if this version of the benchmark has no such task, size, split or level.
+      InputError: if this version of the benchmark has no such task, track, size, split or level.
     """
-    TaskOptions(task=summary.task, **known_levels(summary.perturbation))  # raises if one of them is not allowed
+    name, level = summary.track or "", (summary.level or 0) if summary.track else 0
+    track: dict[str, Any] = {"track": name, "level": (level,)} if name else {}
+    TaskOptions(task=summary.task, **track, **known_levels(summary.perturbation))  # raises if one is not allowed
+    sizes = (TRACKS[name].sizes[level - 1],) if name else SIZES
     if summary.split not in (*SPLITS, _CUSTOM):
         raise unknown("split", summary.split, (*SPLITS, _CUSTOM))
-    if summary.split in SPLITS and summary.size not in SIZES:
-        raise unknown("size", summary.size, SIZES)
+    if summary.split in SPLITS and summary.size not in sizes:
+        raise unknown("size", summary.size, sizes)
     return Setting(
         task=summary.task,
         size=summary.size,
         split=summary.split,
         landmark_distance=summary.provenance.options.landmark_distance if summary.task == "hierarchical" else 0,
-        levels=tuple(sorted((name, level) for name, level in summary.perturbation.items() if level)),
+        perturbations=tuple(sorted((name, level) for name, level in summary.perturbation.items() if level)),
         mazes=tuple(sorted({record.maze for record in records})) if summary.split == _CUSTOM else (),
+        track=name,
+        level=level,
     )
 
 

@@ -8,6 +8,8 @@ from mazebench.report.results import METRICS
 
 SPL_RELATIVE = "spl_relative"
 METRIC_NAMES = METRICS | {SPL_RELATIVE: "SPL / oracle's"}
+UNTRAINED_MARK = "*"
+UNTRAINED_NOTE = f"{UNTRAINED_MARK} The agent was never trained on maps of this scale."
 
 
 @dataclasses.dataclass(frozen=True)
@@ -19,10 +21,12 @@ class Cell:
     high: float | None = None
     episodes: int | None = None
     runs: int | None = None  # of training, where several are pooled
+    is_untrained_scale: bool = False  # whether the agent learned, but never on maps of this scale
 
     def __str__(self) -> str:
+        mark = UNTRAINED_MARK if self.is_untrained_scale else ""
         interval = "" if self.low is None else f" [{self.low:.2f}, {self.high:.2f}]"
-        return f"{self.value:.2f}{interval}{'' if self.runs is None else f', {self.runs} runs'}"
+        return f"{self.value:.2f}{mark}{interval}{'' if self.runs is None else f', {self.runs} runs'}"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -6,9 +6,9 @@ import csv
 import io
 import re
 
-from mazebench.report.table import METRIC_NAMES, Cell, Table
+from mazebench.report.table import METRIC_NAMES, UNTRAINED_MARK, Cell, Table
 
-_CSV_COLUMNS = ("table", "metric", "row", "column", "source", "episodes", "value", "low95", "high95", "runs")
+_CSV_COLUMNS = ("table", "metric", "row", "column", "source", "episodes", "value", "low95", "high95", "runs", "mark")
 _LATEX = {
     **{character: f"\\{character}" for character in "&%$#_{}"},
     "\\": r"\textbackslash{}",
@@ -47,7 +47,9 @@ def to_csv(table: Table) -> str:
                 if cell is not None:
                     source = "paper" if column.is_paper else "measured"
                     figures = [_digits(value) for value in (cell.value, cell.low, cell.high)]
-                    writer.writerow([table.name, metric, row, column.label, source, cell.episodes, *figures, cell.runs])
+                    mark = UNTRAINED_MARK if cell.is_untrained_scale else ""
+                    values = [cell.episodes, *figures, cell.runs, mark]
+                    writer.writerow([table.name, metric, row, column.label, source, *values])
     return file.getvalue()
 
 

@@ -13,6 +13,7 @@ from mazebench.report.results import ReportedResult
 from mazebench.report.rows import distance_rows, note_on_distances, setting_rows
 from mazebench.report.settings import DEFAULT_LANDMARK_DISTANCE, Setting, level_help, level_name, short_name
 from mazebench.report.table import Table
+from mazebench.report.tracks import track_tables
 
 
 def build_tables(results: Sequence[ReportedResult], labels: Sequence[str]) -> list[Table]:
@@ -31,8 +32,8 @@ def perturbed_groups(results: Sequence[ReportedResult]) -> Iterator[tuple[str, S
 
     Only settings without other perturbations count, and only agents that have results with the perturbation.
     """
-    perturbed = [result for result in results if len(result.setting.levels) == 1]
-    kinds = {(result.setting.perturbed[0], _unperturbed(result.setting)) for result in perturbed}
+    settings = [result.setting for result in results if len(result.setting.perturbations) == 1]
+    kinds = {(name, setting.without(name)) for setting in settings for name, _ in setting.perturbations}
     for perturbation, base in sorted(kinds):
         group = [result for result in results if result.setting.without(perturbation) == base]
         labels = {result.label for result in group if result.setting != base}
@@ -53,7 +54,7 @@ def _maze_sets(results: Sequence[ReportedResult]) -> Iterator[tuple[list[Reporte
 
 
 def _tables_of(results: Sequence[ReportedResult], labels: Sequence[str]) -> Iterator[Table]:
-    plain = [result for result in results if not result.setting.levels]
+    plain = [result for result in results if result.setting.is_exact]
     local = [result for result in plain if result.setting.task == "local"]
     routes = [result for result in plain if result.setting.task == "hierarchical"]
     usual_routes = [result for result in routes if result.setting.landmark_distance == DEFAULT_LANDMARK_DISTANCE]
@@ -74,6 +75,7 @@ def _tables_of(results: Sequence[ReportedResult], labels: Sequence[str]) -> Iter
         # The paper prints local navigation on warped maps by distance.
         if (perturbation, base.task) == ("map_warp", "local"):
             yield from _by_distance_when_warped(base, group, labels)
+    yield from track_tables(results, labels)
 
 
 def _by_distance(
@@ -98,9 +100,9 @@ def _by_landmark_distance(size: int, results: Sequence[ReportedResult], labels: 
 
 
 def _by_level(perturbation: str, base: Setting, results: Sequence[ReportedResult], labels: Sequence[str]) -> Table:
-    levels = sorted({result.setting.level(perturbation) for result in results})
+    levels = sorted({result.setting.level_of(perturbation) for result in results})
     names = {level: f"{level:g}" for level in levels}
-    rows = setting_rows(results, names, lambda setting: setting.level(perturbation))
+    rows = setting_rows(results, names, lambda setting: setting.level_of(perturbation))
     name = f"{short_name(perturbation)}-{base.place}"
     title = f"{level_name(perturbation).capitalize()}: {base}"
     note = f"{level_help(perturbation)} {note_on_distances(results)}".strip()
@@ -110,8 +112,8 @@ def _by_level(perturbation: str, base: Setting, results: Sequence[ReportedResult
 def _by_distance_when_warped(
     base: Setting, results: Sequence[ReportedResult], labels: Sequence[str]
 ) -> Iterator[Table]:
-    for level in sorted({result.setting.level("map_warp") for result in results} - {0.0}):
-        group = [result for result in results if result.setting.level("map_warp") == level]
+    for level in sorted({result.setting.level_of("map_warp") for result in results} - {0.0}):
+        group = [result for result in results if result.setting.level_of("map_warp") == level]
         title = f"Local navigation, {base.size} × {base.size}, on maps warped by up to {level:g} of their side"
         yield _by_distance(f"warp-{level:g}-{base.place}", title, group, labels, warped=True)
 
@@ -120,7 +122,7 @@ def _split_tables(results: Sequence[ReportedResult], labels: Sequence[str]) -> I
     """Yields a table of training against eval mazes for each unperturbed setting in which an agent has both."""
     by_label: dict[tuple[Setting, str], list[ReportedResult]] = {}
     for result in results:
-        if result.setting.split in ("train", "eval") and not result.setting.levels:
+        if result.setting.split in ("train", "eval") and not result.setting.perturbations:
             key = dataclasses.replace(result.setting, split="eval"), result.label
             by_label.setdefault(key, []).append(result)
     for base in sorted({setting for setting, _ in by_label}):
@@ -134,7 +136,3 @@ def _split_tables(results: Sequence[ReportedResult], labels: Sequence[str]) -> I
 
 def _sizes(results: Sequence[ReportedResult]) -> list[int]:
     return sorted({result.setting.size for result in results})
-
-
-def _unperturbed(setting: Setting) -> Setting:
-    return dataclasses.replace(setting, levels=())

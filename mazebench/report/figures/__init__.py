@@ -11,7 +11,13 @@ from mazebench.report.figures.curves import draw_table, draw_table_panels
 from mazebench.report.figures.trajectories import draw_gallery
 from mazebench.report.figures.violins import draw_distribution
 from mazebench.report.galleries import Gallery
-from mazebench.report.table import Table
+from mazebench.report.table import UNTRAINED_NOTE, Table
+
+# Figures with a panel for each of several tables: their names, the beginning of the tables' names, their titles.
+_PANELS = (
+    ("local-sizes", "local-", "Local navigation by distance, in mazes of several sizes"),
+    ("tracks", "track-", "Tracks: success rate by level"),
+)
 
 
 def draw_figures(
@@ -26,11 +32,12 @@ def draw_figures(
     for table in curves:
         draw_table(table, labels, folder / table.name)
         yield Picture(table.name, table.title, table.note)
-    by_size = [table for table in curves if table.name.startswith("local-")]
-    if len(by_size) > 1:
-        title = "Local navigation by distance, in mazes of several sizes"
-        draw_table_panels(by_size, title, labels, folder / "local-sizes")
-        yield Picture("local-sizes", title, "Success rate.")
+    for name, prefix, title in _PANELS:
+        panels = [table for table in curves if table.name.startswith(prefix)]
+        if len(panels) > 1:
+            draw_table_panels(panels, title, labels, folder / name)
+            marked = [UNTRAINED_NOTE] if any(UNTRAINED_NOTE in table.note for table in panels) else []
+            yield Picture(name, title, " ".join(["Success rate.", *marked]))
     for distribution in distributions:
         draw_distribution(distribution, labels, folder / distribution.name)
         yield Picture(distribution.name, distribution.title, distribution.note)

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 
 from mazebench.report.figures.style import PALETTE, STYLE, WIDTH, finish, new_figure, panel_grid, shorten
 from mazebench.report.results import METRICS
-from mazebench.report.table import Cell, Column, Table
+from mazebench.report.table import UNTRAINED_MARK, Cell, Column, Table
 
 _MARKERS = "os^DvPX"
 _PAPER_MARKERS = "x+1*"
@@ -95,6 +95,9 @@ def _draw_curve(
     color, marker = PALETTE[rank], _MARKERS[(place + place // len(PALETTE)) % len(_MARKERS)]
     style: dict[str, Any] = {"color": color, "marker": marker, "label": shorten(label)}
     style |= {"markersize": 4.8 - 0.35 * rank, "linewidth": 1.8 - 0.15 * rank}
+    for at, cell in zip(x, cells, strict=True):
+        if cell and cell.is_untrained_scale:
+            axes.annotate(UNTRAINED_MARK, (at, cell.value), (3, 1), textcoords="offset points")
     if is_curve:
         axes.fill_between(x[there], low, high, color=color, alpha=0.16, linewidth=0)
         axes.plot(x[there], value, **style)

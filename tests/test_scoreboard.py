@@ -1,0 +1,131 @@
+"""The scoreboard of the tracks: its table from made-up results, its place in a page, what it refuses."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+from made_results import edit_records, edit_summary, make_result, read_summary
+
+from mazebench.errors import InputError
+from mazebench.evaluation.results import SUITE
+from mazebench.report.scoreboard import BEGIN, END, read_entries, to_markdown, write_scoreboard
+from mazebench.storage.json_files import write_json
+from mazebench.tasks.tracks import TRACKS
+
+PARTS = [(track, level) for track in TRACKS for level in (1, 2, 3)]
+
+
+def make_part(folder, agent, track, level, successes=200, **options):
+    """Writes the result of an agent that reaches the first `successes` of the 200 goals."""
+    part = make_result(folder / f"{track}-{level}", agent, track=track, level=level, record=False, **options)
+    edit_summary(part, provenance=read_summary(part)["provenance"] | {"agent_package": "made-up 1.0"})
+
+    def edit(record):
+        success = record["episode"] < successes
+        lengths = {"path_length": 1.0, "shortest_path": 1.0}
+        return record | lengths | {"success": success, "spl": float(success), "spl_grid": float(success)}
+
+    return edit_records(part, edit)
+
+
+def rows(folders):
+    """The cells of each line of the scoreboard of some folders."""
+    lines = to_markdown(read_entries(folders)).splitlines()
+    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory):
+    """A run of the suite with two agents: `whole` on all tracks and levels, `part` on two."""
+    folder = tmp_path_factory.mktemp("suite")
+    for track, level in PARTS:
+        make_part(folder / "whole", "whole", track, level, 200 if level < 3 else 100, privileged=True)
+    for level, checkpoint in ((1, "a" * 64), (2, "b" * 64)):
+        make_part(folder / "part", "part", "lost", level, 50, checkpoint=checkpoint)
+    edit_summary(folder / "part" / "lost-2", untrained_scale=True)
+    content = {"suite": "tracks", "parts": [f"{track}-{level}" for track, level in PARTS], "benchmark": "v2"}
+    content |= {"benchmark_manifest_sha256": "0" * 64, "seed": 0, "agents": ["part", "whole"]}
+    write_json(folder / SUITE, content | {"folders": {"part": "part", "whole": "whole"}})
+    return folder
+
+
+class TestTable:
+    def test_a_row_is_an_agent_and_a_column_a_track_and_level(self, suite):
+        head, _, whole, part = rows([suite])
+        assert head == ["agent", "mean", *(f"{track} {level}" for track, level in PARTS), "configurations", "from"]
+        # In 8 of 12 parts all goals are reached, in 4 half of them.
+        assert whole[1].startswith("0.83 [0.")
+        assert whole[0] == "whole (privileged)"
+        assert whole[2:] == [*["1.00", "1.00", "0.50"] * 4, "1", "made-up 1.0"]
+        assert part == ["part", *[""] * 4, "0.25", "0.25\\*", *[""] * 7, "2", "made-up 1.0"]
+
+    def test_a_folder_of_one_agent_gives_one_row(self, suite):
+        assert rows([suite / "part"])[2:] == rows([suite])[3:]
+        assert [row[0] for row in rows([suite / "part" / "lost-1", suite / "whole"])[2:]] == [
+            "whole (privileged)",
+            "part",
+        ]
+
+
+class TestPage:
+    def test_the_table_stands_between_two_comments(self, suite, tmp_path):
+        page = tmp_path / "page.md"
+        page.write_text(f"before\n{BEGIN}old\n{END}after\n")
+        write_scoreboard(read_entries([suite]), page)
+        written = page.read_text()
+        assert written == f"before\n{BEGIN}{to_markdown(read_entries([suite]))}{END}after\n"
+        write_scoreboard(read_entries([suite]), page)
+        assert page.read_text() == written
+
+    def test_a_page_without_the_comments_is_left_as_it_is(self, suite, tmp_path):
+        page = tmp_path / "page.md"
+        page.write_text("nothing\n")
+        with pytest.raises(InputError, match=r"page\.md: expected the lines <!-- scoreboard begins --> and "):
+            write_scoreboard(read_entries([suite / "part"]), page)
+        assert page.read_text() == "nothing\n"
+
+    def test_bad_input_ends_the_command_with_one_line_and_status_2(self, tmp_path):
+        command = [sys.executable, "-m", "mazebench.report.scoreboard", str(tmp_path / "none"), "page.md"]
+        run = subprocess.run(command, capture_output=True, text=True)
+        said = f"mazebench: {tmp_path}/none: expected a finished evaluation, found nothing there\n"
+        assert (run.returncode, run.stderr) == (2, said)
+
+
+class TestRefused:
+    def test_a_result_that_is_not_of_a_track(self, tmp_path):
+        make_result(tmp_path / "run", record=False)
+        with pytest.raises(InputError, match=r"run: expected eval episodes of a track, found eval local"):
+            read_entries([tmp_path / "run"])
+
+    def test_a_result_on_train_mazes(self, tmp_path):
+        make_part(tmp_path, "x", "lost", 1, split="train")
+        with pytest.raises(InputError, match=r"lost-1: expected eval episodes of a track, found train lost"):
+            read_entries([tmp_path])
+
+    def test_a_result_of_some_of_the_episodes(self, tmp_path):
+        make_part(tmp_path, "x", "lost", 1, num_mazes=3)
+        with pytest.raises(InputError, match=r"lost-1: expected 200 episodes, found 30"):
+            read_entries([tmp_path])
+
+    def test_a_result_of_another_benchmark(self, tmp_path):
+        part = make_part(tmp_path, "x", "lost", 1)
+        provenance = read_summary(part)["provenance"] | {"benchmark_manifest_sha256": "0" * 64}
+        edit_summary(part, provenance=provenance)
+        with pytest.raises(InputError, match=r"lost-1: expected results of the installed benchmark, found those of"):
+            read_entries([tmp_path])
+
+    def test_two_results_of_one_part(self, tmp_path):
+        make_part(tmp_path, "x", "lost", 1)
+        make_part(tmp_path, "x", "lost", 2)
+        (tmp_path / "lost-1").rename(tmp_path / "again")
+        make_part(tmp_path, "x", "lost", 1)
+        with pytest.raises(InputError, match="expected one result of lost 1, found two"):
+            read_entries([tmp_path])
+
+    def test_a_folder_with_two_agents_results(self, tmp_path):
+        make_part(tmp_path, "x", "lost", 1)
+        make_part(tmp_path, "y", "lost", 2)
+        with pytest.raises(InputError, match="expected results of one agent, found those of x, y"):
+            read_entries([tmp_path])
