@@ -8,19 +8,25 @@ import sys
 import numpy as np
 import pytest
 from acting import inputs_of
+from mazebench_agents.planner.observation import start_cell
 from run_folders import IMPORTS
 
 from mazebench.agent import Agent, Inputs, Interface, SingleAgent, Truth, as_agent_class
 from mazebench.agent_loading import agent_names, load_agent_class
+from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
+from mazebench.evaluation.agent_inputs import true_state
+from mazebench.evaluation.checked_agent import CheckedAgent
 from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.trials import select_trials
 from mazebench.maps.benchmark import load_mazes
 from mazebench.tasks.registry import make_spec
+from mazebench.tasks.spec import TaskSpec
 from mazebench.testing import ConformanceError, check_agent
 from mazebench.training.protocol import LearningAgent
 
 INTERFACE = Interface("local", 13, 13)
+SENSORS = {"navigator": ("lidar",)}  # that agents can't do without
 
 
 class Counting(Agent):
@@ -268,12 +274,12 @@ class TestConformance:
     @pytest.mark.parametrize("name", agent_names())
     def test_installed_agent_conforms(self, name, tmp_path):
         agent_class, checkpoint = load_agent_class(name), None
+        interface = Interface("hierarchical", 7, agent_class.context_size(7), sensors=SENSORS.get(name, ()))
         if issubclass(agent_class, LearningAgent):
             # Untrained: the contract does not depend on what it learned.
-            interface = Interface("hierarchical", 7, agent_class.context_size(7))
             agent_class.build_learner(interface, load_mazes(13, "train")[:1]).save(tmp_path, {})
             checkpoint = tmp_path / "agent.safetensors"
-        check_agent(agent_class, checkpoint=checkpoint)
+        check_agent(agent_class, interface, checkpoint)
 
     @pytest.mark.parametrize("agent_class", [Counting, CountingAlone, Drawing])
     def test_conforming_agent_passes(self, agent_class):
@@ -450,16 +456,56 @@ class TestPlanners:
         # Start or goal may be shown as walls, or as one cell.
         assert success_rate(name, num_mazes=10, distances=(1, 5, 9), episodes_per_distance=2, **perturbation) < 1.0
 
+    def test_the_closed_loop_planner_knows_the_scale_of_a_finer_map(self):
+        found = success_rate("planner-closed-loop", 3, range(2, 16, 4), episodes_per_distance=2, context_size=26)
+        assert found == 1.0
+
+    def test_without_a_mark_the_start_is_the_free_cell_nearest_to_the_middle(self):
+        context = np.zeros((4, 5, 5), dtype=np.float32)
+        context[0] = 1
+        context[0, 1, 1:4] = context[0, 1:4, 3] = 0  # free are a corridor's cells (1, 1) to (1, 3) and (3, 3)
+        assert start_cell(context) == (1, 2)
+        context[3, 3, 3] = 1
+        assert start_cell(context) == (3, 3)
+
     def test_oracle_reaches_all_goals_whatever_is_wrong_with_the_map_and_the_senses(self):
         perturbation = {"map_flip": 0.2, "position_noise": 1.0}
         assert success_rate("oracle", 5, range(1, 16, 2), episodes_per_distance=2, **perturbation) == 1.0
         assert success_rate("oracle", 5, range(1, 16, 2), episodes_per_distance=2, map_warp=0.25) == 1.0
 
 
-def success_rate(name: str, num_mazes: int, distances, episodes_per_distance: int, **perturbation: float) -> float:
+class TestTracks:
+    @pytest.mark.parametrize("name", agent_names())
+    @pytest.mark.parametrize("level", [1, 2, 3])
+    @pytest.mark.parametrize("track", ["lost", "far"])
+    def test_every_agent_acts(self, name, track, level):
+        act_for_three_steps(name, make_spec(track, level=level))
+
+    @pytest.mark.parametrize("name", agent_names())
+    def test_every_agent_acts_on_a_map_of_twice_the_resolution(self, name):
+        act_for_three_steps(name, make_spec(size=13, context_size=26, sensors=SENSORS.get(name, ())))
+
+
+def act_for_three_steps(name: str, spec: TaskSpec) -> None:
+    agent_class = load_agent_class(name)
+    interface = Interface(spec.task, spec.size, spec.context_size, sensors=spec.sensors)
+    agent = CheckedAgent(name, agent_class.build(interface), interface.num_actions)
+    env = MazeVectorEnv(spec, 2, num_threads=1)
+    (observation, info), state = env.reset(seed=0), agent.initial_state(2)
+    new, seed = np.ones(2, dtype=bool), np.zeros(2, dtype=np.int64)
+    for _ in range(3):
+        truth = true_state(spec, env.episodes, info["position"], info["yaw"]) if agent_class.needs_truth else None
+        actions, state = agent.act(Inputs(observation, new, info["is_first"], seed, truth), state)
+        observation, _, _, _, info = env.step(actions)
+        new = np.zeros(2, dtype=bool)
+
+
+def success_rate(
+    name: str, num_mazes: int, distances, episodes_per_distance: int, context_size: int = 13, **perturbation: float
+) -> float:
     agent_class = load_agent_class(name)
     spec = make_spec("local", maps=load_mazes(13, "train")[:num_mazes], distances=distances, **perturbation)
-    spec = dataclasses.replace(spec, context_size=agent_class.context_size(13))
+    spec = dataclasses.replace(spec, context_size=context_size)
     trials = list(enumerate(select_trials("local", spec.mazes, False, distances, episodes_per_distance)))
     agent = agent_class.build(Interface("local", 13, spec.context_size))
     played = run_trials(agent, spec, trials, 64, needs_truth=agent_class.needs_truth)

@@ -37,10 +37,11 @@ class MapEncoder(nn.Module):
 
 
 def marked_position(plane: torch.Tensor) -> torch.Tensor:
-    """Returns the row and column `[G, 2]` float of the mark in one-hot planes `[G, M, M]`."""
+    """Returns the row and column `[G, 2]` float of the mark in planes `[G, M, M]`; the middle where there is none."""
     size = plane.shape[-1]
-    index = plane.flatten(1).argmax(dim=1)
-    return torch.stack([index // size, index % size], dim=-1).to(plane.dtype)
+    mark, index = plane.flatten(1).max(dim=1)
+    position = torch.stack([index // size, index % size], dim=-1).to(plane.dtype)
+    return torch.where(mark[:, None] > 0, position, (size - 1) / 2)
 
 
 def position_code(position: torch.Tensor, size: int, sharpness: torch.Tensor) -> torch.Tensor:

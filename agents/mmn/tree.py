@@ -4,19 +4,19 @@
 `[B, N]` of `node_type`; a node first expanded in simulation i, counted from 0, has index i + 1, the root has 0. All
 arithmetic on values is in float32.
 
-Numba compiles the kernels anew when this file changes, but not when a module that it imports does. So all functions
-that the kernels call are in this file.
+All functions that the kernels call are in this file; `common.kernels` says why. Those that are called for each node of
+a path are inlined: if LLVM decides, a search takes a tenth longer.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
+
+from ..common.kernels import compiled, inlined
 
 ROOT = 0
 UNVISITED = -1
@@ -65,20 +65,6 @@ class PUCTSettings(NamedTuple):
 
     pb_c_init: np.float32
     pb_c_base: np.float32
-
-
-def compiled(function: Callable[..., Any], inline: bool = False) -> Callable[..., Any]:
-    """Returns `function` as machine code, cached on disk if numba finds a folder that it can write to."""
-    options: dict[str, Any] = {"error_model": "numpy", "forceinline": inline}
-    try:
-        return numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # numba found no such folder
-        return numba.njit(**options)(function)
-
-
-def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Returns `function` compiled into its callers; if LLVM decides, a search takes a tenth longer."""
-    return compiled(function, inline=True)
 
 
 @compiled

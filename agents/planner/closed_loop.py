@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import pathlib
+from typing import Self
 
 import numpy as np
 
-from mazebench.agent import Agent, Inputs
+from mazebench.agent import Agent, Inputs, Interface
 from mazebench.maps.maze import Cell
 
 from . import observation
@@ -20,24 +22,19 @@ _POSITION_GAIN = 0.1  # weight of an observed position against the one predicted
 class _Navigator:
     """The estimated motion of one environment's body, and the pilot that drives it."""
 
-    position: Point  # m, estimated
-    velocity: Point  # m/s, in the world's frame, at the last observation
+    position: Point  # estimated
+    velocity: Point  # cells a second, in the world's frame, at the last observation
     pilot: Pilot
 
     def update(self, observed: Body) -> None:
         """Predicts the position one step on from the mean velocity, and corrects it by the observed position."""
-        velocity = _velocity(observed)
+        velocity = observed.velocity()
         x, y = self.position
         self.position = (
             _filtered(x, (self.velocity[0] + velocity[0]) / 2, observed.x),
             _filtered(y, (self.velocity[1] + velocity[1]) / 2, observed.y),
         )
         self.velocity = velocity
-
-
-def _velocity(body: Body) -> Point:
-    coast_x, coast_y = body.coasting()
-    return coast_x / observation.COASTING_TIME, coast_y / observation.COASTING_TIME
 
 
 def _filtered(coordinate: float, velocity: float, observed: float) -> float:
@@ -47,6 +44,14 @@ def _filtered(coordinate: float, velocity: float, observed: float) -> float:
 
 class ClosedLoopPlanner(Agent):
     """Pure pursuit of a path that is planned once a context, from the estimated cell of the body."""
+
+    def __init__(self, cells_per_metre: float = 1.0):
+        self._cells_per_metre = cells_per_metre  # of the map that the context shows
+
+    @classmethod
+    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
+        """Returns a planner for the scale of the map, which follows from M and N."""
+        return cls(interface.context_size / interface.size)
 
     @classmethod
     def context_size(cls, size: int) -> int:
@@ -65,19 +70,17 @@ class ClosedLoopPlanner(Agent):
         size = contexts.shape[-1]
         actions = np.zeros(len(state), dtype=np.int64)
         for slot, values in enumerate(inputs.observation["state"].tolist()):
-            observed, start = (
-                observation.observed_body(values),
-                observation.marked_cell(contexts[slot, observation.START]),
-            )
+            observed = observation.observed_body(values, self._cells_per_metre)
+            start = observation.start_cell(contexts[slot])
             if inputs.new_episode[slot]:
                 # An episode begins in the centre of the start cell.
-                state[slot] = _Navigator(observation.centre(start, size), _velocity(observed), Pilot([]))
+                state[slot] = _Navigator(observation.centre(start, size), observed.velocity(), Pilot([]))
             else:
                 state[slot].update(observed)
             navigator = state[slot]
             if inputs.new_context[slot]:
                 path = observation.plan(contexts[slot], _nearest_free(contexts[slot], navigator.position, start))
-                navigator.pilot = Pilot.along(path, size)
+                navigator.pilot = Pilot.along(path, size, self._cells_per_metre)
             x, y = navigator.position
             actions[slot] = navigator.pilot.action(observed._replace(x=x, y=y))
         return actions, state

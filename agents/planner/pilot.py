@@ -23,36 +23,41 @@ _DRIVES = (
 )
 
 
+def steer(body: Body, aim: Point, largest_misalignment: float = _LARGEST_MISALIGNMENT) -> int:
+    """Returns the drive nearest to the direction of `aim`, or a turn if it is off by more than that angle (rad)."""
+    # Aimed from where the body would come to rest: aimed from where it is, it would overshoot and turn back.
+    coast_x, coast_y = body.coasting()
+    bearing = math.atan2(aim[1] - (body.y + coast_y), aim[0] - (body.x + coast_x)) - body.yaw
+    drive, heading = min(_DRIVES, key=lambda drive: abs(observation.wrap(bearing - drive[1])))
+    misalignment = observation.wrap(bearing - heading)
+    if abs(misalignment) <= largest_misalignment:
+        return drive
+    return observation.LOOK_LEFT if misalignment > 0 else observation.LOOK_RIGHT
+
+
 @dataclasses.dataclass
 class Pilot:
     """A path that is followed, and how far along it the body is."""
 
     points: list[Point]  # centres of the path's cells
+    lookahead: float = _LOOKAHEAD  # cells along the path to the point aimed at
     segment: int = 0  # the body is on the way from points[segment] to the next
 
     @classmethod
-    def along(cls, path: Sequence[Cell], size: int) -> Pilot:
-        """Returns a pilot at the beginning of a path of cells."""
-        return cls([observation.centre(cell, size) for cell in path])
+    def along(cls, path: Sequence[Cell], size: int, cells_per_metre: float = 1.0) -> Pilot:
+        """Returns a pilot at the beginning of a path of cells on a map of `size` cells a side."""
+        return cls([observation.centre(cell, size) for cell in path], cells_per_metre * _LOOKAHEAD)
 
     def action(self, body: Body) -> int:
-        """Returns the drive nearest to the direction of the aim, or a turn if even that one is too far off."""
-        # Aimed from where the body would come to rest: aimed from where it is, it would overshoot and turn back.
+        """Returns the drive or turn that brings the body towards the aim."""
         coast_x, coast_y = body.coasting()
-        x, y = body.x + coast_x, body.y + coast_y
-        aim_x, aim_y = self._aim(x, y)
-        bearing = math.atan2(aim_y - y, aim_x - x) - body.yaw
-        drive, heading = min(_DRIVES, key=lambda drive: abs(observation.wrap(bearing - drive[1])))
-        misalignment = observation.wrap(bearing - heading)
-        if abs(misalignment) <= _LARGEST_MISALIGNMENT:
-            return drive
-        return observation.LOOK_LEFT if misalignment > 0 else observation.LOOK_RIGHT
+        return steer(body, self._aim(body.x + coast_x, body.y + coast_y))
 
     def _aim(self, x: float, y: float) -> Point:
-        """Returns the point `_LOOKAHEAD` metres ahead of (x, y) on the path, or the path's end if that is nearer."""
-        along = self._advance(x, y) + _LOOKAHEAD
+        """Returns the point `lookahead` ahead of (x, y) on the path, or the path's end if that is nearer."""
+        along = self._advance(x, y) + self.lookahead
         for start, end in zip(self.points[self.segment :], self.points[self.segment + 1 :], strict=False):
-            if along <= 1:  # centres of neighbouring cells are 1 m apart
+            if along <= 1:  # centres of neighbouring cells are 1 apart
                 return start[0] + along * (end[0] - start[0]), start[1] + along * (end[1] - start[1])
             along -= 1
         return self.points[-1]

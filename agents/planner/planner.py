@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import pathlib
+from typing import Self
 
 import numpy as np
 
-from mazebench.agent import Agent, Inputs
+from mazebench.agent import Agent, Inputs, Interface
 from mazebench.maps.maze import Cell
 
 from . import observation
@@ -55,6 +57,14 @@ class _Plan:
 class Planner(Agent):
     """Drives open loop between the cells of a path that is planned once a context."""
 
+    def __init__(self, cells_per_metre: float = 1.0):
+        self._cells_per_metre = cells_per_metre  # of the map that the context shows
+
+    @classmethod
+    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
+        """Returns a planner for the scale of the map, which follows from M and N."""
+        return cls(interface.context_size / interface.size)
+
     @classmethod
     def context_size(cls, size: int) -> int:
         """Returns N: the map at full resolution, whose cells are waypoints."""
@@ -68,9 +78,9 @@ class Planner(Agent):
         """Returns actions `[B]`, planned for one environment after the other."""
         contexts = inputs.observation["context"]
         size = contexts.shape[-1]
-        bodies = [observation.observed_body(values) for values in inputs.observation["state"].tolist()]
+        states = inputs.observation["state"].tolist()
+        bodies = [observation.observed_body(values, self._cells_per_metre) for values in states]
         for slot in np.flatnonzero(inputs.new_context):
-            start = observation.marked_cell(contexts[slot, observation.START])
-            state[slot] = _Plan(observation.plan(contexts[slot], start))
+            state[slot] = _Plan(observation.plan(contexts[slot], observation.start_cell(contexts[slot])))
             state[slot].aim(bodies[slot], size)
         return np.array([plan.action(body, size) for plan, body in zip(state, bodies, strict=True)]), state

@@ -1,0 +1,338 @@
+"""Registers a map that is drawn by hand with the cells of a maze, and reads off which cells are walls.
+
+The point of the maze at a pixel is affine in the pixel plus a Gaussian random field, in the field's main modes
+(Karhunen-Loeve expansion). The parameters, the walls' thickness and the walls are estimated in turns:
+
+- `compare` finds how grey pixels should be, blurred by the uncertainty of their points. So far from what is known
+  nothing is compared, and the registration grows from the start and the outline inwards.
+- The probability of each cell to be a wall is updated by mean field, from a prior that knows mazes of corridors: cells
+  with odd row and column are rooms, those with even row and column are pillars.
+- A Gauss-Newton step moves the points and changes the thickness (Lucas and Kanade 1981; Amit et al. 1991 for the prior
+  of modes).
+
+Points are (row, column) in cells, with the maze's corners at 0 and N. `P` x `Q` are the pixels around the drawing, `D`
+the parameters of an axis.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+from scipy import special
+
+from mazebench.maps.maze import Cell
+
+from .drawing import compare, widths_of_pixels
+from .gauss_newton import normal_equations, variances
+
+_SMOOTHNESS = 4.2  # cells, deviation of the Gaussian by which displacements of two points are correlated
+_DISPLACEMENT = 0.6  # cells, deviation
+_NUM_MODES = 24
+_AFFINE = 1.0  # cells, deviation of what is off at first in the middle, and at the edges for the wrong scale
+_THICKENING = 0.3  # cells, deviation
+_LARGEST_THICKENING = 0.6  # cells
+_MARKED_POINT = 0.2  # cells, deviation of a cell's centre from the centre of the pixel that marks it
+_MARK_OFF = 0.5  # cells, from which a mark counts less, because it was moved out of a wall
+
+_ROOM, _PILLAR, _DOOR = 0.01, 0.99, 0.4  # prior probabilities of a wall
+_LARGEST_LOG_ODDS = 30.0
+_DAMPING = 0.5  # share of the new log odds in an update; all at once, neighbours would go back and forth
+
+_LARGEST_STEP = 0.5  # cells that a point is moved at once
+_WIDTHS = (0.2, 3.0)  # cells, the smallest and the largest side of a box
+_NODES = 4  # per cell, at which modes are computed
+_MODES_PER_AXIS = 9
+
+_SHARP = 0.05  # root mean square difference of picture and expectation, below which a registration is right
+_ERROR = 0.002  # probability that a cell is misread where the registration is right
+_ERROR_SLOPE = 4.0  # by how much that grows with the difference of picture and expectation beyond `_SHARP`
+_LARGEST_ERROR = 0.3
+_CENTRE = 0.1  # pixels, smallest deviation of where a cell's centre is drawn
+_FARTHEST_MARK = 4.0  # pixels from the centre of the cell that it marks
+_UNEXPLAINED_MARK = 1e-3  # weight of cells that a mark should not mark, at no distance from it
+# [25, 2] deviates of two normal variables, each of the same probability
+_QUANTILES = np.array(list(itertools.product(special.ndtri(np.arange(0.1, 1, 0.2)), repeat=2)))
+
+
+class _Schedule(NamedTuple):
+    """How coarse each step is."""
+
+    noise: np.ndarray  # [S] standard deviation of grey values
+    blur: np.ndarray  # [S] by how much the variance of points is overestimated, 0 for no blur
+
+
+def _schedule(first: float, last: float, num_steps: int, blur: float) -> _Schedule:
+    noise = [*np.geomspace(first, last, num_steps), 0.15, 0.12, 0.1, 0.08, 0.08, 0.08]
+    return _Schedule(np.array(noise), np.array([*[blur] * num_steps, 1.0, 0.5, 0.2, 0.0, 0.0, 0.0]))
+
+
+_RIGID_STEPS = 3  # before walls are estimated
+# Tried in turn until a registration is right; the first is the fastest.
+_SCHEDULES = (_schedule(0.8, 0.2, 12, 2.0), _schedule(0.8, 0.2, 24, 2.5), _schedule(0.5, 0.25, 24, 1.5))
+
+
+@dataclasses.dataclass(frozen=True)
+class Registration:
+    """Where the pixels of a picture lie in a maze, and where that has walls."""
+
+    walls: np.ndarray  # [N, N] float, the probability that a cell is a wall
+    picture: np.ndarray  # [P, Q] float, the part of the picture around the drawing
+    points: np.ndarray  # [P, Q, 2] float, at the pixels' centres
+    deviations: np.ndarray  # [P, Q, 2] float, of the points along rows and columns, in cells
+    corner: Cell  # pixel of the whole picture at which the part begins
+    thickening: float  # cells
+    residual: float  # root mean square difference of picture and expectation
+
+    def marked(self, pixel: Cell) -> np.ndarray:
+        """Returns `[N, N]` float: the probability of `pixel` of the picture to be marked if a cell is.
+
+        A cell is marked by the pixel in which its centre lies, or if that is a wall, by the nearest free pixel.
+        """
+        mark = np.clip(np.subtract(pixel, self.corner), 0, np.subtract(self.picture.shape, 1))
+        centres, deviations = self._drawn_centres()
+        off = np.sqrt(((centres - mark) ** 2).sum(axis=-1))
+        near = off < _FARTHEST_MARK
+        places = centres[near][:, None] + _QUANTILES * deviations[near][:, None]
+        marks = self._marks(places.reshape(-1, 2)).reshape(places.shape)
+        marked = _UNEXPLAINED_MARK * np.exp(-(off**2) / 2)
+        marked[near] += (marks == mark).all(axis=-1).mean(axis=-1)
+        return marked
+
+    def _drawn_centres(self) -> tuple[np.ndarray, np.ndarray]:
+        """Returns `[N, N, 2]` twice: where the cells' centres are drawn, and the deviations of that, in pixels.
+
+        Pixel (0, 0) has its centre at 0. The nearest pixel's point is corrected by the derivatives there.
+        """
+        size, width = len(self.walls), self.points.shape[1]
+        centres = np.moveaxis(np.indices((size, size)), 0, -1).reshape(-1, 2) + 0.5
+        points = self.points.reshape(-1, 2)
+        nearest = ((centres[:, None] - points) ** 2).sum(axis=-1).argmin(axis=1)
+        jacobians = np.stack(np.gradient(self.points, axis=(0, 1)), axis=-1).reshape(-1, 2, 2)[nearest]
+        off = np.linalg.solve(jacobians, (centres - points[nearest])[:, :, None])[:, :, 0]
+        deviations = self.deviations.reshape(-1, 2)[nearest] / np.abs(np.diagonal(jacobians, axis1=1, axis2=2))
+        drawn = np.column_stack(np.divmod(nearest, width)) + off
+        return drawn.reshape(size, size, 2), np.maximum(deviations, _CENTRE).reshape(size, size, 2)
+
+    def _marks(self, places: np.ndarray) -> np.ndarray:
+        """Returns `[T, 2]` int: the pixels that mark points drawn at `places` `[T, 2]`, in pixels."""
+        marks = np.clip(np.rint(places), 0, np.subtract(self.picture.shape, 1)).astype(np.intp)
+        in_wall = self.picture[marks[:, 0], marks[:, 1]] > 0.5
+        if in_wall.any():
+            free = np.argwhere(self.picture <= max(0.5, self.picture.min()))
+            marks[in_wall] = free[((places[in_wall, None] - free) ** 2).sum(axis=-1).argmin(axis=1)]
+        return marks
+
+
+def register(picture: np.ndarray, size: int, anchor: tuple[Cell, np.ndarray] | None = None) -> Registration:
+    """Returns the registration of a picture with a maze of `size` cells a side.
+
+    Args:
+      picture: `[M, M]` float, the share of wall in each pixel.
+      size: N.
+      anchor: a pixel and the point `[2]` in it, if one is known.
+    """
+    picture = picture.astype(np.float64)
+    corridors, any_style = (
+        [(_corridor_prior(size), schedule) for schedule in _SCHEDULES],
+        (_flat_prior(size), _SCHEDULES[0]),
+    )
+    found: list[Registration] = []
+    for prior, schedule in [*(corridors if size % 2 else []), any_style]:
+        found.append(_Fit.begin(picture, prior, anchor).run(schedule))
+        if found[-1].residual < _SHARP:
+            break
+    return min(found, key=lambda registration: registration.residual)
+
+
+@dataclasses.dataclass
+class _Fit:
+    """A registration under way."""
+
+    picture: np.ndarray  # [P, Q] float
+    corner: Cell
+    nominal: np.ndarray  # [P, Q, 2] float, the points if all parameters are 0
+    basis: np.ndarray  # [2, P Q, D] float, by how much each parameter of an axis moves the points along it
+    precision: np.ndarray  # [2 D + 1] float, of the parameters by the prior: rows, columns, thickening
+    parameters: np.ndarray  # [2 D + 1] float
+    covariance: np.ndarray  # [2 D + 1, 2 D + 1] float, of the parameters
+    log_odds: np.ndarray  # [N, N] float, of walls
+    prior: np.ndarray  # [N, N] float, log odds of walls
+    anchor: tuple[int, np.ndarray] | None  # index of a pixel among P Q, and the point in it
+
+    @classmethod
+    def begin(cls, picture: np.ndarray, prior: np.ndarray, anchor: tuple[Cell, np.ndarray] | None) -> _Fit:
+        """Returns the fit that lays the maze's inner cells on the box around what is free in the picture.
+
+        `prior` is `[N, N]` float, the log odds of walls.
+        """
+        size = len(prior)
+        free = picture < max(0.5, picture.min() + 0.1)
+        extents = [np.flatnonzero(free.any(axis=1 - axis))[[0, -1]] for axis in (0, 1)]
+        crops, coordinates = [], []
+        for (first, last), length in zip(extents, picture.shape, strict=True):
+            crop = np.arange(max(first - 2, 0), min(last + 3, length))
+            crops.append(crop)
+            coordinates.append(1 + (crop + 0.5 - first) * (size - 2) / (last + 1 - first))
+        corner = (int(crops[0][0]), int(crops[1][0]))
+        basis = _basis(coordinates[0], coordinates[1], size)
+        precision = np.ones(2 * basis.shape[-1] + 1)
+        precision[-1] = 1 / _THICKENING**2
+        fit = cls(
+            picture=picture[np.ix_(*crops)],
+            corner=corner,
+            nominal=np.stack(np.meshgrid(*coordinates, indexing="ij"), axis=-1),
+            basis=basis,
+            precision=precision,
+            parameters=np.zeros(len(precision)),
+            covariance=np.diag(1 / precision),
+            log_odds=prior.copy(),
+            prior=prior,
+            anchor=None,
+        )
+        if anchor is not None:
+            (row, column), point = anchor
+            fit.anchor = ((row - corner[0]) * len(crops[1]) + column - corner[1], np.asarray(point))
+            hessian = np.diag(precision)
+            fit._add_anchor(hessian, np.zeros(len(precision)), fit.points())
+            fit.covariance = np.linalg.inv(hessian)
+        return fit
+
+    def run(self, schedule: _Schedule) -> Registration:
+        """Returns the registration after all steps of a schedule."""
+        for step, (noise, blur) in enumerate(zip(schedule.noise, schedule.blur, strict=True)):
+            differences = self._step(float(noise), float(blur), step >= _RIGID_STEPS)
+        residual = float(np.sqrt((differences**2).mean()))
+        error = min(_ERROR + _ERROR_SLOPE * max(residual - _SHARP, 0.0), _LARGEST_ERROR)
+        walls = (1 - error) * special.expit(self.log_odds) + error * special.expit(self.prior)
+        walls[[0, -1]] = walls[:, [0, -1]] = 1.0
+        return Registration(
+            walls=walls,
+            picture=self.picture,
+            points=self.points(),
+            deviations=np.sqrt(self._variances()),
+            corner=self.corner,
+            thickening=float(self.parameters[-1]),
+            residual=residual,
+        )
+
+    def points(self) -> np.ndarray:
+        """Returns `[P, Q, 2]` float: the points at the pixels' centres."""
+        return self.nominal + self._shifts(self.parameters)
+
+    def _shifts(self, parameters: np.ndarray) -> np.ndarray:
+        """Returns `[P, Q, 2]` float: by how much parameters `[2 D + 1]` move the points."""
+        shifts = np.einsum("apd, ad -> pa", self.basis, parameters[:-1].reshape(2, -1))
+        return shifts.reshape(self.nominal.shape)
+
+    def _variances(self) -> np.ndarray:
+        """Returns `[P, Q, 2]` float: the variances of the points along rows and columns."""
+        return variances(self.basis, self.covariance).reshape(self.nominal.shape)
+
+    def _step(self, noise: float, blur: float, walls_too: bool) -> np.ndarray:
+        """Improves walls and parameters; returns `[P, Q]`, the differences of picture and expectation before."""
+        points = self.points()
+        widths = widths_of_pixels(points, _WIDTHS[0])
+        if blur:
+            # A box as wide as one whose variance is that of the pixel's box and the point together.
+            widths = np.minimum(np.sqrt(widths**2 + 12 * blur * self._variances()), _WIDTHS[1])
+        walls, thickening = special.expit(self.log_odds), float(self.parameters[-1])
+        differences, slopes, deviations, evidence = compare(self.picture, points, widths, thickening, walls, noise)
+        if walls_too:
+            log_odds = self.log_odds + _DAMPING * (self.prior + evidence - self.log_odds)
+            self.log_odds = np.clip(log_odds, -_LARGEST_LOG_ODDS, _LARGEST_LOG_ODDS)
+        hessian, gradient = normal_equations(self.basis, slopes, differences, deviations)
+        hessian += np.diag(self.precision)
+        gradient -= self.precision * self.parameters
+        self._add_anchor(hessian, gradient, points)
+        self.covariance = np.linalg.inv(hessian)
+        self._move(self.covariance @ gradient)
+        return differences
+
+    def _add_anchor(self, hessian: np.ndarray, gradient: np.ndarray, points: np.ndarray) -> None:
+        """Adds to both what is known of the anchor; a Cauchy loss, in case that the mark was moved."""
+        if self.anchor is None:
+            return
+        pixel, point = self.anchor
+        count = self.basis.shape[-1]
+        for axis, off in enumerate(point - points.reshape(-1, 2)[pixel]):
+            weight = 1 / _MARKED_POINT**2 / (1 + (off / _MARK_OFF) ** 2)
+            basis, own = self.basis[axis, pixel], slice(axis * count, (axis + 1) * count)
+            hessian[own, own] += weight * np.outer(basis, basis)
+            gradient[own] += weight * off * basis
+
+    def _move(self, step: np.ndarray) -> None:
+        largest = np.abs(self._shifts(step)).max()
+        self.parameters = self.parameters + step * min(1.0, _LARGEST_STEP / max(largest, 1e-9))
+        self.parameters[-1] = np.clip(self.parameters[-1], -_LARGEST_THICKENING, _LARGEST_THICKENING)
+
+
+def _corridor_prior(size: int) -> np.ndarray:
+    """Returns `[N, N]` float: the log odds of walls in mazes of corridors."""
+    walls = np.full((size, size), _DOOR)
+    walls[1::2, 1::2] = _ROOM
+    walls[::2, ::2] = _PILLAR
+    return _with_border(walls)
+
+
+def _flat_prior(size: int) -> np.ndarray:
+    """Returns `[N, N]` float: the log odds of walls in mazes of any style."""
+    return _with_border(np.full((size, size), _DOOR))
+
+
+def _with_border(walls: np.ndarray) -> np.ndarray:
+    walls[[0, -1]] = walls[:, [0, -1]] = 1.0
+    return np.minimum(special.logit(walls), _LARGEST_LOG_ODDS)
+
+
+def _basis(rows: np.ndarray, columns: np.ndarray, size: int) -> np.ndarray:
+    """Returns `[2, P Q, D]`: by how much each parameter moves the points at `rows` `[P]` x `columns` `[Q]`, in cells.
+
+    The first two parameters of an axis are a shift and a scale, the others weigh the modes of the field.
+    """
+    along_rows, along_columns = _modes_at(rows, size), _modes_at(columns, size)
+    first, second = _main_modes(size)
+    modes = along_rows[:, None, first] * along_columns[None, :, second]
+    basis = np.empty((2, len(rows) * len(columns), 2 + _NUM_MODES))
+    basis[:, :, 0] = _AFFINE
+    basis[0, :, 1] = _AFFINE * np.repeat(2 * rows / size - 1, len(columns))
+    basis[1, :, 1] = _AFFINE * np.tile(2 * columns / size - 1, len(rows))
+    basis[:, :, 2:] = _DISPLACEMENT * modes.reshape(-1, _NUM_MODES)
+    return basis
+
+
+def _modes_at(coordinates: np.ndarray, size: int) -> np.ndarray:
+    """Returns `[T, 9]`: the modes of a Gaussian process on [0, N], times their deviations, at `coordinates` `[T]`.
+
+    By the method of Nystroem from the modes at nodes; constant from 1.5 cells outside on.
+    """
+    nodes, weights, _ = _modes(size)
+    return _correlation(np.clip(coordinates, -1.5, size + 1.5), nodes) @ weights
+
+
+@functools.lru_cache
+def _modes(size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns nodes `[T]` on [0, N], the modes' weights at them `[T, 9]`, and the modes' variances `[9]`."""
+    nodes = np.linspace(0, size, _NODES * size + 1)
+    lengths = np.full(len(nodes), 1 / _NODES)
+    lengths[[0, -1]] /= 2
+    root = np.sqrt(lengths)
+    variances, vectors = np.linalg.eigh(root[:, None] * _correlation(nodes, nodes) * root)
+    variances, vectors = variances[::-1][:_MODES_PER_AXIS], vectors[:, ::-1][:, :_MODES_PER_AXIS]
+    return nodes, root[:, None] * vectors / np.sqrt(variances), variances
+
+
+@functools.lru_cache
+def _main_modes(size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the modes along rows and along columns whose products have the largest variances."""
+    variances = _modes(size)[2]
+    products = np.outer(variances, variances)
+    first, second = np.unravel_index(np.argsort(-products, axis=None)[:_NUM_MODES], products.shape)
+    return first, second
+
+
+def _correlation(points: np.ndarray, others: np.ndarray) -> np.ndarray:
+    return np.exp(-(((points[:, None] - others) / _SMOOTHNESS) ** 2) / 2)

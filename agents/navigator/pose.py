@@ -1,0 +1,115 @@
+"""Where the body is on the map: as the state tells it, or by localization where the state does not."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from mazebench.maps.maze import Cell
+
+from ..planner import observation
+from ..planner.observation import Body, Point
+from . import localization
+from .localization import Belief
+from .map_reading import MapReading
+
+_CONFIDENT = 0.9  # probability of a pose from which it is taken for the true one
+_DEVIATION = 0.02  # m, standard deviation of a position that is found by localization
+_ROUNDING = 1e-4  # m, of positions as float32
+_JUMP = 1.0  # m; a body does not move so far in a step, so another hypothesis became the likeliest
+
+
+@dataclasses.dataclass
+class PoseEstimate:
+    """The estimated pose of one environment's body."""
+
+    body: Body  # with the likeliest pose on the map
+    belief: Belief | None = None  # None where the state tells the pose
+    dead_reckoning: DeadReckoning | None = None  # the odometry; None where it is the pose of the state
+
+    @classmethod
+    def begin(cls, reading: MapReading, observed: Body, ranges: np.ndarray) -> PoseEstimate:
+        """Returns the estimate after the first observation of an episode."""
+        if known_position(observed) is not None:
+            return cls(observed)
+        heading, dead_reckoning = None, None
+        # The origin lies in the border of any maze: there, the pose counts from the start, and tells no place on the
+        # map. Elsewhere, noise moved the position off a cell's centre. Then adding up the velocities tells the way.
+        if (observed.x, observed.y, observed.yaw) != (0.0, 0.0, 0.0):
+            heading = observed.yaw
+            dead_reckoning = DeadReckoning((observed.x, observed.y), observed.velocity())
+        goal = _only_cell(reading.goal)
+        belief = localization.begin(reading.walls > 0.5, reading.start, _pose(observed), ranges, goal, heading)
+        return cls(_placed(observed, belief), belief, dead_reckoning)
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether the pose is taken for the true one."""
+        return self.belief is None or self.belief.confidence >= _CONFIDENT
+
+    @property
+    def deviation(self) -> float:
+        """The standard deviation of the position in metres, if the pose is certain."""
+        return 0.0 if self.belief is None else _DEVIATION
+
+    def update(self, reading: MapReading, seen_walls: np.ndarray, observed: Body, ranges: np.ndarray) -> bool:
+        """Takes in an observation; returns whether an unlike pose became the likeliest.
+
+        Args:
+          reading: of the map.
+          seen_walls: `[N, N]` bool, the walls by the map and what was seen.
+          observed: the body as the state has it.
+          ranges: `[32]` m, the scan.
+        """
+        if self.belief is None:
+            self.body = observed
+            return False
+        # What was seen explains scans from a wrong pose as well as from the true one. So it is used only where the
+        # start is known.
+        walls, odometry = reading.walls > 0.5, observed
+        if self.dead_reckoning is not None:
+            walls, odometry = seen_walls, self.dead_reckoning.move(observed)
+        before = self.belief.pose
+        self.belief = localization.update(self.belief, walls, _pose(odometry), ranges, _only_cell(reading.goal))
+        self.body = _placed(observed, self.belief)
+        return bool(np.abs(self.belief.pose - before)[:2].max() > _JUMP)
+
+
+@dataclasses.dataclass
+class DeadReckoning:
+    """A position that adds up the velocities."""
+
+    position: Point  # m
+    velocity: Point  # m/s, at the last observation
+
+    def move(self, observed: Body) -> Body:
+        """Moves on by the mean velocity since the last observation; returns the observed body at the position."""
+        velocity = observed.velocity()
+        (x, y), half_step = self.position, observation.STEP_TIME / 2
+        x += half_step * (self.velocity[0] + velocity[0])
+        y += half_step * (self.velocity[1] + velocity[1])
+        self.position, self.velocity = (x, y), velocity
+        return observed._replace(x=x, y=y)
+
+
+def known_position(observed: Body) -> Point | None:
+    """Returns where on the map an episode begins, if the first state tells it: then it is the centre of a cell."""
+    off_centre = max(abs(coordinate % 1.0 - 0.5) for coordinate in (observed.x, observed.y))
+    return (observed.x, observed.y) if off_centre < _ROUNDING else None
+
+
+def _pose(body: Body) -> np.ndarray:
+    """Returns x, y and yaw as `[3]` float."""
+    return np.array([body.x, body.y, body.yaw])
+
+
+def _placed(observed: Body, belief: Belief) -> Body:
+    x, y, yaw = belief.pose.tolist()
+    return observed._replace(x=x, y=y, yaw=yaw)
+
+
+def _only_cell(goal: np.ndarray) -> Cell | None:
+    """Returns the one cell that a distribution `[N, N]` leaves, None if it leaves several."""
+    cells = np.argwhere(goal > 0)
+    return (int(cells[0, 0]), int(cells[0, 1])) if len(cells) == 1 else None

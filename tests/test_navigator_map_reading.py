@@ -1,0 +1,202 @@
+"""Reading a map: which cells are walls, and which one is the goal, when the map's pixels are not the maze's cells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mazebench_agents.navigator.coarse_map import read_coarse_map
+from mazebench_agents.navigator.drawing import compare, widths_of_pixels
+from mazebench_agents.navigator.gauss_newton import normal_equations, variances
+from mazebench_agents.navigator.map_reading import read_map
+
+from mazebench.maps.generators import generate
+from mazebench.maps.maze import cell_to_point
+from mazebench.tasks.context import START, build_context
+from mazebench.tasks.episode import sample_pair
+from mazebench.tasks.perturbations.base import ShownMap
+from mazebench.tasks.tracks.sketch import Sketch
+
+SIZE = 13
+
+
+def sketched(seed, level, style="dfs"):
+    """A maze, its start and goal, and the context of its map drawn by hand."""
+    rng = np.random.default_rng(seed)
+    maze = generate(style, SIZE, rng)
+    start, goal = sample_pair(maze, 8, rng)
+    shown = Sketch().show(ShownMap(maze.walls), level, (start, goal), rng)
+    return maze, start, goal, build_context(shown.seen_walls(), shown.seen_cell(start), shown.seen_cell(goal), 2 * SIZE)
+
+
+def coarse(seed, size, context_size):
+    """A maze, its start and goal, and the context of its map with fewer pixels than cells."""
+    rng = np.random.default_rng(seed)
+    maze = generate("dfs", size, rng)
+    start, goal = sample_pair(maze, 20, rng)
+    return maze, start, goal, build_context(maze.walls, start, goal, context_size)
+
+
+def point(cell, size):
+    x, y = cell_to_point(cell, size)
+    return float(x), float(y)
+
+
+def cross_entropy(probability, walls):
+    """Nats a cell."""
+    return float(-np.log(np.where(walls, probability, 1 - probability)[1:-1, 1:-1]).mean())
+
+
+class TestDrawnMap:
+    @pytest.mark.parametrize("level", [1, 2, 3])
+    def test_most_goals_and_cells_are_read_right(self, level):
+        found, wrong, surprise = [], [], []
+        for seed in range(40):
+            maze, start, goal, context = sketched(seed, level)
+            reading = read_map(context, SIZE, point(start, SIZE))
+            found.append(np.unravel_index(reading.goal.argmax(), reading.goal.shape) == goal)
+            wrong.append(((reading.walls > 0.5) != maze.walls).mean())
+            surprise.append(cross_entropy(reading.walls, maze.walls))
+        assert np.mean(found) >= 0.9
+        assert np.mean(wrong) < 0.01
+        assert np.mean(surprise) < 0.03
+
+    def test_undistorted_drawing_is_read_right(self):
+        maze, start, goal, _ = sketched(0, 1)
+        picture = np.kron(maze.walls, np.ones((2, 2))).astype(np.float32)
+        double = [(2 * row + 1, 2 * column + 1) for row, column in (start, goal)]
+        reading = read_map(build_context(picture, *double, 2 * SIZE), SIZE)
+        np.testing.assert_array_equal(reading.walls > 0.5, maze.walls)
+        assert reading.goal[goal] > 0.9
+        assert reading.start[start] > 0.9
+
+    def test_start_is_found_where_only_its_mark_is_known(self):
+        _, start, _, context = sketched(3, 1)
+        assert read_map(context, SIZE).start[start] > 0.9
+
+    def test_map_without_a_start_mark_is_read(self):
+        maze, _, _, context = sketched(3, 1)
+        context[START] = 0
+        reading = read_map(context, SIZE)
+        np.testing.assert_array_equal(reading.walls > 0.5, maze.walls)
+        assert reading.start.max() < 0.05
+
+    @pytest.mark.parametrize("style", ["rooms", "obstacles"])
+    def test_mazes_of_other_styles_are_read_better_than_guessed(self, style):
+        wrong = []
+        for seed in range(10):
+            maze, start, _, context = sketched(seed, 1, style)
+            wrong.append(((read_map(context, SIZE, point(start, SIZE)).walls > 0.5) != maze.walls)[1:-1, 1:-1].mean())
+        assert np.mean(wrong) < 0.15
+
+    @pytest.mark.parametrize("value", [0.0, 0.4, 1.0])
+    def test_sheet_without_a_maze_gives_distributions(self, value):
+        context = np.full((4, 2 * SIZE, 2 * SIZE), value, np.float32)
+        for distribution in read_map(context, SIZE)[1:]:
+            assert distribution.sum() == pytest.approx(1)
+            assert distribution.min() >= 0
+
+
+class TestCoarseMap:
+    def test_probabilities_of_doors_are_what_they_say(self):
+        probability, wall = [], []
+        for seed in range(6):
+            maze, *_ = coarse(seed, 51, 21)
+            picture = build_context(maze.walls, (1, 1), (1, 1), 21)[0].astype(np.float64)
+            walls = read_coarse_map(np.rint(255 * picture) / 255, 51, np.full((51, 51), np.nan))
+            probability.append(walls[1:-1:2, 2:-1:2].ravel())
+            wall.append(maze.walls[1:-1:2, 2:-1:2].ravel())
+        probability, wall = np.concatenate(probability), np.concatenate(wall)
+        assert ((probability > 0.5) == wall).mean() > 0.95
+        for low, high in ((0.0, 0.05), (0.05, 0.5), (0.5, 0.95), (0.95, 1.0)):
+            chosen = (probability >= low) & (probability <= high)
+            assert wall[chosen].mean() == pytest.approx(probability[chosen].mean(), abs=0.06)
+
+    def test_cells_around_the_start_are_known_from_the_local_map(self):
+        maze, start, goal, context = coarse(0, 51, 21)
+        reading = read_map(context, 51, point(start, 51))
+        row, column = (slice(max(0, index - 10), index + 11) for index in start)
+        assert np.abs(reading.walls - maze.walls)[row, column].max() < 0.01
+        assert reading.start[start] == 1
+        assert reading.goal[goal] > 0.2
+
+    def test_goal_lies_in_the_cells_that_share_its_mark(self):
+        _, _, goal, context = coarse(0, 51, 21)
+        cells = np.argwhere(read_map(context, 51).goal > 0)
+        assert list(goal) in cells.tolist()
+        assert {(row * 21 // 51, column * 21 // 51) for row, column in cells} == {
+            (goal[0] * 21 // 51, goal[1] * 21 // 51)
+        }
+
+    @pytest.mark.parametrize(("style", "size"), [("obstacles", 30), ("rooms", 31)])
+    def test_map_that_corridors_do_not_explain_is_resampled(self, style, size):
+        maze = generate(style, size, np.random.default_rng(0))
+        picture = build_context(maze.walls, (1, 1), (1, 1), 21)[0].astype(np.float64)
+        walls = read_coarse_map(picture, size, np.full((size, size), np.nan))
+        assert np.corrcoef(walls.ravel(), maze.walls.ravel())[0, 1] > 0.6
+
+
+class TestCompare:
+    @pytest.fixture
+    def drawing(self):
+        """Walls, points and box widths of a slightly rotated maze, with pixels of 0.6 cells."""
+        rng = np.random.default_rng(0)
+        walls = rng.random((SIZE, SIZE))
+        walls[[0, -1]] = walls[:, [0, -1]] = 1.0
+        grid = np.moveaxis(np.indices((20, 22)), 0, -1) * 0.6 + 0.3
+        points = grid + 0.05 * grid[..., ::-1] * [1, -1]
+        return walls, points, widths_of_pixels(points, 0.2)
+
+    @pytest.mark.parametrize("thickening", [-0.3, 0.2])
+    def test_slopes_are_derivatives_of_the_expectation(self, drawing, thickening):
+        walls, points, widths = drawing
+        blank, step = np.zeros(points.shape[:2]), 1e-7
+
+        def expected(shift, change):
+            return -compare(blank, points + shift, widths, thickening + change, walls, 0.1)[0]
+
+        slopes = compare(blank, points, widths, thickening, walls, 0.1)[1]
+        for index, (shift, change) in enumerate([((step, 0), 0), ((0, step), 0), ((0, 0), step)]):
+            shift = np.array(shift)
+            numerical = (expected(shift, change) - expected(-shift, -change)) / (2 * step)
+            np.testing.assert_allclose(slopes[..., index], numerical, atol=1e-5)
+
+    @pytest.mark.parametrize("thickening", [-0.3, 0.0, 0.2])
+    def test_evidence_of_a_lone_doubtful_cell_is_the_ratio_of_likelihoods(self, drawing, thickening):
+        walls, points, widths = drawing
+        walls, cell, noise = np.round(walls), (5, 6), 0.1
+        walls[cell] = 0.3
+        picture = np.random.default_rng(1).random(points.shape[:2])
+        evidence = compare(picture, points, widths, thickening, walls, noise)[3][cell]
+        log_likelihoods = []
+        for wall in (1.0, 0.0):
+            walls[cell] = wall
+            differences = compare(picture, points, widths, thickening, walls, noise)[0]
+            log_likelihoods.append(-((differences / noise) ** 2).sum() / 2)
+        assert evidence == pytest.approx(log_likelihoods[0] - log_likelihoods[1], abs=0.2)
+
+    def test_pixels_show_the_share_of_wall_in_them(self):
+        walls = np.zeros((SIZE, SIZE))
+        walls[:, 6] = 1.0
+        points = np.array([[[4.5, 6.25], [4.5, 7.0], [4.5, 7.2]]])
+        for thickening, shares in ((0.0, [1, 0.5, 0.1]), (0.2, [1, 0.7, 0.3]), (-0.2, [0.8, 0.3, 0])):
+            expected = -compare(np.zeros((1, 3)), points, np.full((1, 3, 2), 0.5), thickening, walls, 0.1)[0]
+            np.testing.assert_allclose(expected[0], shares, atol=1e-12)
+
+
+class TestGaussNewton:
+    def test_sums_are_those_of_the_jacobian(self):
+        rng = np.random.default_rng(0)
+        basis, slopes = rng.normal(size=(2, 20, 3)), rng.normal(size=(4, 5, 3))
+        differences, deviations = rng.normal(size=(4, 5)), rng.uniform(1, 2, size=(4, 5))
+        weighted = slopes.reshape(-1, 3) / deviations.reshape(-1, 1)
+        jacobian = np.hstack([basis[0] * weighted[:, :1], basis[1] * weighted[:, 1:2], weighted[:, 2:]])
+        hessian, gradient = normal_equations(basis, slopes, differences, deviations)
+        np.testing.assert_allclose(hessian, jacobian.T @ jacobian, atol=1e-12)
+        np.testing.assert_allclose(gradient, jacobian.T @ (differences / deviations).ravel(), atol=1e-12)
+
+    def test_variances_are_those_of_drawn_parameters(self):
+        rng = np.random.default_rng(0)
+        basis, factor = rng.normal(size=(2, 6, 3)), rng.normal(size=(7, 7))
+        parameters = factor @ rng.normal(size=(7, 100_000))
+        points = np.stack([basis[0] @ parameters[:3], basis[1] @ parameters[3:6]], axis=1)
+        np.testing.assert_allclose(variances(basis, factor @ factor.T), points.var(axis=-1), rtol=0.05)
