@@ -29,7 +29,7 @@ class TestOptions:
     @pytest.mark.parametrize(
         ("options", "message"),
         [
-            ({"sensors": "eyes"}, r"^unknown sensors 'eyes'; available: chase, egocentric, top$"),
+            ({"sensors": "eyes"}, r"^unknown sensors 'eyes'; available: chase, egocentric, lidar, top$"),
             ({"sensors": ["top", "top"]}, r"^expected each sensor once, found top, top$"),
             ({"camera_size": 0}, r"^expected camera_size from 1 to 1280, found 0$"),
             ({"camera_size": 1281}, r"^expected camera_size from 1 to 1280, found 1281$"),

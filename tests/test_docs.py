@@ -201,7 +201,7 @@ def shortened(command: list[str]) -> list[str] | None:
         agent = options[options.index("--agent") + 1]
         if agent in PLAIN_AGENTS or pathlib.Path(f"{agent.partition(':')[0]}.py").exists():
             few = ("--distances", "1,2", "--episodes-per-distance", "1")
-            return arguments if "hierarchical" in options or "--out" in options else [*arguments, *few]
+            return arguments if {"hierarchical", "--track", "--out"} & set(options) else [*arguments, *few]
     return None
 
 

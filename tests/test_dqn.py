@@ -34,6 +34,13 @@ def test_network_with_the_true_scale_reads_the_map_where_the_agent_is():
     torch.testing.assert_close(read[0, 2, 4:6], torch.tensor([-0.1, 0.3]))
 
 
+def test_network_takes_the_middle_of_the_map_for_a_start_that_is_not_marked():
+    network = QNetwork(4, 8)
+    context = torch.zeros(2, 4, 7, 7)
+    context[:, 2, 1, 5] = context[1, 3, 0, 0] = 1
+    assert network.locate(torch.zeros(2, 1, 2), network.encode(context))[:, 0].tolist() == [[3.0, 3.0], [0.0, 0.0]]
+
+
 def test_network_without_context_does_not_depend_on_it():
     agent = DQN(DQN.default_config, 13)
     assert agent.initial_state(2).code is None

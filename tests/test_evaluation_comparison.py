@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_results import make_record
+from made_results import make_record, make_result
 
 from mazebench.errors import InputError
-from mazebench.evaluation.comparison import Comparison, compare_results, to_json
+from mazebench.evaluation.comparison import Comparison, compare_folders, compare_results, to_json
 from mazebench.evaluation.intervals import difference_interval
 from mazebench.evaluation.metrics import summarize
 from mazebench.evaluation.records import Provenance, Record, Summary, TaskProvenance
@@ -107,3 +107,13 @@ class TestResults:
             compare_results(result(tmp_path, records), result(tmp_path, others))
         with pytest.raises(InputError, match=r"found 2 and 1 of them$"):
             compare_results(result(tmp_path, records), result(tmp_path, records[:1]))
+
+    def test_two_levels_of_a_track_are_compared_on_the_same_pairs(self, tmp_path):
+        for level in (1, 2):
+            make_result(tmp_path / str(level), "mah", track="lost", level=level, num_mazes=2, record=False)
+        found = compare_folders(tmp_path / "1", tmp_path / "2")
+        assert found.title == (
+            f"A is mah (track lost, level 1) in {tmp_path / '1'}, B is mah (track lost, level 2) in {tmp_path / '2'}; "
+            "local, eval mazes 13 x 13"
+        )
+        assert found.parts[""].overall.num_episodes == 20

@@ -12,7 +12,7 @@ from run_folders import FEW, IMPORTS, summary_of
 from mazebench import __version__
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.options import EvalOptions, make_task
 from mazebench.evaluation.provenance import checkpoint_metadata, provenance
 from mazebench.maps.benchmark import manifest_hash
 
@@ -46,7 +46,8 @@ def test_versions_options_and_machine_are_in_the_summary(tmp_path):
 
 def test_a_checkpoint_is_named_by_its_hash_and_tells_its_config(tmp_path):
     checkpoint = write_checkpoint(tmp_path / "x.safetensors", {"mine": json.dumps({"config": {"width": 8}})})
-    found = provenance(EvalOptions("mah", checkpoint=checkpoint), load_agent_class("mah"), ()).model_dump()
+    options = EvalOptions("mah", checkpoint=checkpoint)
+    found = provenance(options, load_agent_class("mah"), make_task(options)).model_dump()
     assert found["checkpoint_sha256"] == hashlib.sha256((tmp_path / "x.safetensors").read_bytes()).hexdigest()
     assert found["checkpoint_metadata"] == {"mine": {"config": {"width": 8}}}
 
@@ -56,7 +57,8 @@ def test_an_agent_at_hand_is_named_by_the_hash_of_its_file(tmp_path, monkeypatch
     (tmp_path / "provenance_at_hand.py").write_text(code)
     monkeypatch.syspath_prepend(tmp_path)
     name = "provenance_at_hand:Mine"
-    found = provenance(EvalOptions(name), load_agent_class(name), ()).model_dump()
+    options = EvalOptions(name)
+    found = provenance(options, load_agent_class(name), make_task(options)).model_dump()
     assert found["agent_code_sha256"] == hashlib.sha256(code.encode()).hexdigest()
     assert (found["agent_class"], found["agent_package"]) == (name, None)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pathlib
 
 import numpy as np
@@ -14,15 +15,18 @@ from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.trajectories import (
     TRAJECTORIES,
     Trajectory,
+    from_json,
     load_trajectories,
     pack_trajectories,
     save_trajectories,
+    to_json,
 )
 from mazebench.evaluation.trials import frozen_trials
-from mazebench.maps.benchmark import load_mazes
+from mazebench.maps.benchmark import TRACKS_VERSION, load_mazes
 from mazebench.maps.maze import cell_to_point, point_to_cell
+from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.registry import make_spec
-from mazebench.tasks.shown_map import show_map
+from mazebench.tasks.shown_map import leg_context, show_map
 
 HALF = np.float16(0.5)
 
@@ -34,9 +38,20 @@ def episode(index: int, size: int = 5) -> Trajectory:
     return Trajectory(pose, shown, np.arange(index % 3 + 1, dtype=np.int32) + index)
 
 
+def track_episode(index: int) -> Trajectory:
+    """Returns a made-up trajectory of a track on which the map is drawn and the pose is odometry."""
+    made = episode(index)
+    marks = np.array([-1, index], dtype=np.int32)
+    picture = np.full((6, 6), 40 * index, dtype=np.uint8)
+    return dataclasses.replace(made, marks=marks, picture=picture, observed=-made.pose)
+
+
 def assert_same(found: Trajectory, expected: Trajectory) -> None:
-    for name in ("pose", "shown", "landmarks"):
-        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), strict=True)
+    for field in dataclasses.fields(Trajectory):
+        ours, theirs = getattr(found, field.name), getattr(expected, field.name)
+        assert (ours is None) == (theirs is None)
+        if ours is not None:
+            np.testing.assert_array_equal(ours, theirs, strict=True)
 
 
 def arrays_of(path: pathlib.Path) -> dict[str, np.ndarray]:
@@ -75,6 +90,26 @@ class TestFile:
         save_trajectories(tmp_path / "y.npz", trajectories)
         assert (tmp_path / "y.npz").read_bytes() == file.read_bytes()
 
+    def test_on_tracks_it_has_arrays_more(self, tmp_path):
+        save_trajectories(tmp_path / "x.npz", pack_trajectories([track_episode(0), track_episode(1)]))
+        arrays = arrays_of(tmp_path / "x.npz")
+        assert {name: (arrays[name].dtype.str, arrays[name].shape) for name in [*arrays][6:]} == {
+            "marks": ("<i4", (2, 2)),
+            "picture": ("|u1", (2, 6, 6)),
+            "observed": ("<f2", (2 + 3, 3)),
+        }
+        trajectories = load_trajectories(tmp_path / "x.npz", 2)
+        for index in range(2):
+            assert_same(trajectories[index], track_episode(index))
+
+    @pytest.mark.parametrize(
+        ("made", "more"), [(episode(2), []), (track_episode(2), ["marks", "picture", "observed"])], ids=["v1", "track"]
+    )
+    def test_a_line_of_the_journal_holds_one_episode(self, made, more):
+        content = to_json(made)
+        assert list(content) == ["pose", "shown", "landmarks", *more]
+        assert_same(from_json(content, 5), made)
+
     @pytest.mark.parametrize("size", [5, 6, 13, 254, 255])
     def test_the_size_of_the_maps_follows_from_their_bytes(self, tmp_path, size):
         save_trajectories(tmp_path / "x.npz", pack_trajectories([episode(1, size)]))
@@ -101,6 +136,22 @@ class TestDamage:
         np.savez(file, **{name: value for name, value in arrays.items() if value is not None})
         with pytest.raises(InputError, match=rf"x\.npz: (expected .*)?{said}"):
             load_trajectories(file, 3)
+
+    @pytest.mark.parametrize(
+        ("name", "value", "said"),
+        [
+            ("marks", np.array([[-1, 0], [-1, 36], [0, 0]], dtype=np.int32), "expected marks from -1 to 35"),
+            ("marks", np.zeros((2, 2), dtype=np.int32), r"expected marks of shape \(3, 2\), found \(2, 2\)"),
+            ("picture", np.zeros((3, 6, 7), dtype=np.uint8), "expected 3 pictures of M x M pixels, found shape"),
+            ("picture", np.zeros((3, 6, 6)), "damaged file: picture of type float64, not uint8"),
+            ("observed", np.zeros((8, 3), dtype=np.float16), "expected 9 finite observed poses"),
+        ],
+    )
+    def test_an_array_of_a_track_that_cannot_be_is_refused(self, tmp_path, name, value, said):
+        save_trajectories(tmp_path / "x.npz", pack_trajectories([track_episode(index) for index in range(3)]))
+        np.savez(tmp_path / "x.npz", **arrays_of(tmp_path / "x.npz") | {name: value})
+        with pytest.raises(InputError, match=said):
+            load_trajectories(tmp_path / "x.npz", 3)
 
     def test_a_file_that_is_missing_or_no_archive_is_named(self, tmp_path):
         with pytest.raises(InputError, match=r"none\.npz: can't read the trajectories: No such file"):
@@ -159,6 +210,33 @@ class TestRecording:
             assert found.landmarks[-1] == 11 * 13 + 1  # the goal stays where it is in the world
             num_changed += (found.shown != spec.mazes[trial.episode.maze].walls).sum()
         assert num_changed > 100
+
+    @pytest.mark.parametrize(("track", "level"), [("stale", 1), ("lost", 1), ("lost", 2), ("sketch", 3)])
+    def test_on_a_track_it_is_what_the_agent_was_given(self, tmp_path, track, level):
+        summary = evaluate("random", tmp_path, record=True, track=track, level=level, distances=(3,))
+        spec = make_spec(track, 13, "eval", level=level)
+        trials = [trial for trial in frozen_trials("local", 13, TRACKS_VERSION) if trial.distance == 3]
+        trajectories = load_trajectories(tmp_path / TRAJECTORIES, summary.episodes)
+        for trial, found in list(zip(trials, trajectories, strict=True))[:2]:
+            shown = show_map(spec, trial.episode)
+            context = leg_context(spec, shown, trial.episode.start, trial.episode.goal)
+            np.testing.assert_array_equal(found.shown, shown.walls)
+            if track == "sketch":
+                np.testing.assert_array_equal(found.picture, np.rint(context[GLOBAL_MAP] * 255))
+            else:
+                assert found.picture is None
+            assert found.marks[1] == context[GOAL].argmax()
+            assert found.marks[0] == (-1 if (track, level) == ("lost", 2) else context[START].argmax())
+            assert (found.observed is not None) == (track == "lost")
+
+    def test_the_observed_path_is_the_true_one_in_the_frame_of_the_first_pose(self, tmp_path):
+        summary = evaluate("random", tmp_path, record=True, track="lost", distances=(3,))
+        for found in load_trajectories(tmp_path / TRAJECTORIES, summary.episodes):
+            true, observed = found.pose.astype(float), found.observed.astype(float)
+            assert not observed[0].any()
+            cosine, sine = np.cos(true[0, 2]), np.sin(true[0, 2])
+            expected = (true - true[0])[:, :2] @ [[cosine, -sine], [sine, cosine]]
+            np.testing.assert_allclose(observed[:, :2], expected, atol=0.02)
 
     def test_yaw_follows_the_body(self, tmp_path):
         evaluate(Turning, tmp_path, record=True, distances=(2,), episodes_per_distance=1)

@@ -64,6 +64,27 @@ class TestScripts:
         needs("stable_baselines3")
         assert " drove " in run(EXAMPLES / "sb3_continuous.py", "--steps", "110", folder=tmp_path)
 
+    def test_sb3_tracks(self, tmp_path):
+        needs("stable_baselines3")
+        budget = ("--steps", "512", "--num-envs", "4", "--out", "ppo.zip")
+        output = run(EXAMPLES / "sb3_tracks.py", *budget, folder=tmp_path)
+        assert output.startswith("context: [4, 13, 13]\nlidar: [32]\nstate: [12]\n")
+        # The policy is an agent, also where contexts are larger than those that it was trained on.
+        shutil.copy(EXAMPLES / "sb3_agent.py", tmp_path)
+        which = ("--agent", "sb3_agent:PPOAgent", "--checkpoint", "ppo.zip", "--distances", "3")
+        run("-m", "mazebench", "eval", *which, "--track", "sketch", "--out", "results", folder=tmp_path)
+        assert json.loads((tmp_path / "results" / "summary.json").read_text())["episodes"] == 11
+        check = (
+            "from mazebench.agent import Interface\n"
+            "from mazebench.testing import check_agent\n"
+            "check_agent('sb3_agent:PPOAgent', Interface('local', 13, 13, sensors=('lidar',)), 'ppo.zip')\n"
+        )
+        run("-c", check, folder=tmp_path)
+
+    def test_the_page_shows_the_agent_of_sb3_as_it_is(self):
+        page = (EXAMPLES.parent / "compete.md").read_text(encoding="utf-8")
+        assert f"\n{(EXAMPLES / 'sb3_agent.py').read_text(encoding='utf-8')}```\n" in page
+
     def test_pixels(self, tmp_path):
         needs("torch")
         probe = "import mujoco; mujoco.GLContext(64, 64).free()"

@@ -41,18 +41,19 @@ WALLS = {
     "dm_control": ("mazebench/world", "mazebench/tasks", "mazebench/envs", "mazebench/bench"),
     "torch": ("agents",),
     "gymnasium": ("mazebench/envs", "mazebench/bench"),
-    "numba": ("agents/mmn",),
+    "numba": ("agents/common/kernels.py",),
     "ray": ("mazebench/evaluation/cluster.py", "mazebench/training/distributed.py"),
     "matplotlib": ("mazebench/report",),
     "curses": ("mazebench/play/terminal.py",),
 }
 FOLDERS = {"mazebench": "mazebench", "mazebench_agents": "agents", "mazebench_assets": "assets"}
-# Methods of dm_control's, Gymnasium's and torch's classes, of Perturbation and of Sensor, which document them.
+# Methods of dm_control's, Gymnasium's and torch's classes, and of our base classes of perturbations, drawings, tracks
+# and sensors, which document them.
 OVERRIDES = {
     "initialize_episode", "before_step", "after_step", "get_observation", "get_reward", "get_termination",
     "action_spec", "observation_spec", "reward_spec", "reset", "step", "render", "close", "close_extras",
     "forward",
-    "show", "state_error", "read",
+    "show", "state_error", "picture", "pixel", "points", "distances", "time_limit", "check", "facts", "read",
 }  # fmt: skip
 
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
