@@ -58,7 +58,7 @@ def main() -> None:
                 raise KeyboardInterrupt
             sys.exit(status)
     except _UsageError as error:
-        _fail(error.format_message(), 2)  # type: ignore[attr-defined]
+        _fail(error.format_message().replace("Value error, ", ""), 2)  # type: ignore[attr-defined]
     except InputError as error:
         _fail(str(error), 2)
     except OSError as error:
