@@ -1,0 +1,87 @@
+"""Trains Stable-Baselines3's PPO on the train mazes of a track, at all of its levels, and saves the policy.
+
+python docs/examples/sb3_tracks.py --steps 400000 --out ppo.zip
+"""
+
+import argparse
+
+import gymnasium
+import numpy as np
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
+
+import mazebench  # noqa: F401  (registers the ids)
+
+
+class MazeVecEnv(VecEnv):
+    """A vector environment of mazebench with the interface of Stable-Baselines3."""
+
+    def __init__(self, envs):
+        self.envs = envs
+        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+
+    def reset(self):
+        observations, _ = self.envs.reset(seed=self._seeds)  # of `seed`, or None for each environment
+        self._reset_seeds()
+        return observations
+
+    def step_async(self, actions):
+        self.actions = actions
+
+    def step_wait(self):
+        observations, rewards, terminated, truncated, info = self.envs.step(self.actions)
+        infos = [{} for _ in range(self.num_envs)]
+        for slot in np.flatnonzero(terminated | truncated):
+            # The time limit is no property of the world, so PPO goes on from the last observation there.
+            infos[slot]["terminal_observation"] = info["final_obs"][slot]
+            infos[slot]["TimeLimit.truncated"] = bool(truncated[slot])
+            infos[slot]["is_success"] = bool(terminated[slot])  # which PPO prints as success_rate
+        return observations, rewards, terminated | truncated, infos
+
+    def close(self):
+        self.envs.close()
+
+    def get_attr(self, attr_name, indices=None):
+        return [getattr(self.envs, attr_name)] * self.num_envs
+
+    def set_attr(self, attr_name, value, indices=None):
+        setattr(self.envs, attr_name, value)
+
+    def env_method(self, method_name, *arguments, indices=None, **options):
+        return [getattr(self.envs, method_name)(*arguments, **options)]
+
+    def env_is_wrapped(self, wrapper_class, indices=None):
+        return [False] * self.num_envs
+
+
+parser = argparse.ArgumentParser()
+parser.add_argument("--track", default="mazebench/Stale-13-v2", help="its Gymnasium id")
+parser.add_argument("--level", type=int, nargs="+", default=[1, 2, 3], help="of several, each episode draws one")
+parser.add_argument("--distances", type=int, nargs="+", default=[1, 2, 3, 4, 5, 6], help="cells from start to goal")
+parser.add_argument("--steps", type=int, default=400_000)
+parser.add_argument("--num-envs", type=int, default=64)
+parser.add_argument("--seed", type=int, default=0)
+parser.add_argument("--out", default="ppo.zip")
+arguments = parser.parse_args()
+
+options = {"split": "train", "level": arguments.level, "distances": arguments.distances}
+envs = gymnasium.make_vec(arguments.track, num_envs=arguments.num_envs, **options)
+for name, space in envs.single_observation_space.spaces.items():
+    print(f"{name}: {list(space.shape)}")
+model = PPO(
+    "MultiInputPolicy",
+    VecNormalize(VecMonitor(MazeVecEnv(envs)), norm_obs=False, gamma=0.98),  # rewards of an order of 1
+    n_steps=128,
+    batch_size=1024,
+    n_epochs=4,
+    learning_rate=5e-4,
+    gamma=0.98,
+    ent_coef=0.01,
+    policy_kwargs={"net_arch": [256, 256]},
+    seed=arguments.seed,
+    device="cpu",
+    verbose=1,
+)
+model.learn(arguments.steps)
+model.save(arguments.out)
+print(f"saved {arguments.out}, which sb3_agent.py plays")
