@@ -22,6 +22,7 @@ from mazebench_agents.planner.pilot import Pilot, steer
 import mazebench
 from mazebench.maps.generators import dfs_walls
 from mazebench.maps.maze import path_through_walls
+from mazebench.world.angles import wrap_angle
 from mazebench.world.lidar import NUM_RAYS
 
 SIZE = 13
@@ -72,7 +73,7 @@ class Driver:
         angles = body.yaw + 2 * math.pi / NUM_RAYS * np.arange(NUM_RAYS)
         if self.direction is None:
             self.direction = float(angles[np.argmax(ranges)])
-        ahead = np.abs(observation.wrap(angles - self.direction))
+        ahead = np.abs(wrap_angle(angles - self.direction))
         if ranges[np.argmin(ahead)] < 0.75:
             self.direction = float(angles[np.argmax(np.where(ahead < 2.4, ranges, 0.0))])
         aim = complex(body.x, body.y) + cmath.rect(1.0, self.direction)
@@ -97,7 +98,7 @@ def measure(level: int, policy: str, num_episodes: int) -> None:
             actions[b] = drivers[b].act(observed["state"][b], observed["lidar"][b])
             belief = drivers[b].belief
             errors[step, b] = math.dist(belief.pose[:2], info["position"][b])
-            turns[step, b] = abs(observation.wrap(belief.pose[2] - info["yaw"][b]))
+            turns[step, b] = abs(wrap_angle(belief.pose[2] - info["yaw"][b]))
             sure[step, b] = belief.confidence
         observed, _, terminated, truncated, info = env.step(actions)
         steps[going & terminated] = step + 1

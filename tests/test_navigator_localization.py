@@ -12,8 +12,8 @@ from mazebench_agents.navigator.exploration import disambiguate
 from mazebench.maps.generators import dfs_walls
 from mazebench.maps.maze import Maze, cell_to_point, point_to_cell
 from mazebench.tasks.tracks.lost import Odometry, corrupted_odometry
+from mazebench.world.angles import wrap_angle
 from mazebench.world.lidar import Lidar
-from mazebench.world.physics import wrap_angle
 
 SIZE = 13
 

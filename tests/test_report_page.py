@@ -59,12 +59,17 @@ def browser(tmp_path_factory):
         yield browser
 
 
-@pytest.fixture
-def opened(browser, page):
-    """The browser with the page loaded anew and an episode in the explorer."""
+def load_anew(browser, page):
+    """Opens the page and waits until the explorer shows an episode."""
     browser.errors.clear()
     browser.open(page)
     browser.wait_for("document.getElementById('clock').value.startsWith('step')")
+
+
+@pytest.fixture
+def opened(browser, page):
+    """The browser with the page loaded anew and an episode in the explorer."""
+    load_anew(browser, page)
     yield browser
     assert browser.errors == []
     assert browser.run("window.hacked === undefined")
@@ -104,9 +109,7 @@ def track_page(tmp_path_factory):
 @pytest.fixture
 def on_tracks(browser, track_page):
     """The browser with the page of tracks loaded anew."""
-    browser.errors.clear()
-    browser.open(track_page)
-    browser.wait_for("document.getElementById('clock').value.startsWith('step')")
+    load_anew(browser, track_page)
     yield browser
     assert browser.errors == []
 

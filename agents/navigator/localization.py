@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mazebench.maps.maze import Cell, cell_to_point
+from mazebench.world.angles import wrap_angle
 
 from . import scans
 from .scans import WallFrame
@@ -86,7 +87,7 @@ def begin(
     ranges = np.asarray(ranges, dtype=np.float64)
     poses, weights = _poses_within(start_distribution, scans.wall_frame(ranges))
     if heading is not None:
-        is_likely = np.abs(_wrapped(poses[:, 2] - heading)) < math.pi / 4
+        is_likely = np.abs(wrap_angle(poses[:, 2] - heading)) < math.pi / 4
         poses, weights = poses[is_likely], weights[is_likely]
     reading = np.array(odometry, dtype=np.float64)
     belief = Belief(poses, weights, 1.0, reading, driven=_SCALE_PRIOR, moved=_SCALE_PRIOR, num_poor=0)
@@ -131,7 +132,7 @@ def _moved(belief: Belief, odometry: np.ndarray, frame: WallFrame) -> Belief:
     new_x, new_y, new_yaw = _aligned(x + predicted.real, y + predicted.imag, yaw + turn, frame)
     corrected = complex(new_x - x, new_y - y) * cmath.rect(1, -yaw)
     steps = corrected * np.exp(1j * belief.poses[:, 2])
-    yaws = _wrapped(belief.poses[:, 2] + new_yaw - yaw)
+    yaws = wrap_angle(belief.poses[:, 2] + new_yaw - yaw)
     return belief._replace(
         poses=np.stack([belief.poses[:, 0] + steps.real, belief.poses[:, 1] + steps.imag, yaws], axis=1),
         odometry=odometry,
@@ -185,12 +186,7 @@ def _reconsidered(belief: Belief, walls: np.ndarray, frame: WallFrame) -> Belief
     """Returns a belief in which the likeliest pose has half of the probability, and all others on the map the rest."""
     others, _ = _poses_within((~walls).astype(np.float64), frame)
     apart = np.abs(others - belief.pose)
-    turned = np.abs(_wrapped(apart[:, 2]))
+    turned = np.abs(wrap_angle(apart[:, 2]))
     others = others[(apart[:, :2].max(axis=1) > 0.5) | (turned > math.pi / 4)]
     weights = np.concatenate([[0.5], np.full(len(others), 0.5 / len(others))])
     return belief._replace(poses=np.concatenate([belief.poses[:1], others]), weights=weights, num_poor=0)
-
-
-def _wrapped(angle: np.ndarray) -> np.ndarray:
-    """Returns the same angles in [-pi, pi)."""
-    return (angle + math.pi) % (2 * math.pi) - math.pi

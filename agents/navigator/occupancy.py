@@ -12,9 +12,9 @@ import math
 
 import numpy as np
 
-from ..common.kernels import compiled
+from mazebench.world.lidar import MAX_RANGE  # m; a ray that is as long saw no wall
 
-MAX_RANGE = 5.0  # m; a ray that is as long saw no wall
+from ..common.kernels import compiled
 
 _RAY = 6.0  # log odds that one ray adds to a cell where the pose is sure
 _LARGEST = 12.0  # log odds: two rays' worth, so that errors can be undone

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import pathlib
-from typing import Self
 
 import numpy as np
 
-from mazebench.agent import Agent, Inputs, Interface
+from mazebench.agent import Inputs
 from mazebench.maps.maze import Cell
 
 from . import observation
+from .map_planner import MapPlanner
 from .observation import Body, Point
 from .pilot import Pilot
 
@@ -42,21 +41,8 @@ def _filtered(coordinate: float, velocity: float, observed: float) -> float:
     return (1 - _POSITION_GAIN) * predicted + _POSITION_GAIN * observed
 
 
-class ClosedLoopPlanner(Agent):
+class ClosedLoopPlanner(MapPlanner):
     """Pure pursuit of a path that is planned once a context, from the estimated cell of the body."""
-
-    def __init__(self, cells_per_metre: float = 1.0):
-        self._cells_per_metre = cells_per_metre  # of the map that the context shows
-
-    @classmethod
-    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
-        """Returns a planner for the scale of the map, which follows from M and N."""
-        return cls(interface.context_size / interface.size)
-
-    @classmethod
-    def context_size(cls, size: int) -> int:
-        """Returns N: the map at full resolution."""
-        return size
 
     def initial_state(self, batch_size: int) -> list[_Navigator]:
         """Returns navigators that `act` replaces where an episode begins."""

@@ -88,8 +88,3 @@ def cell_of(x: float, y: float, size: int) -> Cell:
 
 def _clip(index: int, size: int) -> int:
     return min(max(index, 0), size - 1)
-
-
-def wrap(angle: float) -> float:
-    """Returns the same angle in [-pi, pi)."""
-    return (angle + math.pi) % (2 * math.pi) - math.pi

@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 
 from mazebench.maps.maze import Cell
+from mazebench.world.angles import wrap_angle
 
 from . import observation
 from .observation import Body, Point
@@ -28,8 +29,8 @@ def steer(body: Body, aim: Point, largest_misalignment: float = _LARGEST_MISALIG
     # Aimed from where the body would come to rest: aimed from where it is, it would overshoot and turn back.
     coast_x, coast_y = body.coasting()
     bearing = math.atan2(aim[1] - (body.y + coast_y), aim[0] - (body.x + coast_x)) - body.yaw
-    drive, heading = min(_DRIVES, key=lambda drive: abs(observation.wrap(bearing - drive[1])))
-    misalignment = observation.wrap(bearing - heading)
+    drive, heading = min(_DRIVES, key=lambda drive: abs(wrap_angle(bearing - drive[1])))
+    misalignment = wrap_angle(bearing - heading)
     if abs(misalignment) <= largest_misalignment:
         return drive
     return observation.LOOK_LEFT if misalignment > 0 else observation.LOOK_RIGHT

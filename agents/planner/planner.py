@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import pathlib
-from typing import Self
 
 import numpy as np
 
-from mazebench.agent import Agent, Inputs, Interface
+from mazebench.agent import Inputs
 from mazebench.maps.maze import Cell
+from mazebench.world.angles import wrap_angle
 
 from . import observation
+from .map_planner import MapPlanner
 from .observation import Body
 
 
@@ -39,7 +39,7 @@ class _Plan:
         x, y = observation.centre(self.target, size)
         coast_x, coast_y = body.coasting()
         bearing = math.atan2(y - body.y - coast_y, x - body.x - coast_x)
-        self.turns = round(observation.wrap(bearing - body.yaw) / observation.TURN_STEP)
+        self.turns = round(wrap_angle(bearing - body.yaw) / observation.TURN_STEP)
 
     def action(self, body: Body, size: int) -> int:
         """Turns as aimed, drives until the observed position is in the target, then aims at the next cell."""
@@ -54,21 +54,8 @@ class _Plan:
         return observation.LOOK_LEFT if left else observation.LOOK_RIGHT
 
 
-class Planner(Agent):
+class Planner(MapPlanner):
     """Drives open loop between the cells of a path that is planned once a context."""
-
-    def __init__(self, cells_per_metre: float = 1.0):
-        self._cells_per_metre = cells_per_metre  # of the map that the context shows
-
-    @classmethod
-    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
-        """Returns a planner for the scale of the map, which follows from M and N."""
-        return cls(interface.context_size / interface.size)
-
-    @classmethod
-    def context_size(cls, size: int) -> int:
-        """Returns N: the map at full resolution, whose cells are waypoints."""
-        return size
 
     def initial_state(self, batch_size: int) -> list[_Plan]:
         """Returns plans that `act` replaces where a context is new."""

@@ -26,9 +26,10 @@ from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.sensors.base import Worlds
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
+from mazebench.world.angles import wrap_angle
 from mazebench.world.mjcf import STEPS_PER_ACTION
 from mazebench.world.models import models_of
-from mazebench.world.physics import states_from_sensors, wrap_angle
+from mazebench.world.physics import states_from_sensors
 from mazebench.world.rendering import Cameras
 
 # Returns the next episode of environment i, or None: then the environment rests, which means that it is not stepped any

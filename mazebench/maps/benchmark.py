@@ -37,10 +37,7 @@ def load_mazes(size: int, split: str) -> tuple[Maze, ...]:
     Raises:
       InputError: if there is no such size or split.
     """
-    if size not in SIZES:
-        raise unknown("size", size, SIZES)
-    if split not in SPLITS:
-        raise unknown("split", split, SPLITS)
+    _check_names(size, SIZES, split)
     return _load_mazes(size, split, VERSION)
 
 
@@ -50,12 +47,17 @@ def load_track_mazes(size: int, split: str) -> tuple[Maze, ...]:
     Raises:
       InputError: if there is no such size or split.
     """
-    if size not in TRACK_SIZES:
-        raise unknown("size", size, TRACK_SIZES)
-    if split not in SPLITS:
-        raise unknown("split", split, SPLITS)
+    _check_names(size, TRACK_SIZES, split)
     has_train_mazes = mazes_file(size, split) in manifest(TRACKS_VERSION)["files"]
     return _load_mazes(size, split, TRACKS_VERSION if has_train_mazes else VERSION)
+
+
+def _check_names(size: int, sizes: tuple[int, ...], split: str) -> None:
+    """Raises `InputError` if there is no such size or split."""
+    if size not in sizes:
+        raise unknown("size", size, sizes)
+    if split not in SPLITS:
+        raise unknown("split", split, SPLITS)
 
 
 @functools.cache

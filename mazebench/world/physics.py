@@ -14,6 +14,7 @@ with warnings.catch_warnings():
     from dm_control.mujoco import engine, wrapper
 
 from mazebench.maps.maze import Cell, cell_to_point
+from mazebench.world.angles import wrap_angle
 from mazebench.world.mjcf import NUM_SENSORS
 from mazebench.world.models import copy_maze
 
@@ -81,11 +82,6 @@ class Physics(engine.Physics):
     def state(self) -> np.ndarray:
         """Returns the state, `[12]` float64; see `states_from_sensors`."""
         return states_from_sensors(self.data.sensordata)
-
-
-def wrap_angle(angle: np.ndarray | float) -> np.ndarray:
-    """Returns the same angle in [-pi, pi)."""
-    return np.mod(np.asarray(angle) + np.pi, 2 * np.pi) - np.pi
 
 
 def states_from_sensors(sensors: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from mazebench.maps.maze import Cell
 from mazebench.tasks.context import LOCAL_MAP, START
 from mazebench.tasks.perturbations.base import ShownMap, StateError
 from mazebench.tasks.tracks.base import Track
+from mazebench.world.angles import wrap_angle
 
 STEP_TIME = 0.16  # s, of an agent step; a constant here, so that reading options does not load MuJoCo
 _SCALES = (0.9, 1.1)  # lowest and highest of an episode's scale
@@ -81,10 +82,5 @@ class Odometry:
         self._observed = (
             odometry_x + cosine * moved_x - sine * moved_y,
             odometry_y + sine * moved_x + cosine * moved_y,
-            _wrap(heading + yaw - true_yaw + drift),
+            wrap_angle(heading + yaw - true_yaw + drift),
         )
-
-
-def _wrap(angle: float) -> float:
-    """Returns the same angle in [-pi, pi)."""
-    return (angle + math.pi) % (2 * math.pi) - math.pi
