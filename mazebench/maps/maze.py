@@ -1,7 +1,7 @@
 """The maze: a legal grid of walls, with its cells, points and shortest paths.
 
 `N` is the number of rows and of columns of a maze, `F` the number of its free cells. A cell is `(row, column)` with
-row 0 on top; a point is `(x, y)` in metres with x to the right and y up. One cell is one metre.
+row 0 on top; a point is `(x, y)` in metres with x to the right and y up. In the benchmark one cell is one metre.
 """
 
 from __future__ import annotations
@@ -45,17 +45,20 @@ class Maze:
 
     walls: np.ndarray  # [N, N] bool, True is wall; copied and made read-only
     name: str = "maze"
+    cell_size: float = 1.0  # m, the side of a cell; 1 in the benchmark
 
     def __post_init__(self) -> None:
         walls = np.array(self.walls)
         if walls.dtype != bool:
             raise MazeError(f"{self.name}: expected walls of dtype bool, found {walls.dtype}")
+        if not 0 < self.cell_size < math.inf:
+            raise MazeError(f"{self.name}: expected a cell_size above 0 m, found {self.cell_size}")
         _check(walls, self.name)
         walls.flags.writeable = False
         object.__setattr__(self, "walls", walls)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Maze) and np.array_equal(self.walls, other.walls)
+        return isinstance(other, Maze) and self.cell_size == other.cell_size and np.array_equal(self.walls, other.walls)
 
     def __hash__(self) -> int:
         return hash(self.walls.tobytes())
@@ -64,7 +67,7 @@ class Maze:
         return self  # it never changes
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Maze, (self.walls, self.name)  # without what is cached
+        return Maze, (self.walls, self.name, self.cell_size)  # without what is cached
 
     @property
     def size(self) -> int:
