@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import contextvars
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pydantic
+
+# The list in which remarks are held back; None where they are printed.
+_held: contextvars.ContextVar[list[str] | None] = contextvars.ContextVar("held", default=None)
 
 
 class InputError(ValueError):
@@ -23,6 +32,12 @@ def one_line(text: str) -> str:
     return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)
 
 
+def shortened(text: str, most: int = 300) -> str:
+    """Returns `text` in one line of at most `most` characters, and how many were cut."""
+    text = " ".join(text.split())
+    return text if len(text) <= most else f"{text[:most]}... ({len(text) - most:,} more characters)"
+
+
 def unknown(kind: str, name: object, available: Iterable[object]) -> InputError:
     """Returns the error of an unknown name, which lists the known ones."""
     names = ", ".join(sorted(str(item) for item in available)) or "none"
@@ -31,4 +46,27 @@ def unknown(kind: str, name: object, available: Iterable[object]) -> InputError:
 
 def remark(line: str) -> None:
     """Prints a line for the user beside the output, on stderr."""
-    print(f"mazebench: {one_line(line)}", file=sys.stderr)
+    held = _held.get()
+    if held is None:
+        print(f"mazebench: {one_line(line)}", file=sys.stderr)
+    else:
+        held.append(line)
+
+
+@contextlib.contextmanager
+def held_remarks() -> Iterator[list[str]]:
+    """Gathers the remarks of the block in a list, and prints none of them."""
+    lines: list[str] = []
+    token = _held.set(lines)
+    try:
+        yield lines
+    finally:
+        _held.reset(token)
+
+
+def describe_fault(error: pydantic.ValidationError) -> str:
+    """Returns the first fault that a validation found, in words."""
+    fault = error.errors(include_url=False)[0]
+    where = ".".join(map(str, fault["loc"]))
+    found = "" if fault["type"] in ("json_invalid", "missing") else f", found {str(fault['input'])[:60]!r}"
+    return f"{where + ': ' if where else ''}{fault['msg']}{found}"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mazebench.errors import InputError
-from mazebench.maps.generators import STYLES, corner_cells, dfs_walls, generate
-from mazebench.maps.maze import Maze
+from mazebench.maps.generators import STYLES, dfs_walls, generate
+from mazebench.maps.maze import Maze, corner_cells
 from mazebench.maps.text import format_maze, parse_maze
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.registry import make_spec

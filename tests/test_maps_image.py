@@ -9,9 +9,13 @@ import hypothesis
 import numpy as np
 import pytest
 from hypothesis import strategies as st
+from scipy import ndimage
 
 from mazebench.errors import InputError
+from mazebench.maps import colors
+from mazebench.maps.files import read_maze
 from mazebench.maps.generators import generate
+from mazebench.maps.grids import largest_area
 from mazebench.maps.image import draw_maze, maze_from_image, read_image_maze, write_image
 from mazebench.maps.maze import Maze, MazeError
 
@@ -28,8 +32,10 @@ def photograph(walls: np.ndarray, rng: np.random.Generator, table: bool = False)
     """The plan on paper: turned up to 15 degrees, in perspective, half in shade, blurred, noisy, a JPEG."""
     ink = rng.uniform(10, 90)
     paper = np.maximum(blocks(walls, 24), ink).astype(np.float32)
-    paper = cv2.copyMakeBorder(paper, *(len(paper) // 4,) * 4, cv2.BORDER_CONSTANT, value=255)
-    side = len(paper)
+    side = 3 * max(paper.shape) // 2
+    margins = [(side - length) // 2 for length in paper.shape for _ in range(2)]
+    paper = cv2.copyMakeBorder(paper, *margins, cv2.BORDER_CONSTANT, value=255)
+    paper = cv2.resize(paper, (side, side)) if paper.shape != (side, side) else paper
     angle = np.deg2rad(rng.uniform(-15, 15))
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     corners = np.array([[0, 0], [side, 0], [side, side], [0, side]], dtype=np.float32)
@@ -103,6 +109,19 @@ def test_drawing_marks_start_goal_and_path_when_given(maze):
     assert (image[5, 5] == draw_maze(maze, 16)[5, 5]).all()
 
 
+@pytest.mark.parametrize(("size", "cell_pixels"), [(13, 40), (61, 6), (255, 2)])
+def test_marks_and_path_are_seen_in_mazes_of_all_sizes(size, cell_pixels):
+    walls = np.pad(np.zeros((size - 2, size - 2), dtype=bool), 1, constant_values=True)
+    row = size // 2
+    path = np.linspace([1.5, size / 2], [size - 1.5, size / 2], 100)
+    image = draw_maze(Maze(walls, "room"), cell_pixels, (row, size // 4), (row, size - size // 4), path).astype(int)
+    for color in (colors.START, colors.GOAL):
+        seen = np.argwhere(abs(image - colors.to_bytes(color)).max(axis=-1) < 20)
+        assert (np.ptp(seen, axis=0) + 1 >= 0.026 * len(image)).all()  # without the soft edge
+    path_rows = (image[:, len(image) // 2] < 230).any(axis=-1)[cell_pixels:-cell_pixels]
+    assert path_rows.sum() >= len(image) / 150
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -123,12 +142,13 @@ def test_writing_is_refused_when_the_folder_is_missing(maze, tmp_path):
         write_image(draw_maze(maze), tmp_path / "missing" / "maze.png")
 
 
-@pytest.mark.parametrize("extension", [".png", ".bmp", ".jpg"])
+@pytest.mark.parametrize("extension", [".png", ".bmp", ".jpg", ".pgm", ".ppm", ".tif", ".webp", ".gif"])
 @pytest.mark.parametrize("cell_pixels", [8, 16])
 def test_map_is_read_from_each_format(maze, tmp_path, extension, cell_pixels):
     path = tmp_path / f"plan{extension}"
-    path.write_bytes(encode(draw_maze(maze, cell_pixels), extension))
-    assert read_image_maze(path) == maze
+    drawing = draw_maze(maze, cell_pixels)
+    path.write_bytes(encode(drawing[..., 0] if extension == ".pgm" else drawing, extension))
+    assert read_maze(path) == maze
     assert read_image_maze(path).name == "plan"
 
 
@@ -151,6 +171,94 @@ def test_map_is_read_in_the_size_given(maze):
 
 def test_map_is_read_when_paper_surrounds_it(maze):
     assert maze_from_image(np.pad(blocks(maze.walls, 16), 16, constant_values=255)) == maze
+
+
+def rectangle(rows: int, columns: int, num_bars: int, rng: np.random.Generator) -> np.ndarray:
+    """A hall with bars of wall in it: `[rows, columns]` bool."""
+    walls = np.ones((rows, columns), dtype=bool)
+    walls[1:-1, 1:-1] = False
+    for _ in range(num_bars):
+        length = int(rng.integers(1, max(rows, columns)))
+        row, column = int(rng.integers(1, rows - 1)), int(rng.integers(1, columns - 1))
+        if rng.random() < 0.5:
+            walls[row, column : column + length] = True
+        else:
+            walls[row : row + length, column] = True
+    walls[1, 1] = False  # so that something is free
+    return largest_area(walls)
+
+
+def padded(walls: np.ndarray) -> Maze:
+    """The maze that a rectangular plan becomes, worked in another way than `square_maze` does."""
+    square = np.ones((max(walls.shape),) * 2, dtype=bool)
+    square[: walls.shape[0], : walls.shape[1]] = walls
+    return Maze(square)
+
+
+RECTANGLES = (st.integers(5, 28), st.integers(5, 28), st.integers(0, 12), SEEDS)
+
+
+@hypothesis.given(*RECTANGLES, st.integers(1, 24), st.booleans())
+@FEW
+def test_rectangular_pixel_map_is_padded_and_never_distorted(rows, columns, num_bars, seed, cell_pixels, has_marks):
+    walls = rectangle(rows, columns, num_bars, np.random.default_rng(seed))
+    image = np.dstack([blocks(walls, cell_pixels)] * 3)
+    if has_marks:
+        row, column = np.argwhere(~walls)[0] * cell_pixels
+        image[row : row + cell_pixels, column : column + cell_pixels] = (220, 30, 30)
+    # All cells may be doubled: then the pixels do not tell how many there are.
+    assert maze_from_image(image, max(rows, columns)) == padded(walls)
+
+
+def test_rectangular_plan_of_9_x_15_cells_is_padded_and_one_line_says_so(capsys):
+    walls = np.ones((9, 15), dtype=bool)
+    walls[1:-1, 1:-1] = False
+    walls[4, 3:10] = True
+    for image in (blocks(walls, 20), np.pad(blocks(walls, 20), 30, constant_values=255)):
+        assert maze_from_image(image, name="plan") == padded(walls)
+        assert capsys.readouterr().err == "mazebench: plan: 9 x 15 cells, padded with wall at the bottom to 15 x 15\n"
+
+
+@hypothesis.given(*RECTANGLES)
+@hypothesis.settings(max_examples=12, deadline=None)
+def test_photograph_of_a_rectangular_plan_is_padded_and_never_distorted(rows, columns, num_bars, seed):
+    rows, columns = sorted((rows, columns)) if seed % 2 else sorted((rows, columns), reverse=True)
+    hypothesis.assume(min(rows, columns) >= 7 and max(rows, columns) <= 2.5 * min(rows, columns))
+    rng = np.random.default_rng(seed)
+    walls = rectangle(rows, columns, num_bars, rng)
+    assert maze_from_image(photograph(walls, rng)) == padded(walls)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_photograph_of_a_rectangular_maze_is_read(seed):
+    rng = np.random.default_rng(seed)
+    rows, columns = ((9, 15), (13, 27), (21, 13), (15, 11), (11, 25), (19, 9))[seed]
+    walls = generate("dfs", max(rows, columns), rng).walls[:rows, :columns].copy()
+    walls[[0, -1]] = walls[:, [0, -1]] = True
+    walls = largest_area(walls)
+    image = photograph(walls, rng, table=seed == 5)
+    assert maze_from_image(image) == padded(walls)
+    assert maze_from_image(image, max(rows, columns)) == padded(walls)
+
+
+@pytest.mark.parametrize("shade", [(255, 0, 0), (0, 0, 255), (0, 160, 0), (255, 200, 0)])
+@pytest.mark.parametrize("margin", [0, 30])
+def test_cells_in_colour_are_floor(maze, shade, margin):
+    image = np.dstack([blocks(maze.walls, 20)] * 3)
+    row, column = maze.free_cells[5] * 20
+    image[row : row + 20, column : column + 20] = shade
+    assert maze_from_image(np.pad(image, ((margin,) * 2, (margin,) * 2, (0, 0)), constant_values=255)) == maze
+
+
+def test_a_drawing_with_marks_is_read(maze):
+    path = np.array([[1.5, 11.5], [1.5, 9.5]])
+    assert maze_from_image(draw_maze(maze, 16, maze.free_cells[0], maze.free_cells[-1], path)) == maze
+
+
+def test_walls_in_colour_are_walls(maze):
+    image = np.dstack([blocks(maze.walls, 20)] * 3)
+    image[image[..., 0] == 0] = (20, 30, 160)
+    assert maze_from_image(image) == maze
 
 
 def test_map_is_refused_when_the_border_is_open(maze):
@@ -222,6 +330,32 @@ def test_picture_is_refused_when_it_shows_no_plan(image):
         maze_from_image(image)
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda image: np.full_like(image, 255), "m: expected dark walls on light paper, found a page of one shade"),
+        (np.zeros_like, "m: expected dark walls on light paper, found a page of one shade"),
+        (
+            lambda image: 255 - image,
+            "m: expected dark walls on a light ground, found light ones on a dark ground; invert",
+        ),
+        (
+            lambda image: 255 - np.pad(image, 40, constant_values=255),
+            "m: expected dark walls on a light ground, found light ones on a dark ground; invert",
+        ),
+        (
+            lambda image: thin_line_plan(8, 40, 2, 2, 0),
+            "filled walls as thick as a cell, found only lines between 8 x 8 cells; read them with --walls lines",
+        ),
+        (lambda image: thin_line_plan(12, 30, 3, 3, 0), r"\(are the walls lines\? read them with --walls lines\)$"),
+    ],
+    ids=["white", "black", "inverted", "inverted paper", "lines", "thicker lines"],
+)
+def test_a_picture_that_is_not_read_gets_a_line_that_helps(maze, change, message):
+    with pytest.raises(MazeError, match=message):
+        maze_from_image(change(blocks(maze.walls, 16)), name="m")
+
+
 @pytest.mark.parametrize("size", [4, 256])
 def test_size_is_refused_when_no_maze_has_it(maze, size):
     with pytest.raises(InputError, match=f"expected a size of 5 to 255 cells, found {size}"):
@@ -231,18 +365,24 @@ def test_size_is_refused_when_no_maze_has_it(maze, size):
 @pytest.mark.parametrize("extension", [".png", ".bmp", ".jpg"])
 def test_a_picture_cut_short_is_named_in_one_line(maze, extension, capfd):
     content = encode(draw_maze(maze), extension)
-    with pytest.raises(InputError, match=r"plan\.png: expected a PNG, JPEG or BMP picture, found .* damaged one$"):
+    with pytest.raises(InputError, match=r"plan\.png: expected a picture, found a .* picture that is damaged$"):
         read_bytes(content[: len(content) // 2])
     assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize(
-    "content",
-    [b"", b"#####\n", b"\x89PNG\r\n\x1a\n"],
-    ids=["empty", "text", "only a start"],
+    ("content", "found"),
+    [
+        (b"", "an empty file"),
+        (b"#####\n", "a file of another kind"),
+        (b"\x89PNG\r\n\x1a\n", "a PNG picture that is damaged"),
+        (b"%PDF-1.7\n", "a PDF"),
+        (b"PK\x03\x04\x14\0", "a ZIP archive"),
+    ],
+    ids=["empty", "text", "only a start", "pdf", "zip"],
 )
-def test_a_file_that_is_no_picture_is_named_in_one_line(content):
-    with pytest.raises(InputError, match=r"plan\.png: expected a PNG, JPEG or BMP picture, found another file"):
+def test_a_file_that_is_no_picture_is_named_in_one_line(content, found):
+    with pytest.raises(InputError, match=rf"plan\.png: expected a picture, found {found}$"):
         read_bytes(content)
 
 
@@ -297,3 +437,46 @@ def test_photograph_is_read_when_the_paper_is_squared_and_cells_have_letters(maz
         corner = (96 + 24 * int(column) + 6, 96 + 24 * int(row) + 18)
         cv2.putText(image, letter, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 0, 1)
     assert maze_from_image(image) == maze
+
+
+def without_pillars(walls: np.ndarray) -> np.ndarray:
+    """The walls without single cells of wall, for which a drawing of lines has no line."""
+    beside = np.pad(walls, 1)
+    beside = beside[:-2, 1:-1] | beside[2:, 1:-1] | beside[1:-1, :-2] | beside[1:-1, 2:]
+    return walls & beside
+
+
+def line_drawing(walls: np.ndarray, room_pixels: int, line: int, has_gaps: bool) -> np.ndarray:
+    """A maze of rooms (odd rows and columns of `walls`) with lines as walls; gaps are entrance and exit."""
+    rows, columns = walls.shape
+    margin = 40
+    image = np.full((rows // 2 * room_pixels + 2 * margin, columns // 2 * room_pixels + 2 * margin), 255, np.uint8)
+    for row, column in np.argwhere(walls):
+        at = margin + np.array([column - column % 2, row - row % 2]) // 2 * room_pixels
+        reach = np.array([column % 2, row % 2]) * room_pixels
+        if (row, column) not in ((0, 1), (rows - 1, columns - 2)) or not has_gaps:
+            cv2.line(image, at.tolist(), (at + reach).tolist(), 0, line)
+    return image
+
+
+@hypothesis.given(SEEDS, st.integers(4, 14), st.integers(4, 14), st.integers(14, 40), st.booleans())
+@hypothesis.settings(max_examples=5, deadline=None)
+def test_a_maze_of_lines_between_rooms_is_read_when_asked_for(seed, rows, columns, room_pixels, has_gaps):
+    hypothesis.assume(max(rows, columns) <= 2 * min(rows, columns))
+    rng = np.random.default_rng(seed)
+    walls = generate("dfs", 2 * max(rows, columns) + 1, rng).walls[: 2 * rows + 1, : 2 * columns + 1].copy()
+    walls[[0, -1]] = walls[:, [0, -1]] = True
+    walls = without_pillars(walls)
+    image = line_drawing(walls, room_pixels, int(rng.integers(1, max(2, room_pixels // 5))), has_gaps)
+    components = np.unique(ndimage.label(~walls)[0])
+    if len(components) > 2:
+        with pytest.raises(MazeError, match="expected one connected free area"):
+            maze_from_image(image, walls="lines")
+    else:
+        assert maze_from_image(image, walls="lines") == padded(walls)
+
+
+def test_a_picture_without_lines_is_refused_as_a_maze_of_lines(maze):
+    for image in (np.full((200, 200), 255, np.uint8), np.random.default_rng(0).integers(0, 256, (50, 50), np.uint8)):
+        with pytest.raises(MazeError, match="expected rooms in a square grid with lines as walls"):
+            maze_from_image(image, walls="lines")

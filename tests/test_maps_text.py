@@ -50,6 +50,32 @@ class TestRoundTrip:
     def test_other_characters_and_line_ends_are_read(self, text):
         assert parse_maze(text) == parse_maze(PLAN)
 
+    @pytest.mark.parametrize("encoding", ["ascii", "utf-8-sig", "utf-16"])
+    def test_a_byte_order_mark_is_no_error(self, encoding, tmp_path):
+        (tmp_path / "plan.txt").write_bytes(PLAN.encode(encoding))
+        assert read_text_maze(tmp_path / "plan.txt") == parse_maze(PLAN)
+
+
+class TestRectangle:
+    @pytest.mark.parametrize(
+        ("text", "padded", "remark"),
+        [
+            (
+                "######\n#....#\n######\n",
+                "######\n#....#\n######\n######\n######\n######\n",
+                "mazebench: m: 3 x 6 cells, padded with wall at the bottom to 6 x 6\n",
+            ),
+            (
+                "###\n#.#\n#.#\n#.#\n###\n",
+                "#####\n#.###\n#.###\n#.###\n#####\n",
+                "mazebench: m: 5 x 3 cells, padded with wall on the right to 5 x 5\n",
+            ),
+        ],
+    )
+    def test_a_text_is_padded_with_wall_to_a_square_and_one_line_says_so(self, text, padded, remark, capsys):
+        assert format_maze(parse_maze(text, "m")) == padded
+        assert capsys.readouterr().err == remark
+
 
 class TestRefusal:
     @pytest.mark.parametrize(
@@ -58,7 +84,8 @@ class TestRefusal:
             ("#####\n#..x#\n", r"^m: expected one of '#\*1' \(wall\) or '\. 0PG' \(free\), found 'x' at \(1, 3\)$"),
             (PLAN.replace(".", "·"), r"found '·' at \(1, 1\)$"),
             ("#####\n#..##\n####\n", r"^m: expected rows of 5 cells like the first, found 4 in row 2$"),
-            ("######\n#....#\n######\n", r"^m: expected a square grid, found shape \(3, 6\)$"),
+            ("#..#\n####\n####\n", r"^m: expected a closed border, found cell \(0, 1\) free$"),
+            ("####\n#..#\n####\n", r"^m: expected 5 to 255 cells a side, found 4$"),
             (PLAN.replace("#..##", "...##"), r"^m: expected a closed border, found cell \(1, 0\) free$"),
         ],
     )

@@ -8,14 +8,18 @@ from typing import Annotated, Any
 
 import typer
 
-from mazebench.commands.options import refuse_ignored
+from mazebench.commands.display import load_mujoco
+from mazebench.commands.options import refuse_ignored, takes_options
+from mazebench.maps.options import MAP_OPTIONS, MapOptions
 
 
+@takes_options(MapOptions, MAP_OPTIONS)
 def generate(
     context: typer.Context,
+    values: dict[str, Any],
     size: Annotated[
         int | None,
-        typer.Option(help="Cells a side, 5 to 255; 13 if not given. With --from-image, what the picture shows."),
+        typer.Option(help="Cells a side, 5 to 255; 13 if not given. With --from-image, what the map shows."),
     ] = None,
     count: Annotated[int, typer.Option(min=1, help="How many mazes.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same mazes.")] = 0,
@@ -24,29 +28,35 @@ def generate(
         "mazes"
     ),
     formats: Annotated[
-        str, typer.Option("--format", help="Files to write: any of mjcf, txt, png, glb, obj, stl, separated by commas.")
+        str,
+        typer.Option(
+            "--format",
+            help="Files to write: any of mjcf, mjcf-textured, txt, png, ros, glb, obj, stl, separated by commas.",
+        ),
     ] = "txt,mjcf,png,glb",
     from_image: Annotated[
-        pathlib.Path | None, typer.Option(help="Read the maze off a picture of a floor plan, or a text map, instead.")
+        pathlib.Path | None,
+        typer.Option(help="Read the maze off a map instead: picture of a floor plan, text, array (.npy), ROS (.yaml)."),
     ] = None,
 ) -> None:
-    """Make mazes: MJCF for MuJoCo, text, picture, mesh."""
+    """Make mazes: MJCF for MuJoCo, text, picture, ROS map, mesh."""
+    load_mujoco(renders=False)
     from mazebench.storage.files import make_folder
     from mazebench.storage.locks import FolderLock
     from mazebench.world.formats import make_mazes, parse_formats, write_maze
 
-    refuse_ignored(context, (from_image is not None, "the picture shows one maze", ("count", "seed", "style")))
-    mazes = make_mazes(size, count, seed, style, from_image)
+    refuse_ignored(context, (from_image is not None, "the map shows one maze", ("count", "seed", "style")))
+    mazes = make_mazes(size, count, seed, style, from_image, MapOptions(**values))
     chosen = parse_formats(formats)
     with ExitStack() as opened:
-        for index, maze in enumerate(mazes):
+        for index, placed in enumerate(mazes):
             if index == 0:  # nothing is made for bad input
                 make_folder(out)
                 opened.enter_context(FolderLock(out))
-            for path in write_maze(maze, out, chosen, from_image):
+            for path in write_maze(placed, out, chosen, from_image):
                 print(path)
             if index == 0:
-                _preview(maze)
+                _preview(placed.maze)
 
 
 def _preview(maze: Any) -> None:

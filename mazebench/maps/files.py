@@ -1,55 +1,105 @@
-"""Mazes in files: one text or picture, or a folder of them."""
+"""Mazes in files: one text, picture, array or ROS map, or a folder of them."""
 
 from __future__ import annotations
 
 import pathlib
+from typing import Any
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, held_remarks, remark
+from mazebench.maps.arrays import read_array_maze
 from mazebench.maps.image import read_image_maze
-from mazebench.maps.maze import Maze
+from mazebench.maps.maze import Maze, resized
+from mazebench.maps.occupancy import PlacedMaze
+from mazebench.maps.options import OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions
+from mazebench.maps.ros import ROS_SUFFIXES, map_of_picture, picture_of, place_ros_maze
 from mazebench.maps.text import read_text_maze
 
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp")
+IMAGE_SUFFIXES = (
+    *(".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".pbm", ".pnm"),
+    *(".tif", ".tiff", ".webp", ".gif"),
+)
 TEXT_SUFFIXES = (".txt", ".map")
+ARRAY_SUFFIXES = (".npy",)
+# In the order in which they are read if a folder holds one map in several: those come first that say the cells' size.
+SUFFIXES = (*ROS_SUFFIXES, *TEXT_SUFFIXES, *ARRAY_SUFFIXES, *IMAGE_SUFFIXES)
 MAX_FILES = 10_000
 
 
-def read_maze(path: str | pathlib.Path, size: int | None = None) -> Maze:
-    """Reads the maze in one file: a picture if the suffix says so, else text.
+def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any) -> Maze:
+    """Reads the maze in one file: a ROS map, an array or a picture if the suffix says so, else text.
 
     Args:
-      path: of the file.
-      size: number of cells a side, for a picture whose cells can't be counted.
+      path: of the file; of a ROS map, of its YAML file.
+      size: N that the maze must have; for a picture whose cells can't be counted, the cells on its longer side.
+      **options: those of `mazebench.maps.options.MapOptions`.
 
     Raises:
-      InputError: if the file can't be read or holds no legal maze.
+      InputError: if the file can't be read or holds no legal maze, or an option does not belong to such files.
     """
-    path = pathlib.Path(path)
-    if path.suffix.lower() in IMAGE_SUFFIXES:
-        return read_image_maze(path, size)
-    return read_text_maze(path)
+    return read_placed(pathlib.Path(path), size, MapOptions(**options)).maze
 
 
-def read_mazes(path: str | pathlib.Path) -> tuple[Maze, ...]:
+def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
     """Reads the maze in a file, or the mazes in a folder's map files in the order of their names.
 
-    If a folder holds one map in several formats, as `mazebench generate` writes them, the text is read.
+    If a folder holds one map in several formats, as `mazebench generate` writes them, one of them is read: the first of
+    ROS map, text, array, picture.
+
+    Args:
+      path: of the file or folder.
+      **options: those of `mazebench.maps.options.MapOptions`.
 
     Raises:
       InputError: if there is no map, one can't be read, or a folder holds more than 10,000.
     """
-    path = pathlib.Path(path)
+    return read_all(pathlib.Path(path), MapOptions(**options))
+
+
+def read_all(path: pathlib.Path, options: MapOptions) -> tuple[Maze, ...]:
+    """Reads the maze in a file, or those in a folder, as `read_mazes` does."""
     if not path.is_dir():
-        return (read_maze(path),)
+        return (read_placed(path, None, options).maze,)
+    files = _map_files(path)
+    with held_remarks() as lines:
+        mazes = tuple(read_placed(file, None, options).maze for file in files)
+    if lines:
+        remark(lines[0] if len(mazes) == 1 else f"{len(lines)} of {len(mazes)} maps were changed, such as {lines[0]}")
+    return mazes
+
+
+def read_placed(path: pathlib.Path, size: int | None, options: MapOptions) -> PlacedMaze:
+    """Reads the maze in one file, as `read_maze` does, and its place in the frame of a ROS map."""
+    suffix = path.suffix.lower()
+    if suffix not in IMAGE_SUFFIXES:
+        options.require_defaults(PICTURE_OPTIONS, "pictures", f"{path}")
+    elif (ros_map := map_of_picture(path)) is not None:
+        raise InputError(f"{path}: expected a maze, found the picture of a ROS map; give {ros_map}")
+    if suffix in ROS_SUFFIXES:
+        placed = place_ros_maze(path, options)
+    elif suffix in ARRAY_SUFFIXES:
+        placed = PlacedMaze(read_array_maze(path, options))
+    else:
+        options.require_defaults(OCCUPANCY_OPTIONS, "ROS maps and arrays", f"{path}")
+        maze = read_image_maze(path, size, options.walls) if suffix in IMAGE_SUFFIXES else read_text_maze(path)
+        placed = PlacedMaze(resized(maze, options.cell_size))
+    if size not in (None, placed.maze.size):
+        raise InputError(f"{path}: expected a maze of size {size}, found size {placed.maze.size}")
+    return placed
+
+
+def _map_files(folder: pathlib.Path) -> list[pathlib.Path]:
+    """Returns a file of each map in a folder, by their names."""
     try:
-        files = list(path.iterdir())
+        files = [file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES]
     except OSError as error:
-        raise InputError(f"{path}: can't read the folder: {error.strerror}") from error
+        raise InputError(f"{folder}: can't read the folder: {error.strerror}") from error
     by_stem: dict[str, pathlib.Path] = {}
-    for file in sorted(files, key=lambda file: (file.suffix.lower() not in TEXT_SUFFIXES, file.name)):
-        if file.suffix.lower() in TEXT_SUFFIXES + IMAGE_SUFFIXES:
+    pictures: set[pathlib.Path] = set()  # of ROS maps
+    for file in sorted(files, key=lambda file: (SUFFIXES.index(file.suffix.lower()), file.name)):
+        if file.suffix.lower() in ROS_SUFFIXES:
+            pictures.add(picture_of(file))
+        if file not in pictures:
             by_stem.setdefault(file.stem, file)
     if not 0 < len(by_stem) <= MAX_FILES:
-        suffixes = " ".join(TEXT_SUFFIXES + IMAGE_SUFFIXES)
-        raise InputError(f"{path}: expected 1 to {MAX_FILES} maps ({suffixes}), found {len(by_stem)}")
-    return tuple(read_maze(by_stem[stem]) for stem in sorted(by_stem))
+        raise InputError(f"{folder}: expected 1 to {MAX_FILES} maps ({' '.join(SUFFIXES)}), found {len(by_stem)}")
+    return [by_stem[stem] for stem in sorted(by_stem)]

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import labmaze
 import numpy as np
-from scipy import ndimage
 
 from mazebench.errors import InputError, unknown
-from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, Cell, Maze
+from mazebench.maps.grids import largest_area
+from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, Maze
 
 # Share of the walls between two corridors that are opened. With it, over 90 % of 13 x 13 mazes have 3 to 6 landmarks at
 # distance 5 from corner to corner, as in the paper (docs/maps.md has the distribution over 1,000 mazes).
@@ -80,7 +80,7 @@ def rooms_walls(size: int, rng: np.random.Generator) -> np.ndarray:
         extra_connection_probability=0.1,
         random_seed=int(rng.integers(_LABMAZE_SEEDS)),
     ).entity_layer
-    return _largest_area(
+    return largest_area(
         np.array([[character == "*" for character in line] for line in str(text).splitlines()], dtype=bool)
     )
 
@@ -93,7 +93,7 @@ def obstacles_walls(size: int, rng: np.random.Generator) -> np.ndarray:
     walls = np.ones((size, size), dtype=bool)
     walls[1:-1, 1:-1] = rng.random((size - 2, size - 2)) < _OBSTACLE_DENSITY
     walls[tuple(rng.integers(1, size - 1, size=2))] = False
-    return _largest_area(walls)
+    return largest_area(walls)
 
 
 STYLES: dict[str, Callable[[int, np.random.Generator], np.ndarray]] = {
@@ -101,21 +101,6 @@ STYLES: dict[str, Callable[[int, np.random.Generator], np.ndarray]] = {
     "rooms": rooms_walls,
     "obstacles": obstacles_walls,
 }
-
-
-def corner_cells(maze: Maze) -> tuple[Cell, Cell]:
-    """Returns the free cells nearest the top-right and the bottom-left corner, the paper's global start and goal."""
-    rows, columns = maze.free_cells.T
-    top_right = np.argmin(rows + (maze.size - 1 - columns))
-    bottom_left = np.argmin((maze.size - 1 - rows) + columns)
-    return (int(rows[top_right]), int(columns[top_right])), (int(rows[bottom_left]), int(columns[bottom_left]))
-
-
-def _largest_area(walls: np.ndarray) -> np.ndarray:
-    areas, _ = ndimage.label(~walls)
-    sizes = np.bincount(areas.ravel())
-    sizes[0] = 0
-    return areas != np.argmax(sizes)
 
 
 def _require_odd(style: str, size: int) -> None:

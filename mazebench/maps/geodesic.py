@@ -6,8 +6,8 @@ two in a row the wall is flat there, with two on the diagonal or three the free 
 carries a circle that a path can touch only in the quadrant opposite to the wall. The disc fits everywhere on that
 quadrant, because all other walls are a cell away.
 
-Lattice points are (x, y) in metres, with walls indexed `[x, y]` here. `K` is the number of circles, `P` of straight
-pieces and `S` of segments tested together.
+Lengths are in cells here, except those that `DiscPaths` takes and returns. Lattice points are (x, y), with walls
+indexed `[x, y]`. `K` is the number of circles, `P` of straight pieces and `S` of segments tested together.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from scipy.sparse import csgraph
 from mazebench.errors import InputError
 from mazebench.maps.maze import Cell, Maze
 
-# Metres (radians in a component of a unit vector) by which a contact may miss; rounding errors are below 1e-12.
+# Cells (radians in a component of a unit vector) by which a contact may miss; rounding errors are below 1e-12.
 _TOLERANCE = 1e-9
 # Numbers tested at once, which keep temporary arrays to some ten megabytes.
 _PAIRS_AT_ONCE = 2**18
@@ -32,17 +32,17 @@ _LINES_AT_ONCE = 16
 class _Circles(NamedTuple):
     """Circles that a path may touch from outside; a point is a circle of radius 0."""
 
-    centre: np.ndarray  # [K, 2] float, metres
+    centre: np.ndarray  # [K, 2] float
     quadrant: np.ndarray  # [K, 2] float, signs (x, y) of the exposed normals; (0, 0) allows every normal
-    radius: np.ndarray  # [K] float, metres
+    radius: np.ndarray  # [K] float
 
 
 class _Pieces(NamedTuple):
     """Straight pieces of paths, each between two contacts."""
 
     circle: np.ndarray  # [P, 2] int, the circles that the two ends touch
-    offset: np.ndarray  # [P, 2] float, metres along each circle, anticlockwise from the middle of its quadrant
-    end: np.ndarray  # [P, 2, 2] float, the two ends (x, y) in metres
+    offset: np.ndarray  # [P, 2] float, along each circle, anticlockwise from the middle of its quadrant
+    end: np.ndarray  # [P, 2, 2] float, the two ends (x, y)
 
 
 _Table = TypeVar("_Table", _Circles, _Pieces)
@@ -57,17 +57,17 @@ class DiscPaths:
     pairs of them that see each other.
 
     Args:
-      radius: metres, above 0 and below 0.5.
+      radius: metres, above 0 and below half a cell.
 
     Raises:
       InputError: if `radius` is out of range.
     """
 
     def __init__(self, maze: Maze, radius: float):
-        if not 0 < radius < 0.5:
-            raise InputError(f"expected a radius above 0 and below 0.5 m, found {radius}")
+        if not 0 < radius < maze.cell_size / 2:
+            raise InputError(f"expected a radius above 0 and below {maze.cell_size / 2} m, found {radius}")
         self._maze = maze
-        self._radius = float(radius)
+        self._radius = float(radius) / maze.cell_size
         self._space = _FreeSpace(maze.walls, self._radius)
         self._corners = _exposed_corners(self._space.walls, self._radius)
         batches = (
@@ -78,13 +78,13 @@ class DiscPaths:
         self._pieces = _concatenate(list(batches))
 
     def length(self, start: np.ndarray, goal: Cell) -> float:
-        """Returns the metres from `start` (`[2]`, the disc's centre) to the goal cell; 0 if `start` is in it.
+        """Returns the metres from `start` (`[2]` m, the disc's centre) to the goal cell; 0 if `start` is in it.
 
         Raises:
           InputError: if `start` is not at least the radius away from every wall, or `goal` is not a free cell.
         """
         start, corner = self._check(start, goal)
-        return 0.0 if _is_in_cell(start, corner) else self._search(start, corner)[1]
+        return 0.0 if _is_in_cell(start, corner) else self._maze.cell_size * self._search(start, corner)[1]
 
     def path(self, start: np.ndarray, goal: Cell, arc_step: float = 0.05) -> np.ndarray:
         """Returns points (x, y) along a shortest path from `start`, on arcs at most `arc_step` metres apart: `[L, 2]`.
@@ -96,7 +96,7 @@ class DiscPaths:
             raise InputError(f"expected an arc_step above 0 m, found {arc_step}")
         start, corner = self._check(start, goal)
         if _is_in_cell(start, corner):
-            return start[None]
+            return self._maze.cell_size * start[None]
         pieces, _, nodes = self._search(start, corner)
         circle, offset = pieces.circle.ravel()[nodes], pieces.offset.ravel()[nodes]
         points = [start[None]]
@@ -104,16 +104,17 @@ class DiscPaths:
             if circle[i] != circle[i - 1]:
                 points.append(pieces.end.reshape(-1, 2)[nodes[i]][None])
             elif offset[i] != offset[i - 1]:
-                points.append(self._arc(circle[i], offset[i - 1], offset[i], arc_step))
-        return np.concatenate(points)
+                points.append(self._arc(circle[i], offset[i - 1], offset[i], arc_step / self._maze.cell_size))
+        return self._maze.cell_size * np.concatenate(points)
 
     def _check(self, start: np.ndarray, goal: Cell) -> tuple[np.ndarray, np.ndarray]:
-        """Returns `start` as an array and the goal cell's lower left corner (`[2]` int), if both are legal."""
-        point = np.asarray(start, dtype=np.float64)
+        """Returns `start` (m) in cells and the goal cell's lower left corner (`[2]` int), if both are legal."""
+        point = np.asarray(start, dtype=np.float64) / self._maze.cell_size
         if point.shape != (2,) or not self._space.holds(point):
+            radius = self._radius * self._maze.cell_size
             raise InputError(
-                f"{self._maze.name}: expected a start (x, y) at least {self._radius} m from every wall, "
-                f"found {point.tolist()}"
+                f"{self._maze.name}: expected a start (x, y) at least {radius:g} m from every wall, "
+                f"found {np.asarray(start).tolist()}"
             )
         row, column = self._maze.require_free(goal)
         return point, np.array([column, self._maze.size - 1 - row])
@@ -213,8 +214,8 @@ class _FreeSpace:
         """Returns whether the segments between free points (`[S, 2]` each) are free: `[S]` bool.
 
         They are unless a corner of a wall is too near or they enter a wall. Both show on the lattice's lines across a
-        segment's longer axis: the two lattice points about a crossing are the only ones on that line within 0.5 m, and
-        between two lines the segment changes cells at most once.
+        segment's longer axis: the two lattice points about a crossing are the only ones on that line within half a
+        cell, and between two lines the segment changes cells at most once.
         """
         steep = np.abs(end - start)[:, 1] > np.abs(end - start)[:, 0]
         forward = np.where(steep, end[:, 1] > start[:, 1], end[:, 0] > start[:, 0])[:, None]
@@ -335,7 +336,7 @@ def _perpendiculars(circles: _Circles, num_sources: int, axis: int, level: float
 
 
 def _offset(circles: _Circles, index: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Returns metres along circles `[...]` from the middle of their quadrant to the normals `[..., 2]`: `[...]`."""
+    """Returns lengths along circles `[...]` from the middle of their quadrant to the normals `[..., 2]`: `[...]`."""
     x, y = np.moveaxis(circles.quadrant[index], -1, 0)
     angle = np.arctan2(x * normal[..., 1] - y * normal[..., 0], x * normal[..., 0] + y * normal[..., 1])
     return circles.radius[index] * angle
@@ -348,7 +349,7 @@ def _graph(pieces: _Pieces) -> sparse.csr_array:
     """
     circle, offset = pieces.circle.ravel(), pieces.offset.ravel()
     num_nodes = len(circle)
-    # An offset is at most pi / 4 * 0.5 m, so the sum sorts by circle first.
+    # An offset is at most pi / 4 * 0.5 cells, so the sum sorts by circle first.
     order = np.argsort(circle + offset)
     joined = circle[order[1:]] == circle[order[:-1]]
     before, after = order[:-1][joined], order[1:][joined]

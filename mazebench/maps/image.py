@@ -10,24 +10,30 @@ import pathlib
 import cv2
 import numpy as np
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, held_remarks
+from mazebench.maps import colors
+from mazebench.maps.file_kinds import kind_of
+from mazebench.maps.grids import square_maze
+from mazebench.maps.line_drawing import read_lines
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, Cell, Maze, MazeError
-from mazebench.maps.photograph import read_plan
+from mazebench.maps.photograph import MIN_SIDE, read_plan
 from mazebench.storage.files import open_whole, read_at_most
 
-_MAX_BYTES = 32 * 2**20  # of a picture's file
+_MAX_BYTES = 2**27  # of a picture's file; _MAX_PIXELS gray pixels take half of it
 _MAX_SIDE = 8192  # pixels of a drawing's side
 _MAX_PIXELS = _MAX_SIDE**2  # of a picture that is read: every drawing, and more than the 50 megapixels of a telephone
 _PNG_START = b"\x89PNG\r\n\x1a\n"
 
 # Neighbouring wall cells alternate between two nearly equal shades, so that the cells of a drawing can be counted.
 _WALL_SHADES = np.array([[30, 32, 38], [34, 36, 42]], dtype=np.uint8)
-_START_SHADE = (64, 160, 100)
-_GOAL_SHADE = (214, 60, 60)
 _PATH_SHADES = np.array([[70, 90, 200], [200, 80, 160], [250, 160, 50]])  # at the path's start, middle and end
 _RAY_SHADE = (40, 150, 190)
+_MOST_UNITS = 24  # cells a side; in larger mazes marks and paths are as large as in one of this size
 _SUBPIXEL_BITS = 4  # cv2 draws at sixteenths of a pixel
 
+_MIN_DARK = 0.3  # share of the pixels of a picture of light walls on a dark ground
+_MARK_SATURATION = 90  # of 255, between the strongest and the weakest channel of a mark
+_MAX_MARK_SHARE = 0.15  # of the picture, and of its dark pixels; if more are coloured, the paper or the walls are
 _MAX_MAP_SHADES = 8  # of a map of one pixel a cell: walls, floor, marks; a photograph has more
 
 
@@ -40,8 +46,9 @@ def draw_maze(
 ) -> np.ndarray:
     """Draws `maze` with near-black walls on white floor: `[H, W, 3]` uint8 RGB with H = W = N * cell_pixels.
 
-    A green disc marks `start`, a red one `goal`. `path` is `[T, 2]` points (x, y) in metres, equally spaced in time; it
-    is drawn as a line from blue (first) to orange (last). `maze_from_image` reads a drawing without marks exactly.
+    A green disc marks `start`, a red one `goal`, each at least 3 % of the picture wide. `path` is `[T, 2]` points
+    (x, y) in metres, equally spaced in time; it is drawn as a line from blue (first) to orange (last).
+    `maze_from_image` reads a drawing without marks exactly.
 
     Raises:
       InputError: if the picture would be larger than 8192 pixels a side or `path` is not finite points.
@@ -52,7 +59,7 @@ def draw_maze(
     for cell in (start, goal):
         if cell is not None:
             maze.require_free(cell)
-    return draw_grid(maze.walls, cell_pixels, start, goal, path)
+    return draw_grid(maze.walls, cell_pixels, start, goal, None if path is None else np.asarray(path) / maze.cell_size)
 
 
 def draw_grid(
@@ -62,7 +69,7 @@ def draw_grid(
     goal: Cell | None = None,
     path: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Draws any walls, such as those of a perturbed map, as `draw_maze` draws a maze.
+    """Draws any walls, such as those of a perturbed map, as `draw_maze` draws a maze, with a `path` in cells.
 
     Cells of `walls` (`[N, N]`) are bool, or shares of wall in [0, 1], which are drawn in shades between floor and wall.
 
@@ -74,11 +81,11 @@ def draw_grid(
     image = np.ascontiguousarray(cells.repeat(cell_pixels, axis=0).repeat(cell_pixels, axis=1))
     if path is not None:
         _draw_path(image, path, cell_pixels)
-    for cell, shade in ((start, _START_SHADE), (goal, _GOAL_SHADE)):
+    for cell, color in ((start, colors.START), (goal, colors.GOAL)):
         if cell is not None:
             centre = _to_subpixels(np.array([cell[1] + 0.5, cell[0] + 0.5]) * cell_pixels)
-            radius = round(0.36 * cell_pixels * 2**_SUBPIXEL_BITS)
-            cv2.circle(image, centre.tolist(), radius, shade, cv2.FILLED, cv2.LINE_AA, _SUBPIXEL_BITS)
+            radius = round(0.36 * _unit(image, cell_pixels) * 2**_SUBPIXEL_BITS)
+            cv2.circle(image, centre.tolist(), radius, colors.to_bytes(color), cv2.FILLED, cv2.LINE_AA, _SUBPIXEL_BITS)
     return image
 
 
@@ -88,18 +95,18 @@ def draw_rays(image: np.ndarray, cell_pixels: int, centre: np.ndarray, ends: np.
     Args:
       image: `[H, W, 3]` uint8 RGB.
       cell_pixels: of the picture.
-      centre: `[2]` m (x, y), where all rays begin.
-      ends: `[R, 2]` m, in the order of their directions.
+      centre: `[2]` cells (x, y), where all rays begin.
+      ends: `[R, 2]` cells, in the order of their directions.
     """
     points = np.concatenate([[centre], ends]) * [cell_pixels, -cell_pixels] + [0, len(image)]
     begin, *corners = _to_subpixels(points).tolist()
-    area = image.copy()
+    area, unit = image.copy(), _unit(image, cell_pixels)
     cv2.fillPoly(area, [np.array(corners)], _RAY_SHADE, cv2.LINE_AA, _SUBPIXEL_BITS)
     cv2.addWeighted(area, 0.25, image, 0.75, 0, dst=image)
     for number, corner in enumerate(corners):
-        thickness = max(1, round(cell_pixels / (10 if number == 0 else 30)))
+        thickness = max(1, round(unit / (10 if number == 0 else 30)))
         cv2.line(image, begin, corner, _RAY_SHADE, thickness, cv2.LINE_AA, _SUBPIXEL_BITS)
-        radius = round(cell_pixels * 2**_SUBPIXEL_BITS / 12)
+        radius = round(unit * 2**_SUBPIXEL_BITS / 12)
         cv2.circle(image, corner, radius, _RAY_SHADE, cv2.FILLED, cv2.LINE_AA, _SUBPIXEL_BITS)
 
 
@@ -117,38 +124,53 @@ def write_image(image: np.ndarray, path: str | pathlib.Path) -> None:
         raise InputError(f"{path}: can't write the picture: {error.strerror}") from error
 
 
-def read_image_maze(path: str | pathlib.Path, size: int | None = None) -> Maze:
-    """Reads the maze in a PNG, JPEG or BMP file, as `maze_from_image` does, and names it after the file.
+def read_image_maze(path: str | pathlib.Path, size: int | None = None, walls: str = "filled") -> Maze:
+    """Reads the maze in a picture, as `maze_from_image` does, and names it after the file.
 
     Raises:
-      InputError: if the file can't be read or has more than 32 MiB, or `size` is out of range.
-      MazeError: if the file is not such a picture, has too many pixels, or shows no legal maze.
+      InputError: if the file can't be read, or `size` is out of range.
+      MazeError: if the file is not a picture that `read_picture` reads, or shows no legal maze.
     """
     path = pathlib.Path(path)
-    image = _decode(read_at_most(path, _MAX_BYTES, "picture"))
+    return maze_from_image(read_picture(path), size, path.stem, walls)
+
+
+def read_picture(path: str | pathlib.Path) -> np.ndarray:
+    """Returns the picture in a file of a kind that OpenCV reads, as `maze_from_image` takes it.
+
+    Raises:
+      InputError: if the file can't be read or has more than 128 MiB.
+      MazeError: if it is no picture, or has too many pixels.
+    """
+    content = read_at_most(path, _MAX_BYTES, "picture")
+    image = _decode(content)
     if image is None:
-        raise MazeError(f"{path}: expected a PNG, JPEG or BMP picture, found another file or a damaged one")
+        kind = kind_of(content) or "a file of another kind"
+        raise MazeError(f"{path}: expected a picture, found {kind}{' that is damaged' * kind.endswith('picture')}")
     if image.shape[0] * image.shape[1] > _MAX_PIXELS:
         raise MazeError(f"{path}: expected at most {_MAX_PIXELS} pixels, found {image.shape[1]} x {image.shape[0]}")
-    return maze_from_image(image, size, path.stem)
+    return image
 
 
-def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maze") -> Maze:
+def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maze", walls: str = "filled") -> Maze:
     """Reads the maze in a picture of a floor plan; dark is wall, light or transparent is floor.
 
-    Two kinds of plan can be read. In both, walls are filled and at least as thick as a cell.
+    Two kinds of plan can be read. In both, walls are filled and at least as thick as a cell. A plan of R x C cells that
+    is not square is padded with wall, see `square_maze`. Marks in colour on a plan with gray walls are floor.
 
     * A pixel map, in which each cell is a block of k x k pixels, k >= 1. It is read exactly.
     * A scan or photograph of a drawn or printed plan, on paper or cut out along its outer walls. It may be turned by
-      less than 45 degrees, in perspective and unevenly lit. The outer walls must form a closed square, the cells a
+      less than 45 degrees, in perspective and unevenly lit. The outer walls must form a closed rectangle, the cells a
       regular grid.
 
-    Plans whose walls are thin lines between the cells, and light walls on dark paper, are refused.
+    With `walls="lines"`, a plan of R x C rooms is read whose walls are lines between the rooms. It becomes a maze of
+    2 R + 1 by 2 C + 1 cells. Light walls on dark paper are refused.
 
     Args:
       image: `[H, W]` gray, `[H, W, 3]` RGB or `[H, W, 4]` RGB and opacity, uint8 or uint16.
-      size: N; estimated from the drawing if None.
+      size: N, the cells on the longer side; estimated from the drawing if None.
       name: of the maze, also in errors.
+      walls: "filled" or "lines".
 
     Raises:
       InputError: if `size` is out of range.
@@ -158,10 +180,21 @@ def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maz
     if size is not None and not MIN_SIZE <= size <= MAX_SIZE:
         raise InputError(f"{name}: expected a size of {MIN_SIZE} to {MAX_SIZE} cells, found {size}")
     gray = _to_gray(image, name)
-    walls = _pixel_map(gray, size)
-    if walls is not None:
-        return Maze(walls, name)
-    return read_plan(gray, size, name)
+    if walls == "lines":
+        return square_maze(read_lines(gray, size, name), name)
+    try:
+        return square_maze(_read_walls(gray, size, name), name)
+    except MazeError as error:
+        if np.mean(gray < 128) < _MIN_DARK or not _is_maze(255 - gray, size, name):
+            raise
+        raise MazeError(
+            f"{name}: expected dark walls on a light ground, found light ones on a dark ground; invert the picture"
+        ) from error
+
+
+def _unit(image: np.ndarray, cell_pixels: int) -> float:
+    """Returns the pixels by which marks and paths are measured: a cell's, or more where cells are too small to see."""
+    return max(cell_pixels, len(image) / _MOST_UNITS)
 
 
 def _draw_path(image: np.ndarray, path: np.ndarray, cell_pixels: int) -> None:
@@ -176,7 +209,7 @@ def _draw_path(image: np.ndarray, path: np.ndarray, cell_pixels: int) -> None:
     times = np.linspace(0, 1, len(points))[kept]
     shades = np.stack([np.interp(times, [0, 0.5, 1], shade) for shade in _PATH_SHADES.T], axis=1)
     corners = _to_subpixels(pixels[kept]).tolist()
-    thickness = max(1, round(cell_pixels / 6))
+    thickness = max(1, round(_unit(image, cell_pixels) / 6))
     for before, after, shade in zip(corners[:-1], corners[1:], shades[1:], strict=True):
         cv2.line(image, before, after, shade.tolist(), thickness, cv2.LINE_AA, _SUBPIXEL_BITS)
 
@@ -207,24 +240,48 @@ def _to_gray(image: np.ndarray, name: str) -> np.ndarray:
     shape = image.shape
     if not (len(shape) == 2 or shape[2:] in ((3,), (4,))) or image.dtype not in (np.uint8, np.uint16):
         raise MazeError(f"{name}: expected a gray, RGB or RGBA picture of uint8 or uint16, found {shape} {image.dtype}")
-    if min(shape[:2]) < MIN_SIZE:
-        raise MazeError(f"{name}: expected at least {MIN_SIZE} x {MIN_SIZE} pixels, found {shape[1]} x {shape[0]}")
+    if min(shape[:2]) < MIN_SIDE or max(shape[:2]) < MIN_SIZE:
+        raise MazeError(f"{name}: expected at least {MIN_SIZE} x {MIN_SIDE} pixels, found {shape[1]} x {shape[0]}")
     if image.dtype == np.uint16:
         image = (image >> 8).astype(np.uint8)
     if len(shape) == 2:
         return image
-    gray = cv2.cvtColor(np.ascontiguousarray(image[..., :3]), cv2.COLOR_RGB2GRAY)
+    colours = np.ascontiguousarray(image[..., :3])
+    gray = cv2.cvtColor(colours, cv2.COLOR_RGB2GRAY)
+    _clear_marks(gray, colours)
     if shape[2] == 3:
         return gray
     opacity = image[..., 3].astype(np.uint16)
     return ((gray * opacity + 255 * (255 - opacity)) // 255).astype(np.uint8)
 
 
+def _clear_marks(gray: np.ndarray, colours: np.ndarray) -> None:
+    """Makes pixels in strong colours white in `gray`, in place, unless they may be paper or walls."""
+    is_mark = colours.max(axis=2) - colours.min(axis=2) >= _MARK_SATURATION
+    dark = gray < 128
+    if is_mark.mean() < _MAX_MARK_SHARE and is_mark[dark].mean() < _MAX_MARK_SHARE:
+        gray[is_mark] = 255
+
+
+def _read_walls(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
+    """Returns the walls, `[R, C]` bool, that `gray` shows. Raises `MazeError` if it shows none."""
+    walls = _pixel_map(gray, size)
+    return read_plan(gray, size, name) if walls is None else walls
+
+
+def _is_maze(gray: np.ndarray, size: int | None, name: str) -> bool:
+    try:
+        with held_remarks():
+            square_maze(_read_walls(gray, size, name), name)
+    except MazeError:
+        return False
+    return True
+
+
 def _pixel_map(gray: np.ndarray, size: int | None) -> np.ndarray | None:
-    """Returns the walls of a pixel map, `[N, N]` bool; None if the picture isn't one."""
-    height, width = gray.shape
+    """Returns the walls of a pixel map, `[R, C]` bool; None if the picture isn't one."""
     shades = np.flatnonzero(cv2.calcHist([gray], [0], None, [256], [0, 256]))
-    if height != width or len(shades) < 2:
+    if len(shades) < 2:
         return None
     dark = gray < shades[[0, -1]].mean()
     block = _block(gray)
@@ -232,9 +289,10 @@ def _pixel_map(gray: np.ndarray, size: int | None) -> np.ndarray | None:
     if not (border[1:] != border[:-1]).all():
         # The border does not alternate as in a drawing of ours, so shades tell nothing: JPEG may have made them of two.
         block = _block(dark)
-    num_cells = size or height // block
-    cell = height // num_cells
-    if not MIN_SIZE <= num_cells <= MAX_SIZE or cell * num_cells != height or block % cell:
+    longer, shorter = max(gray.shape), min(gray.shape)
+    num_cells = size or longer // block
+    cell = longer // num_cells
+    if not MIN_SIZE <= num_cells <= MAX_SIZE or cell * num_cells != longer or block % cell or shorter < MIN_SIDE * cell:
         return None
     if block == 1 and len(shades) > _MAX_MAP_SHADES:
         return None
@@ -244,7 +302,7 @@ def _pixel_map(gray: np.ndarray, size: int | None) -> np.ndarray | None:
 
 
 def _block(picture: np.ndarray) -> int:
-    """Returns the side in pixels of the largest blocks of one shade that a square picture consists of."""
+    """Returns the side in pixels of the largest blocks of one shade that a picture consists of."""
     rows = np.flatnonzero((picture[1:] != picture[:-1]).any(axis=1)) + 1
     columns = np.flatnonzero((picture[:, 1:] != picture[:, :-1]).any(axis=0)) + 1
-    return int(np.gcd.reduce([*rows, *columns, len(picture)]))
+    return int(np.gcd.reduce([*rows, *columns, *picture.shape]))

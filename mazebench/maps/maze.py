@@ -1,7 +1,8 @@
 """The maze: a legal grid of walls, with its cells, points and shortest paths.
 
 `N` is the number of rows and of columns of a maze, `F` the number of its free cells. A cell is `(row, column)` with
-row 0 on top; a point is `(x, y)` in metres with x to the right and y up. In the benchmark one cell is one metre.
+row 0 on top. A point is `(x, y)`, x to the right and y up from the maze's lower left corner. Points in a world are in
+metres, points on a map are in cells; only `Maze` converts one into the other. In the benchmark, a cell is 1 m wide.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+import numbers
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +25,7 @@ Cell = tuple[int, int]
 MIN_SIZE = 5
 MAX_SIZE = 255
 WALL_HEIGHT = 1.0  # metres; DeepMind Lab's 100 units
+MIN_CELL_SIZE = 0.4  # m, in which the body drives: it is 0.3 m wide, and contacts act 0.03 m before a wall
 UNREACHABLE = -1
 
 # (rows, columns) to each neighbour, in the order in which a shortest path prefers them.
@@ -51,11 +55,12 @@ class Maze:
         walls = np.array(self.walls)
         if walls.dtype != bool:
             raise MazeError(f"{self.name}: expected walls of dtype bool, found {walls.dtype}")
-        if not 0 < self.cell_size < math.inf:
-            raise MazeError(f"{self.name}: expected a cell_size above 0 m, found {self.cell_size}")
+        if not isinstance(self.cell_size, numbers.Real) or not 0 < self.cell_size < math.inf:
+            raise MazeError(f"{self.name}: expected a cell_size above 0 m, found {self.cell_size!r}")
         _check(walls, self.name)
         walls.flags.writeable = False
         object.__setattr__(self, "walls", walls)
+        object.__setattr__(self, "cell_size", float(self.cell_size))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Maze) and self.cell_size == other.cell_size and np.array_equal(self.walls, other.walls)
@@ -83,6 +88,23 @@ class Maze:
         """Returns whether `cell` lies in the maze and is not a wall."""
         row, column = cell
         return 0 <= row < self.size and 0 <= column < self.size and not self.walls[row, column]
+
+    @property
+    def side(self) -> float:
+        """The side of the whole maze, in metres."""
+        return self.size * self.cell_size
+
+    def point(self, cells: np.ndarray | Cell) -> np.ndarray:
+        """Returns the centres (x, y) in metres, `[..., 2]` float, of `[..., 2]` cells."""
+        return self.cell_size * cell_to_point(cells, self.size)
+
+    def cell(self, points: np.ndarray) -> np.ndarray:
+        """Returns the cells, `[..., 2]` int, of `[..., 2]` points in metres; of two cells, the right or upper one."""
+        return point_to_cell(np.asarray(points) / self.cell_size, self.size)
+
+    def cell_at(self, x: float, y: float) -> Cell:
+        """Returns the cell of a single point in metres, as `cell` does, but in a fraction of the time."""
+        return cell_of_point(x / self.cell_size, y / self.cell_size, self.size)
 
     def require_free(self, cell: Cell) -> Cell:
         """Returns `cell` if it is free.
@@ -146,6 +168,37 @@ class Maze:
         return csgraph.dijkstra(self._graph, unweighted=True, indices=source).astype(np.int32)
 
 
+def corner_cells(maze: Maze) -> tuple[Cell, Cell]:
+    """Returns the free cells nearest the top-right and the bottom-left corner, the paper's global start and goal."""
+    rows, columns = maze.free_cells.T
+    top_right = np.argmin(rows + (maze.size - 1 - columns))
+    bottom_left = np.argmin((maze.size - 1 - rows) + columns)
+    return (int(rows[top_right]), int(columns[top_right])), (int(rows[bottom_left]), int(columns[bottom_left]))
+
+
+def require_one_size(mazes: Sequence[Maze]) -> None:
+    """Checks that there is a maze, and that all have one size and cells of one size.
+
+    Raises:
+      MazeError: if not.
+    """
+    if not isinstance(mazes, Sequence) or not all(isinstance(maze, Maze) for maze in mazes):
+        raise MazeError(f"expected a sequence of Maze, found {mazes!r}"[:200])
+    if not mazes:
+        raise MazeError("expected at least one maze, found none")
+    for what, found in (
+        ("one size", {maze.size for maze in mazes}),
+        ("cells of one size in metres", {maze.cell_size for maze in mazes}),
+    ):
+        if len(found) > 1:
+            raise MazeError(f"expected mazes of {what}, found {', '.join(map(str, sorted(found)))}")
+
+
+def resized(maze: Maze, cell_size: float | None) -> Maze:
+    """Returns `maze` with cells of `cell_size` m; itself if that is None."""
+    return maze if cell_size is None else dataclasses.replace(maze, cell_size=cell_size)
+
+
 def grid_graph(index: np.ndarray) -> sparse.csr_array:
     """Returns the 4-connected graph of the cells whose `index` (`[N, N]` int, consecutive from 0) is not negative."""
     right = (index[:, :-1].ravel(), index[:, 1:].ravel())
@@ -202,13 +255,13 @@ def _descend(distances: np.ndarray, start: Cell, step_cost: np.ndarray | None = 
 
 
 def cell_to_point(cells: np.ndarray | Cell, size: int) -> np.ndarray:
-    """Returns the centres (x, y) in metres, `[..., 2]` float, of `[..., 2]` cells in a maze of `size` cells a side."""
+    """Returns the centres (x, y) in cells, `[..., 2]` float, of `[..., 2]` cells on a map of `size` cells a side."""
     cells = np.asarray(cells, dtype=np.float64)
     return np.stack([cells[..., 1] + 0.5, size - cells[..., 0] - 0.5], axis=-1)
 
 
 def point_to_cell(points: np.ndarray, size: int) -> np.ndarray:
-    """Returns the cells, `[..., 2]` int, of `[..., 2]` points (x, y); of two cells, the right or upper one."""
+    """Returns the cells, `[..., 2]` int, of `[..., 2]` points (x, y) in cells; of two, the right or upper one."""
     points = np.floor(np.asarray(points)).astype(np.int64)
     return np.stack([size - 1 - points[..., 1], points[..., 0]], axis=-1)
 
@@ -228,17 +281,17 @@ def canonical_bytes(walls: np.ndarray) -> bytes:
     return min(np.ascontiguousarray(grid).tobytes() for grid in symmetries(walls))
 
 
-def _check(walls: np.ndarray, name: str) -> None:
-    if walls.ndim != 2 or walls.shape[0] != walls.shape[1]:
-        raise MazeError(f"{name}: expected a square grid, found shape {walls.shape}")
-    size = len(walls)
-    if not MIN_SIZE <= size <= MAX_SIZE:
-        raise MazeError(f"{name}: expected {MIN_SIZE} to {MAX_SIZE} cells a side, found {size}")
+def require_closed_border(walls: np.ndarray, name: str) -> None:
+    """Raises `MazeError` with the first cell on the border of any grid (`[R, C]` bool) that is free."""
     border = np.ones_like(walls)
     border[1:-1, 1:-1] = False
     open_border = np.argwhere(border & ~walls)
     if len(open_border):
         raise MazeError(f"{name}: expected a closed border, found cell {_show(open_border[0])} free")
+
+
+def require_connected(walls: np.ndarray, name: str) -> None:
+    """Raises `MazeError` unless the free cells of any grid (`[R, C]` bool) are one connected area of at least one."""
     components, num_components = ndimage.label(~walls)
     if num_components == 0:
         raise MazeError(f"{name}: expected a free cell, found only walls")
@@ -248,6 +301,16 @@ def _check(walls: np.ndarray, name: str) -> None:
             f"{name}: expected one connected free area, found {num_components}; "
             f"cell {_show(cut_off)} cannot be reached from {_show(np.argwhere(components == 1)[0])}"
         )
+
+
+def _check(walls: np.ndarray, name: str) -> None:
+    if walls.ndim != 2 or walls.shape[0] != walls.shape[1]:
+        raise MazeError(f"{name}: expected a square grid, found shape {walls.shape}")
+    size = len(walls)
+    if not MIN_SIZE <= size <= MAX_SIZE:
+        raise MazeError(f"{name}: expected {MIN_SIZE} to {MAX_SIZE} cells a side, found {size}")
+    require_closed_border(walls, name)
+    require_connected(walls, name)
 
 
 def _show(cell: np.ndarray) -> str:

@@ -1,185 +1,106 @@
-"""The maze in a scan or photograph of a drawn plan.
+"""The maze in a scan or photograph of a plan whose walls are filled.
 
-The drawing is found by its outer walls, deskewed to a square, and its cells are counted by the edges of its walls.
-`N` is the number of cells along a side of the maze.
+The drawing is found, and its cells are counted by the edges of its walls. `R` and `C` are the numbers of rows and
+columns of cells, `H` and `W` of pixels.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import cv2
 import numpy as np
 
-from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, Maze, MazeError
+from mazebench.maps.cell_grid import core_bounds, fit_grid
+from mazebench.maps.drawing import dark_and_light, deskew, flatten, frames, ink_of
+from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, MazeError, require_connected
 
-_WORKING_SIDE = 2400  # pixels; larger photographs are shrunk to it
-_LIGHT_SIDE = 128  # pixels of the small copy in which the light on the paper is estimated
-_MIN_LIGHT = 0.6  # of the brightest paper; a wide area darker than this is wall, not paper in the shade
-_MARGIN = 8  # pixels of paper added around a photograph, for drawings cut out along their outer walls
-_MIN_FRAME_AREA = 0.05  # of the picture
-_MIN_FRAME_FILL = 0.9  # smaller area over larger one, of a frame's outline and the four-sided shape fitted to it
-_SQUARE_SIDE = 2048  # pixels of the deskewed drawing: 8 a cell for the largest maze
+MIN_SIDE = 3  # cells on the shorter side of a plan: wall, floor, wall
 # On synthetic photographs of 13 and 21 cells the true N had a fit of 0.6 to 0.95, any other N at most 0.39.
 _MIN_FIT = 0.4
 _NEARLY_BEST = 0.97  # share of the best fit
-_CORE = 0.5  # share of a cell's side: the middle of a cell, which decides whether it is wall
+_MIN_INK = 0.25  # share of a plan with filled walls; line drawings have less
 _MIN_CONTRAST = 64  # between the shades of walls and floor, of 255
 _MIN_LINE = 0.22  # share of the contrast; the lines of squared paper are fainter
 _LINE_WIDTH, _LINE_LENGTH = 0.6, 0.9  # shares of a cell's side; walls are wider than a line, letters shorter
 _MIN_CLARITY = 0.1  # share of the contrast, between a core's shade and the middle of wall and floor
 
 
-def read_plan(gray: np.ndarray, size: int | None, name: str) -> Maze:
-    """Returns the maze that `gray` (`[H, W]` uint8, dark is wall) shows.
+def read_plan(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
+    """Returns the walls, `[R, C]` bool, that `gray` (`[H, W]` uint8, dark is wall) shows.
 
     Args:
-      size: N; estimated from the drawing if None.
-      name: of the maze, also in errors.
+      gray: the picture.
+      size: the larger one of R and C; estimated from the drawing if None.
+      name: of the maze, for errors.
 
     Raises:
       MazeError: if no legal maze is found.
     """
-    paper, fine = _flatten(gray)
-    problem = f"{name}: expected a drawing whose dark outer walls form a closed square, found none"
-    for corners in _frames(_ink(paper)):
+    paper, fine = flatten(gray)
+    dark, light = dark_and_light(paper)
+    if light - dark < _MIN_CONTRAST or gray.min() == gray.max():
+        raise MazeError(f"{name}: expected dark walls on light paper, found a page of one shade")
+    ink = ink_of(paper)
+    problem = (
+        f"{name}: expected a drawing whose dark outer walls form a closed rectangle, found none ({_advice(ink, size)})"
+    )
+    for corners in frames(ink):
         try:
-            return _read_square(_deskew(paper, corners), _deskew(fine, corners), size, name)
+            return _read_rectangle(deskew(paper, corners), deskew(fine, corners), size, name)
         except MazeError as error:
             problem = str(error)
-    advice = "give the number of cells a side" if size is None else f"are there {size} cells a side?"
-    raise MazeError(f"{problem} ({advice})")
+    raise MazeError(problem)
 
 
-def _flatten(gray: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the picture at working size with the light evened out, as (without noise, with noise).
+def _read_rectangle(drawing: np.ndarray, fine: np.ndarray, size: int | None, name: str) -> np.ndarray:
+    """Returns the walls, `[R, C]` bool, of a deskewed drawing; `fine` is the drawing with its noise.
 
-    Both are `[H', W']` uint8 with a margin around the picture; 255 is paper.
+    The outermost cells are walls.
     """
-    gray = _shrink(gray, _WORKING_SIDE)
-    small = _shrink(gray, _LIGHT_SIDE)
-    # A closing half as wide as the picture replaces ink by the paper around it.
-    closed = cv2.morphologyEx(small, cv2.MORPH_CLOSE, np.ones((max(small.shape) // 2,) * 2, np.uint8))
-    light = np.maximum(closed, _MIN_LIGHT * np.percentile(closed, 95)).astype(np.float32)
-    light = cv2.resize(cv2.GaussianBlur(light, (0, 0), 3), gray.shape[::-1], interpolation=cv2.INTER_LINEAR)
-    fine = np.clip(255.0 * gray / np.maximum(light, 1), 0, 255).astype(np.uint8)
-    fine = cv2.copyMakeBorder(fine, *(_MARGIN,) * 4, cv2.BORDER_CONSTANT, value=255)
-    return cv2.medianBlur(fine, 3), fine
-
-
-def _shrink(gray: np.ndarray, side: int) -> np.ndarray:
-    scale = min(1, side / max(gray.shape))
-    height, width = (max(1, round(length * scale)) for length in gray.shape)
-    return cv2.resize(gray, (width, height), interpolation=cv2.INTER_AREA)
-
-
-def _ink(paper: np.ndarray) -> np.ndarray:
-    """Returns an array of the same shape, uint8: 255 at ink, 0 at paper."""
-    return (paper < np.mean(_dark_and_light(paper))).astype(np.uint8) * 255
-
-
-def _dark_and_light(shades: np.ndarray) -> tuple[float, float]:
-    """Returns the mean dark and the mean light shade of a uint8 picture, split by Otsu's method."""
-    # Otsu's threshold separates the two, but need not lie halfway between them.
-    threshold, _ = cv2.threshold(shades, 0, 1, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
-    counts = cv2.calcHist([shades], [0], None, [256], [0, 256]).ravel()
-    levels = np.arange(256)
-    everything = np.ones(256, dtype=bool)
-    parts = (part if counts[part].any() else everything for part in (levels <= threshold, levels > threshold))
-    dark, light = (float(counts[part] @ levels[part] / counts[part].sum()) for part in parts)
-    return dark, light
-
-
-def _frames(ink: np.ndarray) -> Iterator[np.ndarray]:
-    """Yields the corners of up to two four-sided shapes that may be the drawing's outer walls.
-
-    The first is the largest shape of ink. The second is the largest one that does not touch the picture's edge, which
-    is the drawing if the picture shows a dark table around the paper.
-    """
-    clear = ink.copy()
-    clear[:_MARGIN] = clear[-_MARGIN:] = clear[:, :_MARGIN] = clear[:, -_MARGIN:] = 255
-    cv2.floodFill(clear, None, (0, 0), 0)
-    for shapes in (ink, clear):
-        without_specks = cv2.morphologyEx(shapes, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-        outlines, _ = cv2.findContours(without_specks, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        outline = max(outlines, key=cv2.contourArea, default=None)
-        if outline is not None and cv2.contourArea(outline) >= _MIN_FRAME_AREA * ink.size:
-            corners = _fit_corners(outline)
-            if corners is not None:
-                yield corners
-
-
-def _fit_corners(outline: np.ndarray) -> np.ndarray | None:
-    """Returns the corners (x, y) of an outline with four straight sides, `[4, 2]` float32 from top left, or None."""
-    hull = cv2.convexHull(outline, clockwise=False)  # clockwise if y points down
-    tolerances = cv2.arcLength(hull, True) * np.arange(0.01, 0.1, 0.005)
-    polygons = (cv2.approxPolyDP(hull, tolerance, True)[:, 0] for tolerance in tolerances)
-    rough = next((polygon for polygon in polygons if len(polygon) == 4), None)
-    if rough is None:
-        return None
-    rightwards = np.roll(rough, -1, axis=0)[:, 0] - rough[:, 0]  # of the side that starts at each corner
-    rough = np.roll(rough, -int(np.argmax(rightwards - np.roll(rightwards, 2))), axis=0).astype(np.float64)
-    points = outline[:, 0].astype(np.float64)
-    sides = [_fit_side(points, rough[i], rough[(i + 1) % 4]) for i in range(4)]
-    meetings = np.array([np.cross(sides[i - 1], sides[i]) for i in range(4)])  # homogeneous
-    if (np.abs(meetings[:, 2]) < 1e-9).any():
-        return None
-    corners = (meetings[:, :2] / meetings[:, 2:]).astype(np.float32)
-    smaller, larger = sorted((cv2.contourArea(outline), cv2.contourArea(corners)))
-    return corners if smaller >= _MIN_FRAME_FILL * larger else None
-
-
-def _fit_side(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Returns the homogeneous line (`[3]` float) through the `points` of an outline along one of its sides."""
-    length = np.hypot(*(end - start))
-    along = (end - start) / length
-    share = (points - start) @ along / length
-    away = np.abs((points - start) @ [-along[1], along[0]])
-    near = points[(share > 0.05) & (share < 0.95) & (away < 0.03 * length)]
-    near = np.concatenate([near, [start, end]])  # so that there are two points or more
-    direction, point = cv2.fitLine(near.astype(np.float32), cv2.DIST_HUBER, 0, 0.01, 0.01).reshape(2, 2).astype(float)
-    return np.cross([*point, 1.0], [*(point + direction), 1.0])
-
-
-def _deskew(paper: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Returns the drawing as seen from straight above, `[_SQUARE_SIDE, _SQUARE_SIDE]` uint8."""
-    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float32) * (_SQUARE_SIDE - 1)
-    transform = cv2.getPerspectiveTransform(corners, square)
-    return cv2.warpPerspective(paper, transform, (_SQUARE_SIDE, _SQUARE_SIDE), borderValue=255)
-
-
-def _read_square(square: np.ndarray, fine: np.ndarray, size: int | None, name: str) -> Maze:
-    """Returns the maze in a deskewed drawing; `fine` is the drawing with its noise. The outermost cells are walls."""
-    fits = _grid_fits(_ink(square))
-    if size is None:
-        is_best = (fits[1:-1] >= fits[:-2]) & (fits[1:-1] >= fits[2:]) & (fits[1:-1] >= _NEARLY_BEST * fits.max())
-        size = 1 + int(np.argmax(is_best))
-    if fits[size] < _MIN_FIT:
-        raise MazeError(f"{name}: expected walls along the lines of a square grid of cells, found edges off it")
-    cores = _cores(square, size)
-    dark, light = _dark_and_light(np.round(cores).astype(np.uint8))
+    ink = ink_of(drawing)
+    advice = _advice(ink, size)
+    shape, fit = _count_cells(ink, size)
+    if fit < _MIN_FIT:
+        raise MazeError(f"{name}: expected walls along the lines of a grid of cells, found edges off it ({advice})")
+    cores = _cores(drawing, shape)
+    dark, light = dark_and_light(np.round(cores).astype(np.uint8))
+    in_words = f"{shape[0]} x {shape[1]} cells"
     if light - dark < _MIN_CONTRAST:
-        raise MazeError(f"{name}: expected dark walls on light paper, found shades {dark:.0f} and {light:.0f} of 255")
+        raise MazeError(
+            f"{name}: expected filled walls as thick as a cell, found only lines between {in_words}; "
+            "read them with --walls lines"
+        )
     clarity = np.abs(cores - (dark + light) / 2) / (light - dark)
     clarity[[0, -1], :] = clarity[:, [0, -1]] = 1
     if clarity.min() < _MIN_CLARITY:
         cell = tuple(map(int, np.argwhere(clarity == clarity.min())[0]))
-        raise MazeError(f"{name}: expected {size} x {size} cells of wall or floor, found cell {cell} between the two")
+        raise MazeError(f"{name}: expected {in_words} of wall or floor, found cell {cell} between the two ({advice})")
     walls = cores < (dark + light) / 2
     walls[[0, -1], :] = walls[:, [0, -1]] = True
     lines = _lines_in_floor(fine, walls, _MIN_LINE * (light - dark))
     if lines.any():
         cell = tuple(map(int, np.argwhere(lines)[0]))
         raise MazeError(
-            f"{name}: expected filled walls as thick as a cell, found a thin line across the floor at {cell}"
+            f"{name}: expected filled walls as thick as a cell, found a thin line across the floor at {cell} ({advice})"
         )
-    return Maze(walls, name)
+    try:
+        require_connected(walls, name)
+    except MazeError as error:
+        raise MazeError(f"{error} ({advice})") from error
+    return walls
+
+
+def _advice(ink: np.ndarray, size: int | None) -> str:
+    """Returns what to try with a drawing that is not read."""
+    if size is not None:
+        return f"are there {size} cells a side?"
+    if np.count_nonzero(ink) < _MIN_INK * ink.size:
+        return "are the walls lines? read them with --walls lines"
+    return "give the number of cells on the longer side"
 
 
 def _lines_in_floor(fine: np.ndarray, walls: np.ndarray, contrast: float) -> np.ndarray:
-    """Returns the floor cells in which a thin dark line, about a cell long or longer, is found: `[N, N]` bool."""
-    size = len(walls)
-    cell = _SQUARE_SIDE // size
+    """Returns the floor cells in which a thin dark line, about a cell long or longer, is found: `[R, C]` bool."""
+    cell = min(length // count for length, count in zip(fine.shape, walls.shape, strict=True))
     thick, long = max(3, round(_LINE_WIDTH * cell)), max(3, round(_LINE_LENGTH * cell))
     dark = cv2.morphologyEx(fine, cv2.MORPH_BLACKHAT, np.ones((thick, thick), np.uint8)) > contrast
     lines = np.zeros(fine.shape, dtype=bool)
@@ -190,30 +111,28 @@ def _lines_in_floor(fine: np.ndarray, walls: np.ndarray, contrast: float) -> np.
     floor = cv2.erode(floor, np.ones((2 * (cell // 4) + 1,) * 2, np.uint8))
     rows, columns = np.nonzero(lines & (floor > 0))
     found = np.zeros_like(walls)
-    found[rows * size // len(fine), columns * size // len(fine)] = True
+    found[rows * walls.shape[0] // fine.shape[0], columns * walls.shape[1] // fine.shape[1]] = True
     return found
 
 
-def _grid_fits(ink: np.ndarray) -> np.ndarray:
-    """Returns for each N how well the edges of the ink lie on its grid: `[MAX_SIZE + 2]` float, -1 below MIN_SIZE.
+def _count_cells(ink: np.ndarray, size: int | None) -> tuple[tuple[int, int], float]:
+    """Returns the numbers of rows and columns of the grid on which the edges of the ink lie best, and the worse fit.
 
-    The fit is the mean of `cos(2 pi N x)` over the positions `x` of edges, in shares of the frame's side; 1 is best.
-    Multiples of the true N fit nearly as well, so the smallest N that fits nearly best is the true one.
+    The fit of a number n along one axis is the mean of `cos(2 pi n x)` over the positions `x` of edges across that
+    axis, in shares of its length; 1 is best. Cells are about square, so rows and columns are counted together.
+    Multiples of the true numbers fit nearly as well, so the true ones are the smallest that fit nearly best and stretch
+    cells as the best ones do.
     """
-    across = cv2.reduce(cv2.absdiff(ink[1:], ink[:-1]), 1, cv2.REDUCE_SUM, dtype=cv2.CV_64F)
-    down = cv2.reduce(cv2.absdiff(ink[:, 1:], ink[:, :-1]), 0, cv2.REDUCE_SUM, dtype=cv2.CV_64F)
-    edges = across.ravel() + down.ravel()
-    positions = np.arange(1, len(ink)) / len(ink)
-    edges[np.minimum(positions, 1 - positions) < 0.5 / MAX_SIZE] = 0  # the frame's outline
-    sizes = np.arange(MIN_SIZE, MAX_SIZE + 2)
-    fits = np.cos(2 * np.pi * np.outer(sizes, positions)) @ edges / max(1, edges.sum())
-    return np.concatenate([np.full(MIN_SIZE, -1.0), fits])
+    across = cv2.reduce(cv2.absdiff(ink[1:], ink[:-1]), 1, cv2.REDUCE_SUM, dtype=cv2.CV_64F).ravel()
+    down = cv2.reduce(cv2.absdiff(ink[:, 1:], ink[:, :-1]), 0, cv2.REDUCE_SUM, dtype=cv2.CV_64F).ravel()
+    return fit_grid(across, down, ink.shape, MIN_SIDE, (MIN_SIZE, MAX_SIZE), size, _NEARLY_BEST)
 
 
-def _cores(square: np.ndarray, size: int) -> np.ndarray:
-    """Returns the mean shade of the middle of each cell: `[size, size]` float."""
-    sums = cv2.integral(square)
-    bounds = (np.arange(size)[:, None] + [0.5 - _CORE / 2, 0.5 + _CORE / 2]) * _SQUARE_SIDE / size
-    starts, ends = np.round(bounds).astype(int).T
-    totals = sums[ends][:, ends] - sums[starts][:, ends] - sums[ends][:, starts] + sums[starts][:, starts]
-    return totals / np.outer(ends - starts, ends - starts)
+def _cores(drawing: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Returns the mean shade of the middle of each cell: `[R, C]` float."""
+    sums = cv2.integral(drawing)
+    (top, bottom), (left, right) = (
+        core_bounds(count, length) for count, length in zip(shape, drawing.shape, strict=True)
+    )
+    totals = sums[bottom][:, right] - sums[top][:, right] - sums[bottom][:, left] + sums[top][:, left]
+    return totals / np.outer(bottom - top, right - left)

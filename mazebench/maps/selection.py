@@ -5,36 +5,62 @@ from __future__ import annotations
 import pathlib
 from collections.abc import Iterable
 
+import numpy as np
+
 from mazebench.errors import InputError
+from mazebench.maps.arrays import read_array
 from mazebench.maps.benchmark import load_mazes
-from mazebench.maps.files import read_mazes
-from mazebench.maps.maze import Maze
+from mazebench.maps.files import read_all
+from mazebench.maps.maze import Maze, resized
+from mazebench.maps.options import MAP_OPTIONS, NO_OPTIONS, OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions
 
 _DEFAULT_SIZE = 13
 
-# Mazes of one's own: one or several, or the path of a file or of a folder.
-Maps = str | pathlib.Path | Maze | Iterable[Maze]
+# Mazes of one's own: one or several, as values or arrays, or the path of a file or of a folder.
+Maps = str | pathlib.Path | Maze | np.ndarray | Iterable[Maze | np.ndarray]
 
 
-def load_mazes_of(size: int | None = None, split: str = "train", maps: Maps | None = None) -> tuple[Maze, ...]:
+def load_mazes_of(
+    size: int | None = None, split: str = "train", maps: Maps | None = None, options: MapOptions = NO_OPTIONS
+) -> tuple[Maze, ...]:
     """Returns the mazes of a task.
 
     Args:
       size: N, the cells on a side of benchmark v1's mazes: 13 (the default), 15, 17, 19 or 21; with `maps`, a size that
         they must have.
       split: "train" or "eval" mazes of benchmark v1; without effect with `maps`.
-      maps: mazes of your own instead: a `Maze`, several of one size, or a text or image file or a folder of them.
+      maps: mazes of your own instead: a `Maze`, an array as `maze_from_array` takes it, several of these of one size,
+        or the path of a file or of a folder of files.
+      options: how `maps` are read.
 
     Raises:
-      InputError: if there are no such mazes, or a map can't be read.
+      InputError: if there are no such mazes, a map can't be read, or a map option is given without `maps`.
     """
     if maps is None:
+        options.require_defaults(MAP_OPTIONS, "maps of your own", "the benchmark's mazes")
         return load_mazes(_DEFAULT_SIZE if size is None else size, split)
-    if isinstance(maps, Maze):
-        mazes: tuple[Maze, ...] = (maps,)
-    else:
-        mazes = read_mazes(maps) if isinstance(maps, (str, pathlib.Path)) else tuple(maps)
+    mazes = _own_mazes(maps, options)
     for maze in mazes:
         if size not in (None, maze.size):
             raise InputError(f"expected mazes of size {size}, found size {maze.size}")
     return mazes
+
+
+def _own_mazes(maps: Maps, options: MapOptions) -> tuple[Maze, ...]:
+    if isinstance(maps, (str, pathlib.Path)):
+        return read_all(pathlib.Path(maps), options)
+    if isinstance(maps, Maze) or (isinstance(maps, np.ndarray) and maps.ndim < 3):
+        return (_own_maze(maps, "maze", options),)
+    if not isinstance(maps, Iterable):
+        raise InputError(f"expected maps as mazes, arrays or a path, found {type(maps).__name__}")
+    return tuple(_own_maze(item, f"maze-{index}", options) for index, item in enumerate(maps))
+
+
+def _own_maze(item: object, name: str, options: MapOptions) -> Maze:
+    options.require_defaults(PICTURE_OPTIONS, "pictures", type(item).__name__)
+    if isinstance(item, np.ndarray):
+        return read_array(item, name, options)
+    if not isinstance(item, Maze):
+        raise InputError(f"expected a Maze or an array in maps, found {type(item).__name__}")
+    options.require_defaults(OCCUPANCY_OPTIONS, "ROS maps and arrays", f"the maze {item.name!r}")
+    return resized(item, options.cell_size)

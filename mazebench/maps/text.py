@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import codecs
 import pathlib
 
 import numpy as np
 
+from mazebench.errors import InputError
+from mazebench.maps.file_kinds import kind_of
+from mazebench.maps.grids import square_maze
 from mazebench.maps.maze import MAX_SIZE, Maze, MazeError
-from mazebench.storage.files import open_whole, read_at_most
+from mazebench.storage.files import open_file, open_whole
 
 _WALL = "#*1"
 _FREE = ". 0PG"
-# Of the largest legal text, MAX_SIZE rows of MAX_SIZE cells and a line end of two bytes.
-_MAX_BYTES = MAX_SIZE * (MAX_SIZE + 2)
+# Of the largest legal text: a mark of the encoding, and MAX_SIZE rows of MAX_SIZE cells and two line ends, each of at
+# most two bytes.
+_MAX_BYTES = 4 + 2 * MAX_SIZE * (MAX_SIZE + 2)
+_ENCODINGS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 
 
 def format_maze(maze: Maze) -> str:
@@ -21,7 +27,7 @@ def format_maze(maze: Maze) -> str:
 
 
 def parse_maze(text: str, name: str = "maze") -> Maze:
-    """Returns the maze that `text` draws.
+    """Returns the maze that `text` draws; one that is not square is padded with wall, see `square_maze`.
 
     Raises:
       MazeError: if a character is unknown, the rows differ in length, or the grid is not a legal maze.
@@ -39,20 +45,27 @@ def parse_maze(text: str, name: str = "maze") -> Maze:
                     f"{name}: expected one of {_WALL!r} (wall) or {_FREE!r} (free), "
                     f"found {character!r} at ({row}, {column})"
                 )
-    return Maze(np.array([[character in _WALL for character in line] for line in rows], dtype=bool), name)
+    return square_maze(np.array([[character in _WALL for character in line] for line in rows], dtype=bool), name)
 
 
 def read_text_maze(path: str | pathlib.Path) -> Maze:
-    """Reads the maze in a text file, and names it after the file.
+    """Reads the maze in a text file, ASCII or with a byte-order mark, and names it after the file.
 
     Raises:
       InputError: if the file can't be read, or is larger than any maze's.
       MazeError: if it is not text or not a legal maze.
     """
     path = pathlib.Path(path)
-    content = read_at_most(path, _MAX_BYTES, "map")
+    with open_file(path, "map") as file:
+        content = file.read(_MAX_BYTES + 1)
+    kind = kind_of(content)
+    if kind is not None:
+        raise MazeError(f"{path}: expected a text map, found {kind}")
+    if len(content) > _MAX_BYTES:
+        raise InputError(f"{path}: expected a text map of at most {_MAX_BYTES} bytes, found more")
+    encoding = next((name for mark, name in _ENCODINGS.items() if content.startswith(mark)), "ascii")
     try:
-        text = content.decode("ascii")
+        text = content.decode(encoding)
     except UnicodeDecodeError as error:
         raise MazeError(
             f"{path}: expected a text map, found byte 0x{content[error.start]:02x} at {error.start}"

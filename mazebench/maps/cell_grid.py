@@ -1,0 +1,73 @@
+"""The grid of cells of a drawing, which the edges of its walls lie on.
+
+`R` and `C` are the numbers of rows and columns of cells.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from mazebench.maps.maze import MAX_SIZE
+
+# Of a cell: logarithm of width by height. Perspective makes 0.1 or 0.2 of it, the same for all multiples of a grid.
+_MAX_STRETCH, _SAME_STRETCH = 0.3, 0.02
+CORE = 0.5  # share of a cell's side: the middle of a cell, which decides whether it is wall
+
+
+def fit_grid(
+    across: np.ndarray,
+    down: np.ndarray,
+    pixels: tuple[int, ...],
+    shortest: int,
+    longest: tuple[int, int],
+    size: int | None,
+    nearly_best: float,
+) -> tuple[tuple[int, int], float]:
+    """Returns the numbers of rows and columns that fit weights along the two axes best, and the worse fit.
+
+    Args:
+      across: weight of each position from top to bottom; `down` from left to right.
+      down: see `across`.
+      pixels: height and width of the picture.
+      shortest: the smallest number of cells along an axis.
+      longest: the smallest and the largest number of cells along the longer axis.
+      size: the number of cells along the longer axis; estimated if None.
+      nearly_best: share of the best fit with which smaller numbers are preferred.
+    """
+    row_fits, row_weight = _axis_fits(across)
+    column_fits, column_weight = _axis_fits(down)
+    weight = max(1e-9, row_weight + column_weight)
+    fits = (row_weight * row_fits[:, None] + column_weight * column_fits[None, :]) / weight  # [R, C]
+    counts = np.arange(len(row_fits))
+    stretch = np.log(np.maximum(counts, 1)[:, None] / np.maximum(counts, 1)[None, :] * pixels[1] / pixels[0])
+    longer = np.maximum(counts[:, None], counts[None, :])
+    allowed = (np.abs(stretch) <= _MAX_STRETCH) & (longer >= longest[0]) & (longer <= longest[1])
+    allowed &= np.minimum(counts[:, None], counts[None, :]) >= shortest
+    if size is not None:
+        allowed &= longer == size
+    fits[~allowed] = -1.0
+    best = fits.max()
+    near = cv2.dilate(fits, np.ones((3, 3), np.uint8))
+    as_stretched = np.abs(stretch - stretch.ravel()[fits.argmax()]) <= _SAME_STRETCH
+    rows, columns = np.nonzero((fits >= near) & (fits >= nearly_best * best) & as_stretched & allowed)
+    if best <= 0:
+        return (longest[0], longest[0]), -1.0
+    first = int(np.argmin(rows * columns))
+    row, column = int(rows[first]), int(columns[first])
+    return (row, column), float(min(row_fits[row], column_fits[column]))
+
+
+def core_bounds(count: int, length: int) -> tuple[np.ndarray, np.ndarray]:
+    """Returns where the middle of each of `count` cells along `length` pixels begins, and where it ends."""
+    bounds = (np.arange(count)[:, None] + [0.5 - CORE / 2, 0.5 + CORE / 2]) * length / count
+    starts, ends = np.round(bounds).astype(int).T
+    return starts, ends
+
+
+def _axis_fits(edges: np.ndarray) -> tuple[np.ndarray, float]:
+    """Returns the fit of each number of cells along an axis, `[MAX_SIZE + 1]` float, and the weight of the edges."""
+    positions = np.arange(1, len(edges) + 1) / (len(edges) + 1)
+    edges = np.where(np.minimum(positions, 1 - positions) < 0.5 / MAX_SIZE, 0, edges)  # without the frame's outline
+    weight = float(edges.sum())
+    return np.cos(2 * np.pi * np.outer(np.arange(MAX_SIZE + 1), positions)) @ edges / max(1e-9, weight), weight

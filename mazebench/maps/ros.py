@@ -1,0 +1,193 @@
+"""Maps of ROS: a YAML file and a picture, as `map_server` reads and `map_saver` writes them.
+
+The rules are those of http://wiki.ros.org/map_server, and in the details of `nav2_map_server` (map_io.cpp).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import pathlib
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+import pydantic
+import yaml
+
+from mazebench.errors import InputError
+from mazebench.maps.image import read_picture
+from mazebench.maps.maze import Maze
+from mazebench.maps.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, PlacedMaze, place_maze
+from mazebench.maps.options import MapOptions
+from mazebench.storage.files import open_whole, read_at_most
+
+ROS_SUFFIXES = (".yaml", ".yml")
+_MAX_BYTES = 2**16  # of a YAML file
+_FREE_SHADE, _UNKNOWN_SHADE, _OCCUPIED_SHADE = 254, 205, 0  # that map_saver writes
+_OCCUPIED_THRESH, _FREE_THRESH = 0.65, 0.196  # with which map_server reads them back
+
+
+class _Metadata(pydantic.BaseModel):
+    """The content of the YAML file; other keys are ignored, as by map_server."""
+
+    image: str = pydantic.Field(min_length=1, description="the name of a picture")  # absolute, or beside the YAML file
+    resolution: float = pydantic.Field(gt=0, allow_inf_nan=False, description="the side of a pixel, above 0 m")
+    # x, y (m) and yaw (rad) of the lower left corner of the picture
+    origin: tuple[float, float, float] = pydantic.Field(description="three numbers, [x, y, yaw]")
+    negate: bool = pydantic.Field(description="0 or 1")  # whether light is occupied
+    occupied_thresh: float = pydantic.Field(
+        description="a number from 0 to 1"
+    )  # a pixel that is occupied with more is wall
+    free_thresh: float = pydantic.Field(description="a number from 0 to 1")  # and with less is free
+    mode: Literal["trinary", "scale", "raw"] = pydantic.Field("trinary", description="trinary, scale or raw")
+
+
+def read_ros_maze(path: str | pathlib.Path, **options: Any) -> PlacedMaze:
+    """Reads the maze in a map of ROS, named after the YAML file at `path`, and its place in the map's frame.
+
+    A point (x, y) of the maze lies at `(x0 + x cos(yaw) - y sin(yaw), y0 + x sin(yaw) + y cos(yaw))` in the map's frame
+    if (x0, y0, yaw) is the origin that is returned.
+
+    Args:
+      path: of the YAML file.
+      **options: those of `MapOptions`.
+
+    Raises:
+      InputError: if a file can't be read or an option is not allowed.
+      MazeError: if there is no legal maze in the map.
+    """
+    return place_ros_maze(path, MapOptions(**options))
+
+
+def place_ros_maze(path: str | pathlib.Path, options: MapOptions) -> PlacedMaze:
+    """Reads a map of ROS as `read_ros_maze` does."""
+    return place_maze(read_occupancy(path), options, pathlib.Path(path).stem)
+
+
+def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
+    """Reads what map_server would publish of a map, with all that is between free and occupied as unknown.
+
+    It departs from map_server in one case. In the mode trinary, map_saver writes the shade 205 for unknown, but many of
+    its versions write a `free_thresh` with which map_server takes 205 as free. In a picture of map_saver's shades
+    alone, 205 is therefore unknown whatever the threshold says.
+
+    Raises:
+      InputError: if one of the two files can't be read.
+    """
+    path = pathlib.Path(path)
+    metadata = _read_metadata(path)
+    try:
+        picture = read_picture(path.parent / metadata.image)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    states = _states(picture, metadata)
+    is_unknown = _saved_as_unknown(picture)
+    changes = []
+    if metadata.mode == "trinary" and (states[is_unknown] == FREE).any():
+        states[is_unknown] = UNKNOWN
+        changes.append(
+            f"shade {_UNKNOWN_SHADE} read as unknown, as map_saver means it, though free_thresh "
+            f"{metadata.free_thresh:g} says free"
+        )
+    return OccupancyGrid(states, metadata.resolution, metadata.origin, tuple(changes))
+
+
+def picture_of(path: str | pathlib.Path) -> pathlib.Path:
+    """Returns the path of the picture that a YAML file names.
+
+    Raises:
+      InputError: if the file can't be read.
+    """
+    path = pathlib.Path(path)
+    return path.parent / _read_metadata(path).image
+
+
+def map_of_picture(path: pathlib.Path) -> pathlib.Path | None:
+    """Returns the YAML file of the same name that names a picture; None if there is none."""
+    for suffix in ROS_SUFFIXES:
+        with contextlib.suppress(InputError):  # of another YAML file, or none
+            if picture_of(path.with_suffix(suffix)) == path:
+                return path.with_suffix(suffix)
+    return None
+
+
+def write_ros_map(maze: Maze, path: str | pathlib.Path, origin: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
+    """Writes `maze` as a map of ROS, with a picture of a pixel for each cell beside the YAML file at `path`.
+
+    A pixel's side is the size of a cell. `origin` is x, y (m) and yaw (rad) of the maze's lower left corner in the
+    map's frame, as `read_ros_maze` returns it; if it is not given, that frame is the maze's.
+    """
+    path = pathlib.Path(path)
+    picture = path.with_suffix(".pgm")
+    shades = np.where(maze.walls, _OCCUPIED_SHADE, _FREE_SHADE).astype(np.uint8)
+    metadata = {
+        "image": picture.name,
+        "mode": "trinary",
+        "resolution": float(maze.cell_size),
+        "origin": [round(number, 9) for number in origin],
+        "negate": 0,
+        "occupied_thresh": _OCCUPIED_THRESH,
+        "free_thresh": _FREE_THRESH,
+    }
+    with open_whole(picture) as file:
+        file.write(cv2.imencode(".pgm", shades)[1].tobytes())
+    with open_whole(path) as file:
+        yaml.safe_dump(metadata, file, encoding="utf-8", allow_unicode=True, sort_keys=False, default_flow_style=None)
+
+
+def _read_metadata(path: pathlib.Path) -> _Metadata:
+    text = read_at_most(path, _MAX_BYTES, "map")
+    expected = f"{path}: expected the YAML file of a ROS map"
+    try:
+        content = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: of a date that does not exist
+        raise InputError(f"{expected}, found {' '.join(str(error).split())[:120]}") from error
+    if not isinstance(content, dict):
+        found = "an empty file" if content is None else f"no keys but {str(content)[:60]!r}"
+        raise InputError(f"{expected}, with keys such as image and resolution, found {found}")
+    try:
+        return _Metadata.model_validate(content)
+    except pydantic.ValidationError as error:
+        key = str(error.errors()[0]["loc"][0])
+        found = repr(content[key])[:60] if key in content else f"only {', '.join(map(str, content))}"[:120]
+        meaning = _Metadata.model_fields[key].description
+        raise InputError(f"{expected}, with {key} ({meaning}), found {found}") from error
+
+
+def _states(picture: np.ndarray, metadata: _Metadata) -> np.ndarray:
+    """Returns `[H, W]` int8 of a picture: `[H, W]`, or `[H, W, 3]` or `[H, W, 4]` with opacity, uint8 or uint16."""
+    if picture.dtype == np.uint16:
+        picture = (picture >> 8).astype(np.uint8)
+    channels = picture if picture.ndim == 3 else picture[..., None]
+    opaque = channels[..., 3] == 255 if channels.shape[2] == 4 else None
+    if opaque is not None and metadata.mode != "trinary":  # where the opacity counts as a fourth shade
+        channels = channels[..., :3]
+    num_channels = channels.shape[2]
+    sums = channels.sum(axis=2, dtype=np.uint16)
+    shades = np.arange(255 * num_channels + 1) / (255 * num_channels)
+    states = _state_of_shades(shades, metadata)[sums]
+    if opaque is not None and metadata.mode == "scale":
+        states[~opaque] = UNKNOWN
+    return states
+
+
+def _saved_as_unknown(picture: np.ndarray) -> np.ndarray:
+    """Returns `[H, W]` bool: the unknown pixels of a picture of map_saver's shades; none of any other picture."""
+    colors = picture[..., :3] if picture.ndim == 3 else picture[..., None]
+    shades = colors[..., 0]
+    found = set(np.unique(colors).tolist())
+    needed = {_FREE_SHADE, _UNKNOWN_SHADE}
+    is_saved = needed <= found <= needed | {_OCCUPIED_SHADE} and (colors == shades[..., None]).all()
+    return (shades == _UNKNOWN_SHADE) & is_saved
+
+
+def _state_of_shades(shades: np.ndarray, metadata: _Metadata) -> np.ndarray:
+    """Returns the states, int8, of shades from 0 (black) to 1 (white)."""
+    occupied = shades if metadata.negate else 1 - shades
+    if metadata.mode == "raw":  # the picture holds percentages; above 100 is unknown
+        percent = np.round(255 * shades)
+        occupied = np.where(percent <= OCCUPIED, percent / OCCUPIED, np.nan)
+    states = np.full(shades.shape, UNKNOWN, dtype=np.int8)
+    states[occupied < metadata.free_thresh] = FREE
+    states[occupied > metadata.occupied_thresh] = OCCUPIED
+    return states

@@ -1,0 +1,108 @@
+"""Mazes from arrays and .npy files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mazebench
+from mazebench.errors import InputError
+from mazebench.maps.arrays import maze_from_array, read_array_maze
+from mazebench.maps.generators import generate
+from mazebench.maps.maze import Maze, MazeError
+from mazebench.maps.options import NO_OPTIONS
+
+WALLS = generate("dfs", 7, np.random.default_rng(0)).walls
+
+
+class TestWalls:
+    @pytest.mark.parametrize("dtype", [bool, np.uint8, np.int64, np.float64])
+    def test_walls_are_true_or_one(self, dtype):
+        assert maze_from_array(WALLS.astype(dtype)) == Maze(WALLS)
+
+    def test_a_rectangle_is_padded_with_wall_and_one_line_says_so(self, capsys):
+        walls = np.ones((9, 15), dtype=bool)
+        walls[1:-1, 1:-1] = False
+        maze = maze_from_array(walls, "hall")
+        assert (maze.walls[:9] == walls).all()
+        assert maze.walls[9:].all()
+        assert capsys.readouterr().err == "mazebench: hall: 9 x 15 cells, padded with wall at the bottom to 15 x 15\n"
+
+    def test_a_cell_has_the_size_asked_for(self):
+        assert maze_from_array(WALLS, cell_size=0.5) == Maze(WALLS, cell_size=0.5)
+
+    @pytest.mark.parametrize(
+        ("array", "message"),
+        [
+            (np.zeros(5), "expected a two-dimensional array of numbers, found shape (5,) float64"),
+            (np.full((5, 5), "#"), "expected a two-dimensional array of numbers, found shape (5, 5) <U1"),
+            (
+                np.full((5, 5), 0.5),
+                "bool or as 0 and 1, or occupancy as integers from -1 to 100, found float64",
+            ),
+            (np.arange(25).reshape(5, 5) * 11, "found int64 from 0 to 264"),
+            (np.zeros((5, 5)), "expected a closed border, found cell (0, 0) free"),
+            (np.zeros((5, 9)), "expected a closed border, found cell (0, 0) free"),
+        ],
+    )
+    def test_another_array_is_refused(self, array, message):
+        with pytest.raises(MazeError) as caught:
+            maze_from_array(array)
+        assert message in str(caught.value)
+
+
+class TestOccupancy:
+    def test_per_cent_are_thresholded_and_what_cannot_be_reached_is_closed(self, capsys):
+        occupancy = np.full((5, 6), 100, dtype=np.int8)
+        occupancy[1, 1:5] = [0, 25, -1, 0]  # the last is cut off by the unknown cell
+        occupancy[2, 1:3] = [64, 65]  # unknown, occupied
+        walls = np.ones((6, 6), dtype=bool)
+        walls[1, 1:3] = False
+        assert maze_from_array(occupancy, "map") == Maze(walls)
+        assert "1 of 3 free cells (33 %) closed that can't be reached from the others" in capsys.readouterr().err
+        walls[1, 1:5] = walls[2, 1] = False
+        assert maze_from_array(occupancy, unknown="free") == Maze(walls)
+
+
+class TestFile:
+    def test_an_array_is_read_from_its_file(self, tmp_path):
+        np.save(tmp_path / "plan.npy", WALLS)
+        maze = read_array_maze(tmp_path / "plan.npy", NO_OPTIONS)
+        assert (maze, maze.name) == (Maze(WALLS), "plan")
+        assert mazebench.read_maze(tmp_path / "plan.npy", cell_size=2.0) == Maze(WALLS, cell_size=2.0)
+
+    def test_a_pickle_is_refused(self, tmp_path):
+        np.save(tmp_path / "plan.npy", np.array([{}]), allow_pickle=True)
+        with pytest.raises(InputError, match=r"plan\.npy: expected a \.npy file of numbers, found .*Object arrays"):
+            mazebench.read_maze(tmp_path / "plan.npy")
+
+    @pytest.mark.parametrize(
+        ("content", "found"), [(b"", "an empty file"), (b"PK\3\4", "a ZIP archive"), (b"abc", "a file of another kind")]
+    )
+    def test_another_file_is_named(self, content, found, tmp_path):
+        (tmp_path / "plan.npy").write_bytes(content)
+        with pytest.raises(InputError, match=rf"plan\.npy: expected a \.npy file of numbers, found {found}"):
+            mazebench.read_maze(tmp_path / "plan.npy")
+
+    def test_a_file_that_names_more_numbers_than_it_has_is_refused(self, tmp_path):
+        np.save(tmp_path / "plan.npy", WALLS)
+        content = (tmp_path / "plan.npy").read_bytes().replace(b"(7, 7), ", b"(7777777, 7777777)")
+        (tmp_path / "plan.npy").write_bytes(content)
+        with pytest.raises(InputError, match=r"plan\.npy: expected a \.npy file of numbers"):
+            mazebench.read_maze(tmp_path / "plan.npy")
+
+
+class TestTasks:
+    def test_an_array_is_a_task(self):
+        env = mazebench.load(maps=WALLS, distances=[2])
+        assert env.task.spec.mazes == (Maze(WALLS),)
+
+    def test_several_arrays_are_a_task(self):
+        other = WALLS.T.copy()
+        for maps in ([WALLS, other], (Maze(WALLS), other), np.stack([WALLS, other])):
+            assert mazebench.make_spec(maps=maps, distances=[2]).mazes == (Maze(WALLS), Maze(other))
+
+    @pytest.mark.parametrize("maps", [5, [WALLS.tolist()], [None]])
+    def test_what_is_no_map_is_refused(self, maps):
+        with pytest.raises(InputError, match=r"expected .* in maps|expected maps as"):
+            mazebench.make_spec(maps=maps)

@@ -1,0 +1,364 @@
+"""Maps of ROS: map_server's rules worked by hand, the place of a maze in its map, and the way back.
+
+`published` below says in other words what http://wiki.ros.org/map_server documents, and for opacity what
+nav2_map_server does.
+"""
+
+from __future__ import annotations
+
+import math
+import pathlib
+
+import cv2
+import hypothesis
+import numpy as np
+import pytest
+import yaml
+from hypothesis import strategies as st
+
+import mazebench
+from mazebench.errors import InputError
+from mazebench.maps.files import read_maze, read_mazes
+from mazebench.maps.generators import generate
+from mazebench.maps.maze import Maze, MazeError, cell_to_point
+from mazebench.maps.options import MapOptions
+from mazebench.maps.ros import read_occupancy, read_ros_maze, write_ros_map
+from mazebench.maps.text import parse_maze, write_text_maze
+from mazebench.world.formats import make_mazes, write_maze
+
+METADATA = {
+    "image": "map.pgm",
+    "resolution": 1.0,
+    "origin": [0.0, 0.0, 0.0],
+    "negate": 0,
+    "occupied_thresh": 0.65,
+    "free_thresh": 0.196,
+}
+
+
+def write_map(folder: pathlib.Path, picture: np.ndarray, **metadata) -> pathlib.Path:
+    """Writes a map and returns the path of its YAML file."""
+    metadata = METADATA | metadata
+    cv2.imwrite(str(folder / metadata["image"]), picture)
+    (folder / "map.yaml").write_text(yaml.safe_dump(metadata))
+    return folder / "map.yaml"
+
+
+def drawn(text: str, pixels: int = 1) -> np.ndarray:
+    """A picture of rows of `#` (black), `.` (white) and `?` (the gray of what is unknown)."""
+    shades = {"#": 0, ".": 254, "?": 205}
+    rows = [[shades[letter] for letter in row] for row in text.split()]
+    return np.array(rows, dtype=np.uint8).repeat(pixels, axis=0).repeat(pixels, axis=1)
+
+
+def published(shade: float, opacity: float = 1.0, *, mode="trinary", negate=False, occupied=0.65, free=0.196) -> str:
+    """What map_server makes of a pixel: `shade` is the mean of its colours from 0 (black) to 1 (white)."""
+    if mode == "raw":
+        per_cent = round(shade * 255)
+        return "?" if per_cent > 100 else "#" if per_cent / 100 > occupied else "." if per_cent / 100 < free else "?"
+    if mode == "scale" and opacity < 1:
+        return "?"
+    probability = shade if negate else 1 - shade
+    return "#" if probability > occupied else "." if probability < free else "?"
+
+
+class TestThresholds:
+    @pytest.mark.parametrize(
+        ("shade", "state"),
+        # Occupied with probability (255 - shade) / 255 above 0.65: at most 89 (0.651), not 90 (0.647). Free below
+        # 0.196: at least 206 (0.192), not 205 (0.1961), which map_saver writes for unknown.
+        [(0, 100), (89, 100), (90, -1), (205, -1), (206, 0), (254, 0), (255, 0)],
+    )
+    def test_shades_as_worked_by_hand(self, shade, state, tmp_path):
+        path = write_map(tmp_path, np.full((5, 5), shade, np.uint8))
+        assert (read_occupancy(path).states == state).all()
+
+    @pytest.mark.parametrize("mode", ["trinary", "scale", "raw"])
+    @pytest.mark.parametrize("negate", [False, True])
+    @pytest.mark.parametrize(("occupied", "free"), [(0.65, 0.196), (0.65, 0.25), (0.9, 0.1)])
+    def test_every_gray_follows_the_documented_rules(self, mode, negate, occupied, free, tmp_path):
+        grays = np.arange(256, dtype=np.uint8).reshape(16, 16)
+        path = write_map(tmp_path, grays, mode=mode, negate=int(negate), occupied_thresh=occupied, free_thresh=free)
+        expected = [
+            {"#": 100, ".": 0, "?": -1}[published(shade / 255, mode=mode, negate=negate, occupied=occupied, free=free)]
+            for shade in range(256)
+        ]
+        assert read_occupancy(path).states.ravel().tolist() == expected
+
+    def test_colours_are_averaged_and_opacity_counts_as_map_server_counts_it(self, tmp_path):
+        picture = np.zeros((5, 5, 4), dtype=np.uint8)
+        picture[:] = (0, 120, 240, 255)  # a mean of 120: occupied with 0.53; with the opacity 153.75: 0.397
+        picture[0] = (250, 255, 255, 100)  # a mean of 253: free; with the opacity 215: 0.157, free
+        picture[1] = (250, 255, 255, 0)  # with the opacity 190: 0.255, unknown
+        path = write_map(tmp_path, picture, image="map.png", free_thresh=0.2)
+        assert read_occupancy(path).states[:, 0].tolist() == [0, -1, -1, -1, -1]
+        path = write_map(tmp_path, picture, image="map.png", free_thresh=0.2, occupied_thresh=0.5, mode="scale")
+        assert read_occupancy(path).states[:, 0].tolist() == [-1, -1, 100, 100, 100]
+
+
+BUILDING = "??????? ?#####? ?#...#? ?#.?.#? ?#...#? ?#####? ???????"
+
+
+class TestMapSaver:
+    """map_saver of ROS 2 wrote `free_thresh: 0.25`, with which map_server takes its own shade for unknown as free."""
+
+    @pytest.mark.parametrize(
+        "picture",
+        [
+            drawn(BUILDING),
+            cv2.cvtColor(drawn(BUILDING), cv2.COLOR_GRAY2BGR),
+            cv2.cvtColor(drawn(BUILDING), cv2.COLOR_GRAY2BGRA),  # as map_saver writes a PNG
+        ],
+        ids=["gray", "colour", "opacity"],
+    )
+    def test_its_unknown_is_read_as_unknown_whatever_the_threshold(self, picture, tmp_path, capsys):
+        path = write_map(tmp_path, picture, image="map.png", free_thresh=0.25)
+        assert (read_occupancy(path).states == -1).sum() == 25
+        assert read_maze(path) == parse_maze("#####\n#...#\n#.#.#\n#...#\n#####")
+        assert capsys.readouterr().err == (
+            "mazebench: map: shade 205 read as unknown, as map_saver means it, though free_thresh 0.25 says free; "
+            "the maze's lower left corner is (1, 1) m on the map, so its point (x, y) is (x - 1, y - 1) m in the maze\n"
+        )
+
+    def test_a_map_that_is_read_back_by_the_rules_is_not_remarked_on(self, tmp_path, capsys):
+        assert read_maze(write_map(tmp_path, drawn(BUILDING))).size == 5
+        assert capsys.readouterr().err == ""
+
+    @pytest.mark.parametrize("other", [100, 206, 255])
+    def test_a_picture_with_another_shade_follows_the_rules(self, other, tmp_path):
+        picture = drawn(BUILDING)
+        picture[3, 3] = other
+        path = write_map(tmp_path, picture, free_thresh=0.25)
+        assert (read_occupancy(path).states[0] == 0).all()
+
+    def test_the_other_modes_follow_the_rules(self, tmp_path):
+        path = write_map(tmp_path, drawn(BUILDING), free_thresh=0.25, mode="scale")
+        assert (read_occupancy(path).states[0] == 0).all()
+
+
+class TestMaze:
+    def test_a_map_of_cells_is_read_as_it_is(self, tmp_path, capsys):
+        path = write_map(tmp_path, drawn("##### #...# ###.# #...# #####"), resolution=0.5)
+        walls = parse_maze("#####\n#...#\n###.#\n#...#\n#####").walls
+        assert read_maze(path) == Maze(walls, cell_size=0.5)
+        assert read_maze(path).name == "map"
+        assert capsys.readouterr().err == ""
+
+    def test_the_border_is_closed_and_what_cannot_be_reached_too(self, tmp_path, capsys):
+        path = write_map(tmp_path, drawn("...#. ...#. ####."), origin=[-3.0, 2.0, 0.0])
+        read = read_ros_maze(path)
+        assert read.maze == parse_maze("######\n#...##\n#...##\n######\n######\n######")
+        # A column and a row of wall are added on the left and above, two rows below.
+        assert read.origin == (-4.0, 0.0, 0.0)
+        assert capsys.readouterr().err == (
+            "mazebench: map: 3 of 9 free cells (33 %) closed that can't be reached from the others; "
+            "4 x 6 cells padded with wall to 6 x 6; "
+            "the maze's lower left corner is (-4, 0) m on the map, so its point (x, y) is (x + 4, y) m in the maze\n"
+        )
+
+    def test_unknown_surroundings_are_cut_off_and_unknown_cells_inside_are_wall_or_free(self, tmp_path):
+        rows = ["?????????", "??#####??", "??#...#??", "??#.?.#??", "??#...#??", "??#####??", "?????????"]
+        path = write_map(tmp_path, drawn(" ".join(rows)))
+        assert read_maze(path) == parse_maze("#####\n#...#\n#.#.#\n#...#\n#####")
+        assert read_maze(path, unknown="free") == parse_maze("#####\n#...#\n#...#\n#...#\n#####")
+        assert read_ros_maze(path).origin == (2.0, 1.0, 0.0)
+
+    def test_unknown_cells_around_the_building_are_wall_in_any_case(self, tmp_path):
+        path = write_map(tmp_path, drawn("##### #...# #.?.# #...# ##### ???#?"))
+        assert read_maze(path, unknown="free").walls[5].all()
+
+    def test_pixels_are_coarsened_to_cells_that_are_wall_if_one_pixel_is(self, tmp_path, capsys):
+        picture = drawn("##### #...# #...# #...# #####", pixels=8)
+        picture[8, 31] = 0  # in the corner of cell (1, 3)
+        path = write_map(tmp_path, picture, resolution=0.05, origin=[1.0, 1.0, 0.0])
+        expected = parse_maze("#####\n#..##\n#...#\n#...#\n#####").walls
+        assert read_maze(path) == Maze(expected, cell_size=0.4)
+        assert capsys.readouterr().err == (
+            "mazebench: map: 40 x 40 pixels of 0.05 m as cells of 0.4 m; "
+            "agents drive surely in cells from 0.5 m, try --cell-size 0.5; "
+            "the maze's lower left corner is (1, 1) m on the map, so its point (x, y) is (x - 1, y - 1) m in the maze\n"
+        )
+        assert read_maze(path, cell_size=0.5).size == 5
+        assert "surely" not in capsys.readouterr().err
+
+    @pytest.mark.parametrize(("cell_size", "nearest"), [(0.07, "0.4"), (0.33, "0.4"), (0.2, "0.4"), (0.52, "0.5")])
+    def test_a_size_of_cells_that_cannot_be_made_is_answered_with_one_that_can(self, cell_size, nearest, tmp_path):
+        path = write_map(tmp_path, drawn("##### #...# #...# #...# #####", pixels=10), resolution=0.05)
+        with pytest.raises(InputError, match=rf"of pixels of 0\.05 m, such as {nearest}, found {cell_size}"):
+            read_maze(path, cell_size=cell_size)
+        assert read_maze(path, cell_size=float(nearest)).cell_size == float(nearest)
+
+    def test_rooms_that_are_lost_are_counted_and_what_to_try_is_said(self, tmp_path, capsys):
+        picture = drawn("######### #...#...# #...#...# #...#...# #########", pixels=10)
+        picture[20:29, 40:50] = 254  # a door of 0.9 m, which is no whole cell of 0.5 m wide
+        path = write_map(tmp_path, picture, resolution=0.05)
+        read_maze(path, cell_size=0.5)
+        assert (
+            "9 of 18 free cells (50 %) closed that can't be reached from the others; "
+            "doors narrower than two cells (1 m) may close, try a smaller --cell-size; 5 x 9"
+        ) in capsys.readouterr().err
+        read_maze(path)
+        assert "; doors narrower than two cells (0.8 m) may close; 7 x 12" in capsys.readouterr().err  # none is smaller
+
+    def test_unknown_cells_and_inflation_are_named_where_they_may_have_closed_rooms(self, tmp_path, capsys):
+        path = write_map(tmp_path, drawn("######### #...?...# #...#...# #...#...# #########"))
+        read_maze(path)
+        assert (
+            "(50 %) closed that can't be reached from the others; unknown cells are wall, try --unknown free; 5 x"
+            in (capsys.readouterr().err)
+        )
+        read_maze(path, unknown="free")
+        assert "closed" not in capsys.readouterr().err
+        path = write_map(tmp_path, drawn("######### #...#...# #.......# #...#...# #########", pixels=3))
+        read_maze(path, inflate=2.0)
+        assert "; walls are inflated, try a smaller --inflate; " in capsys.readouterr().err
+
+    def test_walls_are_inflated_by_metres(self, tmp_path):
+        picture = np.full((9, 9), 254, np.uint8)
+        picture[[0, -1]] = picture[:, [0, -1]] = picture[4, 4] = 0
+        path = write_map(tmp_path, picture, resolution=0.4)
+        walls = read_maze(path, inflate=0.6).walls  # the centres of diagonal neighbours are 0.566 m away
+        assert walls[3:6, 3:6].all()
+        assert walls[1, 1:-1].all()
+        assert not walls[2, 2:7].any()
+        assert read_maze(path, inflate=0.4).walls[3:6, 3:6].sum() == 5
+
+    def test_a_large_map_gets_larger_cells_unless_their_size_is_given(self, tmp_path):
+        picture = np.full((600, 300), 254, np.uint8)
+        picture[[0, -1]] = picture[:, [0, -1]] = 0
+        path = write_map(tmp_path, picture, resolution=0.5)
+        assert (read_maze(path).size, read_maze(path).cell_size) == (200, 1.5)
+        with pytest.raises(MazeError, match=r"at most 255 cells a side, found 600 of 0\.5 m; give a larger cell_size"):
+            read_maze(path, cell_size=0.5)
+
+    def test_walls_around_the_free_cells_are_cut_off_where_the_map_is_too_large(self, tmp_path):
+        picture = np.zeros((300, 300), np.uint8)
+        picture[100:110, 50:60] = 254
+        read = read_ros_maze(write_map(tmp_path, picture))
+        assert read.maze.size == 12
+        assert len(read.maze.free_cells) == 100
+        assert read.origin == (49.0, 189.0, 0.0)
+
+
+class TestFrame:
+    @hypothesis.given(
+        st.integers(0, 2**32 - 1), st.sampled_from([0.05, 0.1, 1.0]), st.floats(-3, 3), st.sampled_from([None, 2.0])
+    )
+    @hypothesis.settings(max_examples=30, deadline=None)
+    def test_a_free_cell_lies_where_its_pixels_lie(self, tmp_path_factory, seed, resolution, yaw, cell_size):
+        rng = np.random.default_rng(seed)
+        picture = np.full(rng.integers(40, 90, size=2), 205, np.uint8)
+        top, left = rng.integers(0, 20, size=2)
+        known = picture[top : top + 40, left : left + 40]
+        known[rng.random(known.shape) < 0.9] = 254
+        picture = cv2.medianBlur(picture, 3)
+        origin = [*rng.uniform(-50, 50, size=2).tolist(), yaw]
+        path = write_map(tmp_path_factory.mktemp("ros"), picture, resolution=resolution, origin=origin)
+        try:
+            maze, (x0, y0, read_yaw) = read_ros_maze(path, cell_size=cell_size)
+        except MazeError:  # nothing is left at this size of cells
+            return
+        points = cell_to_point(maze.free_cells, maze.size) * maze.cell_size
+        x = x0 + points[:, 0] * math.cos(read_yaw) - points[:, 1] * math.sin(read_yaw)
+        y = y0 + points[:, 0] * math.sin(read_yaw) + points[:, 1] * math.cos(read_yaw)
+        # Back to pixels by the definition of the origin: the pose of the lower left corner of the picture.
+        grid = read_occupancy(path)
+        dx, dy = x - grid.origin[0], y - grid.origin[1]
+        columns = np.floor((dx * math.cos(yaw) + dy * math.sin(yaw)) / resolution + 1e-6).astype(int)
+        rows = len(picture) - 1 - np.floor((dy * math.cos(yaw) - dx * math.sin(yaw)) / resolution + 1e-6).astype(int)
+        assert (picture[rows, columns] == 254).all()
+
+
+class TestRoundTrip:
+    @pytest.mark.parametrize(("style", "size"), [("dfs", 13), ("rooms", 21), ("obstacles", 40), ("obstacles", 255)])
+    @pytest.mark.parametrize("cell_size", [1.0, 0.5, 0.7])
+    def test_a_maze_is_read_as_it_was_written(self, style, size, cell_size, tmp_path, capsys):
+        maze = Maze(generate(style, size, np.random.default_rng(size)).walls, "plan", cell_size)
+        write_ros_map(maze, tmp_path / "plan.yaml")
+        read = read_ros_maze(tmp_path / "plan.yaml")
+        assert read.maze == maze
+        assert (read.maze.name, read.origin) == ("plan", (0.0, 0.0, 0.0))
+        assert capsys.readouterr().err == ""
+
+    def test_a_map_overlays_the_one_it_was_read_from(self, tmp_path):
+        picture = drawn("??????? ##..... ##....# ####..# ???####", pixels=8)
+        path = write_map(tmp_path, picture, resolution=0.0625, origin=[-3.25, 4.5, 0.5])
+        maze, origin = read_ros_maze(path)
+        write_ros_map(maze, tmp_path / "again.yaml", origin)
+        assert read_ros_maze(tmp_path / "again.yaml").maze == maze
+        one, other = read_occupancy(path), read_occupancy(tmp_path / "again.yaml")
+        free = maze.point(maze.free_cells)
+        turn = np.array([[math.cos(0.5), math.sin(0.5)], [-math.sin(0.5), math.cos(0.5)]])  # to the right
+        for grid in (one, other):
+            x, y = (turn @ (free @ turn + np.subtract(origin[:2], grid.origin[:2])).T) / grid.resolution
+            rows = len(grid.states) - 1 - np.floor(y).astype(int)
+            assert (grid.states[rows, np.floor(x).astype(int)] == 0).all()
+
+    def test_the_command_keeps_the_frame(self, tmp_path):
+        source = write_map(tmp_path, drawn(BUILDING), origin=[-7.35, -4.2, 0.0])
+        placed = next(make_mazes(None, 1, 0, "dfs", source, MapOptions()))
+        write_maze(placed, tmp_path / "out", ["ros"])
+        assert yaml.safe_load((tmp_path / "out" / "map.yaml").read_text())["origin"] == [-6.35, -3.2, 0.0]
+
+    def test_the_files_say_what_map_server_needs(self, tmp_path):
+        write_ros_map(parse_maze("#####\n#...#\n###.#\n#...#\n#####"), tmp_path / "plan.yaml")
+        metadata = yaml.safe_load((tmp_path / "plan.yaml").read_text())
+        assert metadata.keys() == {*METADATA, "mode"}
+        assert (metadata["image"], metadata["resolution"], metadata["origin"]) == ("plan.pgm", 1.0, [0.0, 0.0, 0.0])
+        assert (metadata["occupied_thresh"], metadata["free_thresh"]) == (0.65, 0.196)
+        assert (tmp_path / "plan.pgm").read_bytes().startswith(b"P5\n")
+        assert (read_occupancy(tmp_path / "plan.yaml").states[2] == [100, 100, 100, 0, 100]).all()
+
+
+class TestRefusal:
+    @pytest.mark.parametrize(
+        ("content", "message"),
+        [
+            ("", "expected the YAML file of a ROS map, with keys such as image and resolution, found an empty file"),
+            ("hello", "with keys such as image and resolution, found no keys but 'hello'"),
+            ("image: [", "expected the YAML file of a ROS map, found while parsing a flow"),
+            ("image: map.pgm", "with resolution (the side of a pixel, above 0 m), found only image"),
+            (
+                yaml.safe_dump(METADATA | {"resolution": 0}),
+                "with resolution (the side of a pixel, above 0 m), found 0",
+            ),
+            (
+                yaml.safe_dump(METADATA | {"mode": "foo"}),
+                "with mode (trinary, scale or raw), found 'foo'",
+            ),
+            (yaml.safe_dump(METADATA | {"origin": [0, 0]}), "with origin (three numbers, [x, y, yaw]), found [0, 0]"),
+            (yaml.safe_dump(METADATA), "map.yaml: {folder}/map.pgm: can't read the picture: No such file"),
+        ],
+    )
+    def test_a_damaged_map_is_named_in_one_line(self, content, message, tmp_path):
+        (tmp_path / "map.yaml").write_text(content)
+        with pytest.raises(InputError) as caught:
+            read_maze(tmp_path / "map.yaml")
+        assert message.replace("{folder}", str(tmp_path)) in str(caught.value)
+
+    def test_the_picture_alone_is_answered_with_the_file_to_give(self, tmp_path):
+        path = write_map(tmp_path, drawn("##### #...# #...# #...# #####"))
+        with pytest.raises(
+            InputError, match=r"map\.pgm: expected a maze, found the picture of a ROS map; give .*map\.yaml"
+        ):
+            read_maze(tmp_path / "map.pgm")
+        path.write_text("a: 1")  # another file that has the name by chance
+        assert read_maze(tmp_path / "map.pgm").size == 5
+
+    def test_a_map_without_a_free_cell_is_refused(self, tmp_path):
+        path = write_map(tmp_path, np.zeros((9, 9), np.uint8))
+        with pytest.raises(MazeError, match="map: expected a free cell, found none of 1 m; unknown cells: wall"):
+            read_maze(path)
+
+
+def test_a_folder_of_maps_reads_each_once(tmp_path):
+    mazes = [generate("dfs", 7, np.random.default_rng(seed)) for seed in range(2)]
+    for maze, name in zip(mazes, "ab", strict=True):
+        write_ros_map(Maze(maze.walls, name, 0.5), tmp_path / f"{name}.yaml")
+        write_text_maze(maze, tmp_path / f"{name}.txt")
+    content = (tmp_path / "b.yaml").read_text()
+    (tmp_path / "c.pgm").write_bytes((tmp_path / "b.pgm").read_bytes())
+    (tmp_path / "b.yaml").write_text(content.replace("b.pgm", "c.pgm"))
+    found = read_mazes(tmp_path)
+    assert [(maze.name, maze.cell_size) for maze in found] == [("a", 0.5), ("b", 0.5)]
+    assert mazebench.make_spec(maps=tmp_path, distances=[2]).mazes == found
