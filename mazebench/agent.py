@@ -27,6 +27,7 @@ class Interface:
     context_size: int  # M
     num_actions: int = 6
     sensors: tuple[str, ...] = ()  # whose readings are observed beside the state and the context
+    cell_size: float = 1.0  # m, the side of a cell of the mazes
 
 
 class Truth(NamedTuple):
@@ -53,6 +54,7 @@ class _Declarations:
     """What the class of an agent may declare; each declaration has a default."""
 
     needs_truth: ClassVar[bool] = False  # results of an agent that does are labelled as privileged
+    needs_sensors: ClassVar[tuple[str, ...]] = ()  # an evaluation adds them to the sensors that it is given
     learns: ClassVar[bool] = False  # an agent that does can be given a checkpoint, even if it ships with none
 
     @classmethod
@@ -186,5 +188,6 @@ def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
     if issubclass(declared, Agent):
         return declared
     # Named as the class that it wraps, for messages and provenance.
-    attributes = {name: getattr(declared, name) for name in ("__module__", "__qualname__", "__doc__", "needs_truth")}
+    names = ("__module__", "__qualname__", "__doc__", "needs_truth", "needs_sensors")
+    attributes = {name: getattr(declared, name) for name in names}
     return type(declared.__name__, (_SingleAgents,), attributes | {"single_class": declared})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import inspect
 import pathlib
@@ -11,7 +12,8 @@ from importlib import metadata
 from typing import Any
 
 from mazebench.agent import Agent, SingleAgent, as_agent_class
-from mazebench.errors import InputError, unknown
+from mazebench.errors import InputError, shortened, unknown
+from mazebench.tasks.sensors import SENSORS
 
 ENTRY_POINT_GROUP = "mazebench.agents"
 _IMPORTLIB = pathlib.Path(importlib.__file__).parent
@@ -20,6 +22,15 @@ _IMPORTLIB = pathlib.Path(importlib.__file__).parent
 def agent_names() -> list[str]:
     """Returns the names of all installed agents."""
     return sorted(_entry_points())
+
+
+def learning_agents() -> list[str]:
+    """Returns the names of the installed agents that learn; loads all whose dependencies are installed."""
+    found = []
+    for name in agent_names():
+        with contextlib.suppress(InputError):
+            found += [name] if load_agent_class(name).learns else []
+    return found
 
 
 def load_agent_class(name: str) -> type[Agent]:
@@ -51,7 +62,8 @@ def checked_agent_class(name: str, loaded: Any) -> type[Agent]:
     """Returns `loaded` as an `Agent` class.
 
     Raises:
-      InputError: unless it is a subclass of `Agent` or `SingleAgent` that defines `act` and builds by a classmethod.
+      InputError: unless it is a subclass of `Agent` or `SingleAgent` that defines `act`, builds by a classmethod and
+        needs sensors that there are.
     """
     if not isinstance(loaded, type) or not issubclass(loaded, (Agent, SingleAgent)):
         found = " and ".join(base.__name__ for base in loaded.__bases__) if isinstance(loaded, type) else repr(loaded)
@@ -62,6 +74,9 @@ def checked_agent_class(name: str, loaded: Any) -> type[Agent]:
     for method in ("build", "context_size", "default_checkpoint", "measure"):
         if inspect.isfunction(inspect.getattr_static(loaded, method)):
             raise InputError(f"agent {name!r}: expected {method}() to be a classmethod, found a method of its objects")
+    if not (isinstance(loaded.needs_sensors, tuple) and set(loaded.needs_sensors) <= set(SENSORS)):
+        expected = f"expected needs_sensors as a tuple of {', '.join(SENSORS)}"
+        raise InputError(f"agent {name!r}: {expected}, found {loaded.needs_sensors!r}")
     return as_agent_class(loaded)
 
 
@@ -85,21 +100,25 @@ def _is_ours(filename: str) -> bool:
 def _import_class(name: str) -> Any:
     module_name, _, class_name = name.partition(":")
     if module_name.endswith(".py"):
-        wanted = f"{module_name.removesuffix('.py').replace('/', '.')}:{class_name}"
+        file = pathlib.PurePath(module_name).with_suffix("")
+        if file.is_absolute() or ".." in file.parts:
+            wanted = f"{file.name}:{class_name} with {file.parent} as the working directory"
+        else:
+            wanted = f"{'.'.join(file.parts)}:{class_name}"
         raise InputError(f"agent {name!r}: expected module:Class, such as {wanted}, found a file's name")
     if "" not in sys.path and "." not in sys.path:
         sys.path.insert(0, "")
     try:
         return getattr(importlib.import_module(module_name), class_name)
     except (ImportError, AttributeError, ValueError, TypeError) as error:
-        found = f"{error}{source_line(error)}"
+        found = f"{shortened(str(error))}{source_line(error)}"
         raise InputError(f"agent {name!r}: expected module:Class that can be imported, found: {found}") from error
     except Exception as error:  # other people's modules may raise anything
         raise _import_error(name, error) from error
 
 
 def _import_error(name: str, error: Exception) -> InputError:
-    found = f"{type(error).__name__}: {error}{source_line(error)}"
+    found = f"{shortened(f'{type(error).__name__}: {error}')}{source_line(error)}"
     return InputError(f"agent {name!r}: its module can't be imported: {found}")
 
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import strategies
 
-from mazebench.maps.generators import corner_cells, generate
+from mazebench.maps.generators import generate
+from mazebench.maps.maze import corner_cells
 from mazebench.options import options_of
 from mazebench.tasks.options import TaskOptions
 from mazebench.tasks.perturbations import Perturbations, active_perturbations, perturbation_levels

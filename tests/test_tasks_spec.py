@@ -11,7 +11,7 @@ import sys
 
 import numpy as np
 import pytest
-from simple_mazes import corridor
+from simple_mazes import corridor, field
 
 from mazebench.errors import InputError
 from mazebench.maps.generators import generate
@@ -68,13 +68,14 @@ class TestDistances:
         assert episodes(spec, 20, seed=3) != episodes(spec, 20, seed=4)
 
     def test_a_distance_that_a_maze_does_not_have_is_refused(self):
-        with pytest.raises(InputError, match="corridor: no two cells are 7 cells apart; the farthest are 6"):
+        with pytest.raises(InputError, match=r"corridor: expected distances of at most 6 cells.*found 7.*--distances"):
             make_spec(maps=CORRIDOR, distances=[1, 7])
 
-    def test_distances_depend_on_the_split_by_default(self):
+    def test_distances_depend_on_the_split_and_the_track_by_default(self):
         assert make_spec(split="train").distances == tuple(range(1, 6))
         assert make_spec(split="eval").distances == tuple(range(1, 16))
-        assert make_spec(maps=dfs_mazes(), split="eval").distances == tuple(range(1, 6))
+        assert make_spec("far", maps=field(25)).distances == tuple(range(20, 41))
+        assert make_spec("lost", maps=field(9)).distances == tuple(range(3, 13))
 
 
 class TestFixedPairs:
@@ -99,10 +100,10 @@ class TestOptions:
             ({"size": 14, "maps": None}, r"unknown size '14'; available: 13, 15, 17, 19, 21"),
             ({"size": 13}, r"expected mazes of size 13, found size 9"),
             ({"maps": ()}, r"expected at least one maze, found none"),
-            ({"maps": (CORRIDOR, CUT_CORNERS)}, r"expected mazes of one size, found sizes \[7, 9\]"),
+            ({"maps": (CORRIDOR, CUT_CORNERS)}, r"expected mazes of one size, found 7, 9"),
             ({"distances": ()}, r"expected at least one distance, found none"),
             ({"distances": (0, 1)}, r"expected distances of at least 1, found 0"),
-            ({"time_limit": 0}, r"expected time_limit of at least 1, found 0"),
+            ({"time_limit": -1}, r"expected time_limit of at least 0, found -1"),
             ({"time_limit": "5"}, r"expected time_limit of type int, found '5'"),
             ({"context_size": 2}, r"expected context_size from 3 to 255, found 2"),
             (
@@ -111,6 +112,7 @@ class TestOptions:
             ),
             ({"map_flip": 1.1}, r"expected map_flip from 0 to 1, found 1\.1"),
             ({"flip": 0.1}, r"unknown option 'flip'; available: .*map_flip, map_warp"),
+            ({"mapz": "plan.txt"}, r"unknown option 'mapz'; available: .*map_warp, maps, .*size, split, start"),
             ({"map_warp": 0.26}, r"expected map_warp from 0 to 0\.25, found 0\.26"),
             ({"position_noise": float("nan")}, r"expected position_noise .*, found nan"),
         ],
@@ -145,7 +147,7 @@ class TestOptions:
             (
                 "far",
                 {"maps": CORRIDOR},
-                "corridor: no two cells are 40 cells apart; the farthest are 6; choose smaller",
+                "corridor: expected distances of at most 6 cells, as far as the maze reaches, found 40; choose others",
             ),
         ],
     )

@@ -6,42 +6,48 @@ import math
 
 import numpy as np
 
-from ..common.kernels import compiled
+from ..common.kernels import compiled, inlined
 
-_CLEARANCE = (
-    0.19  # m, of the body's centre from walls: its radius of 0.15 m, a contact's margin of 0.03 m, and a little
-)
-_SPACING = 0.25  # m, of the points of the path that are tried
-_FARTHEST = 4.0  # m along the path
-_NEAREST = 0.75  # m along the path; aimed at if no farther point can be reached straight
+# Metres.
+_CLEARANCE = 0.19  # of the body's centre from walls: its radius of 0.15, a contact's margin of 0.03, and a little
+_SPACING = 0.25  # of the points of the path that are tried
+_FARTHEST = 4.0  # along the path
+_NEAREST = 0.75  # along the path, or cells if they are larger; aimed at if no farther point can be reached straight
 
 
 @compiled
-def aim(blocked: np.ndarray, points: np.ndarray, x: float, y: float) -> tuple[float, float]:
-    """Returns the point (x, y) to drive at from (x, y).
+def aim(
+    blocked: np.ndarray, points: np.ndarray, x: float, y: float, cells_per_metre: float = 1.0
+) -> tuple[float, float]:
+    """Returns the point (x, y) to drive at from (x, y); points are in cells.
 
     Args:
       blocked: `[N, N]` bool, the cells to keep clear of.
-      points: `[P, 2]` m, the centres of the path's cells; the body is in the first one.
-      x: m, where the body would come to rest.
-      y: m.
+      points: `[P, 2]`, the centres of the path's cells; the body is in the first one.
+      x: where the body would come to rest.
+      y: likewise.
+      cells_per_metre: of the map.
     """
-    length = min(float(len(points) - 1), _FARTHEST)
-    along = length
-    while along > _NEAREST:
-        segment = min(int(along), len(points) - 2)
-        share = along - segment
-        aim_x = points[segment, 0] + share * (points[segment + 1, 0] - points[segment, 0])
-        aim_y = points[segment, 1] + share * (points[segment + 1, 1] - points[segment, 1])
-        if is_clear(blocked, x, y, aim_x, aim_y, _CLEARANCE):
-            return aim_x, aim_y
-        along -= _SPACING
     if len(points) == 1:
         return points[0, 0], points[0, 1]
-    share = min(_NEAREST, length)
+    length = float(len(points) - 1)
+    nearest = min(_NEAREST * max(cells_per_metre, 1.0), length)
+    along = min(_FARTHEST * cells_per_metre, length)
+    while along > nearest:
+        aim_x, aim_y = _point_along(points, along)
+        if is_clear(blocked, x, y, aim_x, aim_y, _CLEARANCE * cells_per_metre):
+            return aim_x, aim_y
+        along -= _SPACING * cells_per_metre
+    return _point_along(points, nearest)
+
+
+@inlined
+def _point_along(points: np.ndarray, along: float) -> tuple[float, float]:
+    segment = min(int(along), len(points) - 2)
+    share = along - segment
     return (
-        points[0, 0] + share * (points[1, 0] - points[0, 0]),
-        points[0, 1] + share * (points[1, 1] - points[0, 1]),
+        points[segment, 0] + share * (points[segment + 1, 0] - points[segment, 0]),
+        points[segment, 1] + share * (points[segment + 1, 1] - points[segment, 1]),
     )
 
 

@@ -11,7 +11,7 @@ from .localization import Belief
 
 _POSES = 16  # the likeliest ones, which are told apart
 _NEARBY = 6  # cells
-_TELLING = 0.1  # m, by which two expected ranges differ
+_TELLING = 0.1  # cells, by which two expected ranges differ
 _TELLING_RAYS = 4  # so many of which tell two scans apart
 _CONFUSION_COST = 20.0  # cells of a way that certainty is worth
 
@@ -26,15 +26,16 @@ def disambiguate(belief: Belief, walls: np.ndarray) -> list[Cell]:
     poses, weights = belief.poses[:_POSES], belief.weights[:_POSES] / belief.weights[:_POSES].sum()
     x, y, _ = belief.pose.tolist()
     paths = _paths_nearby(walls, cell_of_point(x, y, len(walls)))
-    seen = _scans_at(walls, poses, cell_to_point(np.array([path[-1] for path in paths]), len(walls)))
+    points = cell_to_point(np.array([path[-1] for path in paths]), len(walls))
+    seen = _scans_at(walls, poses, points, belief.reach)
     is_alike = (np.abs(seen[:, None] - seen) > _TELLING).sum(axis=-1) < _TELLING_RAYS  # [H, H, P]
     confusion = np.einsum("i,j,ijp->p", weights, weights, is_alike)
     lengths = np.array([len(path) for path in paths])
     return paths[int(np.argmin(lengths + _CONFUSION_COST * confusion))]
 
 
-def _scans_at(walls: np.ndarray, poses: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Returns `[H, P, 32]` m: what each of H poses would see, had the body driven as from the first one to P points.
+def _scans_at(walls: np.ndarray, poses: np.ndarray, points: np.ndarray, reach: float) -> np.ndarray:
+    """Returns `[H, P, 32]`: what each of H poses would see, had the body driven as from the first one to P points.
 
     The scans are those of a body that then looks along the first pose's x axis, so that they do not depend on how the
     body is turned now.
@@ -44,7 +45,7 @@ def _scans_at(walls: np.ndarray, poses: np.ndarray, points: np.ndarray) -> np.nd
     reached = np.stack(
         np.broadcast_arrays(poses[:, :1] + ways.real, poses[:, 1:2] + ways.imag, turns), axis=-1
     )  # [H, P, 3]
-    return scans.predict(walls, reached.reshape(-1, 3)).reshape(*ways.shape, -1)
+    return scans.predict(walls, reached.reshape(-1, 3), reach).reshape(*ways.shape, -1)
 
 
 def _paths_nearby(walls: np.ndarray, start: Cell) -> list[list[Cell]]:

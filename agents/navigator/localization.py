@@ -1,13 +1,14 @@
 """Where the body is on a map: a bank of weighted poses, from odometry and lidar.
 
-The walls lie on a grid of 1 m. So one scan tells the pose without a map, but for the grid's own symmetries: the heading
-up to quarter turns, and the position within a cell. Odometry that is corrected by that at each step does not drift.
-What is left to find is discrete, the cell and the quarter turn. Each combination is a hypothesis: a pose that moves
-along with the odometry, weighted by how well the map explains the scans from there. This is multiple hypothesis
-localization (Jensfelt & Kristensen 2001) with a grid filter's weights (Thrun, Burgard & Fox 2005, Probabilistic
-Robotics, section 8.2). Nothing in it is random.
+The walls lie on the grid of the cells. So one scan tells the pose without a map, but for the grid's own symmetries:
+the heading up to quarter turns, and the position within a cell. Odometry that is corrected by that at each step does
+not drift. What is left to find is discrete, the cell and the quarter turn. Each combination is a hypothesis: a pose
+that moves along with the odometry, weighted by how well the map explains the scans from there. This is multiple
+hypothesis localization (Jensfelt & Kristensen 2001) with a grid filter's weights (Thrun, Burgard & Fox 2005,
+Probabilistic Robotics, section 8.2). Nothing in it is random.
 
-`H` is the number of hypotheses, `N` the number of cells on a side of the map.
+Lengths are in cells, which the constants take for 1 m wide. `H` is the number of hypotheses, `N` the number of cells
+on a side of the map.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 
 from mazebench.maps.maze import Cell, cell_to_point
 from mazebench.world.angles import wrap_angle
+from mazebench.world.lidar import MAX_RANGE
 
 from . import scans
 from .scans import WallFrame
@@ -33,11 +35,11 @@ _NEGLIGIBLE = 40.0  # from the likeliest hypothesis to one that is dropped
 _CLEARLY = 0.5  # from the first hypothesis to one that takes its place; smaller differences are rounding errors
 _AT_GOAL = 10.0  # that a hypothesis in the goal cell, where the episode would have ended, loses by each scan
 
-_INSIDE = 0.48  # m to either side of a cell's centre; nearer to the border, rounding may decide
+_INSIDE = 0.48  # to either side of a cell's centre; nearer to the border, rounding may decide
 
-# The odometry's scale is uniform in .9 to 1.1, and corrected steps are 1 cm off. The ratio of these variances is what a
+# The odometry's scale is uniform in .9 to 1.1, and corrected steps are 0.01 off. The ratio of these variances is what a
 # scale of 1 weighs against squared steps.
-_SCALE_PRIOR = 0.01**2 / (0.2**2 / 12)  # m^2
+_SCALE_PRIOR = 0.01**2 / (0.2**2 / 12)
 
 # If the likeliest pose explains less than this share of the rays, so many scans in a row, all poses are considered.
 _POOR = 0.5
@@ -47,13 +49,14 @@ _NUM_POOR = 5
 class Belief(NamedTuple):
     """What is known of the body's pose: hypotheses, of which the first one is the likeliest."""
 
-    poses: np.ndarray  # [H, 3] float, H >= 1: x, y (m) and yaw (rad) on the map
+    poses: np.ndarray  # [H, 3] float, H >= 1: x, y and yaw (rad) on the map
     weights: np.ndarray  # [H] float, the probabilities of the poses
     explained: float  # the share of the last scan's rays that the map explains from the first pose
     odometry: np.ndarray  # [3] float, the last reading
-    driven: float  # m^2, the sum of the odometry's squared steps and of the prior
-    moved: float  # m^2, the sum of these steps' products with the corrected ones and of the prior
+    driven: float  # the sum of the odometry's squared steps and of the prior
+    moved: float  # the sum of these steps' products with the corrected ones and of the prior
     num_poor: int  # the number of scans in a row, up to the last one, of which too little is explained
+    reach: float = MAX_RANGE  # of the sensor; a ray as long saw no wall
 
     @property
     def pose(self) -> np.ndarray:
@@ -73,24 +76,26 @@ def begin(
     ranges: np.ndarray,
     goal: Cell | None = None,
     heading: float | None = None,
+    reach: float = MAX_RANGE,
 ) -> Belief:
     """Returns the belief after the first scan of an episode.
 
     Args:
       walls: `[N, N]` bool, the map.
       start_distribution: `[N, N]` float, the probability that the body is in a cell.
-      odometry: `[3]`, x and y (m) and yaw (rad) in the odometry's own frame.
-      ranges: `[32]` m, the scan.
+      odometry: `[3]`, x, y and yaw (rad) in the odometry's own frame.
+      ranges: `[32]`, the scan.
       goal: the cell in which the body is not, because the episode would have ended there.
       heading: rad, on the map; None if it is unknown.
+      reach: of the sensor; a ray as long saw no wall.
     """
     ranges = np.asarray(ranges, dtype=np.float64)
-    poses, weights = _poses_within(start_distribution, scans.wall_frame(ranges))
+    poses, weights = _poses_within(start_distribution, scans.wall_frame(ranges, reach))
     if heading is not None:
         is_likely = np.abs(wrap_angle(poses[:, 2] - heading)) < math.pi / 4
         poses, weights = poses[is_likely], weights[is_likely]
     reading = np.array(odometry, dtype=np.float64)
-    belief = Belief(poses, weights, 1.0, reading, driven=_SCALE_PRIOR, moved=_SCALE_PRIOR, num_poor=0)
+    belief = Belief(poses, weights, 1.0, reading, driven=_SCALE_PRIOR, moved=_SCALE_PRIOR, num_poor=0, reach=reach)
     return _weighted(belief, walls, ranges, goal)
 
 
@@ -99,7 +104,7 @@ def update(
 ) -> Belief:
     """Returns the belief one step on; the arguments are those of `begin`."""
     ranges = np.asarray(ranges, dtype=np.float64)
-    frame = scans.wall_frame(ranges)
+    frame = scans.wall_frame(ranges, belief.reach)
     belief = _moved(belief, np.array(odometry, dtype=np.float64), frame)
     belief = _weighted(belief, walls, ranges, goal)
     if belief.num_poor < _NUM_POOR or np.isnan(frame).any():
@@ -163,7 +168,7 @@ def _turned(frame: WallFrame, turns: int) -> WallFrame:
 
 def _weighted(belief: Belief, walls: np.ndarray, ranges: np.ndarray, goal: Cell | None) -> Belief:
     """Returns the belief with weights after a scan, the likeliest pose first, without negligible ones."""
-    log_likelihoods, explained = scans.score(walls, belief.poses, ranges)
+    log_likelihoods, explained = scans.score(walls, belief.poses, ranges, belief.reach)
     log_weights = _MEMORY * np.log(belief.weights) + log_likelihoods
     if goal is not None:
         from_goal = np.abs(belief.poses[:, :2] - cell_to_point(goal, len(walls))).max(axis=1)

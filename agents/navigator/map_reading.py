@@ -30,7 +30,7 @@ class MapReading(NamedTuple):
 def read_map(context: np.ndarray, size: int, start_point: Point | None = None) -> MapReading:
     """Returns what a context `[4, M, M]` tells of a maze of `size` cells a side.
 
-    `start_point` is a point (x, y) in the start cell, in metres, if one is known.
+    `start_point` is a point (x, y) in the start cell, in cells, if one is known.
     """
     start = None if start_point is None else cell_of(*start_point, size)
     if context.shape[-1] > size:

@@ -13,6 +13,7 @@ from scipy import ndimage
 from mazebench.agent import Agent, Inputs, Interface
 from mazebench.errors import InputError
 from mazebench.maps.maze import Cell
+from mazebench.world.lidar import MAX_RANGE
 
 from ..planner import observation
 from ..planner.observation import Body
@@ -47,17 +48,23 @@ class _Memory:
 
     def forget(self) -> None:
         """Drops what was seen, because it was seen from elsewhere than believed."""
-        self.occupancy = Occupancy.of_map(self.reading.walls)
+        self.occupancy = Occupancy.of_map(self.reading.walls, self.occupancy.reach)
         self.searched[:] = False
         self.telling = []
 
 
 class Navigator(Agent):
-    """A classical robot: it localizes itself, maps what it sees, plans again at each step, and pursues its path."""
+    """A classical robot: it localizes itself, maps what it sees, plans again at each step, and pursues its path.
 
-    def __init__(self, size: int):
+    It measures lengths in cells.
+    """
+
+    needs_sensors = ("lidar",)
+
+    def __init__(self, size: int, cells_per_metre: float = 1.0):
         """Acts in mazes of `size` cells a side."""
-        self._size = size
+        self._size, self._cells_per_metre = size, cells_per_metre
+        self._ray_scale = np.float32(cells_per_metre)  # as exact as the sensor
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
@@ -67,8 +74,8 @@ class Navigator(Agent):
           InputError: if the environments have no lidar.
         """
         if "lidar" not in interface.sensors:
-            raise InputError("navigator needs the sensor lidar; add --sensors lidar")
-        return cls(interface.size)
+            raise InputError("navigator needs the sensor lidar; give the interface sensors=('lidar',)")
+        return cls(interface.size, 1 / interface.cell_size)
 
     @classmethod
     def context_size(cls, size: int) -> int:
@@ -87,8 +94,8 @@ class Navigator(Agent):
         for slot, values in enumerate(inputs.observation["state"].tolist()):
             if inputs.active is not None and not inputs.active[slot]:
                 continue
-            context, ranges = inputs.observation["context"][slot], inputs.observation["lidar"][slot]
-            observed, memory = observation.observed_body(values), state[slot]
+            context, ranges = inputs.observation["context"][slot], self._ray_scale * inputs.observation["lidar"][slot]
+            observed, memory = observation.observed_body(values, self._cells_per_metre), state[slot]
             if memory is None or inputs.new_episode[slot]:
                 memory = state[slot] = self._begin(context, observed, ranges)
             else:
@@ -97,18 +104,19 @@ class Navigator(Agent):
                     memory.searched[:] = False
                 if memory.pose.update(memory.reading, memory.walls > 0.5, observed, ranges):
                     memory.forget()
-            actions[slot] = _act(memory, ranges)
+            actions[slot] = _act(memory, ranges, self._cells_per_metre)
         return actions, state
 
     def _begin(self, context: np.ndarray, observed: Body, ranges: np.ndarray) -> _Memory:
         """Returns what is known after an episode's first observation."""
         reading = read_map(context, self._size, known_position(observed))
-        pose = PoseEstimate.begin(reading, observed, ranges)
+        reach = float(self._ray_scale * np.float32(MAX_RANGE))
+        pose = PoseEstimate.begin(reading, observed, ranges, reach)
         searched = np.zeros((self._size, self._size), dtype=bool)
-        return _Memory(reading, Occupancy.of_map(reading.walls), pose, searched, reading.walls)
+        return _Memory(reading, Occupancy.of_map(reading.walls, reach), pose, searched, reading.walls)
 
 
-def _act(memory: _Memory, ranges: np.ndarray) -> int:
+def _act(memory: _Memory, ranges: np.ndarray, cells_per_metre: float) -> int:
     """Returns the action after a scan `ranges` `[32]`, which is added to what was seen."""
     body = memory.pose.body
     # From a wrong pose, walls are seen in the frame of that pose. `forget` drops them if another pose takes its place.
@@ -121,7 +129,7 @@ def _act(memory: _Memory, ranges: np.ndarray) -> int:
     blocked = walls > _BLOCKED
     blocked[tuple(np.transpose(path))] = False
     coast_x, coast_y = body.coasting()
-    aim = driving.aim(blocked, points, body.x + coast_x, body.y + coast_y)
+    aim = driving.aim(blocked, points, body.x + coast_x, body.y + coast_y, cells_per_metre)
     return steer(body, aim, _LARGEST_MISALIGNMENT)
 
 

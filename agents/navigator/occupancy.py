@@ -2,7 +2,7 @@
 
 Moravec & Elfes 1985; Thrun, Burgard & Fox 2005, Probabilistic Robotics, chapter 9. Cells along a ray are free and the
 cell at its end is a wall. The sensor is exact and walls are whole cells, so one ray settles a cell unless the pose is
-uncertain. `N` is the number of cells on a side.
+uncertain. Lengths are in cells, which the constants take for 1 m wide. `N` is the number of cells on a side.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ import math
 
 import numpy as np
 
-from mazebench.world.lidar import MAX_RANGE  # m; a ray that is as long saw no wall
+from mazebench.world.lidar import MAX_RANGE
 
 from ..common.kernels import compiled
 
 _RAY = 6.0  # log odds that one ray adds to a cell where the pose is sure
 _LARGEST = 12.0  # log odds: two rays' worth, so that errors can be undone
 _SURE = 3.0  # log odds of evidence, from which a cell counts as seen
-_EXACT = 0.02  # m; ends of rays this near to a corner or grazing a cell by less are not used
+_EXACT = 0.02  # ends of rays this near to a corner or grazing a cell by less are not used
 _GRAZING = 0.1  # sine of the angle between a ray and a wall, below which its end is not used
 _SMALLEST = 1e-9  # instead of a direction's component of 0
 _BINS = np.array([0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98])  # of prior probabilities, within which the map errs alike
@@ -33,19 +33,21 @@ class Occupancy:
 
     prior: np.ndarray  # [N, N] float, the probability of a wall by the map
     evidence: np.ndarray  # [N, N] float, log odds of a wall that lidar adds to the prior
+    reach: float  # of the sensor; a ray as long saw no wall
 
     @classmethod
-    def of_map(cls, prior: np.ndarray) -> Occupancy:
+    def of_map(cls, prior: np.ndarray, reach: float = MAX_RANGE) -> Occupancy:
         """Returns the estimate before anything was seen."""
-        return cls(prior, np.zeros_like(prior))
+        return cls(prior, np.zeros_like(prior), reach)
 
     def see(self, x: float, y: float, yaw: float, ranges: np.ndarray, uncertainty: float = 0.0) -> bool:
-        """Takes in the ranges `[32]` (m) seen from a pose; returns whether a cell's evidence changed.
+        """Takes in the ranges `[32]` seen from a pose; returns whether a cell's evidence changed.
 
-        `uncertainty` is the standard deviation of the position in metres.
+        `uncertainty` is the standard deviation of the position.
         """
         margin = _EXACT + 2 * uncertainty
-        return trace_rays(self.evidence, x, y, yaw, ranges, margin, _RAY / (1 + (uncertainty / _EXACT) ** 2))
+        log_odds = _RAY / (1 + (uncertainty / _EXACT) ** 2)
+        return trace_rays(self.evidence, x, y, yaw, ranges, self.reach, margin, log_odds)
 
     def probability(self) -> np.ndarray:
         """Returns `[N, N]` float: the probability of a wall in each cell."""
@@ -90,19 +92,26 @@ def posterior(prior: np.ndarray, evidence: np.ndarray, bins: np.ndarray, prior_c
 
 @compiled
 def trace_rays(
-    evidence: np.ndarray, x: float, y: float, yaw: float, ranges: np.ndarray, margin: float, log_odds: float
+    evidence: np.ndarray,
+    x: float,
+    y: float,
+    yaw: float,
+    ranges: np.ndarray,
+    reach: float,
+    margin: float,
+    log_odds: float,
 ) -> bool:
     """Adds what the rays of a scan tell to `evidence` `[N, N]`; returns whether it changed.
 
-    `margin` is how far a ray's end may be off, in metres. What could as well belong to another cell is not used.
+    `margin` is how far a ray's end may be off. What could as well belong to another cell is not used.
     """
     changed = False
     for i in range(len(ranges)):
         angle = yaw + 2 * math.pi * i / len(ranges)
-        dx, dy, reach = math.cos(angle), math.sin(angle), float(ranges[i])
-        changed |= _clear(evidence, x, y, dx, dy, reach, margin, log_odds)
-        if reach < MAX_RANGE:
-            changed |= _mark(evidence, x + reach * dx, y + reach * dy, dx, dy, margin, log_odds)
+        dx, dy, length = math.cos(angle), math.sin(angle), float(ranges[i])
+        changed |= _clear(evidence, x, y, dx, dy, length, margin, log_odds)
+        if length < reach:
+            changed |= _mark(evidence, x + length * dx, y + length * dy, dx, dy, margin, log_odds)
     return changed
 
 

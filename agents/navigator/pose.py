@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 
 from mazebench.maps.maze import Cell
+from mazebench.world.lidar import MAX_RANGE
 
 from ..planner import observation
 from ..planner.observation import Body, Point
@@ -15,9 +16,10 @@ from .localization import Belief
 from .map_reading import MapReading
 
 _CONFIDENT = 0.9  # probability of a pose from which it is taken for the true one
-_DEVIATION = 0.02  # m, standard deviation of a position that is found by localization
-_ROUNDING = 1e-4  # m, of positions as float32
-_JUMP = 1.0  # m; a body does not move so far in a step, so another hypothesis became the likeliest
+# Cells, which are taken for 1 m wide.
+_DEVIATION = 0.02  # standard deviation of a position that is found by localization
+_ROUNDING = 1e-4  # of positions as float32
+_JUMP = 1.0  # a body does not move so far in a step, so another hypothesis became the likeliest
 
 
 @dataclasses.dataclass
@@ -29,8 +31,8 @@ class PoseEstimate:
     dead_reckoning: DeadReckoning | None = None  # the odometry; None where it is the pose of the state
 
     @classmethod
-    def begin(cls, reading: MapReading, observed: Body, ranges: np.ndarray) -> PoseEstimate:
-        """Returns the estimate after the first observation of an episode."""
+    def begin(cls, reading: MapReading, observed: Body, ranges: np.ndarray, reach: float = MAX_RANGE) -> PoseEstimate:
+        """Returns the estimate after the first observation of an episode; `reach` is the range sensor's, in cells."""
         if known_position(observed) is not None:
             return cls(observed)
         heading, dead_reckoning = None, None
@@ -40,7 +42,8 @@ class PoseEstimate:
             heading = observed.yaw
             dead_reckoning = DeadReckoning((observed.x, observed.y), observed.velocity())
         goal = _only_cell(reading.goal)
-        belief = localization.begin(reading.walls > 0.5, reading.start, _pose(observed), ranges, goal, heading)
+        walls = reading.walls > 0.5
+        belief = localization.begin(walls, reading.start, _pose(observed), ranges, goal, heading, reach)
         return cls(_placed(observed, belief), belief, dead_reckoning)
 
     @property
@@ -50,7 +53,7 @@ class PoseEstimate:
 
     @property
     def deviation(self) -> float:
-        """The standard deviation of the position in metres, if the pose is certain."""
+        """The standard deviation of the position in cells, if the pose is certain."""
         return 0.0 if self.belief is None else _DEVIATION
 
     def update(self, reading: MapReading, seen_walls: np.ndarray, observed: Body, ranges: np.ndarray) -> bool:
@@ -60,7 +63,7 @@ class PoseEstimate:
           reading: of the map.
           seen_walls: `[N, N]` bool, the walls by the map and what was seen.
           observed: the body as the state has it.
-          ranges: `[32]` m, the scan.
+          ranges: `[32]` cells, the scan.
         """
         if self.belief is None:
             self.body = observed
@@ -80,8 +83,8 @@ class PoseEstimate:
 class DeadReckoning:
     """A position that adds up the velocities."""
 
-    position: Point  # m
-    velocity: Point  # m/s, at the last observation
+    position: Point  # cells
+    velocity: Point  # cells a second, at the last observation
 
     def move(self, observed: Body) -> Body:
         """Moves on by the mean velocity since the last observation; returns the observed body at the position."""

@@ -1,7 +1,8 @@
 """Scans of the lidar: what a map lets one expect, and what a scan tells without a map.
 
-A pose is (x, y, yaw) on the map, metres and radians. A scan is `[32]` metres, as the sensor `lidar` observes it. `H` is
-the number of poses.
+Lengths are in cells, which the constants take for 1 m wide. A pose is (x, y, yaw) on the map, cells and radians. A scan
+is `[32]` cells, what the sensor `lidar` observes; a ray that is as long as the sensor's `reach` saw no wall. `H` is the
+number of poses.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from mazebench.world.lidar import MAX_RANGE, NUM_RAYS
 
 from ..common.kernels import compiled, inlined
 
-# The heading up to quarter turns (rad), x and y within a cell in the frame with that heading (m); see `wall_frame`.
+# The heading up to quarter turns (rad), x and y within a cell in the frame with that heading; see `wall_frame`.
 WallFrame = tuple[float, float, float]
 
 _ANGLES = 2 * np.pi / NUM_RAYS * np.arange(NUM_RAYS)
@@ -22,27 +23,29 @@ _COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
 _FACE_X, _FACE_Y, _NO_FACE = 0, 1, 2  # a ray ends at a wall's face x = constant, y = constant, or at no wall
 
 # The sensor is exact. What errors there are come from the pose, and are measured across the face that a ray ends at.
-_SIGMA = 0.02  # m
+_SIGMA = 0.02
 _OUTLIER_COST = 2.5  # minus the log likelihood of a ray that the map does not explain
-_EXPLAINED = 0.05  # m
+_EXPLAINED = 0.05
 _SAME_DIRECTION = math.radians(0.3)  # between two pieces of walls
-_OFF_LINE = 0.02  # m; nearer to a line of the grid, a ray's end may lie on it
+_OFF_LINE = 0.02  # nearer to a line of the grid, a ray's end may lie on it
 
 
 @compiled
-def predict(walls: np.ndarray, poses: np.ndarray) -> np.ndarray:
-    """Returns `[H, 32]` m: the scans that the map `walls` `[N, N]` bool lets one expect at `poses` `[H, 3]`."""
+def predict(walls: np.ndarray, poses: np.ndarray, reach: float = MAX_RANGE) -> np.ndarray:
+    """Returns `[H, 32]`: the scans that the map `walls` `[N, N]` bool lets one expect at `poses` `[H, 3]`."""
     expected = np.empty((len(poses), NUM_RAYS))
     for h in range(len(poses)):
         cosine, sine = math.cos(poses[h, 2]), math.sin(poses[h, 2])
         for i in range(NUM_RAYS):
             along_x, along_y = cosine * _COSINES[i] - sine * _SINES[i], sine * _COSINES[i] + cosine * _SINES[i]
-            expected[h, i], _ = _cast(walls, poses[h, 0], poses[h, 1], along_x, along_y)
+            expected[h, i], _ = _cast(walls, poses[h, 0], poses[h, 1], along_x, along_y, reach)
     return expected
 
 
 @compiled
-def score(walls: np.ndarray, poses: np.ndarray, ranges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def score(
+    walls: np.ndarray, poses: np.ndarray, ranges: np.ndarray, reach: float = MAX_RANGE
+) -> tuple[np.ndarray, np.ndarray]:
     """Returns two `[H]`: the log likelihoods of the scan `ranges` at `poses`, and the shares of its rays explained.
 
     A ray is normal about the ray cast or an outlier, whichever is likelier: a mixture like the beam model of Thrun,
@@ -53,7 +56,7 @@ def score(walls: np.ndarray, poses: np.ndarray, ranges: np.ndarray) -> tuple[np.
         cosine, sine = math.cos(poses[h, 2]), math.sin(poses[h, 2])
         for i in range(NUM_RAYS):
             along_x, along_y = cosine * _COSINES[i] - sine * _SINES[i], sine * _COSINES[i] + cosine * _SINES[i]
-            expected, face = _cast(walls, poses[h, 0], poses[h, 1], along_x, along_y)
+            expected, face = _cast(walls, poses[h, 0], poses[h, 1], along_x, along_y, reach)
             # A grazing ray is long or short by much if the pose is off by little.
             across = along_x if face == _FACE_X else (along_y if face == _FACE_Y else 1.0)
             error = (ranges[i] - expected) * across
@@ -63,7 +66,7 @@ def score(walls: np.ndarray, poses: np.ndarray, ranges: np.ndarray) -> tuple[np.
 
 
 @inlined
-def _cast(walls: np.ndarray, x: float, y: float, along_x: float, along_y: float) -> tuple[float, int]:
+def _cast(walls: np.ndarray, x: float, y: float, along_x: float, along_y: float, reach: float) -> tuple[float, int]:
     """Returns how far a ray gets, and the kind of face that it ends at (Amanatides & Woo 1987).
 
     The cell in which it begins counts as free.
@@ -71,7 +74,7 @@ def _cast(walls: np.ndarray, x: float, y: float, along_x: float, along_y: float)
     size = len(walls)
     column, level = math.floor(x), math.floor(y)  # level: the row counted from below
     right, up = (1 if along_x > 0 else -1), (1 if along_y > 0 else -1)
-    # Metres along the ray between two lines of the grid, and to the first one.
+    # Lengths along the ray between two lines of the grid, and to the first one.
     spacing_x, spacing_y = 1 / max(abs(along_x), 1e-12), 1 / max(abs(along_y), 1e-12)
     next_x = (column + 1 - x if right > 0 else x - column) * spacing_x
     next_y = (level + 1 - y if up > 0 else y - level) * spacing_y
@@ -84,15 +87,15 @@ def _cast(walls: np.ndarray, x: float, y: float, along_x: float, along_y: float)
             distance, face = next_y, _FACE_Y
             level += up
             next_y += spacing_y
-        if distance >= MAX_RANGE or not (0 <= column < size and 0 <= level < size):
-            return MAX_RANGE, _NO_FACE
+        if distance >= reach or not (0 <= column < size and 0 <= level < size):
+            return reach, _NO_FACE
         if walls[size - 1 - level, column]:
             return distance, face
 
 
 @compiled
-def wall_frame(ranges: np.ndarray) -> WallFrame:
-    """Returns what the scan `ranges` tells of the pose without a map, where walls lie on a grid of 1 m.
+def wall_frame(ranges: np.ndarray, reach: float = MAX_RANGE) -> WallFrame:
+    """Returns what the scan `ranges` tells of the pose without a map, where walls lie on the grid of the cells.
 
     The pieces of walls between the ends of neighbouring rays have the directions of the grid, but for those that cross
     a corner: the heading is the one on which most pieces agree, in (-pi / 4, pi / 4]. x and y in [0, 1) follow from how
@@ -103,7 +106,7 @@ def wall_frame(ranges: np.ndarray) -> WallFrame:
     count = 0
     for i in range(NUM_RAYS):
         j = (i + 1) % NUM_RAYS
-        if ranges[i] < MAX_RANGE and ranges[j] < MAX_RANGE:
+        if ranges[i] < reach and ranges[j] < reach:
             ahead = ranges[j] * _COSINES[j] - ranges[i] * _COSINES[i]
             aside = ranges[j] * _SINES[j] - ranges[i] * _SINES[i]
             directions[count], first[count] = math.atan2(aside, ahead), i
@@ -122,21 +125,21 @@ def wall_frame(ranges: np.ndarray) -> WallFrame:
             sums[face, 1] += math.sin(2 * np.pi * place)
     x, y = _within_cell(sums[_FACE_X]), _within_cell(sums[_FACE_Y])
     if math.isnan(x) and not math.isnan(y):
-        x = _from_single_rays(ranges, -grid, y)
+        x = _from_single_rays(ranges, -grid, y, reach)
     elif math.isnan(y) and not math.isnan(x):
         # A quarter turn makes y of the frame x of another one, in which its x is -y.
-        y = _from_single_rays(ranges, -grid - np.pi / 2, 1 - x)
+        y = _from_single_rays(ranges, -grid - np.pi / 2, 1 - x, reach)
     return -grid, x, y
 
 
 @inlined
-def _from_single_rays(ranges: np.ndarray, heading: float, y: float) -> float:
+def _from_single_rays(ranges: np.ndarray, heading: float, y: float, reach: float) -> float:
     """Returns x within a cell, by rays whose ends lie on no line y = constant of the grid; NaN if there are none."""
     total = np.zeros(2)
     for i in range(NUM_RAYS):
         along_x, along_y = math.cos(heading + _ANGLES[i]), math.sin(heading + _ANGLES[i])
         end_x, end_y = ranges[i] * along_x, y + ranges[i] * along_y
-        if ranges[i] < MAX_RANGE and abs(end_y - round(end_y)) > _OFF_LINE:
+        if ranges[i] < reach and abs(end_y - round(end_y)) > _OFF_LINE:
             total[0] += math.cos(2 * np.pi * end_x)
             total[1] += math.sin(2 * np.pi * end_x)
     return _within_cell(total)

@@ -16,8 +16,8 @@ class MapPlanner(Agent):
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
-        """Returns a planner for the scale of the map, which follows from M and N."""
-        return cls(interface.context_size / interface.size)
+        """Returns a planner for the scale of the map, which follows from M, N and the size of a cell."""
+        return cls(interface.context_size / (interface.size * interface.cell_size))
 
     @classmethod
     def context_size(cls, size: int) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from mazebench.errors import InputError
 from mazebench.world.mjcf import ACTIONS, action_controls, velocity_controls
 
 VELOCITY_SIZE = 3  # forward, left, turn to the left
@@ -15,11 +16,16 @@ def controls_of_action(action: int) -> np.ndarray:
     """Returns `[5]` float: the controls of one of the six actions.
 
     Raises:
-      ValueError: if there is no such action.
+      InputError: if there is no such action.
     """
-    index = int(action)
-    if not (0 <= index < len(ACTIONS) and index == action):
-        raise ValueError(f"expected an action from 0 to {len(ACTIONS) - 1} ({', '.join(ACTIONS)}), found {action!r}")
+    try:
+        index = int(action)
+        is_one = 0 <= index < len(ACTIONS) and index == action
+    except (TypeError, ValueError, OverflowError):  # a text, None, several, NaN, infinity
+        is_one = False
+    if not is_one:
+        expected = f"expected an action from 0 to {len(ACTIONS) - 1} ({', '.join(ACTIONS)})"
+        raise InputError(f"{expected}, found {_in_short(action)}")
     return _CONTROLS[index]
 
 
@@ -27,13 +33,14 @@ def controls_of_actions(actions: np.ndarray, num_envs: int) -> np.ndarray:
     """Returns `[B, 5]` float: the controls of `[B]` int actions, one for each of B environments.
 
     Raises:
-      ValueError: if `actions` are not B of the six actions.
+      InputError: if `actions` are not B of the six actions.
     """
     actions = np.asarray(actions)
     is_integer = np.issubdtype(actions.dtype, np.integer)
     if actions.shape != (num_envs,) or not is_integer or actions.min() < 0 or actions.max() >= len(ACTIONS):
-        raise ValueError(
-            f"expected {num_envs} actions from 0 to {len(ACTIONS) - 1}, found shape {actions.shape}, values {actions}"
+        raise InputError(
+            f"expected {num_envs} actions from 0 to {len(ACTIONS) - 1}, found shape {actions.shape}, "
+            f"values {_in_short(actions)}"
         )
     return _CONTROLS[actions.astype(np.int64, copy=False)]
 
@@ -42,13 +49,18 @@ def controls_of_velocities(velocities: np.ndarray, shape: tuple[int, ...]) -> np
     """Returns `[..., 5]` float: the controls of continuous actions `[..., 3]`, which are clipped to [-1, 1].
 
     Raises:
-      ValueError: if `velocities` are not finite numbers of that shape.
+      InputError: if `velocities` are not finite numbers of that shape.
     """
     velocities = np.asarray(velocities)
     is_numeric = np.issubdtype(velocities.dtype, np.floating) or np.issubdtype(velocities.dtype, np.integer)
     if velocities.shape != shape or not is_numeric or not np.isfinite(velocities).all():
-        raise ValueError(
+        raise InputError(
             f"expected velocities (forward, left, turn) from -1 to 1 of shape {shape}, "
-            f"found shape {velocities.shape}, values {velocities}"
+            f"found shape {velocities.shape}, values {_in_short(velocities)}"
         )
     return velocity_controls(np.clip(velocities, -1.0, 1.0))
+
+
+def _in_short(value: object) -> str:
+    """Returns `value` in one line of at most 80 letters."""
+    return " ".join(str(value).split())[:80]

@@ -7,7 +7,6 @@ import dataclasses
 import numpy as np
 
 from mazebench.errors import InputError
-from mazebench.maps.generators import corner_cells
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.spec import TaskSpec
 
@@ -35,22 +34,33 @@ def sample_episode(spec: TaskSpec, rng: np.random.Generator) -> Episode:
     """Draws an episode of a task."""
     index = int(rng.integers(len(spec.mazes)))
     maze = spec.mazes[index]
-    if spec.task == "hierarchical":
-        start, goal = corner_cells(maze)
-    else:
+    start, goal = spec.ends(maze)
+    if start is None or goal is None:
         pair_rng = np.random.default_rng([_FIXED_PAIR_SEED, index]) if spec.pairs == "fixed" else rng
-        start, goal = sample_pair(maze, spec.distances[pair_rng.integers(len(spec.distances))], pair_rng)
+        distance = spec.distances[pair_rng.integers(len(spec.distances))]
+        start, goal = sample_pair(maze, distance, pair_rng, start, goal)
     return Episode(index, start, goal, float(rng.uniform(-np.pi, np.pi)), int(rng.integers(_SEEDS)))
 
 
-def sample_pair(maze: Maze, distance: int, rng: np.random.Generator) -> tuple[Cell, Cell]:
+def sample_pair(
+    maze: Maze, distance: int, rng: np.random.Generator, start: Cell | None = None, goal: Cell | None = None
+) -> tuple[Cell, Cell]:
     """Draws a start and a goal `distance` cells apart.
 
-    The start is uniform among the cells that have such a goal, then the goal is uniform among those of the start.
+    The start is uniform among the cells that have such a goal, then the goal is uniform among those of the start. If
+    one of the two is given, the other is uniform among the cells that far from it; if both are, nothing is drawn.
 
     Raises:
       InputError: if no two cells of the maze are that far apart.
     """
+    if start is not None and goal is not None:
+        return start, goal
+    if (given := start or goal) is not None:
+        others = maze.cells_at(given, distance)
+        if not len(others):
+            raise InputError(f"{maze.name}: found no cell {distance} cells from {given}; choose others (--distances)")
+        row, column = others[rng.integers(len(others))].tolist()
+        return (given, (row, column)) if given is start else ((row, column), given)
     for _ in range(_MAX_TRIES):
         start = maze.free_cells[rng.integers(len(maze.free_cells))]
         goals = maze.cells_at((int(start[0]), int(start[1])), distance)

@@ -13,8 +13,9 @@ from dm_control.rl import control
 from dm_env import specs
 
 from mazebench.errors import InputError
-from mazebench.maps.maze import Maze, cell_of_point, cell_to_point
+from mazebench.maps.maze import Maze
 from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_action, controls_of_velocities
+from mazebench.tasks.arguments import Arguments, require_task_spec
 from mazebench.tasks.episode import Episode, check_episode, sample_episode
 from mazebench.tasks.observation import OpenSensors, observation_specs, state_errors
 from mazebench.tasks.route import Event, plan_route
@@ -81,6 +82,11 @@ class Navigation(control.Task):
         return self._event is Event.REACHED
 
     @property
+    def maze(self) -> int:
+        """The index of the maze that the physics has, among the task's mazes."""
+        return self._maze
+
+    @property
     def is_first(self) -> bool:
         """Whether the context is new, which it is when an episode or a leg begins."""
         return self._is_first
@@ -90,7 +96,7 @@ class Navigation(control.Task):
         self._next_episode = None
         episode = self.episode
         self._load_maze(physics, episode.maze)
-        start = cell_to_point(episode.start, self.spec.size)
+        start = self.spec.mazes[episode.maze].point(episode.start)
         self._position: tuple[float, float] = (float(start[0]), float(start[1]))
         physics.place_agent(start, episode.yaw)
         self.shown_map = show_map(self.spec, episode)
@@ -115,7 +121,7 @@ class Navigation(control.Task):
         self.path_length += math.sqrt(moved_x * moved_x + moved_y * moved_y)
         self._position = (x, y)
         self.steps += 1
-        self._event = self.route.advance(cell_of_point(x, y, self.spec.size), self.steps)
+        self._event = self.route.advance(self.spec.mazes[self._maze].cell_at(x, y), self.steps)
         self._is_first = False
         if self._event is Event.LANDMARK:
             self._begin_leg(physics)
@@ -123,7 +129,7 @@ class Navigation(control.Task):
     def _begin_leg(self, physics: Physics) -> None:
         self._context = leg_context(self.spec, self.shown_map, self.route.start, self.route.target)
         self._is_first = True
-        physics.place_goal(self.route.goal, self.spec.size)
+        physics.place_goal(self.spec.mazes[self._maze].point(self.route.goal))
 
     def get_observation(self, physics: Physics) -> dict[str, np.ndarray]:
         state = physics.state()
@@ -202,14 +208,20 @@ class Environment(control.Environment):
     task: Navigation
 
     def __init__(self, spec: TaskSpec, seed: int | None = None):
-        task = Navigation(spec, np.random.default_rng(seed))
+        """Opens the environment; `seed` is that of the first reset.
+
+        Raises:
+          InputError: if `seed` is not a natural number, or `spec` not a `TaskSpec`.
+        """
+        require_task_spec(spec)
+        task = Navigation(spec, np.random.default_rng(Arguments(seed=seed).seed))
         # The task judges the time limit itself, so that a goal reached on the last step is a termination.
         super().__init__(Physics.of_maze(models_of(spec.mazes)[0]), task, n_sub_steps=STEPS_PER_ACTION)
 
     def reset(self, seed: int | None = None, episode: Episode | None = None) -> dm_env.TimeStep:
         """Starts an episode: the next one of the environment's stream, the first one of `seed`'s, or `episode`."""
         if seed is not None:
-            self.task.rng = np.random.default_rng(seed)
+            self.task.rng = np.random.default_rng(Arguments(seed=seed).seed)
         if episode is not None:
             self.task.set_next_episode(episode)
         return super().reset()

@@ -11,6 +11,7 @@ from mazebench.maps.covering import cover
 from mazebench.maps.maze import WALL_HEIGHT, Maze
 from mazebench.storage.files import open_whole
 from mazebench.world.mjcf import maze_spec
+from mazebench.world.textures import add_textures, wall_faces
 
 MESH_FORMATS = ("glb", "obj", "stl")
 
@@ -25,13 +26,16 @@ _PROUD = (
 _TO_GLTF = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
-def write_mjcf(maze: Maze, path: pathlib.Path) -> None:
-    """Writes a model that MuJoCo and its viewer open without any other file.
+def write_mjcf(maze: Maze, path: pathlib.Path, textures: bool = False) -> None:
+    """Writes a model that MuJoCo and its viewer open without any other file; with `textures`, in the textured look.
 
     Raises:
       OSError: if it can't be written.
     """
     spec = maze_spec(maze)
+    if textures:
+        faces = wall_faces(maze)
+        add_textures(spec, maze, faces, len(faces))
     spec.compile()
     with open_whole(path) as file:
         file.write(spec.to_xml().encode("utf-8"))
@@ -42,7 +46,10 @@ def wall_mesh(maze: Maze) -> trimesh.Trimesh:
 
     A pillar of 2 cm joins walls that touch only at a corner, where no body can pass anyway.
     """
-    boxes = [_box(left, maze.size - bottom, right, maze.size - top) for top, left, bottom, right in cover(maze.walls)]
+    boxes = [
+        _box(*(maze.cell_size * edge for edge in (left, maze.size - bottom, right, maze.size - top)))
+        for top, left, bottom, right in cover(maze.walls)
+    ]
     half = _PILLAR / 2
     boxes += [_box(x - half, y - half, x + half, y + half, _PROUD) for x, y in _diagonal_corners(maze)]
     mesh = trimesh.boolean.union(boxes, engine="manifold", check_volume=False)
@@ -55,12 +62,12 @@ def _box(left: float, low: float, right: float, high: float, proud: float = 0.0)
 
 
 def _diagonal_corners(maze: Maze) -> np.ndarray:
-    """Returns the `K` points (x, y) where two walls touch only at a corner: `[K, 2]` int."""
+    """Returns the `K` points (x, y) in metres where two walls touch only at a corner: `[K, 2]` float."""
     walls = maze.walls
     top_left, top_right, bottom_left, bottom_right = walls[:-1, :-1], walls[:-1, 1:], walls[1:, :-1], walls[1:, 1:]
     touching = (top_left == bottom_right) & (top_right == bottom_left) & (top_left != top_right)
     rows, columns = np.nonzero(touching)
-    return np.stack([columns + 1, maze.size - 1 - rows], axis=-1)
+    return maze.cell_size * np.stack([columns + 1, maze.size - 1 - rows], axis=-1)
 
 
 def write_mesh(maze: Maze, path: pathlib.Path) -> None:

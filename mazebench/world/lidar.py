@@ -38,10 +38,11 @@ def ray_ends(pose: np.ndarray, ranges: np.ndarray) -> np.ndarray:
 
 
 class Lidar:
-    """The range sensor in some mazes of one size."""
+    """The range sensor in some mazes of one size, whose cells have one size."""
 
     def __init__(self, mazes: Sequence[Maze]):
-        self._size = mazes[0].size
+        self._size, self._cell_size = mazes[0].size, mazes[0].cell_size
+        self._reach = MAX_RANGE / self._cell_size  # cells
         # Rows from the bottom to the top, so that row and column are the integer parts of y and x.
         free = np.stack([~maze.walls[::-1] for maze in mazes])
         self._free = np.stack([np.rot90(free, turns, axes=(1, 2)) for turns in range(4)]).ravel()
@@ -59,21 +60,21 @@ class Lidar:
         num_bodies = len(pose)
         heading = np.floor(pose[:, 2] / _STEP)  # in steps, rounded down
         spacing = _line_spacing(pose[:, 2] - heading * _STEP)
-        cell, gap = self._turned_places(maze, pose[:, :2].T)
+        cell, gap = self._turned_places(maze, pose[:, :2].T / self._cell_size)
         crossing = gap[:, :, None] * spacing[:, None]  # [2, 4, 8, K]
         cells = cell.repeat(_PER_TURN, axis=0).ravel()
         distances = self._traverse(cells, crossing.reshape(2, -1), spacing.reshape(2, -1))
-        ranges = np.minimum(distances, MAX_RANGE).astype(np.float32)
+        ranges = np.minimum(distances * self._cell_size, MAX_RANGE).astype(np.float32)
         # The first of `ranges` is less than a step from +x, the first that is returned is straight ahead. With "wrap",
         # ray 0 follows ray 31.
         ray = (heading % NUM_RAYS).astype(np.int64)[:, None] + np.arange(NUM_RAYS)  # [K, 32]
         return ranges.take(ray * num_bodies + np.arange(num_bodies)[:, None], mode="wrap")
 
     def _turned_places(self, maze: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns where the points (`[2, K]`, m) lie in the mazes turned by 0, 1, 2 and 3 quarters.
+        """Returns where the points (`[2, K]`, in cells) lie in the mazes turned by 0, 1, 2 and 3 quarters.
 
         That is the number of the cell in `_free` (`[4, K]` int), and the distances to the next lines on the right and
-        above (`[2, 4, K]`, m).
+        above (`[2, 4, K]`, in cells).
         """
         corner = np.floor(point)
         offset = point - corner
@@ -83,15 +84,15 @@ class Lidar:
         return ((self._first_maze + maze) * self._size + row) * self._size + column, gap
 
     def _traverse(self, cell: np.ndarray, crossing: np.ndarray, spacing: np.ndarray) -> np.ndarray:
-        """Returns the distance at which each ray enters a wall, or one of at least `MAX_RANGE`: `[R]` float64, m.
+        """Returns the distance at which each ray enters a wall, or one beyond its range: `[R]` float64, in cells.
 
         A ray goes from cell to cell, over the nearer of the next lines of constant x and of constant y (Amanatides and
         Woo, A Fast Voxel Traversal Algorithm for Ray Tracing, 1987).
 
         Args:
           cell: `[R]` int, which the rays begin in; overwritten.
-          crossing: `[2, R]` m along each ray, to the next line of constant x and to the next one of constant y.
-          spacing: `[2, R / 4]` m along each ray, between two such lines; the same for all four turns.
+          crossing: `[2, R]` cells along each ray, to the next line of constant x and to the next one of constant y.
+          spacing: `[2, R / 4]` cells along each ray, between two such lines; the same for all four turns.
         """
         distances = np.empty(len(cell))
         ray = np.arange(len(cell))  # those that have met no wall
@@ -101,7 +102,7 @@ class Lidar:
             distances[ray] = distance
             cell += np.where(is_x, 1, self._size)
             # With "clip", a body that was never placed and stands outside the free cells does no harm.
-            going_on = (self._free.take(cell, mode="clip") & (distance < MAX_RANGE)).nonzero()[0]
+            going_on = (self._free.take(cell, mode="clip") & (distance < self._reach)).nonzero()[0]
             ray, cell, is_x = ray.take(going_on), cell.take(going_on), is_x.take(going_on)
             step = spacing.take(ray, axis=1, mode="wrap")
             step[0] *= is_x
@@ -111,7 +112,7 @@ class Lidar:
 
 
 def _line_spacing(heading: np.ndarray) -> np.ndarray:
-    """Returns the distances along rays between two lines of constant x, and of constant y: `[2, 8, K]`, m.
+    """Returns the distances along rays between two lines of constant x, and of constant y: `[2, 8, K]`, in cells.
 
     The rays are those that point to the right and upwards, the first of them at an angle of `heading` (`[K]` rad, less
     than a step) from +x.

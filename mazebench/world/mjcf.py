@@ -1,6 +1,6 @@
 """A maze as a MuJoCo model: merged wall boxes, floor, lights, cameras, and a body that moves like DeepMind Lab's.
 
-Lengths are metres, one cell is 1 m and stands for DeepMind Lab's 100 game units. The body slides along x and y and
+Lengths are metres; 1 m stands for 100 game units of DeepMind Lab. The body slides along x and y and
 yaws; height, roll and pitch are fixed. The constants below are fitted to measurements in DeepMind Lab, which
 docs/tasks.md lists.
 """
@@ -10,8 +10,9 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from mazebench.maps import colors
 from mazebench.maps.covering import Rectangle, cover
-from mazebench.maps.maze import WALL_HEIGHT, Maze, cell_to_point
+from mazebench.maps.maze import WALL_HEIGHT, Maze
 from mazebench.world import MAX_PIXELS
 
 BODY_RADIUS = 0.15  # DeepMind Lab's box is 30 x 30 x 56 units
@@ -56,25 +57,25 @@ def build_spec(maze: Maze, boxes: list[Rectangle], num_boxes: int, name: str = "
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0, 0, 0]
     # Set, not computed by MuJoCo, so that models of one size share camera and shadow ranges.
-    spec.stat.center = [maze.size / 2, maze.size / 2, WALL_HEIGHT / 2]
-    spec.stat.extent = maze.size
+    spec.stat.center = [maze.side / 2, maze.side / 2, WALL_HEIGHT / 2]
+    spec.stat.extent = maze.side
     spec.stat.meansize = 0.5
-    spec.visual.map.znear = 0.02 / maze.size
+    spec.visual.map.znear = 0.02 / maze.side
     # `global` is a keyword of Python.
     getattr(spec.visual, "global").offwidth = MAX_PIXELS
     getattr(spec.visual, "global").offheight = MAX_PIXELS
     spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
     spec.visual.headlight.diffuse = [0.25, 0.25, 0.25]
     spec.visual.headlight.specular = [0, 0, 0]
-    _add_materials(spec, maze.size)
-    _add_room(spec, maze.size)
-    _add_walls(spec, maze.size, boxes, num_boxes)
-    _add_goal(spec)
+    _add_materials(spec, maze)
+    _add_room(spec, maze.side)
+    _add_walls(spec, maze, boxes, num_boxes)
+    _add_goal(spec, maze.cell_size)
     _add_body(spec, maze)
     return spec
 
 
-def _add_materials(spec: mujoco.MjSpec, size: int) -> None:
+def _add_materials(spec: mujoco.MjSpec, maze: Maze) -> None:
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
@@ -84,9 +85,9 @@ def _add_materials(spec: mujoco.MjSpec, size: int) -> None:
         width=64,
         height=64,
     )
-    # The middle of the texture lies on the middle of the floor, which is the middle of a cell if `size` is odd, else a
-    # corner.
-    lines = mujoco.mjtMark.mjMARK_EDGE if size % 2 else mujoco.mjtMark.mjMARK_CROSS
+    # The middle of the texture lies on the middle of the floor, which is the middle of a cell if its number of cells
+    # is odd, else a corner.
+    lines = mujoco.mjtMark.mjMARK_EDGE if maze.size % 2 else mujoco.mjtMark.mjMARK_CROSS
     spec.add_texture(
         name="cells",
         type=mujoco.mjtTexture.mjTEXTURE_2D,
@@ -101,15 +102,16 @@ def _add_materials(spec: mujoco.MjSpec, size: int) -> None:
     textures = [""] * mujoco.mjtTextureRole.mjNTEXROLE
     textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "cells"
     # With texuniform, a repetition of 1 spans two metres.
-    spec.add_material(name="floor", textures=textures, texrepeat=[2, 2], texuniform=True)
+    repeat = 2 / maze.cell_size
+    spec.add_material(name="floor", textures=textures, texrepeat=[repeat, repeat], texuniform=True)
     spec.add_material(name="wall", rgba=[0.36, 0.47, 0.60, 1])
     spec.add_material(name="agent", rgba=[0.90, 0.45, 0.13, 1])
     spec.add_material(name="nose", rgba=[0.15, 0.15, 0.18, 1])
-    spec.add_material(name="goal", rgba=[0.84, 0.24, 0.24, 0.7], emission=0.1)
+    spec.add_material(name="goal", rgba=[*colors.GOAL, 0.7], emission=0.1)
 
 
-def _add_room(spec: mujoco.MjSpec, size: int) -> None:
-    middle = size / 2
+def _add_room(spec: mujoco.MjSpec, side: float) -> None:
+    middle = side / 2
     world = spec.worldbody
     # The floor is only seen: the body's height is fixed, so it needs no contact.
     world.add_geom(
@@ -124,26 +126,27 @@ def _add_room(spec: mujoco.MjSpec, size: int) -> None:
     world.add_light(
         name="sun",
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        pos=[middle, middle, 2 * size],
+        pos=[middle, middle, 2 * side],
         dir=[0.3, 0.4, -1],
         diffuse=[0.55, 0.55, 0.55],
         castshadow=False,  # its shadow map is too coarse for large mazes
     )
-    # High and narrow, so that walls hardly lean outwards; about 1.04 * size metres at the walls' height fill the view.
-    height = 4.0 * size
-    fovy = np.rad2deg(2 * np.arctan(0.52 * size / (height - WALL_HEIGHT)))
+    # High and narrow, so that walls hardly lean outwards; about 1.04 * side at the walls' height fill the view.
+    height = 4.0 * side
+    fovy = np.rad2deg(2 * np.arctan(0.52 * side / (height - WALL_HEIGHT)))
     world.add_camera(name="top", pos=[middle, middle, height], quat=[1, 0, 0, 0], fovy=fovy)
 
 
-def _add_walls(spec: mujoco.MjSpec, size: int, boxes: list[Rectangle], num_boxes: int) -> None:
+def _add_walls(spec: mujoco.MjSpec, maze: Maze, boxes: list[Rectangle], num_boxes: int) -> None:
+    scale = maze.cell_size
     for index in range(num_boxes):
         if index < len(boxes):
             top, left, bottom, right = boxes[index]
-            pos = [(left + right) / 2, size - (top + bottom) / 2, WALL_HEIGHT / 2]
-            half = [(right - left) / 2, (bottom - top) / 2, WALL_HEIGHT / 2]
+            pos = [scale * (left + right) / 2, scale * (maze.size - (top + bottom) / 2), WALL_HEIGHT / 2]
+            half = [scale * (right - left) / 2, scale * (bottom - top) / 2, WALL_HEIGHT / 2]
         else:
             # Collidable and apart from each other: geoms without contacts would change the layout of MjData.
-            pos, half = [index + 0.5, 0.5, -_PARKED_DEPTH], [0.1, 0.1, 0.1]
+            pos, half = [scale * (index + 0.5), scale * 0.5, -_PARKED_DEPTH], [0.1, 0.1, 0.1]
         spec.worldbody.add_geom(
             name=f"wall_{index}",
             type=mujoco.mjtGeom.mjGEOM_BOX,
@@ -156,16 +159,20 @@ def _add_walls(spec: mujoco.MjSpec, size: int, boxes: list[Rectangle], num_boxes
         )
 
 
-def _add_goal(spec: mujoco.MjSpec) -> None:
+def _add_goal(spec: mujoco.MjSpec, cell_size: float) -> None:
     """Adds the marker of the goal. The task moves it by its mocap pose; nothing collides with it."""
     marker = spec.worldbody.add_body(name="goal", mocap=True, pos=[0, 0, -_PARKED_DEPTH])
     marker.add_site(
-        name="goal", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[0.3, 0.02, 0], pos=[0, 0, 0.02], material="goal"
+        name="goal",
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[0.3 * cell_size, 0.02, 0],
+        pos=[0, 0, 0.02],
+        material="goal",
     )
 
 
 def _add_body(spec: mujoco.MjSpec, maze: Maze) -> None:
-    x, y = cell_to_point(maze.free_cells[0], maze.size)
+    x, y = maze.point(maze.free_cells[0])
     # The joints measure from the world's origin, so qpos is (x, y, yaw). Keyframe 0 is in the first free cell.
     body = spec.worldbody.add_body(name="agent", pos=[0, 0, BODY_HEIGHT / 2])
     body.add_joint(name="x", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0], damping=[_DAMPING, 0, 0])
@@ -187,7 +194,9 @@ def _add_body(spec: mujoco.MjSpec, maze: Maze) -> None:
     eye = _EYE_HEIGHT - BODY_HEIGHT / 2
     # The camera looks along the body's x axis: its right is -y, its up is z. The nose is below its view.
     body.add_camera(name="egocentric", pos=[0.12, 0, eye], xyaxes=[0, -1, 0, 0, 0, 1], fovy=75)
-    body.add_camera(name="chase", pos=[-1.6, 0, 2.2], xyaxes=[0, -1, 0, 0.75, 0, 0.66], fovy=60)
+    # Between narrow walls, it is nearer and looks down more steeply.
+    behind = min(1.0, maze.cell_size)
+    body.add_camera(name="chase", pos=[-1.6 * behind, 0, 2.2], xyaxes=[0, -1, 0, 0.75, 0, 0.66 * behind], fovy=60)
     _add_actuators(spec)
     _add_sensors(spec)
     spec.add_key(name="start", qpos=[x, y, 0], mpos=[0, 0, -_PARKED_DEPTH], mquat=[1, 0, 0, 0])

@@ -13,7 +13,6 @@ with warnings.catch_warnings():
     warnings.filterwarnings("ignore", message=".*GLFWError.*|.*DISPLAY.*")
     from dm_control.mujoco import engine, wrapper
 
-from mazebench.maps.maze import Cell, cell_to_point
 from mazebench.world.angles import wrap_angle
 from mazebench.world.mjcf import NUM_SENSORS
 from mazebench.world.models import copy_maze
@@ -46,9 +45,9 @@ class Physics(engine.Physics):
         """Moves the body to `position` (`[2]`, m) and `yaw` (rad); call it within `reset_context()`."""
         self.data.qpos[:] = (*position, yaw)
 
-    def place_goal(self, cell: Cell, size: int) -> None:
-        """Moves the goal marker to a cell of a maze of `size` cells a side."""
-        self.data.mocap_pos[0] = (*cell_to_point(cell, size), 0.0)
+    def place_goal(self, position: np.ndarray) -> None:
+        """Moves the goal marker to `position` (`[2]`, m)."""
+        self.data.mocap_pos[0] = (*position, 0.0)
 
     def set_controls(self, controls: np.ndarray) -> None:
         """Sets the controls (`[5]`) of the four drives and the turn; see `mjcf.action_controls`."""

@@ -31,7 +31,7 @@ class Drawing(abc.ABC):
 
     @abc.abstractmethod
     def points(self, points: np.ndarray, size: int) -> np.ndarray:
-        """Returns `[T, 2]` float: where points (x, y) in metres of a maze of `size` cells a side lie in the picture.
+        """Returns `[T, 2]` float: where points (x, y) in cells of a maze of `size` cells a side lie in the picture.
 
         They are counted in pixels, x to the right and y up from the picture's lower left corner.
         """
@@ -58,7 +58,7 @@ class ShownMap:
         return cell if self.drawing is None else self.drawing.pixel(cell, self._picture)
 
     def seen_points(self, points: np.ndarray) -> np.ndarray:
-        """Returns `[T, 2]` float: where points (x, y) of the maze, in metres, lie on the seen map, in pixels."""
+        """Returns `[T, 2]` float: where points (x, y) of the maze, in cells, lie on the seen map, in pixels."""
         return points if self.drawing is None else self.drawing.points(points, len(self.walls))
 
 

@@ -19,6 +19,7 @@ class SensorOptions(Options):
     """The options that sensors read."""
 
     camera_size: int = option(64, "Pixels on a side of a camera's picture.", lowest=1, highest=MAX_PIXELS)
+    textures: bool = option(False, "Walls in pictures have patterns and colours that tell places apart.")
 
 
 class Worlds(NamedTuple):

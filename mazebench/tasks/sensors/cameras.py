@@ -22,8 +22,7 @@ class CameraSensor(Sensor):
         from mazebench.world.rendering import Cameras
 
         self._names = names
-        self._models = models_of(mazes)
-        self._cameras = Cameras(self._models[0], names, options.camera_size)
+        self._cameras = Cameras(models_of(mazes, options.textures), names, options.camera_size, smooth=False)
 
     def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
         """Returns `[K, H, H, 3]` uint8 by name.
@@ -31,9 +30,7 @@ class CameraSensor(Sensor):
         Raises:
           RenderingError: if no rendering context can be opened.
         """
-        pictures = [
-            self._cameras.take(self._models[maze], pose, marker) for maze, pose, marker in zip(*worlds, strict=True)
-        ]
+        pictures = [self._cameras.take(*world) for world in zip(*worlds, strict=True)]
         return {name: np.stack([taken[name] for taken in pictures]) for name in self._names}
 
     def close(self) -> None:

@@ -1,0 +1,374 @@
+"""Maps of one's own: cells of any size, a start and a goal, and the distances and the time limit that fit."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import cv2
+import gymnasium
+import numpy as np
+import pytest
+from simple_mazes import corridor, field
+
+import mazebench
+from mazebench.agent import Interface
+from mazebench.agent_loading import load_agent_class
+from mazebench.envs.goal import GoalMazeEnv
+from mazebench.errors import InputError
+from mazebench.evaluation.chunk import run_trials
+from mazebench.evaluation.evaluate import run_plan
+from mazebench.evaluation.film import film_episode
+from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.plan import make_plan
+from mazebench.evaluation.pool import open_pool
+from mazebench.evaluation.results import load_result
+from mazebench.evaluation.trajectories import TRAJECTORIES, load_trajectories
+from mazebench.evaluation.trials import draw_trials
+from mazebench.maps.generators import generate
+from mazebench.maps.geodesic import DiscPaths
+from mazebench.maps.image import draw_maze
+from mazebench.maps.maze import Maze, corner_cells
+from mazebench.maps.text import format_maze
+from mazebench.play.game import Game
+from mazebench.play.picture import Style, draw_world
+from mazebench.report.report import write_report
+from mazebench.report.results import read_results
+from mazebench.tasks.context import resized_map
+from mazebench.tasks.episode import sample_episode
+from mazebench.tasks.registry import make_spec
+from mazebench.tasks.spec import TaskSpec
+from mazebench.world.export import wall_mesh
+from mazebench.world.lidar import Lidar
+from mazebench.world.mjcf import STEPS_PER_ACTION, action_controls
+from mazebench.world.models import models_of
+from mazebench.world.physics import Physics
+
+ROOM = "#######\n#.....#\n#.....#\n#.....#\n#.....#\n#.....#\n#######\n"
+
+
+def dfs(size: int = 9, cell_size: float = 1.0, seed: int = 0) -> Maze:
+    maze = generate("dfs", size, np.random.default_rng(seed), f"dfs-{seed}")
+    return dataclasses.replace(maze, cell_size=cell_size)
+
+
+def doubled(maze: Maze) -> Maze:
+    """The same world in twice as many cells a side, of half the size."""
+    return Maze(maze.walls.repeat(2, axis=0).repeat(2, axis=1), maze.name, maze.cell_size / 2)
+
+
+@pytest.fixture(scope="module")
+def scaled(tmp_path_factory):
+    """Results of an evaluation in cells of half a metre."""
+    folder = tmp_path_factory.mktemp("scaled")
+    (folder / "maze.txt").write_text(format_maze(dfs(13)))
+    plan = make_plan(EvalOptions("oracle", maps=str(folder / "maze.txt"), sensors=("lidar",)))
+    task = make_spec(maps=dfs(13, 0.5), context_size=13, sensors=("lidar",))
+    labels = plan.labels | {"cell_size": 0.5}
+    plan = dataclasses.replace(plan, task=task, trials=tuple(draw_trials(task, 1)), labels=labels)
+    with open_pool(0, None) as pool:
+        run_plan(plan, folder / "oracle", pool, record=True)
+    return folder / "oracle"
+
+
+class TestScale:
+    """A world does not depend on how many cells it is cut into."""
+
+    def test_points_and_cells_are_converted(self):
+        maze = dataclasses.replace(corridor(), cell_size=0.5)
+        np.testing.assert_array_equal(maze.point((1, 1)), [0.75, 3.75])
+        np.testing.assert_array_equal(maze.point(np.array([[1, 1], [8, 0]])), [[0.75, 3.75], [0.25, 0.25]])
+        np.testing.assert_array_equal(maze.cell(np.array([0.99, 3.5])), [1, 1])
+        assert maze.cell_at(1.0, 3.99) == (1, 2)
+        assert maze.side == 4.5
+
+    def test_walls_are_the_same_boxes(self):
+        maze = dfs()
+        one, other = (models_of((each,))[0] for each in (maze, doubled(maze)))
+        walls = [index for index in range(one.ngeom) if one.geom(index).name.startswith("wall")]
+        np.testing.assert_array_equal(one.geom_pos[walls], other.geom_pos[walls])
+        np.testing.assert_array_equal(one.geom_size[walls], other.geom_size[walls])
+        np.testing.assert_array_equal(one.stat.center, other.stat.center)
+
+    def test_a_body_drives_the_same_way(self):
+        maze = dfs()
+        paths = []
+        for each in (maze, doubled(maze)):
+            physics = Physics.of_maze(models_of((each,))[0])
+            with physics.reset_context():
+                physics.place_agent(maze.point(maze.free_cells[0]), 0.3)
+            path = []
+            for action in (0, 0, 0, 4, 4, 0, 0, 2, 2, 1, 0, 0, 0, 5, 0, 0):
+                physics.set_controls(action_controls()[action])
+                physics.step(STEPS_PER_ACTION)
+                path.append(physics.position())
+            paths.append(path)
+        np.testing.assert_array_equal(*paths)
+
+    def test_rays_are_as_long(self):
+        maze, rng = dfs(13), np.random.default_rng(0)
+        points = maze.point(maze.free_cells) + rng.uniform(-0.3, 0.3, size=(len(maze.free_cells), 2))
+        poses = np.column_stack([points, rng.uniform(-np.pi, np.pi, len(points))])
+        index = np.zeros(len(poses), dtype=np.int64)
+        one, other = (Lidar([each]).ranges(index, poses) for each in (maze, doubled(maze)))
+        np.testing.assert_allclose(one, other, atol=1e-5)
+
+    def test_shortest_paths_scale_with_the_body(self):
+        maze = dfs()
+        large = dataclasses.replace(maze, cell_size=2.5)
+        start, goal = corner_cells(maze)
+        one, other = DiscPaths(maze, 0.15), DiscPaths(large, 2.5 * 0.15)
+        assert other.length(large.point(start), goal) == pytest.approx(2.5 * one.length(maze.point(start), goal))
+        path = other.path(large.point(start), goal, arc_step=2.5 * 0.05)
+        np.testing.assert_allclose(path, 2.5 * one.path(maze.point(start), goal))
+
+    def test_the_mesh_is_the_same(self):
+        maze = dfs()
+        one, other = wall_mesh(maze), wall_mesh(doubled(maze))
+        np.testing.assert_allclose(one.bounds, other.bounds)
+        assert one.volume == pytest.approx(other.volume, rel=1e-4)  # pillars where walls touch
+
+    def test_pictures_show_the_same_path(self):
+        maze = dfs()
+        path = maze.point(np.array(maze.shortest_path(*corner_cells(maze))))
+        pictures = (draw_maze(each, pixels, path=path) for each, pixels in ((maze, 16), (doubled(maze), 8)))
+        thick, thin = (np.ptp(picture.astype(int), axis=-1) > 60 for picture in pictures)
+        assert thin.any()
+        assert not (thin & ~thick).any()
+
+    def test_the_terminal_shows_the_body_in_its_cell(self):
+        game = Game(make_spec(maps=dfs(cell_size=0.5), start=(1, 1), goal=(7, 7), sensors=("lidar",)), 0)
+        rows, columns = np.nonzero(draw_world(game, 1, 2).styles == Style.BODY)
+        assert (rows.tolist(), columns.tolist()) == ([1], [3])
+        assert "cells of 0.5 m" in game.title()
+
+
+class TestEnvironments:
+    def test_the_three_environments_play_the_same_episode(self):
+        options = {"maps": dfs(cell_size=0.6), "sensors": ("lidar",)}
+        single = mazebench.load("local", **options)
+        gym = gymnasium.make("mazebench/Local-13-v1", **options)
+        vector = mazebench.make_vec("local", 2, **options)
+        observed = [single.reset(seed=3).observation, gym.reset(seed=3)[0], vector.reset(seed=3)[0]]
+        for action in (0, 0, 4, 0, 2, 0):
+            for name in ("state", "context", "lidar"):
+                np.testing.assert_array_equal(observed[0][name], observed[1][name])
+                np.testing.assert_array_equal(observed[0][name], observed[2][name][0])
+            steps = single.step(action), gym.step(action), vector.step(np.full(2, action))
+            observed = [steps[0].observation, steps[1][0], steps[2][0]]
+        start = single.task.episode.start
+        assert vector.task_spec.mazes[0].cell_at(*single.physics.position()) != start
+        vector.close()
+
+    def test_the_goal_is_reached_in_its_cell(self):
+        maze = dataclasses.replace(corridor(), cell_size=0.5)
+        env = mazebench.load("local", maps=maze, distances=[3])
+        time_step = env.reset(episode=mazebench.Episode(0, (1, 1), (1, 4), 0.0, 0))
+        while not time_step.last():
+            time_step = env.step(0)
+        assert env.task.success
+        assert 2.0 <= env.physics.position()[0] < 2.5
+
+    def test_hindsight_goals_are_centres_in_metres(self):
+        env = GoalMazeEnv(make_spec(maps=dfs(cell_size=0.7), start="1,1", goal="1,2"))
+        observation, info = env.reset(seed=0)
+        assert env.observation_space.contains(observation)
+        np.testing.assert_allclose(observation["desired_goal"], [1.75, 5.25])
+        assert env.compute_terminated(observation["achieved_goal"], observation["achieved_goal"], info)
+
+    def test_mazes_of_one_task_have_one_scale(self):
+        with pytest.raises(InputError, match=r"expected mazes of cells of one size in metres, found 0.5, 1.0"):
+            make_spec(maps=(dfs(), dfs(cell_size=0.5, seed=1)))
+
+    def test_cells_through_which_no_body_passes_are_refused(self):
+        with pytest.raises(InputError, match=r"dfs-0: expected cells of at least 0.4 m.*found 0.35 m"):
+            make_spec(maps=dfs(cell_size=0.35))
+
+    def test_tracks_keep_their_scale(self):
+        with pytest.raises(InputError, match=r"track 'lost': expected cells of 1 m, found 0.5 m"):
+            make_spec("lost", maps=dfs(13, cell_size=0.5))
+
+
+class TestAgents:
+    @pytest.mark.parametrize("cell_size", [0.5, 2.0])
+    @pytest.mark.parametrize("name", ["planner-closed-loop", "oracle", "navigator"])
+    def test_agents_that_plan_drive_at_any_scale(self, name, cell_size):
+        agent_class, maze = load_agent_class(name), dfs(13, cell_size)
+        spec = make_spec(maps=maze, context_size=agent_class.context_size(13), sensors=("lidar",))
+        interface = Interface("local", 13, spec.context_size, sensors=spec.sensors, cell_size=cell_size)
+        trials = list(enumerate(draw_trials(spec, 1)))
+        agent = agent_class.build(interface)
+        outcomes = [
+            outcome
+            for ended in run_trials(agent, spec, trials, 16, needs_truth=agent_class.needs_truth)
+            for outcome in ended
+        ]
+        assert len(outcomes) == len(trials)
+        assert all(outcome.success for outcome in outcomes)
+
+    def test_a_scale_on_which_an_agent_did_not_learn_is_remarked(self, tmp_path):
+        (tmp_path / "large.txt").write_text(format_maze(generate("dfs", 31, np.random.default_rng(0))))
+        told: list[str] = []
+        options = {"maps": str(tmp_path / "large.txt"), "distances": (1,), "episodes_per_distance": 1}
+        summary = mazebench.evaluate("mah", warn=told.append, **options)
+        assert summary.untrained_scale
+        assert told == [
+            "mah learned on maps of 1 m a cell; here its map of 21 x 21 cells shows 31 x 31 cells of 1 m, 1.48 m a cell"
+        ]
+        mazebench.evaluate("planner", warn=told.append, **options)
+        assert len(told) == 1
+
+    def test_a_map_that_is_coarser_than_the_mazes_is_remarked(self, tmp_path):
+        (tmp_path / "large.txt").write_text(format_maze(generate("dfs", 31, np.random.default_rng(0))))
+        assert make_plan(EvalOptions("random", maps=str(tmp_path / "large.txt"))).remark == (
+            "random is shown the 31 x 31 cells as a map of 21 x 21; context_size() of its class chooses another one "
+            "(docs/agents.md)"
+        )
+        assert make_plan(EvalOptions("planner", maps=str(tmp_path / "large.txt"))).remark is None
+        assert make_plan(EvalOptions("random", track="far")).remark is None
+
+    def test_a_film_has_the_map_as_it_is_shown(self, tmp_path):
+        maze = generate("dfs", 31, np.random.default_rng(0))
+        (tmp_path / "large.txt").write_text(format_maze(maze))
+        for agent, side in (("random", 21), ("planner", 31)):
+            options = EvalOptions(agent, maps=str(tmp_path / "large.txt"), distances=(1,))
+            film_episode(options, tmp_path / "x.png", "map", 10 * side)
+            picture = cv2.imread(str(tmp_path / "x.png"), cv2.IMREAD_GRAYSCALE)
+            centres = picture[5::10, 5::10]
+            assert centres.shape == (side, side)
+            # Dark where walls are, but for the marks and the path.
+            assert np.corrcoef(centres.ravel(), resized_map(maze.walls, side).ravel())[0, 1] < -0.95
+
+
+class TestEnds:
+    @pytest.mark.parametrize("start", ["1,3", (1, 3), np.array([1, 3]), " 1,3", "3.5m,7.5m", "3.01m, 7.99 m"])
+    def test_a_start_is_a_cell_or_a_point(self, start):
+        spec = make_spec(maps=field(9), start=start)
+        episodes = [sample_episode(spec, np.random.default_rng(seed)) for seed in range(20)]
+        assert {episode.start for episode in episodes} == {(1, 3)}
+        assert len({episode.goal for episode in episodes}) > 5
+        assert len({episode.yaw for episode in episodes}) == 20
+
+    def test_a_point_is_in_metres(self):
+        assert make_spec(maps=dataclasses.replace(field(9), cell_size=0.5), goal="1.75m,3.75m").ends(
+            dataclasses.replace(field(9), cell_size=0.5)
+        ) == (None, (1, 3))
+
+    def test_the_other_end_is_drawn_at_the_distances(self):
+        spec = make_spec(maps=dfs(), goal=(7, 7), distances=(2, 5))
+        for seed in range(20):
+            episode = sample_episode(spec, np.random.default_rng(seed))
+            assert episode.goal == (7, 7)
+            assert spec.mazes[0].distance(episode.start, episode.goal) in (2, 5)
+
+    def test_both_ends_are_those_of_every_episode_in_all_environments(self):
+        options = {"maps": dfs(), "start": (1, 1), "goal": (7, 7)}
+        env, vector = mazebench.load("local", **options), mazebench.make_vec("local", 3, **options)
+        vector.reset(seed=0)
+        assert {(episode.start, episode.goal) for episode in vector.episodes} == {((1, 1), (7, 7))}
+        for seed in range(3):
+            env.reset(seed=seed)
+            assert env.task.episode == vector.episodes[seed]
+        vector.close()
+
+    def test_landmarks_lead_from_the_start_to_the_goal(self):
+        env = mazebench.load("hierarchical", maps=dfs(), start=(7, 7))
+        env.reset(seed=0)
+        assert env.task.route.cells[0] == (7, 7)
+        assert env.task.route.cells[-1] == corner_cells(dfs())[1]
+
+    @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            ({"start": "here"}, r"expected start as a cell 'row,column' or a point '1.5m,2.5m' \(x, y\), found 'here'"),
+            ({"goal": (1, 2, 3)}, r"expected goal as a cell .* found \(1, 2, 3\)"),
+            ({"goal": (1.0, 2.0)}, r"expected goal as a cell .* found \(1.0, 2.0\)"),
+            ({"start": "0,0"}, r"start '0,0': dfs-0: expected a free cell, found \(0, 0\), a wall or outside"),
+            (
+                {"goal": "99m,1m"},
+                r"goal '99m,1m': dfs-0: expected a point in the 9 x 9 m of the maze, .* found one outside",
+            ),
+            ({"goal": "9" * 400 + "m,1m"}, r"found one outside"),
+            ({"goal": "0.5m,1m"}, r"free cells reach from \(1, 1\) to \(8, 8\) m, found a wall"),
+            ({"start": (1, 1), "goal": "1,1"}, r"dfs-0: expected start and goal in different cells, found both in"),
+            ({"start": (1, 1), "distances": (60,)}, r"dfs-0: expected distances of at most \d+ cells.*--distances"),
+            ({"start": (1, 1), "goal": (7, 7), "distances": (2,)}, r"found distances \(2,\), which would be ignored"),
+            ({"start": (1, 1), "pairs": "fixed"}, r"expected pairs 'random' beside a start or a goal, found 'fixed'"),
+            ({"goal": (1, 1), "num_goals": 2}, r"expected num_goals 1 beside a goal, found 2"),
+            ({"start": (1, 1), "track": "lost"}, r"track 'lost': expected start None, found '1,1'"),
+        ],
+    )
+    def test_ends_that_contradict_are_refused_in_a_line(self, options, message):
+        with pytest.raises(InputError, match=message) as caught:
+            make_spec(maps=dfs(), **options)
+        assert "\n" not in str(caught.value)
+
+
+class TestDefaults:
+    @pytest.mark.parametrize(
+        ("maze", "distances", "time_limit"),
+        [
+            (field(7), range(1, 9), 100),
+            (corridor(), range(1, 7), 100),
+            (field(25), range(3, 42, 3), None),  # the diameter is 44, nine tenths of it 39
+        ],
+    )
+    def test_distances_reach_as_far_as_the_map(self, maze, distances, time_limit):
+        spec = make_spec(maps=maze)
+        if time_limit is None:
+            assert (len(spec.distances), spec.distances[0], spec.distances[-1]) == (15, 3, 39)
+            assert spec.time_limit == 6 * 39 + 50
+        else:
+            assert (spec.distances, spec.time_limit) == (tuple(distances), time_limit)
+
+    @pytest.mark.parametrize(("cell_size", "steps_a_cell"), [(0.5, 5), (1.0, 6), (3.0, 10)])
+    def test_the_time_limit_grows_with_the_way(self, cell_size, steps_a_cell):
+        maze = dataclasses.replace(field(25), cell_size=cell_size)
+        assert make_spec(maps=maze, distances=(20, 40)).time_limit == steps_a_cell * 40 + 50
+        assert make_spec(maps=maze, start=(1, 1), goal=(1, 21)).time_limit == steps_a_cell * 20 + 50
+        assert make_spec("hierarchical", maps=maze, landmark_distance=20).time_limit == steps_a_cell * 20 + 50
+        assert make_spec(maps=maze, time_limit=7).time_limit == 7
+
+    def test_distances_from_a_start_reach_as_far_as_from_there(self):
+        assert make_spec(maps=corridor(), start=(1, 4)).distances == (1, 2, 3)
+
+    def test_the_benchmark_keeps_its_own(self):
+        assert make_spec(split="eval").distances == tuple(range(1, 16))
+        assert make_spec(split="eval").time_limit == TaskSpec(mazes=(dfs(),)).time_limit == 100
+
+
+class TestEvaluation:
+    def test_an_own_map_is_evaluated_without_distances(self, tmp_path):
+        (tmp_path / "room.txt").write_text(ROOM)
+        summary = mazebench.evaluate("planner", maps=str(tmp_path / "room.txt"), episodes_per_distance=1)
+        assert list(summary.by_distance) == [str(distance) for distance in range(1, 9)]
+        assert summary.overall.success_rate == 1.0
+
+    def test_given_ends_are_not_the_frozen_benchmark(self, tmp_path):
+        options = {"start": "1,1", "goal": "11.5m,1.5m", "episodes_per_distance": 1}
+        summary = mazebench.evaluate("planner-closed-loop", tmp_path, **options)
+        assert (summary.split, summary.episodes, summary.overall.spl_relative) == ("custom", 20, None)
+        assert summary.provenance.options.start == "1,1"
+        records = load_result(tmp_path).records
+        assert {(record.start, record.goal) for record in records} == {((1, 1), (11, 11))}
+        assert {record.distance for record in records} == {20, 24, 28, 32, 36}
+        assert summary.overall.success_rate == 1.0
+
+    def test_lengths_are_in_metres(self, scaled):
+        summary, records = load_result(scaled).summary, load_result(scaled).records
+        assert summary.cell_size == 0.5
+        assert summary.overall.success_rate == 1.0
+        for record in records:
+            grid = record.distance * 0.5
+            assert record.shortest_path <= grid
+            assert record.spl_grid == pytest.approx(min(1.0, grid / max(grid, record.path_length)))
+        assert json.loads((scaled / "episodes.jsonl").read_text().splitlines()[0])["cell_size"] == 0.5
+        poses = load_trajectories(scaled / TRAJECTORIES, len(records))[0].pose
+        np.testing.assert_allclose(poses[0, :2], dfs(13, 0.5).point(records[0].start), atol=0.01)
+
+    def test_a_report_says_the_scale(self, scaled, tmp_path):
+        (result,) = read_results([scaled], pytest.fail)
+        assert str(result.setting) == "local, 13 × 13, custom mazes, cells of 0.5 m"
+        write_report([scaled], tmp_path / "report", warn=pytest.fail)
+        page = (tmp_path / "report" / "report.html").read_text()
+        assert '"cellSize":0.5' in page

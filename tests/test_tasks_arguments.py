@@ -1,0 +1,105 @@
+"""What the constructors of environments refuse, each in one line."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+import mazebench
+from mazebench.envs.gym import MazeEnv
+from mazebench.envs.vector import MazeVectorEnv
+from mazebench.errors import InputError
+from mazebench.tasks.navigation import Environment
+
+ID = "mazebench/Local-13-v1"
+MAKERS = {
+    "load": mazebench.load,
+    "make": lambda **options: gymnasium.make(ID, **options),
+    "make_vec": lambda **options: gymnasium.make_vec(ID, **options),
+}
+SPEC = mazebench.make_spec(size=13)
+
+WRONG_OPTIONS = [
+    ("map_flip", "0.1", "expected map_flip of type float, found '0.1'"),
+    ("time_limit", 1.5, "expected time_limit of type int, found 1.5"),
+    ("continuous", "yes", "expected continuous of type bool, found 'yes'"),
+    ("distances", "1-5", "expected distances of type tuple[int, ...], found ('1-5',)"),
+    ("seed", -1, "expected seed of at least 0, found -1"),
+    ("seed", "a", "expected seed of type int | None, found 'a'"),
+    ("seed", 1.5, "expected seed of type int | None, found 1.5"),
+]
+WRONG_IN = {
+    "make": [
+        ("render_mode", "bogus", "unknown render_mode 'bogus'; available: rgb_array"),
+        ("camera", "nose", "unknown camera 'nose'; available: chase, egocentric, top"),
+    ],
+    "make_vec": [
+        ("render_mode", "bogus", "unknown render_mode 'bogus'; available: rgb_array"),
+        ("num_envs", 0, "expected num_envs of at least 1, found 0"),
+        ("num_envs", "3", "expected num_envs of type int, found '3'"),
+        ("num_threads", -1, "expected num_threads of at least 0, found -1"),
+        ("autoreset_mode", "Never", "unknown autoreset_mode 'Never'; available: Disabled, NextStep, SameStep"),
+    ],
+}
+WRONG = [(maker, *wrong) for maker in MAKERS for wrong in WRONG_OPTIONS + WRONG_IN.get(maker, [])]
+
+
+class TestArguments:
+    @pytest.mark.parametrize(("maker", "name", "value", "message"), WRONG)
+    def test_a_wrong_argument_is_refused_in_one_line(self, maker, name, value, message):
+        with pytest.raises(InputError) as error:
+            MAKERS[maker](**{name: value})
+        assert str(error.value) == message
+
+    @pytest.mark.parametrize("maker", MAKERS.values(), ids=MAKERS)
+    def test_numbers_of_numpy_are_accepted(self, maker):
+        maker(seed=np.int64(3), time_limit=np.int32(50), distances=np.arange(1, 4), map_flip=np.float32(0.5))
+
+    @pytest.mark.parametrize("make", [Environment, MazeEnv, lambda spec: MazeVectorEnv(spec, 2)])
+    @pytest.mark.parametrize(("spec", "found"), [(None, "NoneType"), ("local", "str")])
+    def test_anything_but_a_task_spec_is_refused(self, make, spec, found):
+        with pytest.raises(
+            InputError, match=rf"expected a TaskSpec, as mazebench.make_spec\(\) returns, found {found}"
+        ):
+            make(spec)
+
+
+class TestReset:
+    @pytest.mark.parametrize("seed", [-1, "a", 1.5, [1, 2]])
+    @pytest.mark.parametrize("make", [Environment, lambda spec: MazeVectorEnv(spec, 3)])
+    def test_a_wrong_seed_is_refused(self, make, seed):
+        with pytest.raises(
+            InputError, match=r"expected seed of (at least 0|type int \| None)|expected 3 seeds, found 2"
+        ):
+            make(SPEC).reset(seed=seed)
+
+    @pytest.mark.parametrize("seed", [-1, "a", 1.5])
+    def test_gymnasium_refuses_a_wrong_seed_of_a_single_environment(self, seed):
+        with pytest.raises(gymnasium.error.Error, match="Seed must be"):
+            MazeEnv(SPEC).reset(seed=seed)
+
+    @pytest.mark.parametrize("options", [3, {"level": 2}, {"episode": 3}])
+    def test_wrong_options_are_refused(self, options):
+        with pytest.raises(InputError, match=r"options as a dict|unknown option 'level'|to be an Episode, found int"):
+            MazeEnv(SPEC).reset(options=options)
+
+
+class TestActions:
+    @pytest.mark.parametrize("action", [6, -1, 1.5, "forward", None, np.nan, np.inf, [0, 0], np.zeros((3, 3))])
+    @pytest.mark.parametrize("make", [MazeEnv, Environment, lambda spec: MazeVectorEnv(spec, 3)])
+    def test_a_wrong_action_is_refused_in_one_line(self, make, action):
+        env = make(SPEC)
+        env.reset(seed=0)
+        with pytest.raises(
+            InputError, match=r"^expected (an action|3 actions) from 0 to 5[^\n]*, (found|values)[^\n]*$"
+        ):
+            env.step(action)
+
+    @pytest.mark.parametrize("action", [1, "forward", None, [0, 0], [np.nan, 0, 0], np.zeros((3, 2))])
+    @pytest.mark.parametrize("make", [MazeEnv, Environment, lambda spec: MazeVectorEnv(spec, 3)])
+    def test_a_wrong_velocity_is_refused_in_one_line(self, make, action):
+        env = make(mazebench.make_spec(size=13, continuous=True))
+        env.reset(seed=0)
+        with pytest.raises(InputError, match=r"^expected velocities [^\n]*, found shape [^\n]*$"):
+            env.step(action)
