@@ -90,6 +90,35 @@ observation, _ = env.reset(seed=0)
 assert observation["top"].shape == (48, 48, 3) and observation["observation"].shape == (12 + 3 * 13 * 13,)
 """)
 
+    def test_gymnasium_records_a_film_of_an_episode(self, tmp_path):
+        pytest.importorskip("moviepy")
+        run_with_egl(f"""
+env = gymnasium.make("mazebench/Local-13-v1", render_mode="rgb_array", time_limit=4)
+env = gymnasium.wrappers.RecordVideo(env, {str(tmp_path / "films")!r})
+env.reset(seed=0)
+for _ in range(4):
+    env.step(0)
+env.close()
+""")
+        assert [path.name for path in (tmp_path / "films").iterdir()] == ["rl-video-episode-0.mp4"]
+
+    def test_environments_that_end_leave_the_pictures_of_others_as_they_are(self):
+        run_with_egl("""
+import gc
+def opened():
+    env = mazebench.load("local", size=13, sensors="egocentric")
+    return env, env.reset(seed=9).observation["egocentric"]
+env, before = opened()
+other, _ = opened()
+other.close()
+np.testing.assert_array_equal(env.reset(seed=9).observation["egocentric"], before)
+third, picture = opened()
+np.testing.assert_array_equal(picture, before)
+del third
+gc.collect()
+np.testing.assert_array_equal(env.reset(seed=9).observation["egocentric"], before)
+""")
+
 
 @pytest.mark.parametrize(
     "program",

@@ -54,8 +54,9 @@ def differences(first: mujoco.MjModel, second: mujoco.MjModel) -> set[str]:
 
 
 class TestMazeModels:
-    def test_models_of_mazes_differ_in_known_fields_only(self):
-        models = MazeModels(mazes(0))
+    @pytest.mark.parametrize("textures", [False, True])
+    def test_models_of_mazes_differ_in_known_fields_only(self, textures):
+        models = MazeModels(mazes(0), textures)
         assert {"nq", "opt.timestep", "stat.extent", "vis.map.znear", "geom_size"} < {
             name for name, _ in fields(models[0])
         }
@@ -91,8 +92,9 @@ def drive(model: mujoco.MjModel) -> np.ndarray:
 
 
 class TestCopyMaze:
-    def test_a_copied_maze_is_the_same_model(self):
-        models = MazeModels(mazes(4))
+    @pytest.mark.parametrize("textures", [False, True])
+    def test_a_copied_maze_is_the_same_model(self, textures):
+        models = MazeModels(mazes(4), textures)
         physics = Physics.of_maze(models[0])
         target = physics.model.ptr
         for index in (1, 2, 3, 0):

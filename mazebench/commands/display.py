@@ -1,17 +1,34 @@
-"""Whether this machine has a display, and which backend renders without one."""
+"""The rendering backend of a command, settled before MuJoCo is imported."""
 
 from __future__ import annotations
 
 import os
-import sys
+from collections.abc import Iterable
+
+from mazebench.tasks.sensors import SENSORS
+from mazebench.tasks.sensors.cameras import CameraSensor
+from mazebench.world import backend
 
 
-def has_display() -> bool:
-    """Returns whether windows can be expected to open here."""
-    return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+def load_mujoco(renders: bool) -> None:
+    """Imports MuJoCo for a command, which then works with any value of MUJOCO_GL if it renders nothing.
 
+    Args:
+      renders: whether the command renders. Without a display it does so with EGL, unless the user chose a backend.
 
-def choose_rendering_backend() -> None:
-    """Lets this process render without a display, unless the user chose a backend; before MuJoCo is imported."""
-    if not has_display():
+    Raises:
+      RenderingError: if the command renders and the backend can't be loaded.
+    """
+    if renders and not backend.has_display():
         os.environ.setdefault("MUJOCO_GL", "egl")
+    try:
+        backend.load_mujoco()
+    except backend.RenderingError:
+        if renders:
+            raise
+        os.environ["MUJOCO_GL"] = "off"  # in worker processes too
+
+
+def has_camera(sensors: Iterable[str]) -> bool:
+    """Returns whether one of the sensors with these names is a camera; unknown names are none."""
+    return any(SENSORS.get(name) is CameraSensor for name in sensors)

@@ -6,12 +6,13 @@ from typing import Annotated, Any
 
 import typer
 
-from mazebench.commands.display import has_display
-from mazebench.commands.options import default_distances, refuse_ignored_by_task, takes_options
+from mazebench.commands.display import load_mujoco
+from mazebench.commands.options import refuse_ignored_by_task, takes_options, watched_distances
 from mazebench.errors import InputError
 from mazebench.evaluation.options import TASK_CHOICES, EvalOptions
+from mazebench.world.backend import has_display
 
-_CHOICES = tuple(name for name in TASK_CHOICES if name not in ("episodes_per_distance", "camera_size"))
+_CHOICES = tuple(name for name in TASK_CHOICES if name not in ("episodes_per_distance", "camera_size", "textures"))
 
 
 @takes_options(EvalOptions, _CHOICES)
@@ -25,7 +26,9 @@ def play(
 ) -> None:
     """Drive yourself, with the keyboard: in MuJoCo's viewer, or without a display in the terminal."""
     refuse_ignored_by_task(context, values)
-    values["distances"] = values["distances"] or default_distances(values["track"]) or None
+    values["distances"] = watched_distances(values)
+    in_window = has_display() and not terminal
+    load_mujoco(renders=in_window)
     from mazebench.play.game import LIDAR, Game
     from mazebench.tasks.registry import make_spec
 
@@ -33,9 +36,9 @@ def play(
         if sensor != LIDAR:
             raise InputError(f"expected sensors {LIDAR} or none, found {sensor}, which is not shown while you drive")
     game = Game(make_spec(**values), seed)
-    if terminal or not has_display():
-        from mazebench.play import terminal as screen
+    if in_window:
+        from mazebench.play import viewer as screen
     else:
-        from mazebench.play import viewer as screen  # type: ignore[no-redef]
+        from mazebench.play import terminal as screen  # type: ignore[no-redef]
     screen.play(game)
     print(game.outcome())

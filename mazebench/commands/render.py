@@ -7,10 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
-from mazebench.commands.display import choose_rendering_backend
-from mazebench.commands.options import default_distances, refuse_ignored_by_task, takes_options
+from mazebench.commands.display import load_mujoco
+from mazebench.commands.options import refuse_ignored_by_task, takes_options, watched_distances
 from mazebench.evaluation.options import TASK_CHOICES, EvalOptions
 
+_DRAWN = ("map", "lidar")  # views that need no rendering
 _CHOICES = tuple(name for name in TASK_CHOICES if name != "episodes_per_distance")
 
 
@@ -31,8 +32,8 @@ def render(
 ) -> None:
     """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
     refuse_ignored_by_task(context, values)
-    values["distances"] = values["distances"] or default_distances(values["track"])
-    choose_rendering_backend()
+    values["distances"] = watched_distances(values) or ()
+    load_mujoco(renders=view not in _DRAWN)
     from mazebench.evaluation import film
 
     outcome = film.film_episode(EvalOptions(agent, **values), out, view, pixels)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 
 import cv2
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mazebench.agent import Inputs
 from mazebench.errors import InputError, unknown
@@ -17,10 +18,12 @@ from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.image import draw_grid, draw_rays, write_image
 from mazebench.storage.files import open_whole, writing_to
+from mazebench.tasks.context import resized_map
 from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.lidar import ray_ends
-from mazebench.world.rendering import CAMERAS, Renderer
+from mazebench.world.models import models_of
+from mazebench.world.rendering import CAMERAS, Cameras
 
 MAP, LIDAR = "map", "lidar"
 _FRAMES_PER_SECOND = 1 / 0.16  # one an agent step: the film runs in real time
@@ -46,7 +49,7 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
         raise unknown("view", view, (MAP, *CAMERAS, LIDAR, "all"))
     if out.suffix not in _WRITERS:
         raise unknown("suffix", out.suffix, _WRITERS)
-    frames, outcome = _run(options, view, pixels)
+    frames, outcome = _run(options, view, pixels, is_film=out.suffix != ".png")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         _WRITERS[out.suffix](frames, out)
@@ -55,7 +58,8 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
     return outcome
 
 
-def _run(options: EvalOptions, view: str, pixels: int) -> tuple[list[np.ndarray], str]:
+def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[list[np.ndarray], str]:
+    """Runs the episode; returns a picture of each of its moments, or of the last one alone, and what came of it."""
     plan = make_plan(options)
     views = _views(view, plan.task)
     number = options.seed % len(plan.trials)
@@ -68,9 +72,14 @@ def _run(options: EvalOptions, view: str, pixels: int) -> tuple[list[np.ndarray]
     state = agent.initial_state(1)
     seed = np.array([agent_seed(options.seed, number)])
     scene = _Scene(environment, plan.task, views, pixels)
+    frames: list[np.ndarray] = []
     try:
-        frames = [scene.draw(time_step.observation)]
-        while not time_step.last():
+        while True:
+            scene.record_position()
+            if is_film or time_step.last():
+                frames.append(scene.draw(time_step.observation))
+            if time_step.last():
+                break
             observation = {name: value[None] for name, value in time_step.observation.items() if name != "is_first"}
             truth = None
             if plan.agent_class.needs_truth:
@@ -79,7 +88,6 @@ def _run(options: EvalOptions, view: str, pixels: int) -> tuple[list[np.ndarray]
             new_episode, new_context = np.array([time_step.first()]), np.array([task.is_first])
             actions, state = agent.act(Inputs(observation, new_episode, new_context, seed, truth), state)
             time_step = environment.step(int(actions[0]))
-            frames.append(scene.draw(time_step.observation))
     finally:
         scene.close()
     ending = "reached the goal" if task.success else "ran out of time"
@@ -113,34 +121,43 @@ class _Scene:
 
     def __post_init__(self) -> None:
         self._path: list[np.ndarray] = []
-        cameras = [view for view in self.views if view in CAMERAS]
-        self._renderer = Renderer(self.environment.physics.model.ptr, self.pixels, self.pixels) if cameras else None
+        names = tuple(view for view in self.views if view in CAMERAS)
+        models = models_of(self.task_spec.mazes, self.task_spec.textures)
+        self._cameras = Cameras(models, names, self.pixels) if names else None
+
+    def record_position(self) -> None:
+        """Adds the body's position to the driven path."""
+        self._path.append(self.environment.physics.position())
 
     def draw(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
         """Returns a picture `[H, W, 3]` uint8 of the current state, in which `observation` was made.
 
         The shown map, and the maze in the view of the range sensor, have the path driven up to now.
         """
-        self._path.append(self.environment.physics.position())
-        return np.concatenate([self._view(view, observation) for view in self.views], axis=1)
+        pictures = {} if self._cameras is None else self._take(self._cameras)
+        pictures |= {view: self._drawing(view, observation) for view in self.views if view not in pictures}
+        return np.concatenate([pictures[view] for view in self.views], axis=1)
 
     def close(self) -> None:
-        if self._renderer is not None:
-            self._renderer.close()
+        if self._cameras is not None:
+            self._cameras.close()
 
-    def _view(self, view: str, observation: Mapping[str, np.ndarray]) -> np.ndarray:
-        if view in CAMERAS:
-            assert self._renderer is not None
-            return self._renderer.render(self.environment.physics.data.ptr, view)
+    def _take(self, cameras: Cameras) -> dict[str, np.ndarray]:
+        data = self.environment.physics.data
+        return cameras.take(self.environment.task.maze, data.qpos, data.mocap_pos[0])
+
+    def _drawing(self, view: str, observation: Mapping[str, np.ndarray]) -> np.ndarray:
         picture = self._map() if view == MAP else self._rays(observation[LIDAR])
         return cv2.resize(picture, (self.pixels, self.pixels), interpolation=cv2.INTER_AREA)
 
     def _map(self) -> np.ndarray:
         """Returns a picture of the map that the agent is shown, some two times as large as a view."""
-        task = self.environment.task
-        walls = task.shown_map.seen_walls()
-        start, goal = (task.shown_map.seen_cell(cell) for cell in (task.episode.start, task.episode.goal))
-        path = task.shown_map.seen_points(np.array(self._path))
+        task, side = self.environment.task, self.task_spec.context_size
+        seen = task.shown_map.seen_walls()
+        walls, size = resized_map(seen, side), len(seen)
+        pixels = (task.shown_map.seen_cell(cell) for cell in (task.episode.start, task.episode.goal))
+        start, goal = ((row * side // size, column * side // size) for row, column in pixels)
+        path = task.shown_map.seen_points(self._to_cells(self._path)) * (side / size)
         return draw_grid(walls, self._cell_pixels(walls), start, goal, path)
 
     def _rays(self, ranges: np.ndarray) -> np.ndarray:
@@ -148,17 +165,20 @@ class _Scene:
         physics, episode = self.environment.physics, self.environment.task.episode
         walls = self.task_spec.mazes[episode.maze].walls
         cell_pixels = self._cell_pixels(walls)
-        picture = draw_grid(walls, cell_pixels, episode.start, episode.goal, np.array(self._path))
+        picture = draw_grid(walls, cell_pixels, episode.start, episode.goal, self._to_cells(self._path))
         pose = np.array([*physics.position(), physics.yaw()])
-        draw_rays(picture, cell_pixels, pose[:2], ray_ends(pose, ranges))
+        draw_rays(picture, cell_pixels, self._to_cells(pose[:2]), self._to_cells(ray_ends(pose, ranges)))
         return picture
+
+    def _to_cells(self, points: ArrayLike) -> np.ndarray:  # [..., 2] m
+        return np.asarray(points) / self.task_spec.cell_size
 
     def _cell_pixels(self, walls: np.ndarray) -> int:
         return 2 * self.pixels // len(walls) + 1
 
 
 def _write_png(frames: list[np.ndarray], out: pathlib.Path) -> None:
-    write_image(frames[-1], out)
+    write_image(frames[0], out)
 
 
 def _write_gif(frames: list[np.ndarray], out: pathlib.Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import dm_env
 import numpy as np
@@ -79,6 +80,10 @@ class Game:
         pose = np.array([*self.path[-1], self.environment.physics.yaw()])
         return ray_ends(pose, self.time_step.observation[LIDAR])
 
+    def to_cells(self, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
+        """Returns `[..., 2]` points in metres in cells, in which pictures are drawn."""
+        return np.asarray(points) / self.task_spec.cell_size
+
     @property
     def landmarks(self) -> list[Cell]:
         """The landmarks that are still to be reached before the goal, as cells of the true maze."""
@@ -90,7 +95,8 @@ class Game:
         task = self.environment.task
         maze, episode = self.task_spec.mazes[task.episode.maze], task.episode
         distance = maze.distance(episode.start, episode.goal)
-        return f"maze {maze.name}, {self.task_spec.task}: the goal is {distance} cells away"
+        scale = "" if maze.cell_size == 1 else f" of {maze.cell_size:g} m"
+        return f"maze {maze.name}, {self.task_spec.task}: the goal is {distance} cells{scale} away"
 
     def status(self) -> str:
         """Returns a line that describes the state of the episode."""

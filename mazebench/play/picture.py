@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mazebench.maps import colors
 from mazebench.maps.maze import Cell
 from mazebench.play.game import HELP, Game
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
@@ -39,8 +40,8 @@ _MIN_WIDTH, _MIN_HEIGHT = 24, 10
 _SHADES = {
     Style.FLOOR: (255, 255, 255),
     Style.WALL: (32, 34, 40),
-    Style.START: (64, 160, 100),
-    Style.GOAL: (214, 60, 60),
+    Style.START: colors.to_bytes(colors.START),
+    Style.GOAL: colors.to_bytes(colors.GOAL),
 }
 
 
@@ -59,8 +60,9 @@ def draw(game: Game, width: int, height: int, plain: bool = False) -> Characters
         return screen
     rows, columns = _scale(game, width, height)
     half = (width - _GAP) // 2
-    world = _focus(draw_world(game, rows, columns, plain), height - _LINES, half, game.path[-1] / game.task_spec.size)
-    shown = _focus(draw_map(game, rows, columns), height - _LINES, half, game.path[-1] / game.task_spec.size)
+    place = game.to_cells(game.path[-1]) / game.task_spec.size
+    world = _focus(draw_world(game, rows, columns, plain), height - _LINES, half, place)
+    shown = _focus(draw_map(game, rows, columns), height - _LINES, half, place)
     right = world.glyphs.shape[1] + _GAP
     _write(screen, 0, 0, game.title())
     _write(screen, 1, 0, "the world")
@@ -77,9 +79,9 @@ def draw_world(game: Game, rows: int, columns: int, plain: bool = False) -> Char
     """Returns the true maze with the path and the rays of the range sensor, `rows` x `columns` characters a cell."""
     task, size = game.environment.task, game.task_spec.size
     styles = np.where(game.walls, Style.WALL, Style.FLOOR).repeat(rows, axis=0).repeat(columns, axis=1)
-    path = np.array(game.path) * [columns, -rows] + [0, size * rows]
+    path = game.to_cells(game.path) * [columns, -rows] + [0, size * rows]
     if game.rays is not None:
-        ends = game.rays * [columns, -rows] + [0, size * rows]
+        ends = game.to_cells(game.rays) * [columns, -rows] + [0, size * rows]
         points = np.linspace(path[-1], ends, _RAY_POINTS, endpoint=False).astype(int)  # [_RAY_POINTS, 32, 2]
         styles[points[..., 1], points[..., 0]] = Style.RAY
     styles[path[:, 1].astype(int), path[:, 0].astype(int)] = Style.PATH

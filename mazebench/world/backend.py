@@ -1,0 +1,64 @@
+"""The rendering backend that MUJOCO_GL names. MuJoCo and dm_control load it when they are imported."""
+
+from __future__ import annotations
+
+import ctypes.util
+import os
+import sys
+
+from mazebench.errors import InputError
+
+_LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}  # of the backends that need no display
+_GLFW = ("glfw", "on", "enable", "enabled", "true", "1", "")
+_OFF = ("off", "disable", "disabled", "false", "0")
+
+
+class RenderingError(InputError):
+    """This machine, as it is set up, can't render."""
+
+
+def load_mujoco() -> None:
+    """Imports MuJoCo and dm_control, and with them the rendering backend.
+
+    Raises:
+      RenderingError: if they can't load the backend that the environment variable MUJOCO_GL names.
+    """
+    if "MUJOCO_GL" not in os.environ:
+        return  # they take what there is
+    try:
+        import mazebench.world.physics  # noqa: F401
+    # The kind of error depends on the backend.
+    except (AttributeError, ImportError, OSError, RuntimeError) as error:
+        raise rendering_error(error) from None  # it says all
+
+
+def rendering_error(error: Exception) -> RenderingError:
+    """Returns an error that says why `error` came up while a backend was opened, and which backends are installed."""
+    chosen = os.environ.get("MUJOCO_GL")
+    setting = "MUJOCO_GL is not set" if chosen is None else f"MUJOCO_GL={chosen}"
+    others = [f"MUJOCO_GL={name}" for name in installed_backends() if name != chosen]
+    advice = f"set {' or '.join(others)} before Python starts" if others else "no other backend is installed here"
+    return RenderingError(f"can't open a rendering context, {setting}: {_reason(chosen, error)}; {advice}")
+
+
+def installed_backends() -> list[str]:
+    """Returns the values of MUJOCO_GL whose libraries are installed. GLFW always is, but it needs a display."""
+    backends = [name for name, library in _LIBRARIES.items() if ctypes.util.find_library(library)]
+    return ["glfw", *backends] if has_display() else backends
+
+
+def has_display() -> bool:
+    """Returns whether windows can be expected to open here."""
+    return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _reason(chosen: str | None, error: Exception) -> str:
+    if chosen in _OFF:
+        return "this switches rendering off"
+    if chosen in _LIBRARIES and chosen not in installed_backends():
+        return f"the library {_LIBRARIES[chosen]} is not installed"
+    if chosen is not None and chosen not in (*_LIBRARIES, *_GLFW):
+        return f"expected {', '.join(_LIBRARIES)}, glfw or off"
+    if not has_display() and chosen not in _LIBRARIES:
+        return "this machine has no display"
+    return str(error).splitlines()[0] if str(error) else repr(error)

@@ -1,0 +1,185 @@
+"""The textured look of a maze: walls, floor and sky that tell places apart, by MuJoCo's own textures alone.
+
+Cells near each other form a region, and the walls seen from a region have one of a few surfaces. Regions and surfaces
+are drawn from a hash of the walls. So equal mazes look equal, and in a maze that was never seen a surface says nothing
+about the place on the map.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from scipy.sparse import csgraph
+
+from mazebench.maps.maze import WALL_HEIGHT, Maze, grid_graph
+
+_CELLS_PER_REGION = 7
+_OFFSET = 0.002  # m, from a wall to its face
+_PARKED_DEPTH = 20.0  # m below the floor
+
+_Colour = tuple[float, float, float]
+
+
+class _Surface(NamedTuple):
+    """A texture for walls, told apart from the others, from the red goal and from the orange body."""
+
+    builtin: mujoco.mjtBuiltin
+    colours: tuple[_Colour, _Colour]
+    mark: mujoco.mjtMark
+    mark_colour: _Colour
+    pixels: tuple[int, int]  # width and height of the texture; marks are one pixel wide
+    span: tuple[float, float]  # m, along the wall and upwards, that the texture covers
+
+
+def _tiles(colour: _Colour, lines: _Colour, pixels: tuple[int, int], span: tuple[float, float]) -> _Surface:
+    return _Surface(mujoco.mjtBuiltin.mjBUILTIN_FLAT, (colour, colour), mujoco.mjtMark.mjMARK_EDGE, lines, pixels, span)
+
+
+def _checks(one: _Colour, other: _Colour, span: tuple[float, float]) -> _Surface:
+    return _Surface(mujoco.mjtBuiltin.mjBUILTIN_CHECKER, (one, other), mujoco.mjtMark.mjMARK_NONE, one, (64, 64), span)
+
+
+def _dots(colour: _Colour, dots: _Colour) -> _Surface:
+    mark = mujoco.mjtMark.mjMARK_RANDOM
+    return _Surface(mujoco.mjtBuiltin.mjBUILTIN_FLAT, (colour, colour), mark, dots, (16, 16), (1, 1))
+
+
+_WHITE, _DARK = (0.95, 0.95, 0.95), (0.16, 0.17, 0.22)
+_SURFACES = (
+    _tiles((0.20, 0.42, 0.85), _WHITE, (24, 24), (0.5, 0.5)),
+    _checks((0.20, 0.55, 0.25), (0.62, 0.85, 0.50), (1, 1)),
+    _tiles((0.95, 0.80, 0.22), _DARK, (64, 16), (1, 0.25)),
+    _dots((0.50, 0.30, 0.72), (0.88, 0.80, 0.98)),
+    _checks((0.08, 0.60, 0.62), _WHITE, (0.5, 0.5)),
+    _tiles(_WHITE, (0.35, 0.36, 0.40), (32, 16), (0.5, 0.25)),
+    _dots(_DARK, (0.98, 0.86, 0.30)),
+    _tiles((0.56, 0.38, 0.22), (0.24, 0.15, 0.08), (16, 64), (0.25, 1)),
+    _checks((0.13, 0.20, 0.50), (0.45, 0.68, 0.95), (1, 0.5)),
+    _tiles((0.42, 0.44, 0.50), _DARK, (12, 12), (1, 1)),
+    _checks(_DARK, _WHITE, (0.5, 1)),
+    _tiles((0.55, 0.78, 0.20), (0.13, 0.30, 0.08), (16, 64), (0.25, 1)),
+)
+_SKY = ((0.28, 0.50, 0.82), (0.90, 0.95, 0.99))
+_FLOOR = ((0.86, 0.83, 0.78), (0.80, 0.77, 0.71))
+_RED = (0.95, 0.10, 0.10, 1.0)
+
+
+class Face(NamedTuple):
+    """A part of a wall's side, as high as the wall, that is seen from one region."""
+
+    x: float  # m, its middle
+    y: float
+    yaw: float  # rad, from +y to where it faces
+    half_length: float  # m
+    surface: int  # index among the surfaces
+
+
+def wall_faces(maze: Maze) -> list[Face]:
+    """Returns the sides of walls that border free cells, in pieces as long as one surface reaches."""
+    faces = []
+    surfaces = _surfaces(maze)
+    scale, middle = maze.cell_size, maze.size / 2
+    for turns in range(4):
+        turned = np.rot90(surfaces, turns)
+        # Free cells with a wall below; the outer walls are the last row.
+        seen = np.where(turned[1:] < 0, turned[:-1], -1)
+        for row, line in enumerate(seen):
+            ends = (np.flatnonzero(np.diff(line)) + 1).tolist()
+            for begin, end in itertools.pairwise([0, *ends, len(line)]):
+                if line[begin] < 0:
+                    continue
+                x, y = scale * ((begin + end) / 2 - middle), scale * (middle - row - 1) + _OFFSET
+                for _ in range(turns):  # back, clockwise
+                    x, y = y, -x
+                half_length, surface = scale * (end - begin) / 2, int(line[begin])
+                faces.append(Face(x + scale * middle, y + scale * middle, -turns * np.pi / 2, half_length, surface))
+    return faces
+
+
+def _surfaces(maze: Maze) -> np.ndarray:
+    """Returns the surface of the walls that are seen from each free cell, -1 in walls: `[N, N]` int.
+
+    Regions next to each other have different surfaces if that can be, and all surfaces are used about equally often.
+    """
+    rng = np.random.default_rng(list(hashlib.sha256(np.packbits(maze.walls).tobytes()).digest()))
+    num_cells = len(maze.free_cells)
+    cells = np.full(maze.walls.shape, -1)
+    cells[~maze.walls] = np.arange(num_cells)
+    graph = grid_graph(cells)
+    sites = np.sort(rng.choice(num_cells, max(1, num_cells // _CELLS_PER_REGION), replace=False))
+    _, _, nearest = csgraph.dijkstra(graph, unweighted=True, indices=sites, min_only=True, return_predecessors=True)
+    region = np.searchsorted(sites, nearest)  # of each free cell
+    borders = region[np.stack(graph.nonzero())]  # [2, E]
+    surface = np.full(len(sites), -1)  # of each region
+    uses = np.zeros(len(_SURFACES))
+    for site in range(len(sites)):
+        around = surface[borders[1, borders[0] == site]]
+        is_around = np.isin(np.arange(len(_SURFACES)), around)
+        rank = np.where(is_around, np.inf, uses)
+        surface[site] = rng.choice(np.flatnonzero(rank == rank.min()))
+        uses[surface[site]] += 1
+    result = np.full(maze.walls.shape, -1)
+    result[~maze.walls] = surface[region]
+    return result
+
+
+def add_textures(spec: mujoco.MjSpec, maze: Maze, faces: list[Face], num_faces: int) -> None:
+    """Gives `spec`, the model of `maze`, the textured look.
+
+    Args:
+      spec: from `mazebench.world.mjcf`.
+      maze: the maze of that model.
+      faces: its `wall_faces`. They are only seen; the walls behind them are as they were.
+      num_faces: how many faces the model gets; those that are too many are below the floor.
+    """
+    _add_materials(spec)
+    middle = maze.cell_size * maze.size / 2
+    parked = [Face(middle, middle, 0.0, 0.1, 0)] * (num_faces - len(faces))
+    for index, face in enumerate([*faces, *parked]):
+        depth = 0.0 if index < len(faces) else _PARKED_DEPTH
+        # A plane faces its own z axis. This one is turned so that its y axis points up, then about the vertical.
+        cos, sin = np.cos((face.yaw + np.pi) / 2), np.sin((face.yaw + np.pi) / 2)
+        spec.worldbody.add_geom(
+            name=f"face_{index}",
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            pos=[face.x, face.y, WALL_HEIGHT / 2 - depth],
+            quat=np.array([cos, cos, sin, sin]) * np.sqrt(0.5),
+            size=[face.half_length, WALL_HEIGHT / 2, 1],
+            material=f"face_{face.surface}",
+            contype=0,
+            conaffinity=0,
+        )
+
+
+def _add_materials(spec: mujoco.MjSpec) -> None:
+    sky, floor = spec.texture("sky"), spec.texture("cells")
+    sky.rgb1, sky.rgb2 = _SKY
+    floor.builtin, (floor.rgb1, floor.rgb2) = mujoco.mjtBuiltin.mjBUILTIN_CHECKER, _FLOOR
+    textures = [""] * mujoco.mjtTextureRole.mjNTEXROLE
+    for index, surface in enumerate(_SURFACES):
+        name = f"face_{index}"
+        spec.add_texture(
+            name=name,
+            type=mujoco.mjtTexture.mjTEXTURE_2D,
+            builtin=surface.builtin,
+            rgb1=surface.colours[0],
+            rgb2=surface.colours[1],
+            mark=surface.mark,
+            markrgb=surface.mark_colour,
+            random=0.12,  # the share of dots
+            width=surface.pixels[0],
+            height=surface.pixels[1],
+        )
+        textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+        # With texuniform, a repetition of 1 spans two metres.
+        repeat = [2 / surface.span[0], 2 / surface.span[1]]
+        spec.add_material(name=name, textures=textures, texrepeat=repeat, texuniform=True, specular=0, emission=0.3)
+    spec.add_material(name="beacon", rgba=_RED, emission=0.5)
+    # Seen at eye level, the goal's disc on the floor is hardly visible from afar.
+    spec.body("goal").add_site(
+        name="beacon", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[0.1, 0.4, 0], pos=[0, 0, 0.4], material="beacon"
+    )

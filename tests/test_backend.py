@@ -1,0 +1,96 @@
+"""A value of MUJOCO_GL that is misspelt, or names a missing backend, matters only where something is rendered."""
+
+from __future__ import annotations
+
+import ctypes.util
+import os
+import pickle
+import subprocess
+import sys
+
+import pytest
+
+from mazebench.world.backend import RenderingError, installed_backends
+
+MISSING = [name for name, library in (("egl", "EGL"), ("osmesa", "OSMesa")) if not ctypes.util.find_library(library)]
+WRONG = ["elg", *MISSING]
+
+
+def run(backend: str, *arguments: str, folder) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"MUJOCO_GL": backend}
+    command = [sys.executable, *arguments]
+    return subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True)
+
+
+@pytest.mark.parametrize("backend", WRONG)
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("generate", "--size", "5", "--format", "txt,mjcf"),
+        ("eval", "--agent", "planner", "--split", "train", "--distances", "1", "--episodes-per-distance", "1"),
+        ("render", "--view", "map", "--out", "map.png"),
+        ("list",),
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_a_command_that_renders_nothing_works(backend, arguments, tmp_path):
+    result = run(backend, "-m", "mazebench", *arguments, folder=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "rendering context" not in result.stderr
+
+
+@pytest.mark.parametrize("backend", [*WRONG, "off"])
+@pytest.mark.parametrize(
+    "arguments",
+    [("render", "--out", "x.png"), ("eval", "--agent", "planner", "--sensors", "egocentric")],
+    ids=lambda arguments: arguments[0],
+)
+def test_a_command_that_renders_says_in_one_line_what_is_wrong(backend, arguments, tmp_path):
+    result = run(backend, "-m", "mazebench", *arguments, folder=tmp_path)
+    assert result.returncode == 2
+    assert "Traceback" not in result.stderr
+    last = result.stderr.splitlines()[-1]
+    assert last.startswith(f"mazebench: can't open a rendering context, MUJOCO_GL={backend}: ")
+    assert not any(f"set MUJOCO_GL={name}" in result.stderr for name in MISSING)
+
+
+@pytest.mark.parametrize("backend", WRONG)
+def test_mazebench_is_imported_and_specs_are_made(backend, tmp_path):
+    program = "import mazebench; print(mazebench.make_spec('local', size=13).size)"
+    assert run(backend, "-c", program, folder=tmp_path).stdout == "13\n"
+
+
+@pytest.mark.parametrize("backend", WRONG)
+def test_every_environment_is_refused_with_the_same_line(backend, tmp_path):
+    program = """
+import gymnasium, mazebench
+for make in (
+    lambda: gymnasium.make("mazebench/Local-13-v1"),
+    lambda: gymnasium.make("mazebench/LocalGoal-13-v1"),
+    lambda: mazebench.make_vec("local", 2),
+    lambda: mazebench.load("local"),
+    lambda: mazebench.evaluate("planner"),
+):
+    try:
+        make()
+    except mazebench.InputError as error:
+        assert error.__suppress_context__  # one traceback, if nobody catches it
+        print(error)
+"""
+    said = run(backend, "-c", program, folder=tmp_path).stdout.splitlines()
+    assert len(said) == 5
+    assert len(set(said)) == 1
+    assert said[0].startswith(f"can't open a rendering context, MUJOCO_GL={backend}: ")
+
+
+def test_only_backends_that_are_installed_are_advised(monkeypatch):
+    monkeypatch.setenv("DISPLAY", "")
+    monkeypatch.setenv("WAYLAND_DISPLAY", "")
+    assert not set(installed_backends()) & set(MISSING)
+    if sys.platform == "linux":
+        assert "glfw" not in installed_backends()
+
+
+def test_the_error_passes_from_a_worker_as_it_is():
+    error = RenderingError("can't open a rendering context")
+    assert str(pickle.loads(pickle.dumps(error))) == str(error)  # noqa: S301

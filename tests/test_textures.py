@@ -1,0 +1,156 @@
+"""The textured look: a matter of pictures alone, which depends on the walls alone."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from rendering import run_with_egl
+
+from mazebench.maps.benchmark import load_mazes
+from mazebench.maps.generators import generate
+from mazebench.maps.maze import Maze, point_to_cell
+from mazebench.world.export import write_mjcf
+from mazebench.world.textures import Face, wall_faces
+
+MAZES = [
+    generate(style, size, np.random.default_rng(size)) for style in ("dfs", "rooms", "obstacles") for size in (5, 15)
+]
+
+
+def facing(face: Face) -> np.ndarray:
+    return np.array([-np.sin(face.yaw), np.cos(face.yaw)])
+
+
+@pytest.mark.parametrize("maze", MAZES, ids=lambda maze: maze.name)
+class TestWallFaces:
+    def test_faces_are_the_sides_of_walls_that_border_free_cells(self, maze):
+        free = ~maze.walls
+        num_sides = (free[1:] ^ free[:-1]).sum() + (free[:, 1:] ^ free[:, :-1]).sum()
+        faces = wall_faces(maze)
+        assert sum(2 * face.half_length for face in faces) == pytest.approx(num_sides)
+        for face in faces:
+            normal = facing(face)
+            along = np.array([normal[1], -normal[0]])
+            for part in np.arange(0.5 - face.half_length, face.half_length):
+                point = np.array([face.x, face.y]) + part * along
+                assert maze.is_free(tuple(point_to_cell(point + 0.1 * normal, maze.size)))
+                assert not maze.is_free(tuple(point_to_cell(point - 0.1 * normal, maze.size)))
+
+    def test_a_cell_sees_one_surface(self, maze):
+        surfaces: dict[tuple[int, int], set[int]] = {}
+        for face in wall_faces(maze):
+            normal = facing(face)
+            for part in np.arange(0.5 - face.half_length, face.half_length):
+                point = np.array([face.x, face.y]) + part * np.array([normal[1], -normal[0]]) + 0.1 * normal
+                surfaces.setdefault(tuple(point_to_cell(point, maze.size).tolist()), set()).add(face.surface)
+        assert all(len(seen) == 1 for seen in surfaces.values())
+
+    def test_faces_scale_with_the_cells(self, maze):
+        large = wall_faces(Maze(maze.walls, cell_size=2.0))
+        for face, scaled in zip(wall_faces(maze), large, strict=True):
+            np.testing.assert_allclose([scaled.x, scaled.y], [2 * face.x, 2 * face.y], atol=0.01)
+            assert (scaled.half_length, scaled.yaw, scaled.surface) == (2 * face.half_length, face.yaw, face.surface)
+
+
+def test_the_look_depends_on_the_walls_alone():
+    maze, other = load_mazes(13, "eval")[:2]
+    assert wall_faces(Maze(maze.walls, "another name")) == wall_faces(maze)
+    assert wall_faces(other) != wall_faces(maze)
+
+
+def test_the_corridors_of_a_maze_differ():
+    for maze in load_mazes(13, "eval"):
+        assert len({face.surface for face in wall_faces(maze)}) >= 8
+
+
+def test_a_surface_says_nothing_about_the_place_on_the_map():
+    # The most frequent surface of the upper left corner's walls, over all mazes of the benchmark's size 13.
+    corners = [
+        face.surface for maze in load_mazes(13, "train") + load_mazes(13, "eval") for face in wall_faces(maze)[:1]
+    ]
+    assert np.bincount(corners).max() < len(corners) / 3
+
+
+class TestMjcf:
+    def test_plain_mujoco_opens_the_textured_file_from_anywhere(self, tmp_path, monkeypatch):
+        write_mjcf(MAZES[1], tmp_path / "maze.xml", textures=True)
+        monkeypatch.chdir("/")  # no other file is needed
+        model = mujoco.MjModel.from_xml_path(str(tmp_path / "maze.xml"))
+        faces = [model.geom(index) for index in range(model.ngeom) if model.geom(index).name.startswith("face_")]
+        assert len(faces) == len(wall_faces(MAZES[1]))
+        for face, expected in zip(faces, wall_faces(MAZES[1]), strict=True):
+            assert model.mat(face.matid.item()).name == f"face_{expected.surface}"
+            np.testing.assert_allclose(face.pos, (expected.x, expected.y, 0.5), atol=1e-9)
+            rotation = np.zeros(9)
+            mujoco.mju_quat2Mat(rotation, face.quat)
+            _, up, outwards = rotation.reshape(3, 3).T
+            np.testing.assert_allclose(outwards, (*facing(expected), 0), atol=1e-9)
+            np.testing.assert_allclose(up, (0, 0, 1), atol=1e-9)
+
+    def test_the_body_drives_as_in_the_plain_file(self, tmp_path):
+        ends = []
+        for textures in (False, True):
+            write_mjcf(MAZES[0], tmp_path / "maze.xml", textures=textures)
+            model = mujoco.MjModel.from_xml_path(str(tmp_path / "maze.xml"))
+            data = mujoco.MjData(model)
+            mujoco.mj_resetDataKeyframe(model, data, 0)
+            for drive in (0, 2, 1, 3):
+                data.ctrl[:] = np.eye(5)[drive]
+                mujoco.mj_step(model, data, 150)
+            ends.append(data.qpos.copy())
+        np.testing.assert_array_equal(*ends)
+
+
+class TestPictures:
+    def test_only_pictures_change(self):
+        run_with_egl("""
+options = dict(size=13, seed=3, sensors="egocentric")
+plain, textured = mazebench.load("local", **options), mazebench.load("local", **options, textures=True)
+one, other = plain.reset().observation, textured.reset().observation
+for action in (0, 4, 0, 0, 5, 2):
+    for name in one:
+        assert np.array_equal(one[name], other[name]) == (name != "egocentric")
+    one, other = plain.step(action).observation, textured.step(action).observation
+""")
+
+    def test_textured_pictures_are_the_same_in_all_environments(self):
+        run_with_egl("""
+options = dict(size=13, sensors="egocentric", textures=True)
+envs = mazebench.make_vec("local", 3, **options)
+pictures = envs.reset(seed=[3, 8, 9])[0]["egocentric"]
+env = gymnasium.make("mazebench/Local-13-v1", **options)
+dm = mazebench.load("local", **options)
+for slot, seed in enumerate((3, 8, 9)):
+    np.testing.assert_array_equal(env.reset(seed=seed)[0]["egocentric"], pictures[slot])
+    np.testing.assert_array_equal(dm.reset(seed=seed).observation["egocentric"], pictures[slot])
+    alone = mazebench.load("local", **options, seed=seed)  # no maze was exchanged here
+    np.testing.assert_array_equal(alone.reset().observation["egocentric"], pictures[slot])
+""")
+
+    def test_what_environments_render_is_textured_too(self):
+        run_with_egl("""
+def rendered(**options):
+    env = gymnasium.make("mazebench/Local-13-v1", render_mode="rgb_array", camera="chase", **options)
+    env.reset(seed=1)
+    envs = mazebench.make_vec("local", 1, size=13, render_mode="rgb_array", **options)
+    envs.reset(seed=1)
+    return env.render(), envs.render()[0]
+for plain, textured in zip(rendered(), rendered(textures=True)):
+    assert plain.shape == textured.shape == (480, 480, 3)
+    assert not np.array_equal(plain, textured)
+""")
+
+    def test_the_goal_is_seen_in_red_from_four_cells_away(self):
+        run_with_egl("""
+from mazebench.maps.text import parse_maze
+from mazebench.world.models import models_of
+from mazebench.world.rendering import Cameras
+maze = parse_maze("########\\n#......#\\n########\\n########\\n########\\n########\\n########\\n########", "corridor")
+red = []
+for textures in (False, True):
+    cameras = Cameras(models_of((maze,), textures), ("egocentric",), 64, smooth=False)
+    picture = cameras.take(0, np.array([1.5, 6.5, 0.0]), np.array([5.5, 6.5, 0.0]))["egocentric"].astype(int)
+    red.append(int(((picture[..., 0] > 150) & (picture[..., 1:] < 90).all(axis=-1)).sum()))
+assert red[1] >= 12 > red[0], red
+""")
