@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mazebench.envs.registration import make_vec
     from mazebench.errors import InputError
     from mazebench.evaluation.evaluate import evaluate
+    from mazebench.maps.arrays import maze_from_array
     from mazebench.maps.files import read_maze, read_mazes
     from mazebench.maps.generators import generate
     from mazebench.maps.maze import Maze, MazeError
@@ -42,6 +43,7 @@ _HOMES = {
     "generate": "mazebench.maps.generators",
     "load": "mazebench.tasks.registry",
     "make_spec": "mazebench.tasks.registry",
+    "maze_from_array": "mazebench.maps.arrays",
     "make_vec": "mazebench.envs.registration",
     "read_maze": "mazebench.maps.files",
     "read_mazes": "mazebench.maps.files",
@@ -61,6 +63,7 @@ __all__ = [
     "load",
     "make_spec",
     "make_vec",
+    "maze_from_array",
     "read_maze",
     "read_mazes",
 ]
@@ -75,4 +78,6 @@ if not TYPE_CHECKING:  # a type checker would take any name for one that is here
     def __getattr__(name: str) -> Any:
         if name not in _HOMES:
             raise AttributeError(f"module 'mazebench' has no attribute {name!r}")
+        if name == "evaluate":
+            importlib.import_module("mazebench.world.backend").load_mujoco()  # for its error if MUJOCO_GL is wrong
         return getattr(importlib.import_module(_HOMES[name]), name)

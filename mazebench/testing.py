@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -14,7 +15,7 @@ from mazebench.agent_loading import checked_agent_class, load_agent_class
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.evaluation.agent_inputs import agent_seed, true_state
-from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling
+from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling, context_size_of
 from mazebench.maps.generators import generate
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.spec import TaskSpec
@@ -41,7 +42,8 @@ def check_agent(
 
     Args:
       agent_class: the class, or what `--agent` takes.
-      interface: what the agent is built for; by default hierarchical navigation in 7 x 7 mazes.
+      interface: what the agent is built for; by default hierarchical navigation in 7 x 7 mazes with
+        the sensors that it needs.
       checkpoint: passed on to `build`.
 
     Raises:
@@ -95,11 +97,12 @@ class _Trial:
         self.name = agent_class.__name__
         self._agent_class, self._checkpoint = agent_class, checkpoint
         if interface is None:
-            with calling(self.name, "context_size"):
-                interface = Interface("hierarchical", _SIZE, int(agent_class.context_size(_SIZE)))
+            context_size = context_size_of(self.name, agent_class, _SIZE)
+            interface = Interface("hierarchical", _SIZE, context_size, sensors=agent_class.needs_sensors)
         self._interface = interface
         rng = np.random.default_rng(0)
-        mazes = tuple(generate("dfs", interface.size, rng, f"maze-{index}") for index in range(_NUM_MAZES))
+        drawn = (generate("dfs", interface.size, rng, f"maze-{index}") for index in range(_NUM_MAZES))
+        mazes = tuple(dataclasses.replace(maze, cell_size=interface.cell_size) for maze in drawn)
         self._task_spec = TaskSpec(
             task="hierarchical",
             mazes=mazes,

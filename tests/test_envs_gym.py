@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import subprocess
 import sys
 import warnings
@@ -10,13 +11,19 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.envs import registration
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import env_checker
+from gymnasium.vector import AutoresetMode
 from rendering import run_with_egl
 from simple_mazes import corridor
 
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.registration import register_environments
 from mazebench.envs.vector import MazeVectorEnv
+from mazebench.errors import InputError
+from mazebench.maps.generators import generate
+from mazebench.maps.maze import Maze
+from mazebench.maps.text import write_text_maze
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.registry import make_spec
 from mazebench.tasks.tracks import TRACKS
@@ -42,6 +49,20 @@ def corridor_env(**options) -> MazeEnv:
 
 
 class TestRegistration:
+    @pytest.mark.parametrize("name", ["mazebench/Local-13-v1", "mazebench/LocalGoal-13-v1", "mazebench/Far-31-v2"])
+    def test_the_size_of_an_id_yields_to_maps_and_to_a_size(self, name):
+        maze = generate("dfs", 51, np.random.default_rng(0))
+        assert gymnasium.make(name, maps=maze, distances=[40]).unwrapped.task_spec.mazes == (maze,)
+        assert gymnasium.make(name).unwrapped.task_spec.size == int(name.split("-")[1])
+        with pytest.raises(InputError, match="expected mazes of size 15, found size 51"):
+            gymnasium.make(name, maps=maze, size=15)
+
+    def test_an_unknown_option_is_refused_with_all_there_are(self):
+        for make, own in ((gymnasium.make, "camera, "), (gymnasium.make_vec, "num_envs, ")):
+            with pytest.raises(InputError, match=f"unknown option 'mapz'; available: .*{own}") as caught:
+                make("mazebench/Local-13-v1", mapz="plan.png")
+            assert {"maps", "size", "split", "seed"} <= set(str(caught.value).split(": ")[1].split(", "))
+
     @pytest.mark.parametrize(
         "program",
         [
@@ -187,3 +208,47 @@ for seed, picture in enumerate(pictures):
     assert np.abs(env.render().astype(int) - picture).mean() < 1, "not the picture of the single environment"
     env.close()
 """)
+
+
+def own_mazes() -> list[Maze]:
+    rng = np.random.default_rng(0)
+    return [dataclasses.replace(generate("dfs", 7, rng, name), cell_size=0.5) for name in ("one", "two")]
+
+
+class TestSpec:
+    """`env.spec` describes an environment also as JSON."""
+
+    OPTIONS = (
+        {"seed": np.int64(3), "distances": range(1, 4)},
+        {"maps": own_mazes(), "distances": np.array([1, 2])},
+        {"maps": own_mazes()[0], "sensors": ("lidar",)},
+    )
+
+    @pytest.mark.parametrize("options", OPTIONS)
+    @pytest.mark.parametrize("name", ["mazebench/Local-13-v1", "mazebench/LocalGoal-13-v1"])
+    def test_an_environment_is_made_again_from_json(self, name, options):
+        env = gymnasium.make(name, **options)
+        again = gymnasium.make(EnvSpec.from_json(env.spec.to_json()))
+        assert again.spec.to_json() == env.spec.to_json()
+        assert again.unwrapped.task_spec == env.unwrapped.task_spec
+        names = [[maze.name for maze in each.unwrapped.task_spec.mazes] for each in (env, again)]
+        assert names[0] == names[1]
+
+    @pytest.mark.parametrize("options", OPTIONS)
+    def test_a_vector_environment_is_made_again_from_json(self, options):
+        envs = gymnasium.make_vec(
+            "mazebench/Local-13-v1", num_envs=3, autoreset_mode=AutoresetMode.NEXT_STEP, **options
+        )
+        again = gymnasium.make_vec(EnvSpec.from_json(envs.spec.to_json()))
+        assert again.task_spec == envs.task_spec
+        assert (again.num_envs, again.metadata) == (3, envs.metadata)
+
+    def test_a_path_stays_a_path(self, tmp_path):
+        write_text_maze(own_mazes()[0], tmp_path / "room.txt")
+        env = gymnasium.make("mazebench/Local-13-v1", maps=tmp_path / "room.txt", distances=[1])
+        assert env.spec.kwargs["maps"] == str(tmp_path / "room.txt")
+        assert gymnasium.make(EnvSpec.from_json(env.spec.to_json())).unwrapped.task_spec == env.unwrapped.task_spec
+
+    def test_a_description_that_lacks_something_is_refused(self):
+        with pytest.raises(InputError, match="expected a maze with name, rows and cell_size, found rows"):
+            gymnasium.make("mazebench/Local-13-v1", maps=[{"rows": ["#####"]}])

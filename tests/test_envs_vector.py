@@ -10,10 +10,12 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers import vector as wrappers
 from simple_mazes import corridor
 
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
+from mazebench.errors import InputError
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.episode import Episode
@@ -204,7 +206,7 @@ class TestSeeds:
 
     @pytest.mark.parametrize("seed", [[1, 2], -1])
     def test_an_invalid_seed_is_refused(self, seed):
-        with pytest.raises(ValueError, match=r"expected 3 seeds, found|expected non-negative integer"):
+        with pytest.raises(ValueError, match=r"expected 3 seeds, found|expected seed of at least 0, found"):
             MazeVectorEnv(SPECS["local"], 3).reset(seed=seed)
 
 
@@ -213,24 +215,60 @@ def without_final(infos: dict) -> dict:
     return {key: infos[key] for key in infos if "final" not in key}
 
 
+def sync_vector_env(spec: TaskSpec, mode: AutoresetMode) -> SyncVectorEnv:
+    return SyncVectorEnv([lambda: MazeEnv(spec)] * NUM_ENVS, autoreset_mode=mode)
+
+
 class TestAutoreset:
+    @pytest.mark.parametrize("mode", AutoresetMode)
     @every_spec
-    def test_steps_and_infos_are_those_of_a_sync_vector_env(self, spec):
-        ours = MazeVectorEnv(spec, NUM_ENVS)
-        theirs = SyncVectorEnv([lambda: MazeEnv(spec)] * NUM_ENVS, autoreset_mode=AutoresetMode.SAME_STEP)
-        assert ours.metadata["autoreset_mode"] == theirs.metadata["autoreset_mode"]
+    def test_steps_and_infos_are_those_of_a_sync_vector_env(self, spec, mode):
+        ours, theirs = MazeVectorEnv(spec, NUM_ENVS, autoreset_mode=mode), sync_vector_env(spec, mode)
+        assert ours.metadata["autoreset_mode"] is mode
         assert ours.observation_space == theirs.observation_space
         assert ours.action_space == theirs.action_space
         self.assert_same_infos(ours.reset(seed=SEEDS), theirs.reset(seed=SEEDS))
-        ended = 0
+        num_ended = 0
         for action in random_actions(150, NUM_ENVS):
             one, other = ours.step(action), theirs.step(action)
             for expected, found in zip(other[1:4], one[1:4], strict=True):  # rewards and flags
                 np.testing.assert_array_equal(found, expected)
                 assert found.dtype == expected.dtype
             self.assert_same_infos((one[0], one[4]), (other[0], other[4]))
-            ended += (one[2] | one[3]).sum()
-        assert ended > 3
+            ended = one[2] | one[3]
+            num_ended += ended.sum()
+            if mode is AutoresetMode.DISABLED and ended.any():
+                resets = (env.reset(options={"reset_mask": ended.copy()}) for env in (ours, theirs))
+                self.assert_same_infos(*resets)
+        assert num_ended > 3
+
+    def test_a_mode_may_be_given_by_its_value(self):
+        env = gymnasium.make_vec("mazebench/Local-13-v1", num_envs=2, autoreset_mode="NextStep")
+        assert env.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+
+    @pytest.mark.parametrize("mode", AutoresetMode)
+    def test_a_masked_reset_begins_episodes_where_the_mask_says_so(self, mode):
+        spec = SPECS["position_noise"]  # what is observed elsewhere must not be drawn anew
+        ours, theirs = MazeVectorEnv(spec, NUM_ENVS, autoreset_mode=mode), sync_vector_env(spec, mode)
+        self.assert_same_infos(ours.reset(seed=SEEDS), theirs.reset(seed=SEEDS))
+        for action in random_actions(10, NUM_ENVS):
+            mask = action < 3
+            steps = [env.step(action) for env in (ours, theirs)]
+            self.assert_same_infos(*((step[0], step[4]) for step in steps))
+            resets = (env.reset(seed=7, options={"reset_mask": mask.copy()}) for env in (ours, theirs))
+            self.assert_same_infos(*resets)
+
+    def test_a_step_is_refused_where_an_episode_ended_if_autoreset_is_disabled(self):
+        env = MazeVectorEnv(make_spec(maps=corridor(), time_limit=1), 3, autoreset_mode=AutoresetMode.DISABLED)
+        env.reset(seed=0)
+        env.step(np.full(3, LOOK_LEFT))
+        env.reset(options={"reset_mask": np.array([True, False, False])})
+        with pytest.raises(gymnasium.error.ResetNeeded, match=r"reset_mask.*environments 1, 2$"):
+            env.step(np.full(3, LOOK_LEFT))
+
+    def test_a_reset_of_some_before_all_is_refused(self):
+        with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+            MazeVectorEnv(SPECS["local"], 2).reset(options={"reset_mask": np.array([True, False])})
 
     def assert_same_infos(self, ours, theirs) -> None:
         for key in ("state", "context"):
@@ -255,13 +293,59 @@ class TestAutoreset:
                 np.testing.assert_array_equal(ours[key][mask], theirs[key][mask], err_msg=key)
 
 
+WRAPPERS = {
+    "FlattenObservation": wrappers.FlattenObservation,
+    "FilterObservation": lambda env: wrappers.FilterObservation(env, ["state"]),
+    "DtypeObservation": lambda env: wrappers.DtypeObservation(wrappers.FlattenObservation(env), np.float64),
+    "NormalizeObservation": lambda env: wrappers.NormalizeObservation(wrappers.FlattenObservation(env)),
+    "NormalizeReward": wrappers.NormalizeReward,
+    "RecordEpisodeStatistics": wrappers.RecordEpisodeStatistics,
+    "TransformReward": lambda env: wrappers.TransformReward(env, lambda rewards: rewards * 2),
+    "TransformObservation": lambda env: wrappers.TransformObservation(
+        env, lambda observation: observation | {"state": observation["state"] * 2}
+    ),
+    "DictInfoToList": wrappers.DictInfoToList,
+}
+
+
+class TestWrappers:
+    """Gymnasium's vector wrappers give what they give around Gymnasium's own vector environment."""
+
+    @pytest.mark.parametrize("name", WRAPPERS)
+    def test_next_step(self, name):
+        self.compare(WRAPPERS[name], AutoresetMode.NEXT_STEP)
+
+    @pytest.mark.parametrize(
+        "name", ["NormalizeReward", "RecordEpisodeStatistics", "TransformReward", "DictInfoToList"]
+    )
+    def test_same_step(self, name):  # Gymnasium's wrappers of observations refuse it
+        self.compare(WRAPPERS[name], AutoresetMode.SAME_STEP)
+
+    def compare(self, wrapper, mode) -> None:
+        spec = SPECS["local"]
+        ours, theirs = wrapper(MazeVectorEnv(spec, NUM_ENVS, autoreset_mode=mode)), wrapper(sync_vector_env(spec, mode))
+        assert ours.observation_space == theirs.observation_space
+        assert_tree_equal(ours.reset(seed=SEEDS)[0], theirs.reset(seed=SEEDS)[0])
+        num_ended = 0
+        for action in random_actions(80, NUM_ENVS):
+            one, other = ours.step(action), theirs.step(action)
+            assert_tree_equal(one[0], other[0])
+            for found, expected in zip(one[1:4], other[1:4], strict=True):
+                np.testing.assert_array_equal(found, expected)
+            if "episode" in other[4]:
+                for key in ("r", "l"):
+                    np.testing.assert_array_equal(one[4]["episode"][key], other[4]["episode"][key])
+                num_ended += other[4]["_episode"].sum()
+        assert num_ended > 3 or wrapper is not wrappers.RecordEpisodeStatistics
+
+
 class TestEpisodeSource:
     """Episodes in a corridor for three slots: the goal is 6 steps forward."""
 
-    def env(self, num_episodes: int, time_limit: int = 100) -> MazeVectorEnv:
+    def env(self, num_episodes: int, time_limit: int = 100, **arguments) -> MazeVectorEnv:
         waiting = collections.deque(Episode(0, (1, 1), (1, 4), 0.0, seed) for seed in range(num_episodes))
         spec = make_spec(maps=corridor(), time_limit=time_limit)
-        return MazeVectorEnv(spec, 3, episode_source=lambda slot: waiting.popleft() if waiting else None)
+        return MazeVectorEnv(spec, 3, episode_source=lambda slot: waiting.popleft() if waiting else None, **arguments)
 
     def test_slots_stand_still_when_episodes_run_out(self):
         env = self.env(num_episodes=3)
@@ -289,6 +373,18 @@ class TestEpisodeSource:
             ended += terminated | truncated
         np.testing.assert_array_equal(ended, [2, 1, 1])
         np.testing.assert_array_equal(infos["_final_info"], [True, False, False])
+
+    def test_slots_stand_still_after_the_step_that_would_begin_an_episode(self):
+        env = self.env(num_episodes=3, autoreset_mode=AutoresetMode.NEXT_STEP)
+        env.reset()
+        for _ in range(6):
+            last = env.step(np.zeros(3, dtype=int))
+        np.testing.assert_array_equal(last[2], [True, True, True])
+        for _ in range(3):
+            observation, rewards, terminated, truncated, infos = env.step(np.zeros(3, dtype=int))
+            np.testing.assert_array_equal(rewards, 0)
+            assert not (terminated | truncated | infos["is_first"]).any()
+            np.testing.assert_array_equal(observation["state"], last[0]["state"])
 
 
 class TestArrays:
@@ -334,6 +430,16 @@ class TestBadInput:
         with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
             MazeVectorEnv(SPECS["local"], 3).step(np.zeros(3, dtype=int))
 
-    def test_an_empty_vector_environment_is_refused(self):
-        with pytest.raises(ValueError, match="expected at least one environment, found num_envs=0"):
-            MazeVectorEnv(SPECS["local"], 0)
+    @pytest.mark.parametrize(
+        "options",
+        [
+            3,
+            {"episode": None},
+            {"reset_mask": [True, True]},
+            {"reset_mask": np.ones(2)},
+            {"reset_mask": np.zeros(2, bool)},
+        ],
+    )
+    def test_wrong_options_are_refused(self, options):
+        with pytest.raises(InputError, match=r"options as a dict|unknown option 'episode'|expected reset_mask"):
+            MazeVectorEnv(SPECS["local"], 2).reset(options=options)

@@ -97,5 +97,9 @@ for count in range(arguments.steps // num_envs):
         target.load_state_dict(network.state_dict())
         rate = (count + 1) * num_envs / (time.perf_counter() - begin)
         print(f"{(count + 1) * num_envs} steps, {rate:.0f}/s: success rate {np.mean(successes[-500:]):.2f}", flush=True)
-print(f"{updates} updates; success rate {np.mean(successes[-500:]):.2f} in the last {len(successes[-500:])} episodes")
+if updates:
+    recent = successes[-500:]
+    print(f"{updates} updates; success rate {np.mean(recent):.2f} in the last {len(recent)} episodes")
+else:
+    print(f"0 updates, because {arguments.steps} steps are less than --learning-starts {arguments.learning_starts}")
 envs.close()

@@ -12,7 +12,6 @@ import numpy as np
 from mazebench.envs import spaces
 from mazebench.envs.gym import MazeEnv
 from mazebench.errors import InputError
-from mazebench.maps.maze import cell_to_point, point_to_cell
 from mazebench.tasks.context import GOAL, NUM_PLANES
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.physics import STATE_SIZE
@@ -46,13 +45,13 @@ class GoalMazeEnv(MazeEnv):
         if task_spec.track is not None:  # which may hide where the body is, and has time limits of its own
             raise InputError(f"expected no track for a goal-conditioned environment, found {task_spec.track!r}")
         super().__init__(task_spec, seed, render_mode, camera)
-        size, num_values = task_spec.size, STATE_SIZE + len(_SHOWN_PLANES) * task_spec.context_size**2
+        side, num_values = task_spec.mazes[0].side, STATE_SIZE + len(_SHOWN_PLANES) * task_spec.context_size**2
         sensed = {name: spaces.observation_space(task_spec)[name] for name in task_spec.sensors}
         self.observation_space = gymnasium.spaces.Dict(
             {
                 "observation": gymnasium.spaces.Box(-np.inf, np.inf, (num_values,), np.float32),
-                "achieved_goal": gymnasium.spaces.Box(0.0, size, (2,), np.float32),
-                "desired_goal": gymnasium.spaces.Box(0.0, size, (2,), np.float32),
+                "achieved_goal": gymnasium.spaces.Box(0.0, side, (2,), np.float32),
+                "desired_goal": gymnasium.spaces.Box(0.0, side, (2,), np.float32),
                 **sensed,
             }
         )
@@ -63,7 +62,7 @@ class GoalMazeEnv(MazeEnv):
 
     def compute_terminated(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Infos) -> np.ndarray:
         """Returns `[...]` bool: where the achieved goal `[..., 2]` is the desired one; ignores `info`."""
-        # Exact, because the centre of a cell is a float32 number without rounding.
+        # Exact, because equal cells have equal centres as float32.
         return (np.asarray(achieved_goal) == np.asarray(desired_goal)).all(axis=-1)
 
     def compute_truncated(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Infos) -> np.ndarray:
@@ -73,12 +72,12 @@ class GoalMazeEnv(MazeEnv):
 
     def _observation(self, time_step: dm_env.TimeStep) -> dict[str, np.ndarray]:
         shown = super()._observation(time_step)
-        size = self.task_spec.size
-        cell = point_to_cell(self.environment.physics.position(), size)
+        maze = self.task_spec.mazes[self.environment.task.episode.maze]
+        cell = maze.cell(self.environment.physics.position())
         planes = shown.pop("context")[_SHOWN_PLANES]
         return {
             "observation": np.concatenate([shown.pop("state"), planes.ravel()]),
-            "achieved_goal": cell_to_point(cell, size).astype(np.float32),
-            "desired_goal": cell_to_point(self.environment.task.route.goal, size).astype(np.float32),
+            "achieved_goal": maze.point(cell).astype(np.float32),
+            "desired_goal": maze.point(self.environment.task.route.goal).astype(np.float32),
             **shown,
         }

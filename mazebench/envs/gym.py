@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import dm_env
@@ -9,13 +10,17 @@ import gymnasium
 import numpy as np
 
 from mazebench.envs import spaces
+from mazebench.envs.env_spec import JsonSpec
+from mazebench.errors import InputError, unknown
+from mazebench.tasks.arguments import Arguments
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.navigation import Environment, EnvironmentState
 from mazebench.tasks.spec import TaskSpec
-from mazebench.world.rendering import Renderer
+from mazebench.world.models import models_of
+from mazebench.world.rendering import Cameras
 
 
-class MazeEnv(gymnasium.Env):
+class MazeEnv(JsonSpec, gymnasium.Env):
     """One environment; observations, rewards and endings are those of `mazebench.tasks.navigation.Navigation`.
 
     `info` has `is_first` (whether the context is new: an episode or the leg to the next landmark began), `success`,
@@ -28,23 +33,37 @@ class MazeEnv(gymnasium.Env):
     def __init__(
         self, task_spec: TaskSpec, seed: int | None = None, render_mode: str | None = None, camera: str = "top"
     ):
+        """Opens the environment.
+
+        Args:
+          task_spec: the task.
+          seed: of the first reset.
+          render_mode: None or "rgb_array".
+          camera: of `render`: "top", "chase" or "egocentric".
+
+        Raises:
+          InputError: if an argument is not allowed.
+        """
+        arguments = Arguments(render_mode=render_mode, camera=camera)
+        self.environment = Environment(task_spec, seed)
         self.task_spec = task_spec
         self.render_mode = render_mode
         self.observation_space = spaces.observation_space(task_spec)
         self.action_space = spaces.action_space(task_spec)
-        self.environment = Environment(task_spec, seed)
-        self._camera = camera
-        self._renderer: Renderer | None = None
+        self._camera = arguments.camera
+        self._cameras: Cameras | None = None  # of `render`
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Starts an episode, the same for the same `seed`, or the one of `options={"episode": Episode(...)}`."""
+        """Starts an episode, the same for the same `seed`, or the one of `options={"episode": Episode(...)}`.
+
+        Raises:
+          gymnasium.error.Error: if `seed` is not a natural number.
+          InputError: if `options` hold anything but an episode.
+        """
         super().reset(seed=seed)
-        episode = (options or {}).get("episode")
-        if episode is not None and not isinstance(episode, Episode):
-            raise ValueError(f"expected options['episode'] to be an Episode, found {type(episode).__name__}")
-        time_step = self.environment.reset(seed, episode)
+        time_step = self.environment.reset(seed, _episode_of(options))
         return self._observation(time_step), self._info()
 
     def step(self, action: int | np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
@@ -52,6 +71,7 @@ class MazeEnv(gymnasium.Env):
 
         Raises:
           gymnasium.error.ResetNeeded: before the first reset and after the end of an episode.
+          InputError: if there is no such action.
         """
         if self.environment.needs_reset:
             raise gymnasium.error.ResetNeeded("expected a call to reset() before this step()")
@@ -64,15 +84,14 @@ class MazeEnv(gymnasium.Env):
         """Returns `[480, 480, 3]` uint8 of the current state if `render_mode` is "rgb_array", else None."""
         if self.render_mode is None:
             return None
-        physics = self.environment.physics
-        if self._renderer is None:
-            self._renderer = Renderer(physics.model.ptr)
-        return self._renderer.render(physics.data.ptr, self._camera)
+        if self._cameras is None:
+            self._cameras = Cameras(models_of(self.task_spec.mazes, self.task_spec.textures), (self._camera,))
+        data = self.environment.physics.data
+        return self._cameras.take(self.environment.task.maze, data.qpos, data.mocap_pos[0])[self._camera]
 
     def close(self) -> None:
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        if self._cameras is not None:
+            self._cameras.close()
         self.environment.close()
 
     def get_state(self) -> EnvironmentState:
@@ -84,7 +103,7 @@ class MazeEnv(gymnasium.Env):
         self.environment.set_state(state)
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_renderer": None}  # a copy opens one of its own
+        return vars(self) | {"_cameras": None}  # a copy opens some of its own
 
     def _observation(self, time_step: dm_env.TimeStep) -> dict[str, np.ndarray]:
         return {key: time_step.observation[key] for key in ("state", "context", *self.task_spec.sensors)}
@@ -101,3 +120,16 @@ class MazeEnv(gymnasium.Env):
             "maze": task.episode.maze,
             "landmark": task.route.leg,
         }
+
+
+def _episode_of(options: dict[str, Any] | None) -> Episode | None:
+    """Returns the episode that the options of `reset` hold."""
+    if not isinstance(options, Mapping | None):
+        raise InputError(f"expected options as a dict, found {type(options).__name__}")
+    for name in options or {}:
+        if name != "episode":
+            raise unknown("option", name, ("episode",))
+    episode = (options or {}).get("episode")
+    if not isinstance(episode, Episode | None):
+        raise InputError(f"expected options['episode'] to be an Episode, found {type(episode).__name__}")
+    return episode

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
 from mazebench.maps import BENCHMARK_SIZES
 from mazebench.tasks import TASK_VERSION, TRACKS_VERSION
+from mazebench.world.backend import load_mujoco
 
 if TYPE_CHECKING:
+    from gymnasium.vector import AutoresetMode
+
     from mazebench.envs.goal import GoalMazeEnv
     from mazebench.envs.gym import MazeEnv
     from mazebench.envs.vector import MazeVectorEnv
+    from mazebench.tasks.spec import TaskSpec
 
 _TASKS = {"Local": "local", "Hierarchical": "hierarchical"}
 # Tracks by title and size, with the level that is played if none is given. `TRACKS` has the same ones; it is not read
@@ -24,6 +29,9 @@ _TRACKS = {
     ("Far", 31): 1,
     ("Far", 51): 2,
 }
+_ID_SIZE = "id_size"  # the keyword of an id's size, apart from the `size` that a user gives
+_SINGLE = ("seed", "render_mode", "camera")  # what a single environment takes besides its task's options
+_VECTOR = ("seed", "num_envs", "num_threads", "render_mode", "autoreset_mode")
 
 
 def register_environments() -> None:
@@ -35,14 +43,14 @@ def register_environments() -> None:
     for title, task in _TASKS.items():
         for size in BENCHMARK_SIZES:
             env_id = f"mazebench/{title}-{size}-v{TASK_VERSION}"
-            _register(env_id, {"task": task, "size": size})
+            _register(env_id, {"task": task, _ID_SIZE: size})
     for (title, size), level in _TRACKS.items():
         env_id = f"mazebench/{title}-{size}-v{TRACKS_VERSION}"
-        _register(env_id, {"task": title.lower(), "size": size, "level": level})
+        _register(env_id, {"task": title.lower(), _ID_SIZE: size, "level": level})
     for size in BENCHMARK_SIZES:
         env_id = f"mazebench/LocalGoal-{size}-v{TASK_VERSION}"
         if env_id not in gymnasium.registry:
-            gymnasium.register(env_id, "mazebench.envs.registration:make_goal_env", kwargs={"size": size})
+            gymnasium.register(env_id, "mazebench.envs.registration:make_goal_env", kwargs={_ID_SIZE: size})
 
 
 def _register(env_id: str, options: dict[str, Any]) -> None:
@@ -59,20 +67,20 @@ def make_env(
     task: str = "local", *, seed: int | None = None, render_mode: str | None = None, camera: str = "top", **options: Any
 ) -> MazeEnv:
     """Returns a `MazeEnv`; `options` are those of `mazebench.make_spec`."""
+    load_mujoco()
     from mazebench.envs.gym import MazeEnv
-    from mazebench.tasks.registry import make_spec
 
-    return MazeEnv(make_spec(task, **options), seed, render_mode, camera)
+    return MazeEnv(_task_spec(task, options, _SINGLE), seed, render_mode, camera)
 
 
 def make_goal_env(
     *, seed: int | None = None, render_mode: str | None = None, camera: str = "top", **options: Any
 ) -> GoalMazeEnv:
     """Returns a `GoalMazeEnv` of the local task; `options` are those of `mazebench.make_spec`."""
+    load_mujoco()
     from mazebench.envs.goal import GoalMazeEnv
-    from mazebench.tasks.registry import make_spec
 
-    return GoalMazeEnv(make_spec("local", **options), seed, render_mode, camera)
+    return GoalMazeEnv(_task_spec("local", options, _SINGLE), seed, render_mode, camera)
 
 
 def make_vec(
@@ -82,13 +90,34 @@ def make_vec(
     seed: int | None = None,
     num_threads: int = 0,
     render_mode: str | None = None,
+    autoreset_mode: AutoresetMode | str = "SameStep",
     **options: Any,
 ) -> MazeVectorEnv:
     """Returns `num_envs` environments side by side on `num_threads` threads (0: all cores).
 
-    `options` are those of `mazebench.make_spec`.
+    `autoreset_mode` says what follows the end of an episode; see `MazeVectorEnv`. `options` are those of
+    `mazebench.make_spec`.
     """
+    load_mujoco()
     from mazebench.envs.vector import MazeVectorEnv
-    from mazebench.tasks.registry import make_spec
 
-    return MazeVectorEnv(make_spec(task, **options), num_envs, seed, num_threads, render_mode)
+    task_spec = _task_spec(task, options, _VECTOR)
+    return MazeVectorEnv(task_spec, num_envs, seed, num_threads, render_mode, autoreset_mode=autoreset_mode)
+
+
+def _task_spec(task: str, options: dict[str, Any], arguments: Iterable[str]) -> TaskSpec:
+    """Returns the task of an environment that takes `arguments` besides `options`.
+
+    The size that an id names is the size of the mazes unless a size or maps are given.
+
+    Raises:
+      InputError: as `mazebench.make_spec`.
+    """
+    from mazebench.envs.env_spec import with_mazes
+    from mazebench.tasks.registry import check_names, make_spec
+
+    id_size = options.pop(_ID_SIZE, None)
+    if options.get("maps") is None and options.get("size") is None:
+        options["size"] = id_size
+    check_names(options, arguments)
+    return make_spec(task, **with_mazes(options))

@@ -5,19 +5,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import gymnasium
 import mujoco
-import mujoco.batch
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from mazebench.envs import spaces
-from mazebench.maps.maze import cell_to_point, point_to_cell
+from mazebench.envs.env_spec import JsonSpec
+from mazebench.errors import InputError, unknown
 from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_actions, controls_of_velocities
+from mazebench.tasks.arguments import Arguments, require_task_spec
 from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.observation import OpenSensors, state_errors
@@ -27,27 +29,38 @@ from mazebench.tasks.sensors.base import Worlds
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.angles import wrap_angle
+from mazebench.world.batch import open_batch
 from mazebench.world.mjcf import STEPS_PER_ACTION
 from mazebench.world.models import models_of
-from mazebench.world.physics import states_from_sensors
+from mazebench.world.physics import STATE_SIZE, states_from_sensors
 from mazebench.world.rendering import Cameras
 
 # Returns the next episode of environment i, or None: then the environment rests, which means that it is not stepped any
 # more.
 EpisodeSource = Callable[[int], Episode | None]
+Seeds = int | Sequence[int | None] | None
 
-_PICTURE_SIZE = 480  # pixels a side of what `render` returns
 _VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)  # makes the sensors current at the new state
 
 
-class MazeVectorEnv(gymnasium.vector.VectorEnv):
+class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
     """B environments of one task; the same seed gives the same episode as in the dm_env and Gymnasium environments.
 
-    Autoreset is SAME_STEP: where an episode ends, `step` returns the first observation of the next episode, and
-    `info["final_obs"]` and `info["final_info"]` hold the last ones of the ended episode. `info` has arrays `[B]`:
-    `is_first` (whether the context is new: an episode or the leg to the next landmark began), `success`, `steps`,
-    `path_length` (m), `position` (`[B, 2]` m) and `yaw` (rad; both are the true ones, for records and hindsight; agents
-    must not use them), `maze` (index among the task's mazes) and `landmark` (number of legs done).
+    `autoreset_mode` says what follows the end of an episode, as Gymnasium defines it:
+
+    - SAME_STEP: `step` returns the first observation of the next episode, and `info["final_obs"]` and
+      `info["final_info"]` hold the last ones of the ended episode.
+    - NEXT_STEP: `step` returns the last observation; the next `step` ignores the action there, begins the next episode
+      and returns its first observation with reward 0.
+    - DISABLED: `step` returns the last observation; `reset(options={"reset_mask": mask})` must come before the next
+      `step`.
+
+    The episodes are the same in all three. `info` has arrays `[B]`: `is_first` (whether the context is new: an episode
+    or the leg to the next landmark began), `success`, `steps`, `path_length` (m), `position` (`[B, 2]` m) and `yaw`
+    (rad; both are the true ones, for records and hindsight; agents must not use them), `maze` (index among the task's
+    mazes) and `landmark` (number of legs done).
+
+    `close` ends the threads. A process that is forked meanwhile can't use the environment, but can make its own.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": ["rgb_array"], "render_fps": 6.25}  # noqa: RUF012
@@ -56,10 +69,11 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         self,
         task_spec: TaskSpec,
         num_envs: int,
-        seed: int | None = None,
+        seed: Seeds = None,
         num_threads: int = 0,
         render_mode: str | None = None,
         episode_source: EpisodeSource | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
     ):
         """Opens the environments.
 
@@ -70,23 +84,30 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
           num_threads: of the simulation; 0 uses all cores.
           render_mode: None or "rgb_array", for Gymnasium's wrappers.
           episode_source: returns the next episode of an environment; by default each draws from a stream of its own.
+          autoreset_mode: one of Gymnasium's three, or its value: "SameStep", "NextStep" or "Disabled".
+
+        Raises:
+          InputError: if an argument is not allowed.
         """
-        if num_envs < 1:
-            raise ValueError(f"expected at least one environment, found num_envs={num_envs}")
+        require_task_spec(task_spec)
+        arguments = Arguments(num_envs=num_envs, num_threads=num_threads, render_mode=render_mode)
         self.task_spec = task_spec
-        self.num_envs = num_envs
+        self.num_envs = num_envs = arguments.num_envs
         self.render_mode = render_mode
+        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        self.metadata = self.metadata | {"autoreset_mode": self.autoreset_mode}
         self.single_observation_space = spaces.observation_space(task_spec)
         self.single_action_space = spaces.action_space(task_spec)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._episode_source = episode_source or self._draw_episode
-        self._rngs = _streams(seed, num_envs)
+        self._episode_source = episode_source
+        self._rngs = [np.random.default_rng(value) for value in _seeds(seed, num_envs)]
         self._was_reset = False
         self._allocate()
         self._maze_models = models_of(task_spec.mazes)
         self._models = [self._maze_models[0]] * num_envs
-        self._batch = mujoco.batch.Batch(self._maze_models[0], num_envs, num_threads)
+        self._process = os.getpid()
+        self._batch = open_batch(self._maze_models[0], num_envs, arguments.num_threads)
         self._sensordata = self._batch.bind("sensordata")
         self._qpos = self._batch.bind("qpos")
         self._ctrl = self._batch.bind("ctrl")
@@ -118,31 +139,50 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         self._landmark = np.zeros(num_envs, dtype=np.int64)
         self._maze = np.zeros(num_envs, dtype=np.int64)
         self._active = np.zeros(num_envs, dtype=bool)
+        self._ended = np.zeros(num_envs, dtype=bool)  # whether the episode is over and the next one has yet to begin
+        self._states = np.zeros((num_envs, STATE_SIZE), dtype=np.float32)  # as observed last
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+        self, *, seed: Seeds = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Starts an episode in each environment.
+        """Starts an episode in each environment, or in those of a mask.
 
         Args:
           seed: one seed for each environment, or an integer s for s, s + 1, ...; with None, an environment's stream of
             episodes goes on.
-          options: ignored.
+          options: `{"reset_mask": mask}` with `mask` `[B]` bool resets only where it is True. The other environments
+            stay as they are, and `info` says nothing of them.
+
+        Raises:
+          InputError: if an argument is not allowed.
+          gymnasium.error.ResetNeeded: if the mask leaves out environments that were never reset.
+          gymnasium.error.ClosedEnvironmentError: after `close`, and in a forked process.
         """
-        if options:
-            raise ValueError(f"expected no options, found {', '.join(options)}")
-        if seed is not None:
-            fresh = _streams(seed, self.num_envs)
-            keep = isinstance(seed, Sequence)
-            self._rngs = [
-                old if keep and seed[i] is None else new  # type: ignore[index]
-                for i, (old, new) in enumerate(zip(self._rngs, fresh, strict=True))
-            ]
+        self._require_open()
+        mask = self._reset_mask(options)
+        if not (self._was_reset or mask.all()):
+            raise gymnasium.error.ResetNeeded("expected a call to reset() of all environments before this one of some")
+        for i, value in enumerate(_seeds(seed, self.num_envs)):
+            if value is not None and mask[i]:
+                self._rngs[i] = np.random.default_rng(value)
         self._was_reset = True
-        self._active[:] = True
-        self._begin_episodes(range(self.num_envs))
-        is_first = np.ones(self.num_envs, dtype=bool)
-        return self._observations(self._observed_states()), self._infos(is_first, np.zeros(self.num_envs, dtype=bool))
+        self._begin_episodes(np.flatnonzero(mask))
+        self._observe(np.flatnonzero(mask))
+        return self._observations(), self._infos(mask.copy(), np.zeros(self.num_envs, dtype=bool), mask)
+
+    def _reset_mask(self, options: dict[str, Any] | None) -> np.ndarray:
+        """Returns `[B]` bool: which environments `options` say to reset."""
+        if not isinstance(options, Mapping | None):
+            raise InputError(f"expected options as a dict, found {type(options).__name__}")
+        for name in options or {}:
+            if name != "reset_mask":
+                raise unknown("option", name, ("reset_mask",))
+        mask = (options or {}).get("reset_mask", np.ones(self.num_envs, dtype=bool))
+        if not (isinstance(mask, np.ndarray) and mask.dtype == bool and mask.shape == (self.num_envs,) and mask.any()):
+            raise InputError(
+                f"expected reset_mask, an array of {self.num_envs} bool, not all False, found {mask!r}"[:200]
+            )
+        return mask
 
     def step(
         self, actions: np.ndarray
@@ -150,43 +190,66 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         """Takes one agent step (0.16 s) in each environment; `actions` is `[B]` int, or `[B, 3]` float if continuous.
 
         Raises:
-          gymnasium.error.ResetNeeded: before the first reset.
-          ValueError: if `actions` are not B legal actions.
+          gymnasium.error.ResetNeeded: before the first reset; with autoreset disabled, where an episode has ended.
+          gymnasium.error.ClosedEnvironmentError: after `close`, and in a forked process.
+          InputError: if `actions` are not B legal actions.
         """
-        if not self._was_reset:
-            raise gymnasium.error.ResetNeeded("expected a call to reset() before this step()")
+        self._require_open()
+        self._require_reset()
         self._ctrl[:] = self._controls(actions)
-        resting = not self._active.all()
-        ids = np.flatnonzero(self._active) if resting else None
-        self._batch.step(ids, nstep=STEPS_PER_ACTION, stage=_VELOCITY_STAGE)
+        running = self._active & ~self._ended
+        all_run = running.all()
+        self._batch.step(None if all_run else np.flatnonzero(running), nstep=STEPS_PER_ACTION, stage=_VELOCITY_STAGE)
         moved = self._qpos[:, :2] - self._positions
         self._positions += moved
         self._path_length += np.sqrt(moved[:, 0] * moved[:, 0] + moved[:, 1] * moved[:, 1])
-        self._steps += self._active
-        is_first, terminated, truncated = self._advance()
+        self._steps += running
+        is_first, terminated, truncated = self._advance(running)
         rewards = np.where(terminated, 0.0, -1.0)
-        if resting:
-            rewards[~self._active] = 0.0
+        if not all_run:
+            rewards[~running] = 0.0
+        if self._ended.any():
+            is_first[self._begin_episodes(np.flatnonzero(self._ended))] = True
+        self._observe(slice(None))
         infos = self._infos(is_first, terminated)
-        states = self._observed_states()
-        ended = np.flatnonzero(terminated | truncated)
-        if len(ended):
-            infos = self._autoreset(ended, states, infos)
-        return self._observations(states), rewards, terminated, truncated, infos
+        ended = terminated | truncated
+        if self.autoreset_mode is not AutoresetMode.SAME_STEP:
+            self._ended = ended
+        elif ended.any():
+            infos = self._autoreset(ended, infos)
+        return self._observations(), rewards, terminated, truncated, infos
+
+    def _require_open(self) -> None:
+        if self.closed:
+            raise gymnasium.error.ClosedEnvironmentError("expected an open environment, found one after close()")
+        if os.getpid() != self._process:
+            raise gymnasium.error.ClosedEnvironmentError(
+                "expected a vector environment that this process made, found one of the process that forked it; make "
+                "another one with the same task_spec and seed"
+            )
+
+    def _require_reset(self) -> None:
+        if not self._was_reset:
+            raise gymnasium.error.ResetNeeded("expected a call to reset() before this step()")
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._ended.any():
+            raise gymnasium.error.ResetNeeded(
+                "expected a call to reset(options={'reset_mask': mask}) before this step(): the episodes ended in "
+                f"environments {', '.join(map(str, np.flatnonzero(self._ended)))}"[:200]
+            )
 
     def _controls(self, actions: np.ndarray) -> np.ndarray:
         if self.task_spec.continuous:
             return controls_of_velocities(actions, (self.num_envs, VELOCITY_SIZE))
         return controls_of_actions(actions, self.num_envs)
 
-    def _advance(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _advance(self, running: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Returns three `[B]` bool: where a new leg began, where the goal was reached, where the time ran out."""
         size = self.task_spec.size
         is_first, terminated, truncated = np.zeros((3, self.num_envs), dtype=bool)
         cells = self.cells()
         # Nothing happens to a route unless one of these holds; then the route's own rules decide.
         due = (cells == self._target) | (cells == self._goal) | (self._steps >= self._deadline)
-        for i in np.flatnonzero(due & self._active).tolist():
+        for i in np.flatnonzero(due & running).tolist():
             event = self._route(i).advance(divmod(int(cells[i]), size), int(self._steps[i]))
             if event is Event.LANDMARK:
                 self._begin_leg(i)
@@ -195,30 +258,30 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
             truncated[i] = event is Event.TIMEOUT
         return is_first, terminated, truncated
 
-    def _autoreset(self, ended: np.ndarray, states: np.ndarray, infos: dict[str, Any]) -> dict[str, Any]:
-        """Begins the next episodes, writes their states into `states`, and adds the ended ones' infos to `infos`."""
+    def _autoreset(self, ended: np.ndarray, infos: dict[str, Any]) -> dict[str, Any]:
+        """Begins the next episodes where one `ended`, and returns the infos with the ended ones' last observations."""
         final_obs = np.full(self.num_envs, None, dtype=object)
-        mask = np.zeros(self.num_envs, dtype=bool)
-        mask[ended] = True
-        sensed = self._sense(ended)
-        for index, i in enumerate(ended):
-            final_obs[i] = {"state": states[i].copy(), "context": self._context[i].copy()}
+        indices = np.flatnonzero(ended)
+        sensed = self._sense(indices)
+        for index, i in enumerate(indices):
+            final_obs[i] = {"state": self._states[i].copy(), "context": self._context[i].copy()}
             final_obs[i] |= {name: values[index] for name, values in sensed.items()}
         final_info = {key: value if key.startswith("_") else value.copy() for key, value in infos.items()}
-        final_info.update({key: mask for key in infos if key.startswith("_")})
-        began = self._begin_episodes(ended)
-        states[began] = self._observed_states(began)
+        final_info.update({key: ended for key in infos if key.startswith("_")})
+        began = self._begin_episodes(indices)
+        self._observe(began)
         is_first = infos["is_first"]
         is_first[began] = True
-        infos = self._infos(is_first, infos["success"] & ~mask)
-        return infos | {"final_obs": final_obs, "_final_obs": mask, "final_info": final_info, "_final_info": mask}
+        infos = self._infos(is_first, infos["success"] & ~ended)
+        return infos | {"final_obs": final_obs, "_final_obs": ended, "final_info": final_info, "_final_info": ended}
 
-    def _begin_episodes(self, indices: Sequence[int] | np.ndarray | range) -> np.ndarray:
+    def _begin_episodes(self, indices: np.ndarray) -> np.ndarray:
         """Begins the next episodes of the environments `indices`; returns those that have one, the others rest."""
-        for i in indices:
-            self.episodes[i] = self._episode_source(int(i))
+        for i in indices.tolist():
+            self.episodes[i] = self._episode_source(i) if self._episode_source else self._draw_episode(i)
             self._active[i] = self.episodes[i] is not None
-        began = np.array([i for i in indices if self._active[i]], dtype=np.int64)
+        self._ended[indices] = False
+        began = indices[self._active[indices]]
         if not len(began):
             return began
         for i in began:
@@ -236,7 +299,7 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         self._shown[i] = shown
         self._routes[i] = plan_route(spec, episode, shown)
         self._state_errors[i] = state_errors(spec, episode)
-        self._positions[i] = cell_to_point(episode.start, spec.size)
+        self._positions[i] = spec.mazes[episode.maze].point(episode.start)
         self._qpos[i] = (*self._positions[i], episode.yaw)
         self._path_length[i], self._steps[i], self._maze[i] = 0.0, 0, episode.maze
         self._begin_leg(i)
@@ -248,26 +311,27 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
         self._start[i], self._target[i], self._goal[i] = (
             row * self.task_spec.size + column for row, column in (route.start, route.target, route.goal)
         )
-        self._marker[i, 0] = (*cell_to_point(route.goal, self.task_spec.size), 0.0)
+        self._marker[i, 0] = (*self.task_spec.mazes[self._maze[i]].point(route.goal), 0.0)
         self._deadline[i], self._landmark[i] = route.deadline, route.leg
 
-    def _observed_states(self, indices: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """Returns `[K, 12]` float32: the states of the environments `indices`, as their agents observe them."""
+    def _observe(self, indices: np.ndarray | slice) -> None:
+        """Takes over into `_states` the states of the environments `indices`, as their agents observe them."""
         states = states_from_sensors(self._sensordata[indices])
         if any(self._state_errors):
             for state, i in zip(states, np.arange(self.num_envs)[indices], strict=True):
                 for add_error in self._state_errors[i] if self._active[i] else ():
                     add_error(state)
-        return states.astype(np.float32)
+        self._states[indices] = states
 
-    def _observations(self, states: np.ndarray) -> dict[str, np.ndarray]:
-        return {"state": states, "context": self._context.copy(), **self._sense(slice(None))}
+    def _observations(self) -> dict[str, np.ndarray]:
+        return {"state": self._states.copy(), "context": self._context.copy(), **self._sense(slice(None))}
 
     def _sense(self, indices: np.ndarray | slice) -> dict[str, np.ndarray]:
         """Returns `[K, ...]` by sensor: what the environments `indices` observe with it."""
         return self._sensors.read(Worlds(self._maze[indices], self._qpos[indices], self._marker[indices, 0]))
 
-    def _infos(self, is_first: np.ndarray, success: np.ndarray) -> dict[str, Any]:
+    def _infos(self, is_first: np.ndarray, success: np.ndarray, told: np.ndarray | None = None) -> dict[str, Any]:
+        """Returns the infos of the environments `told`, `[B]` bool; of all by default."""
         infos = {
             "is_first": is_first,
             "success": success.copy(),
@@ -278,8 +342,8 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
             "maze": self._maze.copy(),
             "landmark": self._landmark.copy(),
         }
-        everywhere = np.ones(self.num_envs, dtype=bool)
-        return infos | {f"_{key}": everywhere for key in infos}
+        told = np.ones(self.num_envs, dtype=bool) if told is None else told.copy()
+        return infos | {f"_{key}": told for key in infos}
 
     def _draw_episode(self, i: int) -> Episode:
         return sample_episode(self.task_spec, self._rngs[i])
@@ -296,7 +360,8 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
 
     def cells(self) -> np.ndarray:
         """Returns `[B]` int: the true cells of the bodies, as row * N + column; agents must not use them."""
-        return point_to_cell(self._positions, self.task_spec.size) @ (self.task_spec.size, 1)
+        # All mazes have one size and one cell size, so that any of them tells the cells.
+        return self.task_spec.mazes[0].cell(self._positions) @ (self.task_spec.size, 1)
 
     def legs(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns two `[B]` int: the start cells and target cells of the current legs, as row * N + column."""
@@ -304,20 +369,35 @@ class MazeVectorEnv(gymnasium.vector.VectorEnv):
 
     def render(self) -> tuple[np.ndarray, ...]:
         """Returns a picture `[480, 480, 3]` uint8 of each environment, seen from above."""
+        self._require_open()
         if self._top_camera is None:
-            self._top_camera = Cameras(self._models[0], ("top",), _PICTURE_SIZE, smooth=True)
-        worlds = zip(self._models, self._qpos, self._marker[:, 0], strict=True)
+            self._top_camera = Cameras(models_of(self.task_spec.mazes, self.task_spec.textures), ("top",))
+        worlds = zip(self._maze.tolist(), self._qpos, self._marker[:, 0], strict=True)
         return tuple(self._top_camera.take(*world)["top"] for world in worlds)
 
     def close_extras(self, **kwargs: Any) -> None:
         self._sensors.close()
         if self._top_camera is not None:
             self._top_camera.close()
+        del self._batch, self._sensordata, self._qpos, self._ctrl, self._marker  # which ends the threads
 
 
-def _streams(seed: int | Sequence[int | None] | None, num_envs: int) -> list[np.random.Generator]:
-    if seed is None or isinstance(seed, (int, np.integer)):
-        seed = [None if seed is None else int(seed) + i for i in range(num_envs)]
-    if len(seed) != num_envs:
-        raise ValueError(f"expected {num_envs} seeds, found {len(seed)}")
-    return [np.random.default_rng(value) for value in seed]
+def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    try:
+        return AutoresetMode(mode)
+    except ValueError as error:
+        raise unknown("autoreset_mode", mode, [known.value for known in AutoresetMode]) from error
+
+
+def _seeds(seed: Seeds, num_envs: int) -> list[int | None]:
+    """Returns the seed of each environment.
+
+    Raises:
+      InputError: unless `seed` is None, a natural number, or one of either for each environment.
+    """
+    if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
+        if len(seed) != num_envs:
+            raise InputError(f"expected {num_envs} seeds, found {len(seed)}")
+        return [Arguments(seed=value).seed for value in seed]
+    first = Arguments(seed=seed).seed
+    return [None if first is None else first + i for i in range(num_envs)]
