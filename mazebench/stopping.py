@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
-import pathlib
 import shlex
-import shutil
 import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -42,8 +41,21 @@ def handling(numbers: Iterable[int], handler: Callable[[int, Any], None]) -> Ite
             signal.signal(number, earlier)
 
 
+@contextlib.contextmanager
+def postponing() -> Iterator[None]:
+    """Under `listening`, lets the first signal in the block wait for the next `check`; a second one raises at once."""
+    heeded = [number for number in _EXCEPTIONS if signal.getsignal(number) is _raise]
+    with handling(heeded, _raise_later):
+        yield
+
+
+def is_asked() -> bool:
+    """Returns whether the next `check` will raise."""
+    return bool(_raised)
+
+
 def check() -> None:
-    """Raises again what a signal raised; loops call it, since destructors and compilers' callbacks lose exceptions."""
+    """Raises what a signal raised before, or what waits; loops call it, since libraries' callbacks lose exceptions."""
     if _raised:
         raise _raised[0]
 
@@ -70,13 +82,15 @@ def _raise(number: int, frame: object) -> NoReturn:
     raise _EXCEPTIONS[number]
 
 
+def _raise_later(number: int, frame: object) -> None:
+    if _raised:
+        _raise(number, frame)
+    _raised.append(_EXCEPTIONS[number])
+
+
 def _end(kind: type[BaseException], kept: str, *options: str) -> NoReturn:
-    program = [sys.argv[0]]
-    if pathlib.Path(program[0]).name == "__main__.py":
-        program = [sys.executable, "-m", "mazebench"]
-    elif shutil.which("mazebench") == program[0]:
-        program = ["mazebench"]
-    words = [*program, *sys.argv[1:], *(option for option in options if option not in sys.argv)]
+    words = ["mazebench", *sys.argv[1:], *(option for option in options if option not in sys.argv)]
     event, status = ("terminated", 143) if kind is Terminated else ("interrupted", 130)
+    atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)  # libraries end noisily where one more arrives
     print(f"mazebench: {event}; {kept} with: {shlex.join(words)}", file=sys.stderr)
     sys.exit(status)

@@ -24,6 +24,9 @@ def make_experience(**values):
         "ended": np.array([False]),
         "final_state": np.zeros((1, 12), dtype=np.float32),
         "final_cell": np.array([0]),
+        "context": np.zeros((1, 4, 3, 3), dtype=np.float32),
+        "sensors": {},
+        "final_sensors": {},
     }
     return Experience(**{**defaults, **values})
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import subprocess
+import sys
 
 import pytest
 
@@ -43,7 +45,7 @@ class TestSignal:
         with pytest.raises(SystemExit) as ended, stopping.listening(), stopping.stoppable(how_to_go_on):
             signal.raise_signal(number)
         assert ended.value.code == status
-        line = f"mazebench: {word}; 2 of 3 are kept; go on with: /else/where/mazebench eval --out 'my run' --resume\n"
+        line = f"mazebench: {word}; 2 of 3 are kept; go on with: mazebench eval --out 'my run' --resume\n"
         assert capsys.readouterr().err == line
 
     def test_a_lost_exception_is_raised_again_by_the_next_check(self, number, kind, status, word):
@@ -67,3 +69,17 @@ def test_interrupts_that_are_ignored_from_the_start_stay_ignored():
             os.kill(os.getpid(), signal.SIGINT)
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def test_an_interrupt_while_modules_are_imported_prints_nothing(tmp_path):
+    (tmp_path / "typer.py").write_text(
+        "import signal\nsignal.raise_signal(signal.SIGINT)\n"
+    )  # imported for the command
+    run = subprocess.run(
+        [sys.executable, "-m", "mazebench", "list"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # which the background ignores
+    )
+    assert (run.returncode, run.stdout, run.stderr) == (-signal.SIGINT, "", "")

@@ -19,7 +19,7 @@ from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 from mazebench.training.loop import TrainingError, train
 from mazebench.training.options import TrainOptions
-from mazebench.training.run_folder import RunFolder
+from mazebench.training.sitting import Status
 
 
 def tiny_options(**changes):
@@ -29,6 +29,14 @@ def tiny_options(**changes):
 
 def metrics(folder):
     return [json.loads(line) for line in (folder / "metrics.jsonl").read_text().splitlines()]
+
+
+def assert_same_run(one, other):
+    """Asserts that two runs of 2,400 steps wrote the same metrics and the same last checkpoint."""
+    assert metrics(one) == metrics(other)
+    for name in ("agent.safetensors", "training.safetensors", "random.json", "replay.npz", "counters.json"):
+        paths = [folder / "checkpoints" / "000000002400" / name for folder in (one, other)]
+        assert paths[0].read_bytes() == paths[1].read_bytes(), name
 
 
 @pytest.fixture(scope="module")
@@ -52,10 +60,7 @@ def test_run_folder_has_config_metrics_tensorboard_and_two_checkpoints(unbroken)
 def test_resumed_run_equals_the_unbroken_one(unbroken, tmp_path):
     train(tiny_options(env_steps=1600), tmp_path)
     train(tiny_options(env_steps=2400), tmp_path, resume=True)
-    assert metrics(tmp_path) == metrics(unbroken)
-    for name in ("agent.safetensors", "training.safetensors", "random.json"):
-        paths = [folder / "checkpoints" / "000000002400" / name for folder in (unbroken, tmp_path)]
-        assert paths[0].read_bytes() == paths[1].read_bytes(), name
+    assert_same_run(tmp_path, unbroken)
 
 
 def test_resume_without_the_replay_fills_it_before_learning_goes_on(tmp_path):
@@ -74,12 +79,11 @@ def test_resume_reports_no_step_twice(tmp_path):
 
 
 def test_resume_says_whether_the_run_goes_on_or_is_finished(unbroken, tmp_path):
-    lines: list[str | None] = []
-    train(tiny_options(env_steps=2400), unbroken, resume=True, report=lambda share, line: lines.append(line))
-    assert lines[-1] == f"{unbroken}: the run is finished, at 2,400 steps"
-    assert not any("resuming" in line for line in lines if line)
+    lines: list[Status | str] = []
+    train(tiny_options(env_steps=2400), unbroken, resume=True, report=lines.append)
+    assert lines == [f"{unbroken}: the run is finished, at 2,400 steps"]
     train(tiny_options(env_steps=800), tmp_path)
-    train(tiny_options(env_steps=1600), tmp_path, resume=True, report=lambda share, line: lines.append(line))
+    train(tiny_options(env_steps=1600), tmp_path, resume=True, report=lines.append)
     assert f"resuming {tmp_path} at 800 steps" in lines
 
 
@@ -106,24 +110,94 @@ def test_wrong_option_is_refused(tmp_path, changes, message):
 
 @pytest.mark.parametrize(
     ("changes", "message"),
-    [({}, "expected --minutes or --env-steps"), ({"env_steps": 100, "ray_address": "auto"}, "--ray needs --workers")],
+    [({}, "expected --minutes or --env-steps"), ({"env_steps": 100, "ray": "auto"}, "--ray needs --workers")],
 )
 def test_options_that_contradict_each_other_are_refused(changes, message):
     with pytest.raises(InputError, match=message):
         tiny_options(**changes)
 
 
-def test_interrupt_that_a_library_swallowed_ends_the_run_with_its_last_checkpoint(tmp_path):
-    def report(share, line):
-        if line and line.startswith("800 steps"):
-            with contextlib.suppress(stopping.Terminated):
+class Stop:
+    """A report that stops a run with SIGTERM at its first status for which `wanted` holds; keeps all it is given."""
+
+    def __init__(self, wanted):
+        self._wanted = wanted
+        self.given: list[Status | str] = []
+
+    def __call__(self, status):
+        self.given.append(status)
+        if isinstance(status, Status) and self._wanted(status):
+            self._wanted = lambda status: False
+            with contextlib.suppress(stopping.Terminated):  # as a library may
                 signal.raise_signal(signal.SIGTERM)
+
+
+def stopped(options, folder, wanted, resume=False):
+    """Runs a training to where it is stopped; returns what it reported."""
+    report = Stop(wanted)
+    with stopping.listening(), pytest.raises(stopping.Terminated):
+        train(options, folder, resume, report)
+    return report.given
+
+
+def checkpoints(folder):
+    return sorted(int(path.name) for path in (folder / "checkpoints").iterdir())
+
+
+def test_stopped_run_leaves_a_savepoint_and_goes_on_from_it_to_its_next_milestone(unbroken, tmp_path):
+    stopped(tiny_options(env_steps=2400), tmp_path, lambda status: status.env_steps == 1208)
+    assert checkpoints(tmp_path) == [800, 1208]
+    assert metrics(tmp_path) == metrics(unbroken)[:1]
+    lines: list[Status | str] = []
+    train(tiny_options(env_steps=2400), tmp_path, resume=True, report=lines.append)
+    assert f"resuming {tmp_path} at 1,208 steps" in lines
+    assert checkpoints(tmp_path) == [1600, 2400]
+    assert [line["env_steps"] for line in metrics(tmp_path)] == [800, 1600, 2400]
+    assert metrics(tmp_path)[-1]["updates"] == (2400 - 400) // 32
+
+
+def test_metrics_of_a_milestone_cover_the_updates_before_and_after_a_savepoint(tmp_path):
+    """The updates before it are those of the unbroken run, so with none after it the means are equal."""
+    options = tiny_options(env_steps=808, checkpoint_steps=10**6)
+    train(options, tmp_path / "unbroken")
+    stopped(options, tmp_path / "stopped", lambda status: status.env_steps == 800)
+    train(options, tmp_path / "stopped", resume=True)
+    (whole,), (resumed,) = metrics(tmp_path / "unbroken"), metrics(tmp_path / "stopped")
+    assert resumed["updates"] == whole["updates"] == (808 - 400) // 32
+    assert resumed["td_loss"] == whole["td_loss"]
+
+
+def test_run_that_is_stopped_while_it_is_evaluated_is_resumed_to_the_same_bytes(unbroken, tmp_path):
+    stopped(tiny_options(env_steps=2400), tmp_path, lambda status: status.evaluated and status.env_steps == 1600)
+    assert checkpoints(tmp_path) == [800, 1600]
+    assert metrics(tmp_path) == metrics(unbroken)[:1]
+    stopped(tiny_options(env_steps=2400), tmp_path, lambda status: status.evaluated and status.env_steps == 2400, True)
+    train(tiny_options(env_steps=2400), tmp_path, resume=True)
+    assert_same_run(tmp_path, unbroken)
+
+
+def test_savepoints_do_not_change_the_run_that_saves_them(unbroken, tmp_path):
+    train(tiny_options(env_steps=2400, checkpoint_minutes=1e-9), tmp_path)
+    assert_same_run(tmp_path, unbroken)
+
+
+def test_without_savepoints_a_stopped_run_goes_on_from_its_last_milestone_to_the_same_bytes(unbroken, tmp_path):
+    options = tiny_options(env_steps=2400, checkpoint_minutes=0)
+    stopped(options, tmp_path, lambda status: status.env_steps == 1208)
+    assert checkpoints(tmp_path) == [0, 800]
+    train(options, tmp_path, resume=True)
+    assert_same_run(tmp_path, unbroken)
+
+
+def test_second_signal_ends_the_run_without_a_savepoint(tmp_path):
+    def report(status):
+        if isinstance(status, Status) and status.env_steps == 1208:
+            signal.raise_signal(signal.SIGTERM)
+            signal.raise_signal(signal.SIGTERM)
 
     with stopping.listening(), pytest.raises(stopping.Terminated):
         train(tiny_options(env_steps=2400), tmp_path, report=report)
-    assert [line["env_steps"] for line in metrics(tmp_path)] == [800]
-    with RunFolder(tmp_path) as folder:
-        assert [path.name for path in folder.checkpoints()] == [f"{0:012d}", f"{800:012d}"]
+    assert checkpoints(tmp_path) == [0, 800]
 
 
 def test_loss_that_is_not_finite_stops_the_run_with_the_last_checkpoint(tmp_path):

@@ -16,6 +16,10 @@ from mazebench.errors import InputError
 from mazebench.maps.maze import Maze
 from mazebench.storage.json_files import read_json
 from mazebench.tasks.context import build_context
+from mazebench.tasks.episode import sample_episode
+from mazebench.tasks.perturbations import active_perturbations
+from mazebench.tasks.shown_map import show_map
+from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Experience
 from mazebench.world.mjcf import ACTIONS
 
@@ -40,8 +44,9 @@ class HindsightLearner:
         seed: int,
         optimizer: torch.optim.Optimizer,
         keep_anchor: bool = False,
+        priority_exponent: float = 0.0,
     ):
-        """`optimizer` is of the actor's network; `keep_anchor` is passed on to `Hindsight`."""
+        """`optimizer` is of the actor's network; `keep_anchor` and `priority_exponent` are those of the replay."""
         self.actor = actor
         config = self._config = actor.config
         self.num_envs = config.num_envs
@@ -49,7 +54,7 @@ class HindsightLearner:
         self._rng = np.random.default_rng([seed, 1])
         self._target = copy.deepcopy(actor.network).requires_grad_(False)
         self._optimizer = optimizer
-        self._replay = Replay(config.num_envs, config.replay_capacity, config.priority_exponent)
+        self._replay = Replay(config.num_envs, config.replay_capacity, priority_exponent)
         self._hindsight = Hindsight(
             config.hindsight_ratio,
             config.hindsight_mean_offset,
@@ -73,6 +78,31 @@ class HindsightLearner:
     def task_options(self) -> dict[str, Any]:
         """Returns the number of goals of an episode, as configured."""
         return {"num_goals": self._config.num_goals}
+
+    def prepare(self, task: TaskSpec) -> None:
+        """Makes the replay keep the shown maps of a task in which they may not be those of the mazes.
+
+        Raises:
+          InputError: if the maps are drawn or lack marks, or a sensor is asked for, which the network does not read.
+        """
+        name = f"agent {self.actor.name!r}"
+        if task.track is None and task.sensors:
+            raise InputError(f"{name}: reads no sensors, found {', '.join(task.sensors)}")
+        if task.track is None and not active_perturbations(task):
+            return
+        episode = sample_episode(task, np.random.default_rng(0))
+        shown = [show_map(dataclasses.replace(task, level=(level,)), episode) for level in task.level]
+        if any(each.drawing is not None or each.hidden for each in shown):
+            found = "map_warp" if task.track is None else f"track {task.track!r}"
+            raise InputError(
+                f"{name}: learns only on maps of one pixel a cell with start and goal marked; found {found}"
+            )
+        if task.context_size != task.size:
+            raise InputError(
+                f"{name}: learns on tracks and with perturbations from contexts of the maze's size {task.size}, "
+                f"found {task.context_size}"
+            )
+        self._replay.keep_maps(task.size)
 
     def observe(self, experience: Experience, first_env: int = 0) -> None:
         """Stores one step in the environments from `first_env` on."""
@@ -162,9 +192,10 @@ class HindsightLearner:
     def _contexts(self, sample: Sample | SequenceSample, turned: int) -> torch.Tensor:
         """Returns the turned contexts `[G, 4, M, M]` of a sample's groups."""
         size = self._mazes[0].size
+        shown = [self._mazes[maze].walls for maze in sample.maze] if sample.shown is None else sample.shown
         contexts = [
-            build_context(self._mazes[maze].walls, divmod(start, size), divmod(goal, size), self.actor.trained_size)
-            for maze, start, goal in zip(sample.maze.tolist(), sample.start.tolist(), sample.goal.tolist(), strict=True)
+            build_context(walls, divmod(start, size), divmod(goal, size), self.actor.trained_size)
+            for walls, start, goal in zip(shown, sample.start.tolist(), sample.goal.tolist(), strict=True)
         ]
         return symmetry.turn_planes(torch.from_numpy(np.stack(contexts)), turned)
 

@@ -17,6 +17,7 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.storage.arrays import read_arrays
 from mazebench.storage.files import open_file
+from mazebench.tasks.context import GLOBAL_MAP
 from mazebench.training.experience import Experience
 
 from .sum_tree import SumTree
@@ -34,7 +35,7 @@ _ROW_FIELDS = (
     "trajectory",
     "leg",
 )
-_ENV_FIELDS = ("next", "current", "current_leg", "leg_origin", "current_anchor", "current_anchor_origin")
+_ENV_FIELDS = ("next", "current", "current_leg", "leg_origin", "current_anchor", "current_anchor_origin", "maps")
 _NO_ACTION = -1  # in the row after a trajectory's last step
 _STATE_SIZE = 12
 _PRIORITY_TYPE = np.dtype(np.float64)
@@ -58,6 +59,7 @@ class Sample(NamedTuple):
     discount: np.ndarray  # [G, K] float32, of `next_state`: 0 where the goal was reached within the n steps, else 1
     next_state: np.ndarray  # [G, K, 12] float32, after up to n steps; a trajectory's last one where it ends before
     valid: np.ndarray  # [G, K] bool, whether the step was taken outside of the goal
+    shown: np.ndarray | None  # [G, N, N] bool, walls on the shown maps; None unless the replay keeps them
 
 
 class SequenceSample(NamedTuple):
@@ -75,6 +77,7 @@ class SequenceSample(NamedTuple):
     cell: np.ndarray  # [G, S, L + 1] int, the body's true cell at `state`
     action: np.ndarray  # [G, S, L] int, taken in the first L states
     exists: np.ndarray  # [G, S, L + 1] bool, whether the trajectory goes as far; then its last state is repeated
+    shown: np.ndarray | None  # [G, N, N] bool, walls on the shown maps; None unless the replay keeps them
 
 
 @dataclasses.dataclass(frozen=True)
@@ -129,8 +132,16 @@ class Replay:
         self._current_anchor = np.zeros(num_envs, dtype=np.int64)  # the cell where its trajectory started
         self._current_anchor_origin = np.zeros((num_envs, 2), dtype=np.float32)
         self._tree = SumTree(num_envs * self._length)
+        self._map_size = 0  # N; 0 where no maps are kept
+        # Bits of the maps, by trajectory; no more trajectories are stored than rows.
+        self._maps = np.zeros((num_envs, self._length, 0), dtype=np.uint8)
         self._exponent = priority_exponent
         self._largest_priority = 1.0
+
+    def keep_maps(self, size: int) -> None:
+        """Makes the empty replay keep the map that each trajectory is shown; contexts have its `size`, N x N."""
+        self._map_size = size
+        self._maps = np.zeros((self._num_envs, self._length, (size * size + 7) // 8), dtype=np.uint8)
 
     @property
     def num_rows(self) -> int:
@@ -189,8 +200,8 @@ class Replay:
 
     @property
     def num_bytes(self) -> int:
-        """The memory of all rows, used or not."""
-        arrays = [getattr(self, f"_{name}") for name in _ROW_FIELDS]
+        """The memory of all rows, used or not, and of maps."""
+        arrays = [getattr(self, f"_{name}") for name in (*_ROW_FIELDS, "maps")]
         return sum(array.nbytes for array in arrays)
 
     def add(self, experience: Experience, first_env: int = 0) -> None:
@@ -201,6 +212,9 @@ class Replay:
         self._current_leg[envs] += experience.new_context
         self._leg_origin[envs[experience.new_context]] = experience.state[experience.new_context, :2]
         begins = experience.new_episode
+        if self._map_size:
+            walls = experience.context[begins, GLOBAL_MAP].reshape(-1, self._map_size**2) > 0.5
+            self._maps[envs[begins], self._current[envs[begins]] % self._length] = np.packbits(walls, axis=-1)
         self._current_anchor[envs[begins]] = experience.start[begins]
         self._current_anchor_origin[envs[begins]] = experience.state[begins, :2]
         self._write(envs, columns, experience, experience.state, experience.cell, experience.action)
@@ -268,6 +282,7 @@ class Replay:
             discount,
             self._state[env, last],
             (self._cell[env, steps] != goal) & (last != steps),
+            self._shown_walls(group),
         )
 
     def sample_sequences(
@@ -303,6 +318,7 @@ class Replay:
             self._cell[env, steps].astype(np.int64),
             np.maximum(self._action[env, steps[..., :-1]], 0).astype(np.int64),
             np.stack(exists, axis=-1),
+            self._shown_walls(group),
         )
 
     def _draw_groups(self, num_groups: int, num_steps: int, hindsight: Hindsight, rng: np.random.Generator) -> _Groups:
@@ -327,6 +343,14 @@ class Replay:
             anchor, origin = self._anchor[env, index].astype(np.int64), self._anchor_origin[env, index]
         maze = self._maze[env, index].astype(np.int64)
         return _Groups(row, env, steps, maze, start, goal, relabelled, anchor, origin)
+
+    def _shown_walls(self, group: _Groups) -> np.ndarray | None:
+        if not self._map_size:
+            return None
+        trajectory = self._trajectory.reshape(-1)[group.row]
+        maps = self._maps[group.env, trajectory % self._length]
+        shape = (-1, self._map_size, self._map_size)
+        return np.unpackbits(maps, axis=-1, count=self._map_size**2).reshape(shape).astype(bool)
 
     def update_priorities(self, row: np.ndarray, error: np.ndarray) -> None:
         """Sets the priorities of `row` `[K]`, of a sample, by the errors `[K]` of learning."""

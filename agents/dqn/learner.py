@@ -23,7 +23,7 @@ class DQNLearner(HindsightLearner):
 
     def __init__(self, actor: NetworkAgent, mazes: tuple[Maze, ...], seed: int):
         optimizer = torch.optim.Adam(actor.network.parameters(), lr=actor.config.learning_rate)
-        super().__init__(actor, mazes, seed, optimizer)
+        super().__init__(actor, mazes, seed, optimizer, priority_exponent=actor.config.priority_exponent)
 
     def update(self) -> dict[str, float]:
         """Learns from one batch; returns its losses and other scalars by name."""

@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import datetime
+import math
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+
+from mazebench.training.sitting import Report, Status, in_words
+
+_SECONDS_BETWEEN_LINES = 20  # so that there are two a minute even if steps take seconds
 
 
 @dataclasses.dataclass
@@ -38,10 +45,10 @@ def _episodes_shown(title: str) -> Iterator[Callable[[int, int], None]]:
         BarColumn,
         MofNCompleteColumn,
         Progress,
-        TextColumn,
         TimeElapsedColumn,
         TimeRemainingColumn,
     )
+    from rich.table import Column
 
     console = Console(stderr=True)
     if not console.is_terminal:
@@ -56,34 +63,84 @@ def _episodes_shown(title: str) -> Iterator[Callable[[int, int], None]]:
 
         yield say
         return
+    console.print(title, markup=False, highlight=False)  # names of agents would leave the bar no room in its line
+    whole = Column(no_wrap=True)  # where the terminal is narrow, the bar is cut, not the numbers
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
+        BarColumn(None, table_column=Column(ratio=1)),
+        *(column(table_column=whole) for column in (MofNCompleteColumn, TimeElapsedColumn, TimeRemainingColumn)),
     )
-    with Progress(*columns, console=console) as bar:
-        task = bar.add_task(title, total=None)
+    with Progress(*columns, console=console, expand=True) as bar:
+        task = bar.add_task("", total=None)
         yield lambda done, of: bar.update(task, completed=done, total=of)
 
 
 @contextmanager
-def training() -> Iterator[Callable[[float, str | None], None]]:
-    """Yields a function (share, line) that prints the line, on a terminal above a bar of the share."""
+def training() -> Iterator[Report]:
+    """Yields a function that prints lines and shows the status: below them on a terminal, now and then elsewhere."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TimeElapsedColumn
+    from rich.live import Live
+    from rich.progress_bar import ProgressBar
+    from rich.table import Table
+    from rich.text import Text
 
     console = Console()
     if not console.is_terminal:
-        yield lambda share, line: None if line is None else print(line, flush=True)
+        yield StatusLines()
         return
-    with Progress(BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), console=console) as bar:
-        task = bar.add_task("", total=1.0)
+    with Live(console=console) as live:
 
-        def show(share: float, line: str | None) -> None:
-            bar.update(task, completed=share)
-            if line is not None:
-                console.print(line, markup=False, highlight=False)
+        def show(status: Status | str) -> None:
+            if isinstance(status, str):
+                live.console.print(status, markup=False, highlight=False)
+            else:
+                shown = Table.grid()
+                shown.add_row(ProgressBar(total=1.0, completed=status.share))
+                shown.add_row(Text(describe(status, datetime.datetime.now())))
+                live.update(shown)
 
         yield show
+
+
+class StatusLines:
+    """Prints lines, and between them the status, at most `_SECONDS_BETWEEN_LINES` after the line before."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic):
+        """`clock` returns seconds."""
+        self._clock = clock
+        self._printed = clock()
+
+    def __call__(self, status: Status | str) -> None:
+        if isinstance(status, str):
+            self._print(status)
+        elif self._clock() >= self._printed + _SECONDS_BETWEEN_LINES:
+            now = datetime.datetime.now()
+            self._print(f"{now:%H:%M:%S} {describe(status, now)}")
+
+    def _print(self, line: str) -> None:
+        print(line, flush=True)
+        self._printed = self._clock()
+
+
+def describe(status: Status, now: datetime.datetime) -> str:
+    """Returns a status in words; `now` is the local time."""
+    parts = [f"{status.share:.0%} of {'this sitting' if status.is_timed else 'the run'} done"]
+    if status.seconds_left is not None:
+        end = now + datetime.timedelta(seconds=status.seconds_left)
+        day = "" if end.date() == now.date() else f"{end:%Y-%m-%d} "
+        parts.append(f"{_duration(status.seconds_left)} left, until {day}{end:%H:%M}")
+    parts.append(status.summary)
+    if status.evaluated is not None:
+        ended, of = status.evaluated
+        parts.append(f"evaluating: {ended:,} of {of:,} held-out episodes")
+    elif status.losses:
+        parts.append(in_words(status.losses))
+    else:
+        parts.append("collecting before learning begins" if not status.updates else "no update in the last minute")
+    return "; ".join(parts)
+
+
+def _duration(seconds: float) -> str:
+    minutes = math.ceil(seconds / 60)
+    if minutes <= 1:
+        return f"{math.ceil(seconds)} s"
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"

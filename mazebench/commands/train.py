@@ -3,69 +3,65 @@
 from __future__ import annotations
 
 import pathlib
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from mazebench import stopping
 from mazebench.commands import progress
-from mazebench.commands.options import refuse_ignored
+from mazebench.commands.display import has_camera, load_mujoco
+from mazebench.commands.options import NO_CAMERA, NO_TRACK, TRACK, refuse_ignored, takes_options
 from mazebench.errors import InputError
+from mazebench.maps.benchmark import SIZES
+from mazebench.training.options import TRAIN_CHOICES, TrainOptions
 
 
+@takes_options(TrainOptions, TRAIN_CHOICES)
 def train(
     context: typer.Context,
-    agent: Annotated[str, typer.Option(help="A learning agent: mmn, mah or dqn, or module:Class.")],
-    size: Annotated[int, typer.Option(help="Size of the benchmark's training mazes: 13, 15, 17, 19 or 21.")] = 13,
-    pairs: Annotated[str, typer.Option(help="random, or fixed: one start-goal pair a maze.")] = "random",
-    minutes: Annotated[float | None, typer.Option(min=0, help="How long this sitting lasts.")] = None,
-    env_steps: Annotated[int | None, typer.Option(min=1, help="Agent steps of the run, all sittings together.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of everything that is drawn.")] = 0,
-    out: Annotated[pathlib.Path | None, typer.Option(help="The run folder; runs/AGENT-SIZE-SEED if not given.")] = None,
+    agent: Annotated[
+        str, typer.Option(help="A learning agent: dqn, mah, mmn or another installed one, or module:Class.")
+    ],
+    values: dict[str, Any],
+    out: Annotated[
+        pathlib.Path | None,
+        typer.Option(help="The run folder; runs/AGENT-SIZE-SEED or runs/AGENT-TRACK-LEVEL-SEED if not given."),
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint in --out.")] = False,
     overrides: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="A value of the agent's config; repeatable."),
     ] = None,
-    checkpoint_steps: Annotated[
-        int, typer.Option(min=1, help="Agent steps between checkpoints, each with an evaluation.")
-    ] = 200_000,
-    eval_mazes: Annotated[int, typer.Option(min=1, help="Held-out mazes of an evaluation, 10 episodes in each.")] = 20,
-    workers: Annotated[int, typer.Option(min=0, help="Ray actors that collect; 0 collects in this process.")] = 0,
-    ray: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Address of a Ray cluster for the workers; local if not given."),
-    ] = None,
 ) -> None:
     """Train an agent on the benchmark's training mazes; evaluated now and then on held-out mazes of the same kind."""
+    load_mujoco(renders=has_camera(values["sensors"]))
     from mazebench.training import loop, run_folder
-    from mazebench.training.options import TrainOptions
 
-    refuse_ignored(context, (not workers, "without --workers this process collects by itself", ("ray",)))
-    options = TrainOptions(
-        agent=agent,
-        size=size,
-        pairs=pairs,
-        seed=seed,
-        overrides=tuple(_parse_override(text) for text in overrides or []),
-        minutes=minutes,
-        env_steps=env_steps,
-        checkpoint_steps=checkpoint_steps,
-        eval_mazes=eval_mazes,
-        workers=workers,
-        ray_address=ray,
+    refuse_ignored(
+        context,
+        (not values["workers"], "without --workers this process collects by itself", ("ray",)),
+        (values["track"] is None, *NO_TRACK),
+        (values["track"] is not None, *TRACK),
+        (not has_camera(values["sensors"]), *NO_CAMERA),
     )
-    folder = out or pathlib.Path("runs") / f"{agent.replace(':', '-')}-{size}-{seed}"
+    options = TrainOptions(agent, overrides=tuple(map(_parse_override, overrides or [])), **values)
+    folder = out or pathlib.Path("runs") / _folder_name(options)
 
     def how_to_go_on() -> tuple[str, ...]:
         last = next(reversed(run_folder.checkpoints(folder)), None)
         if last is None:
             return ("nothing is kept; run it again",)
-        return (f"the checkpoint at {int(last.name):,} steps is kept in {folder}; go on", "--resume")
+        again = "" if options.minutes is None else f" for another {options.minutes:g} minutes"
+        return (f"the checkpoint at {int(last.name):,} steps is kept in {folder}; go on{again}", "--resume")
 
     with stopping.stoppable(how_to_go_on), progress.training() as report:
         loop.train(options, folder, resume, report)
     print(f"run in {folder}; evaluate it by: mazebench eval --agent {agent} --checkpoint {folder}")
+
+
+def _folder_name(options: TrainOptions) -> str:
+    where = options.size or SIZES[0] if options.track is None else "-".join(map(str, (options.track, *options.level)))
+    return f"{options.agent.replace(':', '-')}-{where}-{options.seed}"
 
 
 def _parse_override(text: str) -> tuple[str, str]:

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mazebench.agent import Agent, Inputs
+from mazebench.agent import Agent, Inputs, Observation
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.maps.maze import point_to_cell
 from mazebench.tasks.spec import TaskSpec
 
 _SEEDS = 2**31
@@ -34,13 +33,17 @@ class Experience(NamedTuple):
     ended: np.ndarray  # [B] bool, whether the trajectory ends with this step
     final_state: np.ndarray  # [B, 12] float32, observed after the step where it ended; undefined elsewhere
     final_cell: np.ndarray  # [B] int, likewise
+    context: np.ndarray  # [B, 4, M, M] float32, observed before the step
+    sensors: Observation  # [B, ...] by the sensor's name, observed before the step
+    final_sensors: Observation  # observed after the step where the trajectory ended; undefined elsewhere
 
 
 class Collector:
     """Runs an exploring agent in B environments without end, and returns what it experiences."""
 
     def __init__(self, task_spec: TaskSpec, num_envs: int, seed: int, num_threads: int = 0):
-        self._size = task_spec.size
+        self._any_maze = task_spec.mazes[0]  # all have one size and one cell size
+        self._sensors = task_spec.sensors
         self._env = MazeVectorEnv(task_spec, num_envs, num_threads=num_threads)
         self.restart(seed)
 
@@ -75,16 +78,28 @@ class Collector:
         seeds[ended] = self._agent_seeds.integers(_SEEDS, size=int(ended.sum()))
         self.inputs = Inputs(observation, ended, infos["is_first"], seeds)
         self._maze = infos["maze"]
-        final = (self._final_states(infos, ended), self._final_cells(infos, ended))
-        return Experience(now.observation["state"], action, cell, *before, ended, *final)
+        final = {name: self._final(name, infos, ended) for name in ("state", *self._sensors)}
+        return Experience(
+            now.observation["state"],
+            action,
+            cell,
+            *before,
+            ended,
+            final["state"],
+            self._final_cells(infos, ended),
+            now.observation["context"],
+            {name: now.observation[name] for name in self._sensors},
+            {name: final[name] for name in self._sensors},
+        )
 
-    def _final_states(self, infos: dict[str, Any], ended: np.ndarray) -> np.ndarray:
-        states = np.zeros((self.num_envs, 12), dtype=np.float32)
+    def _final(self, name: str, infos: dict[str, Any], ended: np.ndarray) -> np.ndarray:
+        """Returns `[B, ...]`: the last observation called `name` where a trajectory ended, zero elsewhere."""
+        final = np.zeros_like(self.inputs.observation[name])
         for index in np.flatnonzero(ended):
-            states[index] = infos["final_obs"][index]["state"]
-        return states
+            final[index] = infos["final_obs"][index][name]
+        return final
 
     def _final_cells(self, infos: dict[str, Any], ended: np.ndarray) -> np.ndarray:
         if not ended.any():
             return np.zeros(self.num_envs, dtype=np.int64)
-        return point_to_cell(infos["final_info"]["position"], self._size) @ (self._size, 1)
+        return self._any_maze.cell(infos["final_info"]["position"]) @ (self._any_maze.size, 1)

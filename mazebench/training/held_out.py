@@ -3,36 +3,70 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from mazebench.agent import Agent
+from mazebench.errors import InputError
 from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.trials import select_trials
 from mazebench.maps.generators import generate
+from mazebench.maps.maze import Maze
 from mazebench.tasks.spec import TaskSpec
 
 _SEED = 20_000  # of mazes that are drawn like the benchmark's, and in none of its splits
-_DISTANCES = (2, 4, 6, 8, 10)
+_DISTANCES = (2, 4, 6, 8, 10)  # of a task without a track, unless others are asked for
 _EPISODES = 2  # for each maze and distance
+_MAX_DRAWS = 100  # of a maze in which the task can be played
 
 
 class HeldOutEvaluation:
-    """Episodes in `num_mazes` new mazes of the kind and size of `task_spec`'s."""
+    """Episodes in `num_mazes` new mazes of the size of `task`'s, with its track, perturbations and sensors."""
 
-    def __init__(self, task_spec: TaskSpec, num_mazes: int):
-        streams = np.random.SeedSequence([_SEED, task_spec.size]).spawn(num_mazes)
-        mazes = tuple(
-            generate("dfs", task_spec.size, np.random.default_rng(stream), f"held-out-{index}")
-            for index, stream in enumerate(streams)
-        )
-        self._task_spec = dataclasses.replace(task_spec, mazes=mazes, distances=_DISTANCES, num_goals=1, pairs="random")
-        self._trials = list(enumerate(select_trials("local", mazes, False, _DISTANCES, _EPISODES)))
+    def __init__(self, task: TaskSpec, num_mazes: int, distances: Sequence[int] = ()):
+        """Draws the mazes; the goals are at five of the `distances`, or of those of the task's track.
 
-    def success_rates(self, agent: Agent) -> dict[int, float]:
-        """Returns the agent's success rate by distance in cells; it acts greedily."""
-        reached: dict[int, list[bool]] = {distance: [] for distance in _DISTANCES}
-        for outcomes in run_trials(agent, self._task_spec, self._trials, len(self._trials)):
+        Raises:
+          InputError: if no such mazes are found.
+        """
+        if not distances:
+            distances = _DISTANCES if task.track is None else task.distances
+        spread = np.linspace(min(distances), max(distances), len(_DISTANCES)).round().astype(int).tolist()
+        self._distances = tuple(sorted({min(distances, key=lambda each: abs(each - wanted)) for wanted in spread}))
+        plain = dataclasses.replace(task, distances=self._distances, num_goals=1, pairs="random")
+        streams = np.random.SeedSequence([_SEED, task.size]).spawn(num_mazes)
+        mazes = [_draw_maze(plain, f"held-out-{index}", stream) for index, stream in enumerate(streams)]
+        self.task = dataclasses.replace(plain, mazes=tuple(mazes))
+        self.trials = list(enumerate(select_trials("local", mazes, False, self._distances, _EPISODES)))
+
+    def success_rates(self, agent: Agent, progress: Callable[[int, int], None]) -> dict[int, float]:
+        """Returns the agent's success rate by distance in cells; it acts greedily.
+
+        Args:
+          agent: the agent, which does not change.
+          progress: called with how many episodes have ended, and of how many.
+        """
+        reached: dict[int, list[bool]] = {distance: [] for distance in self._distances}
+        num_ended = 0
+        for outcomes in run_trials(agent, self.task, self.trials, len(self.trials)):
             for outcome in outcomes:
                 reached[outcome.trial.distance].append(outcome.success)
+            num_ended += len(outcomes)
+            progress(num_ended, len(self.trials))
         return {distance: float(np.mean(successes)) for distance, successes in reached.items()}
+
+
+def _draw_maze(task: TaskSpec, name: str, stream: np.random.SeedSequence) -> Maze:
+    """Returns the first maze of `stream` in which `task` can be played."""
+    rng = np.random.default_rng(stream)
+    for draw in range(_MAX_DRAWS):
+        maze = generate("dfs", task.size, rng, name)
+        try:
+            dataclasses.replace(task, mazes=(maze,))
+        except InputError:
+            if draw == _MAX_DRAWS - 1:
+                raise
+        else:
+            break
+    return maze

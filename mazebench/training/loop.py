@@ -1,40 +1,48 @@
-"""The training loop: collects, learns at a fixed replay ratio, evaluates and saves checkpoints."""
+"""The training loop: collects, learns at a fixed replay ratio, evaluates and saves checkpoints.
+
+A milestone is a checkpoint with an evaluation, after every so many steps. Trajectories begin anew there, so a run that
+is resumed from it goes on as the unbroken one did. A savepoint is a checkpoint between milestones. A run that saves it
+goes on unchanged; a run that is resumed from it begins new trajectories there, and so differs from the unbroken one.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import pathlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from mazebench import stopping
 from mazebench.agent import Interface
-from mazebench.agent_loading import load_agent_class
+from mazebench.agent_loading import learning_agents, load_agent_class
 from mazebench.errors import InputError, RunError
-from mazebench.maps.selection import load_mazes_of
+from mazebench.evaluation.checked_agent import context_size_of
+from mazebench.options import options_of
+from mazebench.tasks.options import TaskOptions
 from mazebench.tasks.registry import make_spec
 from mazebench.tasks.spec import TaskSpec
+from mazebench.training.counters import BEGINNING, Counters
+from mazebench.training.experience import Experience
 from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.options import TrainOptions
 from mazebench.training.protocol import Learner, LearningAgent
-from mazebench.training.run_folder import Counters, RunFolder
+from mazebench.training.run_folder import RunFolder, read_counters
+from mazebench.training.sitting import Report, Sitting, in_words
 from mazebench.training.sources import InProcessSource, Source
-
-# Called with the share of the sitting that is done, from 0 to 1, and now and then with a line to print.
-Report = Callable[[float, str | None], None]
 
 
 class TrainingError(RunError):
     """A run can't go on; its checkpoints are intact."""
 
 
-def train(
-    options: TrainOptions, out: pathlib.Path, resume: bool = False, report: Report = lambda share, line: None
-) -> None:
+def train(options: TrainOptions, out: pathlib.Path, resume: bool = False, report: Report = lambda status: None) -> None:
     """Trains an agent in the run folder `out`; from its last checkpoint if `resume`.
+
+    Under `mazebench.stopping.listening`, the first signal saves a savepoint and ends the training.
 
     Raises:
       InputError: if an option is wrong, or `out` can't be used.
@@ -42,26 +50,24 @@ def train(
     """
     agent_class = load_agent_class(options.agent)
     if not issubclass(agent_class, LearningAgent):
-        raise InputError(f"agent {options.agent!r} doesn't learn: its class is no LearningAgent")
-    context_size = agent_class.context_size(options.size)
-    interface = Interface("local", options.size, context_size)
-    mazes = load_mazes_of(options.size)
-    learner = agent_class.build_learner(interface, mazes, seed=options.seed, overrides=dict(options.overrides))
-    task_options = learner.task_options()
-    if options.pairs == "fixed":
-        task_options["num_goals"] = 1  # a maze has one goal, its pair's
-    task_spec = make_spec("local", options.size, pairs=options.pairs, context_size=context_size, **task_options)
+        raise InputError(f"agent {options.agent!r} doesn't learn; agents that do: {', '.join(learning_agents())}")
+    task = _chosen_task(options, agent_class)
+    interface = Interface(task.task, task.size, task.context_size, sensors=task.sensors)
+    learner = agent_class.build_learner(interface, task.mazes, seed=options.seed, overrides=dict(options.overrides))
+    task = _with_wishes(task, learner.task_options(), options)
+    learner.prepare(task)
+    held_out = HeldOutEvaluation(task, options.eval_mazes, options.distances)
     # The source comes first: if the cluster can't be reached, no run is begun.
-    with _open_source(options, task_spec, learner) as source, RunFolder(out) as folder:
-        counters = _begin_or_resume(options, folder, learner, resume)
-        if options.env_steps is not None and counters.env_steps >= options.env_steps:
-            report(1.0, f"{out}: the run is finished, at {counters.env_steps:,} steps")
+    with _open_source(options, task, learner) as source, RunFolder(out) as folder:
+        counters = _begin_or_resume(options, folder, learner, task, resume)
+        if options.env_steps is not None and counters.env_steps >= options.env_steps and counters.is_milestone:
+            report(f"{out}: the run is finished, at {counters.env_steps:,} steps")
             return
         if counters.env_steps:
-            report(0.0, f"resuming {out} at {counters.env_steps:,} steps")
-        report(0.0, f"{options.agent}: {learner.description()}")
-        held_out = HeldOutEvaluation(task_spec, options.eval_mazes)
-        TrainingLoop(options, folder, learner, source, held_out, counters, report).run()
+            report(f"resuming {out} at {counters.env_steps:,} steps")
+        report(f"{options.agent}: {learner.description()}")
+        with stopping.postponing():
+            TrainingLoop(options, folder, learner, task, source, held_out, counters, report).run()
 
 
 class TrainingLoop:
@@ -72,115 +78,114 @@ class TrainingLoop:
         options: TrainOptions,
         folder: RunFolder,
         learner: Learner,
+        task: TaskSpec,
         source: Source,
         held_out: HeldOutEvaluation,
         counters: Counters,
         report: Report,
     ):
-        """Goes on from `counters`, with a `learner` that is as it was there."""
-        self._options, self._folder, self._learner, self._source = options, folder, learner, source
+        """Goes on from the checkpoint at `counters`, with a `learner` that is as it was there."""
+        self._options, self._folder, self._learner, self._task, self._source = options, folder, learner, task, source
         self._held_out, self._report = held_out, report
-        self._env_steps, self._updates = counters.env_steps, counters.updates
-        self._begin = time.monotonic()
-        self._since_checkpoint = _Tally()
+        self._counters = counters
+        self._sitting = Sitting(options.minutes, options.env_steps, counters)
+        self._saved_steps, self._saved_time = counters.env_steps, time.monotonic()
 
     def run(self) -> None:
-        """Trains until the time or the steps are up, and leaves a checkpoint of the last step."""
-        while self._share_done() < 1.0:
-            before = self._env_steps
-            self._train_until(before + self._options.checkpoint_steps)
-            if self._env_steps > before:
-                self._checkpoint()
-
-    def _train_until(self, env_steps: int) -> None:
-        # New trajectories from every checkpoint on, so that a resumed run goes on as the unbroken one did.
-        for pieces in self._source.collect(_mix(self._options.seed, self._env_steps)):
-            stopping.check()
-            for first_env, experience in pieces:
-                self._learner.observe(experience, first_env)
-                num_steps = len(experience.action)
-                self._env_steps += num_steps
-                self._since_checkpoint.env_steps += num_steps
-            for _ in range(self._learner.num_updates_due(self._env_steps) - self._updates):
-                self._update()
-            self._report(min(1.0, self._share_done()), None)
-            if self._env_steps >= env_steps or self._share_done() >= 1.0:
+        """Trains until the time or the steps are up; the last step is a milestone."""
+        while True:
+            self._train_until(self._counters.milestone_steps + self._options.checkpoint_steps)
+            if not self._counters.is_milestone:
+                self._reach_milestone()
+            if self._is_over():
                 return
 
+    def _train_until(self, env_steps: int) -> None:
+        # New trajectories, so that a run that is resumed from this milestone goes on as the unbroken one did.
+        source = self._source.collect(_mix(self._options.seed, self._counters.env_steps))
+        while self._counters.env_steps < env_steps and not self._is_over():
+            self._learn_from(next(source))
+            self._report(self._sitting.status(self._counters))
+            if self._is_savepoint_due():
+                self._save()
+            stopping.check()
+
+    def _learn_from(self, pieces: Sequence[tuple[int, Experience]]) -> None:
+        """Stores experience, each piece with the index of its first environment, and makes the updates due."""
+        for first_env, experience in pieces:
+            self._learner.observe(experience, first_env)
+            self._counters = self._counters.after_steps(len(experience.action))
+        for _ in range(self._learner.num_updates_due(self._counters.env_steps) - self._counters.updates):
+            self._update()
+
     def _update(self) -> None:
-        values = self._learner.update()
-        self._updates += 1
-        for name, value in values.items():
+        losses = self._learner.update()
+        self._counters = self._counters.after_update(losses)
+        for name, value in losses.items():
             if not math.isfinite(value):
                 last = self._folder.checkpoints()[-1]
-                raise TrainingError(f"{name} became {value} at update {self._updates}; last good checkpoint: {last}")
-        self._since_checkpoint.add_update(values)
+                raise TrainingError(
+                    f"{name} became {value} at update {self._counters.updates}; last good checkpoint: {last}"
+                )
+        self._sitting.add_update(losses)
 
-    def _share_done(self) -> float:
-        """Returns the share of the sitting that is done; 1 or more at its end."""
-        minutes, env_steps = self._options.minutes, self._options.env_steps
-        shares = [0.0]
-        if minutes is not None:
-            shares.append((time.monotonic() - self._begin) / (60 * minutes) if minutes else 1.0)
-        if env_steps is not None:
-            shares.append(self._env_steps / max(1, env_steps))
-        return max(shares)
+    def _is_over(self) -> bool:
+        return self._sitting.share_done(self._counters) >= 1.0
 
-    def _checkpoint(self) -> None:
-        speed = self._since_checkpoint.speed()
-        metrics = self._since_checkpoint.means()
-        rates = self._held_out.success_rates(self._learner.actor)
-        metrics |= {f"success_rate_{distance}": rate for distance, rate in rates.items()}
-        counters = Counters(self._env_steps, self._updates)
-        self._folder.log(counters, metrics)
-        _save(self._options, self._folder, self._learner, counters)
-        values = ", ".join(f"{name} {value:.3g}" for name, value in metrics.items())
-        line = f"{self._env_steps:,} steps, {self._updates:,} updates, {speed}: {values}"
-        self._report(min(1.0, self._share_done()), line)
-        self._since_checkpoint = _Tally()
+    def _is_savepoint_due(self) -> bool:
+        seconds = 60 * self._options.checkpoint_minutes
+        return seconds > 0 and (stopping.is_asked() or time.monotonic() >= self._saved_time + seconds)
 
+    def _save(self) -> None:
+        _save(self._options, self._folder, self._learner, self._task, self._counters)
+        self._saved_steps, self._saved_time = self._counters.env_steps, time.monotonic()
 
-class _Tally:
-    """Counts and sums since the last checkpoint."""
+    def _reach_milestone(self) -> None:
+        """Saves, evaluates, and logs; a run that is stopped in the evaluation repeats it when it is resumed."""
+        counters, status = self._counters, self._sitting.status(self._counters)
+        if counters.env_steps != self._saved_steps:
+            self._save()
+        rates = self._held_out.success_rates(self._learner.actor, self._show_evaluation)
+        metrics = counters.mean_losses() | {f"success_rate_{distance}": rate for distance, rate in rates.items()}
+        self._folder.make_milestone(counters, metrics)
+        self._counters = counters.at_milestone()
+        self._report(f"{status.summary}: {in_words(metrics)}")
 
-    def __init__(self) -> None:
-        self.env_steps = 0
-        self._begin = time.monotonic()
-        self._updates = 0
-        self._sums: dict[str, float] = {}
-
-    def add_update(self, values: Mapping[str, float]) -> None:
-        """Adds what an update returned."""
-        self._updates += 1
-        for name, value in values.items():
-            self._sums[name] = self._sums.get(name, 0.0) + value
-
-    def means(self) -> dict[str, float]:
-        """Returns the means over the updates, by name."""
-        return {name: value / self._updates for name, value in self._sums.items()}
-
-    def speed(self) -> str:
-        """Returns steps and updates per second, in words."""
-        elapsed = max(time.monotonic() - self._begin, 1e-9)
-        return f"{self.env_steps / elapsed:,.0f} steps/s, {self._updates / elapsed:.1f} updates/s"
+    def _show_evaluation(self, ended: int, of: int) -> None:
+        stopping.check()
+        self._report(self._sitting.status(self._counters, evaluated=(ended, of)))
 
 
-def _open_source(options: TrainOptions, task_spec: TaskSpec, learner: Learner) -> Source:
+def _chosen_task(options: TrainOptions, agent_class: type[LearningAgent]) -> TaskSpec:
+    """Returns the task of `options`, with the context size that the agent needs, before the learner's own wishes."""
+    task = make_spec(size=options.size, **options.chosen_task)
+    if task.track is not None:
+        return task
+    return dataclasses.replace(task, context_size=context_size_of(options.agent, agent_class, task.size))
+
+
+def _with_wishes(task: TaskSpec, wishes: dict[str, Any], options: TrainOptions) -> TaskSpec:
+    """Returns `task` with the options that the learner wants, where the user chose none."""
+    wishes = {name: value for name, value in wishes.items() if name not in options.chosen_task}
+    if task.track is not None or task.pairs == "fixed":
+        wishes["num_goals"] = 1  # a track has one goal, and so has a maze with a fixed pair
+    return dataclasses.replace(task, **wishes)
+
+
+def _open_source(options: TrainOptions, task: TaskSpec, learner: Learner) -> Source:
     """Raises `InputError` if workers are wanted, and Ray is not installed or its cluster can't be reached."""
     if not options.workers:
-        return InProcessSource(task_spec, learner.actor, learner.num_envs)
+        return InProcessSource(task, learner.actor, learner.num_envs)
     from mazebench.training.distributed import RaySource
 
-    return RaySource(task_spec, learner, options.workers, options.ray_address)
+    return RaySource(task, learner, options.workers, options.ray)
 
 
-def _begin_or_resume(options: TrainOptions, folder: RunFolder, learner: Learner, resume: bool) -> Counters:
+def _begin_or_resume(
+    options: TrainOptions, folder: RunFolder, learner: Learner, task: TaskSpec, resume: bool
+) -> Counters:
     """Saves the first checkpoint of a new run, or loads the last one into `learner`; returns where the run is."""
-    config: dict[str, Any] = {
-        "agent": options.agent,
-        "size": options.size,
-        "pairs": options.pairs,
-        "seed": options.seed,
+    config = _origin(options, task) | {
         "checkpoint_steps": options.checkpoint_steps,
         "agent_config": learner.config(),
     }
@@ -189,24 +194,23 @@ def _begin_or_resume(options: TrainOptions, folder: RunFolder, learner: Learner,
         raise InputError(f"{folder.path}: holds a run already; go on with --resume or name another folder")
     folder.check_config(config)
     if not checkpoints:
-        _save(options, folder, learner, Counters())
-        return Counters()
-    counters = Counters.read(checkpoints[-1])
+        _save(options, folder, learner, task, BEGINNING)
+        return BEGINNING
+    counters = read_counters(checkpoints[-1])
     learner.load(checkpoints[-1])
-    folder.forget_metrics_after(counters.env_steps)
+    folder.forget_metrics_after(counters.milestone_steps)
     return counters
 
 
-def _save(options: TrainOptions, folder: RunFolder, learner: Learner, counters: Counters) -> None:
-    provenance = {
-        "env_steps": counters.env_steps,
-        "updates": counters.updates,
-        "agent": options.agent,
-        "size": options.size,
-        "pairs": options.pairs,
-        "seed": options.seed,
-    }
+def _save(options: TrainOptions, folder: RunFolder, learner: Learner, task: TaskSpec, counters: Counters) -> None:
+    provenance = {"env_steps": counters.env_steps, "updates": counters.updates, **_origin(options, task)}
     folder.save_checkpoint(counters, lambda path: learner.save(path, provenance))
+
+
+def _origin(options: TrainOptions, task: TaskSpec) -> dict[str, Any]:
+    """Returns what is trained, and in which task."""
+    values = {name: getattr(task, name) for name in options_of(TaskOptions)}
+    return {"agent": options.agent, "size": task.size, "task": values, "seed": options.seed}
 
 
 def _mix(*numbers: int) -> int:

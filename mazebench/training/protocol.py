@@ -13,6 +13,7 @@ import numpy as np
 
 from mazebench.agent import Agent, Interface
 from mazebench.maps.maze import Maze
+from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Experience
 
 
@@ -73,7 +74,17 @@ class Learner(Protocol):
         """Returns one line for people: the size of the network and of the replay."""
 
     def task_options(self) -> dict[str, Any]:
-        """Returns the options of `make_spec` that the learner wants to collect with."""
+        """Returns the options of the task that the learner wants to collect with, unless the user asks for others.
+
+        They are fields of `TaskOptions`, but not those that choose mazes or context size: `track` and `level`.
+        """
+
+    def prepare(self, task: TaskSpec) -> None:
+        """Prepares to learn in `task`, before the first experience.
+
+        Raises:
+          InputError: if the learner can't, because its network does not take a sensor, or it needs exact maps.
+        """
 
     def observe(self, experience: Experience, first_env: int = 0) -> None:
         """Stores one step in the environments from `first_env` on."""

@@ -1,21 +1,26 @@
-"""The folder of a training run: its config, metrics and checkpoints, written by one process at a time."""
+"""The folder of a training run: its config, metrics and checkpoints, written by one process at a time.
+
+A checkpoint is a milestone, whose metrics are logged, or a savepoint, from which a run that was stopped goes on.
+"""
 
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import json
 import os
 import pathlib
 import re
 import shutil
 from collections.abc import Callable, Mapping
-from typing import Any, Self
+from typing import Any
 
-from mazebench.errors import InputError, RunError
+import pydantic
+
+from mazebench.errors import InputError, RunError, describe_fault
 from mazebench.storage.files import WriteError, make_folder, open_to_write, open_whole, writing_to
 from mazebench.storage.json_files import read_json, repair_and_read_lines, to_line, write_json
 from mazebench.storage.locks import FolderLock
+from mazebench.training.counters import Counters
 from mazebench.training.tensorboard import Board
 
 CONFIG = "config.json"
@@ -23,29 +28,7 @@ METRICS = "metrics.jsonl"
 CHECKPOINTS = "checkpoints"
 _COUNTERS = "counters.json"
 _BOARD = "tensorboard"
-_KEPT_CHECKPOINTS = 2
 _CHECKPOINT_NAME = re.compile(r"[0-9]{12,}")  # agent steps; older checkpoints are deleted, so no other folder may match
-
-
-@dataclasses.dataclass(frozen=True)
-class Counters:
-    """How far a run is."""
-
-    env_steps: int = 0
-    updates: int = 0
-
-    @classmethod
-    def read(cls, checkpoint: pathlib.Path) -> Self:
-        """Returns the counters of a checkpoint, whose folder is named after its steps.
-
-        Raises:
-          InputError: if they can't be read.
-        """
-        found, path = read_json(checkpoint / _COUNTERS), checkpoint / _COUNTERS
-        steps, updates = (found.get(key) if isinstance(found, dict) else None for key in ("env_steps", "updates"))
-        if type(steps) is not int or type(updates) is not int or steps != int(checkpoint.name) or updates < 0:
-            raise InputError(f"{path}: expected env_steps {int(checkpoint.name)} and updates, found {str(found)[:80]}")
-        return cls(steps, updates)
 
 
 class RunFolder:
@@ -81,34 +64,43 @@ class RunFolder:
         return checkpoints(self.path)
 
     def save_checkpoint(self, counters: Counters, save: Callable[[pathlib.Path], None]) -> None:
-        """Lets `save` fill a new checkpoint, which then takes its place at once; the last two are kept.
+        """Lets `save` fill a new checkpoint, which then takes its place at once; the last milestone is kept beside it.
 
         Raises:
           RunError: if it can't be written; the checkpoints before are intact.
         """
-        final = self.path / CHECKPOINTS / f"{counters.env_steps:012d}"
+        final = self._checkpoint(counters)
         temporary = final.with_suffix(".tmp")
         try:
             temporary.mkdir()
             save(temporary)
-            write_json(temporary / _COUNTERS, dataclasses.asdict(counters))
+            write_json(temporary / _COUNTERS, counters.model_dump())
             for path in temporary.iterdir():
                 _sync(path)
-            shutil.rmtree(final, ignore_errors=True)
             os.replace(temporary, final)
         except OSError as error:
             shutil.rmtree(temporary, ignore_errors=True)
             raise self._cannot("save", final, error) from error
-        for old in self.checkpoints()[:-_KEPT_CHECKPOINTS]:
-            shutil.rmtree(old, ignore_errors=True)
+        for checkpoint in self.checkpoints():
+            if int(checkpoint.name) not in (counters.env_steps, counters.milestone_steps):
+                shutil.rmtree(checkpoint, ignore_errors=True)
 
-    def log(self, counters: Counters, metrics: Mapping[str, float]) -> None:
-        """Appends a line to the metrics, and writes them for TensorBoard.
+    def make_milestone(self, counters: Counters, metrics: Mapping[str, float]) -> None:
+        """Logs the metrics of the checkpoint at `counters`, which then is a milestone.
 
         Raises:
           RunError: if they can't be written; the checkpoints are intact.
         """
-        values = dataclasses.asdict(counters) | dict(metrics)
+        self._log(counters, metrics)
+        path = self._checkpoint(counters) / _COUNTERS
+        try:
+            write_json(path, counters.at_milestone().model_dump())
+        except OSError as error:
+            raise self._cannot("save", path, error) from error
+
+    def _log(self, counters: Counters, metrics: Mapping[str, float]) -> None:
+        """Appends a line to the metrics, and writes them for TensorBoard."""
+        values = {"env_steps": counters.env_steps, "updates": counters.updates, **metrics}
         try:
             with open_to_write(self.path / METRICS, "a") as file:
                 file.write(to_line(values))
@@ -120,7 +112,7 @@ class RunFolder:
             raise self._cannot("write", self.path, error) from error
 
     def forget_metrics_after(self, env_steps: int) -> None:
-        """Removes the metrics of later steps, which a resumed run takes again."""
+        """Removes the metrics of later milestones, which a resumed run reaches again."""
         path = self.path / METRICS
         with writing_to(self.path):
             kept = [line for line in repair_and_read_lines(path) if line.get("env_steps", 0) <= env_steps]
@@ -144,6 +136,9 @@ class RunFolder:
             name = next((name for name in names if before.get(name) != now.get(name)), "content")
             raise InputError(f"{path}: holds another run, differing in {name!r}")
 
+    def _checkpoint(self, counters: Counters) -> pathlib.Path:
+        return self.path / CHECKPOINTS / f"{counters.env_steps:012d}"
+
     def __enter__(self) -> RunFolder:
         return self
 
@@ -159,6 +154,23 @@ class RunFolder:
 def checkpoints(path: pathlib.Path) -> list[pathlib.Path]:
     """Returns the complete checkpoints of the run folder `path`, oldest first."""
     return sorted(folder for folder in path.glob(f"{CHECKPOINTS}/*") if _CHECKPOINT_NAME.fullmatch(folder.name))
+
+
+def read_counters(checkpoint: pathlib.Path) -> Counters:
+    """Returns the counters of a checkpoint, whose folder is named after its steps.
+
+    Raises:
+      InputError: if they can't be read.
+    """
+    path = checkpoint / _COUNTERS
+    found = read_json(path)
+    try:
+        counters = Counters.model_validate(found)
+    except pydantic.ValidationError as error:
+        raise InputError(f"{path}: expected the counters of a run, found {describe_fault(error)}") from error
+    if counters.env_steps != int(checkpoint.name):
+        raise InputError(f"{path}: expected env_steps {int(checkpoint.name)}, found {counters.env_steps}")
+    return counters
 
 
 def _sync(path: pathlib.Path) -> None:

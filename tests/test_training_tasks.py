@@ -1,0 +1,164 @@
+"""Training in a task of one's own choice: tracks, perturbations, distances; its replay and its evaluation."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+import safetensors
+from faults import TINY
+from mazebench_agents.common.overrides import override
+from mazebench_agents.common.replay import Hindsight
+from mazebench_agents.dqn import MAH
+from mazebench_agents.dqn.learner import DQNLearner
+
+from mazebench.agent import Interface
+from mazebench.errors import InputError
+from mazebench.tasks.context import GLOBAL_MAP
+from mazebench.tasks.registry import make_spec
+from mazebench.tasks.tracks import TRACKS
+from mazebench.training.experience import Collector
+from mazebench.training.held_out import HeldOutEvaluation
+from mazebench.training.loop import train
+from mazebench.training.options import TrainOptions
+
+
+def tiny_options(**changes: Any) -> TrainOptions:
+    values = {"overrides": tuple(TINY.items()), "checkpoint_steps": 800, "eval_mazes": 1, "env_steps": 1600}
+    return TrainOptions(**{"agent": "mah", **values, **changes})
+
+
+def task_in(folder) -> dict[str, Any]:
+    """The task that a run's config and the provenance of its checkpoint name."""
+    task = json.loads((folder / "config.json").read_text())["task"]
+    with safetensors.safe_open(folder / "checkpoints" / "000000001600" / "agent.safetensors", "numpy") as file:
+        (metadata,) = map(json.loads, file.metadata().values())
+    assert metadata["provenance"]["task"] == task
+    return task
+
+
+class NearLearner(DQNLearner):
+    def task_options(self) -> dict[str, Any]:
+        return {"num_goals": 2, "distances": (1, 2), "time_limit": 50}
+
+
+class Near(MAH):
+    """Wants near goals."""
+
+    @classmethod
+    def build_learner(cls, interface, mazes, *, seed=0, overrides=None):
+        config = override(cls.default_config, overrides or {})
+        return NearLearner(cls(config, interface.context_size, seed), tuple(mazes), seed)
+
+
+def test_a_run_on_a_track_names_it_and_is_evaluated_on_it(tmp_path):
+    train(tiny_options(track="stale", level=(1, 2)), tmp_path)
+    task = task_in(tmp_path)
+    assert (task["track"], task["level"], task["num_goals"], task["sensors"]) == ("stale", [1, 2], 1, ["lidar"])
+    last = json.loads((tmp_path / "metrics.jsonl").read_text().splitlines()[-1])
+    assert [name for name in last if "success" in name] == [f"success_rate_{each}" for each in (3, 7, 12, 16, 20)]
+
+
+def test_a_resumed_run_on_wrong_maps_equals_the_unbroken_one(tmp_path):
+    options = tiny_options(map_flip=0.1)
+    train(options, tmp_path / "unbroken")
+    train(dataclasses.replace(options, env_steps=800), tmp_path / "resumed")
+    train(options, tmp_path / "resumed", resume=True)
+    for name in ("agent.safetensors", "replay.npz"):
+        paths = [tmp_path / run / "checkpoints" / "000000001600" / name for run in ("unbroken", "resumed")]
+        assert paths[0].read_bytes() == paths[1].read_bytes(), name
+
+
+def test_a_run_is_not_resumed_in_another_task(tmp_path):
+    train(tiny_options(env_steps=8), tmp_path)
+    with pytest.raises(InputError, match="holds another run, differing in 'task'"):
+        train(tiny_options(map_flip=0.1), tmp_path, resume=True)
+
+
+def test_the_user_chooses_before_the_learner_does(tmp_path):
+    train(tiny_options(agent=f"{__name__}:Near", distances=(3, 4)), tmp_path)
+    task = task_in(tmp_path)
+    assert (task["distances"], task["num_goals"], task["time_limit"]) == ([3, 4], 2, 50)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"size": 14}, "unknown size '14'"),
+        ({"pairs": "foo"}, "unknown pairs 'foo'; available: fixed, random"),
+        ({"minutes": 0}, "expected minutes from 0.01 to 527040, found 0"),
+        ({"minutes": float("inf")}, "expected minutes from 0.01 to 527040, found inf"),
+        ({"seed": 2**63}, "expected seed from 0 to 9223372036854775807"),
+        ({"task": "hierarchical"}, "expected task 'local' in a training, found 'hierarchical'"),
+        ({"continuous": True}, "expected continuous False in a training, found True"),
+        ({"track": "stale", "map_flip": 0.1}, "track 'stale': expected no perturbation, found map_flip 0.1"),
+        ({"track": "stale", "pairs": "fixed"}, "track 'stale': expected pairs 'random', found 'fixed'"),
+        ({"track": "far", "size": 13}, "track 'far', level 1: expected size 31, found 13"),
+        ({"track": "sketch"}, "agent 'mah': learns only on maps of one pixel a cell .*; found track 'sketch'"),
+        ({"track": "lost", "level": (1, 2)}, "agent 'mah': learns only on maps .*; found track 'lost'"),
+        ({"track": "far", "level": 3}, "agent 'mah': learns on tracks .* from contexts .* size 51, found 21"),
+        ({"map_warp": 0.1}, "agent 'mah': learns only on maps of one pixel a cell .*; found map_warp"),
+        ({"sensors": "lidar"}, "agent 'mah': reads no sensors, found lidar"),
+        ({"distances": 60}, "expected distances of at most "),
+        ({"agent": "planner"}, "agent 'planner' doesn't learn; agents that do: dqn, mah, mmn"),
+    ],
+)
+def test_what_can_not_be_trained_is_refused_before_a_folder_is_made(tmp_path, changes, message):
+    with pytest.raises(InputError, match=message):
+        train(tiny_options(**changes), tmp_path / "run")
+    assert not list(tmp_path.iterdir())
+
+
+def test_goals_are_relabelled_on_the_maps_that_were_shown():
+    task = make_spec("stale", split="train")
+    learner = MAH.build_learner(Interface("local", 13, 13), task.mazes, overrides=TINY)
+    learner.prepare(task)
+    collector = Collector(task, learner.num_envs, seed=0)
+    rng, shown = np.random.default_rng(0), set()
+    for _ in range(450):  # more steps than an episode has
+        step = collector.step(rng.integers(6, size=learner.num_envs))
+        shown |= {context[GLOBAL_MAP].tobytes() for context in step.context[step.new_episode]}
+        learner.observe(step)
+    sample = learner._replay.sample(200, 4, 3, Hindsight(ratio=1.0), rng)
+    contexts = learner._contexts(sample, 0).numpy()
+    assert {context[GLOBAL_MAP].tobytes() for context in contexts} <= shown
+    true = np.stack([task.mazes[maze].walls for maze in sample.maze])
+    assert ((contexts[:, GLOBAL_MAP] != true).sum(axis=(1, 2)) == 6).all(), "three doors closed, three opened"
+
+
+def test_experience_has_what_the_sensors_read_before_a_step_and_after_the_last_one():
+    task = make_spec("local", 13, distances=(5,), time_limit=3, sensors=("lidar",))
+    collector = Collector(task, 2, seed=0)
+    steps = [collector.step(np.zeros(2, dtype=np.int64)) for _ in range(4)]
+    assert [step.ended.all() for step in steps] == [False, False, True, False]
+    last, first = steps[2], steps[3]
+    assert last.final_sensors["lidar"].shape == first.sensors["lidar"].shape == last.sensors["lidar"].shape
+    assert (last.final_sensors["lidar"] != first.sensors["lidar"]).any(axis=1).all(), "another episode has begun"
+    assert not steps[1].final_sensors["lidar"].any()
+
+
+@pytest.mark.parametrize(
+    ("task", "distances", "wanted"),
+    [
+        ({}, (), [2, 4, 6, 8, 10]),
+        ({}, (3,), [3]),
+        ({}, (1, 2, 3, 4, 12), [1, 4, 12]),
+        ({"track": "far"}, (), [20, 25, 30, 35, 40]),
+        ({"track": "stale"}, (5, 6), [5, 6]),
+    ],
+)
+def test_held_out_goals_are_at_five_of_the_distances(task, distances, wanted):
+    spec = make_spec(**task, **({"distances": distances} if distances else {}))
+    evaluation = HeldOutEvaluation(spec, 2, distances)
+    assert sorted({trial.distance for _, trial in evaluation.trials}) == wanted
+
+
+def test_held_out_mazes_are_new_ones_in_which_the_track_can_be_played():
+    spec = make_spec("stale", level=3)
+    mazes = HeldOutEvaluation(spec, 3).task.mazes
+    assert not {maze.walls.tobytes() for maze in mazes} & {maze.walls.tobytes() for maze in spec.mazes}
+    for maze in mazes:
+        TRACKS["stale"].check(maze, (3,))
