@@ -9,7 +9,7 @@ import re
 import pytest
 from made_results import edit_records, edit_summary, make_result, of_own_mazes, read_summary
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, one_line
 from mazebench.report.provenance import provenance_rows
 from mazebench.report.reference import paper_columns
 from mazebench.report.report import write_report
@@ -46,9 +46,9 @@ def set_outcomes(folder, outcomes):
     return edit_records(folder, edit)
 
 
-def table_of(label):
+def table_of(*labels):
     cells = {"success_rate": (Cell(0.5, 0.25, 0.75, 4), None)}
-    columns = (Column(label, False, cells),)
+    columns = tuple(Column(label, False, cells) for label in labels)
     return Table("made", "A title", "A note.", "distance", ("2", "4"), (2.0, 4.0), columns)
 
 
@@ -278,11 +278,39 @@ class TestForms:
             "| 4 |  |",
         ]
 
+    def test_markdown_of_many_long_names_has_a_row_for_each_agent(self):
+        names = [f"mylab.agents.planners.variant-{number}:PlannerWithMemory" for number in range(10)]
+        head, _, *lines = to_markdown(table_of(*names)).splitlines()
+        assert head == "| success rate, by distance | 2 | 4 |"
+        assert lines == [f"| {name} | 0.50 [0.25, 0.75] |  |" for name in names]
+
     def test_csv(self):
         [row] = csv.DictReader(io.StringIO(to_csv(table_of('a,"b'))))
         assert row["column"] == 'a,"b'
         assert (row["metric"], row["row"], row["source"], row["episodes"]) == ("success_rate", "2", "measured", "4")
         assert (row["value"], row["low95"], row["high95"]) == ("0.5", "0.25", "0.75")
+
+    @pytest.mark.parametrize("name", ["=cmd|' /C calc'!A0", "+1+2", "-x", "@SUM(1)", "\t=1", "\r=1"])
+    def test_csv_has_no_name_that_a_spreadsheet_runs(self, name):
+        [row] = csv.DictReader(io.StringIO(to_csv(table_of(name)), newline=""))
+        assert row["column"] == f"'{one_line(name)}"
+
+    def test_csv_leaves_numbers_as_they_are(self):
+        cells = {"success_rate": (Cell(-0.5, -1.0, 0.0, 4),)}
+        table = Table("made", "", "", "level", ("-1.5",), (-1.5,), (Column("mah-1", False, cells),))
+        [row] = csv.DictReader(io.StringIO(to_csv(table)))
+        assert [row[name] for name in ("row", "column", "value", "low95")] == ["-1.5", "mah-1", "-0.5", "-1"]
+
+    def test_latex_of_many_long_names_stands_in_blocks_with_names_in_lines(self):
+        names = [f"mylab.planners.variant-{number}:Planner" for number in range(13)]
+        latex = to_latex(table_of(*names))
+        assert latex.count(r"\begin{table}") == latex.count(r"\caption") == 1
+        assert [line for line in latex.splitlines() if line.startswith(r"\begin{tabular}")] == [
+            r"\begin{tabular}{lrrrr}",
+            r"\begin{tabular}{lrrrr}",
+            r"\begin{tabular}{lrrrrr}",
+        ]
+        assert r"\begin{tabular}[b]{@{}r@{}}mylab.planners. \\{} variant-7:Planner\end{tabular}" in latex
 
     def test_latex(self):
         latex = to_latex(table_of("mah_2 & 50%"))

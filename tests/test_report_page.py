@@ -10,8 +10,11 @@ import pytest
 from browser import CHROMIUM, Browser
 from made_results import edit_records, make_result
 
+from mazebench.evaluation.evaluate import evaluate
+from mazebench.maps import colors
 from mazebench.maps.benchmark import load_track_mazes
 from mazebench.report.report import write_report
+from mazebench.tasks.context import resized_map
 from mazebench.world.lidar import Lidar
 
 NASTY = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=1>"
@@ -49,6 +52,10 @@ class TestContent:
         assert NASTY in data_of(page)["labels"]
         for path in (page.parent / "tables").glob("*.md"):
             assert not re.search(r"(?<!\\)<", path.read_text())
+
+    def test_start_and_goal_have_the_colours_of_the_world(self, page):
+        start, goal = map(colors.to_hex, (colors.START, colors.GOAL))
+        assert f"<style>:root {{ --start: {start}; --goal: {goal}; }}" in page.read_text()
 
 
 @pytest.fixture(scope="module")
@@ -188,6 +195,78 @@ class TestTracks:
         assert on_tracks.run("document.documentElement.scrollWidth") <= width
 
 
+class TestOwnMaps:
+    def test_a_map_is_shown_with_the_cells_that_the_agent_was_given(self, browser, tmp_path):
+        rows = ["#" * 30, *["#" + "." * 13 + "#" + "." * 14 + "#"] * 13, *["#" + "." * 28 + "#"] * 15, "#" * 30]
+        (tmp_path / "hall.txt").write_text("\n".join(rows) + "\n")
+        hall = {"maps": str(tmp_path / "hall.txt"), "distances": [5], "episodes_per_distance": 1}
+        evaluate("random", tmp_path / "results", record=True, **hall)
+        write_report([tmp_path / "results"], tmp_path / "report", lambda line: None)
+        load_anew(browser, tmp_path / "report" / "report.html")
+        assert browser.run("view.current.context") == 21
+        drawn = browser.run("resizedMap(view.current.shown, view.current.side, view.current.context)")
+        walls = np.array([[cell == "#" for cell in row] for row in rows])
+        assert np.allclose(drawn, resized_map(walls, 21).ravel(), atol=1e-6)
+        assert browser.run("document.getElementById('shown').width % 21") == 0
+        assert browser.errors == []
+
+    def test_a_result_that_does_not_say_which_cells_claims_nothing(self, opened):
+        opened.run("view.current.context = 0; describe()")
+        assert "may have been shown" in opened.run("document.getElementById('shown-caption').textContent")
+
+
+@pytest.fixture(scope="module")
+def crowded_page(tmp_path_factory):
+    """The page over twelve agents with long names."""
+    folder = tmp_path_factory.mktemp("crowd")
+    for number in range(12):
+        agent = f"mylab.navigation.experiments.variant_{number}.agents:PlannerWithRecurrentMemory"
+        make_result(folder / "results" / str(number), agent, num_mazes=2)
+    write_report([folder / "results"], folder / "report", lambda line: None)
+    return folder / "report" / "report.html"
+
+
+@pytest.fixture
+def crowded(browser, crowded_page):
+    """The browser with the page of many agents loaded anew."""
+    load_anew(browser, crowded_page)
+    yield browser
+    assert browser.errors == []
+
+
+class TestManyAgents:
+    def test_no_two_look_alike_and_their_lines_look_as_in_the_key(self, crowded):
+        look = (
+            "[...svg.querySelectorAll('polyline, path')].map(node => node.getAttribute('d') ||"
+            "node.getAttribute('stroke') + node.getAttribute('stroke-dasharray'))"
+        )
+        keys = crowded.run(f"[...document.querySelectorAll('#agents svg')].map(svg => {look}.join())")
+        assert len(set(keys[:12])) == 12
+        drawn = crowded.run(f"[document.querySelector('#charts svg[role]')].map(svg => {look})[0]")
+        assert all(part in drawn for key in keys[:12] for part in key.split(","))
+
+    def test_tables_have_a_row_for_each(self, crowded):
+        crowded.run("document.querySelector('#charts details').open = true")
+        heads = "[...document.querySelectorAll('#charts table')][0].tBodies[0].rows"
+        names = crowded.run(f"[...{heads}].map(row => row.cells[0].textContent)")
+        assert names[:12] == crowded.run("data.labels")
+
+    @pytest.mark.parametrize("width", [400, 800, 1400])
+    def test_everything_is_reached_without_scrolling_sideways(self, crowded, width):
+        crowded.resize(width, 800)
+        crowded.wait_for(f"document.documentElement.clientWidth === {width}")
+        assert crowded.run("document.documentElement.scrollWidth") <= width
+        assert crowded.run("document.getElementById('provenance').getBoundingClientRect().right") <= width
+
+    def test_provenance_is_a_list_in_a_narrow_window(self, crowded):
+        crowded.resize(400, 800)
+        crowded.wait_for("document.documentElement.clientWidth === 400")
+        cells = "[...document.querySelectorAll('#provenance td')].filter(cell => cell.checkVisibility())"
+        assert crowded.run(f"{cells}.every(cell => cell.textContent && cell.getBoundingClientRect().width > 300)")
+        name = "getComputedStyle(document.querySelector('#provenance td'), '::before').content"
+        assert crowded.run(name) in ('"agent"', "attr(data-name)")
+
+
 class TestReading:
     def test_the_slider_and_the_arrow_keys_move_through_time(self, opened):
         last = int(opened.run("document.getElementById('time').max"))
@@ -246,6 +325,13 @@ class TestReading:
         assert "success rate by" in opened.run(label)
         opened.run("document.querySelector('input[value=spl]').click()")
         assert "SPL by" in opened.run(label)
+
+    def test_few_distances_have_an_interval_for_each_agent_beside_one_another(self, opened):
+        lines = (
+            "[...document.querySelector('#charts svg').querySelectorAll('line[stroke]')].map(node => node.getAttribute"
+        )
+        places = opened.run(f"{lines}('x1'))")
+        assert len(set(places)) == len(places) == 2 * 3  # distances and agents
 
     def test_charts_are_read_with_the_arrow_keys(self, opened):
         opened.run("document.querySelector('#charts svg').focus()")

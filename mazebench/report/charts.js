@@ -3,8 +3,25 @@
 
 const data = JSON.parse(document.getElementById("data").textContent);
 const chosen = { metric: "success_rate", hidden: new Set() };
+// The looks of agents, in the order of looks.py. Markers reach from -1 to 1.
+const MARKERS = [
+  "M-1 0a1 1 0 1 0 2 0a1 1 0 1 0-2 0z", // a circle
+  "M-.9-.9H.9V.9H-.9z", // a square
+  "M0-1.2L1.1.9H-1.1z", // triangles and a diamond
+  "M0-1.3L1 0 0 1.3-1 0z",
+  "M0 1.2L1.1-.9H-1.1z",
+  "M-1.2 0L.9-1.1V1.1z",
+  "M1.2 0L-.9-1.1V1.1z",
+  "M-.4-1.1H.4V-.4H1.1V.4H.4V1.1H-.4V.4H-1.1V-.4H-.4z", // a plus and an X
+  "M-1.1-.5L-.5-1.1 0-.6 .5-1.1 1.1-.5 .6 0 1.1.5 .5 1.1 0 .6-.5 1.1-1.1.5-.6 0z",
+  "M0-1.2L1.1-.4.7 1H-.7L-1.1-.4z", // a pentagon, a star and a hexagon
+  "M0-1.4L.4-.5 1.3-.4.6.2.8 1.1 0 .6-.8 1.1-.6.2-1.3-.4-.4-.5z",
+  "M0-1.2L1-.6V.6L0 1.2-1 .6V-.6z",
+];
+const CROSS = "M-1-1L1 1M1-1L-1 1";
+const DASHES = ["none", "7 3", "9 3 2 3"];
 const PAPER_DASH = "2 4";
-const MARKERS = ["circle", "square", "triangle", "diamond"];
+const MIN_CURVE = 4; // points of a curve with bands, as in figures/curves.py
 
 function element(tag, attributes = {}, ...children) {
   const node = document.createElement(tag);
@@ -20,25 +37,43 @@ function shape(tag, attributes = {}, ...children) {
   return node;
 }
 
-// The paper's agents have the colours of our agents with the same names.
-function colorOf(label) {
-  const name = label.endsWith(" (paper)") ? label.slice(0, -" (paper)".length).toLowerCase() : label;
-  const place = data.labels.indexOf(name);
-  return place < 0 ? "var(--printed)" : `var(--series-${place % 7})`;
+// A name in which a line may end behind marks, but not in a number.
+function breakable(name) {
+  return name.match(/(?:[^.:_/\\-]|[.:_/\\-]\d)*[.:_/\\-]*/g).filter(Boolean).flatMap((part) => [part, element("wbr")]);
 }
 
-function swatch(label) {
-  const node = element("span", { class: "swatch", "aria-hidden": "true" });
-  const isPaper = data.labels.indexOf(label) < 0;
-  node.style.background = isPaper ? "transparent" : colorOf(label);
-  if (isPaper) node.style.border = `2px dotted ${colorOf(label)}`;
-  return node;
+// How an agent is drawn. The paper's agents have the colours of our agents with the same names.
+function lookOf(label) {
+  const isPaper = !data.labels.includes(label);
+  const place = data.labels.indexOf(isPaper ? label.replace(/ \(paper\)$/, "").toLowerCase() : label);
+  const count = data.palette.length;
+  const rank = place % count;
+  const color = place < 0 ? "var(--ink)" : data.palette[rank];
+  if (isPaper) return { color, dash: PAPER_DASH, marker: { d: CROSS, fill: "none", stroke: color }, width: 1.2, half: 3.5 };
+  const dash = DASHES[Math.min(Math.floor(place / count), DASHES.length - 1)];
+  const marker = { d: MARKERS[place % MARKERS.length], fill: color };
+  // The later an agent is drawn, the finer its line: where two agree, both are seen.
+  return { color, dash, marker, width: 2.8 - 0.25 * rank, half: 4.6 - 0.3 * rank };
+}
+
+function mark({ marker, half }, x, y) {
+  return shape("path", { ...marker, transform: `translate(${x} ${y}) scale(${half})`, "stroke-width": 1.6, "vector-effect": "non-scaling-stroke" });
+}
+
+function polyline({ color, dash, width }, points) {
+  return shape("polyline", { points, fill: "none", stroke: color, "stroke-width": width, "stroke-dasharray": dash });
+}
+
+// A piece of an agent's line, for keys.
+function sample(label) {
+  const look = lookOf(label);
+  return shape("svg", { class: "sample", viewBox: "0 0 30 14", "aria-hidden": "true" }, polyline(look, "0,7 30,7"), mark(look, 15, 7));
 }
 
 function formatCell(cell) {
   if (!cell) return "";
   const [value, low, high, , runs, untrainedScale] = cell;
-  const interval = low === null ? "" : ` [${low.toFixed(2)}, ${high.toFixed(2)}]`;
+  const interval = low === null ? "" : ` [${low.toFixed(2)},\u00a0${high.toFixed(2)}]`;
   return value.toFixed(2) + (untrainedScale ? "*" : "") + interval + (runs ? `, ${runs} runs` : "");
 }
 
@@ -53,16 +88,15 @@ function hasValues(column) {
 
 function tableElement(table) {
   const columns = table.columns.filter((column) => hasValues(column));
-  const head = element("tr", {}, element("th", { scope: "col" }, table.rowName));
-  for (const column of columns) head.append(element("th", { scope: "col" }, column.label));
-  const body = element("tbody");
-  table.rows.forEach((row, index) => {
-    const line = element("tr", {}, element("th", { scope: "row" }, row));
-    for (const column of columns) line.append(element("td", { class: "number" }, formatCell(column.cells[chosen.metric][index])));
-    body.append(line);
-  });
+  let lines = [[table.rowName, ...columns.map(({ label }) => label)]];
+  table.rows.forEach((row, index) => lines.push([row, ...columns.map(({ cells }) => formatCell(cells[chosen.metric][index]))]));
+  if (table.isTurned) lines = lines[0].map((_, index) => lines.map((line) => line[index]));
+  const [head, ...body] = lines;
+  const rowOf = ([name, ...cells]) =>
+    element("tr", {}, element("th", { scope: "row" }, ...breakable(name)), ...cells.map((text) => element("td", { class: "value" }, text)));
+  const names = head.map((name) => element("th", { scope: "col" }, ...breakable(name)));
   const caption = element("caption", { class: "hidden" }, `${table.title}: ${data.metrics[chosen.metric]}`);
-  return element("div", { class: "scroll" }, element("table", {}, caption, element("thead", {}, head), body));
+  return element("div", { class: "scroll" }, element("table", {}, caption, element("thead", {}, element("tr", {}, ...names)), element("tbody", {}, ...body.map(rowOf))));
 }
 
 // A frame with an axis from 0 to 1 upwards, and `ticks` ([position on the axis, text]) along the bottom.
@@ -84,18 +118,6 @@ function frame(width, height, low, high, ticks, name) {
   return { svg, across, up, box };
 }
 
-function marker(kind, x, y, color, half = 3.5) {
-  const paths = {
-    square: `M${x - half} ${y - half}h${2 * half}v${2 * half}h${-2 * half}z`,
-    triangle: `M${x} ${y - half - 1}l${half + 1} ${2 * half}h${-2 * half - 2}z`,
-    diamond: `M${x} ${y - half - 1}l${half + 1} ${half + 1}l${-half - 1} ${half + 1}l${-half - 1} ${-half - 1}z`,
-    cross: `M${x - half} ${y - half}l${2 * half} ${2 * half}m0 ${-2 * half}l${-2 * half} ${2 * half}`,
-  };
-  if (kind === "circle") return shape("circle", { cx: x, cy: y, r: half, fill: color });
-  if (kind === "cross") return shape("path", { d: paths.cross, stroke: color, "stroke-width": 1.6, fill: "none" });
-  return shape("path", { d: paths[kind], fill: color });
-}
-
 // The points of a column on a chart, as [x, value, low, high].
 function pointsOf(table, column, shift) {
   return table.x.flatMap((x, index) => {
@@ -104,32 +126,26 @@ function pointsOf(table, column, shift) {
   });
 }
 
-function drawColumn({ svg, across, up }, column, points, isCurve) {
-  const color = colorOf(column.label);
-  const line = points.map(([x, value]) => `${across(x).toFixed(1)},${up(value).toFixed(1)}`).join(" ");
+function drawColumn({ svg, across, up }, column, points, band) {
+  const look = lookOf(column.label);
+  const at = (x, y) => `${across(x).toFixed(1)},${up(y).toFixed(1)}`;
   const hasIntervals = points.every((point) => point[2] !== null);
-  if (hasIntervals && isCurve) {
-    const edge = [...points.map((p) => [p[0], p[3]]), ...points.map((p) => [p[0], p[2]]).reverse()];
-    const corners = edge.map(([x, y]) => `${across(x).toFixed(1)},${up(y).toFixed(1)}`).join(" ");
-    svg.append(shape("polygon", { points: corners, fill: color, opacity: 0.16 }));
+  if (hasIntervals && band) {
+    const edge = [...points.map(([x, , , high]) => at(x, high)), ...points.map(([x, , low]) => at(x, low)).reverse()];
+    svg.append(shape("polygon", { points: edge.join(" "), fill: look.color, opacity: band }));
   }
-  const rank = data.labels.indexOf(column.label) % 7;
-  const dash = column.paper ? { "stroke-dasharray": PAPER_DASH } : {};
-  // The later an agent is drawn, the finer its line: where two agree, both are seen.
-  const width = column.paper ? 1.2 : 2.8 - 0.25 * rank;
-  svg.append(shape("polyline", { points: line, fill: "none", stroke: color, "stroke-width": width, ...dash }));
-  const kind = column.paper ? "cross" : MARKERS[rank % MARKERS.length];
+  svg.append(polyline(look, points.map(([x, value]) => at(x, value)).join(" ")));
   for (const [x, value, low, high, , , untrainedScale] of points) {
-    if (hasIntervals && !isCurve) {
-      svg.append(shape("line", { x1: across(x), x2: across(x), y1: up(low), y2: up(high), stroke: color, "stroke-width": 1.5 }));
+    if (hasIntervals && !band) {
+      svg.append(shape("line", { x1: across(x), x2: across(x), y1: up(low), y2: up(high), stroke: look.color, "stroke-width": 1.5 }));
     }
-    svg.append(marker(kind, across(x), up(value), color, column.paper ? 3.5 : 4.6 - 0.3 * rank));
+    svg.append(mark(look, across(x), up(value)));
     if (untrainedScale) svg.append(shape("text", { x: across(x) + 6, y: up(value) + 2 }, "*"));
   }
 }
 
 function drawChart(host, table) {
-  const isCurve = table.rowName === "distance";
+  const isCurve = table.rowName === "distance" && table.x.length >= MIN_CURVE;
   const step = table.x.length > 1 ? Math.min(...table.x.slice(1).map((x, index) => x - table.x[index])) : 1;
   const margin = isCurve ? 0.3 : 0.4 * step;
   const low = table.x[0] - margin;
@@ -138,9 +154,11 @@ function drawChart(host, table) {
   const view = frame(Math.max(host.clientWidth, 260), 270, low, high, ticks, table.rowName);
   const columns = visibleColumns(table);
   const ours = columns.filter((column) => !column.paper);
+  const dodge = Math.min(0.12, 0.72 / ours.length) * step;
+  const band = isCurve ? Math.min(0.16, 0.9 / ours.length) : 0;
   for (const column of columns) {
-    const shift = isCurve || column.paper ? 0 : (ours.indexOf(column) - (ours.length - 1) / 2) * 0.12 * step;
-    drawColumn(view, column, pointsOf(table, column, shift), isCurve);
+    const shift = isCurve || column.paper ? 0 : (ours.indexOf(column) - (ours.length - 1) / 2) * dodge;
+    drawColumn(view, column, pointsOf(table, column, shift), band);
   }
   const metric = data.metrics[chosen.metric];
   view.svg.setAttribute("role", "img");
@@ -166,7 +184,7 @@ function addReader(host, { svg, across, box }, table, columns) {
     tip.replaceChildren(element("strong", {}, `${table.rowName} ${table.rows[place]}`));
     for (const column of columns) {
       const cell = column.cells[chosen.metric][place];
-      if (cell) tip.append(element("div", {}, swatch(column.label), `${column.label}: ${formatCell(cell)}`));
+      if (cell) tip.append(element("div", {}, sample(column.label), element("span", {}, ...breakable(`${column.label}: `), formatCell(cell))));
     }
     tip.hidden = false;
     tip.style.top = "8px";
@@ -215,7 +233,7 @@ function drawViolins(host, distribution, panel) {
   const count = distribution.levels.length;
   const ticks = distribution.levels.map((level, index) => [index, String(level)]);
   const view = frame(Math.max(host.clientWidth, 220), 190, -0.6, count - 0.4, ticks, distribution.levelName);
-  const color = colorOf(panel.label);
+  const { color } = lookOf(panel.label);
   const half = 0.42 * (view.across(1) - view.across(0));
   panel.violins.forEach((violin, index) => {
     if (!violin) return;
@@ -260,7 +278,7 @@ function violinFigure(distribution) {
     panels.replaceChildren();
     for (const panel of distribution.panels.filter(({ label }) => !chosen.hidden.has(label))) {
       const host = element("div");
-      panels.append(element("div", {}, element("h4", {}, swatch(panel.label), ` ${panel.label}`), host));
+      panels.append(element("div", {}, element("h4", {}, ...breakable(panel.label)), host));
       drawViolins(host, distribution, panel);
     }
   };
@@ -286,7 +304,7 @@ function buildToolbar(redraw) {
       else chosen.hidden.add(label);
       redraw();
     });
-    document.getElementById("agents").append(element("label", {}, input, swatch(label), label));
+    document.getElementById("agents").append(element("label", {}, input, sample(label), element("span", {}, ...breakable(label))));
   }
 }
 
@@ -311,9 +329,10 @@ function buildCharts() {
 }
 
 function buildHead() {
+  const agents = data.labels.length > 6 ? `${data.labels.length} agents` : data.labels.join(", ");
   const count = data.results.reduce((sum, result) => sum + result.episodes, 0);
   document.getElementById("subtitle").textContent =
-    `Benchmark ${data.benchmark}; ${data.labels.join(", ")}; ${count.toLocaleString("en")} episodes in ${data.results.length} results.`;
+    `Benchmark ${data.benchmark}; ${agents}; ${count.toLocaleString("en")} episodes in ${data.results.length} results.`;
   document.getElementById("source").textContent = `The paper: ${data.citation}. ${data.paperNote}`;
   if (data.warnings.length) {
     const warnings = document.getElementById("warnings");
@@ -327,7 +346,8 @@ function buildProvenance() {
   const [head, ...rows] = data.provenance;
   const table = document.getElementById("provenance");
   table.tHead.append(element("tr", {}, ...head.map((name) => element("th", { scope: "col" }, name))));
-  for (const texts of rows) table.tBodies[0].append(element("tr", {}, ...texts.map((text) => element("td", {}, text))));
+  const cell = (text, index) => element("td", { "data-name": head[index] }, ...(text ? [element("span", {}, ...breakable(text))] : []));
+  for (const texts of rows) table.tBodies[0].append(element("tr", {}, ...texts.map(cell)));
 }
 
 buildHead();

@@ -1,7 +1,7 @@
 "use strict";
 // What the explorer draws: maps, paths, what the range sensor measures.
 
-const POSITION_UNITS = 32; // a metre
+const POSITION_UNITS = 32; // a cell
 const YAW_UNITS = 256; // a turn
 const PLASMA = [[13, 8, 135], [126, 3, 168], [204, 71, 120], [248, 149, 64], [240, 220, 50]];
 
@@ -47,15 +47,47 @@ function drawMap(pen, map, side, color) {
   pen.globalAlpha = 1;
 }
 
-function drawMark(pen, cell, side, radius, color) {
+const resizedPlace = (place, side, across) => Math.floor((place * across) / side);
+
+// A map of side x side pixels with fewer ones, across x across, each the share of wall in it.
+function resizedMap(map, side, across) {
+  if (across === side) return map;
+  const step = side / across;
+  const overlap = (from, pixel) => Math.min(from + step, pixel + 1) - Math.max(from, pixel);
+  return Array.from({ length: across * across }, (_, index) => {
+    const [top, left] = [step * Math.floor(index / across), step * (index % across)];
+    let share = 0;
+    for (let row = Math.floor(top); row < Math.min(top + step, side); row++) {
+      for (let column = Math.floor(left); column < Math.min(left + step, side); column++) {
+        share += overlap(top, row) * overlap(left, column) * map[row * side + column];
+      }
+    }
+    return Math.min(1, Math.max(0, share / step ** 2));
+  });
+}
+
+// A disc; nothing where the map marks no cell, -1.
+function drawStart(pen, cell, side, radius, color) {
   if (cell < 0) return;
   pen.beginPath();
   pen.arc((cell % side) + 0.5, Math.floor(cell / side) + 0.5, radius, 0, 2 * Math.PI);
-  pen.fillStyle = color;
+  pen.fillStyle = color("start");
   pen.fill();
 }
 
-// Where a pose lies on a canvas whose unit is a metre: there, y goes down from the upper edge of the maze.
+// A star, told apart from the start without colours too.
+function drawGoal(pen, cell, side, radius, color) {
+  if (cell < 0) return;
+  pen.beginPath();
+  for (let corner = 0; corner < 10; corner++) {
+    const [length, angle] = [(corner % 2 ? 0.55 : 1.3) * radius, (corner * Math.PI) / 5];
+    pen.lineTo((cell % side) + 0.5 + length * Math.sin(angle), Math.floor(cell / side) + 0.5 - length * Math.cos(angle));
+  }
+  pen.fillStyle = color("goal");
+  pen.fill();
+}
+
+// Where a pose lies on a canvas whose unit is a cell: there, y goes down from the upper edge of the maze.
 const placeOf = ({ x, y }, time, size) => [x[time] / POSITION_UNITS, size - y[time] / POSITION_UNITS];
 const angleOf = ({ yaw }, time) => (2 * Math.PI * yaw[time]) / YAW_UNITS; // counter-clockwise
 
@@ -95,7 +127,7 @@ function drawBody(pen, x, y, angle, scale, color) {
   pen.stroke();
 }
 
-// What a range sensor measures: the first ray points straight ahead, the others follow counter-clockwise.
+// What a range sensor measures, in cells: the first ray points straight ahead, the others follow counter-clockwise.
 function rangesOf(walls, size, path, time, { rays, range }) {
   const at = [path.x[time] / POSITION_UNITS, path.y[time] / POSITION_UNITS];
   const angle = (ray) => angleOf(path, time) + (2 * Math.PI * ray) / rays;

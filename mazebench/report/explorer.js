@@ -3,6 +3,7 @@
 
 const STEP_SECONDS = 0.16;
 const MAX_LISTED = 2000;
+const LARGEST_DEFAULT_CONTEXT = 21; // cells a side of an agent's map, unless it asks for more
 
 const byId = (id) => document.getElementById(id);
 const inCells = (count) => `${count} ${count === 1 ? "cell" : "cells"}`;
@@ -39,7 +40,7 @@ function unpack(number) {
     const [drive, bytes] = await inflate(`drives-${number}`);
     const columns = { ...trial, ...drive };
     columns.spl = columns.success.map((_, index) => splOf(columns, index, columns.shortest[index]));
-    columns.splGrid = columns.success.map((_, index) => splOf(columns, index, columns.distance[index]));
+    columns.splGrid = columns.success.map((_, index) => splOf(columns, index, result.cellSize * columns.distance[index]));
     const observed = result.odometry ? unpackPoses(bytes.subarray(5 * result.poses), result.poses) : null;
     return { columns, maps, path: unpackPoses(bytes, result.poses), observed };
   });
@@ -92,6 +93,8 @@ function episodeOf(packed, number, index) {
   const real = maze.walls ? wallsOf(bytesOfBase64(maze.walls), result.size) : null;
   return {
     size: result.size,
+    cellSize: result.cellSize,
+    sensor: { rays: data.lidar.rays, range: data.lidar.range / result.cellSize }, // in cells
     maze: maze.name,
     real,
     ...shownMap(packed, result, index, real),
@@ -114,7 +117,7 @@ function episodeOf(packed, number, index) {
 }
 
 // The map as the agent was shown it: the share of wall in each of `side` x `side` pixels, where start and goal are marked
-// (-1: not marked), and whether the pixels are not the maze's cells.
+// (-1: not marked), whether the pixels are not the maze's cells, and the cells on a side of the agent's map (0: unknown).
 function shownMap({ columns, maps }, result, index, real) {
   const side = result.picture || result.size;
   const count = result.picture ? side * side : Math.ceil((side * side) / 8);
@@ -127,6 +130,7 @@ function shownMap({ columns, maps }, result, index, real) {
     shownStart: (columns.shownStart || columns.start)[index],
     shownGoal: (columns.shownGoal || columns.goal)[index],
     isDrawn: isTrack ? result.picture > 0 : Boolean(columns.shownStart),
+    context: isTrack || side <= LARGEST_DEFAULT_CONTEXT ? side : Math.min(result.context, side),
   };
 }
 
@@ -248,7 +252,7 @@ function remember() {
 function writeOutcome() {
   const { current } = view;
   const verdict = element("strong", { class: current.success ? "reached" : "failed" }, current.success ? "reached the goal" : "did not reach the goal");
-  byId("outcome").replaceChildren(`${data.results[view.result].label} `, verdict, ` in maze ${current.maze}, ${current.steps} steps, ${current.driven.toFixed(2)} m driven.`);
+  byId("outcome").replaceChildren(...breakable(data.results[view.result].label), " ", verdict, ` in maze ${current.maze}, ${current.steps} steps, ${current.driven.toFixed(2)} m driven.`);
 }
 
 function writeNumbers() {
@@ -293,7 +297,7 @@ async function writeOthers() {
 }
 
 function otherRow(number, index, columns) {
-  const button = element("button", { type: "button", class: "link" }, data.results[number].label);
+  const button = element("button", { type: "button", class: "link" }, ...breakable(data.results[number].label));
   if (number === view.result) button.setAttribute("aria-current", "true");
   button.addEventListener("click", () => {
     chooseResult(number);
@@ -305,14 +309,14 @@ function otherRow(number, index, columns) {
 
 function writeKey() {
   const { current } = view;
-  const entries = [["--start", "start"], ["--goal", "goal"]];
-  if (current.observed) entries.push(["--odometry", "odometry, laid on the first pose"]);
-  if (current.landmarks.length) entries.push(["--landmark", "landmarks"]);
-  if (differs(current)) entries.push(["--false-wall", "wall on the map only"], ["--lost-wall", "wall missing on the map"]);
-  const items = entries.map(([color, text]) => {
-    const mark = element("span", { class: "swatch", "aria-hidden": "true" });
-    mark.style.background = `var(${color})`;
-    return element("li", {}, mark, text);
+  const entries = [["start", "start"], ["goal", "goal"]];
+  if (current.observed) entries.push(["odometry", "odometry, laid on the first pose"]);
+  if (current.landmarks.length) entries.push(["landmark", "landmarks"]);
+  if (differs(current)) entries.push(["false-wall", "wall on the map only"], ["lost-wall", "wall missing on the map"]);
+  const items = entries.map(([name, text]) => {
+    const swatch = element("span", { class: `swatch ${name}`, "aria-hidden": "true" });
+    swatch.style.background = `var(--${name})`;
+    return element("li", {}, swatch, text);
   });
   byId("key").replaceChildren(...items, element("li", {}, "Path: from violet (start) to yellow (end)"));
 }
@@ -327,7 +331,7 @@ function draw() {
   const { current } = view;
   if (view.episode < 0) return;
   const color = colors();
-  const ranges = current.lidar && current.path.x.length && byId("lidar").checked ? rangesOf(current.real, current.size, current.path, view.time, data.lidar) : [];
+  const ranges = current.lidar && current.path.x.length && byId("lidar").checked ? rangesOf(current.real, current.size, current.path, view.time, current.sensor) : [];
   drawShown(current, color);
   drawDriven(current, ranges, color);
   if (current.observed) drawOdometry(current, ranges, color);
@@ -336,12 +340,14 @@ function draw() {
 
 function drawShown(current, color) {
   const { side } = current;
-  const pen = prepare(byId("shown"), side);
-  drawMap(pen, current.shown, side, color);
-  if (!current.isDrawn) current.landmarks.forEach((cell) => fillCell(pen, cell, side, color("landmark")));
-  const radius = (0.36 * thickness(current.size) * side) / current.size;
-  drawMark(pen, current.shownStart, side, radius, color("start"));
-  drawMark(pen, current.shownGoal, side, radius, color("goal"));
+  const across = current.context || side;
+  const place = (cell) => (cell < 0 ? cell : resizedPlace(Math.floor(cell / side), side, across) * across + resizedPlace(cell % side, side, across));
+  const pen = prepare(byId("shown"), across);
+  drawMap(pen, current.shown && resizedMap(current.shown, side, across), across, color);
+  if (!current.isDrawn) current.landmarks.forEach((cell) => fillCell(pen, place(cell), across, color("landmark")));
+  const radius = (0.36 * thickness(current.size) * across) / current.size;
+  drawStart(pen, place(current.shownStart), across, radius, color);
+  drawGoal(pen, place(current.shownGoal), across, radius, color);
 }
 
 function drawDriven(current, ranges, color) {
@@ -349,10 +355,11 @@ function drawDriven(current, ranges, color) {
   const pen = prepare(byId("driven"), size);
   drawMap(pen, current.real || (current.isDrawn ? null : current.shown), size, color);
   for (const cell of current.landmarks) fillCell(pen, cell, size, color("landmark"));
-  for (const name of ["start", "goal"]) drawMark(pen, current[name], size, 0.36 * thickness(size), color(name));
+  drawStart(pen, current.start, size, 0.36 * thickness(size), color);
+  drawGoal(pen, current.goal, size, 0.36 * thickness(size), color);
   if (differs(current)) markDifferences(pen, current, color);
   if (!path.x.length) return;
-  drawRays(pen, path, view.time, size, ranges, data.lidar.range, color);
+  drawRays(pen, path, view.time, size, ranges, current.sensor.range, color);
   drawPath(pen, path, view.time, size, color);
   if (current.observed) drawDashed(pen, current.observed, view.time, size, color("odometry"));
 }
@@ -373,7 +380,7 @@ function drawOdometry(current, ranges, color) {
   pen.fillRect(0, 0, extent, extent);
   pen.translate(...[0, 1].map((axis) => (extent - low[axis] - high[axis]) / 2));
   pen.rotate(turn);
-  drawRays(pen, path, view.time, size, ranges, data.lidar.range, color);
+  drawRays(pen, path, view.time, size, ranges, current.sensor.range, color);
   drawPath(pen, path, view.time, size, color);
 }
 
@@ -389,11 +396,12 @@ function markDifferences(pen, current, color) {
 
 function describe() {
   const { current } = view;
-  byId("shown-caption").textContent = current.shown ? "The map that the agent was shown" : "The map that the agent was shown was not recorded";
+  const told = current.context ? "The map that the agent was shown" : "The map, which the agent may have been shown with fewer cells";
+  byId("shown-caption").textContent = current.shown ? told : "The map that the agent was shown was not recorded";
   byId("driven-caption").textContent = !current.path.x.length
     ? "The maze; the path was not recorded (eval --record)"
     : current.real ? "The maze, and the path driven in it" : "The true maze is not in the results; the path driven, on the map";
-  byId("shown").setAttribute("aria-label", `Map of ${current.side} by ${current.side} pixels as shown to the agent`);
+  byId("shown").setAttribute("aria-label", `Map of ${current.context || current.side} by ${current.context || current.side} pixels as shown to the agent`);
   byId("odometry").setAttribute("aria-label", `The path by the agent's odometry up to step ${view.time} of ${current.steps}`);
   byId("driven").setAttribute("aria-label", `Maze ${current.maze} with the path driven up to step ${view.time} of ${current.steps}`);
 }
@@ -405,7 +413,7 @@ function moveTo(time) {
   const { x, y, yaw } = current.path;
   view.time = Math.max(0, Math.min(x.length - 1, time));
   byId("time").value = String(view.time);
-  const metres = (value) => (value / POSITION_UNITS).toFixed(2);
+  const metres = (value) => ((current.cellSize * value) / POSITION_UNITS).toFixed(2);
   const degrees = ((Math.round((360 * (yaw[view.time] || 0)) / YAW_UNITS) + 180) % 360) - 180;
   const text = x.length
     ? `step ${view.time} of ${current.steps}, ${(view.time * STEP_SECONDS).toFixed(2)} s, x ${metres(x[view.time])} y ${metres(y[view.time])} m, heading ${degrees}°`

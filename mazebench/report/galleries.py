@@ -11,12 +11,13 @@ from mazebench.maps.maze import Cell
 from mazebench.report.mazes import real_walls, shown_ends
 from mazebench.report.results import ReportedResult
 from mazebench.report.settings import Setting
-from mazebench.report.tables import perturbed_groups
+from mazebench.report.tables import maze_sets, perturbed_groups
 from mazebench.tasks.tracks import TRACKS
 
 _MAX_COLUMNS = 5  # episodes of a gallery
-_MAX_ROWS = 8  # agents
+_MAX_ROWS = 8  # agents; further ones get galleries of their own
 _DISTANCE = 10  # cells, of local episodes: the farthest that the paper prints; less where there is none
+_NOTE = "The episodes in which the agents' outcomes differ most, of as many mazes as there are: a choice, no sample."
 
 # An episode, whoever drives: maze, start, goal, seed.
 Key = tuple[str, int, int, int, int, int]
@@ -32,7 +33,7 @@ class Drive:
     start: Cell
     goal: Cell
     landmarks: np.ndarray  # [K, 2] int, cells, without the goal
-    points: np.ndarray  # [L, 2] m, where the body was
+    points: np.ndarray  # [L, 2] cells, where the body was
     success: bool
     steps: int
 
@@ -48,13 +49,17 @@ class Gallery:
 
 
 def build_galleries(results: Sequence[ReportedResult], labels: Sequence[str]) -> list[Gallery]:
-    """Returns galleries of the eval mazes: of each task, and of each perturbation and track at a middle level.
+    """Returns galleries of the eval mazes and of each set of own mazes.
 
-    Of several sizes, the smallest is taken.
+    There is one of each task, and of each perturbation and track at a middle level. Of several sizes, the smallest is
+    taken.
     """
-    drawn = [result for result in results if result.trajectories is not None and result.setting.split == "eval"]
-    galleries = [_gallery(setting, drawn, labels) for setting in _settings(drawn)]
-    return [gallery for gallery in galleries if gallery is not None]
+    galleries: list[Gallery] = []
+    for here, prefix, _ in maze_sets(results):
+        drawn = [result for result in here if result.trajectories is not None and result.setting.split != "train"]
+        for setting in _settings(drawn):
+            galleries += _galleries(setting, prefix, drawn, results, labels)
+    return galleries
 
 
 def _settings(results: Sequence[ReportedResult]) -> Iterator[Setting]:
@@ -73,14 +78,20 @@ def _middle(settings: set[Setting]) -> Setting:
     return sorted(settings)[(len(settings) - 1) // 2]
 
 
-def _gallery(setting: Setting, results: Sequence[ReportedResult], labels: Sequence[str]) -> Gallery | None:
-    here = sorted((r for r in results if r.setting == setting), key=lambda result: labels.index(result.label))
-    here = here[:_MAX_ROWS]
+def _galleries(
+    setting: Setting,
+    prefix: str,
+    drawn: Sequence[ReportedResult],
+    results: Sequence[ReportedResult],
+    labels: Sequence[str],
+) -> Iterator[Gallery]:
+    """Yields galleries of the same episodes, in which all agents stand once; any of `results` may tell true walls."""
+    here = sorted((r for r in drawn if r.setting == setting), key=lambda result: labels.index(result.label))
     found = [{key: number for number, key in enumerate(_keys(result))} for result in here]
     common = [key for key in found[0] if all(key in other for other in found)]
     place = ""
     distances = {key: int(here[0].episodes.distance[found[0][key]]) for key in common}
-    if setting.track:  # which has few episodes of each distance: the longest of those that tell as much
+    if setting.track or setting.mazes:  # few episodes of each distance: the longest of those that tell as much
         common.sort(key=lambda key: -distances[key])
     elif setting.task == "local" and common:
         distance = max((d for d in distances.values() if d <= _DISTANCE), default=min(distances.values()))
@@ -88,16 +99,19 @@ def _gallery(setting: Setting, results: Sequence[ReportedResult], labels: Sequen
         place = f", start and goal {distance} cells apart"
     chosen = _most_telling(here, found, common)
     if not chosen:
-        return None
-    return Gallery(
-        name=f"trajectories-{setting.name}",
-        title=f"Trajectories: {setting}{place}",
-        note="The episodes in which the agents' outcomes differ most, at most one of each maze: a choice, no sample.",
-        drives=tuple(
-            (result.label, _drives(result, [numbers[key] for key in chosen], results))
-            for result, numbers in zip(here, found, strict=True)
-        ),
-    )
+        return
+    drives = [
+        (result.label, _drives(result, [numbers[key] for key in chosen], results))
+        for result, numbers in zip(here, found, strict=True)
+    ]
+    count = -(-len(drives) // _MAX_ROWS)
+    for part, rows in enumerate(np.array_split(np.arange(len(drives)), count), 1):
+        yield Gallery(
+            name=f"trajectories-{prefix}{setting.name}" + (f"-part-{part}" if part > 1 else ""),
+            title=f"Trajectories: {setting}{place}" + (f" ({part} of {count})" if count > 1 else ""),
+            note=_NOTE,
+            drives=tuple(drives[row] for row in rows),
+        )
 
 
 def _keys(result: ReportedResult) -> list[Key]:
@@ -110,16 +124,20 @@ def _keys(result: ReportedResult) -> list[Key]:
 def _most_telling(
     results: Sequence[ReportedResult], found: Sequence[dict[Key, int]], common: Sequence[Key]
 ) -> list[Key]:
-    """Returns an episode of each of some mazes, those in which the agents' outcomes differ most, in protocol order."""
+    """Returns the episodes in which the agents' outcomes differ most, of as many mazes as there are, in protocol order.
+
+    A maze gives a second episode only where every maze gives one.
+    """
 
     def evenness(key: Key) -> int:
         failures = [not result.episodes.success[numbers[key]] for result, numbers in zip(results, found, strict=True)]
         return -min(sum(failures), len(failures) - sum(failures))
 
-    by_maze: dict[str, Key] = {}
+    by_maze: dict[str, int] = {}
+    turns: dict[Key, int] = {}
     for key in sorted(common, key=evenness):
-        by_maze.setdefault(key[0], key)
-    return sorted(list(by_maze.values())[:_MAX_COLUMNS])
+        turns[key] = by_maze[key[0]] = by_maze.get(key[0], -1) + 1
+    return sorted(sorted(turns, key=turns.__getitem__)[:_MAX_COLUMNS])
 
 
 def _drives(result: ReportedResult, numbers: Sequence[int], results: Sequence[ReportedResult]) -> tuple[Drive, ...]:
@@ -138,7 +156,7 @@ def _drives(result: ReportedResult, numbers: Sequence[int], results: Sequence[Re
                 start=tuple(episodes.start[number].tolist()),
                 goal=tuple(episodes.goal[number].tolist()),
                 landmarks=np.stack(np.divmod(trajectory.landmarks[:-1], result.setting.size), axis=-1),
-                points=trajectory.pose[:, :2].astype(np.float64),
+                points=trajectory.pose[:, :2].astype(np.float64) / result.setting.cell_size,
                 success=bool(episodes.success[number]),
                 steps=int(episodes.steps[number]),
             )

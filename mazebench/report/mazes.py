@@ -26,7 +26,8 @@ def real_walls(result: ReportedResult, maze: str, results: Sequence[ReportedResu
         mazes = (load_track_mazes if setting.track else load_mazes)(setting.size, setting.split)
         return next((known.walls for known in mazes if known.name == maze), None)
     for other in results:
-        if other.setting.mazes != setting.mazes or other.trajectories is None:
+        is_same = (other.setting.mazes, other.setting.size) == (setting.mazes, setting.size)
+        if not is_same or other.trajectories is None:
             continue
         if other.setting.is_exact or other.trajectories.picture is not None:
             episode = np.flatnonzero(other.episodes.maze == other.episodes.mazes.index(maze))[0]

@@ -17,7 +17,7 @@ from mazebench.report.mazes import shown_ends
 from mazebench.report.results import ReportedResult
 
 # explorer.js counts in the same units.
-_POSITION_UNITS = 32  # a metre; one unit is about a pixel on the screen
+_POSITION_UNITS = 32  # a cell; one unit is about a pixel on the screen
 _YAW_UNITS = 256  # a turn
 _LARGEST = 2**14 - 1  # units, of a coordinate: a difference of two has 16 bits
 
@@ -39,7 +39,9 @@ def pack_drives(result: ReportedResult) -> str:
         "steps": episodes.steps.tolist(),
         "driven": np.round(episodes.path_length, 2).tolist(),
     }
-    return _pack(columns, b"".join(pack_poses(poses) for poses in paths if poses is not None))
+    scale = [result.setting.cell_size] * 2 + [1.0]
+    in_cells = [poses / scale for poses in paths if poses is not None]
+    return _pack(columns, b"".join(map(pack_poses, in_cells)))
 
 
 def lay_on_first_poses(trajectories: Trajectories) -> np.ndarray | None:
@@ -60,7 +62,7 @@ def lay_on_first_poses(trajectories: Trajectories) -> np.ndarray | None:
 def pack_poses(poses: np.ndarray) -> bytes:
     """Packs poses `[sum(length), 3]` in five planes with one byte of each pose: x low, x high, y low, y high, yaw.
 
-    All values are differences from the pose before; those of x and y are zigzag-encoded.
+    x and y come in cells, yaw in rad. All values are differences from the pose before, those of x and y zigzag-encoded.
     """
     units = np.round(poses[:, :2] * _POSITION_UNITS)
     place = np.clip(units, -_LARGEST, _LARGEST).astype(np.int32)

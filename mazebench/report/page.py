@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from mazebench.evaluation.paper import citation, reference
+from mazebench.maps import colors
 from mazebench.report.distributions import Distribution, Violin
+from mazebench.report.looks import PALETTE
 from mazebench.report.mazes import real_walls
 from mazebench.report.packed_episodes import pack_drives, pack_trials, to_base64
 from mazebench.report.provenance import HEAD, benchmark_versions, provenance_rows
@@ -48,6 +50,7 @@ def build_page(
         "citation": citation(),
         "paperNote": reference()["note"],
         "labels": list(labels),
+        "palette": [*PALETTE[:-1], "var(--ink)"],  # the grey is ink, light on a dark page
         "metrics": {
             name: text for name, text in METRIC_NAMES.items() if any(name in table.metrics for table in tables)
         },
@@ -61,7 +64,9 @@ def build_page(
         "provenance": [HEAD, *provenance_rows(results)],
         "first": _first(results),
     }
-    style, script = _read("page.css"), "".join(map(_read, ("charts.js", "drawing.js", "explorer.js")))
+    marks = f"--start: {colors.to_hex(colors.START)}; --goal: {colors.to_hex(colors.GOAL)};"
+    style = f":root {{ {marks} }}\n{_read('page.css')}"
+    script = "".join(map(_read, ("charts.js", "drawing.js", "explorer.js")))
     policy = f"default-src 'none'; style-src '{_hash(style)}'; script-src '{_hash(script)}'"
     packed = [f'<script type="text/plain" id="trials-{n}">{text}</script>' for n, text in enumerate(packed_trials)]
     packed += [
@@ -115,6 +120,7 @@ def _table(table: Table) -> dict[str, Any]:
         "rowName": table.row_name,
         "rows": table.rows,
         "x": table.x,
+        "isTurned": table.is_turned,
         "columns": columns,
     }
 
@@ -168,13 +174,17 @@ def _names(setting: Setting) -> dict[str, Any]:
 def _describe(result: ReportedResult) -> dict[str, Any]:
     setting, trajectories = result.setting, result.trajectories
     picture = None if trajectories is None else trajectories.picture
-    sensors = (result.summary.provenance.options.model_extra or {}).get("sensors", ())
+    provenance = result.summary.provenance
+    sensors = (provenance.options.model_extra or {}).get("sensors", ())
+    context_size = (provenance.model_extra or {}).get("context_size")  # results of earlier versions do not say it
     return {
         "label": result.label,
         "size": setting.size,
+        "cellSize": setting.cell_size,
         "episodes": len(result.episodes),
         "poses": 0 if trajectories is None else len(trajectories.pose),
         "exact": setting.is_exact,
+        "context": context_size if isinstance(context_size, int) else 0,
         "picture": 0 if picture is None else picture.shape[-1],
         "odometry": trajectories is not None and trajectories.observed is not None,
         "lidar": bool(setting.track) or "lidar" in sensors,

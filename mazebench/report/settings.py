@@ -10,7 +10,7 @@ from mazebench.errors import unknown
 from mazebench.evaluation.records import Record, Summary
 from mazebench.maps.benchmark import SIZES, SPLITS
 from mazebench.options import options_of
-from mazebench.tasks.options import TaskOptions
+from mazebench.tasks.options import ENDS, TaskOptions
 from mazebench.tasks.perturbations import Perturbations
 from mazebench.tasks.tracks import TRACKS
 
@@ -30,6 +30,8 @@ class Setting:
     mazes: tuple[str, ...] = ()  # names, of the split "custom"
     track: str = ""  # "" where the benchmark's first version is played
     level: int = 0  # of the track
+    cell_size: float = 1.0  # m
+    ends: tuple[str, str] = ("", "")  # the start and the goal of all episodes, "" for one that was drawn
 
     @property
     def is_exact(self) -> bool:
@@ -48,6 +50,12 @@ class Setting:
         is_default = self.landmark_distance in (0, DEFAULT_LANDMARK_DISTANCE)
         return self.name + ("" if is_default else f"-k{self.landmark_distance}")
 
+    @property
+    def own(self) -> tuple[str, ...]:
+        """What is not the benchmark's beside the mazes, in words: the size of a cell, the start and the goal."""
+        scale = () if self.cell_size == 1 else (f"cells of {self.cell_size:g} m",)
+        return *scale, *(f"{name} {place}" for name, place in zip(ENDS, self.ends, strict=True) if place)
+
     def level_of(self, perturbation: str) -> float:
         """Returns the level of a perturbation; 0 if it is switched off."""
         return dict(self.perturbations).get(perturbation, 0.0)
@@ -61,6 +69,7 @@ class Setting:
         parts = [*([self.track, f"level {self.level}"] if self.track else [self.task]), f"{self.size} × {self.size}"]
         if self.split != "eval":
             parts.append(f"{self.split} mazes")
+        parts += self.own
         if self.task == "hierarchical":
             parts.append(f"landmarks every {self.landmark_distance}")
         parts += [f"{level_name(name)} {level:g}" for name, level in self.perturbations]
@@ -90,6 +99,8 @@ def make_setting(summary: Summary, records: tuple[Record, ...]) -> Setting:
         mazes=tuple(sorted({record.maze for record in records})) if summary.split == _CUSTOM else (),
         track=name,
         level=level,
+        cell_size=summary.cell_size or 1.0,
+        ends=(summary.provenance.options.start or "", summary.provenance.options.goal or ""),
     )
 
 

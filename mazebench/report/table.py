@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 from mazebench.report.results import METRICS
 
 SPL_RELATIVE = "spl_relative"
+_WIDE = 240  # characters
+_CELL = len("0.50 [0.25, 0.75]")
 METRIC_NAMES = METRICS | {SPL_RELATIVE: "SPL / oracle's"}
 UNTRAINED_MARK = "*"
 UNTRAINED_NOTE = f"{UNTRAINED_MARK} The agent was never trained on maps of this scale."
@@ -55,6 +58,17 @@ class Table:
         """The metrics that the table has values of, with their names."""
         return {metric: name for metric, name in METRIC_NAMES.items() if self.columns_of(metric)}
 
+    @property
+    def is_turned(self) -> bool:
+        """Whether columns are shown as rows: where a table is wide and narrower that way, as with long names."""
+        labels = [column.label for column in self.columns]
+        return _width(labels, self.rows) < _width(self.rows, labels) > _WIDE
+
     def columns_of(self, metric: str) -> list[Column]:
         """Returns the columns that have a value of a metric."""
         return [column for column in self.columns if any(column.cells.get(metric, ()))]
+
+
+def _width(rows: Sequence[str], columns: Sequence[str]) -> int:
+    """Returns the characters in a line of a table with such names of rows and columns."""
+    return max(map(len, rows)) + sum(max(len(name), _CELL) for name in columns)

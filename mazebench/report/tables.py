@@ -19,12 +19,27 @@ from mazebench.report.tracks import track_tables
 def build_tables(results: Sequence[ReportedResult], labels: Sequence[str]) -> list[Table]:
     """Returns all tables that `results` can fill, with a column for each of `labels` that has a result in them."""
     tables = []
-    for chosen, prefix, suffix in _maze_sets(results):
+    for chosen, prefix, suffix in maze_sets(results):
         tables += [
             dataclasses.replace(table, name=prefix + table.name, title=table.title + suffix)
             for table in (*_tables_of(chosen, labels), *pooled_tables(chosen))
         ]
     return [*tables, *_split_tables(results, labels), overview(results, labels)]
+
+
+def maze_sets(results: Sequence[ReportedResult]) -> Iterator[tuple[list[ReportedResult], str, str]]:
+    """Yields the results of each set of mazes, a prefix for names of files, and a suffix for titles; eval first."""
+    found = {(result.setting.split, result.setting.mazes, result.setting.own) for result in results}
+    num_custom = 0
+    for split, mazes, own in sorted(found, key=lambda key: (("eval", "train", "custom").index(key[0]), *key[1:])):
+        prefix, suffix = {"train": ("train-", ", on the training mazes")}.get(split, ("", ""))
+        if split == "custom":
+            num_custom += 1
+            more = f" and {len(mazes) - 3} more" if len(mazes) > 3 else ""
+            suffix = ", ".join(("", f"on mazes {', '.join(mazes[:3])}{more}", *own))
+            prefix = f"custom-{num_custom}-"
+        here = [r for r in results if (r.setting.split, r.setting.mazes, r.setting.own) == (split, mazes, own)]
+        yield here, prefix, suffix
 
 
 def perturbed_groups(results: Sequence[ReportedResult]) -> Iterator[tuple[str, Setting, list[ReportedResult]]]:
@@ -38,19 +53,6 @@ def perturbed_groups(results: Sequence[ReportedResult]) -> Iterator[tuple[str, S
         group = [result for result in results if result.setting.without(perturbation) == base]
         labels = {result.label for result in group if result.setting != base}
         yield perturbation, base, [result for result in group if result.label in labels]
-
-
-def _maze_sets(results: Sequence[ReportedResult]) -> Iterator[tuple[list[ReportedResult], str, str]]:
-    """Yields the results of each set of mazes, a prefix for names of files, and a suffix for titles; eval first."""
-    found = {(result.setting.split, result.setting.mazes) for result in results}
-    num_custom = 0
-    for split, mazes in sorted(found, key=lambda key: (("eval", "train", "custom").index(key[0]), key[1])):
-        prefix, suffix = {"train": ("train-", ", on the training mazes")}.get(split, ("", ""))
-        if split == "custom":
-            num_custom += 1
-            more = f" and {len(mazes) - 3} more" if len(mazes) > 3 else ""
-            prefix, suffix = f"custom-{num_custom}-", f", on mazes {', '.join(mazes[:3])}{more}"
-        yield [r for r in results if (r.setting.split, r.setting.mazes) == (split, mazes)], prefix, suffix
 
 
 def _tables_of(results: Sequence[ReportedResult], labels: Sequence[str]) -> Iterator[Table]:

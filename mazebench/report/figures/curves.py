@@ -3,65 +3,69 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 
-from mazebench.report.figures.style import PALETTE, STYLE, WIDTH, finish, new_figure, panel_grid, shorten
+from mazebench.report.figures.style import NAME_CHARACTERS, STYLE, WIDTH, finish, new_figure, panel_grid
+from mazebench.report.looks import PALETTE, Look, wrap
 from mazebench.report.results import METRICS
 from mazebench.report.table import UNTRAINED_MARK, Cell, Column, Table
 
-_MARKERS = "os^DvPX"
-_PAPER_MARKERS = "x+1*"
+_PAPER_MARKERS = "x+12"
 _PAPER_COLOR = "#222222"
-_DODGE = 0.12  # of the smallest step between levels, that two agents stand apart
+_DODGE, _DODGES = 0.12, 0.72  # of the smallest step between levels: two agents are so far apart, all of them at most
+_MIN_CURVE = 4  # points of a curve with bands; fewer have bars, since bands over one point are not seen
+_BAND, _BANDS = 0.16, 0.9  # opacity of a band, and of all bands together at most
 
 
-def draw_table(table: Table, labels: Sequence[str], path: pathlib.Path) -> None:
+def draw_table(table: Table, looks: Mapping[str, Look], path: pathlib.Path) -> None:
     """Draws success rate and SPL by row, one curve for each agent; SPL by grid distance beside the paper's SPL."""
     with_paper = any(column.is_paper and any(column.cells["spl_grid"]) for column in table.columns)
     metrics = ("success_rate", "spl_grid" if with_paper else "spl")
     with mpl.rc_context(STYLE):
-        figure = new_figure(WIDTH, 2.9)
+        figure = new_figure(WIDTH, 2.65)
         for index, metric in enumerate(metrics):
             axes = figure.add_subplot(1, 2, index + 1)
-            _draw_curves(axes, table, metric, labels)
+            draw_curves(axes, table, metric, looks)
             axes.set_title(METRICS[metric].capitalize() if metric == "success_rate" else METRICS[metric], loc="left")
         finish(figure, table.title, path)
 
 
-def draw_table_panels(tables: Sequence[Table], title: str, labels: Sequence[str], path: pathlib.Path) -> None:
+def draw_table_panels(tables: Sequence[Table], title: str, looks: Mapping[str, Look], path: pathlib.Path) -> None:
     """Draws the success rates of several tables in panels of one scale."""
     with mpl.rc_context(STYLE):
         rows, columns = panel_grid(len(tables))
-        figure = new_figure(WIDTH, 2.2 * rows)
+        figure = new_figure(WIDTH, 0.2 + 2.0 * rows)
         for index, table in enumerate(tables):
             axes = figure.add_subplot(rows, columns, index + 1)
-            _draw_curves(axes, table, "success_rate", labels)
+            draw_curves(axes, table, "success_rate", looks)
             axes.set_title(table.title.rpartition(", ")[2], loc="left")
             axes.set_ylabel("success rate" if index % columns == 0 else "")
         finish(figure, title, path)
 
 
-def _draw_curves(axes: Axes, table: Table, metric: str, labels: Sequence[str]) -> None:
+def draw_curves(axes: Axes, table: Table, metric: str, looks: Mapping[str, Look]) -> None:
+    """Draws a metric by row: curves with bands, or few points with bars, beside one another for each agent."""
     x = np.array(table.x)
-    is_curve = table.row_name == "distance"
+    is_curve = table.row_name == "distance" and len(x) >= _MIN_CURVE
     ours = [column for column in table.columns_of(metric) if not column.is_paper]
     step = np.diff(x).min() if len(x) > 1 else 1.0
+    dodge = min(_DODGE, _DODGES / max(len(ours), 1)) * step
+    band = min(_BAND, _BANDS / max(len(ours), 1)) if is_curve else None
     for index, column in enumerate(ours):
-        shift = 0.0 if is_curve else (index - (len(ours) - 1) / 2) * _DODGE * step
-        place = labels.index(column.label)
-        _draw_curve(axes, x + shift, column.cells[metric][: len(x)], column.label, place, is_curve)
+        shift = 0.0 if is_curve else (index - (len(ours) - 1) / 2) * dodge
+        _draw_curve(axes, x + shift, column.cells[metric][: len(x)], looks[column.label], band)
     for index, column in enumerate(column for column in table.columns_of(metric) if column.is_paper):
         points = [(at, cell.value) for at, cell in zip(x, column.cells[metric], strict=False) if cell]
         axes.plot(
             *np.array(points).T,
             linestyle=":",
             linewidth=0.9,
-            color=_paper_color(column, labels),
+            color=_paper_color(column, looks),
             marker=_PAPER_MARKERS[index % len(_PAPER_MARKERS)],
             markersize=5.5,
             label=column.label,
@@ -76,30 +80,28 @@ def _draw_curves(axes: Axes, table: Table, metric: str, labels: Sequence[str]) -
         axes.set_xticks(x[::every], table.rows[: len(x) : every])
 
 
-def _paper_color(column: Column, labels: Sequence[str]) -> str:
+def _paper_color(column: Column, looks: Mapping[str, Look]) -> str:
     """Returns the colour of the agent with the same name as the paper's agent."""
-    namesake = column.label.partition(" ")[0].lower()
-    return PALETTE[labels.index(namesake) % len(PALETTE)] if namesake in labels else _PAPER_COLOR
+    namesake = looks.get(column.label.partition(" ")[0].lower())
+    return namesake.color if namesake else _PAPER_COLOR
 
 
-def _draw_curve(
-    axes: Axes, x: np.ndarray, cells: Sequence[Cell | None], label: str, place: int, is_curve: bool
-) -> None:
-    """Draws a line with a band for a curve over distances, else points with bars.
+def _draw_curve(axes: Axes, x: np.ndarray, cells: Sequence[Cell | None], look: Look, band: float | None) -> None:
+    """Draws a line with a `band` of that opacity, or without one points with bars.
 
     The later an agent is drawn, the finer its line: where two agree, both are seen.
     """
     there = [index for index, cell in enumerate(cells) if cell]
     value, low, high = np.array([(cell.value, cell.low, cell.high) for cell in cells if cell]).T
-    rank = place % len(PALETTE)
-    color, marker = PALETTE[rank], _MARKERS[(place + place // len(PALETTE)) % len(_MARKERS)]
-    style: dict[str, Any] = {"color": color, "marker": marker, "label": shorten(label)}
+    rank = look.place % len(PALETTE)
+    style: dict[str, Any] = {"color": look.color, "marker": look.marker, "linestyle": look.dashes}
     style |= {"markersize": 4.8 - 0.35 * rank, "linewidth": 1.8 - 0.15 * rank}
+    style |= {"label": wrap(look.name, NAME_CHARACTERS)}
     for at, cell in zip(x, cells, strict=True):
         if cell and cell.is_untrained_scale:
             axes.annotate(UNTRAINED_MARK, (at, cell.value), (3, 1), textcoords="offset points")
-    if is_curve:
-        axes.fill_between(x[there], low, high, color=color, alpha=0.16, linewidth=0)
+    if band is not None:
+        axes.fill_between(x[there], low, high, color=look.color, alpha=band, linewidth=0)
         axes.plot(x[there], value, **style)
     else:
         errors = [np.maximum(value - low, 0), np.maximum(high - value, 0)]

@@ -8,15 +8,18 @@ from collections.abc import Sequence
 from typing import Any
 
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 
+from mazebench.report.looks import wrap
 from mazebench.storage.files import open_whole
 
-# Okabe and Ito's colours, told apart with any colour vision; yellow, faint on white, comes last.
-PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442")
 WIDTH = 7.0  # inches, of a page's text
+LINE = 0.16  # inches, of a line of text
+NAME_CHARACTERS = 40  # in a line of a legend, so that two names stand side by side
 _DPI = 200
 _MAX_PANELS_IN_ROW = 3
-_LEGEND_CHARACTERS = 98  # in a line; a handle with its gaps counts as eight
+_MAX_LEGEND_COLUMNS = 6
+_CHARACTERS_PER_INCH = 13  # of a title, in most names
 
 STYLE: Any = {
     "font.size": 8.5,
@@ -28,6 +31,7 @@ STYLE: Any = {
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
     "legend.frameon": False,
+    "legend.handlelength": 2.6,
     "pdf.fonttype": 42,
     "text.parse_math": False,  # agents' names are not formulas
 }
@@ -44,23 +48,32 @@ def panel_grid(count: int) -> tuple[int, int]:
     return -(-count // columns), columns
 
 
-def shorten(text: str, most: int = 32) -> str:
-    """Returns at most `most` characters of a label: its beginning and its end."""
-    if len(text) <= most:
-        return text
-    end = most // 2
-    return f"{text[: most - end - 1]}…{text[-end:]}"
+def wrap_title(title: str, width: float) -> str:
+    """Returns a title in lines of at most `width` inches."""
+    return wrap(title, int(width * _CHARACTERS_PER_INCH))
 
 
 def finish(figure: Figure, title: str, path: pathlib.Path, handles: Sequence[Any] = ()) -> None:
-    """Gives a figure its title and legend, lays it out, and writes it."""
-    handles = handles or _curve_handles(figure)
+    """Gives a figure its title and, below what it has, its legend, lays it out, and writes it."""
+    title = wrap_title(title, figure.get_figwidth())
     figure.suptitle(title, fontsize=10, x=0.01, ha="left")
-    lines = -(-sum(len(handle.get_label()) + 8 for handle in handles) // _LEGEND_CHARACTERS)
-    figure.legend(handles=handles, loc="outside lower center", ncols=-(-len(handles) // lines))
+    legend = _widest_legend(figure, handles or _curve_handles(figure))
+    more = legend.get_window_extent().height / figure.dpi + LINE * title.count("\n")
+    figure.set_figheight(figure.get_figheight() + more)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # the layout, which takes longest, is made once for both files
     save(figure, path)
+
+
+def _widest_legend(figure: Figure, handles: Sequence[Any]) -> Legend:
+    """Adds the legend with as many columns as fit, all but the last of them full."""
+    for rows in range(-(-len(handles) // _MAX_LEGEND_COLUMNS), len(handles) + 1):
+        columns = -(-len(handles) // rows)
+        legend = figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+        if legend.get_window_extent().width <= figure.bbox.width or columns == 1:
+            break
+        legend.remove()
+    return legend
 
 
 def _curve_handles(figure: Figure) -> list[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pathlib
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -13,39 +14,56 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from mazebench.maps import colors
 from mazebench.maps.maze import cell_to_point
-from mazebench.report.figures.style import STYLE, WIDTH, save, shorten
+from mazebench.report.figures.style import LINE, STYLE, WIDTH, save, wrap_title
 from mazebench.report.galleries import Drive, Gallery
+from mazebench.report.looks import Look
 
 # Floor, wall, wall that only the map shows, wall that the map does not show, landmark.
 _CELL_COLORS = ListedColormap(["#ffffff", "#4a4e57", "#f6c7a1", "#a99bc4", "#c9dcec"])
 # Without the palest yellow, which is invisible on white.
 _TIME_COLORS = ListedColormap(mpl.colormaps["plasma"](np.linspace(0, 0.92, 256)))
-_START, _GOAL = ("o", "#009e73", 4.5), ("*", "#d55e00", 7.5)  # marker, colour, width in points
-_COLUMN, _ROW = 1.06, 1.17  # of a gallery, in sides of a maze
+_START, _GOAL = ("o", colors.START, 4.5), ("*", colors.GOAL, 7.5)  # marker, colour, width in points
+# In sides of a maze: the margins left and right, the width of a column, the gap in it, the height of the key.
+_MARGIN, _COLUMN, _GAP, _KEY = 0.05, 1.06, 0.06, 0.4
+_MIN_COLUMNS = 3  # for which there is room: title and key need it
+_MAX_SIDE = 1.8  # inches, of a maze
 
 
-def draw_gallery(gallery: Gallery, path: pathlib.Path) -> None:
+def draw_gallery(gallery: Gallery, looks: Mapping[str, Look], path: pathlib.Path) -> None:
     """Draws a row for each agent and a column for each episode; the colour of a path shows the time."""
     rows, columns = len(gallery.drives), len(gallery.drives[0][1])
     # One axes for everything, with a maze's side as its unit: matplotlib is slow with many axes.
-    width, height = 0.2 + columns * _COLUMN, rows * _ROW + 0.75
-    scale = min(WIDTH / width, 1.8)
+    width = 2 * _MARGIN + max(columns, _MIN_COLUMNS) * _COLUMN - _GAP
+    scale = min(WIDTH / width, _MAX_SIDE)
+    line = LINE / scale
+    title = wrap_title(gallery.title, scale * width)
+    names = [wrap_title(looks[label].name, scale * width) for label, _ in gallery.drives]
+    heads = [wrap_title(f"maze {drive.maze}", scale) for drive in gallery.drives[0][1]]
+    above = line * (1.5 + _most_lines([title]) + _most_lines(heads))
+    below_name = line * (_most_lines(names) + 0.1)
+    row_height = below_name + 1 + 1.6 * line
+    height = above + rows * row_height + _KEY
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(scale * width, scale * height))
         axes = figure.add_axes((0, 0, 1, 1))
-        axes.set(xlim=(-0.2, columns * _COLUMN), ylim=(-rows * _ROW - 0.35, 0.4))
+        axes.set(xlim=(-_MARGIN, width - _MARGIN), ylim=(above - height, above))
         axes.axis("off")
-        axes.text(-0.17, 0.3, gallery.title, fontsize=10, va="center")
-        for row, (label, drives) in enumerate(gallery.drives):
-            place: dict[str, Any] = {"fontsize": 8.5, "rotation": 90, "ha": "center", "va": "center"}
-            axes.text(-0.09, -row * _ROW - 0.5, shorten(label, 20), **place)
+        axes.text(0, above - line / 2, title, fontsize=10, va="top")
+        for column, head in enumerate(heads):
+            axes.text(column * _COLUMN + 0.5, line / 3, head, fontsize=7.5, ha="center", va="bottom")
+        for row, (name, (_, drives)) in enumerate(zip(names, gallery.drives, strict=True)):
+            bottom = -row * row_height - below_name - 1
+            axes.text(0, bottom + 1 + line / 3, name, fontsize=8.5, va="bottom")
             for column, drive in enumerate(drives):
-                _draw_drive(axes, drive, column * _COLUMN, -row * _ROW - 1)
-                if row == 0:
-                    axes.text(column * _COLUMN + 0.5, 0.06, f"maze {drive.maze}", fontsize=7.5, ha="center")
-        _draw_map_key(axes, columns, -rows * _ROW - 0.05, gallery)
+                _draw_drive(axes, drive, column * _COLUMN, bottom)
+        _draw_map_key(axes, columns, -rows * row_height - 0.05, gallery)
         save(figure, path)
+
+
+def _most_lines(texts: Sequence[str]) -> int:
+    return max(1 + text.count("\n") for text in texts)
 
 
 def _draw_drive(axes: Axes, drive: Drive, left: float, bottom: float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import matplotlib as mpl
 import numpy as np
@@ -11,23 +11,29 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from mazebench.report.distributions import GRID, Distribution, Violin
-from mazebench.report.figures.style import PALETTE, STYLE, WIDTH, finish, new_figure, panel_grid, shorten
+from mazebench.report.figures.style import LINE, STYLE, WIDTH, finish, new_figure, panel_grid, wrap_title
+from mazebench.report.looks import Look
+
+_Y_AXIS = 0.5  # inches, of a panel's width
 
 
-def draw_distribution(distribution: Distribution, labels: Sequence[str], path: pathlib.Path) -> None:
+def draw_distribution(distribution: Distribution, looks: Mapping[str, Look], path: pathlib.Path) -> None:
     """Draws a panel for each agent, with a violin for each level and the mean with its interval in it."""
     with mpl.rc_context(STYLE):
         rows, columns = panel_grid(len(distribution.panels))
-        figure = new_figure(WIDTH if columns > 1 else WIDTH / 1.6, 2.2 * rows)
+        width = WIDTH if columns > 1 else WIDTH / 1.6
+        names = {label: wrap_title(looks[label].name, width / columns - _Y_AXIS) for label, _ in distribution.panels}
+        lines = max(name.count("\n") for name in names.values())
+        figure = new_figure(width, 0.2 + (2.1 + LINE * lines) * rows)
         for index, (label, violins) in enumerate(distribution.panels):
             axes = figure.add_subplot(rows, columns, index + 1)
-            _draw_violins(axes, violins, PALETTE[labels.index(label) % len(PALETTE)])
+            _draw_violins(axes, violins, looks[label].color)
             every = 1 if len(distribution.levels) <= 6 else 2
             places = range(0, len(distribution.levels), every)
             axes.set_xticks(places, [f"{distribution.levels[place]:g}" for place in places])
             axes.set_xlabel(distribution.level_name)
             axes.set_ylabel("SPL" if index % columns == 0 else "")
-            axes.set_title(shorten(label), loc="left")
+            axes.set_title(names[label], loc="left")
         mean = Line2D([], [], color="black", marker="o", markersize=3, label="mean, 95 % interval")
         finish(figure, distribution.title, path, [mean])
 
