@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from mazebench_agents.mmn.learner import MMNLearner
 from mazebench_agents.mmn.mmn import MMN
-from mazebench_agents.mmn.network import MMNNetwork
+from mazebench_agents.mmn.spatial import MMNNetwork
 
 from mazebench.agent import Interface
 from mazebench.maps.generators import generate
@@ -63,7 +63,7 @@ def values_by_distance(network: MMNNetwork, mazes: tuple[Maze, ...], rng: np.ran
         value = network.value(network.predict(latent, network.look(latent, code), code).value_logits)[:, 0]
         far = maze.distances(goal)
         for (row, column), cell_value in zip(free.tolist(), value.tolist(), strict=True):
-            learned = float(code.distance[0, :, row, column].mean()) if code.distance.shape[1] else np.nan
+            learned = float(code.distance[0, :, row, column].mean())
             found.setdefault(int(far[row, column]), []).append((cell_value, learned))
     return {distance: np.array(found[distance]) for distance in sorted(found)}
 

@@ -12,21 +12,22 @@ from mazebench_agents.mmn import config as mmn
 
 from mazebench.errors import InputError
 
-CONFIGS = [(dqn, dqn.DQNConfig), (mmn, mmn.MMNConfig)]
+CONFIGS = [(dqn, [dqn.DQNConfig]), (mmn, [mmn.MMNConfig, mmn.PaperConfig])]
 
 
-@pytest.mark.parametrize(("module", "config"), CONFIGS)
-def test_every_config_key_has_a_comment_with_its_reason(module, config):
+@pytest.mark.parametrize(("module", "configs"), CONFIGS)
+def test_every_config_key_has_a_comment_with_its_reason(module, configs):
     source = inspect.getsource(module)
-    fields = {field.name for field in dataclasses.fields(config)}
+    fields = {field.name for config in configs for field in dataclasses.fields(config)}
     assert {node.target.id for node in ast.walk(ast.parse(source)) if isinstance(node, ast.AnnAssign)} == fields
     for name in fields:
         assert re.search(rf"^    {name}: .*  # .+", source, re.MULTILINE), name
 
 
-@pytest.mark.parametrize(("module", "config"), CONFIGS)
-def test_every_number_of_a_config_has_a_range(module, config):
-    numbers = {field.name for field in dataclasses.fields(config) if field.type in ("int", "float")}
+@pytest.mark.parametrize(("module", "configs"), CONFIGS)
+def test_every_number_of_a_config_has_a_range(module, configs):
+    fields = [field for config in configs for field in dataclasses.fields(config)]
+    numbers = {field.name for field in fields if field.type in ("int", "float")}
     assert set(module._RANGES) == numbers
 
 
@@ -39,7 +40,8 @@ def test_every_number_of_a_config_has_a_range(module, config):
         (dqn.DQNConfig, {"num_envs": "0"}, "expected config key 'num_envs' from 1"),
         (dqn.DQNConfig, {"learning_rate": "nan"}, "config key 'learning_rate': expected a finite number, found nan"),
         (dqn.DQNConfig, {"replay_capacity": "1000"}, "expected a replay_capacity of at least min_rows 20000"),
-        (mmn.MMNConfig, {"hypermodel": "deep"}, "'hypermodel' as one of spatial, flat, none, found 'deep'"),
+        (mmn.MMNConfig, {"search": "alpha"}, "'search' as one of gumbel, puct, found 'alpha'"),
+        (mmn.PaperConfig, {"num_distances": "2"}, "unknown config key 'num_distances'"),
         (mmn.MMNConfig, {"temperature": "0"}, "expected config key 'temperature' from 0.001"),
         (mmn.MMNConfig, {"unroll": "9"}, "expected sequence_steps of at least unroll 9, found 8"),
     ],

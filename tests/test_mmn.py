@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 import torch
 from acting import inputs_of
-from mazebench_agents.mmn import MMN
-from mazebench_agents.mmn.config import PRESETS
-from mazebench_agents.mmn.hypermodels import HYPERMODELS, Propagation
+from mazebench_agents.mmn import MMN, MMNPaper
+from mazebench_agents.mmn.config import MMNConfig, PaperConfig
 from mazebench_agents.mmn.losses import unrolled_losses
-from mazebench_agents.mmn.network import MMNNetwork, rotate
-from mazebench_agents.mmn.planning import lookahead
+from mazebench_agents.mmn.network import rotate
+from mazebench_agents.mmn.paper import PaperNetwork
+from mazebench_agents.mmn.planning import lookahead, plan
+from mazebench_agents.mmn.spatial import MMNNetwork, Propagation
 from small_world import learn
 
 from mazebench.agent import Interface
@@ -20,12 +21,23 @@ from mazebench.maps.generators import generate
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 
-SMALL = {"channels": 8, "hidden": 16, "head_hidden": 16, "latent": 8, "groups": 4, "num_envs": 8, "min_rows": 100}
-HYPERMODEL_NAMES = tuple(HYPERMODELS)
+SMALL = {"hidden": 16, "head_hidden": 16, "latent": 8, "groups": 4, "num_envs": 8, "min_rows": 100}
+CONFIGS = {
+    "mmn": MMNConfig(**SMALL, channels=8),
+    "mmn-paper": PaperConfig(**SMALL, embedding=8, task_code=8),
+    "mmn-paper, one code": PaperConfig(**SMALL, embedding=8, task_code=8, rows=False, reading=False),
+    "mmn-paper, no hypermodel": PaperConfig(**SMALL, embedding=8, task_code=8, rows=False, hypermodel=False),
+}
+OF_ALL = pytest.mark.parametrize("config", CONFIGS.values(), ids=CONFIGS)
+OF_BOTH = pytest.mark.parametrize("config", list(CONFIGS.values())[:2], ids=list(CONFIGS)[:2])
 
 
-def small_config(preset="default", **values):
-    return dataclasses.replace(PRESETS[preset], **{**SMALL, **values})
+def agent_class(config):
+    return MMN if isinstance(config, MMNConfig) else MMNPaper
+
+
+def small_config(**values):
+    return dataclasses.replace(CONFIGS["mmn"], **values)
 
 
 def a_context(seed=0, size=7, batch=1):
@@ -37,11 +49,11 @@ def a_context(seed=0, size=7, batch=1):
     return torch.from_numpy(context)
 
 
-def make_learner(mazes, preset="default", seed=0, steps=100, **values):
+def make_learner(mazes, config=CONFIGS["mmn"], seed=0, steps=100):
     """A small learner that has seen some steps of random driving."""
-    overrides = {"preset": preset} | {name: str(value) for name, value in {**SMALL, **values}.items()}
+    overrides = {name: str(value) for name, value in dataclasses.asdict(config).items()}
     size = mazes[0].size
-    learner = MMN.build_learner(Interface("local", size, size), mazes, seed=seed, overrides=overrides)
+    learner = agent_class(config).build_learner(Interface("local", size, size), mazes, seed=seed, overrides=overrides)
     spec = TaskSpec(mazes=mazes, distances=(1, 2, 3), **learner.task_options())
     collector = Collector(spec, learner.num_envs, seed=seed)
     rng = np.random.default_rng(seed)
@@ -126,10 +138,10 @@ def test_anchor_stays_as_long_as_it_agrees_with_the_cell_marked_as_start():
     torch.testing.assert_close(network.reanchored(anchor, moved, start), expected)
 
 
-@pytest.mark.parametrize("name", HYPERMODEL_NAMES)
-def test_another_map_gives_other_transition_weights_and_predictions(name):
+@OF_ALL
+def test_another_map_gives_other_transition_weights_and_predictions(config):
     torch.manual_seed(0)
-    network = MMNNetwork(small_config(hypermodel=name), 7)
+    network = agent_class(config)(config, 7).network
     first, second = network.hypermodel(a_context(0)), network.hypermodel(a_context(1))
     assert not torch.equal(first.weights, second.weights)
     latent = network.encode(torch.randn(1, 5, 9))
@@ -142,36 +154,49 @@ def test_another_map_gives_other_transition_weights_and_predictions(name):
     assert not torch.allclose(next_latent(first), next_latent(second), atol=1e-6)
 
 
-@pytest.mark.parametrize("preset", PRESETS)
-@pytest.mark.parametrize("name", HYPERMODEL_NAMES)
-def test_task_and_model_losses_reach_the_hypermodels_weights(name, preset, mazes):
+@OF_ALL
+def test_task_and_model_losses_reach_the_hypermodels_weights(config, mazes):
     """The paper's point: psi learns from both, and through the transition network whose weights it predicts."""
-    learner = make_learner(mazes, preset, hypermodel=name)
-    network, config = learner.actor.network, learner.actor.config
+    learner = make_learner(mazes, config)
+    network = learner.actor.network
     with torch.no_grad():  # heads that are zero pass nothing on
         network.heads.weight.normal_(std=0.1)
     sample = learner._replay.sample_sequences(8, 3, config.sequence_steps, learner._hindsight, learner._rng)
     batch = learner._batch(sample)
     targets = learner._targets(batch)
-    losses, _, _ = unrolled_losses(network, config, batch, targets, torch.ones(8))
-    psi = {
-        "spatial": lambda: network.hypermodel.rows.weight,
-        "flat": lambda: network.hypermodel.hyper.weight,
-        "none": lambda: network.hypermodel.of_context.weight,
-    }[name]()
+    losses, _ = unrolled_losses(network, config, batch, targets)
+    psi = (network.hypermodel.rows if isinstance(config, MMNConfig) else network.hypermodel.hyper).weight
     for loss in ("value_loss", "policy_loss", "goal_loss", "model_loss"):
         (gradient,) = torch.autograd.grad(losses[loss], psi, retain_graph=True)
         assert gradient.abs().sum() > 0, loss
 
 
-@pytest.mark.parametrize("name", HYPERMODEL_NAMES)
-def test_lookahead_is_every_action_of_the_model_by_itself(name):
+@pytest.mark.parametrize("size", [7, 13])
+def test_search_by_kernels_finds_what_the_search_by_pytorch_finds(size):
+    """One state in a context is searched by kernels, several by PyTorch."""
     torch.manual_seed(0)
-    network = MMNNetwork(small_config(hypermodel=name), 7)
+    network = MMN(CONFIGS["mmn"], size).network
+    for parameter in network.parameters():
+        torch.nn.init.normal_(parameter, std=0.2)
+    with torch.no_grad():
+        contexts = a_context(batch=5, size=size)
+        latent = network.encode(3 * torch.randn(5, 3, 9))
+        several = plan(network, CONFIGS["mmn"], latent, network.hypermodel(contexts), 6)
+        code = network.hypermodel(contexts.repeat_interleave(3, dim=0))
+        single = plan(network, CONFIGS["mmn"], latent.flatten(0, 1)[:, None], code, 6)
+    np.testing.assert_array_equal(single.visit_counts, several.visit_counts)
+    np.testing.assert_allclose(single.qvalues, several.qvalues, rtol=1e-4)
+    np.testing.assert_allclose(single.action_weights, several.action_weights, rtol=1e-3, atol=1e-5)
+
+
+@OF_ALL
+def test_lookahead_is_every_action_of_the_model_by_itself(config):
+    torch.manual_seed(0)
+    network = agent_class(config)(config, 7).network
     torch.nn.init.normal_(network.heads.weight)
     code = network.hypermodel(a_context(batch=2))
     latent = network.encode(torch.randn(2, 3, 9))
-    qvalues = lookahead(network, latent, code, predict_reward=False)
+    qvalues = lookahead(network, latent, code)
     first = network.first_layer(latent, network.look(latent, code), code)
     for action in range(6):
         after = network.step(latent, first, torch.full((2, 3), action), code)
@@ -181,22 +206,22 @@ def test_lookahead_is_every_action_of_the_model_by_itself(name):
         torch.testing.assert_close(qvalues[..., action], expected)
 
 
-@pytest.mark.parametrize(
-    ("preset", "values"), [("default", {}), ("paper", {}), ("default", {"policy_target": "search"})]
-)
-def test_same_seed_gives_the_same_first_updates(preset, values, mazes):
-    learners = [make_learner(mazes, preset, **values) for _ in range(2)]
-    for _ in range(50 if preset == "default" and not values else 5):
+@pytest.mark.parametrize("config", [*CONFIGS.values(), small_config(policy_target="search")])
+def test_same_seed_gives_the_same_first_updates(config, mazes):
+    learners = [make_learner(mazes, config) for _ in range(2)]
+    for _ in range(5):
         first, second = (learner.update() for learner in learners)
         assert first == second
     assert all(np.isfinite(list(first.values())))
 
 
 def test_what_tells_early_whether_a_run_will_work_is_logged(mazes):
-    metrics = make_learner(mazes).update()
-    assert {"goal_loss", "localization_loss", "value_error", "value", "model_error_1", "model_error_4"} <= set(metrics)
-    assert {"value_loss", "policy_loss", "model_loss", "gradient_norm"} <= set(metrics)
-    assert "reward_loss" in make_learner(mazes, "paper").update()
+    both = {"value_loss", "policy_loss", "goal_loss", "model_loss", "gradient_norm", "value_error", "value"}
+    mmn, paper = (set(make_learner(mazes, CONFIGS[name]).update()) for name in ("mmn", "mmn-paper"))
+    assert mmn == both | {"model_error_1", "model_error_4", "map_ratio"} | {
+        f"{name}_loss" for name in ("localization", "distance", "visit")
+    }
+    assert paper == both | {"model_error_1", "model_error_5", "map_ratio"}
 
 
 def test_learner_goes_on_as_if_it_had_not_been_saved(tmp_path, mazes):
@@ -210,12 +235,12 @@ def test_learner_goes_on_as_if_it_had_not_been_saved(tmp_path, mazes):
     assert [resumed.update() for _ in range(3)] == expected
 
 
-@pytest.mark.parametrize("name", HYPERMODEL_NAMES)
-def test_saved_and_built_agent_acts_identically(name, tmp_path, mazes):
-    learner = make_learner(mazes, hypermodel=name)
+@OF_ALL
+def test_saved_and_built_agent_acts_identically(config, tmp_path, mazes):
+    learner = make_learner(mazes, config)
     learner.update()
     learner.save(tmp_path, {})
-    agent = MMN.build(Interface("local", 7, 7), checkpoint=tmp_path / "agent.safetensors")
+    agent = type(learner.actor).build(Interface("local", 7, 7), checkpoint=tmp_path / "agent.safetensors")
     observation = an_observation(40)
     first = np.ones(40, dtype=bool)
     expected, _ = learner.actor.act(inputs_of(observation, first), learner.actor.initial_state(40))
@@ -231,9 +256,9 @@ def an_observation(batch, size=7):
     }
 
 
-@pytest.mark.parametrize("preset", PRESETS)
-def test_actions_do_not_depend_on_what_else_is_in_the_batch(preset):
-    agent = MMN(small_config(preset), 7, seed=2)
+@OF_BOTH
+def test_actions_do_not_depend_on_what_else_is_in_the_batch(config):
+    agent = agent_class(config)(config, 7, seed=2)
     torch.nn.init.normal_(agent.network.heads.weight)
     observation = an_observation(77)
 
@@ -285,24 +310,30 @@ def test_spatial_agent_serves_maps_of_any_size(tmp_path, mazes):
     assert actions.shape == (2,)
 
 
-def test_flat_agent_says_which_sizes_it_serves(tmp_path, mazes):
-    make_learner(mazes, hypermodel="flat").save(tmp_path, {})
+def test_agent_with_one_code_a_context_says_which_sizes_it_serves(tmp_path, mazes):
+    make_learner(mazes, CONFIGS["mmn-paper"]).save(tmp_path, {})
     with pytest.raises(InputError, match=r"expected contexts of 7 x 7, the only ones .* found 13 x 13"):
-        MMN.build(Interface("local", 13, 13), checkpoint=tmp_path / "agent.safetensors")
+        MMNPaper.build(Interface("local", 13, 13), checkpoint=tmp_path / "agent.safetensors")
 
 
-def test_unknown_preset_is_refused(mazes):
-    with pytest.raises(InputError, match="unknown preset 'papre'; available: default, paper"):
-        MMN.build_learner(Interface("local", 7, 7), mazes, overrides={"preset": "papre"})
-
-
-def test_paper_preset_has_nothing_beyond_the_paper():
-    paper = PRESETS["paper"]
-    assert (paper.hypermodel, paper.search, paper.policy_target) == ("flat", "puct", "paper")
+def test_paper_has_what_the_paper_states():
+    paper = PaperConfig()
     assert paper.value_target == "n_step"
-    beyond = (paper.relabel_start, paper.keep_anchor, paper.symmetries, paper.num_distances, paper.localization_weight)
-    assert not any(beyond)
-    assert (paper.num_goals, paper.epsilon_base, paper.predict_reward) == (1, 0.0, True)
+    assert (paper.num_goals, paper.relabel_start, paper.keep_anchor) == (1, False, False)
+
+
+def test_every_weight_of_the_papers_transition_is_generated():
+    """Motion is still in a network all of whose generated weights are 0, whatever its other parameters are."""
+    network = PaperNetwork(CONFIGS["mmn-paper"], 7)
+    for parameter in network.parameters():
+        torch.nn.init.normal_(parameter)
+    code = network.hypermodel(a_context())
+    code = code._replace(weights=torch.zeros_like(code.weights), rows=torch.zeros_like(code.rows))
+    latent = network.encode(torch.randn(1, 6, 9))
+    first = network.first_layer(latent, network.look(latent, code), code)
+    after = network.step(latent, first, torch.arange(6)[None], code)
+    torch.testing.assert_close(after[..., :4], latent[..., :4])  # the pose stays
+    torch.testing.assert_close(after[..., 4:7], torch.zeros(1, 6, 3))
 
 
 def test_mmn_after_a_minute_beats_random_in_a_small_maze():

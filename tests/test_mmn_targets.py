@@ -1,13 +1,12 @@
 """MMN's targets and losses, by numbers one can do by hand."""
 
-import dataclasses
 import math
 
 import pytest
 import torch
-from mazebench_agents.mmn.config import PRESETS
+from mazebench_agents.mmn.config import MMNConfig
 from mazebench_agents.mmn.losses import Batch, Targets, unrolled_losses
-from mazebench_agents.mmn.network import MMNNetwork
+from mazebench_agents.mmn.spatial import MMNNetwork
 from mazebench_agents.mmn.targets import (
     cross_entropy,
     n_step_returns,
@@ -92,45 +91,57 @@ def make_batch(config, at_goal_step=None):
     place = torch.tensor([3.0, 2.0]).expand(2, 1, length, 2)
     action = torch.zeros(2, 1, config.sequence_steps, dtype=torch.long)
     visited, relabelled = torch.zeros(2, 1, 7, 7), torch.ones(2, dtype=torch.bool)
+    maze = torch.arange(2)
     anchor = torch.tensor([3.0, 2.0]).expand(2, 2)
-    batch = Batch(context, anchor, visited, relabelled, features, place, action, exists, at_goal)
+    batch = Batch(context, anchor, visited, maze, relabelled, features, place, action, exists, at_goal)
     value = torch.full((2, 1, length), -3.0)
     policy = torch.full((2, 1, length, 6), 1 / 6)
     return batch, Targets(value, policy)
 
 
-SMALL = dataclasses.replace(
-    PRESETS["default"], channels=4, num_distances=0, hidden=8, head_hidden=8, latent=4, longest_value=9
-)
+SMALL = MMNConfig(channels=4, num_distances=1, hidden=8, head_hidden=8, latent=4, longest_value=9)
 
 
 def test_losses_of_an_untrained_network_by_hand():
     """Its heads are zero: uniform values over ten bins, uniform policies, the goal at a logit of -4."""
     batch, targets = make_batch(SMALL)
-    losses, metrics, error = unrolled_losses(MMNNetwork(SMALL, 7), SMALL, batch, targets, torch.ones(2))
+    losses, metrics = unrolled_losses(MMNNetwork(SMALL, 7), SMALL, batch, targets)
     assert losses["value_loss"].item() == pytest.approx(math.log(10), rel=1e-5)
     assert losses["policy_loss"].item() == pytest.approx(math.log(6), rel=1e-5)
     assert losses["goal_loss"].item() == pytest.approx(math.log(1 + math.exp(-4)), rel=1e-4)
     assert losses["localization_loss"].item() == 0.0  # it believes to be at the start, and is
-    assert error.tolist() == pytest.approx([-1.5, -1.5])  # the mean of -9 to 0 is -4.5, and -3 is the target
+    assert metrics["value_error"].item() == pytest.approx(1.5)  # the mean of -9 to 0 is -4.5, and -3 is the target
     assert metrics["value"].item() == -3.0
+
+
+def test_map_ratio_compares_the_weights_of_two_mazes():
+    """A model whose weights do not depend on the map errs as much with those of the other maze."""
+    batch, targets = make_batch(SMALL)
+    steps = torch.arange(SMALL.sequence_steps + 1.0)
+    batch.features[..., 0] = torch.stack([steps, -steps])[:, None]  # a metre a step, forwards and backwards
+    batch.context[0, 0, 3, 3] = 1  # a wall ahead in one of the two
+    torch.manual_seed(3)
+    network = MMNNetwork(SMALL, 7)
+    _, metrics = unrolled_losses(network, SMALL, batch, targets)
+    assert metrics["map_ratio"].item() != 1.0
+    torch.nn.init.zeros_(network.hypermodel.rows.weight)
+    _, metrics = unrolled_losses(network, SMALL, batch, targets)
+    assert metrics["map_ratio"].item() == pytest.approx(1.0)
 
 
 def test_losses_stop_counting_at_the_goal():
     """The goal in the second state: its end is learned, but neither a value nor a policy there, nor anything later."""
-    config = dataclasses.replace(SMALL, predict_reward=True)
-    batch, targets = make_batch(config, at_goal_step=1)
+    batch, targets = make_batch(SMALL, at_goal_step=1)
     torch.manual_seed(0)
-    network = MMNNetwork(config, 7)
-    losses, _, _ = unrolled_losses(network, config, batch, targets, torch.ones(2))
+    network = MMNNetwork(SMALL, 7)
+    losses, _ = unrolled_losses(network, SMALL, batch, targets)
     later = batch._replace(features=batch.features.clone())
     later.features[:, :, 2:] = 5.0
-    again, _, _ = unrolled_losses(network, config, later, targets, torch.ones(2))
+    again, _ = unrolled_losses(network, SMALL, later, targets)
     assert {name: value.item() for name, value in losses.items()} == {name: v.item() for name, v in again.items()}
     # The root says "not the goal" and weighs 1, the state after it "the goal" and weighs 1 / 4.
     ends = (math.log(1 + math.exp(-4)) + 0.25 * math.log(1 + math.exp(4))) / 1.25
     assert losses["goal_loss"].item() == pytest.approx(ends, rel=1e-4)
-    assert losses["reward_loss"].item() == pytest.approx(ends, rel=1e-4)
 
 
 def test_model_loss_by_hand():
@@ -145,7 +156,7 @@ def test_model_loss_by_hand():
     steps = torch.arange(SMALL.sequence_steps + 1.0)[:, None]
     batch.features[..., :2] = steps * torch.tensor([0.3, -0.1])
     batch.features[..., 3] = 0.0
-    losses, metrics, _ = unrolled_losses(network, SMALL, batch, targets, torch.ones(2))
+    losses, metrics = unrolled_losses(network, SMALL, batch, targets)
     assert metrics["model_error_1"].item() == pytest.approx(0.4, rel=1e-5)
     assert metrics["model_error_4"].item() == pytest.approx(1.6, rel=1e-5)
     # 2 * (0.4 + 0.8 + 1.2 + 1.6) / 4, and squares of 0.3 k and 0.1 k in two of the latent state's eleven numbers; all

@@ -1,4 +1,4 @@
-"""The config of MMN, with the reason for each number, and the presets."""
+"""The configs of MMN and MMN-paper, with the reason for each number."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from mazebench.errors import InputError
 
 # The lowest and the highest value of each key that is bounded.
 _RANGES = {
-    "channels": (1, 1024),
-    "num_distances": (0, 64),
     "latent": (1, 1024),
     "hidden": (1, 4096),
     "head_hidden": (1, 8192),
@@ -23,8 +21,6 @@ _RANGES = {
     "temperature": (1e-3, math.inf),
     "replay_capacity": (2, 100_000_000),
     "min_rows": (1, 100_000_000),
-    "priority_exponent": (0.0, 10.0),
-    "importance_exponent": (0.0, 10.0),
     "groups": (1, 65536),
     "sequences": (1, 65536),
     "sequence_steps": (1, 1000),
@@ -41,14 +37,21 @@ _RANGES = {
     "hindsight_window": (1, 1_000_000),
     "num_goals": (1, 1_000_000),
     "model_weight": (0.0, math.inf),
+    "epsilon_base": (0.0, 1.0),
+    "epsilon_alpha": (0.0, 1000.0),
+    # MMN's
+    "channels": (1, 1024),
+    "num_distances": (1, 64),
     "localization_weight": (0.0, math.inf),
     "distance_weight": (0.0, math.inf),
     "visit_weight": (0.0, math.inf),
-    "epsilon_base": (0.0, 1.0),
-    "epsilon_alpha": (0.0, 1000.0),
+    # MMN-paper's
+    "embedding": (1, 4096),
+    "task_code": (1, 4096),
+    "hyper_rate": (0.0, math.inf),
+    "scale_rate": (0.0, math.inf),
 }
 _CHOICES = {
-    "hypermodel": ("spatial", "flat", "none"),
     "search": ("gumbel", "puct"),
     "policy_target": ("lookahead", "search", "paper"),
     "value_target": ("tree_backup", "n_step"),
@@ -56,22 +59,18 @@ _CHOICES = {
 
 
 @dataclasses.dataclass(frozen=True)
-class MMNConfig:
-    """MuZero with a hypermodel, sized for two CPU cores.
+class PlanningConfig:
+    """What both agents have: MuZero with hindsight, sized for two CPU cores.
 
     Raises:
       InputError: if a value is out of its range.
     """
 
     # Networks
-    hypermodel: str = "spatial"  # or "flat": all weights from one code of the context; "none": the code as an input
-    channels: int = 32  # of the map encoder
-    num_distances: int = 2  # maps of learned distances to the goal; beyond the paper; 0 for none
     latent: int = 32  # numbers of a latent state that are learned
     hidden: int = 128  # units of encoder and transition
     head_hidden: int = 256  # units of the two layers of policy and value
     longest_value: int = 100  # values lie in [-this, 0]; bounds the values of goals out of reach by a timeout
-    predict_reward: bool = False  # as in the paper; by default the reward, -1 outside of the goal, is known
     # Search
     search: str = "gumbel"  # Gumbel MuZero; "puct": MuZero's, the paper's
     num_simulations: int = 8  # in training
@@ -80,15 +79,11 @@ class MMNConfig:
     maxvisit_init: float = 10.0  # Gumbel's c_visit
     epsilon_base: float = 0.4  # Ape-X's ladder, beside the search's own noise: environment i takes a random action
     epsilon_alpha: float = 7.0  # at base ** (1 + alpha i / (B - 1))
-    noise_ladder: bool = True  # multiplies Gumbel noise by 1 - i / (B - 1): the last environments act nearly as in
-    # evaluation, so the replay holds the states in which evaluation gets stuck
     # Experience
     num_envs: int = 128  # side by side
     num_goals: int = 4  # an episode, without a reset between: beyond the paper, whose episodes end at the goal
     replay_capacity: int = 1_000_000  # rows of some 100 bytes
     min_rows: int = 20_000  # before learning begins
-    priority_exponent: float = 0.0  # 0 draws uniformly
-    importance_exponent: float = 0.4  # Ape-X's, where rows are drawn by priority
     hindsight_ratio: float = 0.8  # HER's four relabelled samples for each original one
     hindsight_mean_offset: float = 24.0  # steps; about twelve cells of the path driven
     hindsight_window: int = 100  # steps; how far ahead a goal may lie, long enough for far ones
@@ -103,7 +98,9 @@ class MMNConfig:
     unroll: int = 4  # steps of the model, K
     value_target: str = "tree_backup"  # over a sequence, with the improved policy; or the paper's "n_step"
     n_step: int = 5  # of "n_step" values
-    policy_target: str = "lookahead"  # one step of the target network's model, relabelled; "search": all of a search;
+    policy_target: str = (
+        "lookahead"  # one step of the target network's model, relabelled; "search": all of a search, without noise;
+    )
     # "paper": a search's where the goal was the real one, the network's own policy where it was relabelled
     temperature: float = 0.4  # steps; of the improved policy, softmax(q / temperature), in "lookahead"
     steps_per_update: int = 256  # environment steps; fixed, so that scores do not depend on the speed of workers
@@ -113,20 +110,15 @@ class MMNConfig:
     max_gradient_norm: float = 10.0  # against the steep slopes while values are still far off
     target_rate: float = 0.01  # of the target network's moving average
     model_weight: float = 1.0  # of the paper's auxiliary loss; 1 in the paper
-    localization_weight: float = 0.1  # beyond the paper: of the loss on the estimated position on the map
-    distance_weight: float = 0.02  # beyond the paper: of the loss on propagated distances, against values
-    visit_weight: float = 0.3  # beyond the paper: of the loss on enterable cells, against those that were visited
 
     def __post_init__(self):
-        for name, (lowest, highest) in _RANGES.items():
-            value = getattr(self, name)
-            if not lowest <= value <= highest:
-                raise InputError(f"expected config key {name!r} from {lowest} to {highest}, found {value}")
-        for name, choices in _CHOICES.items():
-            if getattr(self, name) not in choices:
+        for name, value in dataclasses.asdict(self).items():
+            if name in _RANGES and not _RANGES[name][0] <= value <= _RANGES[name][1]:
                 raise InputError(
-                    f"expected config key {name!r} as one of {', '.join(choices)}, found {getattr(self, name)!r}"
+                    f"expected config key {name!r} from {_RANGES[name][0]} to {_RANGES[name][1]}, found {value}"
                 )
+            if name in _CHOICES and value not in _CHOICES[name]:
+                raise InputError(f"expected config key {name!r} as one of {', '.join(_CHOICES[name])}, found {value!r}")
         if self.sequence_steps < self.unroll:
             raise InputError(f"expected sequence_steps of at least unroll {self.unroll}, found {self.sequence_steps}")
         rows = self.replay_capacity // self.num_envs * self.num_envs
@@ -136,26 +128,36 @@ class MMNConfig:
             )
 
 
-PRESETS = {
-    "default": MMNConfig(),
-    # As far as these keys go, the choices of the paper; docs/agents/mmn.md lists what still differs.
-    "paper": MMNConfig(
-        hypermodel="flat",
-        num_distances=0,
-        predict_reward=True,
-        search="puct",
-        epsilon_base=0.0,
-        num_goals=1,
-        relabel_start=False,
-        keep_anchor=False,
-        symmetries=False,
-        sequence_steps=10,
-        unroll=5,
-        value_target="n_step",
-        policy_target="paper",
-        localization_weight=0.0,
-        distance_weight=0.0,
-        visit_weight=0.0,
-        learning_rate=1e-3,  # not in the paper; with the default's, the weights of the hypermodel "flat" diverge
-    ),
-}
+@dataclasses.dataclass(frozen=True)
+class MMNConfig(PlanningConfig):
+    """The config of MMN."""
+
+    channels: int = 32  # of the map encoder
+    num_distances: int = 2  # maps of learned distances to the goal; beyond the paper
+    localization_weight: float = 0.1  # beyond the paper: of the loss on the estimated position on the map
+    distance_weight: float = 0.02  # beyond the paper: of the loss on propagated distances, against values
+    visit_weight: float = 0.3  # beyond the paper: of the loss on enterable cells, against those that were visited
+
+
+@dataclasses.dataclass(frozen=True)
+class PaperConfig(PlanningConfig):
+    """The config of MMN-paper: the paper's choices where it states them."""
+
+    hypermodel: bool = True  # False, an ablation: the code of the context is an input of an ordinary transition
+    rows: bool = True  # generates the first layer's weights of a position with convolutions, for each cell
+    reading: bool = True  # the heads, the paper's g(s, c), read convolutions of the context at the estimated position
+    embedding: int = 64  # numbers of the code of a context, from which the other weights are generated
+    task_code: int = 64  # numbers of that code for the heads
+    hidden: int = 64  # units of the transition, all of whose weights are generated
+    hyper_rate: float = 0.1  # times the learning rate, for the weights of the layer that generates weights: a step of
+    # Adam moves each generated weight by the L1 norm of the code
+    scale_rate: float = 2.0  # times the learning rate, for the map's scale
+    num_goals: int = 1  # as in the paper
+    relabel_start: bool = False  # as in the paper
+    keep_anchor: bool = False  # as in the paper, which takes each context's start
+    sequence_steps: int = 10  # two unrolls
+    unroll: int = 5  # as many as n_step
+    value_target: str = "n_step"  # as in the paper
+    policy_target: str = "search"  # of the target network, under the relabelled goal, without noise
+    steps_per_update: int = 128  # an update costs more than in MMN, so it is the time that is short, not experience
+    constant_updates: int = 2500  # before the learning rate falls, as one over the number of updates

@@ -17,9 +17,8 @@ from ..common.actor import NetworkAgent
 from ..common.layers import state_features
 from ..common.learner import HindsightLearner
 from ..common.replay import SequenceSample
-from .hypermodels import Code
 from .losses import Batch, Targets, unrolled_losses
-from .network import MMNNetwork, Predictions
+from .network import Code, Network, Predictions, rows_of
 from .planning import lookahead, plan
 from .targets import n_step_returns, tree_backup_returns
 
@@ -29,9 +28,8 @@ class MMNLearner(HindsightLearner):
 
     def __init__(self, actor: NetworkAgent, mazes: tuple[Maze, ...], seed: int):
         config = actor.config
-        optimizer = torch.optim.AdamW(
-            actor.network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
-        )
+        groups = actor.network.parameter_groups()
+        optimizer = torch.optim.AdamW(groups, lr=config.learning_rate, weight_decay=config.weight_decay)
         super().__init__(actor, mazes, seed, optimizer, config.keep_anchor)
         self._device = actor.network.support.device
         self._visited = np.zeros((len(mazes), mazes[0].size ** 2), dtype=np.float32)  # 1 in each visited cell
@@ -49,15 +47,12 @@ class MMNLearner(HindsightLearner):
         sample = self.sample()
         batch = self._batch(sample)
         targets = self._targets(batch)
-        weight = torch.from_numpy(sample.weight).to(self._device)
-        losses, metrics, value_error = unrolled_losses(self.actor.network, config, batch, targets, weight)
+        losses, metrics = unrolled_losses(self.actor.network, config, batch, targets)
         self._num_updates += 1
         for group in self._optimizer.param_groups:
-            group["lr"] = config.learning_rate * min(1.0, config.constant_updates / int(self._num_updates[0]))
+            falling = min(1.0, config.constant_updates / int(self._num_updates[0]))
+            group["lr"] = group["rate"] * config.learning_rate * falling
         metrics["gradient_norm"] = self._descend(torch.stack(list(losses.values())).sum())
-        if config.priority_exponent:
-            seen = (batch.exists & ~batch.at_goal)[:, 0, 0].cpu().numpy()
-            self._replay.update_priorities(sample.row[seen], value_error.cpu().numpy()[seen])
         scalars = losses | metrics
         # Copied from the device at once: on a GPU, each copy waits for all kernels launched before.
         values = torch.stack([value.detach() for value in scalars.values()]).tolist()
@@ -66,9 +61,8 @@ class MMNLearner(HindsightLearner):
     def sample(self) -> SequenceSample:
         """Draws the sequences of the next batch."""
         config = self._config
-        beta = config.importance_exponent if config.priority_exponent else 0.0
         return self._replay.sample_sequences(
-            config.groups, config.sequences, config.sequence_steps, self._hindsight, self._rng, beta
+            config.groups, config.sequences, config.sequence_steps, self._hindsight, self._rng
         )
 
     def _batch(self, sample: SequenceSample) -> Batch:
@@ -82,6 +76,7 @@ class MMNLearner(HindsightLearner):
             self._contexts(sample, turned),
             self._marks(sample.anchor, turned),
             symmetry.turn_planes(torch.from_numpy(np.stack(visited)[:, None]), turned),
+            torch.from_numpy(sample.maze),
             torch.from_numpy(sample.relabelled),
             symmetry.turn_features(features, turned),
             self._positions(sample, turned),
@@ -98,15 +93,17 @@ class MMNLearner(HindsightLearner):
         code = network.hypermodel(batch.context, batch.anchor)
         latent = network.encode(batch.features.flatten(1, 2))
         shape = batch.features.shape[1:3]
-        with torch.autocast(self._device.type, torch.bfloat16, enabled=_has_fast_bfloat16(self._device)):
-            qvalues = lookahead(network, latent, code, config.predict_reward).float().unflatten(1, shape)
-        improved = torch.softmax(qvalues / config.temperature, dim=-1)
+        if config.value_target == "tree_backup" or config.policy_target == "lookahead":
+            with torch.autocast(self._device.type, torch.bfloat16, enabled=_has_fast_bfloat16(self._device)):
+                qvalues = lookahead(network, latent, code).float().unflatten(1, shape)
+            policy = torch.softmax(qvalues / config.temperature, dim=-1)
         if config.value_target == "tree_backup":
-            value = tree_backup_returns(qvalues, improved, batch.action, batch.at_goal, batch.exists)
+            value = tree_backup_returns(qvalues, policy, batch.action, batch.at_goal, batch.exists)
         else:
             value = network.value(self._predict(network, latent, code).value_logits).unflatten(1, shape)
             value = n_step_returns(value, batch.at_goal, batch.exists, config.n_step)
-        policy = improved if config.policy_target == "lookahead" else self._searched(batch, latent, code)
+        if config.policy_target != "lookahead":
+            policy = self._searched(batch, latent, code)
         return Targets(value.clamp(-config.longest_value, 0.0), policy)
 
     def _searched(self, batch: Batch, latent: torch.Tensor, code: Code) -> torch.Tensor:
@@ -118,12 +115,12 @@ class MMNLearner(HindsightLearner):
         policy = torch.softmax(self._predict(network, latent, code).policy_logits, dim=-1)
         searched = ~batch.relabelled if config.policy_target == "paper" else torch.ones_like(batch.relabelled)
         if searched.any():
-            result = plan(network, config, latent[searched], code.of(searched), config.num_simulations, self._rng)
+            result = plan(network, config, latent[searched], rows_of(code, searched), config.num_simulations)
             weights = torch.from_numpy(result.action_weights).to(policy.device)
             policy[searched] = weights.unflatten(0, (-1, policy.shape[1]))
         return policy.unflatten(1, batch.features.shape[1:3])
 
-    def _predict(self, network: MMNNetwork, latent: torch.Tensor, code: Code) -> Predictions:
+    def _predict(self, network: Network, latent: torch.Tensor, code: Code) -> Predictions:
         return network.predict(latent, network.look(latent, code), code)
 
 

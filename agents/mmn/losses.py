@@ -11,12 +11,12 @@ from typing import NamedTuple
 import torch
 from torch.nn import functional
 
-from .config import MMNConfig
-from .hypermodels import Code, SpatialHypermodel
-from .network import MMNNetwork, Predictions
+from .config import PlanningConfig
+from .network import Code, Network, Roots
 from .targets import cross_entropy, scale_gradient, two_hot
 
 _HIDDEN_GRADIENT = 0.5  # of an unrolled state at each step: MuZero's
+_OTHER_MAP = "model_error_other_map"
 _MOVED_WEIGHT = 2.0  # of an error of metres moved, beside one of the body's motion
 
 
@@ -26,6 +26,7 @@ class Batch(NamedTuple):
     context: torch.Tensor  # [G, 4, M, M]
     anchor: torch.Tensor  # [G, 2], the position (row, column) from which displacements are measured
     visited: torch.Tensor  # [G, 1, M, M], the share of each cell of the map that was visited in this maze
+    maze: torch.Tensor  # [G], the index of the maze
     relabelled: torch.Tensor  # [G] bool
     features: torch.Tensor  # [G, S, L + 1, 9]
     position: torch.Tensor  # [G, S, L + 1, 2], the true cell on the map (row, column)
@@ -61,11 +62,14 @@ class Means:
 
 
 def unrolled_losses(
-    network: MMNNetwork, config: MMNConfig, batch: Batch, targets: Targets, weight: torch.Tensor
-) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor], torch.Tensor]:
-    """Returns losses by name, to be summed; other scalars by name; and the value errors `[G]` of the first roots.
+    network: Network, config: PlanningConfig, batch: Batch, targets: Targets
+) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor]]:
+    """Returns losses by name, to be summed, and other scalars by name.
 
-    They are the paper's task losses (values, policies, rewards and ends) at the roots and, weighted by 1 / K, in K
+    The scalar `map_ratio` tells how much the map matters to the model: its error after one step with the weights
+    generated for another maze of the batch, over its error with its own weights.
+
+    The losses are the paper's task losses (of values, policies and ends) at the roots and, weighted by 1 / K, in K
     unrolled states, and its auxiliary model loss in the unrolled states.
 
     Args:
@@ -73,7 +77,6 @@ def unrolled_losses(
       config: the weights of the losses, and K.
       batch: the experience.
       targets: the planned values and policies.
-      weight: `[G]`, importance weights.
     """
     code = network.hypermodel(batch.context, batch.anchor)
     roots = slice(0, config.sequence_steps - config.unroll + 1, config.unroll)
@@ -85,52 +88,43 @@ def unrolled_losses(
     latent = network.encode(at(batch.features, 0))
     alive = at(batch.exists & ~batch.at_goal, 0)
     losses, watched = Means(), Means()
-    value_error = torch.zeros(len(weight))
     for step in range(config.unroll + 1):
         exists = at(batch.exists, step) & alive if step else at(batch.exists, 0)
         at_goal, value = at(batch.at_goal, step), at(targets.value, step)
-        share = weight[:, None] * (1 / config.unroll if step else 1.0)
+        share = 1 / config.unroll if step else 1.0
         seen = network.look(latent, code)
         out = network.predict(latent, seen, code)
         going = exists & ~at_goal
         losses.add("value_loss", cross_entropy(two_hot(value, network.num_bins), out.value_logits), going * share)
         losses.add("policy_loss", cross_entropy(at(targets.policy, step), out.policy_logits), going * share)
-        _add_outcome(losses, config, out, at_goal, exists * share)
+        ends = functional.binary_cross_entropy_with_logits(out.goal_logit, at_goal.float(), reduction="none")
+        losses.add("goal_loss", ends, exists * share)
         if step:
             moved_error = _add_model(losses, config, network, latent, at(batch.features, step), exists * share)
             if step in (1, config.unroll):
                 watched.add(f"model_error_{step}", moved_error, exists)
         else:
-            _add_localization(losses, config, network, latent, code, at(batch.position, 0), exists)
-            _add_distances(losses, config, network, latent, code, value, going)
-            _add_visits(losses, config, code, batch.visited)
+            encoded = Roots(latent, at(batch.position, 0), value, exists, going, batch.visited)
+            for name, errors, weights in network.extra_losses(encoded, code):
+                losses.add(name, errors, weights)
             error = (network.value(out.value_logits.detach()) - value) * going
             watched.add("value_error", error.abs(), going)
             watched.add("value", value, going)
-            value_error = error[:, 0]
+            after = at(batch.features, 1), at(batch.exists, 1) & alive
+            _watch_other_maps(watched, network, latent, at(batch.action, 0), *after, code, batch.maze)
         if step < config.unroll:
             action = at(batch.action, step)
             latent = network.step(latent, network.first_layer(latent, seen, code), action, code)
             latent = scale_gradient(latent, _HIDDEN_GRADIENT)
-    return losses.means(), watched.means(), value_error
-
-
-def _add_outcome(
-    losses: Means, config: MMNConfig, out: Predictions, at_goal: torch.Tensor, weight: torch.Tensor
-) -> None:
-    """Adds the loss on ends of episodes and, if configured, the loss on rewards."""
-    truth = at_goal.float()
-    ends = functional.binary_cross_entropy_with_logits(out.goal_logit, truth, reduction="none")
-    losses.add("goal_loss", ends, weight)
-    if config.predict_reward:
-        rewards = functional.binary_cross_entropy_with_logits(out.reward_logit, truth, reduction="none")
-        losses.add("reward_loss", rewards, weight)
+    metrics = watched.means()
+    metrics["map_ratio"] = metrics.pop(_OTHER_MAP) / metrics["model_error_1"].clamp(min=1e-6)
+    return losses.means(), metrics
 
 
 def _add_model(
     losses: Means,
-    config: MMNConfig,
-    network: MMNNetwork,
+    config: PlanningConfig,
+    network: Network,
     latent: torch.Tensor,
     features: torch.Tensor,
     weight: torch.Tensor,
@@ -151,38 +145,20 @@ def _add_model(
     return moved_error.detach()
 
 
-def _add_localization(
-    losses: Means,
-    config: MMNConfig,
-    network: MMNNetwork,
+@torch.no_grad()
+def _watch_other_maps(
+    watched: Means,
+    network: Network,
     latent: torch.Tensor,
-    code: Code,
-    position: torch.Tensor,
+    action: torch.Tensor,
+    features: torch.Tensor,
     exists: torch.Tensor,
-) -> None:
-    """Adds the loss on estimated positions, against the true cells; beyond the paper."""
-    error = (network.locate(latent, code) - position).abs().mean(dim=-1)
-    losses.add("localization_loss", config.localization_weight * error, exists)
-
-
-def _add_distances(
-    losses: Means,
-    config: MMNConfig,
-    network: MMNNetwork,
-    latent: torch.Tensor,
     code: Code,
-    value: torch.Tensor,
-    going: torch.Tensor,
+    maze: torch.Tensor,
 ) -> None:
-    """Adds the loss on propagated distances, against the values; beyond the paper."""
-    if isinstance(network.hypermodel, SpatialHypermodel) and code.distance.shape[1]:
-        distance = network.hypermodel.distances(network.locate(latent, code).detach(), code)  # [G, R, P]
-        error = functional.smooth_l1_loss(distance, -value[..., None].expand_as(distance), reduction="none")
-        losses.add("distance_loss", config.distance_weight * error.mean(dim=-1), going)
-
-
-def _add_visits(losses: Means, config: MMNConfig, code: Code, visited: torch.Tensor) -> None:
-    """Adds the loss on enterable cells, against those visited in this maze; beyond the paper."""
-    if code.enterable.shape[1]:
-        error = functional.binary_cross_entropy_with_logits(code.enterable, visited, reduction="none")
-        losses.add("visit_loss", config.visit_weight * error, torch.ones_like(error))
+    """Adds the model's error after one step with the weights of another maze of the batch."""
+    other = code._make([code.positions, *(part.roll(1, 0) for part in code[1:])])
+    first = network.first_layer(latent, network.look(latent, other), other)
+    moved = network.decode(network.step(latent, first, action, other))[..., :2]
+    error = (moved - features[..., :2]).abs().sum(dim=-1)
+    watched.add(_OTHER_MAP, error, exists & (maze != maze.roll(1, 0))[:, None])

@@ -14,20 +14,23 @@ import numpy as np
 import torch
 
 from mazebench.agent import Inputs, Interface, Observation
-from mazebench.errors import InputError, unknown
+from mazebench.errors import InputError
 from mazebench.maps.maze import Maze
 
 from ..common.actor import NetworkAgent
 from ..common.checkpoint import load_agent, load_into
 from ..common.layers import marked_position, state_features
 from ..common.overrides import override
-from .config import PRESETS, MMNConfig
-from .hypermodels import NUM_ACTIONS, Code
+from .config import MMNConfig, PaperConfig, PlanningConfig
 from .learner import MMNLearner
-from .network import MMNNetwork
+from .network import NUM_ACTIONS, Code, Network, rows_of
+from .paper import PaperNetwork
 from .planning import plan
+from .spatial import MMNNetwork
 
-_ROWS_AT_ONCE = 64  # contexts or states; always as many, since PyTorch rounds differently at another batch size
+# Contexts and states are computed as many at once, always, since PyTorch rounds differently at another batch size.
+_CONTEXTS_AT_ONCE = 16  # few are new in one step
+_STATES_AT_ONCE = 64
 
 
 @dataclasses.dataclass
@@ -42,17 +45,18 @@ class MMN(NetworkAgent):
     """Acts by tree search in a latent model, whose weights a hypermodel generates from the context, once a leg."""
 
     name: ClassVar[str] = "mmn"
-    default_config: ClassVar[MMNConfig] = PRESETS["default"]
-    config: MMNConfig
-    network: MMNNetwork
+    default_config: ClassVar[PlanningConfig] = MMNConfig()
+    network_class: ClassVar[type[Network]] = MMNNetwork
+    config: PlanningConfig
+    network: Network
 
-    def __init__(self, config: MMNConfig, context_size: int, seed: int = 0, device: str = "cpu"):
+    def __init__(self, config: PlanningConfig, context_size: int, seed: int = 0, device: str = "cpu"):
         torch.set_num_threads(1)
         self.config = config
         self.trained_size = context_size
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
-            self.network = MMNNetwork(config, context_size).to(device)
+            self.network = self.network_class(config, context_size).to(device)
         self.explore_from(0, config.num_envs, seed)
 
     @classmethod
@@ -64,10 +68,10 @@ class MMN(NetworkAgent):
         """
         path = cls.default_checkpoint() if checkpoint is None else checkpoint
         tensors, config, trained_size = load_agent(path, cls.name, cls.default_config)
-        if config.hypermodel != "spatial" and interface.context_size != trained_size:
+        if not cls.network_class.serves_any_size and interface.context_size != trained_size:
             raise InputError(
                 f"{path}: expected contexts of {trained_size} x {trained_size}, the only ones that its hypermodel "
-                f"{config.hypermodel!r} serves, found {interface.context_size} x {interface.context_size}"
+                f"serves, found {interface.context_size} x {interface.context_size}"
             )
         agent = cls(config, trained_size, seed)
         load_into(path, agent.network, tensors)
@@ -77,12 +81,8 @@ class MMN(NetworkAgent):
     def build_learner(
         cls, interface: Interface, mazes: Sequence[Maze], *, seed: int = 0, overrides: Mapping[str, str] | None = None
     ) -> MMNLearner:
-        """Returns a learner for an MMN, on a GPU if there is one. The key `preset` names the config to override."""
-        values = dict(overrides or {})
-        preset = values.pop("preset", "default")
-        if preset not in PRESETS:
-            raise unknown("preset", preset, PRESETS)
-        config = override(PRESETS[preset], values)
+        """Returns a learner for an MMN, on a GPU if there is one."""
+        config = override(cls.default_config, overrides or {})
         device = "cuda" if torch.cuda.is_available() else "cpu"
         return MMNLearner(cls(config, interface.context_size, seed, device), tuple(mazes), seed)
 
@@ -101,7 +101,7 @@ class MMN(NetworkAgent):
         """Begins a new stream of exploration; the search's noise falls from the first environment to the last, too."""
         super().explore_from(first_env, num_envs, seed)
         rung = (first_env + np.arange(num_envs)) / max(1, self.config.num_envs - 1)
-        self._noise_scale = 1.0 - rung if self.config.noise_ladder else np.ones(num_envs)
+        self._noise_scale = 1.0 - rung
 
     @torch.no_grad()
     def act(self, inputs: Inputs, state: ActorState, explore: bool = False) -> tuple[np.ndarray, ActorState]:
@@ -115,7 +115,9 @@ class MMN(NetworkAgent):
         features = state_features(torch.from_numpy(inputs.observation["state"]), torch.from_numpy(state.origin))
         actions = [
             self._plan(rows, features_of_rows[:, None].to(device), state.code, explore)
-            for rows, features_of_rows in zip(_slices(len(features)), features.split(_ROWS_AT_ONCE), strict=True)
+            for rows, features_of_rows in zip(
+                _slices(len(features), _STATES_AT_ONCE), features.split(_STATES_AT_ONCE), strict=True
+            )
         ]
         action = np.concatenate(actions)
         if explore:
@@ -128,7 +130,7 @@ class MMN(NetworkAgent):
         origin = np.where(new_anchor[new, None], observation["state"][new, :2], state.origin[new])
         moved = torch.from_numpy(observation["state"][new, :2] - origin).to(device)
         state.origin[new] = origin
-        for rows in _slices(len(new)):
+        for rows in _slices(len(new), _CONTEXTS_AT_ONCE):
             context = torch.from_numpy(observation["context"][new[rows]]).to(device)
             start = marked_position(context[:, 3])
             anchor = start
@@ -136,29 +138,40 @@ class MMN(NetworkAgent):
                 old = state.code.positions[torch.from_numpy(new[rows]), :2]
                 kept = self.network.reanchored(old, moved[rows], start)
                 anchor = torch.where(torch.from_numpy(new_anchor[new[rows], None]).to(device), start, kept)
-            code = self.network.hypermodel(_padded(context), _padded(anchor)).of(slice(len(context)))
+            code = rows_of(
+                self.network.hypermodel(_padded(context, _CONTEXTS_AT_ONCE), _padded(anchor, _CONTEXTS_AT_ONCE)),
+                slice(len(context)),
+            )
             if state.code is None:
                 size = len(state.origin)
-                state.code = Code(*(part.new_zeros(size, *part.shape[1:]) for part in code))
+                state.code = code._make(part.new_zeros(size, *part.shape[1:]) for part in code)
             for whole, part in zip(state.code, code, strict=True):
                 whole[torch.from_numpy(new[rows]).to(device)] = part
 
     def _plan(self, rows: slice, features: torch.Tensor, code: Code, explore: bool) -> np.ndarray:
         """Returns actions in the environments `rows`, whose state features are `[K, 1, 9]`."""
         config = self.config
-        latent = self.network.encode(_padded(features))
-        code = Code(*(_padded(part[rows]) for part in code))
+        latent = self.network.encode(_padded(features, _STATES_AT_ONCE))
+        code = code._make(_padded(part[rows], _STATES_AT_ONCE) for part in code)
         num_simulations = config.num_simulations if explore else config.num_eval_simulations
         scale = np.resize(self._noise_scale[rows], len(latent)) if explore else 1.0
         rng = self._rng if explore else None
         return plan(self.network, config, latent, code, num_simulations, rng, scale).action[: len(features)]
 
 
-def _slices(num_rows: int) -> list[slice]:
-    return [slice(begin, begin + _ROWS_AT_ONCE) for begin in range(0, num_rows, _ROWS_AT_ONCE)]
+class MMNPaper(MMN):
+    """The paper's MMN: all weights of the model are generated from one code of the context."""
+
+    name = "mmn-paper"
+    default_config = PaperConfig()
+    network_class = PaperNetwork
 
 
-def _padded(rows: torch.Tensor) -> torch.Tensor:
-    """Returns `rows` and zeros, `_ROWS_AT_ONCE` rows together."""
-    missing = _ROWS_AT_ONCE - len(rows)
+def _slices(num_rows: int, size: int) -> list[slice]:
+    return [slice(begin, begin + size) for begin in range(0, num_rows, size)]
+
+
+def _padded(rows: torch.Tensor, size: int) -> torch.Tensor:
+    """Returns `rows` and zeros, `size` rows together."""
+    missing = size - len(rows)
     return torch.cat([rows, rows.new_zeros(missing, *rows.shape[1:])]) if missing else rows

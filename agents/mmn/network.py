@@ -1,24 +1,28 @@
-"""The networks of MMN: an encoder of states, a hypermodel of contexts, a latent transition, and heads.
+"""What the networks of MMN and of MMN-paper share: an encoder of states, motion in a latent model, and heads.
 
-`G` is the number of contexts, `K` of latent states in each, `D` the size of a latent state.
+`G` is the number of contexts, `K` of latent states in each, `M` the side of the context, `D` the size of a latent
+state, `H` of the transition's hidden layer.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import abc
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import torch
 from torch import nn
 
-from ..common.layers import NUM_WAVES, waves
-from .config import MMNConfig
-from .hypermodels import HYPERMODELS, NUM_ACTIONS, Code, Hypermodel
+from ..common.layers import marked_position
+from .compiled import CompiledModel
+from .config import PlanningConfig
 
-_NUM_POSE = 4  # x and y moved, sine and cosine of yaw: the first numbers of a latent state, as of state features
-_NUM_BODY = 7  # and velocities forward, left and of yaw
-_NUM_FREE = 6  # of a step in the body's frame: a move, a turn, velocities forward, left and of yaw
-_NUM_STOPPED = 4  # in the map's: a move, velocities
-_NUM_CHANGES = _NUM_FREE + _NUM_STOPPED
+NUM_ACTIONS = 6
+NUM_POSE = 4  # x and y moved, sine and cosine of yaw: the first numbers of a latent state, as of state features
+NUM_BODY = 7  # and velocities forward, left and of yaw
+NUM_FREE = 6  # of a step in the body's frame: a move, a turn, velocities forward, left and of yaw
+NUM_STOPPED = 4  # in the map's: a move, velocities
+NUM_CHANGES = NUM_FREE + NUM_STOPPED
 _SCALE_RATE = 5.0  # the scale's parameters are multiplied by it, so that they are of the order of other weights
 _RARE = -4.0  # logit of being in the goal, before anything is learned
 
@@ -29,59 +33,88 @@ class Predictions(NamedTuple):
     policy_logits: torch.Tensor  # [G, K, 6]
     value_logits: torch.Tensor  # [G, K, bins], of whole values from 1 - bins to 0
     goal_logit: torch.Tensor  # [G, K], of being in the goal cell, which ends the episode
-    reward_logit: torch.Tensor  # [G, K], of a reward of 0, not -1, on arriving
 
 
-class MMNNetwork(nn.Module):
+class Roots(NamedTuple):
+    """Encoded states from which the model is unrolled, for losses that a network adds to those of all networks."""
+
+    latent: torch.Tensor  # [G, K, D]
+    position: torch.Tensor  # [G, K, 2], the true cell on the map (row, column)
+    value: torch.Tensor  # [G, K], its target
+    exists: torch.Tensor  # [G, K] bool
+    going: torch.Tensor  # [G, K] bool, whether the state exists and is not in the goal
+    visited: torch.Tensor  # [G, 1, M, M], the share of each cell of the map that was visited in this maze
+
+
+# The output of a hypermodel for G contexts: a NamedTuple of tensors [G, ...], the first of them `positions` [G, 4],
+# anchor and goal on the map, each (row, column); the second `weights`, those that the hypermodel generates.
+Code = Any
+
+
+class Network(nn.Module, abc.ABC):
     """The paper's e (`encode`), h (`hypermodel`), f (`first_layer`, then `step`) and g (`predict`).
 
-    A latent state holds the displacement from an anchor (m), heading, velocities and a learned code of the motion. A
-    step adds a change that is linear in the body's own frame, as free motion is, and the output of the transition
-    network: a change in that frame, and one in the map's frame, along whose axes walls stop the body. The estimated
-    position on the map is the anchor plus a learned linear map of the displacement.
+    A latent state holds the displacement from an anchor (m), heading, velocities and a learned code of the motion. The
+    estimated position on the map is the anchor plus a learned linear map of the displacement. Subclasses have the
+    hypermodel, the transition, and the inputs of the heads.
     """
 
     support: torch.Tensor  # [bins], the values that a categorical value weighs
+    encoder: nn.Sequential
+    hypermodel: nn.Module  # called with contexts [G, 4, M, M] and anchors [G, 2], returns a Code
+    scale: nn.Parameter
+    body: nn.Sequential
+    heads: nn.Linear
+    serves_any_size: bool  # whether contexts may have another side than those of the training
 
-    def __init__(self, config: MMNConfig, context_size: int):
+    def __init__(self, config: PlanningConfig, context_size: int):
+        """`context_size` is M, which the networks need whose hypermodel serves no other size."""
         super().__init__()
-        self.latent_size = _NUM_BODY + config.latent
+        self.latent_size = NUM_BODY + config.latent
+        self.num_bins = config.longest_value + 1
+        self.register_buffer("support", torch.arange(-config.longest_value, 1.0), persistent=False)
         self.encoder = nn.Sequential(
-            nn.Linear(_NUM_BODY - _NUM_POSE, config.hidden),
+            nn.Linear(NUM_BODY - NUM_POSE, config.hidden),
             nn.ReLU(inplace=True),
             nn.Linear(config.hidden, config.latent),
             nn.LayerNorm(config.latent),
         )
-        make_hypermodel = HYPERMODELS[config.hypermodel]
-        num_inputs = _NUM_BODY - 2 + config.latent + NUM_WAVES
-        num_changes = _NUM_CHANGES + config.latent
-        self.hypermodel: Hypermodel = make_hypermodel(config, num_inputs, num_changes, context_size)
-        self.scale = nn.Parameter(torch.zeros(2, 2))
-        self.free = nn.Linear(_NUM_BODY - _NUM_POSE, _NUM_FREE)
-        self.free_by_action = nn.Embedding(NUM_ACTIONS, _NUM_FREE)
-        nn.init.zeros_(self.free_by_action.weight)
-        self.ahead = nn.Linear(_NUM_STOPPED, self.hypermodel.hidden)
-        self.normalize = nn.LayerNorm(config.latent)
-        self.num_bins = config.longest_value + 1
-        self.body = nn.Sequential(
-            nn.Linear(num_inputs + 2 + self.hypermodel.num_task_features, config.head_hidden),
-            nn.ReLU(inplace=True),
-            nn.Linear(config.head_hidden, config.head_hidden),
-            nn.ReLU(inplace=True),
-        )
-        self.heads = nn.Linear(config.head_hidden, NUM_ACTIONS + self.num_bins + 2)
-        self.register_buffer("support", torch.arange(-config.longest_value, 1.0), persistent=False)
-        nn.init.zeros_(self.heads.weight)
-        nn.init.zeros_(self.heads.bias)
-        nn.init.constant_(self.heads.bias[-2:], _RARE)
+
+    @abc.abstractmethod
+    def look(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
+        """Returns what is read from the context at the positions of latent states, `[G, K, W]`."""
+
+    @abc.abstractmethod
+    def first_layer(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
+        """Returns the transition's first layer without the action, `[G, K, H]`."""
+
+    @abc.abstractmethod
+    def step(self, latent: torch.Tensor, first: torch.Tensor, action: torch.Tensor, code: Code) -> torch.Tensor:
+        """Returns the next latent states `[G, K, D]`, from the output of `first_layer` and actions `[G, K]`."""
+
+    @abc.abstractmethod
+    def predict(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> Predictions:
+        """Returns the outputs of the heads."""
+
+    def parameter_groups(self) -> list[dict[str, Any]]:
+        """Returns the optimizer's groups of parameters; `rate` multiplies the learning rate."""
+        return [{"params": list(self.parameters()), "rate": 1.0}]
+
+    def extra_losses(self, roots: Roots, code: Code) -> Iterator[tuple[str, torch.Tensor, torch.Tensor]]:
+        """Yields the name, the errors and their weights of the network's own losses."""
+        yield from ()
+
+    def compiled(self, code: Code) -> CompiledModel | None:
+        """Returns the model of contexts as kernels for the search on a CPU, if the network has them."""
+        return None
 
     def encode(self, features: torch.Tensor) -> torch.Tensor:
         """Returns latent states `[G, K, D]` of state features `[G, K, 9]`; see `state_features`."""
-        return torch.cat([features[..., :_NUM_BODY], self.encoder(features[..., _NUM_POSE:_NUM_BODY])], dim=-1)
+        return torch.cat([features[..., :NUM_BODY], self.encoder(features[..., NUM_POSE:NUM_BODY])], dim=-1)
 
     def decode(self, latent: torch.Tensor) -> torch.Tensor:
         """Returns the first seven state features `[G, K, 7]` of latent states."""
-        return latent[..., :_NUM_BODY]
+        return latent[..., :NUM_BODY]
 
     def locate(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
         """Returns the estimated positions `[G, K, 2]` (row, column) of latent states on the map."""
@@ -95,42 +128,12 @@ class MMNNetwork(nn.Module):
         position = anchor + self._displacement(moved)
         return anchor + torch.clamp(position, start - 0.5, start + 0.5) - position
 
-    def look(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
-        """Returns what the hypermodel reads from the context at the positions of latent states, `[G, K, W]`."""
-        return self.hypermodel.look(self.locate(latent, code), code)
-
-    def first_layer(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
-        """Returns the transition's first layer without the action, `[G, K, H]`."""
-        return self.hypermodel.first_layer(self._body(latent), seen, code)
-
-    def step(self, latent: torch.Tensor, first: torch.Tensor, action: torch.Tensor, code: Code) -> torch.Tensor:
-        """Returns the next latent states `[G, K, D]`, from the output of `first_layer` and actions `[G, K]`."""
-        heading, velocities = latent[..., 2:_NUM_POSE], latent[..., _NUM_POSE:_NUM_BODY]
-        free = self.free(velocities) + self.free_by_action(action)
-        ahead = torch.cat([rotate(free[..., :2], heading), rotate(free[..., 3:5], heading)], dim=-1)
-        change = self.hypermodel.later_layers(first + self.ahead(ahead), action, code)
-        in_body, in_map, motion = change.split([_NUM_FREE, _NUM_STOPPED, change.shape[-1] - _NUM_CHANGES], dim=-1)
-        in_body = free + in_body
-        moved = latent[..., :2] + rotate(in_body[..., :2], heading) + in_map[..., :2]
-        turn = torch.stack([torch.sin(in_body[..., 2]), torch.cos(in_body[..., 2])], dim=-1)
-        turned = rotate(heading.flip(-1), turn).flip(-1)
-        planar = in_body[..., 3:5] + rotate(in_map[..., 2:], heading * heading.new_tensor([-1.0, 1.0]))
-        motion = self.normalize(latent[..., _NUM_BODY:] + motion)
-        return torch.cat([moved, turned, planar, in_body[..., 5:], motion], dim=-1)
-
     def step_all(self, latent: torch.Tensor, first: torch.Tensor, code: Code) -> torch.Tensor:
         """Returns the next latent states `[G, 6 K, D]` of every action; those of one state are neighbours."""
         num_states = latent.shape[1]
         action = torch.arange(NUM_ACTIONS, device=latent.device).repeat(num_states).expand(len(latent), -1)
         latent, first = (values.repeat_interleave(NUM_ACTIONS, dim=1) for values in (latent, first))
         return self.step(latent, first, action, code)
-
-    def predict(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> Predictions:
-        """Returns the outputs of the heads."""
-        to_goal = (code.positions[:, None, 2:] - self.locate(latent, code)) / 10
-        inputs = torch.cat([self._body(latent), to_goal, self.hypermodel.task_features(seen, code)], dim=-1)
-        out = self.heads(self.body(inputs))
-        return Predictions(out[..., :NUM_ACTIONS], out[..., NUM_ACTIONS:-2], out[..., -2], out[..., -1])
 
     def value(self, value_logits: torch.Tensor) -> torch.Tensor:
         """Returns the means `[G, K]` of categorical values, in steps."""
@@ -140,9 +143,54 @@ class MMNNetwork(nn.Module):
         """Returns displacements `[..., 2]` on the map (row, column) of those in metres (x, y)."""
         return _SCALE_RATE * (moved[..., None] * self.scale).sum(-2)
 
-    def _body(self, latent: torch.Tensor) -> torch.Tensor:
-        """Returns `[G, K, D + 14]`: heading, velocities, the code of the motion, and waves of the displacement."""
-        return torch.cat([latent[..., 2:], waves(latent[..., :2])], dim=-1)
+    def _make_heads(self, num_inputs: int, num_outputs: int, config: PlanningConfig) -> None:
+        """Makes `body` and `heads`, whose first outputs are those of policy and value; at first they are constant."""
+        self.body = nn.Sequential(
+            nn.Linear(num_inputs, config.head_hidden),
+            nn.ReLU(inplace=True),
+            nn.Linear(config.head_hidden, config.head_hidden),
+            nn.ReLU(inplace=True),
+        )
+        self.heads = nn.Linear(config.head_hidden, num_outputs)
+        nn.init.zeros_(self.heads.weight)
+        nn.init.zeros_(self.heads.bias)
+        nn.init.constant_(self.heads.bias[NUM_ACTIONS + self.num_bins :], _RARE)
+
+
+def rows_of(code: Code, rows: slice | torch.Tensor) -> Code:
+    """Returns the codes of some of the contexts."""
+    return code._make(part[rows] for part in code)
+
+
+def marked_positions(context: torch.Tensor, anchor: torch.Tensor | None) -> torch.Tensor:
+    """Returns `[G, 4]`: the anchor, by default the marked start, and the marked goal."""
+    start, goal = (marked_position(context[:, plane]) for plane in (3, 2))
+    return torch.cat([start if anchor is None else anchor, goal], dim=-1)
+
+
+def ahead_of(free: torch.Tensor, latent: torch.Tensor) -> torch.Tensor:
+    """Returns `[G, K, 4]`, in the map's frame: the move and the velocity of free motion, given in the body's frame."""
+    heading = latent[..., 2:NUM_POSE]
+    return torch.cat([rotate(free[..., :2], heading), rotate(free[..., 3:5], heading)], dim=-1)
+
+
+def moved_by(latent: torch.Tensor, free: torch.Tensor, change: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Returns the body `[G, K, 7]` after a step, and the change of the motion's code `[G, K, D - 7]`.
+
+    Args:
+      latent: `[G, K, D]`, before the step.
+      free: `[G, K, 6]`, the step in the body's frame without obstacles.
+      change: `[G, K, 10 + D - 7]`, what is added to it in the body's frame, then in the map's frame, along whose axes
+        walls stop the body, then to the motion's code.
+    """
+    heading = latent[..., 2:NUM_POSE]
+    in_body, in_map, motion = change.split([NUM_FREE, NUM_STOPPED, change.shape[-1] - NUM_CHANGES], dim=-1)
+    in_body = free + in_body
+    moved = latent[..., :2] + rotate(in_body[..., :2], heading) + in_map[..., :2]
+    turn = torch.stack([torch.sin(in_body[..., 2]), torch.cos(in_body[..., 2])], dim=-1)
+    turned = rotate(heading.flip(-1), turn).flip(-1)
+    planar = in_body[..., 3:5] + rotate(in_map[..., 2:], heading * heading.new_tensor([-1.0, 1.0]))
+    return torch.cat([moved, turned, planar, in_body[..., 5:]], dim=-1), motion
 
 
 def rotate(vector: torch.Tensor, heading: torch.Tensor) -> torch.Tensor:

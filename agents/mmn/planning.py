@@ -8,36 +8,34 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from .config import MMNConfig
-from .hypermodels import NUM_ACTIONS, Code
-from .network import MMNNetwork, Predictions
+from .config import PlanningConfig
+from .network import NUM_ACTIONS, Code, Network, Predictions
 from .search import Evaluation, RecurrentFn, Root, SearchResult, gumbel_muzero_policy, muzero_policy
 
 _DIRICHLET_ALPHA = 0.3  # MuZero's, in its board games with the fewest actions
 _DIRICHLET_FRACTION = 0.25  # MuZero's
 
 
-def outcome(predictions: Predictions, predict_reward: bool) -> tuple[torch.Tensor, torch.Tensor]:
+def outcome(predictions: Predictions) -> tuple[torch.Tensor, torch.Tensor]:
     """Returns reward and discount `[G, K]` of arriving in states: a goal ends the episode, any other step costs 1."""
     discount = torch.sigmoid(-predictions.goal_logit)
-    reward = -torch.sigmoid(-predictions.reward_logit) if predict_reward else -discount
-    return reward, discount
+    return -discount, discount
 
 
-def lookahead(network: MMNNetwork, latent: torch.Tensor, code: Code, predict_reward: bool) -> torch.Tensor:
+def lookahead(network: Network, latent: torch.Tensor, code: Code) -> torch.Tensor:
     """Returns action values `[G, K, 6]` of latent states `[G, K, D]` by one step of the model."""
     first = network.first_layer(latent, network.look(latent, code), code)
     after = network.step_all(latent, first, code)
     predictions = network.predict(after, network.look(after, code), code)
-    reward, discount = outcome(predictions, predict_reward)
+    reward, discount = outcome(predictions)
     qvalues = reward + discount * network.value(predictions.value_logits)
     return qvalues.unflatten(1, (-1, NUM_ACTIONS))
 
 
 @torch.no_grad()
 def plan(
-    network: MMNNetwork,
-    config: MMNConfig,
+    network: Network,
+    config: PlanningConfig,
     latent: torch.Tensor,
     code: Code,
     num_simulations: int,
@@ -49,8 +47,12 @@ def plan(
     If `rng` is given, the search has noise. The noise of "gumbel" is multiplied by `noise_scale`, a number or `[B]`.
     """
     size = latent.shape[0] * latent.shape[1], NUM_ACTIONS
-    root = _root(network, latent, code)
-    step = _recurrent_fn(network, config.predict_reward, latent.shape[:2], code)
+    step: RecurrentFn
+    model = network.compiled(code) if latent.is_cpu and latent.shape[1] == 1 else None
+    if model is None:
+        root, step = _root(network, latent, code), _recurrent_fn(network, latent.shape[:2], code)
+    else:
+        root, step = model.root(latent), model.step
     gumbel = np.zeros(size) if rng is None else rng.gumbel(size=size)
     if config.search == "gumbel":
         scaled = gumbel * np.broadcast_to(noise_scale, size[:1])[:, None]
@@ -76,20 +78,20 @@ def plan(
     )
 
 
-def _root(network: MMNNetwork, latent: torch.Tensor, code: Code) -> Root:
+def _root(network: Network, latent: torch.Tensor, code: Code) -> Root:
     predictions, embedding = _arrive(network, latent, code)
     value = network.value(predictions.value_logits)
     return Root(_array(predictions.policy_logits.flatten(0, 1)), _array(value.flatten()), embedding)
 
 
-def _recurrent_fn(network: MMNNetwork, predict_reward: bool, shape: torch.Size, code: Code) -> RecurrentFn:
+def _recurrent_fn(network: Network, shape: torch.Size, code: Code) -> RecurrentFn:
     def step(embedding: torch.Tensor, action: np.ndarray) -> Evaluation:
         latent, first = embedding.unflatten(0, shape).split(
             [network.latent_size, embedding.shape[-1] - network.latent_size], dim=-1
         )
         chosen = torch.from_numpy(action).to(embedding.device).unflatten(0, shape)
         predictions, after = _arrive(network, network.step(latent, first, chosen, code), code)
-        reward, discount = outcome(predictions, predict_reward)
+        reward, discount = outcome(predictions)
         value = network.value(predictions.value_logits)
         scalars = torch.stack([reward, discount, value], dim=-1)
         numbers = _array(
@@ -100,7 +102,7 @@ def _recurrent_fn(network: MMNNetwork, predict_reward: bool, shape: torch.Size, 
     return step
 
 
-def _arrive(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple[Predictions, torch.Tensor]:
+def _arrive(network: Network, latent: torch.Tensor, code: Code) -> tuple[Predictions, torch.Tensor]:
     """Returns predictions for latent states, and embeddings `[B, D + H]`: states and first layers."""
     seen = network.look(latent, code)
     embedding = torch.cat([latent, network.first_layer(latent, seen, code)], dim=-1)
@@ -108,4 +110,4 @@ def _arrive(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple[Pred
 
 
 def _array(tensor: torch.Tensor) -> np.ndarray:
-    return tensor.cpu().numpy()
+    return tensor.float().cpu().numpy()
