@@ -71,6 +71,17 @@ class Exits(Good):
         raise SystemExit(3)
 
 
+class Wordy(Good):
+    def answer(self, batch_size):
+        raise ValueError("no " * 40_000)
+
+
+class Lost(Good):
+    @classmethod
+    def default_checkpoint(cls):
+        return cls.weights
+
+
 class Late(Good):
     def initial_state(self, batch_size):
         return 0
@@ -95,7 +106,12 @@ BROKEN = [
     ("NoState", "initial_state() raised OSError: two lines (contract_at_hand.py:"),
     ("InLibrary", "act() raised JSONDecodeError: Expecting property name enclosed in double quotes"),
     ("Exits", "act() raised SystemExit: 3 (contract_at_hand.py:"),
-    ("Vague", "context_size() raised ValueError: invalid literal for int()"),
+    ("Wordy", f"act() raised ValueError: {'no ' * 96}... (119,711 more characters) (contract_at_hand.py:"),
+    (
+        "Lost",
+        "default_checkpoint() raised AttributeError: type object 'Lost' has no attribute 'weights' (contract_at_h",
+    ),
+    ("Vague", "expected context_size() to return a whole number from 3 to 255, found 'large'"),
 ]
 
 

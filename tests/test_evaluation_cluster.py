@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import pathlib
+import socket
+from collections.abc import Iterator
 
 import pytest
 from run_folders import FEW, IMPORTS, results_of
@@ -35,9 +37,18 @@ class Wrong(Agent):
 """
 
 
-def test_a_cluster_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(InputError, match="can't reach a Ray cluster at 'nowhere'"):
-        evaluate("random", tmp_path / "out", ray_address="nowhere", **FEW)
+@pytest.fixture
+def unused_port() -> Iterator[int]:
+    with socket.socket() as taken:  # by nobody who listens
+        taken.bind(("127.0.0.1", 0))
+        yield taken.getsockname()[1]
+
+
+@pytest.mark.parametrize("address", ["nowhere", "127.0.0.1:{port}", "ray://127.0.0.1:{port}", "127.0.0.1:port"])
+def test_a_cluster_that_is_not_there_is_named(tmp_path, unused_port, address):
+    address = address.format(port=unused_port)
+    with pytest.raises(InputError, match=f"^can't reach a Ray cluster at '{address}': "):
+        evaluate("random", tmp_path / "out", ray_address=address, **FEW)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -182,6 +182,20 @@ class TestAgents:
         starts = {(column + 0.5, 13 - row - 0.5) for row, column in (episode.start for episode in trials)}
         assert set(map(tuple, truth.pose[:, :2].tolist())) == starts
 
+    def test_an_agent_that_needs_a_sensor_is_given_it_as_if_by_the_option(self, tmp_path, monkeypatch):
+        monkeypatch.setattr(Witness, "inputs", [])
+        monkeypatch.setattr(Witness, "needs_sensors", ("lidar",))
+        summary = evaluate(Witness, tmp_path / "declared", **FEW)
+        assert Witness.inputs[0][0]["lidar"] == ((40, 32), "float32")
+        assert summary.provenance.options.model_dump()["sensors"] == ["lidar"]
+        evaluate(Witness, tmp_path / "given", sensors=("lidar",), **FEW)
+        assert results_of(tmp_path / "declared") == results_of(tmp_path / "given")
+
+    def test_a_sensor_that_a_track_offers_is_not_added(self):
+        assert make_plan(EvalOptions("navigator", track="stale")).options.sensors == ()
+        assert make_plan(EvalOptions("navigator")).options.sensors == ("lidar",)
+        assert make_plan(EvalOptions("navigator", sensors=("top",))).task.sensors == ("top", "lidar")
+
 
 class TestSeeds:
     def test_agents_draw_otherwise_with_another_seed(self, random_run, tmp_path):
@@ -314,6 +328,8 @@ class TestRefused:
             ({"pairs": "fixed"}, "expected pairs 'random' in an evaluation, found 'fixed'"),
             ({"speed": 2}, "unknown option 'speed'; available: .*distances.*map_flip"),
             ({"num_envs": 0}, "expected num_envs of at least 1, found 0"),
+            ({"num_envs": "3"}, "expected num_envs of type int, found '3'"),
+            ({"record": "yes"}, "expected record of type bool, found 'yes'"),
             ({"workers": -1}, "expected workers of at least 0, found -1"),
         ],
     )

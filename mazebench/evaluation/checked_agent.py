@@ -10,7 +10,9 @@ import numpy as np
 
 from mazebench.agent import Agent, Inputs
 from mazebench.agent_loading import source_line
-from mazebench.errors import InputError, RunError
+from mazebench.errors import InputError, RunError, shortened
+from mazebench.maps.maze import MAX_SIZE
+from mazebench.tasks.spec import MIN_CONTEXT_SIZE
 
 
 class AgentError(RunError):
@@ -28,8 +30,22 @@ def calling(name: str, method: str) -> Iterator[None]:
     except (InputError, RunError):
         raise
     except (Exception, SystemExit) as error:  # other people's code may raise anything
-        found = " ".join(f"{type(error).__name__}: {error}".split())[:300].removesuffix(":")
+        found = shortened(f"{type(error).__name__}: {error}").removesuffix(":")
         raise AgentError(f"agent {name!r}: {method}() raised {found}{source_line(error)}") from error
+
+
+def context_size_of(name: str, agent_class: type[Agent], size: int) -> int:
+    """Returns the M that the agent `name` needs in mazes of `size` cells a side.
+
+    Raises:
+      AgentError: if it is no whole number, or there are no contexts of that size.
+    """
+    with calling(name, "context_size"):
+        found = agent_class.context_size(size)
+    if not (isinstance(found, int | np.integer) and MIN_CONTEXT_SIZE <= found <= MAX_SIZE):
+        expected = f"a whole number from {MIN_CONTEXT_SIZE} to {MAX_SIZE}"
+        raise AgentError(f"agent {name!r}: expected context_size() to return {expected}, found {_short(found)}")
+    return int(found)
 
 
 class CheckedAgent(Agent):
@@ -70,4 +86,4 @@ class CheckedAgent(Agent):
 def _short(value: object) -> str:
     if isinstance(value, np.ndarray):
         return f"an array of shape {value.shape}"
-    return " ".join(repr(value).split())[:80]
+    return shortened(repr(value), 80)

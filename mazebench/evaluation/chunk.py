@@ -75,7 +75,8 @@ def run_chunk(chunk: Chunk) -> Iterator[list[Ended]]:
         needs_truth=plan.agent_class.needs_truth,
         record=chunk.record,
     ):
-        yield [Ended(_to_record(plan, outcome), outcome.trajectory) for outcome in outcomes]
+        if outcomes:
+            yield [Ended(_to_record(plan, outcome), outcome.trajectory) for outcome in outcomes]
 
 
 def run_whole_chunk(chunk: Chunk) -> list[Ended]:
@@ -102,7 +103,7 @@ def run_trials(
     needs_truth: bool = False,
     record: bool = False,
 ) -> Iterator[list[Outcome]]:
-    """Yields what came of the trials that ended, step by step; each once, in no fixed order.
+    """Yields what came of the trials that ended, after each step; each once, in no fixed order.
 
     Args:
       agent: acts without exploring.
@@ -144,10 +145,7 @@ def run_trials(
             ended = terminated | truncated
             active = np.array([numbered is not None for numbered in slots])
             new_episode = ended & active
-            if ended.any():
-                yield [
-                    _outcome(*_present(running[slot]), info, slot, recorder) for slot in np.flatnonzero(ended).tolist()
-                ]
+            yield [_outcome(*_present(running[slot]), info, slot, recorder) for slot in np.flatnonzero(ended).tolist()]
 
 
 def _present(numbered: tuple[int, Trial] | None) -> tuple[int, Trial]:
@@ -166,7 +164,7 @@ def _outcome(index: int, trial: Trial, info: dict[str, Any], slot: int, recorder
 
 def _to_record(plan: Plan, outcome: Outcome) -> Record:
     episode, trial = outcome.trial.episode, outcome.trial
-    shortest = np.array([trial.shortest_path, float(trial.distance)])
+    shortest = np.array([trial.shortest_path, trial.distance * plan.task.cell_size])
     both = spl(np.array([outcome.success] * 2), shortest, np.array([outcome.path_length] * 2))
     values = {
         "episode": outcome.index,

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import signal
+import socket
 import threading
+import urllib.parse
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from mazebench.errors import InputError, RunError
+from mazebench.errors import InputError, RunError, shortened
 from mazebench.evaluation.chunk import Chunk, Ended, run_whole_chunk
 
 try:
@@ -16,6 +18,7 @@ except ModuleNotFoundError as error:
     raise InputError("--ray needs Ray, which the extra [ray] brings (docs/start.md)") from error
 
 _MAX_RETRIES = 5  # of a chunk whose worker died
+_PATIENCE = 10  # seconds for a host to answer; Ray itself tries for a quarter of an hour
 
 
 class Cluster:
@@ -74,18 +77,26 @@ def connect(address: str) -> None:
     """
     handler, terminated = signal.getsignal(signal.SIGTERM), False
     try:
+        _check_answers(address)
         ray.init(address=address, log_to_driver=False, include_dashboard=False)
     except SystemExit:  # Ray's answer to SIGTERM
         ray.shutdown()
         terminated = True
-    except (ConnectionError, ValueError, RuntimeError) as error:
-        reason = " ".join(str(error).split())[:200]
+    except (OSError, ValueError, RuntimeError) as error:
+        reason = shortened(str(error), 200)
         raise InputError(f"can't reach a Ray cluster at {address!r}: {reason}") from error
     finally:
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGTERM, handler)  # Ray replaces the handler
     if terminated:
         signal.raise_signal(signal.SIGTERM)
+
+
+def _check_answers(address: str) -> None:
+    """Raises `OSError` if nothing answers at an `address` that has a port."""
+    parts = urllib.parse.urlsplit(address if "://" in address else f"//{address}")
+    if parts.port is not None:
+        socket.create_connection((parts.hostname or "", parts.port), _PATIENCE).close()
 
 
 def _first_line(error: object) -> str:

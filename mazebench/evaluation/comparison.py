@@ -158,7 +158,10 @@ def _who(summary: Summary, parts: list[str]) -> str:
 
 def _check_pairs(a: Result, b: Result) -> None:
     for key, ours, theirs in (
-        *((key, getattr(a.summary, key), getattr(b.summary, key)) for key in ("benchmark", "task", "size", "split")),
+        *(
+            (key, getattr(a.summary, key), getattr(b.summary, key))
+            for key in ("benchmark", "task", "size", "cell_size", "split")
+        ),
         *(
             (key, getattr(a.summary.provenance, key), getattr(b.summary.provenance, key))
             for key in ("benchmark_manifest_sha256", "mazes_sha256")

@@ -15,12 +15,11 @@ from mazebench.agent_loading import checked_agent_class, load_agent_class
 from mazebench.errors import InputError, unknown
 from mazebench.evaluation import metrics
 from mazebench.evaluation.chunk import Chunk
-from mazebench.evaluation.options import NUM_ENVS, EvalOptions
+from mazebench.evaluation.options import NUM_ENVS, EvalOptions, RunOptions
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import Pool, open_pool
 from mazebench.evaluation.records import Summary
-from mazebench.evaluation.results import load_result
-from mazebench.evaluation.store import Store, check_same_run, is_finished
+from mazebench.evaluation.store import Store, check_same_run, is_finished, load_finished
 
 _CHUNKS_PER_WORKER = 4  # so that no worker waits long for the last one,
 _LEAST_CHUNK = 64  # but not so many that their environments are few: agents act on all of them at once
@@ -40,6 +39,7 @@ def evaluate(
     workers: int = 0,
     ray_address: str | None = None,
     progress: Progress = lambda ended, of: None,
+    warn: Callable[[str], None] = lambda line: None,
     **options: Any,
 ) -> Summary:
     """Evaluates an agent and returns the summary.
@@ -53,12 +53,14 @@ def evaluate(
       workers: processes; 0 runs in this one, on all cores.
       ray_address: of a Ray cluster to run the workers on; 0 of them then are as many as it has CPUs.
       progress: called as episodes end.
+      warn: called with a line on what a user should know, such as maps of a scale on which the agent did not learn.
       **options: fields of `EvalOptions`: `task`, `size`, `split`, `maps`, `distances`, `map_flip`, `seed` and so on.
 
     Raises:
       InputError: if an option can't be met, or `out` can't be written or holds another run.
       RunError: if the agent or a worker failed; what ended until then is kept.
     """
+    RunOptions(resume=resume, record=record, num_envs=num_envs, workers=workers, ray_address=ray_address)
     name = agent if isinstance(agent, str) else f"{agent.__module__}:{agent.__qualname__}"
     agent_class = load_agent_class(name) if isinstance(agent, str) else checked_agent_class(name, agent)
     known = [field.name for field in dataclasses.fields(EvalOptions) if field.name != "agent"]
@@ -68,6 +70,8 @@ def evaluate(
     if (workers or ray_address) and (name.startswith("__main__:") or load_agent_class(name) is not agent_class):
         raise InputError(f"expected a class that other processes can import by its name, found {name}")
     plan = make_plan(EvalOptions(name, **options), agent_class)
+    if plan.remark:
+        warn(plan.remark)
     with open_pool(workers, ray_address) as pool, tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary if out is None else out)
         return run_plan(plan, folder, pool, resume=resume, record=record, num_envs=num_envs, progress=progress)
@@ -95,8 +99,9 @@ def run_plan(
     num_trials = len(plan.trials)
     if resume and is_finished(folder, record):
         check_same_run(folder, plan)
+        summary = load_finished(folder)
         progress(num_trials, num_trials)
-        return load_result(folder).summary
+        return summary
     with Store(folder, plan, resume=resume, record=record) as store:
         progress(store.num_ended, num_trials)
         for ended in pool.run(_cut(plan, store, pool, num_envs)):

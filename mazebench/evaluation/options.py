@@ -7,9 +7,11 @@ import pathlib
 
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import SPLITS, TRACKS_VERSION, VERSION
-from mazebench.options import option, options_of
+from mazebench.maps.options import MAP_OPTIONS, MapOptions
+from mazebench.options import Options, option, options_of
 from mazebench.tasks.mazes import load_task_mazes
 from mazebench.tasks.options import EVAL_DISTANCES, TaskOptions
+from mazebench.tasks.own import own_task
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.tracks import TRACKS
 
@@ -20,7 +22,7 @@ FIXED = {"pairs": "random", "num_goals": 1, "continuous": False, "context_size":
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class EvalOptions(TaskOptions):
+class EvalOptions(MapOptions, TaskOptions):
     """What is evaluated. Two runs with equal options give the same `episodes.jsonl`.
 
     Raises:
@@ -32,9 +34,12 @@ class EvalOptions(TaskOptions):
         None, "Cells a side of the benchmark's mazes: 13 (if not given), 15, 17, 19 or 21; a track has its own."
     )
     split: str = option("eval", "The benchmark's unseen mazes, or its training mazes.", choices=SPLITS)
-    maps: str | None = option(None, "Mazes of your own: a text or image file, or a folder of them.")
+    maps: str | None = option(None, "Mazes of your own: a text, picture, array or ROS map, or a folder of them.")
     distances: tuple[int, ...] = option(
-        (), "Cells from start to goal, as 1-5,8,10 (local task); if not given, 1-15 or those of the track.", lowest=1
+        (),
+        "Cells from start to goal, as 1-5,8,10 (local task); if not given, 1-15, those of the track, or as far as maps "
+        "of your own reach.",
+        lowest=1,
     )
     episodes_per_distance: int = option(
         EPISODES_PER_DISTANCE, "Episodes for each maze and distance (local task).", lowest=1
@@ -51,6 +56,8 @@ class EvalOptions(TaskOptions):
             found = ", ".join(map(str, self.level))
             raise InputError(f"expected one level in an evaluation, found {found}; the suite 'tracks' plays all levels")
         own = EVAL_DISTANCES if self.track is None else TRACKS[self.track].distances(self.level[0])
+        if self.is_own:
+            return  # the mazes tell which distances there are
         if not self.distances:
             object.__setattr__(self, "distances", own)
         elif self.track is not None and self.is_frozen and not set(self.distances) <= set(own):
@@ -61,14 +68,34 @@ class EvalOptions(TaskOptions):
             )
 
     @property
+    def is_own(self) -> bool:
+        """Whether mazes, start or goal are not the benchmark's."""
+        return self.maps is not None or self.ends_given > 0
+
+    @property
     def is_frozen(self) -> bool:
         """Whether the benchmark's eval mazes are asked for, which have frozen episodes."""
-        return self.maps is None and self.split == "eval"
+        return not self.is_own and self.split == "eval"
 
     @property
     def benchmark(self) -> str:
         """The version of the benchmark that the evaluation belongs to."""
         return VERSION if self.track is None else TRACKS_VERSION
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RunOptions(Options):
+    """How an evaluation is run, which makes no difference to its results.
+
+    Raises:
+      InputError: if a value is not allowed.
+    """
+
+    resume: bool = option(False, "Go on with the run in the folder.")
+    record: bool = option(False, "Write trajectories too.")
+    num_envs: int = option(NUM_ENVS, "Environments side by side in each process, at most.", lowest=1)
+    workers: int = option(0, "Processes; 0 runs in this one.", lowest=0)
+    ray_address: str | None = option(None, "Address of a Ray cluster for the workers.")
 
 
 # What is played, as the command line has it: all but the fixed options, the agent's own and the seed.
@@ -79,4 +106,8 @@ def make_task(options: EvalOptions) -> TaskSpec:
     """Returns the task that `options` name; reads its mazes."""
     values = {field.name: getattr(options, field.name) for field in dataclasses.fields(TaskOptions)}
     maps = None if options.maps is None else pathlib.Path(options.maps)
-    return TaskSpec(mazes=load_task_mazes(options, options.size, options.split, maps), **values)
+    map_options = MapOptions(**{name: getattr(options, name) for name in MAP_OPTIONS})
+    mazes = load_task_mazes(options, options.size, options.split, maps, map_options)
+    if options.is_own:
+        return own_task(mazes, **values | {"distances": options.distances or None})
+    return TaskSpec(mazes=mazes, **values)

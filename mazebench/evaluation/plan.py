@@ -10,13 +10,13 @@ from typing import Any
 
 from mazebench.agent import Agent, Interface
 from mazebench.agent_loading import load_agent_class
-from mazebench.errors import InputError
-from mazebench.evaluation.checked_agent import CheckedAgent, calling
+from mazebench.errors import InputError, held_remarks
+from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of
 from mazebench.evaluation.options import FIXED, EvalOptions, make_task
 from mazebench.evaluation.oracle import oracle_spl
 from mazebench.evaluation.provenance import provenance
 from mazebench.evaluation.records import Provenance
-from mazebench.evaluation.trials import Trial, select_track_trials, select_trials
+from mazebench.evaluation.trials import Trial, draw_trials, select_track_trials, select_trials
 from mazebench.tasks.perturbations import perturbation_levels
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.mjcf import maze_spec
@@ -35,7 +35,7 @@ _COVERED = ("agent", "task", "track", "level", "size", "split", "maps", "checkpo
 class Plan:
     """Everything that one evaluation will run. A pickled plan is its options; unpickling makes the plan anew."""
 
-    options: EvalOptions  # with the very file of the checkpoint
+    options: EvalOptions  # with the very file of the checkpoint, and the sensors that the agent needs
     agent_class: type[Agent]
     task: TaskSpec
     trials: tuple[Trial, ...]  # in the protocol's order, by which they are numbered
@@ -50,20 +50,47 @@ class Plan:
 
     @property
     def untrained_scale(self) -> bool:
-        """Whether the checkpoint says that the agent learned on maps of another scale, in metres a cell of the context.
+        """Whether the agent learned on maps of another scale, in metres a cell of the context."""
+        return self._learned_scale not in (None, self._scale)
 
-        Only checkpoints of the kind that `mazebench train` writes say on which maps they learned.
+    @property
+    def remark(self) -> str | None:
+        """What a user should know before the evaluation, in a line; None if there is nothing."""
+        task = self.task
+        if not self.untrained_scale:
+            if self.options.maps is None or task.track is not None or task.context_size >= task.size:
+                return None
+            return (
+                f"{self.options.agent} is shown the {task.size} x {task.size} cells as a map of {task.context_size} x "
+                f"{task.context_size}; context_size() of its class chooses another one (docs/agents.md)"
+            )
+        return (
+            f"{self.options.agent} learned on maps of {self._learned_scale:g} m a cell; here its map of "
+            f"{task.context_size} x {task.context_size} cells shows {task.size} x {task.size} cells of "
+            f"{task.cell_size:g} m, {self._scale:.3g} m a cell"
+        )
+
+    @property
+    def _scale(self) -> float:  # m a cell of the context
+        return self.task.mazes[0].side / self.task.context_size
+
+    @property
+    def _learned_scale(self) -> float | None:
+        """The scale of the maps on which the agent learned; None where no checkpoint says it.
+
+        Checkpoints of the kind that `mazebench train` writes do. It trains in mazes whose cells are 1 m wide.
         """
         for told in ((self.provenance.model_extra or {}).get("checkpoint_metadata") or {}).values():
             if isinstance(told, dict) and "context_size" in told:
                 size = told.get("provenance", {}).get("size")
-                return size is not None and size * self.task.context_size != told["context_size"] * self.task.size
-        return False
+                return None if size is None else size / told["context_size"]
+        return None
 
     def build_agent(self) -> CheckedAgent:
         """Returns a new agent for the task, held to its contract."""
         options = self.options
-        interface = Interface(options.task, self.task.size, self.task.context_size, sensors=self.task.sensors)
+        task = self.task
+        interface = Interface(task.task, task.size, task.context_size, sensors=task.sensors, cell_size=task.cell_size)
         checkpoint = None if options.checkpoint is None else pathlib.Path(options.checkpoint)
         with calling(options.agent, "build"):
             agent = self.agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)
@@ -84,11 +111,15 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
     options = _with_checkpoint(options, agent_class)
     task = make_task(options)
     if task.track is None:
-        with calling(options.agent, "context_size"):
-            context_size = int(agent_class.context_size(task.size))
+        context_size = context_size_of(options.agent, agent_class, task.size)
         task = dataclasses.replace(task, context_size=context_size)
-    split = options.split if options.maps is None else "custom"
+    if missing := tuple(name for name in agent_class.needs_sensors if name not in task.sensors):
+        options = dataclasses.replace(options, sensors=(*options.sensors, *missing))
+        task = dataclasses.replace(task, sensors=(*task.sensors, *missing))
+    split = "custom" if options.is_own else options.split
     labels = {"agent": options.agent, "task": options.task, "size": task.size, "split": split}
+    if task.cell_size != 1:
+        labels["cell_size"] = task.cell_size
     if task.track is not None:
         labels |= {"track": task.track, "level": task.level[0]}
     trials = _select_trials(options, task)
@@ -100,7 +131,7 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
         **{name: getattr(origin, name) for name in _IDENTIFYING},
         "mujoco": origin.packages.get("mujoco"),
         "world_sha256": hashlib.sha256(maze_spec(task.mazes[0]).to_xml().encode("utf-8")).hexdigest(),
-        **{name: value for name, value in dataclasses.asdict(options).items() if name not in _COVERED},
+        **{name: value for name, value in origin.options.model_dump().items() if name not in _COVERED},
     }
     return Plan(
         options=options,
@@ -116,6 +147,8 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
 
 
 def _select_trials(options: EvalOptions, task: TaskSpec) -> list[Trial]:
+    if options.is_own:
+        return draw_trials(task, options.episodes_per_distance, options.seed)
     what = (options.is_frozen, options.distances, options.episodes_per_distance, options.seed)
     if task.track is not None:
         return select_track_trials(task.mazes, *what)
@@ -125,7 +158,8 @@ def _select_trials(options: EvalOptions, task: TaskSpec) -> list[Trial]:
 @functools.lru_cache(maxsize=1)
 def _make_plan_once(options: EvalOptions) -> Plan:
     """Returns the plan of `options`, the same one for all chunks of an evaluation that a process runs."""
-    return make_plan(options)
+    with held_remarks():  # which the process printed that made the plan first
+        return make_plan(options)
 
 
 def _with_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:
@@ -136,7 +170,8 @@ def _with_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOpti
     Raises:
       InputError: if a checkpoint is given to an agent that reads none.
     """
-    default = agent_class.default_checkpoint()
+    with calling(options.agent, "default_checkpoint"):
+        default = agent_class.default_checkpoint()
     if options.checkpoint is None:
         return options if default is None else dataclasses.replace(options, checkpoint=str(default))
     if default is None and not agent_class.learns and ":" not in options.agent:

@@ -39,13 +39,15 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
         "benchmark": options.benchmark,
         "benchmark_manifest_sha256": manifest_hash(options.benchmark),
         "task_version": task.version,
+        "context_size": task.context_size,  # which the agent chooses
         "checkpoint_sha256": file_hash(options.checkpoint),
         "checkpoint_metadata": checkpoint_metadata(options.checkpoint),
         "agent_class": f"{agent_class.__module__}:{agent_class.__qualname__}",
         "agent_package": _package_of(agent_class),
         "agent_code_sha256": code_hash(options, agent_class),
         "seed": options.seed,
-        "options": dataclasses.asdict(options),
+        # With the distances and the time limit that are played, of which the options may only say to choose them.
+        "options": dataclasses.asdict(options) | {name: getattr(task, name) for name in ("distances", "time_limit")},
         "command": [pathlib.Path(sys.argv[0]).name, *sys.argv[1:]],
         "python": platform.python_version(),
         "packages": {name: _version(name) for name in _PACKAGES},
@@ -55,9 +57,15 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
             "processor": platform.machine(),
             "cores": os.cpu_count(),
         },
-        "mazes_sha256": hashlib.sha256(b"".join(maze.walls.tobytes() for maze in task.mazes)).hexdigest(),
+        "mazes_sha256": _mazes_hash(task),
     }
     return Provenance.model_validate_json(json.dumps(content))  # as a reader will find it
+
+
+def _mazes_hash(task: TaskSpec) -> str:
+    """Returns a SHA-256 of the mazes; 1 m, the width of the benchmark's cells, does not change it."""
+    scale = "" if task.cell_size == 1 else repr(task.cell_size)
+    return hashlib.sha256(b"".join(maze.walls.tobytes() for maze in task.mazes) + scale.encode("ascii")).hexdigest()
 
 
 def code_hash(options: EvalOptions, agent_class: type[Agent]) -> str | None:

@@ -31,13 +31,13 @@ class Record(_Stored):
     """What came of one episode.
 
     The levels of the perturbations follow as further keys; on a track also `track`, `level` and its facts, such as
-    `blocked`.
+    `blocked`; in mazes whose cells are not 1 m wide also `cell_size`, in metres.
     """
 
     agent: Name
     task: Name
     size: Size  # N, cells a side of the maze
-    split: Name  # "train", "eval" or "custom"
+    split: Name  # "train", "eval", or "custom" for mazes, a start or a goal of one's own
     episode: Count  # index in the protocol's order
     maze: Name
     start: Cell  # (row, column)
@@ -48,7 +48,7 @@ class Record(_Stored):
     path_length: Length  # m, driven
     shortest_path: Length  # m, of the body as a disc
     spl: Share  # by `shortest_path`
-    spl_grid: Share  # by `distance`, a cell being 1 m
+    spl_grid: Share  # by `distance`, in metres
     seed: Count  # of the episode: flips, warp, noise
 
     def to_line(self) -> str:
@@ -74,6 +74,8 @@ class TaskProvenance(_Stored):
 
     landmark_distance: Count
     seed: Count = 0
+    start: Name | None = None
+    goal: Name | None = None
 
 
 class Provenance(_Stored):
@@ -98,6 +100,7 @@ class Summary(_Stored):
     task: Name
     size: Size
     split: Name
+    cell_size: Annotated[float, pydantic.Field(gt=0, lt=_LARGEST)] | None = None  # m, where it is not 1
     track: str | None = None
     level: int | None = None  # of the track
     suite: str | None = None  # of a part of a suite, with the part's name
@@ -112,18 +115,10 @@ class Summary(_Stored):
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the content of `summary.json`."""
-        optional = ("untrained_scale", "suite", "part", "track", "level", "by_fact")
+        optional = ("untrained_scale", "cell_size", "suite", "part", "track", "level", "by_fact")
         return {key: value for key, value in self.model_dump().items() if not (key in optional and not value)}
 
 
 def column(records: Sequence[Record], name: str) -> np.ndarray:
     """Returns `[E, ...]`: one field of all records."""
     return np.array([getattr(record, name) for record in records])
-
-
-def describe_fault(error: pydantic.ValidationError) -> str:
-    """Returns the first fault that a validation found, in words."""
-    fault = error.errors(include_url=False)[0]
-    where = ".".join(map(str, fault["loc"]))
-    found = "" if fault["type"] in ("json_invalid", "missing") else f", found {str(fault['input'])[:60]!r}"
-    return f"{where + ': ' if where else ''}{fault['msg']}{found}"

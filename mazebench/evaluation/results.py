@@ -9,9 +9,9 @@ from typing import Annotated, TypeVar
 import numpy as np
 import pydantic
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, describe_fault
 from mazebench.evaluation.metrics import METRICS, spl
-from mazebench.evaluation.records import Record, Summary, column, describe_fault
+from mazebench.evaluation.records import Record, Summary, column
 from mazebench.storage.files import read_at_most
 from mazebench.storage.json_files import read_lines
 
@@ -132,15 +132,15 @@ def _contradiction(summary: Summary, records: tuple[Record, ...]) -> str | None:
     """Returns the first way in which records are not those that a summary was made from, in words."""
     if len(records) != summary.episodes:
         return f"expected {summary.episodes} records, found {len(records)}"
-    same = ("agent", "task", "size", "split", "track", "level")
+    same = ("agent", "task", "size", "split", "cell_size", "track", "level")
     expected = {key: getattr(summary, key) for key in same} | summary.perturbation
     for record in records:
         for key, value in expected.items():
             if getattr(record, key, None) != value:
                 return f"expected {key} {value!r} in episode {record.episode}, found {getattr(record, key, None)!r}"
     success, driven = column(records, "success"), column(records, "path_length")
-    for name, shortest in (("spl", "shortest_path"), ("spl_grid", "distance")):
-        scores = spl(success, column(records, shortest).astype(np.float64), driven)
+    for name, shortest, metres in (("spl", "shortest_path", 1.0), ("spl_grid", "distance", summary.cell_size or 1.0)):
+        scores = spl(success, column(records, shortest) * metres, driven)
         wrong = np.flatnonzero(np.abs(scores - column(records, name)) > _TOLERANCE)
         if len(wrong):
             return f"expected {name} {scores[wrong[0]]:.6f} by the lengths of episode {wrong[0]}, found another"

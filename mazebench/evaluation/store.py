@@ -14,14 +14,15 @@ from typing import Any
 
 import pydantic
 
-from mazebench.errors import InputError, RunError
+from mazebench.errors import InputError, RunError, describe_fault
 from mazebench.evaluation.chunk import Ended
 from mazebench.evaluation.plan import Plan
-from mazebench.evaluation.records import Record, Summary, describe_fault
-from mazebench.evaluation.results import CONFIG, EPISODES, JOURNAL, SUMMARY
+from mazebench.evaluation.records import Record, Summary
+from mazebench.evaluation.results import CONFIG, EPISODES, JOURNAL, SUMMARY, load_result
 from mazebench.evaluation.trajectories import (
     TRAJECTORIES,
     from_json,
+    load_trajectories,
     pack_trajectories,
     save_trajectories,
     to_json,
@@ -33,9 +34,25 @@ from mazebench.storage.locks import FolderLock
 
 def is_finished(folder: pathlib.Path, record: bool = False) -> bool:
     """Returns whether `folder` holds an evaluation that came to its end, with trajectories if those are wanted."""
-    names = (SUMMARY, TRAJECTORIES) if record else (SUMMARY,)
+    names = (SUMMARY, EPISODES, TRAJECTORIES) if record else (SUMMARY, EPISODES)
     # A kill may have left the journal, or trajectories may be recorded in another sitting.
     return all((folder / name).exists() for name in names) and not (folder / JOURNAL).exists()
+
+
+def load_finished(folder: pathlib.Path) -> Summary:
+    """Returns the summary of the finished evaluation in `folder`, whose files are all read.
+
+    Raises:
+      InputError: if one of them is damaged; the message says how to mend that.
+    """
+    try:
+        result = load_result(folder)
+        if (folder / TRAJECTORIES).exists():
+            load_trajectories(folder / TRAJECTORIES, len(result.records))
+    except InputError as error:
+        advice = "delete the damaged file, and --resume runs the episodes again, for trajectories with --record"
+        raise InputError(f"{error}; {advice}") from error
+    return result.summary
 
 
 def check_same_run(folder: pathlib.Path, plan: Plan) -> None:

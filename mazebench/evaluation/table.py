@@ -6,11 +6,15 @@ from collections.abc import Mapping, Sequence
 
 from rich import box
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 
 from mazebench.evaluation.comparison import Row
 from mazebench.evaluation.paper import printed_mmn
 from mazebench.evaluation.records import Figures, Summary
+
+_NAME_CHARACTERS = 12  # in a line, at least, before a name is wrapped
+_ANY_WIDTH = 10_000
 
 
 def print_summary(summary: Summary) -> None:
@@ -20,66 +24,86 @@ def print_summary(summary: Summary) -> None:
     """
     agent = f"{summary.agent} (privileged)" if summary.privileged else summary.agent
     task = f"{summary.track} {summary.level}" if summary.track else summary.task
-    title = f"{agent}: {task}, {summary.split} mazes {summary.size} x {summary.size}"
+    scale = "" if summary.cell_size is None else f" cells of {summary.cell_size:g} m"
+    title = f"{agent}: {task}, {summary.split} mazes {summary.size} x {summary.size}{scale}"
     perturbed = ", ".join(f"{name} {value}" for name, value in summary.perturbation.items() if value)
-    table = _table(f"{title}{', ' + perturbed if perturbed else ''}")
     paper = printed_mmn(summary)
-    columns = ["n", "success rate", *["paper"] * bool(paper), "SPL", "SPL by grid"]
+    head = ["n", "success rate", *["paper"] * bool(paper), "SPL", "SPL by grid"]
+    totals = []
     if summary.task == "local":
-        _add_columns(table, ["distance", *columns])
-        for distance, row in summary.by_distance.items():
-            table.add_row(distance, *_with_paper(row, paper, int(distance)))
-        table.add_section()
-        for name, row in [*summary.by_fact.items(), ("all", summary.overall)]:
-            table.add_row(name, *_with_paper(row, paper))
+        head = ["distance", *head]
+        rows = [[distance, *_with_paper(row, paper, int(distance))] for distance, row in summary.by_distance.items()]
+        totals = [
+            [name, *_with_paper(row, paper)] for name, row in [*summary.by_fact.items(), ("all", summary.overall)]
+        ]
     else:
-        _add_columns(table, columns)
-        landmark_distance = summary.provenance.options.landmark_distance
-        table.add_row(*_with_paper(summary.overall, paper, landmark_distance))
-    console = Console(markup=False)
-    console.print(table)
+        rows = [_with_paper(summary.overall, paper, summary.provenance.options.landmark_distance)]
+    print_table(f"{title}{', ' + perturbed if perturbed else ''}", head, rows, totals)
     if summary.overall.spl_relative is not None:
-        console.print(f"SPL relative to the oracle's: {summary.overall.spl_relative:.2f}")
+        print(f"SPL relative to the oracle's: {summary.overall.spl_relative:.2f}")
     if paper:
-        console.print("paper: success rate of the paper's MMN, in DeepMind Lab")
+        print("paper: success rate of the paper's MMN, in DeepMind Lab")
 
 
 def print_suite(summaries: Sequence[Summary]) -> None:
     """Prints the overall figures of a suite's parts, one table an agent."""
     for agent in dict.fromkeys(summary.agent for summary in summaries):
-        table = _table(f"{agent}: suite {summaries[0].suite}", narrow=True)
-        table.add_column("part", no_wrap=True)
-        _add_columns(table, ("n", "success rate", "SPL", "SPL by grid", "relative"))
+        rows = []
         for summary in summaries:
             if summary.agent == agent:
                 overall = summary.overall
                 relative = "" if overall.spl_relative is None else f"{overall.spl_relative:.2f}"
-                table.add_row(str(summary.part), *_cells(overall)[:-1], f"{overall.spl_grid:.2f}", relative)
-        Console(markup=False).print(table)
+                rows.append([str(summary.part), *_cells(overall)[:-1], f"{overall.spl_grid:.2f}", relative])
+        head = ("part", "n", "success rate", "SPL", "SPL by grid", "relative")
+        print_table(f"{agent}: suite {summaries[0].suite}", head, rows, narrow=True)
     print("relative: SPL divided by the oracle's on the same episodes")
 
 
 def print_comparison(title: str, name: str, rows: Mapping[str, Row]) -> None:
     """Prints what A has more than B, with 95 % intervals; the keys of `rows` go in the column `name`."""
-    table = _table(title, narrow=True)
-    table.add_column(name, no_wrap=True)
-    _add_columns(table, ("A", "B", "A - B, success rate", "A - B, SPL", "A wins"))
-    for key, row in rows.items():
-        table.add_row(key, *_comparison_cells(row))
-    Console(markup=False).print(table)
+    head = (name, "A", "B", "A - B, success rate", "A - B, SPL", "A wins")
+    cells = [[key, *_comparison_cells(row)] for key, row in rows.items()]
+    print_table(title, head, cells, narrow=True)
 
 
-def _table(title: str, narrow: bool = False) -> Table:
-    """Returns an empty table; a `narrow` one has less space between columns, to fit 80 letters."""
+def print_table(
+    title: str,
+    head: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    totals: Sequence[Sequence[str]] = (),
+    narrow: bool = False,
+) -> None:
+    """Prints a table whose first column names the rows; `totals` are the rows below a line.
+
+    On a terminal that is too narrow, the other columns stand in several tables below one another, and names are
+    wrapped: no number is cut. A `narrow` table has less space between its columns.
+    """
+    console = Console(markup=False)
+    console.print(title, style="italic", highlight=False)
+    first = 1
+    while first < len(head):
+        for last in range(len(head), first, -1):
+            (names, *body) = ([line[0], *line[first:last]] for line in (head, *rows, *totals))
+            table = _table(names, body, len(totals), narrow, max(_NAME_CHARACTERS, console.width // 3))
+            width = Measurement.get(console, console.options.update(max_width=_ANY_WIDTH), table).maximum
+            if width <= console.width:
+                break
+        Console(markup=False, width=max(width, console.width)).print(table)
+        first = last
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]], num_totals: int, narrow: bool, most: int) -> Table:
+    """Returns a table with a first column of at most `most` characters, and a line above the last rows."""
     padding = (0, 0 if narrow else 1, 0, 0)
-    return Table(
-        title=title, title_justify="left", box=box.SIMPLE, pad_edge=False, padding=padding, show_edge=not narrow
-    )
-
-
-def _add_columns(table: Table, names: Sequence[str]) -> None:
-    for name in names:
+    table = Table(box=box.SIMPLE, pad_edge=False, padding=padding, show_edge=not narrow)
+    last = len(rows) - num_totals
+    is_number = all(row[0].isdigit() for row in rows[:last])
+    table.add_column(head[0], justify="right" if is_number else "left", overflow="fold", max_width=most)
+    for name in head[1:]:
         table.add_column(name, justify="right", no_wrap=True)
+    for number, row in enumerate(rows, 1):
+        table.add_row(*row, end_section=number == last)
+    return table
 
 
 def _comparison_cells(row: Row) -> list[str]:

@@ -11,11 +11,11 @@ import numpy as np
 
 from mazebench.evaluation.options import EPISODES_PER_DISTANCE
 from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, TRACKS_VERSION, VERSION, read_asset
-from mazebench.maps.generators import corner_cells
 from mazebench.maps.geodesic import DiscPaths
-from mazebench.maps.maze import Cell, Maze, cell_to_point
+from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.episode import Episode, sample_pair
 from mazebench.tasks.options import EVAL_DISTANCES
+from mazebench.tasks.spec import TaskSpec
 from mazebench.world.mjcf import BODY_RADIUS
 
 COLUMNS = ("maze", "start_row", "start_column", "goal_row", "goal_column", "distance", "yaw", "seed", "shortest_path")
@@ -82,10 +82,8 @@ def select_trials(
       InputError: if no two cells of a maze are a wanted distance apart.
     """
     distances = sorted(set(distances))
-    if task == "hierarchical":
-        if frozen:
-            return list(frozen_trials(task, mazes[0].size))
-        return [_hierarchical_trial(maze, index, seed) for index, maze in enumerate(mazes)]
+    if frozen and task == "hierarchical":
+        return list(frozen_trials(task, mazes[0].size))
     if frozen and set(distances) <= set(EVAL_DISTANCES) and episodes_per_distance <= EPISODES_PER_DISTANCE:
         kept = np.arange(EPISODES_PER_DISTANCE) < episodes_per_distance
         trials = frozen_trials(task, mazes[0].size)
@@ -94,25 +92,46 @@ def select_trials(
             for trial, keep in zip(trials, np.resize(kept, len(trials)), strict=True)
             if keep and trial.distance in distances
         ]
-    return [
-        trial
-        for index, maze in enumerate(mazes)
-        for distance in distances
-        for trial in _local_trials(maze, index, distance, episodes_per_distance, seed)
-    ]
+    spec = TaskSpec(task=task, mazes=tuple(mazes), distances=tuple(distances))
+    return draw_trials(spec, episodes_per_distance, seed)
 
 
-def _local_trials(maze: Maze, index: int, distance: int, count: int, seed: int) -> list[Trial]:
+def draw_trials(spec: TaskSpec, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
+    """Draws episodes of a task, by maze and then by distance; of the hierarchical task, one in each maze.
+
+    Where start and goal are given, an episode draws its heading only.
+
+    Raises:
+      InputError: if no two cells of a maze are a wanted distance apart.
+    """
+    trials = []
+    for index, maze in enumerate(spec.mazes):
+        start, goal = spec.ends(maze)
+        if spec.task == "hierarchical":
+            rng = np.random.default_rng([seed, maze.size, index])
+            trials.append(make_trial(maze, index, sample_pair(maze, 0, rng, start, goal), rng))
+            continue
+        distances = sorted(set(spec.distances))
+        if start is not None and goal is not None:
+            distances = [maze.distance(start, goal)]
+        for distance in distances:
+            trials += _local_trials(maze, index, distance, episodes_per_distance, seed, start, goal)
+    return trials
+
+
+def _local_trials(
+    maze: Maze, index: int, distance: int, count: int, seed: int, start: Cell | None, goal: Cell | None
+) -> list[Trial]:
     """Returns `count` episodes, of different pairs if there are so many; the first ones do not depend on `count`."""
     rng = np.random.default_rng([seed, maze.size, index, distance])
     seen: set[tuple[Cell, Cell]] = set()
     trials = []
     for _ in range(count):
-        pair = sample_pair(maze, distance, rng)
+        pair = sample_pair(maze, distance, rng, start, goal)
         for _ in range(_MAX_DRAWS):
             if pair not in seen:
                 break
-            pair = sample_pair(maze, distance, rng)
+            pair = sample_pair(maze, distance, rng, start, goal)
         seen.add(pair)
         trials.append(make_trial(maze, index, pair, rng))
     return trials
@@ -128,15 +147,11 @@ def select_track_trials(
     return [trial for trial in frozen_trials("local", mazes[0].size, TRACKS_VERSION) if trial.distance in wanted]
 
 
-def _hierarchical_trial(maze: Maze, index: int, seed: int) -> Trial:
-    return make_trial(maze, index, corner_cells(maze), np.random.default_rng([seed, maze.size, index]))
-
-
 def make_trial(maze: Maze, index: int, pair: tuple[Cell, Cell], rng: np.random.Generator) -> Trial:
     """Returns the trial of a start and a goal in maze number `index`; draws the first heading and the seed."""
     start, goal = pair
     episode = Episode(index, start, goal, float(rng.uniform(-np.pi, np.pi)), int(rng.integers(_SEEDS)))
-    shortest = _disc_paths(maze).length(cell_to_point(start, maze.size), goal)
+    shortest = _disc_paths(maze).length(maze.point(start), goal)
     return Trial(episode, maze.distance(start, goal), shortest)
 
 
