@@ -5,23 +5,24 @@ AGENT ?= mmn
 
 .PHONY: eval test docs check check-full release pythons bench clean
 
-# Made anew where what is installed may have changed.
-.venv/installed: pyproject.toml constraints.txt
+# Installs an extra: `agents` is what an evaluation needs, `dev` has everything. Made anew where it may have changed.
+.venv/installed-%: pyproject.toml constraints.txt
+	@echo "Installing mazebench[$*] into .venv: a minute or two, and as long as the downloads take."
 	$(PYTHON) -m venv .venv
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
-	touch $@
+	$(BIN)/pip install --no-compile --disable-pip-version-check -c constraints.txt -e '.[$*]'
+	touch .venv/installed-agents $@  # dev includes agents
 
-eval: .venv/installed
+eval: .venv/installed-agents
 	$(BIN)/mazebench eval --agent $(AGENT)
 
-test: .venv/installed
+test: .venv/installed-dev
 	$(BIN)/pytest -n auto -m "not slow"
 
 # Into site/; a warning is an error. The notice that is turned off is not about our pages.
-docs: .venv/installed
+docs: .venv/installed-dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 
-check: .venv/installed
+check: .venv/installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
@@ -33,14 +34,14 @@ check-full: check
 	$(MAKE) pythons
 
 # Into dist/, checked.
-release: .venv/installed
+release: .venv/installed-dev
 	AGENT=$(AGENT) .ci/release dist
 
 # On every Python found; needs wheels of all dependencies.
 pythons: release
 	.ci/pythons "$$(ls -t dist/*.whl | head -n 1)"
 
-bench: .venv/installed
+bench: .venv/installed-agents
 	$(BIN)/mazebench bench
 
 clean:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import io
+import itertools
+import re
 import sys
+from collections.abc import Sequence
 from typing import Annotated, NoReturn
 
 import typer
@@ -18,7 +21,9 @@ from mazebench.commands.play import play
 from mazebench.commands.render import render
 from mazebench.commands.report import report
 from mazebench.commands.train import train
-from mazebench.errors import InputError, RunError, remark
+from mazebench.errors import InputError, RunError, remark, shortened
+
+_LONGEST = 2000  # characters of a message; an agent's InputError may be of any length
 
 # The parser's own error, which typer exports by its children only.
 _UsageError: type[Exception] = typer.BadParameter.__mro__[2]
@@ -28,6 +33,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command(short_help="Make mazes: MJCF, text, picture, mesh.")(generate)
 app.command("eval", short_help="Evaluate agents on unseen mazes.")(evaluate)
@@ -45,20 +51,23 @@ def main() -> None:
 
     An interrupt ends it with 130 and SIGTERM with 143, and one line that says how to go on.
     """
+    sys.argv[0] = "mazebench"  # as users type it: provenance keeps the command
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names of files need not be legal Unicode
     try:
         with stopping.listening(), stopping.stoppable(lambda: ("run it again",)):
             try:
-                status = app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0
+                _refuse_empty_values(sys.argv)
+                status = app(sys.argv[1:] or ["--help"], prog_name="mazebench", standalone_mode=False) or 0
             except typer.Abort:
                 status = 130
             if status == 130:  # typer's, of an interrupt
                 raise KeyboardInterrupt
             sys.exit(status)
     except _UsageError as error:
-        _fail(error.format_message().replace("Value error, ", ""), 2)  # type: ignore[attr-defined]
+        message = error.format_message()  # type: ignore[attr-defined]
+        _fail(message.replace("Value error, ", ""), 2)  # with which pydantic begins, through typer
     except InputError as error:
         _fail(str(error), 2)
     except OSError as error:
@@ -69,8 +78,15 @@ def main() -> None:
         _fail(str(error), 1)
 
 
+def _refuse_empty_values(words: Sequence[str]) -> None:
+    """Raises `InputError` for `--out ""` and `--out=`: an empty path would be the working directory."""
+    for before, word in itertools.pairwise(words):
+        if not word or re.fullmatch(r"--[\w-]+=", word):
+            raise InputError(f"expected a value of {word.rstrip('=') or before}, found an empty one")
+
+
 def _fail(message: str, status: int) -> NoReturn:
-    remark(" ".join(message.split()))
+    remark(shortened(message, _LONGEST))
     sys.exit(status)
 
 

@@ -26,7 +26,6 @@ from mazebench.testing import ConformanceError, check_agent
 from mazebench.training.protocol import LearningAgent
 
 INTERFACE = Interface("local", 13, 13)
-SENSORS = {"navigator": ("lidar",)}  # that agents can't do without
 
 
 class Counting(Agent):
@@ -267,6 +266,15 @@ class AloneWithAGlobal(SingleAgent):
         return len(self.counts) % 6
 
 
+class Sensing(SingleAgent):
+    """Drives forward unless a wall is near, which the lidar says."""
+
+    needs_sensors = ("lidar",)
+
+    def act(self, observation):
+        return 0 if observation["lidar"][0] > 0.5 else 4
+
+
 SAME = r"expected the same actions in an episode "
 
 
@@ -274,17 +282,23 @@ class TestConformance:
     @pytest.mark.parametrize("name", agent_names())
     def test_installed_agent_conforms(self, name, tmp_path):
         agent_class, checkpoint = load_agent_class(name), None
-        interface = Interface("hierarchical", 7, agent_class.context_size(7), sensors=SENSORS.get(name, ()))
+        interface = Interface("hierarchical", 7, agent_class.context_size(7), sensors=agent_class.needs_sensors)
         if issubclass(agent_class, LearningAgent):
             # Untrained: the contract does not depend on what it learned.
             agent_class.build_learner(interface, load_mazes(13, "train")[:1]).save(tmp_path, {})
             checkpoint = tmp_path / "agent.safetensors"
         check_agent(agent_class, interface, checkpoint)
 
-    @pytest.mark.parametrize("agent_class", [Counting, CountingAlone, Drawing])
+    @pytest.mark.parametrize("agent_class", [Counting, CountingAlone, Drawing, Sensing])
     def test_conforming_agent_passes(self, agent_class):
         check_agent(agent_class)
-        check_agent(agent_class, Interface("local", 9, 5))
+        check_agent(agent_class, Interface("local", 9, 5, sensors=agent_class.needs_sensors))
+
+    @pytest.mark.parametrize("needed", ["lidar", ("sonar",)])
+    def test_needed_sensors_are_those_there_are(self, needed, monkeypatch):
+        monkeypatch.setattr(Sensing, "needs_sensors", needed)
+        with pytest.raises(ConformanceError, match=r"expected needs_sensors as a tuple of .*lidar, found"):
+            check_agent(Sensing)
 
     @pytest.mark.parametrize(
         ("broken", "message"),
@@ -332,6 +346,18 @@ class TestConformance:
         assert str(caught.value).startswith(f"agent '{broken.__name__}': ")
         assert "\n" not in str(caught.value)
 
+    @pytest.mark.parametrize("wrong", ["13", 13.0, 0, 100_000, [5, 5], None])
+    def test_a_context_of_no_possible_size_is_named_in_one_line(self, wrong):
+        class Sized(Counting):
+            @classmethod
+            def context_size(cls, size):
+                return wrong
+
+        expected = "agent 'Sized': expected context_size() to return a whole number from 3 to 255, found "
+        with pytest.raises(ConformanceError) as caught:
+            check_agent(Sized)
+        assert str(caught.value) == expected + repr(wrong)
+
     def test_object_in_place_of_a_class_is_refused(self):
         with pytest.raises(ConformanceError, match=r"expected a subclass of .*, found <.*Counting object at .*>$"):
             check_agent(Counting())
@@ -354,6 +380,7 @@ class TestSingleAgent:
 
         class Listening(SingleAgent):
             needs_truth = True
+            needs_sensors = ("lidar",)
 
             def reset(self, observation):
                 given.append(("reset", self.seed, self.new_episode, self.truth.goal.tolist()))
@@ -364,6 +391,7 @@ class TestSingleAgent:
 
         agent_class = as_agent_class(Listening)
         assert agent_class.needs_truth
+        assert agent_class.needs_sensors == ("lidar",)
         assert agent_class.__name__ == "Listening"
         truth = Truth(np.zeros((2, 3, 3), dtype=bool), np.zeros((2, 3)), np.array([[1, 1], [2, 2]]))
         new_episode, new_context = np.array([True, True]), np.array([True, True])
@@ -409,6 +437,10 @@ class TestLoading:
             ("json:Agent", r"^agent 'json:Agent': expected module:Class .* module 'json' has no attribute 'Agent'$"),
             ("json:JSONDecoder", r"^agent 'json:JSONDecoder': expected a subclass of .*, found one of object$"),
             ("json:", r"^agent 'json:': expected module:Class"),
+            ("./mine.py:Agent", r"expected module:Class, such as mine:Agent, found a file's name$"),
+            ("agents/mine.py:Agent", r"such as agents\.mine:Agent, found a file's name$"),
+            ("../mine.py:Agent", r"such as mine:Agent with \.\. as the working directory, found a file's name$"),
+            ("/home/mine.py:Agent", r"such as mine:Agent with /home as the working directory, found a file's name$"),
         ],
     )
     def test_a_name_that_leads_to_no_agent_is_refused(self, name, message):
@@ -483,7 +515,7 @@ class TestTracks:
 
     @pytest.mark.parametrize("name", agent_names())
     def test_every_agent_acts_on_a_map_of_twice_the_resolution(self, name):
-        act_for_three_steps(name, make_spec(size=13, context_size=26, sensors=SENSORS.get(name, ())))
+        act_for_three_steps(name, make_spec(size=13, context_size=26, sensors=load_agent_class(name).needs_sensors))
 
 
 def act_for_three_steps(name: str, spec: TaskSpec) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -12,21 +13,26 @@ import cv2
 import numpy as np
 import pytest
 import typer
-from run_folders import FILES, IMPORTS, RECORDED, files_of
+from faults import COMMAND
+from run_folders import FILES, IMPORTS, RECORDED, files_of, summary_of
 
 from mazebench import __version__, cli
-from mazebench.agent_loading import agent_names
+from mazebench.agent_loading import agent_names, learning_agents
 from mazebench.commands.options import parse_numbers
 from mazebench.errors import InputError
 from mazebench.evaluation.suites import SUITES
 from mazebench.maps.files import read_maze
 from mazebench.maps.text import format_maze
+from mazebench.tasks.sensors import SENSORS
+from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks.base import LEVELS
 
 COMMANDS = typer.main.get_command(cli.app).commands
 FEW = ("--distances", "1,2", "--episodes-per-distance", "1")
 RANDOM = ("eval", "--agent", "random")
 TINY = (*RANDOM, *FEW)
 QUICK = ("eval", "--suite", "quick", "--agent", "random")
+TRAIN = ("train", "--agent", "mah", "--env-steps", "8")
 PLAN = "#####\n#...#\n#.#.#\n#...#\n#####\n"
 
 
@@ -52,6 +58,8 @@ def bad(tmp_path_factory) -> pathlib.Path:
     (folder / "good.txt").write_text(PLAN)
     (folder / "open.txt").write_text(PLAN.replace("#.#.#", "#.#.."))
     (folder / "file").touch()
+    (folder / "zip.txt").write_bytes(b"PK\x03\x04" + bytes(100_000))
+    (folder / "map.yaml").write_text("image: map.pgm\n")
     (folder / "binary.png").write_bytes(np.random.default_rng(0).bytes(3000))
     (folder / "used").mkdir()
     (folder / "used" / "thesis.tex").touch()
@@ -71,8 +79,17 @@ BAD_INPUT = [
     (("--frobnicate",), "No such option"),
     # generate
     (("generate", "--size", "14"), "style 'dfs' makes mazes of odd sizes only, found size 14"),
-    (("generate", "--format", "txt,gif"), "unknown format 'gif'; available: glb, mjcf, obj, png, stl, txt"),
-    (("generate", "--from-image", "x.png", "--seed", "1"), "the picture shows one maze; found --seed, which would"),
+    (("generate", "--format", "txt,gif"), "unknown format 'gif'; available: glb, mjcf, mjcf-textured, obj, png, ros"),
+    (("generate", "--from-image", "x.png", "--seed", "1"), "the map shows one maze; found --seed, which would"),
+    (
+        ("generate", "--from-image", "{bad}/good.txt", "--size", "9"),
+        "good.txt: expected a maze of size 9, found size 5",
+    ),
+    (("generate", "--unknown", "free"), "unknown belongs to maps, found a generated maze"),
+    (
+        ("generate", "--from-image", "{bad}/good.txt", "--inflate", "1"),
+        "inflate belongs to ROS maps and arrays, found ",
+    ),
     (("generate", "--from-image", "{bad}/binary.png"), "binary.png: expected a "),
     # eval: names and numbers
     (("eval",), "Missing option '--agent'"),
@@ -82,11 +99,12 @@ BAD_INPUT = [
     ((*TINY, "--checkpoint", "none"), "agent 'random' reads no checkpoint; found --checkpoint none"),
     ((*TINY, "--map-warp", "0.3"), "expected map_warp from 0 to 0.25, found 0.3"),
     ((*TINY, "--distances", "one"), "expected distances like 1-3 or 2,3, found 'one'"),
-    ((*TINY, "--distances", "500"), "13-eval-00: no two cells are 500 cells apart; the farthest are 50"),
+    ((*TINY, "--distances", "500"), "13-eval-00: expected distances of at most 50 cells"),
     # eval: options that don't go together
     ((*TINY, "--agent", "planner"), "expected one --agent without --suite, found 2"),
     ((*TINY, "--resume"), "--resume needs --out"),
     ((*TINY, "--workers", "2", "--traceback"), "the agent acts in other processes; found --traceback, which would be"),
+    ((*TINY, "--textures"), "no camera is among the --sensors; found --textures, which would be ignored"),
     ((*QUICK, "--suite", "papr"), "unknown suite 'papr'; available: paper, quick, tracks"),
     ((*QUICK, "--task", "local"), "the suite 'quick' has evaluations of its own; found --task, which would be ignored"),
     ((*QUICK, "--agent", "random"), "expected agents with folders of their own, found two for 'random'"),
@@ -111,7 +129,7 @@ BAD_INPUT = [
     ),
     (
         (*RANDOM, "--track", "far", "--maps", "{bad}/good.txt"),
-        "good: no two cells are 40 cells apart; the farthest are 4; choose smaller distances",
+        "good: expected distances of at most 4 cells, as far as the maze reaches, found 40; choose",
     ),
     (
         (*RANDOM, "--track", "stale", "--maps", "{bad}/good.txt"),
@@ -122,10 +140,31 @@ BAD_INPUT = [
         "a track's eval episodes are frozen; found --episodes-per-distance, which would be ignored",
     ),
     ((*RANDOM, "--suite", "tracks", "--track", "far"), "has evaluations of its own; found --track, which would be"),
-    (("train", "--agent", "mah", "--track", "far"), "No such option: --track"),
+    (
+        (*TRAIN, "--track", "far", "--time-limit", "9"),
+        "a track has its own time limit; found --time-limit, which would",
+    ),
+    ((*TRAIN, "--level", "2"), "a level belongs to a track; found --level, which would be ignored"),
+    ((*TRAIN, "--track", "stale", "--map-flip", "0.1"), "track 'stale': expected no perturbation, found map_flip 0.1"),
+    ((*TRAIN, "--track", "sketch"), "agent 'mah': learns only on maps of one pixel a cell"),
+    ((*TRAIN, "--size", "14"), "unknown size '14'; available: 13, 15, 17, 19, 21"),
+    ((*TRAIN, "--pairs", "foo"), "'foo' is not one of 'random', 'fixed'"),
+    ((*TRAIN, "--minutes", "0"), "expected minutes from 0.01 to 527040, found 0.0"),
+    ((*TRAIN, "--checkpoint-minutes", "-1"), "expected checkpoint_minutes from 0 to 527040, found -1.0"),
+    ((*TRAIN, "--seed", "-1"), "expected seed from 0 to 9223372036854775807, found -1"),
+    ((*TRAIN, "--set", "colour"), "expected --set KEY=VALUE, found 'colour'"),
+    (("train", "--agent", "mah"), "expected --minutes or --env-steps, found neither"),
+    (("train", "--agent", "planner", "--minutes", "1"), "agent 'planner' doesn't learn; agents that do: dqn, mah, mmn"),
     # eval: files
+    ((*TINY, "--out", ""), "expected a value of --out, found an empty one"),
+    ((*TINY, "--maps="), "expected a value of --maps, found an empty one"),
     ((*TINY, "--out", "{bad}/file/out"), "file/out: can't write there: Not a directory"),
     ((*TINY, "--out", "{bad}/used"), "expected an empty folder or an evaluation's, found 'thesis.tex' in it"),
+    ((*TINY, "--cell-size", "0.5"), "cell_size belongs to maps of your own, found the benchmark's mazes"),
+    ((*RANDOM, "--track", "far", "--unknown", "free"), "unknown belongs to maps of your own, found the track 'far'"),
+    ((*TINY, "--maps", "{bad}/good.txt", "--cell-size", "-1"), "expected cell_size from 0.01 to 100, found -1.0"),
+    ((*TINY, "--maps", "{bad}/zip.txt"), "zip.txt: expected a text map, found a ZIP archive"),
+    ((*TINY, "--maps", "{bad}/map.yaml"), "map.yaml: expected the YAML file of a ROS map, with resolution (the side"),
     ((*TINY, "--maps", "none.txt"), "none.txt: can't read the map: No such file or directory"),
     ((*TINY, "--maps", "{bad}/open.txt"), "open: expected a closed border, found cell (2, 4) free"),
     # the others
@@ -186,6 +225,13 @@ class TestBadInput:
         run = subprocess.run(arguments, capture_output=True, text=True)
         assert one_line((run.returncode, run.stdout, run.stderr)).startswith("mazebench: unknown agent 'nobody'")
 
+    @pytest.mark.parametrize("program", [(sys.executable, "-m", "mazebench"), (COMMAND,)])
+    def test_the_program_is_called_mazebench_however_it_was_started(self, program, tmp_path):
+        usage = subprocess.run([*program, "eval", "--help"], capture_output=True, text=True).stdout
+        assert usage.startswith("Usage: mazebench eval [OPTIONS]\n")
+        subprocess.run([*program, *TINY, "--out", "run"], cwd=tmp_path, capture_output=True, check=True)
+        assert summary_of(tmp_path / "run")["provenance"]["command"] == ["mazebench", *TINY, "--out", "run"]
+
 
 @pytest.mark.parametrize(
     ("text", "numbers"),
@@ -217,6 +263,22 @@ class TestHelp:
         status, output, errors = command(name, "--help")
         assert (status, errors) == (0, "")
         assert f" {name} [OPTIONS]" in output.splitlines()[0]
+
+    @pytest.mark.parametrize("name", [(), *((name,) for name in sorted(COMMANDS))])
+    def test_one_letter_asks_for_the_page_too(self, command, name):
+        assert command(*name, "-h") == command(*name, "--help")
+
+    def test_the_page_of_eval_names_all_suites_sensors_tracks_and_levels(self, command):
+        page = "".join(command("eval", "--help")[1].split())
+        assert all(f"{name}," in page.partition("--suite")[2].partition("--out")[0] for name in SUITES)
+        assert f"--sensors<{'|'.join(SENSORS)}>" in page
+        assert f"--track<{'|'.join(TRACKS)}>" in page
+        assert f"Levelofthetrack,{LEVELS[0]}to{LEVELS[-1]}" in page
+
+    def test_the_page_of_train_names_the_learning_agents(self, command):
+        assert f"A learning agent: {', '.join(learning_agents())} or another" in " ".join(
+            command("train", "--help")[1].split()
+        )
 
     def test_the_version_is_printed(self, command):
         assert command("--version") == (0, f"{__version__}\n", "")
@@ -263,6 +325,29 @@ class TestGenerate:
         drawn, read = (tmp_path / out / "rooms-13-0-000.txt" for out in ("drawn", "read"))
         assert read.read_text() == drawn.read_text()
 
+    def test_a_rectangular_plan_is_padded_and_a_line_says_so_once(self, command, tmp_path):
+        (tmp_path / "hall.txt").write_text("#######\n#.....#\n#.###.#\n#.....#\n#######\n")
+        said = "mazebench: hall: 5 x 7 cells, padded with wall at the bottom to 7 x 7\n"
+        assert command("generate", "--from-image", "hall.txt", "--out", "read")[::2] == (0, said)
+        assert (tmp_path / "read" / "hall.txt").read_text().endswith("#######\n#######\n#######\n")
+        for out, workers in (("here", "0"), ("there", "2")):
+            status, _, errors = command(*TINY, "--maps", "hall.txt", "--workers", workers, "--out", out)
+            assert (status, errors.count(said)) == (0, 1)
+        assert command("render", "--maps", "hall.txt", "--view", "map", "--out", "x.png")[2] == said
+
+    def test_a_ros_map_is_written_and_read(self, command, tmp_path):
+        options = ("--format", "txt,ros", "--cell-size", "0.5")
+        assert command("generate", "--size", "9", *options, "--out", "ours")[0] == 0
+        assert {path.suffix for path in (tmp_path / "ours").iterdir()} == {".txt", ".yaml", ".pgm"}
+        source = "ours/dfs-9-0-000.yaml"
+        assert command("generate", "--from-image", source, "--format", "txt,ros", "--out", "again")[::2] == (0, "")
+        for suffix in ("txt", "yaml", "pgm"):
+            written, again = (tmp_path / out / f"dfs-9-0-000.{suffix}" for out in ("ours", "again"))
+            assert again.read_bytes() == written.read_bytes()
+        assert read_maze(tmp_path / source).cell_size == 0.5
+        said = one_line(command("generate", "--from-image", source, "--format", "ros", "--out", "ours"))
+        assert "dfs-9-0-000.yaml: would overwrite the map that the maze is read from" in said
+
     def test_one_maze_of_13_cells_is_made_by_default(self, command, tmp_path):
         assert command("generate")[0] == 0
         expected = {f"dfs-13-0-000.{suffix}" for suffix in ("txt", "xml", "png", "glb")}
@@ -292,6 +377,14 @@ class TestEval:
         assert max(len(line) for line in output.splitlines()) <= 80
         for word in ("distance", "success rate", "paper", "SPL", "SPL by grid", "all"):
             assert word in output
+
+    @pytest.mark.parametrize("width", [30, 80])
+    def test_a_terminal_shows_all_digits_of_the_progress(self, command, monkeypatch, width):
+        monkeypatch.setenv("COLUMNS", str(width))
+        monkeypatch.setenv("FORCE_COLOR", "1")  # by which a stream counts as a terminal
+        _, _, errors = command(*TINY, "--out", "run")
+        shown = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", errors)  # without colours and movements
+        assert re.search(r" 40/40 0:\d\d:\d\d 0:\d\d:\d\d", shown)
 
     def test_resume_goes_on_or_starts_anew_and_says_so(self, command, tmp_path):
         status, output, _ = command(*TINY, "--out", "run", "--resume")
@@ -352,6 +445,18 @@ class TestRender:
         assert (status, errors) == (0, "")
         assert output.startswith("new/map.png: planner reached the goal after ")
         assert cv2.imread(str(tmp_path / "new" / "map.png")).shape == (96, 96, 3)
+
+    def test_a_picture_is_the_last_moment_of_the_film_with_the_whole_path(self, command, tmp_path):
+        for name in ("x.png", "x.mp4"):
+            assert command(*self.ARGUMENTS, "--view", "map", "--out", name)[0] == 0
+        film = cv2.VideoCapture(str(tmp_path / "x.mp4"))
+        frames = []
+        while (read := film.read())[0]:
+            frames.append(read[1].astype(int))
+        picture = cv2.imread(str(tmp_path / "x.png"))
+        differences = [np.abs(frame - picture).mean() for frame in frames]
+        assert len(frames) > 3
+        assert np.argmin(differences) == len(frames) - 1
 
     @pytest.mark.parametrize("perturbation", ["--map-flip", "--map-warp"])
     def test_the_map_is_the_one_that_the_agent_is_shown(self, command, tmp_path, perturbation):

@@ -12,6 +12,7 @@ import sys
 
 import pytest
 from faults import TRAIN, said
+from run_folders import RECORDED
 
 from mazebench import cli
 
@@ -127,6 +128,23 @@ def test_resuming_a_run_with_a_damaged_config_is_refused(result, tmp_path, damag
     (folder / "summary.json").unlink()
     (folder / "config.json").write_bytes(damage((result / "config.json").read_bytes()))
     assert f"{folder / 'config.json'}: " in refusal(*EVAL, "--out", folder, "--resume")
+
+
+@damaged
+@pytest.mark.parametrize("name", ["summary.json", "episodes.jsonl", "trajectories.npz"])
+def test_a_finished_run_with_a_damaged_file_is_mended_by_deleting_that(result, tmp_path, name, damage):
+    folder = copied(result, tmp_path / "run")
+    path = folder / name
+    path.write_bytes(damage(path.read_bytes()))
+    for record in ([], ["--record"]):
+        line = refusal(*EVAL, *record, "--out", folder, "--resume")
+        assert name in line
+        assert "delete the damaged file, and --resume runs the episodes again" in line
+    path.unlink()
+    assert run(*EVAL, "--record", "--out", folder, "--resume") == (0, [])
+    assert {file.name for file in folder.iterdir()} == RECORDED
+    assert (folder / "trajectories.npz").read_bytes() == (result / "trajectories.npz").read_bytes()
+    assert (folder / "episodes.jsonl").read_bytes() == (result / "episodes.jsonl").read_bytes()
 
 
 @damaged

@@ -19,6 +19,7 @@ from pages import PAGES, ROOT, Block, blocks, name_of, read
 from mazebench import cli
 from mazebench.maps.generators import generate
 from mazebench.maps.image import draw_maze, write_image
+from mazebench.maps.ros import write_ros_map
 from mazebench.maps.text import write_text_maze
 
 EVERY_PAGE = pytest.mark.parametrize("page", PAGES, ids=name_of)
@@ -152,6 +153,7 @@ def reader(tmp_path, monkeypatch, capsys):
     write_image(draw_maze(maze), "plan.png")
     pathlib.Path("plans").mkdir()
     write_text_maze(maze, "plans/plan.txt")
+    write_ros_map(maze, "map.yaml")
     known = set(sys.modules)
     yield Reader(monkeypatch, capsys)
     for name in set(sys.modules) - known:
@@ -196,12 +198,13 @@ def shortened(command: list[str]) -> list[str] | None:
         folders = [option for option in options if not option.startswith("--")]
         return arguments if pathlib.Path(folders[0]).exists() else None
     if kind == "render":
-        return [*arguments, "--pixels", "64", "--distances", "3"]
+        near = () if {"--start", "--goal"} <= set(options) else ("--distances", "3")
+        return [*arguments, "--pixels", "64", *near]
     if kind == "eval" and "--suite" not in options:
         agent = options[options.index("--agent") + 1]
         if agent in PLAIN_AGENTS or pathlib.Path(f"{agent.partition(':')[0]}.py").exists():
             few = ("--distances", "1,2", "--episodes-per-distance", "1")
-            return arguments if {"hierarchical", "--track", "--out"} & set(options) else [*arguments, *few]
+            return arguments if {"hierarchical", "--track", "--out", "--goal"} & set(options) else [*arguments, *few]
     return None
 
 

@@ -54,6 +54,15 @@ class TestScripts:
         budget = ("--steps", "3000", "--num-envs", "16", "--learning-starts", "500", "--target-updates", "50")
         output = run(EXAMPLES / "vector_dqn.py", *budget, folder=tmp_path)
         assert "156 updates; success rate " in output
+        output = run(EXAMPLES / "vector_dqn.py", "--steps", "64", folder=tmp_path)
+        assert output == "0 updates, because 64 steps are less than --learning-starts 5000\n"
+
+    def test_torchrl_ppo(self, tmp_path):
+        needs("torchrl")
+        budget = ("--steps", "512", "--num-envs", "8", "--rollout", "32", "--batch-size", "128")
+        output = run(EXAMPLES / "torchrl_ppo.py", *budget, folder=tmp_path)
+        assert [line.split(":")[0] for line in output.splitlines()[:2]] == ["256 steps", "512 steps"]
+        assert output.splitlines()[2].startswith("16 updates; ")
 
     def test_sb3_her(self, tmp_path):
         needs("stable_baselines3")

@@ -175,7 +175,7 @@ def track_success_rate(track: str, level: int, distances: tuple[int, ...], num_m
 
 class TestNavigator:
     def test_lidar_is_needed(self):
-        with pytest.raises(InputError, match=r"^navigator needs the sensor lidar; add --sensors lidar$"):
+        with pytest.raises(InputError, match=r"^navigator needs the sensor lidar; give the interface sensors="):
             load_agent_class("navigator").build(Interface("local", 13, 13))
 
     def test_goals_are_reached_where_the_map_is_true(self):

@@ -1,4 +1,4 @@
-"""The tables of docs/options.md; `python tests/test_options_page.py` rewrites the one that follows from the code."""
+"""The tables of docs/options.md; `python tests/test_options_page.py` rewrites those that follow from the code."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import re
 import pytest
 
 from mazebench.envs import registration
-from mazebench.options import Option
+from mazebench.maps.options import MapOptions
+from mazebench.options import Option, Options
 from mazebench.tasks import registry
 from mazebench.tasks.options import TaskOptions
 
@@ -20,9 +21,14 @@ DERIVED_TABLE = re.compile(r"\| option \| default \| values \| what \|\n(?:\|.*\
 TABLE = re.compile(r"^\| option.*\n\|[-|]+\n((?:\|.*\n)+)", re.MULTILINE)
 
 
-def derived_table() -> str:
-    """Returns the table of the fields of `TaskOptions`: its own first, then those of perturbations and sensors."""
-    fields = sorted(dataclasses.fields(TaskOptions), key=lambda field: field.name not in TaskOptions.__annotations__)
+def derived_tables() -> list[str]:
+    """Returns the tables of the options of maps and of tasks, in the order of the page."""
+    return [derived_table(MapOptions), derived_table(TaskOptions)]
+
+
+def derived_table(options: type[Options]) -> str:
+    """Returns the table of the fields of a class: its own first, then those of base classes."""
+    fields = sorted(dataclasses.fields(options), key=lambda field: field.name not in options.__annotations__)
     lines = ["| option | default | values | what |\n", "|---|---|---|---|\n"]
     for field in fields:
         option = field.metadata["option"]
@@ -46,24 +52,25 @@ def parameters(function) -> dict[str, object]:
     return {each.name: each.default for each in found if each.kind is not each.VAR_KEYWORD and each.name != "task"}
 
 
-def test_the_table_of_task_options_follows_from_the_code():
-    assert derived_table() in PAGE.read_text(encoding="utf-8"), "python tests/test_options_page.py rewrites it"
+def test_the_tables_of_options_follow_from_the_code():
+    found = DERIVED_TABLE.findall(PAGE.read_text(encoding="utf-8"))
+    assert found == derived_tables(), "python tests/test_options_page.py rewrites them"
 
 
 @pytest.mark.parametrize(
     ("index", "function", "others"),
     [
         (0, registry.make_spec, None),
-        (2, registry.load, registry.make_spec),
-        (3, registration.make_env, None),
-        (3, registration.make_goal_env, None),
-        (4, registration.make_vec, None),
+        (3, registry.load, registry.make_spec),
+        (4, registration.make_env, None),
+        (4, registration.make_goal_env, None),
+        (5, registration.make_vec, None),
     ],
     ids=["mazes", "load", "gymnasium.make", "goal", "make_vec"],
 )
 def test_the_other_tables_name_the_parameters_of_their_function(index, function, others):
     tables = TABLE.findall(PAGE.read_text(encoding="utf-8"))
-    assert len(tables) == 5
+    assert len(tables) == 6
     found = parameters(function)
     for name in parameters(others) if others else ():
         found.pop(name, None)
@@ -72,4 +79,5 @@ def test_the_other_tables_name_the_parameters_of_their_function(index, function,
 
 if __name__ == "__main__":
     text = PAGE.read_text(encoding="utf-8")
-    PAGE.write_text(DERIVED_TABLE.sub(lambda _: derived_table(), text), encoding="utf-8")
+    tables = iter(derived_tables())
+    PAGE.write_text(DERIVED_TABLE.sub(lambda _: next(tables), text), encoding="utf-8")

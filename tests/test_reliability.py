@@ -13,6 +13,7 @@ import resource
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable
 
@@ -385,7 +386,10 @@ def stop(process: subprocess.Popen, number: signal.Signals) -> str:
 def go_on(line: str, folder: pathlib.Path) -> None:
     """Runs the command in the line that a stopped command prints."""
     command = line.partition(" with: ")[2]
-    done = subprocess.run(command, shell=True, cwd=folder, capture_output=True, text=True, timeout=PATIENCE)
+    on_path = os.environ | {"PATH": f"{pathlib.Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    done = subprocess.run(
+        command, shell=True, cwd=folder, capture_output=True, text=True, timeout=PATIENCE, env=on_path
+    )
     assert done.returncode == 0, done.stderr
 
 
@@ -423,14 +427,38 @@ class TestStop:
 
     @slow
     @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-    def test_a_stopped_training_goes_on_with_the_command_it_prints(self, unbroken, tmp_path, number):
+    def test_a_stopped_training_goes_on_with_the_command_it_prints(self, tmp_path, number):
         process = start(*LEARN, cwd=tmp_path)
         wait_until(lambda: num_metrics(tmp_path) > 1, process)
         line = stop(process, number)
-        steps = int(max(path.name for path in tmp_path.glob("runs/mah-13-0/checkpoints/*") if path.suffix != ".tmp"))
-        assert f"; the checkpoint at {steps:,} steps is kept in runs/mah-13-0; go on with: " in line
+        folder = tmp_path / "runs" / "mah-13-0"
+        steps = [int(path.name) for path in sorted(folder.glob("checkpoints/*"))]
+        assert f"; the checkpoint at {steps[-1]:,} steps is kept in runs/mah-13-0; go on with: " in line
+        assert steps[-1] > 1600
+        assert len(steps) == 2
         go_on(line, tmp_path)
+        assert [line["env_steps"] for line in metrics_of(folder)] == list(range(800, STEPS + 1, 800))
+        assert metrics_of(folder)[-1]["updates"] == (STEPS - 400) // 32
+
+    @slow
+    def test_a_training_that_is_stopped_without_savepoints_goes_on_to_the_same_bytes(self, unbroken, tmp_path):
+        process = start(*LEARN, "--checkpoint-minutes", "0", cwd=tmp_path)
+        wait_until(lambda: num_metrics(tmp_path) > 1, process)
+        go_on(stop(process, signal.SIGINT), tmp_path)
         assert learned_in(tmp_path / "runs" / "mah-13-0") == learned_in(unbroken("learn"))
+
+    @slow
+    @pytest.mark.parametrize("seed", range(3))
+    def test_a_training_that_is_stopped_twice_ends_at_once_and_goes_on(self, tmp_path, seed):
+        rng, folder = np.random.default_rng([8, seed]), tmp_path / "run"
+        process = start(*LEARN, "--out", folder)
+        wait_until(lambda: num_metrics(tmp_path) > 1, process)
+        os.killpg(process.pid, signal.SIGINT)
+        time.sleep(rng.uniform(0, 0.05))
+        if process.poll() is None:
+            stop(process, signal.SIGINT)
+        assert run(*LEARN, "--out", folder, "--resume")[0] == 0
+        assert [line["env_steps"] for line in metrics_of(folder)] == list(range(800, STEPS + 1, 800))
 
     @slow
     def test_a_stopped_report_says_that_it_is_not_whole(self, unbroken, tmp_path):

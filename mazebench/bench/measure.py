@@ -19,24 +19,22 @@ from typing import Any
 import mujoco
 import mujoco.batch
 import numpy as np
-from rich import box
-from rich.console import Console
-from rich.table import Table
 
 from mazebench.agent import Interface
 from mazebench.agent_loading import agent_names, load_agent_class
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
+from mazebench.evaluation.table import print_table
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import generate
 from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 from mazebench.training.protocol import LearningAgent
+from mazebench.world.backend import RenderingError
 from mazebench.world.mjcf import ACTIONS, PHYSICS_TIMESTEP, STEPS_PER_ACTION, action_controls
 from mazebench.world.models import models_of
-from mazebench.world.rendering import RenderingError
 
 _SIZES = (13, 21, 51, 101)
 _NUM_ENVS = (1, 16, 256, 1024, 4096)
@@ -97,18 +95,15 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
 
 def print_tables(results: dict[str, Any]) -> None:
     """Prints what `run` returned, for people."""
-    console = Console(markup=False)
     print(f"{results['machine']['cores']} cores, MuJoCo {results['machine']['mujoco']}")
     tables = {title: results[name] for name, title in _TITLES.items()} | results["agents"]
     for title, rows in tables.items():
         if not rows:  # training, where no learning agent is installed; pictures, where nothing can be rendered
             continue
-        table = Table(box=box.SIMPLE, title=title, title_justify="left", pad_edge=False, padding=(0, 1, 0, 0))
-        for column in rows[0]:
-            table.add_column(column, justify="left" if column == "what" else "right")
-        for row in rows:
-            table.add_row(*(f"{value:,.2f}" if isinstance(value, float) else str(value) for value in row.values()))
-        console.print(table)
+        cells = [
+            [f"{value:,.2f}" if isinstance(value, float) else str(value) for value in row.values()] for row in rows
+        ]
+        print_table(title, list(rows[0]), cells)
 
 
 def _ratio(what: str, num_envs: int, step: Step, bare: Step, seconds: float, rounds: int) -> dict[str, Any]:
@@ -254,7 +249,9 @@ def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -
         learner = agent_class.build_learner(interface, spec.mazes, overrides={"num_envs": "256"})
     except InputError:  # it calls its number of environments by another name, or has none
         learner = agent_class.build_learner(interface, spec.mazes)
-    collector = Collector(dataclasses.replace(spec, **learner.task_options()), learner.num_envs, seed=0)
+    spec = dataclasses.replace(spec, **learner.task_options())
+    learner.prepare(spec)
+    collector = Collector(spec, learner.num_envs, seed=0)
     learner.actor.explore_from(0, learner.num_envs, seed=0)
     state = learner.actor.initial_state(learner.num_envs)
     times = {"act": 0.0, "step": 0.0, "store": 0.0}
@@ -312,15 +309,23 @@ def _compile(spec: TaskSpec) -> None:
 def _picture_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
     """Returns the cost of a step of the vector environment with each camera, and with none."""
     rows = []
-    for cameras in ((), ("egocentric",), ("top",), ("egocentric", "top")):
-        env = MazeVectorEnv(dataclasses.replace(spec, sensors=cameras), _PICTURE_ENVS, seed=0)
+    for cameras, textures in (
+        ((), False),
+        (("egocentric",), False),
+        (("egocentric",), True),
+        (("top",), False),
+        (("egocentric", "top"), False),
+    ):
+        seeing = dataclasses.replace(spec, sensors=cameras, textures=textures)
+        env = MazeVectorEnv(seeing, _PICTURE_ENVS, seed=0)
         try:
             env.reset()
         except RenderingError:
             return []
         rate = _rate(_stepping(env), _PICTURE_ENVS, seconds)
         env.close()
-        rows.append({"what": " and ".join(cameras) or "no camera", "steps/s": round(rate), "ms a step": 1e3 / rate})
+        what = (" and ".join(cameras) or "no camera") + (", textures" if textures else "")
+        rows.append({"what": what, "steps/s": round(rate), "ms a step": 1e3 / rate})
     return rows
 
 

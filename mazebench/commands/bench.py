@@ -8,7 +8,9 @@ from typing import Annotated
 
 import typer
 
-from mazebench.commands.display import choose_rendering_backend
+from mazebench.commands.display import load_mujoco
+from mazebench.errors import remark
+from mazebench.world.backend import RenderingError
 
 
 def bench(
@@ -16,7 +18,11 @@ def bench(
     quick: Annotated[bool, typer.Option("--quick", help="Shorter runs, noisier figures.")] = False,
 ) -> None:
     """Measure speed on this machine, as ratios to the bare simulation taken in the same run."""
-    choose_rendering_backend()
+    try:
+        load_mujoco(renders=True)
+    except RenderingError as error:
+        remark(f"{error}; pictures are not measured")
+        load_mujoco(renders=False)
     from mazebench.bench import measure
 
     results = measure.run(quick=quick, say=lambda line: print(line, file=sys.stderr))

@@ -12,8 +12,9 @@ import typer
 
 from mazebench import stopping
 from mazebench.commands import progress
-from mazebench.commands.options import refuse_ignored, refuse_ignored_by_task, takes_options
-from mazebench.errors import InputError, RunError
+from mazebench.commands.display import has_camera, load_mujoco
+from mazebench.commands.options import NO_CAMERA, refuse_ignored, refuse_ignored_by_task, takes_options
+from mazebench.errors import InputError, RunError, remark
 from mazebench.evaluation.options import NUM_ENVS, TASK_CHOICES, EvalOptions
 
 
@@ -29,7 +30,10 @@ def evaluate(
     values: dict[str, Any],
     suite: Annotated[
         str | None,
-        typer.Option(help="Evaluations by name instead: paper, the whole protocol, or quick, minutes of it."),
+        typer.Option(
+            help="Evaluations by name instead: paper, the whole protocol; quick, minutes of it; or tracks, every track "
+            "at all levels."
+        ),
     ] = None,
     out: Annotated[
         pathlib.Path | None, typer.Option(help="Folder for the results; a new one in results/ if not given.")
@@ -66,7 +70,9 @@ def evaluate(
     refuse_ignored_by_task(context, values)
     if resume and out is None:
         raise InputError("--resume needs --out, the folder of the run to go on with")
-    folder = out or _new_folder(suite or f"{agents[0].replace(':', '-')}-{values['task']}")
+    refuse_ignored(context, (not has_camera(values["sensors"]), *NO_CAMERA))
+    load_mujoco(renders=has_camera(values["sensors"]))
+    folder = out or _new_folder(suite or f"{agents[0].replace(':', '-')}-{values['track'] or values['task']}")
     if resume:
         begun = folder.is_dir() and any(folder.iterdir())
         print(f"resuming {folder}" if begun else f"nothing to resume in {folder}; starting a new run")
@@ -101,8 +107,8 @@ def _evaluate_one(
 ) -> None:
     from mazebench.evaluation import evaluate, table
 
-    with progress.evaluating(f"{agent}, {values['task']}", kept) as show:
-        summary = evaluate.evaluate(agent, folder, record=record, progress=show, **running, **values)
+    with progress.evaluating(f"{agent}, {values['track'] or values['task']}", kept) as show:
+        summary = evaluate.evaluate(agent, folder, record=record, progress=show, warn=remark, **running, **values)
     table.print_summary(summary)
 
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, held_remarks
 from mazebench.options import Option, Options, options_of
 
 # Options that another one leaves without effect, and why.
@@ -20,10 +20,12 @@ LOCAL_ONLY = ("distances", "episodes_per_distance")
 HIERARCHICAL = ("the hierarchical task leads from corner to corner", LOCAL_ONLY)
 LOCAL = ("the local task has no landmarks", ("landmark_distance",))
 OWN_MAPS = ("with --maps the mazes are your own", ("split",))
-_WORTH_WATCHING = 10  # cells from start to goal
+OWN_ENDS = ("with --start and --goal the distance is given", ("distances",))
+NO_CAMERA = ("no camera is among the --sensors", ("camera_size", "textures"))
 NO_TRACK = ("a level belongs to a track", ("level",))
 TRACK = ("a track has its own time limit", ("time_limit",))
 FROZEN_TRACK = ("a track's eval episodes are frozen", ("episodes_per_distance",))
+_WORTH_WATCHING = 10  # cells from start to goal
 
 
 def takes_options(
@@ -84,15 +86,35 @@ def refuse_ignored_by_task(context: typer.Context, values: dict[str, Any]) -> No
         (values["task"] == "hierarchical", *HIERARCHICAL),
         (values["task"] == "local", *LOCAL),
         (values["maps"] is not None, *OWN_MAPS),
+        (values["start"] is not None and values["goal"] is not None, *OWN_ENDS),
         (values["track"] is None, *NO_TRACK),
         (values["track"] is not None, *TRACK),
         (values["track"] is not None and values["maps"] is None and values["split"] == "eval", *FROZEN_TRACK),
     )
 
 
-def default_distances(track: str | None) -> tuple[int, ...]:
-    """Returns the distances of an episode that is to be looked at; none for a track, which has its own."""
-    return (_WORTH_WATCHING,) if track is None else ()
+def watched_distances(values: dict[str, Any]) -> tuple[int, ...] | None:
+    """Returns the given distances, or else that of an episode which is to be looked at.
+
+    It is 10 cells, or as near to that as maps, a start or a goal of one's own allow. None stands for the distances of a
+    track, of given ends, or of corners.
+
+    Raises:
+      InputError: if the task is not one.
+    """
+    has_own = (
+        values["track"] is not None or values["task"] == "hierarchical" or None not in (values["start"], values["goal"])
+    )
+    if values["distances"] or has_own:
+        return values["distances"] or None
+    if values["maps"] is None and values["start"] is None and values["goal"] is None:
+        return (_WORTH_WATCHING,)
+    from mazebench.tasks.registry import make_spec
+
+    of_task = {name: value for name, value in values.items() if name not in ("distances", "checkpoint", "seed")}
+    with held_remarks():  # the command reads the maps again
+        distances = make_spec(**of_task).distances
+    return (min(distances, key=lambda distance: abs(distance - _WORTH_WATCHING)),)
 
 
 def parse_numbers(name: str, text: str) -> tuple[int, ...]:
@@ -116,15 +138,16 @@ def parse_numbers(name: str, text: str) -> tuple[int, ...]:
 
 def _parameter(name: str, option: Option, kind: Any, default: Any) -> inspect.Parameter:
     """Returns the parameter from which typer makes the option."""
-    shown = kind
+    shown, metavar = kind, None
     if kind == tuple[int, ...]:
         shown, default = str | None, ",".join(map(str, default)) or None
     elif kind == tuple[str, ...]:
         shown, default = list[str], list(default)
+        metavar = f"<{'|'.join(option.choices)}>, repeatable" if option.choices else None
     elif option.choices:
         choice = _choice(name, option.choices)
         shown, default = (choice | None, None) if default is None else (choice, choice(default))
-    annotation = Annotated[shown, typer.Option(help=option.help)]  # type: ignore[valid-type]
+    annotation = Annotated[shown, typer.Option(help=option.help, metavar=metavar)]  # type: ignore[valid-type]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 

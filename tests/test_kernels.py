@@ -1,0 +1,35 @@
+"""Compiled kernels: where numba's cache lacks them, one line says why the first answer takes long."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip("numba")
+
+CODE = """
+import numpy as np
+from mazebench_agents.navigator.driving import is_clear
+
+for _ in range(2):
+    is_clear(np.zeros((5, 5), dtype=bool), 1.5, 1.5, 3.5, 3.5, 0.3)
+"""
+
+
+def test_a_compilation_is_announced_once_and_cached(tmp_path):
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", CODE],
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)},
+            capture_output=True,
+            text=True,
+        ).stderr
+        for _ in range(2)
+    ]
+    assert said == [
+        "mazebench: compiling the agent's kernels, which numba's cache lacks; this takes some seconds\n",
+        "",
+    ]
