@@ -17,8 +17,8 @@ from scipy import ndimage, stats
 from torch import nn
 from torch.nn import functional
 
-from mazebench.maps.generators import corner_cells, dfs_walls
-from mazebench.maps.maze import Maze
+from mazebench.maps.generators import dfs_walls
+from mazebench.maps.maze import Maze, corner_cells
 from mazebench.tasks.perturbations.base import ShownMap
 from mazebench.tasks.tracks.stale import SWAPS, Stale, move_doors
 

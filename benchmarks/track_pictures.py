@@ -17,6 +17,7 @@ from matplotlib.patches import Rectangle
 import mazebench
 from mazebench.evaluation.results import load_result
 from mazebench.evaluation.trajectories import TRAJECTORIES, Trajectory, load_trajectories
+from mazebench.maps import colors
 from mazebench.maps.image import draw_grid
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.tracks import TRACKS
@@ -103,7 +104,7 @@ def _draw_odometry(axes: Axes, trajectory: Trajectory, title: str) -> None:
     axes.set_axis_on()
     axes.plot(rotated.real, rotated.imag, "--", color="#e8871e")
     axes.plot(x, y, color="#4458c8")
-    axes.plot(x[0], y[0], "o", color="#40a064")
+    axes.plot(x[0], y[0], "o", color=colors.START)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("x / m")
     axes.set_ylabel("y / m")
