@@ -6,10 +6,11 @@ AGENT ?= mmn
 .PHONY: eval test docs check check-full release pythons bench clean
 
 # Installs an extra: `agents` is what an evaluation needs, `dev` has everything. Made anew where it may have changed.
+# Modules become bytecode when they are first imported, unless Python may not keep it: then pip makes it.
 .venv/installed-%: pyproject.toml constraints.txt
 	@echo "Installing mazebench[$*] into .venv: a minute or two, and as long as the downloads take."
 	$(PYTHON) -m venv .venv
-	$(BIN)/pip install --no-compile --disable-pip-version-check -c constraints.txt -e '.[$*]'
+	$(BIN)/pip install $(if $(PYTHONDONTWRITEBYTECODE),,--no-compile) --disable-pip-version-check -c constraints.txt -e '.[$*]'
 	touch .venv/installed-agents $@  # dev includes agents
 
 eval: .venv/installed-agents
