@@ -73,12 +73,17 @@ def load_anew(browser, page):
     browser.wait_for("document.getElementById('clock').value.startsWith('step')")
 
 
-@pytest.fixture
-def opened(browser, page):
-    """The browser with the page loaded anew and an episode in the explorer."""
+def loaded(browser, page):
+    """Yields the browser with the page loaded anew; then checks that the page raised no error."""
     load_anew(browser, page)
     yield browser
     assert browser.errors == []
+
+
+@pytest.fixture
+def opened(browser, page):
+    """The browser with the page loaded anew and an episode in the explorer."""
+    yield from loaded(browser, page)
     assert browser.run("window.hacked === undefined")
 
 
@@ -116,9 +121,7 @@ def track_page(tmp_path_factory):
 @pytest.fixture
 def on_tracks(browser, track_page):
     """The browser with the page of tracks loaded anew."""
-    load_anew(browser, track_page)
-    yield browser
-    assert browser.errors == []
+    yield from loaded(browser, track_page)
 
 
 def is_seen(name):
@@ -229,9 +232,7 @@ def crowded_page(tmp_path_factory):
 @pytest.fixture
 def crowded(browser, crowded_page):
     """The browser with the page of many agents loaded anew."""
-    load_anew(browser, crowded_page)
-    yield browser
-    assert browser.errors == []
+    yield from loaded(browser, crowded_page)
 
 
 class TestManyAgents:

@@ -94,8 +94,6 @@ def run_plan(
     Raises:
       InputError, RunError: as `evaluate`.
     """
-    if num_envs < 1:
-        raise InputError(f"expected num_envs of at least 1, found {num_envs}")
     num_trials = len(plan.trials)
     if resume and is_finished(folder, record):
         check_same_run(folder, plan)

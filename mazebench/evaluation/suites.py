@@ -12,7 +12,7 @@ from typing import Any
 
 from mazebench.errors import InputError, unknown
 from mazebench.evaluation.evaluate import Progress, run_plan
-from mazebench.evaluation.options import NUM_ENVS, EvalOptions
+from mazebench.evaluation.options import NUM_ENVS, EvalOptions, RunOptions
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import open_pool
 from mazebench.evaluation.records import Summary
@@ -96,6 +96,8 @@ def run_suite(
         something else.
       RunError: if an agent or a worker failed; what ended until then is kept.
     """
+    writes = False if record is None else record
+    RunOptions(resume=resume, record=writes, num_envs=num_envs, workers=workers, ray_address=ray_address)
     if suite not in SUITES:
         raise unknown("suite", suite, SUITES)
     if checkpoint is not None and len(agents) > 1:

@@ -35,10 +35,9 @@ class _Metadata(pydantic.BaseModel):
     # x, y (m) and yaw (rad) of the lower left corner of the picture
     origin: tuple[float, float, float] = pydantic.Field(description="three numbers, [x, y, yaw]")
     negate: bool = pydantic.Field(description="0 or 1")  # whether light is occupied
-    occupied_thresh: float = pydantic.Field(
-        description="a number from 0 to 1"
-    )  # a pixel that is occupied with more is wall
-    free_thresh: float = pydantic.Field(description="a number from 0 to 1")  # and with less is free
+    # A pixel whose probability of being occupied is above the first is wall, below the second free.
+    occupied_thresh: float = pydantic.Field(description="a number from 0 to 1")
+    free_thresh: float = pydantic.Field(description="a number from 0 to 1")
     mode: Literal["trinary", "scale", "raw"] = pydantic.Field("trinary", description="trinary, scale or raw")
 
 
