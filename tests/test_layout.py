@@ -41,7 +41,7 @@ WALLS = {
     "dm_control": ("mazebench/world", "mazebench/tasks", "mazebench/envs", "mazebench/bench"),
     "torch": ("agents",),
     "gymnasium": ("mazebench/envs", "mazebench/bench"),
-    "numba": ("agents/common/kernels.py",),
+    "numba": ("agents/common/kernels.py", "agents/common/lanes.py"),
     "ray": ("mazebench/evaluation/cluster.py", "mazebench/training/distributed.py"),
     "matplotlib": ("mazebench/report",),
     "curses": ("mazebench/play/terminal.py",),

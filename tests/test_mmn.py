@@ -11,7 +11,8 @@ from mazebench_agents.mmn.config import MMNConfig, PaperConfig
 from mazebench_agents.mmn.losses import unrolled_losses
 from mazebench_agents.mmn.network import rotate
 from mazebench_agents.mmn.paper import PaperNetwork
-from mazebench_agents.mmn.planning import lookahead, plan
+from mazebench_agents.mmn.planning import kernel_model, lookahead, torch_model
+from mazebench_agents.mmn.search import gumbel_muzero_policy
 from mazebench_agents.mmn.spatial import MMNNetwork, Propagation
 from small_world import learn
 
@@ -171,22 +172,21 @@ def test_task_and_model_losses_reach_the_hypermodels_weights(config, mazes):
         assert gradient.abs().sum() > 0, loss
 
 
-@pytest.mark.parametrize("size", [7, 13])
-def test_search_by_kernels_finds_what_the_search_by_pytorch_finds(size):
-    """One state in a context is searched by kernels, several by PyTorch."""
+@OF_ALL
+def test_search_by_kernels_finds_what_the_search_by_pytorch_finds(config):
     torch.manual_seed(0)
-    network = MMN(CONFIGS["mmn"], size).network
+    network = agent_class(config)(config, 7).network
     for parameter in network.parameters():
         torch.nn.init.normal_(parameter, std=0.2)
     with torch.no_grad():
-        contexts = a_context(batch=5, size=size)
-        latent = network.encode(3 * torch.randn(5, 3, 9))
-        several = plan(network, CONFIGS["mmn"], latent, network.hypermodel(contexts), 6)
-        code = network.hypermodel(contexts.repeat_interleave(3, dim=0))
-        single = plan(network, CONFIGS["mmn"], latent.flatten(0, 1)[:, None], code, 6)
-    np.testing.assert_array_equal(single.visit_counts, several.visit_counts)
-    np.testing.assert_allclose(single.qvalues, several.qvalues, rtol=1e-4)
-    np.testing.assert_allclose(single.action_weights, several.action_weights, rtol=1e-3, atol=1e-5)
+        latent, code = network.encode(3 * torch.randn(5, 3, 9)), network.hypermodel(a_context(batch=5))
+        found, expected = (
+            gumbel_muzero_policy(*prepare(network, latent, code), 6, np.zeros((15, 6)), rescale_values=False)
+            for prepare in (kernel_model, torch_model)
+        )
+    np.testing.assert_array_equal(found.visit_counts, expected.visit_counts)
+    np.testing.assert_allclose(found.qvalues, expected.qvalues, rtol=1e-4)
+    np.testing.assert_allclose(found.action_weights, expected.action_weights, rtol=1e-3, atol=1e-5)
 
 
 @OF_ALL

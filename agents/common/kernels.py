@@ -1,12 +1,17 @@
-"""Compilation of kernels to machine code.
+"""Compilation of kernels to machine code, which is kept on disk.
 
-Numba compiles a kernel anew when its file changes, but not when a module that it imports does. So a kernel should call
-functions of its own file only.
+Numba notices when a kernel's file changes, but not when a module does that the kernel uses. So the kernels of a file
+are kept in a folder that is named after the contents of the file and of the modules of this package that it imports.
 """
 
 from __future__ import annotations
 
+import functools
+import hashlib
+import inspect
 import multiprocessing
+import pathlib
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -38,17 +43,58 @@ def compiled(function: Callable[..., Any], inline: bool = False, fused: bool = F
 
     If `fused`, a product and a sum may become one operation with one rounding: faster, and other last bits.
     """
-    options: dict[str, Any] = {
-        "error_model": "numpy",
-        "forceinline": inline,
-        "fastmath": {"contract"} if fused else False,
-    }
-    try:
-        return numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # numba found no such folder
-        return numba.njit(**options)(function)
+    return _cached(numba.njit, function, forceinline=inline, **_options(fused))
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     """Returns `function` compiled into its callers, where LLVM might decide otherwise."""
     return compiled(function, inline=True)
+
+
+def first_class(function: Callable[..., Any], arguments: tuple[Any, ...], fused: bool = False) -> Any:
+    """Returns `function`, which has no result, as machine code that kernels may take as an argument.
+
+    The types are those of `arguments`.
+    """
+    return _first_class(function, numba.types.void(*(numba.typeof(argument) for argument in arguments)), fused)
+
+
+@functools.cache
+def _first_class(function: Callable[..., Any], signature: Any, fused: bool) -> Any:
+    return _cached(functools.partial(numba.cfunc, signature), function, **_options(fused))
+
+
+def _options(fused: bool) -> dict[str, Any]:
+    return {"error_model": "numpy", "fastmath": {"contract"} if fused else False}
+
+
+def _cached(compile_with: Callable[..., Any], function: Callable[..., Any], **options: Any) -> Any:
+    config: Any = numba.config
+    given = config.CACHE_DIR
+    config.CACHE_DIR = str(_cache_folder(function, given))
+    try:
+        return compile_with(cache=True, **options)(function)
+    except RuntimeError:  # numba found no folder that it can write to
+        return compile_with(**options)(function)
+    finally:
+        config.CACHE_DIR = given
+
+
+def _cache_folder(function: Callable[..., Any], given: str) -> pathlib.Path:
+    """Returns a folder below the `given` one, or else beside Python's own compiled files."""
+    package = __name__.partition(".")[0]
+    names = {function.__module__}
+    for value in function.__globals__.values():
+        name = value.__name__ if inspect.ismodule(value) else getattr(value, "__module__", None)
+        if isinstance(name, str) and name.startswith(f"{package}."):
+            names.add(name)
+    digest = hashlib.sha256()
+    for name in sorted(names):
+        digest.update(_source(str(sys.modules[name].__file__)))
+    parent = pathlib.Path(given) if given else pathlib.Path(function.__code__.co_filename).parent / "__pycache__"
+    return parent / f"kernels-{digest.hexdigest()[:16]}"
+
+
+@functools.cache
+def _source(file: str) -> bytes:
+    return pathlib.Path(file).read_bytes()

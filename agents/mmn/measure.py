@@ -1,4 +1,4 @@
-"""The speed of the search, compared with its network alone and with mctx if that is installed, and of an update.
+"""The speed of the search, compared with mctx's if that is installed, and of an update.
 
 The search's network is a stand-in of MMN's size. Its transition has other weights in each row, as a hypermodel's has.
 """
@@ -25,14 +25,16 @@ from mazebench.maps.benchmark import load_mazes
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 
+from .compiled import CompiledModel, Heads, Layer, StandIn, stand_in_arrive, stand_in_step
 from .learner import MMNLearner
-from .search import Evaluation, Root, gumbel_muzero_policy, muzero_policy
+from .search import gumbel_muzero_policy, muzero_policy
 
 NUM_ACTIONS = 6
 LATENT = 64
 HIDDEN = 128
 NUM_BINS = 65  # of values in [-64, 0]
 NUM_SIMULATIONS = 16
+_HEADS = ("head_1", "head_2", "outputs")
 _CASES = (("gumbel", 1), ("gumbel", 64), ("gumbel", 256), ("puct", 64))  # policy, roots
 _ROUNDS = 7  # in which the search, its network and mctx are measured by turns
 # XLA would use a thread a core.
@@ -63,35 +65,13 @@ def random_weights(batch_size: int) -> dict[str, np.ndarray]:
     }
 
 
-class Network:
-    """The stand-in, in PyTorch."""
-
-    def __init__(self, batch_size: int):
-        for name, weight in random_weights(batch_size).items():
-            setattr(self, name, torch.from_numpy(weight))
-        self._one_hot = torch.eye(NUM_ACTIONS)
-        self._support = torch.linspace(1 - NUM_BINS, 0, NUM_BINS)
-        self._reward = np.full(batch_size, -1, np.float32)
-
-    transition_1: torch.Tensor
-    transition_2: torch.Tensor
-    head_1: torch.Tensor
-    head_2: torch.Tensor
-    outputs: torch.Tensor
-
-    def __call__(self, latent: torch.Tensor, action: np.ndarray) -> Evaluation:
-        """A step from latent states `[B, D]`."""
-        inputs = torch.cat([latent, self._one_hot[torch.from_numpy(action)]], dim=1)[:, None]  # [B, 1, D + A]
-        hidden = torch.relu_(inputs @ self.transition_1)
-        latent = torch.nn.functional.layer_norm(latent + (hidden @ self.transition_2)[:, 0], (LATENT,))  # [B, D]
-        policy, value, end = self.predict(latent)
-        return Evaluation(self._reward, 1 - end, policy, value, latent)
-
-    def predict(self, latent: torch.Tensor) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Logits `[B, A]`, values `[B]` and the probability `[B]` that the episode has ended."""
-        outputs = torch.relu_(torch.relu_(latent @ self.head_1) @ self.head_2) @ self.outputs
-        value = torch.softmax(outputs[:, NUM_ACTIONS:-1], dim=1) @ self._support
-        return outputs[:, :NUM_ACTIONS].numpy(), value.numpy(), torch.sigmoid(outputs[:, -1]).numpy()
+def stand_in(batch_size: int) -> CompiledModel:
+    """Returns the stand-in as kernels."""
+    # Tensors are aligned in memory, as those of a network are.
+    arrays = {name: torch.tensor(array).numpy() for name, array in random_weights(batch_size).items()}
+    heads = (Layer(arrays[name], np.zeros(arrays[name].shape[1], np.float32)) for name in _HEADS)
+    model = StandIn(arrays["transition_1"], arrays["transition_2"], NUM_BINS, Heads(*heads))
+    return CompiledModel(model, 0, stand_in_step, stand_in_arrive)
 
 
 def measure(seconds: float, build_learner: Callable[..., MMNLearner]) -> dict[str, list[dict[str, Any]]]:
@@ -152,11 +132,8 @@ def _timed(function: Callable[..., Any], times: dict[str, float], part: str) -> 
 
 
 def _row(policy: str, batch_size: int, seconds: float, mctx: Callable[..., float] | None) -> dict[str, Any]:
-    search_step, network_step = _steps(policy, batch_size)
-    sides = {
-        "sims/s": lambda: rate(search_step, batch_size, seconds),
-        "network sims/s": lambda: rate(network_step, batch_size, seconds),
-    }
+    step = _search_step(policy, batch_size)
+    sides = {"sims/s": lambda: rate(step, batch_size, seconds)}
     if mctx is not None:
         sides["mctx sims/s"] = lambda: mctx(policy, batch_size, seconds)
     rounds = [{name: side() for name, side in sides.items()} for _ in range(_ROUNDS)]
@@ -177,29 +154,20 @@ def rate(step: Callable[[], Any], batch_size: int, seconds: float) -> float:
     return count * batch_size * NUM_SIMULATIONS / elapsed
 
 
-def _steps(policy: str, batch_size: int) -> tuple[Callable[[], Any], Callable[[], Any]]:
-    """Returns a function that searches, and one that evaluates the network as often as the search does."""
-    network, rng = Network(batch_size), np.random.default_rng(0)
-    latent = torch.from_numpy(rng.normal(size=(batch_size, LATENT)).astype(np.float32))
-    prior_logits, value, _ = network.predict(latent)
-    root = Root(prior_logits, value, latent)
-    gumbel = rng.gumbel(size=prior_logits.shape).astype(np.float32)
+def _search_step(policy: str, batch_size: int) -> Callable[[], Any]:
+    """Returns a function that searches."""
+    model, rng = stand_in(batch_size), np.random.default_rng(0)
+    root = model.root(torch.from_numpy(rng.normal(size=(batch_size, LATENT)).astype(np.float32)))
+    gumbel = rng.gumbel(size=root.prior_logits.shape).astype(np.float32)
     dirichlet = rng.dirichlet(np.full(NUM_ACTIONS, 0.3), batch_size).astype(np.float32)
-    actions = rng.integers(NUM_ACTIONS, size=(NUM_SIMULATIONS, batch_size))
 
     def search() -> None:
         if policy == "gumbel":
-            gumbel_muzero_policy(root, network, NUM_SIMULATIONS, gumbel)
+            gumbel_muzero_policy(root, model, NUM_SIMULATIONS, gumbel)
         else:
-            muzero_policy(root, network, NUM_SIMULATIONS, dirichlet, gumbel)
+            muzero_policy(root, model, NUM_SIMULATIONS, dirichlet, gumbel)
 
-    @torch.inference_mode()
-    def evaluate() -> None:
-        after = latent
-        for action in actions:
-            after = network(after, action).embedding
-
-    return search, evaluate
+    return search
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from mazebench.maps.maze import Maze
 
 from ..common.actor import NetworkAgent
 from ..common.checkpoint import load_agent, load_into
-from ..common.layers import marked_position, state_features
+from ..common.layers import in_batches, marked_position, state_features
 from ..common.overrides import override
 from .config import MMNConfig, PaperConfig, PlanningConfig
 from .learner import MMNLearner
@@ -111,15 +111,12 @@ class MMN(NetworkAgent):
             new_anchor = inputs.new_episode | (not self.config.keep_anchor)
             self._encode(inputs.observation, new, new_anchor, state)
         assert state.code is not None, "new_context must be set in an environment's first step"
-        device = self.network.support.device
         features = state_features(torch.from_numpy(inputs.observation["state"]), torch.from_numpy(state.origin))
-        actions = [
-            self._plan(rows, features_of_rows[:, None].to(device), state.code, explore)
-            for rows, features_of_rows in zip(
-                _slices(len(features), _STATES_AT_ONCE), features.split(_STATES_AT_ONCE), strict=True
-            )
-        ]
-        action = np.concatenate(actions)
+        device = self.network.support.device
+        latent = in_batches(self.network.encode, _STATES_AT_ONCE, features[:, None].to(device))
+        num_simulations = self.config.num_simulations if explore else self.config.num_eval_simulations
+        noise = (self._rng, self._noise_scale) if explore else ()
+        action = plan(self.network, self.config, latent, state.code, num_simulations, *noise).action
         if explore:
             action = self._explored(action, NUM_ACTIONS)
         return action, state
@@ -147,16 +144,6 @@ class MMN(NetworkAgent):
                 state.code = code._make(part.new_zeros(size, *part.shape[1:]) for part in code)
             for whole, part in zip(state.code, code, strict=True):
                 whole[torch.from_numpy(new[rows]).to(device)] = part
-
-    def _plan(self, rows: slice, features: torch.Tensor, code: Code, explore: bool) -> np.ndarray:
-        """Returns actions in the environments `rows`, whose state features are `[K, 1, 9]`."""
-        config = self.config
-        latent = self.network.encode(_padded(features, _STATES_AT_ONCE))
-        code = code._make(_padded(part[rows], _STATES_AT_ONCE) for part in code)
-        num_simulations = config.num_simulations if explore else config.num_eval_simulations
-        scale = np.resize(self._noise_scale[rows], len(latent)) if explore else 1.0
-        rng = self._rng if explore else None
-        return plan(self.network, config, latent, code, num_simulations, rng, scale).action[: len(features)]
 
 
 class MMNPaper(MMN):

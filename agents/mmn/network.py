@@ -14,7 +14,7 @@ import torch
 from torch import nn
 
 from ..common.layers import marked_position
-from .compiled import CompiledModel
+from .compiled import CompiledModel, Heads, layer_of
 from .config import PlanningConfig
 
 NUM_ACTIONS = 6
@@ -104,9 +104,9 @@ class Network(nn.Module, abc.ABC):
         """Yields the name, the errors and their weights of the network's own losses."""
         yield from ()
 
-    def compiled(self, code: Code) -> CompiledModel | None:
-        """Returns the model of contexts as kernels for the search on a CPU, if the network has them."""
-        return None
+    @abc.abstractmethod
+    def compiled(self, code: Code, num_roots: int) -> CompiledModel:
+        """Returns the model as kernels for the search on a CPU from `num_roots` latent states in each context."""
 
     def encode(self, features: torch.Tensor) -> torch.Tensor:
         """Returns latent states `[G, K, D]` of state features `[G, K, 9]`; see `state_features`."""
@@ -142,6 +142,9 @@ class Network(nn.Module, abc.ABC):
     def _displacement(self, moved: torch.Tensor) -> torch.Tensor:
         """Returns displacements `[..., 2]` on the map (row, column) of those in metres (x, y)."""
         return _SCALE_RATE * (moved[..., None] * self.scale).sum(-2)
+
+    def _compiled_heads(self) -> Heads:
+        return Heads(layer_of(self.body[0]), layer_of(self.body[2]), layer_of(self.heads))
 
     def _make_heads(self, num_inputs: int, num_outputs: int, config: PlanningConfig) -> None:
         """Makes `body` and `heads`, whose first outputs are those of policy and value; at first they are constant."""

@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 from torch import nn
 from torch.nn import functional
 
 from ..common.layers import NUM_PLANES, MapEncoder
+from .compiled import CompiledModel, Contexts, PaperModel, paper_arrive, paper_step
 from .config import PaperConfig
 from .network import (
     NUM_ACTIONS,
@@ -121,6 +123,23 @@ class PaperNetwork(Network):
             self.body(torch.cat([self._inputs(latent, seen), to_goal / 10, bells, task, features], dim=-1))
         )
         return Predictions(out[..., :NUM_ACTIONS], out[..., NUM_ACTIONS:-1], out[..., -1])
+
+    def compiled(self, code: Code, num_roots: int) -> CompiledModel:
+        """Returns the model as kernels, with the weights as they are now."""
+        table = torch.cat([code.rows, code.features], dim=-1)
+        model = PaperModel(
+            Contexts(code.positions.numpy(), table.numpy(), num_roots),
+            self.num_bins,
+            self._shapes["bias"][1],
+            self.scale.detach().numpy(),
+            functional.softplus(self.hypermodel.sharpness.detach() + 1.0).reshape(1).numpy(),
+            np.array(_PERIODS, np.float32),
+            np.array(_WIDTHS, np.float32),
+            code.weights.numpy(),
+            code.task.numpy(),
+            self._compiled_heads(),
+        )
+        return CompiledModel(model, self._shapes["bias"][1], paper_step, paper_arrive)
 
     def _inputs(self, latent: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
         """Returns `[G, K, D + 34]`: the latent state, with 5 m as the unit of the displacement, and the places."""

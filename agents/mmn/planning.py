@@ -10,7 +10,7 @@ import torch
 
 from .config import PlanningConfig
 from .network import NUM_ACTIONS, Code, Network, Predictions
-from .search import Evaluation, RecurrentFn, Root, SearchResult, gumbel_muzero_policy, muzero_policy
+from .search import Evaluation, Model, Root, SearchResult, gumbel_muzero_policy, muzero_policy
 
 _DIRICHLET_ALPHA = 0.3  # MuZero's, in its board games with the fewest actions
 _DIRICHLET_FRACTION = 0.25  # MuZero's
@@ -47,18 +47,13 @@ def plan(
     If `rng` is given, the search has noise. The noise of "gumbel" is multiplied by `noise_scale`, a number or `[B]`.
     """
     size = latent.shape[0] * latent.shape[1], NUM_ACTIONS
-    step: RecurrentFn
-    model = network.compiled(code) if latent.is_cpu and latent.shape[1] == 1 else None
-    if model is None:
-        root, step = _root(network, latent, code), _recurrent_fn(network, latent.shape[:2], code)
-    else:
-        root, step = model.root(latent), model.step
+    root, model = (kernel_model if latent.is_cpu else torch_model)(network, latent, code)
     gumbel = np.zeros(size) if rng is None else rng.gumbel(size=size)
     if config.search == "gumbel":
         scaled = gumbel * np.broadcast_to(noise_scale, size[:1])[:, None]
         return gumbel_muzero_policy(
             root,
-            step,
+            model,
             num_simulations,
             scaled,
             value_scale=config.value_scale,
@@ -69,7 +64,7 @@ def plan(
     noise = np.zeros(size) if rng is None else rng.dirichlet([_DIRICHLET_ALPHA] * NUM_ACTIONS, size[0])
     return muzero_policy(
         root,
-        step,
+        model,
         num_simulations,
         noise,
         gumbel,
@@ -78,13 +73,17 @@ def plan(
     )
 
 
-def _root(network: Network, latent: torch.Tensor, code: Code) -> Root:
+def kernel_model(network: Network, latent: torch.Tensor, code: Code) -> tuple[Root, Model]:
+    """Returns roots and model of a search from latent states `[G, K, D]` on the CPU."""
+    model = network.compiled(code, latent.shape[1])
+    return model.root(latent.flatten(0, 1)), model
+
+
+def torch_model(network: Network, latent: torch.Tensor, code: Code) -> tuple[Root, Model]:
+    """Returns roots and model of a search from latent states `[G, K, D]`."""
     predictions, embedding = _arrive(network, latent, code)
-    value = network.value(predictions.value_logits)
-    return Root(_array(predictions.policy_logits.flatten(0, 1)), _array(value.flatten()), embedding)
+    value, shape = network.value(predictions.value_logits), latent.shape[:2]
 
-
-def _recurrent_fn(network: Network, shape: torch.Size, code: Code) -> RecurrentFn:
     def step(embedding: torch.Tensor, action: np.ndarray) -> Evaluation:
         latent, first = embedding.unflatten(0, shape).split(
             [network.latent_size, embedding.shape[-1] - network.latent_size], dim=-1
@@ -99,7 +98,7 @@ def _recurrent_fn(network: Network, shape: torch.Size, code: Code) -> RecurrentF
         )  # [B, 9], copied at once
         return Evaluation(numbers[:, 0], numbers[:, 1], numbers[:, 3:], numbers[:, 2], after)
 
-    return step
+    return Root(_array(predictions.policy_logits.flatten(0, 1)), _array(value.flatten()), embedding), step
 
 
 def _arrive(network: Network, latent: torch.Tensor, code: Code) -> tuple[Predictions, torch.Tensor]:

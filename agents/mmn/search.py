@@ -2,12 +2,14 @@
 
 `B` is the number of roots, `N` = num_simulations + 1 the number of nodes of a tree, `A` the number of actions and `D`
 the size of an embedding. In each simulation a kernel descends all trees, the model evaluates one batch of B states, and
-a kernel expands and backs up. The search draws no random numbers: noise is an argument. Of actions with equal scores
-the first is taken, where mctx's MuZero adds a tiny noise.
+a kernel expands and backs up; a model that consists of kernels does all simulations in one call. The search draws no
+random numbers: noise is an argument. Of actions with equal scores the first is taken, where mctx's MuZero adds a tiny
+noise.
 """
 
 from __future__ import annotations
 
+import abc
 import math
 from collections.abc import Callable
 from typing import NamedTuple
@@ -16,7 +18,7 @@ import numpy as np
 import torch
 
 from . import tree as trees
-from .tree import ROOT, GumbelSettings, PUCTSettings
+from .tree import ROOT, Settings
 
 
 class Root(NamedTuple):
@@ -47,15 +49,34 @@ class SearchResult(NamedTuple):
     value: np.ndarray  # [B] float32, the mean over the root's visits
 
 
-# Descends all trees [B, N] and attaches nodes of an index; writes actions [B] and the parents' rows of embeddings [B].
-_Simulate = Callable[[np.ndarray, int, np.ndarray, np.ndarray], None]
 # Evaluates actions [B] int64 in the states of embeddings [B, D]; both are the search's, and valid during the call.
 RecurrentFn = Callable[[torch.Tensor, np.ndarray], Evaluation]
 
 
+class SearchableModel(abc.ABC):
+    """A model that runs the simulations itself."""
+
+    @abc.abstractmethod
+    def search(
+        self, tree: np.ndarray, gumbel: np.ndarray, visits: np.ndarray, settings: Settings, embedding: torch.Tensor
+    ) -> None:
+        """Runs all simulations of trees with expanded roots.
+
+        Args:
+          tree: `[B, N]`.
+          gumbel: `[B, A]` float32, added to the scores of the roots' actions.
+          visits: `[N - 1]` int64; in each simulation, the visits of the actions that are considered at the roots.
+          settings: of the selection.
+          embedding: `[B, D]`, of the roots.
+        """
+
+
+Model = RecurrentFn | SearchableModel
+
+
 def gumbel_muzero_policy(
     root: Root,
-    recurrent_fn: RecurrentFn,
+    model: Model,
     num_simulations: int,
     gumbel: np.ndarray,
     *,
@@ -69,7 +90,7 @@ def gumbel_muzero_policy(
 
     Args:
       root: the states to search from.
-      recurrent_fn: the model. It is called once a simulation.
+      model: predicts steps; a function is called once a simulation.
       num_simulations: 0 acts by the prior.
       gumbel: `[B, A]`, standard Gumbel noise, scaled as wanted; zeros to act without noise.
       max_num_considered_actions: at the root.
@@ -81,13 +102,10 @@ def gumbel_muzero_policy(
     batch_size, num_actions = root.prior_logits.shape
     noise = np.empty((batch_size, num_actions), np.float32)
     noise[:] = gumbel
-    settings = GumbelSettings(np.float32(value_scale), np.float32(maxvisit_init), rescale_values, use_mixed_value)
+    scales = np.float32(value_scale), np.float32(maxvisit_init)
+    settings = Settings(False, *scales, rescale_values, use_mixed_value)
     visits = considered_visits(min(max_num_considered_actions, num_actions), num_simulations)
-
-    def simulate(tree: np.ndarray, index: int, actions: np.ndarray, rows: np.ndarray) -> None:
-        trees.simulate_gumbel(tree, index, noise, visits[index - 1], settings, actions, rows)
-
-    tree = _search(root, recurrent_fn, num_simulations, simulate)
+    tree = _search(root, model, num_simulations, noise, visits, settings)
     action = np.empty(batch_size, np.int64)
     action_weights = np.empty((batch_size, num_actions), np.float32)
     qvalues = np.empty((batch_size, num_actions), np.float32)
@@ -99,7 +117,7 @@ def gumbel_muzero_policy(
 
 def muzero_policy(
     root: Root,
-    recurrent_fn: RecurrentFn,
+    model: Model,
     num_simulations: int,
     dirichlet_noise: np.ndarray,
     action_noise: np.ndarray,
@@ -113,7 +131,7 @@ def muzero_policy(
 
     Args:
       root: the states to search from.
-      recurrent_fn: the model. It is called once a simulation.
+      model: predicts steps; a function is called once a simulation.
       num_simulations: 0 acts by the prior with its noise.
       dirichlet_noise: `[B, A]`, a distribution over actions a root.
       action_noise: `[B, A]`, standard Gumbel noise, by which the action is drawn; zeros to take the most visited.
@@ -124,12 +142,9 @@ def muzero_policy(
     """
     prior = (1 - dirichlet_fraction) * _softmax(root.prior_logits) + dirichlet_fraction * dirichlet_noise
     noisy_root = root._replace(prior_logits=_log(prior.astype(np.float32)))
-    settings = PUCTSettings(np.float32(pb_c_init), np.float32(pb_c_base))
-
-    def simulate(tree: np.ndarray, index: int, actions: np.ndarray, rows: np.ndarray) -> None:
-        trees.simulate_puct(tree, index, settings, actions, rows)
-
-    tree = _search(noisy_root, recurrent_fn, num_simulations, simulate)
+    settings = Settings(True, pb_c_init=np.float32(pb_c_init), pb_c_base=np.float32(pb_c_base))
+    none = np.zeros(root.prior_logits.shape, np.float32)
+    tree = _search(noisy_root, model, num_simulations, none, [0] * num_simulations, settings)
     visit_counts = tree["child_visits"][:, ROOT].copy()
     action_weights = visit_counts.astype(np.float32) / np.float32(num_simulations) if num_simulations else prior
     action_weights = action_weights.astype(np.float32)
@@ -160,24 +175,27 @@ def considered_visits(num_considered: int, num_simulations: int) -> list[int]:
 
 
 @torch.inference_mode()
-def _search(root: Root, recurrent_fn: RecurrentFn, num_simulations: int, simulate: _Simulate) -> np.ndarray:
-    """Returns trees `[B, N]` after `num_simulations` simulations of all roots together."""
+def _search(
+    root: Root, model: Model, num_simulations: int, gumbel: np.ndarray, visits: list[int], settings: Settings
+) -> np.ndarray:
+    """Returns trees `[B, N]` after `num_simulations` simulations; `gumbel` and `visits` are `SearchableModel`'s."""
     batch_size, num_actions = root.prior_logits.shape
     tree = np.empty((batch_size, num_simulations + 1), trees.node_type(num_actions))
-    # The kernels would be compiled again for another type of array, so everything is copied into arrays of one type.
-    reward, discount, value = np.empty((3, batch_size), np.float32)
-    prior_logits = np.empty((batch_size, num_actions), np.float32)
-    prior_logits[:], value[:] = root.prior_logits, root.value
-    trees.plant(tree, prior_logits, value)
-    actions, rows = np.empty((2, batch_size), np.int64)
+    numbers = np.zeros((batch_size, 3 + num_actions), np.float32)  # see tree.expand_and_backward
+    numbers[:, 2], numbers[:, 3:] = root.value, root.prior_logits
+    trees.plant(tree, numbers)
+    if isinstance(model, SearchableModel):
+        model.search(tree, gumbel, np.array(visits, np.int64), settings, root.embedding)
+        return tree
+    actions, parents = np.empty((2, batch_size), np.int64)
     embeddings = root.embedding.new_empty((num_simulations + 1, *root.embedding.shape))  # [N, B, D]
     embeddings[ROOT] = root.embedding
-    flat_embeddings, rows_tensor = embeddings.flatten(0, 1), torch.from_numpy(rows)
     for index in range(1, num_simulations + 1):
-        simulate(tree, index, actions, rows)
-        parents = flat_embeddings.index_select(0, rows_tensor.to(embeddings.device))  # [B, D]
-        reward[:], discount[:], prior_logits[:], value[:], embeddings[index] = recurrent_fn(parents, actions)
-        trees.expand_and_backward(tree, index, reward, discount, prior_logits, value)
+        trees.simulate(tree, index, gumbel, visits[index - 1], settings, actions, parents)
+        rows = torch.from_numpy(parents * batch_size + np.arange(batch_size)).to(embeddings.device)
+        after = model(embeddings.flatten(0, 1).index_select(0, rows), actions)
+        numbers[:, 0], numbers[:, 1], numbers[:, 3:], numbers[:, 2], embeddings[index] = after
+        trees.expand_and_backward(tree, index, numbers)
     return tree
 
 

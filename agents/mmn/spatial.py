@@ -14,7 +14,7 @@ from torch import nn
 from torch.nn import functional
 
 from ..common.layers import NUM_PLANES, NUM_WAVES, MapEncoder, waves
-from .compiled import CompiledModel, Layer, Weights, layer_of
+from .compiled import CompiledModel, Contexts, Layer, MMNModel, layer_of, mmn_arrive, mmn_step
 from .config import MMNConfig
 from .network import (
     NUM_ACTIONS,
@@ -111,13 +111,14 @@ class MMNNetwork(Network):
         error = functional.binary_cross_entropy_with_logits(code.enterable, roots.visited, reduction="none")
         yield "visit_loss", self._weights["visit"] * error, torch.ones_like(error)
 
-    def compiled(self, code: Code) -> CompiledModel:
+    def compiled(self, code: Code, num_roots: int) -> CompiledModel:
         """Returns the model as kernels, with the weights as they are now."""
         transition = self.hypermodel.transition
-        sharpness = functional.softplus(self.hypermodel.sharpness.detach() + 1.0)
-        weights = Weights(
+        model = MMNModel(
+            Contexts(code.positions.numpy(), code.weights.numpy(), num_roots),
+            self.num_bins,
             self.scale.detach().numpy(),
-            sharpness.reshape(1).numpy(),
+            functional.softplus(self.hypermodel.sharpness.detach() + 1.0).reshape(1).numpy(),
             layer_of(self.free),
             self.free_by_action.weight.detach().numpy(),
             layer_of(self.ahead),
@@ -126,11 +127,9 @@ class MMNNetwork(Network):
             layer_of(transition.later[0]),
             layer_of(transition.later[2]),
             Layer(self.normalize.weight.detach().numpy()[None], self.normalize.bias.detach().numpy()),
-            layer_of(self.body[0]),
-            layer_of(self.body[2]),
-            layer_of(self.heads),
+            self._compiled_heads(),
         )
-        return CompiledModel(weights, self.num_bins, code.positions, code.weights)
+        return CompiledModel(model, self.ahead.out_features, mmn_step, mmn_arrive)
 
     def _inputs(self, latent: torch.Tensor) -> torch.Tensor:
         """Returns `[G, K, D + 14]`: heading, velocities, the code of the motion, and waves of the displacement."""

@@ -4,8 +4,7 @@
 `[B, N]` of `node_type`; a node first expanded in simulation i, counted from 0, has index i + 1, the root has 0. All
 arithmetic on values is in float32.
 
-All functions that the kernels call are in this file; `common.kernels` says why. Those that are called for each node of
-a path are inlined: if LLVM decides, a search takes a tenth longer.
+Functions that are called for each node of a path are inlined: if LLVM decides, a search takes a tenth longer.
 """
 
 from __future__ import annotations
@@ -26,6 +25,7 @@ _ONE = np.float32(1.0)
 _MINUS_INFINITY = np.float32(-np.inf)
 _TINY = np.finfo(np.float32).tiny
 _LEAST_RANGE = np.float32(1e-8)  # of values that are rescaled to [0, 1]
+_FIRST_LOGIT = 3  # of the numbers of a node
 _LEAST_SCORE = np.float32(-1e9)  # of an action that may be visited: above that of one that may not
 
 
@@ -51,86 +51,73 @@ def node_type(num_actions: int) -> np.dtype:
     )
 
 
-class GumbelSettings(NamedTuple):
-    """How completed q-values are scaled before they are added to logits."""
+class Settings(NamedTuple):
+    """How actions are selected: by Gumbel MuZero or, with `puct`, by MuZero's bounds."""
 
-    value_scale: np.float32
-    maxvisit_init: np.float32
-    rescale_values: bool
-    use_mixed_value: bool
-
-
-class PUCTSettings(NamedTuple):
-    """The exploration constants c1 and c2 of Schrittwieser et al. (2020), appendix B."""
-
-    pb_c_init: np.float32
-    pb_c_base: np.float32
+    puct: bool
+    value_scale: np.float32 = np.float32(0.0)  # Gumbel MuZero's; of completed q-values, beside logits
+    maxvisit_init: np.float32 = np.float32(0.0)
+    rescale_values: bool = False
+    use_mixed_value: bool = False
+    pb_c_init: np.float32 = np.float32(0.0)  # MuZero's c1 and c2 (Schrittwieser et al. 2020, appendix B)
+    pb_c_base: np.float32 = np.float32(0.0)
 
 
 @compiled
-def plant(tree: np.ndarray, prior_logits: np.ndarray, values: np.ndarray) -> None:
-    """Expands the roots with `prior_logits` `[B, A]` and `values` `[B]`."""
+def plant(tree: np.ndarray, numbers: np.ndarray) -> None:
+    """Expands the roots; of `numbers` as in `expand_and_backward`, reward and discount have no meaning."""
     for b in range(len(tree)):
-        _expand(tree[b, ROOT], prior_logits[b], values[b])
+        _expand(tree[b, ROOT], numbers[b])
 
 
 @compiled
-def simulate_gumbel(
+def simulate(
     tree: np.ndarray,
     index: int,
     gumbel: np.ndarray,
     considered_visit: int,
-    settings: GumbelSettings,
+    settings: Settings,
     actions: np.ndarray,
-    rows: np.ndarray,
+    parents: np.ndarray,
 ) -> None:
-    """Descends from each root to an action not yet visited (Danihelka et al. 2022), and attaches a node there.
+    """Descends from each root to an action not yet visited, and attaches a node there.
 
     Args:
       tree: `[B, N]`.
       index: of the new nodes, which are not expanded yet.
-      gumbel: `[B, A]` float32, added to the scores of the roots' actions.
-      considered_visit: only actions visited so many times are considered at the roots.
-      settings: of the completed q-values.
+      gumbel: `[B, A]` float32, added to the scores of the roots' actions; not with `puct`.
+      considered_visit: only actions visited so many times are considered at the roots; not with `puct`.
+      settings: of the selection.
       actions: `[B]`, output: the actions.
-      rows: `[B]`, output: parent * B + b, the rows of the parents in embeddings `[N * B, D]`.
+      parents: `[B]`, output: the nodes that they leave.
     """
     scores = np.empty(gumbel.shape[1], np.float32)
     for b in range(len(tree)):
-        parent, action = ROOT, _gumbel_root_action(tree[b, ROOT], gumbel[b], considered_visit, settings, scores)
+        parent = ROOT
+        if settings.puct:
+            action = _puct_action(tree[b, ROOT], settings)
+        else:
+            action = _gumbel_root_action(tree[b, ROOT], gumbel[b], considered_visit, settings, scores)
         while tree[b, parent].children[action] != UNVISITED:
             parent = tree[b, parent].children[action]
-            action = _gumbel_interior_action(tree[b, parent], settings, scores)
+            if settings.puct:
+                action = _puct_action(tree[b, parent], settings)
+            else:
+                action = _gumbel_interior_action(tree[b, parent], settings, scores)
         _attach(tree, b, index, parent, action)
-        actions[b], rows[b] = action, parent * len(tree) + b
+        actions[b], parents[b] = action, parent
 
 
 @compiled
-def simulate_puct(tree: np.ndarray, index: int, settings: PUCTSettings, actions: np.ndarray, rows: np.ndarray) -> None:
-    """As `simulate_gumbel`, with the upper confidence bounds of Schrittwieser et al. (2020)."""
-    for b in range(len(tree)):
-        parent, action = ROOT, _puct_action(tree[b, ROOT], settings)
-        while tree[b, parent].children[action] != UNVISITED:
-            parent = tree[b, parent].children[action]
-            action = _puct_action(tree[b, parent], settings)
-        _attach(tree, b, index, parent, action)
-        actions[b], rows[b] = action, parent * len(tree) + b
+def expand_and_backward(tree: np.ndarray, index: int, numbers: np.ndarray) -> None:
+    """Expands the nodes that were attached last, and updates the mean values on their paths to the roots.
 
-
-@compiled
-def expand_and_backward(
-    tree: np.ndarray,
-    index: int,
-    rewards: np.ndarray,
-    discounts: np.ndarray,
-    prior_logits: np.ndarray,
-    values: np.ndarray,
-) -> None:
-    """Expands the nodes that were attached last, and updates the mean values on their paths to the roots."""
+    `numbers` `[B, 3 + A]` are the reward and the discount of the step to a node, its value, the logits of its policy.
+    """
     for b in range(len(tree)):
         node = tree[b, index]
-        node.reward, node.discount = rewards[b], discounts[b]
-        _expand(node, prior_logits[b], values[b])
+        node.reward, node.discount = numbers[b, 0], numbers[b, 1]
+        _expand(node, numbers[b])
         _backward(tree, b, index)
 
 
@@ -138,7 +125,7 @@ def expand_and_backward(
 def gumbel_decision(
     tree: np.ndarray,
     gumbel: np.ndarray,
-    settings: GumbelSettings,
+    settings: Settings,
     actions: np.ndarray,
     action_weights: np.ndarray,
     qvalues: np.ndarray,
@@ -175,14 +162,13 @@ def _attach(tree: np.ndarray, b: int, index: int, parent: int, action: int) -> N
 
 
 @inlined
-def _expand(node: Any, prior_logits: np.ndarray, value: np.float32) -> None:
+def _expand(node: Any, numbers: np.ndarray) -> None:
     node.visits = 1
-    node.raw_value = value
-    node.value = value
+    node.raw_value = node.value = numbers[_FIRST_LOGIT - 1]
     for a in range(len(node.children)):
         node.children[a] = UNVISITED
         node.child_visits[a] = 0
-        node.prior_logits[a] = prior_logits[a]
+        node.prior_logits[a] = numbers[_FIRST_LOGIT + a]
     _softmax(node.prior_logits, node.prior_probs)
 
 
@@ -229,7 +215,7 @@ def _most_visits(node: Any) -> int:
 
 @inlined
 def _gumbel_root_action(
-    root: Any, gumbel: np.ndarray, considered_visit: int, settings: GumbelSettings, scores: np.ndarray
+    root: Any, gumbel: np.ndarray, considered_visit: int, settings: Settings, scores: np.ndarray
 ) -> int:
     """Returns the best action by gumbel + logit + transformed q-value, and writes the last into `scores` `[A]`."""
     _complete(root, settings, scores)
@@ -244,7 +230,7 @@ def _gumbel_root_action(
 
 
 @inlined
-def _gumbel_interior_action(node: Any, settings: GumbelSettings, scores: np.ndarray) -> int:
+def _gumbel_interior_action(node: Any, settings: Settings, scores: np.ndarray) -> int:
     """Returns the action whose visits fall most short of the improved policy (Danihelka et al. 2022, section 5)."""
     _complete(node, settings, scores)
     _transform(node, settings, scores)
@@ -260,7 +246,7 @@ def _gumbel_interior_action(node: Any, settings: GumbelSettings, scores: np.ndar
 
 
 @inlined
-def _complete(node: Any, settings: GumbelSettings, qvalues: np.ndarray) -> None:
+def _complete(node: Any, settings: Settings, qvalues: np.ndarray) -> None:
     """Writes the node's `qvalues` `[A]`; actions not visited get the node's value."""
     value = _mixed_value(node) if settings.use_mixed_value else node.raw_value
     for a in range(len(node.qvalues)):
@@ -282,7 +268,7 @@ def _mixed_value(node: Any) -> np.float32:
 
 
 @inlined
-def _transform(node: Any, settings: GumbelSettings, qvalues: np.ndarray) -> None:
+def _transform(node: Any, settings: Settings, qvalues: np.ndarray) -> None:
     """Scales completed `qvalues` `[A]` in place by the visits of the most visited action."""
     if settings.rescale_values:
         _rescale(qvalues)
@@ -303,7 +289,7 @@ def _rescale(values: np.ndarray) -> None:
 
 
 @inlined
-def _puct_action(node: Any, settings: PUCTSettings) -> int:
+def _puct_action(node: Any, settings: Settings) -> int:
     """Returns the action of the highest upper confidence bound (Schrittwieser et al. 2020, appendix B)."""
     lowest, highest = _value_range(node)
     span = max(highest - lowest, _LEAST_RANGE)
