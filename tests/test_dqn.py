@@ -3,9 +3,9 @@
 import numpy as np
 import torch
 from acting import inputs_of
-from mazebench_agents.dqn import DQN, MAH
+from mazebench_agents.dqn import DQN, MAH, MAHPaper
 from mazebench_agents.dqn.learner import double_q_target
-from mazebench_agents.dqn.network import QNetwork
+from mazebench_agents.dqn.network import ReadingQNetwork
 from small_world import learn
 
 
@@ -18,7 +18,7 @@ def test_double_q_target_by_hand():
 
 def test_network_with_the_true_scale_reads_the_map_where_the_agent_is():
     torch.manual_seed(0)
-    network = QNetwork(4, 8)
+    network = ReadingQNetwork(8, 4)
     with torch.no_grad():
         network.scale.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))  # times 5: a cell a metre, y up
         network.sharpness.fill_(20.0)
@@ -35,7 +35,7 @@ def test_network_with_the_true_scale_reads_the_map_where_the_agent_is():
 
 
 def test_network_takes_the_middle_of_the_map_for_a_start_that_is_not_marked():
-    network = QNetwork(4, 8)
+    network = ReadingQNetwork(8, 4)
     context = torch.zeros(2, 4, 7, 7)
     context[:, 2, 1, 5] = context[1, 3, 0, 0] = 1
     assert network.locate(torch.zeros(2, 1, 2), network.encode(context))[:, 0].tolist() == [[3.0, 3.0], [0.0, 0.0]]
@@ -45,6 +45,19 @@ def test_network_without_context_does_not_depend_on_it():
     agent = DQN(DQN.default_config, 13)
     assert agent.initial_state(2).code is None
     assert not any("encoder" in name for name, _ in agent.network.named_parameters())
+
+
+def test_mah_paper_has_one_code_of_the_context_and_no_position():
+    agent = MAHPaper(MAHPaper.default_config, 7)
+    torch.manual_seed(0)
+    contexts = (torch.rand(2, 4, 7, 7) < 0.3).float()
+    code = agent.network.encode(contexts)
+    assert code.shape == (2, 256)
+    assert not torch.equal(code[0], code[1])
+    assert not any("scale" in name for name, _ in agent.network.named_parameters())
+    state = torch.zeros(2, 3, 9)
+    assert agent.network(state, code).shape == (2, 3, 6)
+    assert not torch.equal(agent.network(state, code)[0], agent.network(state, code)[1])
 
 
 def test_mah_after_a_minute_beats_random_in_a_small_maze():

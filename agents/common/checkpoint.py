@@ -69,6 +69,19 @@ def load_agent(path: pathlib.Path, agent: str, default: Config) -> tuple[dict[st
     return tensors, config, context_size
 
 
+def check_size(path: pathlib.Path, trained_size: int, size: int) -> None:
+    """Checks the side of contexts, for a network that serves those that it was trained on only.
+
+    Raises:
+      InputError: if the sizes differ.
+    """
+    if size != trained_size:
+        raise InputError(
+            f"{path}: expected contexts of {trained_size} x {trained_size}, the only ones that its network serves, "
+            f"found {size} x {size}"
+        )
+
+
 def check_shapes(path: pathlib.Path, make: Callable[[], torch.nn.Module], tensors: Mapping[str, torch.Tensor]) -> None:
     """Checks that `tensors` are those of the network that `make` makes, without memory for the network.
 

@@ -1,5 +1,5 @@
 """The paper's two model-free agents."""
 
-from .dqn import DQN, MAH
+from .dqn import DQN, MAH, MAHPaper
 
-__all__ = ["DQN", "MAH"]
+__all__ = ["DQN", "MAH", "MAHPaper"]

@@ -17,12 +17,12 @@ from mazebench.agent import Inputs, Interface
 from mazebench.maps.maze import Maze
 
 from ..common.actor import NetworkAgent
-from ..common.checkpoint import check_shapes, load_agent, load_into
+from ..common.checkpoint import check_shapes, check_size, load_agent, load_into
 from ..common.layers import in_batches, state_features
 from ..common.overrides import override
 from .config import DQNConfig
 from .learner import DQNLearner
-from .network import NUM_ACTIONS, QNetwork
+from .network import NUM_ACTIONS, JoinedQNetwork, QNetwork, ReadingQNetwork
 
 _CONTEXTS_AT_ONCE = 8  # encoded; few are new in one step
 _STATES_AT_ONCE = 64
@@ -33,7 +33,7 @@ class ActorState:
     """The state of acting in B environments."""
 
     origin: np.ndarray  # [B, 2] float32, x and y observed where the context was new
-    code: torch.Tensor | None  # [B, C + 4, M * M], the encoded contexts; None before the first step, or without context
+    code: torch.Tensor | None  # [B, ...], the encoded contexts; None before the first step, or without context
 
 
 class DQN(NetworkAgent):
@@ -50,7 +50,7 @@ class DQN(NetworkAgent):
         self.trained_size = context_size
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
-            self.network = _network(config)
+            self.network = _network(config, context_size)
         self.explore_from(0, config.num_envs, seed)
 
     @classmethod
@@ -62,7 +62,9 @@ class DQN(NetworkAgent):
         """
         path = cls.default_checkpoint() if checkpoint is None else checkpoint
         tensors, config, trained_size = load_agent(path, cls.name, cls.default_config)
-        check_shapes(path, lambda: _network(config), tensors)
+        if config.use_context and not config.reading:
+            check_size(path, trained_size, interface.context_size)
+        check_shapes(path, lambda: _network(config, trained_size), tensors)
         agent = cls(config, trained_size, seed)
         load_into(path, agent.network, tensors)
         return agent
@@ -107,5 +109,18 @@ class MAH(DQN):
     default_config = DQNConfig()
 
 
-def _network(config: DQNConfig) -> QNetwork:
-    return QNetwork(config.channels if config.use_context else 0, config.hidden)
+class MAHPaper(DQN):
+    """MAH with the paper's choices where it states them."""
+
+    name = "mah-paper"
+    default_config = DQNConfig(
+        reading=False, n_step=1, num_goals=1, relabel_start=False, symmetries=False, localization_weight=0.0
+    )
+
+
+def _network(config: DQNConfig, context_size: int) -> QNetwork:
+    if not config.use_context:
+        return QNetwork(config.hidden)
+    if config.reading:
+        return ReadingQNetwork(config.hidden, config.channels)
+    return JoinedQNetwork(config.hidden, config.channels, context_size)

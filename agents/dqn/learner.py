@@ -42,7 +42,7 @@ class DQNLearner(HindsightLearner):
         td_loss = (weight * functional.smooth_l1_loss(q_tm1, target, reduction="none")).sum() / valid.sum().clamp(min=1)
         metrics = {"td_loss": td_loss, "q": q_tm1.mean()}
         loss = td_loss
-        if code is not None:
+        if code is not None and config.reading:
             metrics["localization_error"] = self._localization_error(sample, turned, features, code)
             loss = loss + config.localization_weight * metrics["localization_error"]
         metrics["gradient_norm"] = self._descend(loss)

@@ -1,6 +1,7 @@
-"""The Q-network: features of the map at the estimated position, joined with the state.
+"""The Q-networks: of the state alone, with the map's features at the estimated position, or with a code of the context.
 
-`G` is the number of contexts, `K` of states in each, `M` the side of the context, `C` of channels.
+`G` is the number of contexts, `K` of states in each, `M` the side of the context, `C` of channels, `Q` of numbers of a
+code.
 """
 
 from __future__ import annotations
@@ -15,27 +16,51 @@ from ..common.layers import NUM_WAVES, MapEncoder, marked_position, position_cod
 NUM_STATE_FEATURES = 7
 NUM_ACTIONS = 6
 # Dilations of the 3 x 3 convolutions; together they see 19 cells far, across a 13 x 13 map.
-_DILATIONS = (1, 1, 2, 2, 4, 4, 2, 1, 1)
+_FAR = (1, 1, 2, 2, 4, 4, 2, 1, 1)
+_NEAR = (1, 1, 1, 1)
+_CODE = 256  # numbers of a code of the whole context
 _SCALE_RATE = 5.0  # how much faster the scale is learned than weights of order one tenth are
 _VALUE_SCALE = 10.0  # steps; outputs of order one then span the values that matter
 
 
 class QNetwork(nn.Module):
-    """Dueling action values (Wang et al. 2016); with `channels` 0 of the state alone, without context."""
+    """Dueling action values (Wang et al. 2016) of the state alone; subclasses add what they read of a context."""
 
-    def __init__(self, channels: int, hidden: int):
+    def __init__(self, hidden: int, num_read: int = 0):
+        """`num_read` is the number of inputs from a context."""
         super().__init__()
-        self.channels = channels
-        num_inputs = NUM_STATE_FEATURES
-        if channels:
-            self.encoder = MapEncoder(channels, _DILATIONS)
-            # The estimated position on the map is the start plus a learned linear map of the displacement.
-            self.scale = nn.Parameter(torch.zeros(2, 2))
-            self.sharpness = nn.Parameter(torch.tensor(0.0))
-            num_inputs += channels + 2 + NUM_WAVES
+        num_inputs = NUM_STATE_FEATURES + num_read
         self.body = nn.Sequential(nn.Linear(num_inputs, hidden), nn.ReLU(), nn.Linear(hidden, hidden), nn.ReLU())
         self.value = nn.Linear(hidden, 1)
         self.advantage = nn.Linear(hidden, NUM_ACTIONS)
+
+    def forward(self, state: torch.Tensor, code: torch.Tensor | None = None) -> torch.Tensor:
+        """Returns action values `[G, K, 6]` of states `[G, K, 9]` (see `state_features`) in encoded contexts."""
+        features = state[..., 2:]
+        if code is not None:
+            features = torch.cat([features, self.read(state[..., :2], code)], dim=-1)
+        hidden = self.body(features)
+        advantage = self.advantage(hidden)
+        return _VALUE_SCALE * (self.value(hidden) + advantage - advantage.mean(dim=-1, keepdim=True))
+
+    def encode(self, context: torch.Tensor) -> torch.Tensor:
+        """Returns codes `[G, ...]` of contexts `[G, 4, M, M]`."""
+        raise NotImplementedError
+
+    def read(self, moved: torch.Tensor, code: torch.Tensor) -> torch.Tensor:
+        """Returns inputs `[G, K, ...]` from encoded contexts, after displacements `moved` `[G, K, 2]` (m)."""
+        raise NotImplementedError
+
+
+class ReadingQNetwork(QNetwork):
+    """Reads features of the map at the estimated position: the start plus a learned linear map of the displacement."""
+
+    def __init__(self, hidden: int, channels: int):
+        super().__init__(hidden, channels + 2 + NUM_WAVES)
+        self.channels = channels
+        self.encoder = MapEncoder(channels, _FAR)
+        self.scale = nn.Parameter(torch.zeros(2, 2))
+        self.sharpness = nn.Parameter(torch.tensor(0.0))
 
     def encode(self, context: torch.Tensor) -> torch.Tensor:
         """Returns codes `[G, C + 4, M * M]` of contexts: features of the map, positions of start and goal."""
@@ -43,16 +68,6 @@ class QNetwork(nn.Module):
         positions = [marked_position(context[:, plane]) for plane in (3, 2)]  # start, goal
         size = planes.shape[-1]
         return torch.cat([planes, torch.cat(positions, dim=-1)[:, :, None].expand(-1, -1, size)], dim=1)
-
-    def forward(self, state: torch.Tensor, code: torch.Tensor | None = None) -> torch.Tensor:
-        """Returns action values `[G, K, 6]` of states `[G, K, 9]` (see `state_features`) in encoded contexts."""
-        features = state[..., 2:]
-        if self.channels:
-            assert code is not None
-            features = torch.cat([features, self.read(state[..., :2], code)], dim=-1)
-        hidden = self.body(features)
-        advantage = self.advantage(hidden)
-        return _VALUE_SCALE * (self.value(hidden) + advantage - advantage.mean(dim=-1, keepdim=True))
 
     def locate(self, moved: torch.Tensor, code: torch.Tensor) -> torch.Tensor:
         """Returns estimated positions `[G, K, 2]` (row, column) on the map after displacements `moved` (m)."""
@@ -66,3 +81,20 @@ class QNetwork(nn.Module):
         local = where @ code[:, : self.channels].transpose(1, 2)
         to_goal = (code[:, self.channels + 2 :, 0][:, None] - position) / 10.0
         return torch.cat([local, to_goal, waves(moved)], dim=-1)
+
+
+class JoinedQNetwork(QNetwork):
+    """Joins the state with one code of the whole context, of a fixed size."""
+
+    def __init__(self, hidden: int, channels: int, context_size: int):
+        super().__init__(hidden, _CODE + NUM_WAVES)
+        self.encoder = MapEncoder(channels, _NEAR)
+        self.embedding = nn.Sequential(nn.Linear(channels * context_size**2, _CODE), nn.LayerNorm(_CODE))
+
+    def encode(self, context: torch.Tensor) -> torch.Tensor:
+        """Returns codes `[G, Q]` of contexts."""
+        return self.embedding(self.encoder(context).flatten(1))
+
+    def read(self, moved: torch.Tensor, code: torch.Tensor) -> torch.Tensor:
+        """Returns `[G, K, Q + 16]`: the code, and waves of `moved`."""
+        return torch.cat([code[:, None].expand(-1, moved.shape[1], -1), waves(moved)], dim=-1)

@@ -14,11 +14,10 @@ import numpy as np
 import torch
 
 from mazebench.agent import Inputs, Interface, Observation
-from mazebench.errors import InputError
 from mazebench.maps.maze import Maze
 
 from ..common.actor import NetworkAgent
-from ..common.checkpoint import load_agent, load_into
+from ..common.checkpoint import check_size, load_agent, load_into
 from ..common.layers import in_batches, marked_position, state_features
 from ..common.overrides import override
 from .config import MMNConfig, PaperConfig, PlanningConfig
@@ -68,11 +67,8 @@ class MMN(NetworkAgent):
         """
         path = cls.default_checkpoint() if checkpoint is None else checkpoint
         tensors, config, trained_size = load_agent(path, cls.name, cls.default_config)
-        if not cls.network_class.serves_any_size and interface.context_size != trained_size:
-            raise InputError(
-                f"{path}: expected contexts of {trained_size} x {trained_size}, the only ones that its hypermodel "
-                f"serves, found {interface.context_size} x {interface.context_size}"
-            )
+        if not cls.network_class.serves_any_size:
+            check_size(path, trained_size, interface.context_size)
         agent = cls(config, trained_size, seed)
         load_into(path, agent.network, tensors)
         return agent
