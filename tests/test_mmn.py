@@ -319,7 +319,7 @@ def test_agent_with_one_code_a_context_says_which_sizes_it_serves(tmp_path, maze
 def test_paper_has_what_the_paper_states():
     paper = PaperConfig()
     assert paper.value_target == "n_step"
-    assert (paper.num_goals, paper.relabel_start, paper.keep_anchor) == (1, False, False)
+    assert (paper.model_weight, paper.relabel_start, paper.n_step) == (1, False, 5)
 
 
 def test_every_weight_of_the_papers_transition_is_generated():

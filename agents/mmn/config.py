@@ -152,9 +152,8 @@ class PaperConfig(PlanningConfig):
     hyper_rate: float = 0.1  # times the learning rate, for the weights of the layer that generates weights: a step of
     # Adam moves each generated weight by the L1 norm of the code
     scale_rate: float = 2.0  # times the learning rate, for the map's scale
-    num_goals: int = 1  # as in the paper
+    num_eval_simulations: int = 64  # here, search improves on the policy
     relabel_start: bool = False  # as in the paper
-    keep_anchor: bool = False  # as in the paper, which takes each context's start
     sequence_steps: int = 10  # two unrolls
     unroll: int = 5  # as many as n_step
     value_target: str = "n_step"  # as in the paper
