@@ -24,6 +24,12 @@ def agent_names() -> list[str]:
     return sorted(_entry_points())
 
 
+def package_of(name: str) -> str | None:
+    """Returns name and version of the distribution that brings an installed agent; None if that is not known."""
+    dist = _entry_points()[name].dist
+    return f"{dist.name} {dist.version}" if dist else None
+
+
 def learning_agents() -> list[str]:
     """Returns the names of the installed agents that learn; loads all whose dependencies are installed."""
     found = []

@@ -31,19 +31,27 @@ _FREQUENCIES = (np.float32(0.25), np.float32(0.5), np.float32(1.0), np.float32(2
 _TURN = np.float32(2 * math.pi)
 _SCALE_RATE = np.float32(5.0)  # of `network.Network`
 _NEGLIGIBLE = np.float32(-20.0)  # logits so far below the highest have no weight in float32
-_TREES_AT_ONCE = 16  # so that what they read of their contexts stays in the processor's cache
-_ROWS_AT_ONCE = 4  # in a product, whose sums are then in registers
+_TREES_AT_ONCE = 32  # so that what they read of their contexts stays in the processor's cache
+_ROWS_AT_ONCE = 4  # in a product, and
+_PANEL = 2 * LANES  # columns, whose sums are then in registers
 
 
 _kernel = functools.partial(kernels.compiled, fused=True)
 _inlined = functools.partial(kernels.compiled, inline=True, fused=True)
 
 
-class Layer(NamedTuple):
+class Linear(NamedTuple):
     """A linear layer."""
 
     weight: np.ndarray  # [inputs, outputs] float32
     bias: np.ndarray  # [outputs] float32
+
+
+class Layer(NamedTuple):
+    """A linear layer for `_affine`, in panels of 16 outputs; the last ones may be zeros."""
+
+    weight: np.ndarray  # [panels, inputs, 16] float32
+    bias: np.ndarray  # [16 panels] float32
 
 
 class Heads(NamedTuple):
@@ -69,14 +77,14 @@ class MMNModel(NamedTuple):
     num_bins: int  # of categorical values
     scale: np.ndarray
     sharpness: np.ndarray  # [1], after softplus
-    free: Layer
+    free: Linear
     free_by_action: np.ndarray
-    ahead: Layer
+    ahead: Linear
     inputs: Layer
     actions: np.ndarray
     later_1: Layer
     later_2: Layer
-    normalize: Layer  # weight [1, D - 7]
+    normalize: Linear  # weight [1, D - 7]
     heads: Heads
 
 
@@ -129,11 +137,16 @@ class CompiledModel(SearchableModel):
         _search(tree, gumbel, visits, settings, embedding.numpy(), self._step, self._model)
 
 
-def layer_of(module: Any) -> Layer:
-    """Returns the weights of a linear module, with columns of zeros up to a multiple of 8."""
-    weight, bias = module.weight.detach().T, module.bias.detach()
-    padding = (0, -len(bias) % LANES)
-    return Layer(*(functional.pad(part, padding).contiguous().numpy() for part in (weight, bias)))
+def linear_of(module: Any) -> Linear:
+    """Returns the weights of a linear module."""
+    return Linear(module.weight.detach().T.contiguous().numpy(), module.bias.detach().numpy())
+
+
+def layer_of(weight: torch.Tensor, bias: torch.Tensor) -> Layer:
+    """Returns a layer with weights `[outputs, inputs]` and biases `[outputs]`."""
+    padding = -len(bias) % _PANEL
+    panels = functional.pad(weight.detach(), (0, 0, 0, padding)).unflatten(0, (-1, _PANEL)).transpose(1, 2)
+    return Layer(panels.contiguous().numpy(), functional.pad(bias.detach(), (0, padding)).numpy())
 
 
 @_kernel
@@ -178,7 +191,7 @@ def mmn_step(
     num_rows, num_hidden = len(embeddings), len(model.ahead.bias)
     num_latent = embeddings.shape[2] - num_hidden
     free, change = np.empty((num_rows, 6), np.float32), _scratch(num_rows, len(model.later_2.bias))
-    hidden_1, hidden_2 = _scratch(num_rows, num_hidden), _scratch(num_rows, num_hidden)
+    hidden_1, hidden_2 = _scratch(num_rows, num_hidden), _scratch(num_rows, len(model.later_1.bias))
     for b in range(num_rows):
         before, a = embeddings[b, parents[b]], actions[b]
         _move_freely(before, model.free.weight, model.free.bias, model.free_by_action[a], free[b])
@@ -204,8 +217,9 @@ def mmn_arrive(model: MMNModel, first: int, embeddings: np.ndarray, index: int, 
     contexts, num_rows = model.contexts, len(embeddings)
     num_hidden = len(model.ahead.bias)
     num_latent = embeddings.shape[2] - num_hidden
-    read, hidden = np.empty((num_rows, contexts.table.shape[2]), np.float32), _scratch(num_rows, num_hidden)
-    inputs = _scratch(num_rows, len(model.heads.body_1.weight))
+    read = np.empty((num_rows, contexts.table.shape[2]), np.float32)
+    hidden = _scratch(num_rows, len(model.inputs.bias))
+    inputs = _scratch(num_rows, model.heads.body_1.weight.shape[1])
     for b in range(num_rows):
         latent, x, c = embeddings[b, index], inputs[b], (first + b) // contexts.num_roots
         positions = contexts.positions[c]
@@ -275,11 +289,11 @@ def paper_arrive(model: PaperModel, first: int, embeddings: np.ndarray, index: i
     contexts, num_rows, num_hidden = model.contexts, len(embeddings), model.num_hidden
     num_latent, num_periods, num_widths = embeddings.shape[2] - num_hidden, len(model.periods), len(model.widths)
     num_inputs, num_codes = num_latent + 6 + 4 * num_periods, model.task.shape[1]
-    num_features = len(model.heads.body_1.weight) - num_inputs - 2 - num_widths - num_codes
+    num_features = model.heads.body_1.weight.shape[1] - num_inputs - 2 - num_widths - num_codes
     num_generated = contexts.table.shape[2] - num_features  # of a row of the table
     size = np.float32(math.sqrt(contexts.table.shape[1]))
     read = np.empty(contexts.table.shape[2], np.float32)
-    inputs = _scratch(num_rows, len(model.heads.body_1.weight))
+    inputs = _scratch(num_rows, model.heads.body_1.weight.shape[1])
     for b in range(num_rows):
         embedding, x, c = embeddings[b, index], inputs[b], (first + b) // contexts.num_roots
         positions = contexts.positions[c]
@@ -348,41 +362,30 @@ def stand_in_arrive(model: StandIn, first: int, embeddings: np.ndarray, index: i
 
 @_kernel
 def _affine(x: np.ndarray, layer: Layer, rectified: bool, out: np.ndarray) -> None:
-    """Writes a layer's outputs for `_ROWS_AT_ONCE` rows or a multiple; a row's sums are in the same order everywhere.
+    """Writes a layer's outputs for rows in number a multiple of 4; a row's sums are in the same order everywhere.
 
-    `x` `[rows, inputs or more]` and `out` `[rows, outputs]` are contiguous.
+    `x` `[rows, inputs or more]` and `out` `[rows, outputs, with padding]` are contiguous.
     """
-    weight, bias = layer
-    num_inputs, num_outputs = weight.shape
-    weights, outputs = weight.reshape(-1), out.reshape(-1)
-    for r in range(0, len(x), _ROWS_AT_ONCE):
-        x_1, x_2, x_3, x_4 = x[r], x[r + 1], x[r + 2], x[r + 3]
-        j = 0
-        while j + 2 * LANES <= num_outputs:
-            a_1 = a_2 = a_3 = a_4 = load(bias, j)
-            b_1 = b_2 = b_3 = b_4 = load(bias, j + LANES)
+    num_panels, num_inputs, _ = layer.weight.shape
+    weights, outputs, width = layer.weight.reshape(-1), out.reshape(-1), out.shape[1]
+    for panel in range(num_panels):
+        column = panel * _PANEL
+        for r in range(0, len(x), _ROWS_AT_ONCE):
+            x_1, x_2, x_3, x_4 = x[r], x[r + 1], x[r + 2], x[r + 3]
+            a_1 = a_2 = a_3 = a_4 = load(layer.bias, column)
+            b_1 = b_2 = b_3 = b_4 = load(layer.bias, column + LANES)
             for k in range(num_inputs):
-                a, b = load(weights, k * num_outputs + j), load(weights, k * num_outputs + j + LANES)
+                begin = (panel * num_inputs + k) * _PANEL
+                a, b = load(weights, begin), load(weights, begin + LANES)
                 a_1, b_1 = lanes.add_product(x_1[k], a, a_1), lanes.add_product(x_1[k], b, b_1)
                 a_2, b_2 = lanes.add_product(x_2[k], a, a_2), lanes.add_product(x_2[k], b, b_2)
                 a_3, b_3 = lanes.add_product(x_3[k], a, a_3), lanes.add_product(x_3[k], b, b_3)
                 a_4, b_4 = lanes.add_product(x_4[k], a, a_4), lanes.add_product(x_4[k], b, b_4)
-            end = r * num_outputs + j
+            end = r * width + column
             for a, b in ((a_1, b_1), (a_2, b_2), (a_3, b_3), (a_4, b_4)):
                 store(outputs, end, a)
                 store(outputs, end + LANES, b)
-                end += num_outputs
-            j += 2 * LANES
-        if j < num_outputs:
-            a_1 = a_2 = a_3 = a_4 = load(bias, j)
-            for k in range(num_inputs):
-                a = load(weights, k * num_outputs + j)
-                a_1, a_2 = lanes.add_product(x_1[k], a, a_1), lanes.add_product(x_2[k], a, a_2)
-                a_3, a_4 = lanes.add_product(x_3[k], a, a_3), lanes.add_product(x_4[k], a, a_4)
-            end = r * num_outputs + j
-            for a in (a_1, a_2, a_3, a_4):
-                store(outputs, end, a)
-                end += num_outputs
+                end += width
     if rectified:
         _rectify(outputs)
 
@@ -406,6 +409,12 @@ def _add_product(x: np.ndarray, weight: np.ndarray, out: np.ndarray) -> None:
         store(out, j + 2 * LANES, c)
         store(out, j + 3 * LANES, d)
         j += 4 * LANES
+    while j + LANES <= num_outputs:
+        a = load(out, j)
+        for k in range(num_inputs):
+            a = lanes.add_product(x[k], load(weights, k * num_outputs + j), a)
+        store(out, j, a)
+        j += LANES
     for k in range(num_inputs):
         for i in range(j, num_outputs):
             out[i] += x[k] * weight[k, i]

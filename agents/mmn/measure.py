@@ -25,7 +25,7 @@ from mazebench.maps.benchmark import load_mazes
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 
-from .compiled import CompiledModel, Heads, Layer, StandIn, stand_in_arrive, stand_in_step
+from .compiled import CompiledModel, Heads, StandIn, layer_of, stand_in_arrive, stand_in_step
 from .learner import MMNLearner
 from .search import gumbel_muzero_policy, muzero_policy
 
@@ -69,8 +69,13 @@ def stand_in(batch_size: int) -> CompiledModel:
     """Returns the stand-in as kernels."""
     # Tensors are aligned in memory, as those of a network are.
     arrays = {name: torch.tensor(array).numpy() for name, array in random_weights(batch_size).items()}
-    heads = (Layer(arrays[name], np.zeros(arrays[name].shape[1], np.float32)) for name in _HEADS)
-    model = StandIn(arrays["transition_1"], arrays["transition_2"], NUM_BINS, Heads(*heads))
+    heads = (torch.from_numpy(arrays[name]).T for name in _HEADS)
+    model = StandIn(
+        arrays["transition_1"],
+        arrays["transition_2"],
+        NUM_BINS,
+        Heads(*(layer_of(weight, torch.zeros(len(weight))) for weight in heads)),
+    )
     return CompiledModel(model, 0, stand_in_step, stand_in_arrive)
 
 

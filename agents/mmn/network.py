@@ -144,7 +144,8 @@ class Network(nn.Module, abc.ABC):
         return _SCALE_RATE * (moved[..., None] * self.scale).sum(-2)
 
     def _compiled_heads(self) -> Heads:
-        return Heads(layer_of(self.body[0]), layer_of(self.body[2]), layer_of(self.heads))
+        modules: Any = (self.body[0], self.body[2], self.heads)
+        return Heads(*(layer_of(module.weight, module.bias) for module in modules))
 
     def _make_heads(self, num_inputs: int, num_outputs: int, config: PlanningConfig) -> None:
         """Makes `body` and `heads`, whose first outputs are those of policy and value; at first they are constant."""

@@ -7,14 +7,14 @@ transition's hidden layer, `P` the number of propagated distances, `T` of featur
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import nn
 from torch.nn import functional
 
 from ..common.layers import NUM_PLANES, NUM_WAVES, MapEncoder, waves
-from .compiled import CompiledModel, Contexts, Layer, MMNModel, layer_of, mmn_arrive, mmn_step
+from .compiled import CompiledModel, Contexts, Linear, MMNModel, layer_of, linear_of, mmn_arrive, mmn_step
 from .config import MMNConfig
 from .network import (
     NUM_ACTIONS,
@@ -113,20 +113,20 @@ class MMNNetwork(Network):
 
     def compiled(self, code: Code, num_roots: int) -> CompiledModel:
         """Returns the model as kernels, with the weights as they are now."""
-        transition = self.hypermodel.transition
+        transition: Any = self.hypermodel.transition
         model = MMNModel(
             Contexts(code.positions.numpy(), code.weights.numpy(), num_roots),
             self.num_bins,
             self.scale.detach().numpy(),
             functional.softplus(self.hypermodel.sharpness.detach() + 1.0).reshape(1).numpy(),
-            layer_of(self.free),
+            linear_of(self.free),
             self.free_by_action.weight.detach().numpy(),
-            layer_of(self.ahead),
-            layer_of(transition.inputs),
+            linear_of(self.ahead),
+            layer_of(transition.inputs.weight, transition.inputs.bias),
             transition.actions.weight.detach().numpy(),
-            layer_of(transition.later[0]),
-            layer_of(transition.later[2]),
-            Layer(self.normalize.weight.detach().numpy()[None], self.normalize.bias.detach().numpy()),
+            layer_of(transition.later[0].weight, transition.later[0].bias),
+            layer_of(transition.later[2].weight, transition.later[2].bias),
+            Linear(self.normalize.weight.detach().numpy()[None], self.normalize.bias.detach().numpy()),
             self._compiled_heads(),
         )
         return CompiledModel(model, self.ahead.out_features, mmn_step, mmn_arrive)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import hashlib
 import inspect
 import json
@@ -12,11 +11,11 @@ import pathlib
 import platform
 import struct
 import sys
-from collections.abc import Mapping
 from importlib import metadata
 from typing import Any
 
 from mazebench.agent import Agent
+from mazebench.agent_loading import package_of
 from mazebench.errors import InputError
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.records import Provenance
@@ -43,7 +42,7 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
         "checkpoint_sha256": file_hash(options.checkpoint),
         "checkpoint_metadata": checkpoint_metadata(options.checkpoint),
         "agent_class": f"{agent_class.__module__}:{agent_class.__qualname__}",
-        "agent_package": _package_of(agent_class),
+        "agent_package": _package_of(options.agent, agent_class),
         "agent_code_sha256": code_hash(options, agent_class),
         "seed": options.seed,
         # With the distances and the time limit that are played, of which the options may only say to choose them.
@@ -108,15 +107,12 @@ def checkpoint_metadata(path: str | None) -> dict[str, Any] | None:
         return None
 
 
-def _package_of(agent_class: type[Agent]) -> str | None:
+def _package_of(name: str, agent_class: type[Agent]) -> str | None:
     """Returns name and version of the distribution that an installed agent belongs to."""
-    names = _distributions().get(agent_class.__module__.partition(".")[0])
+    if ":" not in name:
+        return package_of(name)
+    names = metadata.packages_distributions().get(agent_class.__module__.partition(".")[0])  # takes 0.4 s
     return f"{names[0]} {_version(names[0])}" if names else None
-
-
-@functools.cache
-def _distributions() -> Mapping[str, list[str]]:
-    return metadata.packages_distributions()
 
 
 def _version(package: str) -> str | None:
