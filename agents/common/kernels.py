@@ -1,7 +1,7 @@
 """Compilation of kernels to machine code, which is kept on disk.
 
 Numba notices when a kernel's file changes, but not when a module does that the kernel uses. So the kernels of a file
-are kept in a folder that is named after the contents of the file and of the modules of this package that it imports.
+are kept in a folder that is named after the contents of the file and of the modules of this package that it uses.
 """
 
 from __future__ import annotations
@@ -82,17 +82,24 @@ def _cached(compile_with: Callable[..., Any], function: Callable[..., Any], **op
 
 def _cache_folder(function: Callable[..., Any], given: str) -> pathlib.Path:
     """Returns a folder below the `given` one, or else beside Python's own compiled files."""
-    package = __name__.partition(".")[0]
-    names = {function.__module__}
-    for value in function.__globals__.values():
-        name = value.__name__ if inspect.ismodule(value) else getattr(value, "__module__", None)
-        if isinstance(name, str) and name.startswith(f"{package}."):
-            names.add(name)
     digest = hashlib.sha256()
-    for name in sorted(names):
+    for name in sorted(_used_by(function.__module__)):
         digest.update(_source(str(sys.modules[name].__file__)))
     parent = pathlib.Path(given) if given else pathlib.Path(function.__code__.co_filename).parent / "__pycache__"
     return parent / f"kernels-{digest.hexdigest()[:16]}"
+
+
+def _used_by(module: str) -> set[str]:
+    """Returns the names of a module and of those of this package that it uses, directly or not."""
+    package = __name__.partition(".")[0]
+    found, left = {module}, [module]
+    while left:
+        for value in vars(sys.modules[left.pop()]).values():
+            name = value.__name__ if inspect.ismodule(value) else getattr(value, "__module__", None)
+            if isinstance(name, str) and name.startswith(f"{package}.") and name not in found:
+                found.add(name)
+                left.append(name)
+    return found
 
 
 @functools.cache

@@ -61,8 +61,8 @@ def store(_: Any, array: Any, index: Any, values: Any) -> Any:
 
 
 @_typed
-def add_product(_: Any, number: Any, values: Any, total: Any) -> Any:
-    """Returns `total` plus a number times `values`, rounded once if the processor can."""
+def add_scaled(_: Any, number: Any, values: Any, total: Any) -> Any:
+    """Returns `total` plus `number` times `values`, rounded once if the processor can."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         number, values, total = arguments

@@ -25,7 +25,9 @@ from mazebench.maps.benchmark import load_mazes
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 
-from .compiled import CompiledModel, Heads, StandIn, layer_of, stand_in_arrive, stand_in_step
+from .compiled import stand_in as compiled
+from .compiled.model import CompiledModel
+from .compiled.parts import Heads, layer_of
 from .learner import MMNLearner
 from .search import gumbel_muzero_policy, muzero_policy
 
@@ -70,13 +72,13 @@ def stand_in(batch_size: int) -> CompiledModel:
     # Tensors are aligned in memory, as those of a network are.
     arrays = {name: torch.tensor(array).numpy() for name, array in random_weights(batch_size).items()}
     heads = (torch.from_numpy(arrays[name]).T for name in _HEADS)
-    model = StandIn(
+    model = compiled.StandIn(
         arrays["transition_1"],
         arrays["transition_2"],
         NUM_BINS,
         Heads(*(layer_of(weight, torch.zeros(len(weight))) for weight in heads)),
     )
-    return CompiledModel(model, 0, stand_in_step, stand_in_arrive)
+    return CompiledModel(model, 0, compiled.step, compiled.arrive)
 
 
 def measure(seconds: float, build_learner: Callable[..., MMNLearner]) -> dict[str, list[dict[str, Any]]]:

@@ -14,7 +14,8 @@ import torch
 from torch import nn
 
 from ..common.layers import marked_position
-from .compiled import CompiledModel, Heads, layer_of
+from .compiled.model import CompiledModel
+from .compiled.parts import Heads, layer_of
 from .config import PlanningConfig
 
 NUM_ACTIONS = 6

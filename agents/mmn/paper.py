@@ -15,7 +15,9 @@ from torch import nn
 from torch.nn import functional
 
 from ..common.layers import NUM_PLANES, MapEncoder
-from .compiled import CompiledModel, Contexts, PaperModel, paper_arrive, paper_step
+from .compiled import paper as compiled
+from .compiled.model import CompiledModel
+from .compiled.parts import Contexts
 from .config import PaperConfig
 from .network import (
     NUM_ACTIONS,
@@ -127,19 +129,18 @@ class PaperNetwork(Network):
     def compiled(self, code: Code, num_roots: int) -> CompiledModel:
         """Returns the model as kernels, with the weights as they are now."""
         table = torch.cat([code.rows, code.features], dim=-1)
-        model = PaperModel(
+        model = compiled.PaperModel(
             Contexts(code.positions.numpy(), table.numpy(), num_roots),
             self.num_bins,
-            self._shapes["bias"][1],
             self.scale.detach().numpy(),
             functional.softplus(self.hypermodel.sharpness.detach() + 1.0).reshape(1).numpy(),
             np.array(_PERIODS, np.float32),
             np.array(_WIDTHS, np.float32),
-            code.weights.numpy(),
+            compiled.Generated(**{name: part.contiguous().numpy() for name, part in self._weights(code).items()}),
             code.task.numpy(),
             self._compiled_heads(),
         )
-        return CompiledModel(model, self._shapes["bias"][1], paper_step, paper_arrive)
+        return CompiledModel(model, self._shapes["bias"][1], compiled.step, compiled.arrive)
 
     def _inputs(self, latent: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
         """Returns `[G, K, D + 34]`: the latent state, with 5 m as the unit of the displacement, and the places."""

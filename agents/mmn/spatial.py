@@ -14,7 +14,9 @@ from torch import nn
 from torch.nn import functional
 
 from ..common.layers import NUM_PLANES, NUM_WAVES, MapEncoder, waves
-from .compiled import CompiledModel, Contexts, Linear, MMNModel, layer_of, linear_of, mmn_arrive, mmn_step
+from .compiled import spatial as compiled
+from .compiled.model import CompiledModel
+from .compiled.parts import Contexts, Linear, layer_of, linear_of
 from .config import MMNConfig
 from .network import (
     NUM_ACTIONS,
@@ -114,7 +116,7 @@ class MMNNetwork(Network):
     def compiled(self, code: Code, num_roots: int) -> CompiledModel:
         """Returns the model as kernels, with the weights as they are now."""
         transition: Any = self.hypermodel.transition
-        model = MMNModel(
+        model = compiled.SpatialModel(
             Contexts(code.positions.numpy(), code.weights.numpy(), num_roots),
             self.num_bins,
             self.scale.detach().numpy(),
@@ -129,7 +131,7 @@ class MMNNetwork(Network):
             Linear(self.normalize.weight.detach().numpy()[None], self.normalize.bias.detach().numpy()),
             self._compiled_heads(),
         )
-        return CompiledModel(model, self.ahead.out_features, mmn_step, mmn_arrive)
+        return CompiledModel(model, self.ahead.out_features, compiled.step, compiled.arrive)
 
     def _inputs(self, latent: torch.Tensor) -> torch.Tensor:
         """Returns `[G, K, D + 14]`: heading, velocities, the code of the motion, and waves of the displacement."""

@@ -1,0 +1,1 @@
+"""MMN's models as kernels, for searches on a CPU."""
