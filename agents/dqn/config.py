@@ -43,9 +43,7 @@ class DQNConfig:
     """
 
     use_context: bool = True  # MAH with, DQN-dagger without: the paper's "no task context c provided"
-    reading: bool = (
-        True  # of the map's features at the estimated position; False: one code of the context, as the paper
-    )
+    reading: bool = True  # of the map where the agent is; False, the paper's: one code of the whole context
     channels: int = 32  # of the map encoder
     hidden: int = 256  # units of the two layers after it
     num_envs: int = 128  # side by side, each with its own rate of random actions
