@@ -13,6 +13,7 @@ import threading
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
+from mazebench import stopping
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.chunk import Chunk, Ended, run_chunk, run_whole_chunk
 
@@ -81,9 +82,12 @@ class _Processes:
     def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Ended]]:
         before = multiprocessing.active_children()
         try:
-            with _interrupts_blocked():  # while submitting starts the processes that are needed
+            # Submitting starts the processes that are needed; stopped midway, they would end noisily. A signal that
+            # this thread blocks may still arrive in one of NumPy's threads, and would then be handled here.
+            with stopping.postponing(), _interrupts_blocked():
                 futures = [self._executor.submit(run_whole_chunk, chunk) for chunk in chunks]
                 self._processes += [child for child in multiprocessing.active_children() if child not in before]
+            stopping.check()
         except OSError as error:
             raise RunError(f"can't start {self.num_workers} worker processes: {error.strerror}") from error
         try:
