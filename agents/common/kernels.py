@@ -82,11 +82,16 @@ def _cached(compile_with: Callable[..., Any], function: Callable[..., Any], **op
 
 def _cache_folder(function: Callable[..., Any], given: str) -> pathlib.Path:
     """Returns a folder below the `given` one, or else beside Python's own compiled files."""
-    digest = hashlib.sha256()
-    for name in sorted(_used_by(function.__module__)):
-        digest.update(_source(str(sys.modules[name].__file__)))
     parent = pathlib.Path(given) if given else pathlib.Path(function.__code__.co_filename).parent / "__pycache__"
-    return parent / f"kernels-{digest.hexdigest()[:16]}"
+    return parent / f"kernels-{_digest(function.__module__)}"
+
+
+@functools.cache
+def _digest(module: str) -> str:
+    digest = hashlib.sha256()
+    for name in sorted(_used_by(module)):
+        digest.update(pathlib.Path(str(sys.modules[name].__file__)).read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def _used_by(module: str) -> set[str]:
@@ -100,8 +105,3 @@ def _used_by(module: str) -> set[str]:
                 found.add(name)
                 left.append(name)
     return found
-
-
-@functools.cache
-def _source(file: str) -> bytes:
-    return pathlib.Path(file).read_bytes()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import torch
 from torch import nn
@@ -44,11 +45,16 @@ def marked_position(plane: torch.Tensor) -> torch.Tensor:
     return torch.where(mark[:, None] > 0, position, (size - 1) / 2)
 
 
+def steepness(sharpness: torch.Tensor) -> torch.Tensor:
+    """Returns a positive number for a learned one: how fast the weight of a cell falls with its squared distance."""
+    return functional.softplus(sharpness + 1.0)
+
+
 def position_code(position: torch.Tensor, size: int, sharpness: torch.Tensor) -> torch.Tensor:
     """Returns positions `[G, K, 2]` (row, column) as soft one-hots `[G, K, M * M]` over the cells of a map."""
     cells = torch.arange(size, device=position.device)
     distance = (position[..., None] - cells) ** 2  # [G, K, 2, M]
-    weight = torch.softmax(-distance * functional.softplus(sharpness + 1.0), dim=-1)
+    weight = torch.softmax(-distance * steepness(sharpness), dim=-1)
     # A soft one-hot of the row times one of the column.
     return (weight[..., 0, :, None] * weight[..., 1, None, :]).flatten(-2)
 
@@ -79,13 +85,17 @@ def state_features(state: torch.Tensor, origin: torch.Tensor) -> torch.Tensor:
     )
 
 
-def in_batches(function: Callable[..., torch.Tensor], size: int, *inputs: torch.Tensor) -> torch.Tensor:
+def in_batches(function: Callable[..., Any], size: int, *inputs: torch.Tensor) -> Any:
     """Returns `function` of `inputs` `[B, ...]`, computed on `size` rows at a time, the last ones padded by zeros.
+
+    Its results are tensors `[B, ...]`, or NamedTuples of such.
 
     PyTorch rounds differently at another batch size. With a fixed one, a row's result depends on the row alone.
     """
     num_rows = len(inputs[0])
     padding = -num_rows % size
     padded = [torch.cat([values, values.new_zeros(padding, *values.shape[1:])]) for values in inputs]
-    parts = zip(*(values.split(size) for values in padded), strict=True)
-    return torch.cat([function(*part) for part in parts])[:num_rows]
+    results = [function(*part) for part in zip(*(values.split(size) for values in padded), strict=True)]
+    if isinstance(results[0], torch.Tensor):
+        return torch.cat(results)[:num_rows]
+    return results[0]._make(torch.cat(parts)[:num_rows] for parts in zip(*results, strict=True))

@@ -38,7 +38,7 @@ NUM_BINS = 65  # of values in [-64, 0]
 NUM_SIMULATIONS = 16
 _HEADS = ("head_1", "head_2", "outputs")
 _CASES = (("gumbel", 1), ("gumbel", 64), ("gumbel", 256), ("puct", 64))  # policy, roots
-_ROUNDS = 7  # in which the search, its network and mctx are measured by turns
+_ROUNDS = 7  # in which the search and mctx are measured by turns
 # XLA would use a thread a core.
 _ONE_THREAD = {
     "JAX_PLATFORMS": "cpu",

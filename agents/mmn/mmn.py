@@ -22,7 +22,7 @@ from ..common.layers import in_batches, marked_position, state_features
 from ..common.overrides import override
 from .config import MMNConfig, PaperConfig, PlanningConfig
 from .learner import MMNLearner
-from .network import NUM_ACTIONS, Code, Network, rows_of
+from .network import NUM_ACTIONS, Code, Network
 from .paper import PaperNetwork
 from .planning import plan
 from .spatial import MMNNetwork
@@ -123,23 +123,18 @@ class MMN(NetworkAgent):
         origin = np.where(new_anchor[new, None], observation["state"][new, :2], state.origin[new])
         moved = torch.from_numpy(observation["state"][new, :2] - origin).to(device)
         state.origin[new] = origin
-        for rows in _slices(len(new), _CONTEXTS_AT_ONCE):
-            context = torch.from_numpy(observation["context"][new[rows]]).to(device)
-            start = marked_position(context[:, 3])
-            anchor = start
-            if state.code is not None:
-                old = state.code.positions[torch.from_numpy(new[rows]), :2]
-                kept = self.network.reanchored(old, moved[rows], start)
-                anchor = torch.where(torch.from_numpy(new_anchor[new[rows], None]).to(device), start, kept)
-            code = rows_of(
-                self.network.hypermodel(_padded(context, _CONTEXTS_AT_ONCE), _padded(anchor, _CONTEXTS_AT_ONCE)),
-                slice(len(context)),
-            )
-            if state.code is None:
-                size = len(state.origin)
-                state.code = code._make(part.new_zeros(size, *part.shape[1:]) for part in code)
-            for whole, part in zip(state.code, code, strict=True):
-                whole[torch.from_numpy(new[rows]).to(device)] = part
+        rows = torch.from_numpy(new).to(device)
+        context = torch.from_numpy(observation["context"][new]).to(device)
+        anchor = start = marked_position(context[:, 3])
+        if state.code is not None:
+            kept = self.network.reanchored(state.code.positions[rows, :2], moved, start)
+            anchor = torch.where(torch.from_numpy(new_anchor[new, None]).to(device), start, kept)
+        code = in_batches(self.network.hypermodel, _CONTEXTS_AT_ONCE, context, anchor)
+        if state.code is None:
+            size = len(state.origin)
+            state.code = code._make(part.new_zeros(size, *part.shape[1:]) for part in code)
+        for whole, part in zip(state.code, code, strict=True):
+            whole[rows] = part
 
 
 class MMNPaper(MMN):
@@ -148,13 +143,3 @@ class MMNPaper(MMN):
     name = "mmn-paper"
     default_config = PaperConfig()
     network_class = PaperNetwork
-
-
-def _slices(num_rows: int, size: int) -> list[slice]:
-    return [slice(begin, begin + size) for begin in range(0, num_rows, size)]
-
-
-def _padded(rows: torch.Tensor, size: int) -> torch.Tensor:
-    """Returns `rows` and zeros, `size` rows together."""
-    missing = size - len(rows)
-    return torch.cat([rows, rows.new_zeros(missing, *rows.shape[1:])]) if missing else rows

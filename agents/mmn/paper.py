@@ -14,7 +14,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from ..common.layers import NUM_PLANES, MapEncoder
+from ..common.layers import NUM_PLANES, MapEncoder, steepness
 from .compiled import paper as compiled
 from .compiled.model import CompiledModel
 from .compiled.parts import Contexts
@@ -133,7 +133,7 @@ class PaperNetwork(Network):
             Contexts(code.positions.numpy(), table.numpy(), num_roots),
             self.num_bins,
             self.scale.detach().numpy(),
-            functional.softplus(self.hypermodel.sharpness.detach() + 1.0).reshape(1).numpy(),
+            steepness(self.hypermodel.sharpness.detach()).reshape(1).numpy(),
             np.array(_PERIODS, np.float32),
             np.array(_WIDTHS, np.float32),
             compiled.Generated(**{name: part.contiguous().numpy() for name, part in self._weights(code).items()}),

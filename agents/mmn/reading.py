@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 
 import torch
-from torch.nn import functional
+
+from ..common.layers import steepness
 
 
 def read(position: torch.Tensor, table: torch.Tensor, sharpness: torch.Tensor) -> torch.Tensor:
@@ -19,7 +20,7 @@ def read(position: torch.Tensor, table: torch.Tensor, sharpness: torch.Tensor) -
     """
     size = math.isqrt(table.shape[1])
     position = position.clamp(0, size - 1)
-    sharpness = functional.softplus(sharpness + 1.0)
+    sharpness = steepness(sharpness)
     if position.shape[1] > 1:  # one product for all positions of a map
         return _outer(_nearness(position, torch.arange(size, device=position.device), sharpness)) @ table
     cells = position.floor()[..., None] + torch.arange(-1, 3, device=position.device)  # [G, 1, 2, 4]

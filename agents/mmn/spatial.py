@@ -13,7 +13,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from ..common.layers import NUM_PLANES, NUM_WAVES, MapEncoder, waves
+from ..common.layers import NUM_PLANES, NUM_WAVES, MapEncoder, steepness, waves
 from .compiled import spatial as compiled
 from .compiled.model import CompiledModel
 from .compiled.parts import Contexts, Linear, layer_of, linear_of
@@ -120,7 +120,7 @@ class MMNNetwork(Network):
             Contexts(code.positions.numpy(), code.weights.numpy(), num_roots),
             self.num_bins,
             self.scale.detach().numpy(),
-            functional.softplus(self.hypermodel.sharpness.detach() + 1.0).reshape(1).numpy(),
+            steepness(self.hypermodel.sharpness.detach()).reshape(1).numpy(),
             linear_of(self.free),
             self.free_by_action.weight.detach().numpy(),
             linear_of(self.ahead),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import inspect
 import json
@@ -11,6 +12,7 @@ import pathlib
 import platform
 import struct
 import sys
+from collections.abc import Mapping
 from importlib import metadata
 from typing import Any
 
@@ -111,8 +113,13 @@ def _package_of(name: str, agent_class: type[Agent]) -> str | None:
     """Returns name and version of the distribution that an installed agent belongs to."""
     if ":" not in name:
         return package_of(name)
-    names = metadata.packages_distributions().get(agent_class.__module__.partition(".")[0])  # takes 0.4 s
+    names = _distributions().get(agent_class.__module__.partition(".")[0])
     return f"{names[0]} {_version(names[0])}" if names else None
+
+
+@functools.cache
+def _distributions() -> Mapping[str, list[str]]:
+    return metadata.packages_distributions()  # takes 0.4 s
 
 
 def _version(package: str) -> str | None:
