@@ -154,7 +154,10 @@ BAD_INPUT = [
     ((*TRAIN, "--seed", "-1"), "expected seed from 0 to 9223372036854775807, found -1"),
     ((*TRAIN, "--set", "colour"), "expected --set KEY=VALUE, found 'colour'"),
     (("train", "--agent", "mah"), "expected --minutes or --env-steps, found neither"),
-    (("train", "--agent", "planner", "--minutes", "1"), "agent 'planner' doesn't learn; agents that do: dqn, mah, mmn"),
+    (
+        ("train", "--agent", "planner", "--minutes", "1"),
+        "agent 'planner' doesn't learn; agents that do: dqn, mah, mmn, mmn-paper",
+    ),
     # eval: files
     ((*TINY, "--out", ""), "expected a value of --out, found an empty one"),
     ((*TINY, "--maps="), "expected a value of --maps, found an empty one"),

@@ -6,15 +6,16 @@ import pytest
 from mazebench_agents.common.checkpoint import load_checkpoint
 
 from mazebench import testing
+from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.evaluate import evaluate
 
-SHIPPED = ("mmn", "mah", "dqn")
+SHIPPED = ("mmn", "mmn-paper", "mah", "dqn")
 
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_agent_keeps_the_contract(name):
-    testing.check_agent(load_agent_class(name))
+    testing.check_agent(load_agent_class(name), Interface("hierarchical", 13, 13))
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -27,7 +28,7 @@ def test_shipped_checkpoint_has_its_config_and_curve_beside_it(name):
     assert metadata["provenance"]["env_steps"] == curve[-1]["env_steps"]
 
 
-@pytest.mark.parametrize("name", ["mmn", "mah"])
+@pytest.mark.parametrize("name", ["mmn", "mmn-paper", "mah"])
 def test_shipped_agent_with_a_map_reaches_near_goals_in_its_training_mazes(tmp_path, name):
     summary = evaluate(name, tmp_path / name, split="train", distances=(2, 4), episodes_per_distance=2)
     assert summary.overall.success_rate > 0.9

@@ -20,7 +20,8 @@ from mazebench.training.options import TRAIN_CHOICES, TrainOptions
 def train(
     context: typer.Context,
     agent: Annotated[
-        str, typer.Option(help="A learning agent: dqn, mah, mmn or another installed one, or module:Class.")
+        str,
+        typer.Option(help="A learning agent: dqn, mah, mmn, mmn-paper or another installed one, or module:Class."),
     ],
     values: dict[str, Any],
     out: Annotated[

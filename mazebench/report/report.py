@@ -21,7 +21,17 @@ TABLES = "tables"
 _FORMS = {".md": to_markdown, ".csv": to_csv, ".tex": to_latex}
 _SUFFIXES = {TABLES: tuple(_FORMS), FIGURES: (".png", ".pdf")}
 # Where well-known agents stand among others.
-_AGENT_ORDER = ("oracle", "navigator", "mmn", "mah", "dqn", "planner-closed-loop", "planner", "random")
+_AGENT_ORDER = (
+    "oracle",
+    "navigator",
+    "mmn",
+    "mmn-paper",
+    "mah",
+    "dqn",
+    "planner-closed-loop",
+    "planner",
+    "random",
+)
 
 
 def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path, warn: Warn) -> list[ReportedResult]:
