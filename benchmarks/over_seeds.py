@@ -1,7 +1,7 @@
 """Prints success rates on held-out mazes over the training runs of an agent, one checkpoint each.
 
-Call it as `python benchmarks/over_seeds.py AGENT CHECKPOINT...`. The interval is Student's over the runs' success rates: it
-speaks of another run of the same training, on these mazes.
+Call it as `python benchmarks/over_seeds.py AGENT CHECKPOINT...`. The interval is Student's over the runs: it
+speaks of another run of the same training on these mazes.
 """
 
 from __future__ import annotations

@@ -47,14 +47,13 @@ def test_network_without_context_does_not_depend_on_it():
     assert not any("encoder" in name for name, _ in agent.network.named_parameters())
 
 
-def test_mah_paper_has_one_code_of_the_context_and_no_position():
+def test_mah_paper_reads_one_code_of_the_context_and_codes_of_the_estimated_position():
     agent = MAHPaper(MAHPaper.default_config, 7)
     torch.manual_seed(0)
     contexts = (torch.rand(2, 4, 7, 7) < 0.3).float()
     code = agent.network.encode(contexts)
-    assert code.shape == (2, 256)
-    assert not torch.equal(code[0], code[1])
-    assert not any("scale" in name for name, _ in agent.network.named_parameters())
+    assert code.shape == (2, 256 + 4)  # and the marks of start and goal
+    assert not torch.equal(code[0, :256], code[1, :256])
     state = torch.zeros(2, 3, 9)
     assert agent.network(state, code).shape == (2, 3, 6)
     assert not torch.equal(agent.network(state, code)[0], agent.network(state, code)[1])

@@ -16,6 +16,10 @@ from torch.nn import functional
 NUM_PLANES = 4
 NUM_WAVES = 16
 _FREQUENCIES = (0.25, 0.5, 1.0, 2.0)  # per metre, octaves
+PERIODS = (24.0, 12.0, 6.0, 4.0, 3.0, 2.0, 1.0)  # cells, of the waves that code a position
+NUM_PLACE = 6 + 4 * len(PERIODS)
+WIDTHS = (0.5, 2.0, 8.0, 32.0)  # square cells, of the bells that code the distance to the goal
+NUM_TO_GOAL = 2 + len(WIDTHS)
 
 
 class MapEncoder(nn.Module):
@@ -63,6 +67,24 @@ def waves(moved: torch.Tensor) -> torch.Tensor:
     """Returns sines and cosines `[..., 16]` of displacements `[..., 2]` (m), codes of the position within a cell."""
     phase = 2 * math.pi * moved[..., None] * torch.tensor(_FREQUENCIES, device=moved.device)
     return torch.cat([torch.sin(phase), torch.cos(phase)], dim=-1).flatten(-2)
+
+
+def place_code(position: torch.Tensor, marks: torch.Tensor, size: int) -> torch.Tensor:
+    """Returns `[G, K, 34]` of positions `[G, K, 2]` (row, column) on a map of `size` cells a side.
+
+    They are the positions and `marks` `[G, 4]`, those of start and goal, from -1 to 1, then waves of the positions.
+    """
+    places = torch.cat([position, marks[:, None].expand(-1, position.shape[1], -1)], dim=-1)
+    phase = position[..., None] * (2 * math.pi / torch.tensor(PERIODS, device=position.device))
+    waves = torch.cat([torch.sin(phase), torch.cos(phase)], dim=-1).flatten(-2)
+    return torch.cat([(places - (size - 1) / 2) * (2 / size), waves], dim=-1)
+
+
+def goal_code(position: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
+    """Returns `[G, K, 6]`: tens of cells from positions `[G, K, 2]` to goals `[G, 2]`, and bells of the distance."""
+    to_goal = goal[:, None] - position
+    bells = torch.exp(-(to_goal**2).sum(dim=-1, keepdim=True) / torch.tensor(WIDTHS, device=position.device))
+    return torch.cat([to_goal / 10, bells], dim=-1)
 
 
 def state_features(state: torch.Tensor, origin: torch.Tensor) -> torch.Tensor:

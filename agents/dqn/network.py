@@ -11,7 +11,17 @@ import math
 import torch
 from torch import nn
 
-from ..common.layers import NUM_WAVES, MapEncoder, marked_position, position_code, waves
+from ..common.layers import (
+    NUM_PLACE,
+    NUM_TO_GOAL,
+    NUM_WAVES,
+    MapEncoder,
+    goal_code,
+    marked_position,
+    place_code,
+    position_code,
+    waves,
+)
 
 NUM_STATE_FEATURES = 7
 NUM_ACTIONS = 6
@@ -84,17 +94,25 @@ class ReadingQNetwork(QNetwork):
 
 
 class JoinedQNetwork(QNetwork):
-    """Joins the state with one code of the whole context, of a fixed size."""
+    """Joins the state with one code of the whole context, of a fixed size, and with codes of the estimated position."""
 
     def __init__(self, hidden: int, channels: int, context_size: int):
-        super().__init__(hidden, _CODE + NUM_WAVES)
+        super().__init__(hidden, _CODE + NUM_PLACE + NUM_TO_GOAL)
+        self._size = context_size
         self.encoder = MapEncoder(channels, _NEAR)
         self.embedding = nn.Sequential(nn.Linear(channels * context_size**2, _CODE), nn.LayerNorm(_CODE))
+        self.scale = nn.Parameter(torch.zeros(2, 2))
 
     def encode(self, context: torch.Tensor) -> torch.Tensor:
-        """Returns codes `[G, Q]` of contexts."""
-        return self.embedding(self.encoder(context).flatten(1))
+        """Returns codes `[G, Q + 4]` of contexts: of the whole, positions of start and goal."""
+        positions = [marked_position(context[:, plane]) for plane in (3, 2)]  # start, goal
+        return torch.cat([self.embedding(self.encoder(context).flatten(1)), *positions], dim=-1)
 
     def read(self, moved: torch.Tensor, code: torch.Tensor) -> torch.Tensor:
-        """Returns `[G, K, Q + 16]`: the code, and waves of `moved`."""
-        return torch.cat([code[:, None].expand(-1, moved.shape[1], -1), waves(moved)], dim=-1)
+        """Returns `[G, K, Q + 40]`: the code of the context, of the estimated positions, and of the way to the goal."""
+        whole, marks = code[:, :_CODE], code[:, _CODE:]
+        position = marks[:, None, :2] + _SCALE_RATE * (moved @ self.scale)
+        # What tells goals apart trains the scale.
+        places = place_code(position.detach(), marks, self._size)
+        to_goal = goal_code(position, marks[:, 2:])
+        return torch.cat([whole[:, None].expand(-1, moved.shape[1], -1), places, to_goal], dim=-1)

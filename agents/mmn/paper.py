@@ -14,7 +14,17 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from ..common.layers import NUM_PLANES, MapEncoder, steepness
+from ..common.layers import (
+    NUM_PLACE,
+    NUM_PLANES,
+    NUM_TO_GOAL,
+    PERIODS,
+    WIDTHS,
+    MapEncoder,
+    goal_code,
+    place_code,
+    steepness,
+)
 from .compiled import paper as compiled
 from .compiled.model import CompiledModel
 from .compiled.parts import Contexts
@@ -37,9 +47,6 @@ from .reading import read
 _CHANNELS = 24  # of the map's convolutions
 _NEAR = (1, 1, 1, 1)  # dilations of the hypermodel's convolutions
 _FAR = (1, 1, 2, 2, 4, 4, 2, 1, 1)  # of the heads', which see 19 cells far, across a 13 x 13 map
-_PERIODS = (24.0, 12.0, 6.0, 4.0, 3.0, 2.0, 1.0)  # cells, of the waves that code a position
-_NUM_PLACE = 6 + 4 * len(_PERIODS)  # position, start and goal; sines and cosines of the position
-_WIDTHS = (0.5, 2.0, 8.0, 32.0)  # square cells, of the bells that code the distance to the goal
 _FIRST_VALUE = -20.0  # steps; the middle of the values before anything is learned
 _FIRST_CHANGE = 0.1  # times the usual size: the transition's output before anything is learned
 
@@ -63,11 +70,11 @@ class PaperNetwork(Network):
     def __init__(self, config: PaperConfig, context_size: int):
         super().__init__(config, context_size)
         self._size = context_size
-        num_inputs = NUM_BODY + config.latent + _NUM_PLACE
+        num_inputs = NUM_BODY + config.latent + NUM_PLACE
         self._shapes = _weight_shapes(num_inputs, config.hidden, NUM_CHANGES + config.latent)
         self.hypermodel = PaperHypermodel(config, self._shapes, context_size)
         self.scale = nn.Parameter(torch.zeros(2, 2))
-        num_inputs += 2 + len(_WIDTHS) + config.task_code + self.hypermodel.num_features
+        num_inputs += NUM_TO_GOAL + config.task_code + self.hypermodel.num_features
         self._make_heads(num_inputs, NUM_ACTIONS + self.num_bins + 1, config)
         with torch.no_grad():
             self.heads.bias[NUM_ACTIONS:-1] = -(self.support - _FIRST_VALUE).abs() / 3
@@ -87,19 +94,16 @@ class PaperNetwork(Network):
         No gradient reaches the position from here: what tells goals apart, in `predict`, trains it.
         """
         position = self.locate(latent, code).detach()
-        places = torch.cat([position, code.positions[:, None].expand(-1, position.shape[1], -1)], dim=-1)
-        phase = position[..., None] * (2 * math.pi / torch.tensor(_PERIODS, device=position.device))
-        waves = torch.cat([torch.sin(phase), torch.cos(phase)], dim=-1).flatten(-2)
         table = torch.cat([code.rows, code.features], dim=-1)
         seen = read(position, table, self.hypermodel.sharpness)
-        return torch.cat([(places - (self._size - 1) / 2) * (2 / self._size), waves, seen], dim=-1)
+        return torch.cat([place_code(position, code.positions, self._size), seen], dim=-1)
 
     def first_layer(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
         """Returns the layer with generated weights."""
         weights = self._weights(code)
         first = self._inputs(latent, seen) @ weights["inputs"] + weights["bias"]
         if code.rows.shape[-1]:
-            first = first + seen[..., _NUM_PLACE : _NUM_PLACE + first.shape[-1]]
+            first = first + seen[..., NUM_PLACE : NUM_PLACE + first.shape[-1]]
         return first
 
     def step(self, latent: torch.Tensor, first: torch.Tensor, action: torch.Tensor, code: Code) -> torch.Tensor:
@@ -117,13 +121,10 @@ class PaperNetwork(Network):
 
     def predict(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> Predictions:
         """Returns the outputs of the heads."""
-        to_goal = code.positions[:, None, 2:] - self.locate(latent, code)
-        bells = torch.exp(-(to_goal**2).sum(dim=-1, keepdim=True) / torch.tensor(_WIDTHS, device=latent.device))
+        to_goal = goal_code(self.locate(latent, code), code.positions[:, 2:])
         task = code.task[:, None].expand(-1, latent.shape[1], -1)
-        features = seen[..., _NUM_PLACE + code.rows.shape[-1] :]
-        out = self.heads(
-            self.body(torch.cat([self._inputs(latent, seen), to_goal / 10, bells, task, features], dim=-1))
-        )
+        features = seen[..., NUM_PLACE + code.rows.shape[-1] :]
+        out = self.heads(self.body(torch.cat([self._inputs(latent, seen), to_goal, task, features], dim=-1)))
         return Predictions(out[..., :NUM_ACTIONS], out[..., NUM_ACTIONS:-1], out[..., -1])
 
     def compiled(self, code: Code, num_roots: int) -> CompiledModel:
@@ -134,8 +135,8 @@ class PaperNetwork(Network):
             self.num_bins,
             self.scale.detach().numpy(),
             steepness(self.hypermodel.sharpness.detach()).reshape(1).numpy(),
-            np.array(_PERIODS, np.float32),
-            np.array(_WIDTHS, np.float32),
+            np.array(PERIODS, np.float32),
+            np.array(WIDTHS, np.float32),
             compiled.Generated(**{name: part.contiguous().numpy() for name, part in self._weights(code).items()}),
             code.task.numpy(),
             self._compiled_heads(),
@@ -144,7 +145,7 @@ class PaperNetwork(Network):
 
     def _inputs(self, latent: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
         """Returns `[G, K, D + 34]`: the latent state, with 5 m as the unit of the displacement, and the places."""
-        return torch.cat([latent[..., 2:], latent[..., :2] / 5, seen[..., :_NUM_PLACE]], dim=-1)
+        return torch.cat([latent[..., 2:], latent[..., :2] / 5, seen[..., :NUM_PLACE]], dim=-1)
 
     def _weights(self, code: Code) -> dict[str, torch.Tensor]:
         """Returns the generated weights by name, each `[G, rows, columns]`."""
