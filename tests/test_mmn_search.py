@@ -6,7 +6,7 @@ import pathlib
 import numpy as np
 import pytest
 import torch
-from mazebench_agents.mmn import MMN, measure, search
+from mazebench_agents.mmn import measure, search
 
 torch.set_num_threads(1)  # two that share a core with other tests wait for each other
 
@@ -221,5 +221,5 @@ def test_considered_visits_by_hand():
 @pytest.mark.slow
 def test_speed_of_the_search_beside_mctx_is_measured():
     pytest.importorskip("mctx")
-    rows, _ = measure.measure(0.1, MMN.build_learner).values()
+    rows = measure.search_rows(0.1)
     assert all(row["mctx sims/s"] > 0 for row in rows)

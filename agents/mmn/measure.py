@@ -81,29 +81,24 @@ def stand_in(batch_size: int) -> CompiledModel:
     return CompiledModel(model, 0, compiled.step, compiled.arrive)
 
 
-def measure(seconds: float, build_learner: Callable[..., MMNLearner]) -> dict[str, list[dict[str, Any]]]:
-    """Returns tables of simulations per second of CPU time, and of the time of an update.
-
-    Each figure takes about `seconds` to measure; `build_learner` is the agent's.
-    """
+def search_rows(seconds: float) -> list[dict[str, Any]]:
+    """Returns the simulations per second of CPU time, in about `seconds` for each figure."""
     num_threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
         with _mctx() as mctx:
-            rows = [_row(policy, batch_size, seconds / _ROUNDS, mctx) for policy, batch_size in _CASES]
-        parts = update_rows(seconds, build_learner)
+            return [_row(policy, batch_size, seconds / _ROUNDS, mctx) for policy, batch_size in _CASES]
     finally:
         torch.set_num_threads(num_threads)
-    return {
-        f"tree search, {NUM_SIMULATIONS} simulations, one thread": rows,
-        "the parts of an update, one thread": parts,
-    }
 
 
 def update_rows(
     seconds: float, build_learner: Callable[..., MMNLearner], overrides: Mapping[str, str] | None = None
 ) -> list[dict[str, Any]]:
-    """Returns the milliseconds that each part of an update takes, once the replay is filled enough to learn."""
+    """Returns the milliseconds that each part of an update takes, once the replay is filled enough to learn.
+
+    Learners leave PyTorch one thread.
+    """
     learner = build_learner(Interface("local", 13, 13), load_mazes(13, "train"), overrides=overrides)
     collector = Collector(TaskSpec(mazes=load_mazes(13, "train"), **learner.task_options()), learner.num_envs, 0)
     learner.actor.explore_from(0, learner.num_envs, seed=0)

@@ -85,9 +85,12 @@ class MMN(NetworkAgent):
     @classmethod
     def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
         """Returns tables for `mazebench bench`: the speed of the search and of the parts of an update."""
-        from .measure import measure
+        from .measure import NUM_SIMULATIONS, search_rows, update_rows
 
-        return measure(seconds, cls.build_learner)
+        return {
+            f"tree search, {NUM_SIMULATIONS} simulations, one thread": search_rows(seconds),
+            "the parts of an update, one thread": update_rows(seconds, cls.build_learner),
+        }
 
     def initial_state(self, batch_size: int) -> ActorState:
         """Returns a state without codes: `act` encodes a context where it is new."""
@@ -143,3 +146,10 @@ class MMNPaper(MMN):
     name = "mmn-paper"
     default_config = PaperConfig()
     network_class = PaperNetwork
+
+    @classmethod
+    def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
+        """Returns the speed of the parts of an update; the search is that of MMN."""
+        from .measure import update_rows
+
+        return {"the parts of an update, one thread": update_rows(seconds, cls.build_learner)}
