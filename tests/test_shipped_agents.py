@@ -15,7 +15,8 @@ SHIPPED = ("mmn", "mmn-paper", "mah", "dqn")
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_agent_keeps_the_contract(name):
-    testing.check_agent(load_agent_class(name), Interface("hierarchical", 13, 13))
+    interface = Interface("hierarchical", 13, 13) if name == "mmn-paper" else None  # which serves one size
+    testing.check_agent(load_agent_class(name), interface)
 
 
 @pytest.mark.parametrize("name", SHIPPED)

@@ -65,8 +65,7 @@ def position_code(position: torch.Tensor, size: int, sharpness: torch.Tensor) ->
 
 def waves(moved: torch.Tensor) -> torch.Tensor:
     """Returns sines and cosines `[..., 16]` of displacements `[..., 2]` (m), codes of the position within a cell."""
-    phase = 2 * math.pi * moved[..., None] * torch.tensor(_FREQUENCIES, device=moved.device)
-    return torch.cat([torch.sin(phase), torch.cos(phase)], dim=-1).flatten(-2)
+    return _sines(2 * math.pi * moved[..., None] * torch.tensor(_FREQUENCIES, device=moved.device))
 
 
 def place_code(position: torch.Tensor, marks: torch.Tensor, size: int) -> torch.Tensor:
@@ -75,9 +74,8 @@ def place_code(position: torch.Tensor, marks: torch.Tensor, size: int) -> torch.
     They are the positions and `marks` `[G, 4]`, those of start and goal, from -1 to 1, then waves of the positions.
     """
     places = torch.cat([position, marks[:, None].expand(-1, position.shape[1], -1)], dim=-1)
-    phase = position[..., None] * (2 * math.pi / torch.tensor(PERIODS, device=position.device))
-    waves = torch.cat([torch.sin(phase), torch.cos(phase)], dim=-1).flatten(-2)
-    return torch.cat([(places - (size - 1) / 2) * (2 / size), waves], dim=-1)
+    of_position = _sines(position[..., None] * (2 * math.pi / torch.tensor(PERIODS, device=position.device)))
+    return torch.cat([(places - (size - 1) / 2) * (2 / size), of_position], dim=-1)
 
 
 def goal_code(position: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
@@ -121,3 +119,8 @@ def in_batches(function: Callable[..., Any], size: int, *inputs: torch.Tensor) -
     if isinstance(results[0], torch.Tensor):
         return torch.cat(results)[:num_rows]
     return results[0]._make(torch.cat(parts)[:num_rows] for parts in zip(*results, strict=True))
+
+
+def _sines(phase: torch.Tensor) -> torch.Tensor:
+    """Returns sines and cosines `[..., 4 W]` of phases `[..., 2, W]`."""
+    return torch.cat([torch.sin(phase), torch.cos(phase)], dim=-1).flatten(-2)

@@ -82,7 +82,7 @@ class ReadingQNetwork(QNetwork):
     def locate(self, moved: torch.Tensor, code: torch.Tensor) -> torch.Tensor:
         """Returns estimated positions `[G, K, 2]` (row, column) on the map after displacements `moved` (m)."""
         start = code[:, self.channels : self.channels + 2, 0]
-        return start[:, None] + _SCALE_RATE * (moved @ self.scale)
+        return _moved_from(start, moved, self.scale)
 
     def read(self, moved: torch.Tensor, code: torch.Tensor) -> torch.Tensor:
         """Returns `[G, K, C + 18]`: features of the map around the body, the goal's offset, waves of `moved`."""
@@ -111,8 +111,13 @@ class JoinedQNetwork(QNetwork):
     def read(self, moved: torch.Tensor, code: torch.Tensor) -> torch.Tensor:
         """Returns `[G, K, Q + 40]`: the code of the context, of the estimated positions, and of the way to the goal."""
         whole, marks = code[:, :_CODE], code[:, _CODE:]
-        position = marks[:, None, :2] + _SCALE_RATE * (moved @ self.scale)
+        position = _moved_from(marks[:, :2], moved, self.scale)
         # What tells goals apart trains the scale.
         places = place_code(position.detach(), marks, self._size)
         to_goal = goal_code(position, marks[:, 2:])
         return torch.cat([whole[:, None].expand(-1, moved.shape[1], -1), places, to_goal], dim=-1)
+
+
+def _moved_from(start: torch.Tensor, moved: torch.Tensor, scale: torch.Tensor) -> torch.Tensor:
+    """Returns positions `[G, K, 2]`: `start` `[G, 2]` plus a linear map of displacements `moved` `[G, K, 2]` (m)."""
+    return start[:, None] + _SCALE_RATE * (moved @ scale)

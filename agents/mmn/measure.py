@@ -12,7 +12,7 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -81,25 +81,24 @@ def stand_in(batch_size: int) -> CompiledModel:
     return CompiledModel(model, 0, compiled.step, compiled.arrive)
 
 
-def search_rows(seconds: float) -> list[dict[str, Any]]:
-    """Returns the simulations per second of CPU time, in about `seconds` for each figure."""
+def search_table(seconds: float) -> dict[str, list[dict[str, Any]]]:
+    """Returns the simulations per second of CPU time by title, in about `seconds` for each figure."""
     num_threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
         with _mctx() as mctx:
-            return [_row(policy, batch_size, seconds / _ROUNDS, mctx) for policy, batch_size in _CASES]
+            rows = [_row(policy, batch_size, seconds / _ROUNDS, mctx) for policy, batch_size in _CASES]
     finally:
         torch.set_num_threads(num_threads)
+    return {f"tree search, {NUM_SIMULATIONS} simulations, one thread": rows}
 
 
-def update_rows(
-    seconds: float, build_learner: Callable[..., MMNLearner], overrides: Mapping[str, str] | None = None
-) -> list[dict[str, Any]]:
-    """Returns the milliseconds that each part of an update takes, once the replay is filled enough to learn.
+def update_table(seconds: float, build_learner: Callable[..., MMNLearner]) -> dict[str, list[dict[str, Any]]]:
+    """Returns the milliseconds that each part of an update takes by title, once the replay is filled enough to learn.
 
     Learners leave PyTorch one thread.
     """
-    learner = build_learner(Interface("local", 13, 13), load_mazes(13, "train"), overrides=overrides)
+    learner = build_learner(Interface("local", 13, 13), load_mazes(13, "train"))
     collector = Collector(TaskSpec(mazes=load_mazes(13, "train"), **learner.task_options()), learner.num_envs, 0)
     learner.actor.explore_from(0, learner.num_envs, seed=0)
     state = learner.actor.initial_state(learner.num_envs)
@@ -116,7 +115,8 @@ def update_rows(
         learner.update()
         count += 1
     times["losses"] = elapsed - sum(times.values())
-    return [{"what": part, "ms": 1e3 * spent / count, "%": 100 * spent / elapsed} for part, spent in times.items()]
+    rows = [{"what": part, "ms": 1e3 * spent / count, "%": 100 * spent / elapsed} for part, spent in times.items()]
+    return {"the parts of an update, one thread": rows}
 
 
 def _timed(function: Callable[..., Any], times: dict[str, float], part: str) -> Callable[..., Any]:

@@ -85,12 +85,9 @@ class MMN(NetworkAgent):
     @classmethod
     def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
         """Returns tables for `mazebench bench`: the speed of the search and of the parts of an update."""
-        from .measure import NUM_SIMULATIONS, search_rows, update_rows
+        from .measure import search_table, update_table
 
-        return {
-            f"tree search, {NUM_SIMULATIONS} simulations, one thread": search_rows(seconds),
-            "the parts of an update, one thread": update_rows(seconds, cls.build_learner),
-        }
+        return search_table(seconds) | update_table(seconds, cls.build_learner)
 
     def initial_state(self, batch_size: int) -> ActorState:
         """Returns a state without codes: `act` encodes a context where it is new."""
@@ -150,6 +147,6 @@ class MMNPaper(MMN):
     @classmethod
     def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
         """Returns the speed of the parts of an update; the search is that of MMN."""
-        from .measure import update_rows
+        from .measure import update_table
 
-        return {"the parts of an update, one thread": update_rows(seconds, cls.build_learner)}
+        return update_table(seconds, cls.build_learner)
