@@ -10,12 +10,13 @@ from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.evaluate import evaluate
 
-SHIPPED = ("mmn", "mmn-paper", "mah", "dqn")
+SHIPPED = ("mmn", "mmn-paper", "mah", "mah-paper", "dqn")
+OF_ONE_SIZE = ("mmn-paper", "mah-paper")
 
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_agent_keeps_the_contract(name):
-    interface = Interface("hierarchical", 13, 13) if name == "mmn-paper" else None  # which serves one size
+    interface = Interface("hierarchical", 13, 13) if name in OF_ONE_SIZE else None
     testing.check_agent(load_agent_class(name), interface)
 
 

@@ -27,6 +27,7 @@ _AGENT_ORDER = (
     "mmn",
     "mmn-paper",
     "mah",
+    "mah-paper",
     "dqn",
     "planner-closed-loop",
     "planner",
