@@ -11,8 +11,10 @@ import sys
 
 import numpy as np
 import torch
+from mazebench_agents.mmn import MMN
+from mazebench_agents.mmn.belief.belief import GOAL, MAP
+from mazebench_agents.mmn.belief.framing import framed
 from mazebench_agents.mmn.learner import MMNLearner
-from mazebench_agents.mmn.mmn import MMN
 from mazebench_agents.mmn.spatial import MMNNetwork
 
 from mazebench.agent import Interface
@@ -54,9 +56,9 @@ def values_by_distance(network: MMNNetwork, mazes: tuple[Maze, ...], rng: np.ran
     for maze in mazes:
         free = np.argwhere(~maze.walls)
         goal = tuple(free[rng.integers(len(free))].tolist())
-        context = torch.from_numpy(build_context(maze.walls, goal, goal, maze.size))
+        shown = torch.from_numpy(framed(build_context(maze.walls, goal, goal, maze.size), maze.size))
         anchors = torch.from_numpy(free).float()
-        code = network.hypermodel(context.expand(len(free), -1, -1, -1), anchors)
+        code = network.hypermodel(shown[[MAP, GOAL]].expand(len(free), -1, -1, -1), anchors)
         features = torch.zeros(len(free), 1, 9)
         features[..., 3] = 1.0  # the cosine of yaw
         latent = network.encode(features)

@@ -6,19 +6,20 @@ import numpy as np
 import pytest
 import torch
 from acting import inputs_of
+from mazebench_agents.common.layers import marked_position
 from mazebench_agents.mmn import MMN, MMNPaper
 from mazebench_agents.mmn.config import MMNConfig, PaperConfig
-from mazebench_agents.mmn.losses import unrolled_losses
 from mazebench_agents.mmn.network import rotate
 from mazebench_agents.mmn.paper import PaperNetwork
 from mazebench_agents.mmn.planning import kernel_model, lookahead, torch_model
 from mazebench_agents.mmn.search import gumbel_muzero_policy
-from mazebench_agents.mmn.spatial import MMNNetwork, Propagation
+from mazebench_agents.mmn.spatial import MMNNetwork, Propagation, brought_nearer
 from small_world import learn
 
 from mazebench.agent import Interface
 from mazebench.errors import InputError
 from mazebench.maps.generators import generate
+from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 
@@ -50,6 +51,13 @@ def a_context(seed=0, size=7, batch=1):
     return torch.from_numpy(context)
 
 
+def code_of(network, context):
+    """What the hypermodel makes of contexts; that of MMN reads what is believed of them."""
+    if not isinstance(network, MMNNetwork):
+        return network.hypermodel(context)
+    return network.hypermodel(context[:, [GLOBAL_MAP, GOAL]], marked_position(context[:, START]))
+
+
 def make_learner(mazes, config=CONFIGS["mmn"], seed=0, steps=100):
     """A small learner that has seen some steps of random driving."""
     overrides = {name: str(value) for name, value in dataclasses.asdict(config).items()}
@@ -74,20 +82,47 @@ def make_propagation():
     with torch.no_grad():
         propagation.cost.weight.zero_()
         propagation.cost.bias.fill_(np.log(np.e - 1) - 2)  # softplus(2 + bias) = 1
-        propagation.enterable.weight.fill_(-60.0)
-        propagation.enterable.bias.fill_(30.0)
     return propagation
 
 
+def believed(wall, goal):
+    """The belief `[1, 2, M, M]` with a goal."""
+    planes = torch.zeros(1, 2, *wall.shape)
+    planes[0, 0] = wall
+    planes[0, 1][goal] = 1
+    return planes
+
+
 def test_propagation_with_equal_costs_is_the_distance_on_the_grid():
-    walls = torch.tensor([[0, 0, 0], [1, 1, 0], [0, 0, 0]], dtype=torch.float32)[None, None]
-    goal = torch.zeros(1, 1, 3, 3)
-    goal[..., 2, 0] = 1
-    distance = make_propagation()(walls, goal)[0][0, 0]
+    belief = believed(torch.tensor([[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 0.0]]), (2, 0))
+    distance = make_propagation()(torch.zeros(1, 1, 3, 3), belief)[0, 0]
     torch.testing.assert_close(distance[0], torch.tensor([6.0, 5.0, 4.0]))  # around the wall
     torch.testing.assert_close(distance[2], torch.tensor([0.0, 1.0, 2.0]))
-    slopes = Propagation.slopes(distance[None, None])[0]  # up, down, left, right, distance
-    torch.testing.assert_close(slopes[:, 0, 1], torch.tensor([2.0, 2.0, 1 / 3, -1 / 3, 5 / 30]))
+    slopes = Propagation.slopes(distance[None, None])[0]  # up, down, left, right
+    torch.testing.assert_close(slopes[:, 0, 1], torch.tensor([2.0, 2.0, 1 / 3, -1 / 3]))
+
+
+@pytest.mark.parametrize(("chance", "expected"), [(0.1, 2 + 12 / 9), (0.5, 6.0)])
+def test_cell_that_may_be_wall_costs_the_tries_that_fail_or_the_way_around_it(chance, expected):
+    belief = believed(torch.tensor([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]), (2, 0))
+    belief[0, 0, 1, 0] = chance  # between the start, above, and the goal
+    distance = make_propagation()(torch.zeros(1, 1, 3, 3), belief)[0, 0]
+    assert distance[0, 0].item() == pytest.approx(expected)
+
+
+def test_goal_that_may_be_in_two_cells_is_sought_in_the_nearer_one_unless_it_is_improbable():
+    belief = believed(torch.zeros(1, 9)[:, :].expand(9, 9), (0, 8))
+    for chance, expected in ((0.5, 14.0), (0.9, 3 + 12 / 9)):  # relative to that of the far cell, 14 cells away
+        belief[0, 1, 6, 3] = chance
+        distance = make_propagation()(torch.zeros(1, 1, 9, 9), belief)[0, 0]
+        assert distance[6, 0].item() == pytest.approx(min(expected, 3 + 12 * (1 / chance - 1)))
+
+
+def test_goals_out_of_reach_are_brought_nearer_and_the_way_stays_the_same():
+    distance = torch.arange(0.0, 90.0, 10.0).reshape(1, 1, 3, 3)
+    near, far = (brought_nearer(distance, torch.tensor([cell])) for cell in ([1.0, 0.0], [2.0, 2.0]))
+    torch.testing.assert_close(near, distance)
+    torch.testing.assert_close(far.flatten(), torch.tensor([10.0, 10, 10, 10, 10, 10, 10, 20, 30]))
 
 
 def test_network_with_the_true_scale_looks_where_the_agent_is():
@@ -95,7 +130,7 @@ def test_network_with_the_true_scale_looks_where_the_agent_is():
     with torch.no_grad():
         network.scale.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))  # times 5: a cell a metre, y up
         network.hypermodel.sharpness.fill_(20.0)
-    code = network.hypermodel(a_context())
+    code = code_of(network, a_context())
     moved = torch.tensor([[[0.0, 0.0], [2.0, 0.0], [1.0, 3.0]]])
     latent = torch.cat([moved, torch.zeros(1, 3, network.latent_size - 2)], dim=-1)
     seen = network.look(latent, code)
@@ -110,7 +145,7 @@ def test_free_motion_is_the_same_wherever_the_body_heads():
     torch.nn.init.normal_(network.free_by_action.weight)
     for last in (network.hypermodel.transition.later[-1].weight, network.hypermodel.transition.later[-1].bias):
         torch.nn.init.zeros_(last)
-    code = network.hypermodel(a_context())
+    code = code_of(network, a_context())
     features = torch.randn(1, 1, 9)
     yaw = torch.tensor(0.4)
 
@@ -143,7 +178,7 @@ def test_anchor_stays_as_long_as_it_agrees_with_the_cell_marked_as_start():
 def test_another_map_gives_other_transition_weights_and_predictions(config):
     torch.manual_seed(0)
     network = agent_class(config)(config, 7).network
-    first, second = network.hypermodel(a_context(0)), network.hypermodel(a_context(1))
+    first, second = code_of(network, a_context(0)), code_of(network, a_context(1))
     assert not torch.equal(first.weights, second.weights)
     latent = network.encode(torch.randn(1, 5, 9))
 
@@ -162,10 +197,7 @@ def test_task_and_model_losses_reach_the_hypermodels_weights(config, mazes):
     network = learner.actor.network
     with torch.no_grad():  # heads that are zero pass nothing on
         network.heads.weight.normal_(std=0.1)
-    sample = learner._replay.sample_sequences(8, 3, config.sequence_steps, learner._hindsight, learner._rng)
-    batch = learner._batch(sample)
-    targets = learner._targets(batch)
-    losses, _ = unrolled_losses(network, config, batch, targets)
+    losses, _ = learner._losses(learner.sample())
     psi = (network.hypermodel.rows if isinstance(config, MMNConfig) else network.hypermodel.hyper).weight
     for loss in ("value_loss", "policy_loss", "goal_loss", "model_loss"):
         (gradient,) = torch.autograd.grad(losses[loss], psi, retain_graph=True)
@@ -179,7 +211,7 @@ def test_search_by_kernels_finds_what_the_search_by_pytorch_finds(config):
     for parameter in network.parameters():
         torch.nn.init.normal_(parameter, std=0.2)
     with torch.no_grad():
-        latent, code = network.encode(3 * torch.randn(5, 3, 9)), network.hypermodel(a_context(batch=5))
+        latent, code = network.encode(3 * torch.randn(5, 3, 9)), code_of(network, a_context(batch=5))
         found, expected = (
             gumbel_muzero_policy(*prepare(network, latent, code), 6, np.zeros((15, 6)), rescale_values=False)
             for prepare in (kernel_model, torch_model)
@@ -194,7 +226,7 @@ def test_lookahead_is_every_action_of_the_model_by_itself(config):
     torch.manual_seed(0)
     network = agent_class(config)(config, 7).network
     torch.nn.init.normal_(network.heads.weight)
-    code = network.hypermodel(a_context(batch=2))
+    code = code_of(network, a_context(batch=2))
     latent = network.encode(torch.randn(2, 3, 9))
     qvalues = lookahead(network, latent, code)
     first = network.first_layer(latent, network.look(latent, code), code)
@@ -219,7 +251,7 @@ def test_what_tells_early_whether_a_run_will_work_is_logged(mazes):
     both = {"value_loss", "policy_loss", "goal_loss", "model_loss", "gradient_norm", "value_error", "value"}
     mmn, paper = (set(make_learner(mazes, CONFIGS[name]).update()) for name in ("mmn", "mmn-paper"))
     assert mmn == both | {"model_error_1", "model_error_4", "map_ratio"} | {
-        f"{name}_loss" for name in ("localization", "distance", "visit")
+        f"{name}_loss" for name in ("localization", "distance", "wall", "goal_place")
     }
     assert paper == both | {"model_error_1", "model_error_5", "map_ratio"}
 
@@ -283,9 +315,9 @@ def test_context_is_encoded_where_it_is_new_and_only_there():
     assert not torch.equal(before[1][1], state.code.weights[1])
 
 
-@pytest.mark.parametrize("keep_anchor", [True, False])
-def test_motion_is_told_from_where_the_episode_began_through_its_landmarks(keep_anchor):
-    agent = MMN(small_config(keep_anchor=keep_anchor), 7)
+@pytest.mark.parametrize("config", [CONFIGS["mmn-paper"], dataclasses.replace(CONFIGS["mmn-paper"], keep_anchor=False)])
+def test_motion_is_told_from_where_the_episode_began_through_its_landmarks(config):
+    agent = MMNPaper(config, 7)
     with torch.no_grad():
         agent.network.scale.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))
     observation = an_observation(2)  # the start marked in (5, 1)
@@ -298,7 +330,7 @@ def test_motion_is_told_from_where_the_episode_began_through_its_landmarks(keep_
     observation["context"][:, 3, 4, 2] = 1
     _, state = agent.act(inputs_of(observation, every, np.array([False, True])), state)
     anew = [[0.8, 1.1], [4, 2]]
-    for env, (origin, anchor) in enumerate([[[0, 0], [5, 1]] if keep_anchor else anew, anew]):
+    for env, (origin, anchor) in enumerate([[[0, 0], [5, 1]] if config.keep_anchor else anew, anew]):
         np.testing.assert_allclose(state.origin[env], origin)
         torch.testing.assert_close(state.code.positions[env, :2], torch.tensor(anchor, dtype=torch.float32))
 
@@ -327,7 +359,7 @@ def test_every_weight_of_the_papers_transition_is_generated():
     network = PaperNetwork(CONFIGS["mmn-paper"], 7)
     for parameter in network.parameters():
         torch.nn.init.normal_(parameter)
-    code = network.hypermodel(a_context())
+    code = code_of(network, a_context())
     code = code._replace(weights=torch.zeros_like(code.weights), rows=torch.zeros_like(code.rows))
     latent = network.encode(torch.randn(1, 6, 9))
     first = network.first_layer(latent, network.look(latent, code), code)

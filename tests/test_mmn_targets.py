@@ -79,8 +79,8 @@ def test_cross_entropy_by_hand():
 def make_batch(config, at_goal_step=None):
     """Two contexts, a sequence each; all states alike, standing still in the start, one cell left of the goal."""
     length = config.sequence_steps + 1
-    context = torch.zeros(2, 4, 7, 7)
-    context[:, 3, 3, 2] = context[:, 2, 3, 3] = 1
+    belief = torch.zeros(2, 2, 7, 7)
+    belief[:, 1, 3, 3] = 1
     features = torch.zeros(2, 1, length, 9)
     features[..., 3] = 1  # cosine of yaw
     at_goal = torch.zeros(2, 1, length, dtype=torch.bool)
@@ -90,10 +90,10 @@ def make_batch(config, at_goal_step=None):
         exists[..., at_goal_step + 1 :] = False
     place = torch.tensor([3.0, 2.0]).expand(2, 1, length, 2)
     action = torch.zeros(2, 1, config.sequence_steps, dtype=torch.long)
-    visited, relabelled = torch.zeros(2, 1, 7, 7), torch.ones(2, dtype=torch.bool)
+    relabelled = torch.ones(2, dtype=torch.bool)
     maze = torch.arange(2)
     anchor = torch.tensor([3.0, 2.0]).expand(2, 2)
-    batch = Batch(context, anchor, visited, maze, relabelled, features, place, action, exists, at_goal)
+    batch = Batch(belief, anchor, maze, relabelled, features, place, action, exists, at_goal)
     value = torch.full((2, 1, length), -3.0)
     policy = torch.full((2, 1, length, 6), 1 / 6)
     return batch, Targets(value, policy)

@@ -78,6 +78,16 @@ class SequenceSample(NamedTuple):
     action: np.ndarray  # [G, S, L] int, taken in the first L states
     exists: np.ndarray  # [G, S, L + 1] bool, whether the trajectory goes as far; then its last state is repeated
     shown: np.ndarray | None  # [G, N, N] bool, walls on the shown maps; None unless the replay keeps them
+    past: Past
+
+
+class Past(NamedTuple):
+    """Up to T rows of each group's trajectory, oldest first; the last one is the group's earliest step."""
+
+    state: np.ndarray  # [G, T, 12] float32
+    action: np.ndarray  # [G, T] int, taken in the state
+    cell: np.ndarray  # [G, T] int, the body's true cell
+    exists: np.ndarray  # [G, T] bool, False before the trajectory
 
 
 @dataclasses.dataclass(frozen=True)
@@ -293,8 +303,12 @@ class Replay:
         hindsight: Hindsight,
         rng: np.random.Generator,
         beta: float = 0.0,
+        num_past: int = 0,
     ) -> SequenceSample:
-        """Draws groups as `sample` does, of sequences of `num_steps` L, or fewer where their trajectory ends."""
+        """Draws groups as `sample` does, of sequences of `num_steps` L, or fewer where their trajectory ends.
+
+        `num_past` is T, of `Past`.
+        """
         group = self._draw_groups(num_groups, num_sequences, hindsight, rng)
         env = group.env[:, None]
         index, going = group.steps, np.ones(group.steps.shape, dtype=bool)
@@ -319,7 +333,18 @@ class Replay:
             np.maximum(self._action[env, steps[..., :-1]], 0).astype(np.int64),
             np.stack(exists, axis=-1),
             self._shown_walls(group),
+            self._past(group, num_past),
         )
+
+    def _past(self, group: _Groups, num_rows: int) -> Past:
+        """Returns what came before the groups, and nothing of what came after their earliest steps."""
+        env, earliest = group.env[:, None], self._earliest(group.env, group.row % self._length, group.steps)[:, None]
+        back = np.arange(num_rows)[::-1]
+        index = (earliest - back) % self._length
+        age = (self._next[env] - 1 - earliest) % self._length + back
+        exists = (age < self._length) & (self._trajectory[env, index] == self._trajectory[env, earliest])
+        action = np.maximum(self._action[env, index], 0).astype(np.int64)
+        return Past(self._state[env, index], action, self._cell[env, index].astype(np.int64), exists)
 
     def _draw_groups(self, num_groups: int, num_steps: int, hindsight: Hindsight, rng: np.random.Generator) -> _Groups:
         """Draws the rows of groups, and relabels a share of them."""

@@ -44,7 +44,11 @@ _RANGES = {
     "num_distances": (1, 64),
     "localization_weight": (0.0, math.inf),
     "distance_weight": (0.0, math.inf),
-    "visit_weight": (0.0, math.inf),
+    "belief_channels": (1, 1024),
+    "belief_weight": (0.0, math.inf),
+    "belief_rate": (0.0, math.inf),
+    "scale_updates": (1, 1_000_000_000),
+    "wrong_maps": (0.0, 1.0),
     # MMN-paper's
     "embedding": (1, 4096),
     "task_code": (1, 4096),
@@ -88,8 +92,6 @@ class PlanningConfig:
     hindsight_mean_offset: float = 24.0  # steps; about twelve cells of the path driven
     hindsight_window: int = 100  # steps; how far ahead a goal may lie, long enough for far ones
     relabel_start: bool = True  # beyond the paper, which keeps the start; gives contexts like those after a landmark
-    keep_anchor: bool = True  # beyond the paper: after landmarks and relabelled starts, displacements are still
-    # measured from the centre of the trajectory's first cell; the position within a later cell is unknown
     symmetries: bool = True  # beyond the paper: rotations and mirror images as training data
     # Learning
     groups: int = 32  # contexts in a batch; the hypermodel runs once for each
@@ -105,7 +107,7 @@ class PlanningConfig:
     temperature: float = 0.4  # steps; of the improved policy, softmax(q / temperature), in "lookahead"
     steps_per_update: int = 256  # environment steps; fixed, so that scores do not depend on the speed of workers
     learning_rate: float = 3e-3  # AdamW's
-    constant_updates: int = 3000  # before the learning rate falls, as one over the number of updates
+    constant_updates: int = 2500  # before the learning rate falls, as one over the number of updates
     weight_decay: float = 1e-4  # AdamW's
     max_gradient_norm: float = 10.0  # against the steep slopes while values are still far off
     target_rate: float = 0.01  # of the target network's moving average
@@ -136,7 +138,13 @@ class MMNConfig(PlanningConfig):
     num_distances: int = 2  # maps of learned distances to the goal; beyond the paper
     localization_weight: float = 0.1  # beyond the paper: of the loss on the estimated position on the map
     distance_weight: float = 0.02  # beyond the paper: of the loss on propagated distances, against values
-    visit_weight: float = 0.3  # beyond the paper: of the loss on enterable cells, against those that were visited
+    hindsight_mean_offset: float = 32.0  # steps; farther than in MMN-paper, since a wrong map makes ways longer
+    hindsight_window: int = 150  # steps
+    belief_channels: int = 32  # of the belief's convolutions
+    belief_weight: float = 1.0  # beyond the paper: of the losses on where walls and the goal are
+    scale_updates: int = 300  # before the learning rate of the map's scale falls: an error of it grows along the way
+    belief_rate: float = 0.5  # times the learning rate, for the belief
+    wrong_maps: float = 0.7  # beyond the paper: share of wrong maps among those that the belief learns from
 
 
 @dataclasses.dataclass(frozen=True)
@@ -154,9 +162,10 @@ class PaperConfig(PlanningConfig):
     scale_rate: float = 2.0  # times the learning rate, for the map's scale
     num_eval_simulations: int = 64  # here, search improves on the policy
     relabel_start: bool = False  # as in the paper
+    keep_anchor: bool = True  # beyond the paper: after landmarks and relabelled starts, displacements are still
+    # measured from the centre of the trajectory's first cell; the position within a later cell is unknown
     sequence_steps: int = 10  # two unrolls
     unroll: int = 5  # as many as n_step
     value_target: str = "n_step"  # as in the paper
     policy_target: str = "search"  # of the target network, under the relabelled goal, without noise
     steps_per_update: int = 128  # an update costs more than in MMN, so it is the time that is short, not experience
-    constant_updates: int = 2500  # before the learning rate falls, as one over the number of updates

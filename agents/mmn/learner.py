@@ -1,19 +1,18 @@
-"""The learner of MMN: sequences with goals relabelled in hindsight, in which the model is unrolled.
+"""The learner of MMN-paper, which MMN's extends: sequences with goals relabelled in hindsight, and unrolled models.
 
 `G` is the number of contexts in a batch, `S` of sequences in each, `L` of steps of a sequence, so L + 1 of states.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import torch
 
 from mazebench.maps.maze import Maze
-from mazebench.tasks.context import resized_map
-from mazebench.training.experience import Experience
 
 from ..common import symmetry
-from ..common.actor import NetworkAgent
 from ..common.layers import state_features
 from ..common.learner import HindsightLearner
 from ..common.replay import SequenceSample
@@ -26,31 +25,23 @@ from .targets import n_step_returns, tree_backup_returns
 class MMNLearner(HindsightLearner):
     """Updates the network of its actor."""
 
-    def __init__(self, actor: NetworkAgent, mazes: tuple[Maze, ...], seed: int):
+    def __init__(self, actor: Any, mazes: tuple[Maze, ...], seed: int):
         config = actor.config
         groups = actor.network.parameter_groups()
         optimizer = torch.optim.AdamW(groups, lr=config.learning_rate, weight_decay=config.weight_decay)
-        super().__init__(actor, mazes, seed, optimizer, config.keep_anchor)
+        super().__init__(actor, mazes, seed, optimizer, actor.keeps_anchor)
         self._device = actor.network.support.device
-        self._visited = np.zeros((len(mazes), mazes[0].size ** 2), dtype=np.float32)  # 1 in each visited cell
         self._num_updates = np.zeros(1, dtype=np.int64)
-        self._arrays |= {"visited": self._visited, "num_updates": self._num_updates}
-
-    def observe(self, experience: Experience, first_env: int = 0) -> None:
-        """Stores one step in the environments from `first_env` on, and marks its cells as visited."""
-        super().observe(experience, first_env)
-        self._visited[experience.maze, experience.cell] = 1.0
+        self._arrays |= {"num_updates": self._num_updates}
 
     def update(self) -> dict[str, float]:
         """Learns from one batch; returns its losses and, to judge a run early, other scalars by name."""
         config = self._config
-        sample = self.sample()
-        batch = self._batch(sample)
-        targets = self._targets(batch)
-        losses, metrics = unrolled_losses(self.actor.network, config, batch, targets)
+        losses, metrics = self._losses(self.sample())
         self._num_updates += 1
         for group in self._optimizer.param_groups:
-            falling = min(1.0, config.constant_updates / int(self._num_updates[0]))
+            constant_updates = group.get("constant_updates", config.constant_updates)
+            falling = min(1.0, constant_updates / int(self._num_updates[0]))
             group["lr"] = group["rate"] * config.learning_rate * falling
         metrics["gradient_norm"] = self._descend(torch.stack(list(losses.values())).sum())
         scalars = losses | metrics
@@ -65,21 +56,34 @@ class MMNLearner(HindsightLearner):
             config.groups, config.sequences, config.sequence_steps, self._hindsight, self._rng
         )
 
-    def _batch(self, sample: SequenceSample) -> Batch:
+    def _losses(self, sample: SequenceSample) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor]]:
+        """Returns losses by name, to be summed, and other scalars by name."""
         turned = self._draw_symmetry()
-        size, context_size = self._mazes[0].size, self.actor.trained_size
-        visited = [resized_map(self._visited[maze].reshape(size, size), context_size) for maze in sample.maze]
+        marks = self._marks(sample.anchor, turned), self._positions(sample, turned)
+        return self._unrolled(self._batch(sample, turned, self._contexts(sample, turned), *marks))
+
+    def _unrolled(self, batch: Batch) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor]]:
+        return unrolled_losses(self.actor.network, self._config, batch, self._targets(batch))
+
+    def _batch(
+        self,
+        sample: SequenceSample,
+        turned: int,
+        context: torch.Tensor,
+        anchor: torch.Tensor,
+        position: torch.Tensor,
+    ) -> Batch:
+        """Returns a sample as tensors, with what the hypermodel reads and with positions on the turned map."""
         features = state_features(torch.from_numpy(sample.state), torch.from_numpy(sample.origin)[:, None, None])
         reached = (sample.cell == sample.goal[:, None, None]) & sample.exists
         not_before = np.cumsum(reached, axis=-1) - reached == 0
         batch = Batch(
-            self._contexts(sample, turned),
-            self._marks(sample.anchor, turned),
-            symmetry.turn_planes(torch.from_numpy(np.stack(visited)[:, None]), turned),
+            context,
+            anchor,
             torch.from_numpy(sample.maze),
             torch.from_numpy(sample.relabelled),
             symmetry.turn_features(features, turned),
-            self._positions(sample, turned),
+            position,
             torch.from_numpy(symmetry.turn_actions(sample.action, turned)),
             torch.from_numpy(sample.exists & not_before),
             torch.from_numpy(reached & not_before),

@@ -23,9 +23,8 @@ _MOVED_WEIGHT = 2.0  # of an error of metres moved, beside one of the body's mot
 class Batch(NamedTuple):
     """A sample as tensors, rotated or mirrored."""
 
-    context: torch.Tensor  # [G, 4, M, M]
+    context: torch.Tensor  # [G, ..., M, M], what the hypermodel reads: contexts, or beliefs
     anchor: torch.Tensor  # [G, 2], the position (row, column) from which displacements are measured
-    visited: torch.Tensor  # [G, 1, M, M], the share of each cell of the map that was visited in this maze
     maze: torch.Tensor  # [G], the index of the maze
     relabelled: torch.Tensor  # [G] bool
     features: torch.Tensor  # [G, S, L + 1, 9]
@@ -104,7 +103,7 @@ def unrolled_losses(
             if step in (1, config.unroll):
                 watched.add(f"model_error_{step}", moved_error, exists)
         else:
-            encoded = Roots(latent, at(batch.position, 0), value, exists, going, batch.visited)
+            encoded = Roots(latent, at(batch.position, 0), value, exists, going)
             for name, errors, weights in network.extra_losses(encoded, code):
                 losses.add(name, errors, weights)
             error = (network.value(out.value_logits.detach()) - value) * going

@@ -106,8 +106,15 @@ def update_table(seconds: float, build_learner: Callable[..., MMNLearner]) -> di
         experience, state = collector.play(learner.actor, state)
         learner.observe(experience)
     learner.update()
-    times = {"sampling": 0.0, "its tensors": 0.0, "targets": 0.0, "losses": 0.0, "backward, optimizer": 0.0}
-    parts = {"sample": "sampling", "_batch": "its tensors", "_targets": "targets", "_descend": "backward, optimizer"}
+    parts = {
+        "sample": "sampling",
+        "_pictured": "wrong maps, evidence",
+        "_batch": "its tensors",
+        "_targets": "targets",
+        "_descend": "backward, optimizer",
+    }
+    parts = {method: part for method, part in parts.items() if hasattr(learner, method)}
+    times = dict.fromkeys(parts.values(), 0.0) | {"losses": 0.0}
     for method, part in parts.items():
         setattr(learner, method, _timed(getattr(learner, method), times, part))
     count, begin = 0, time.perf_counter()

@@ -1,6 +1,6 @@
-"""MMN, the map-conditioned multi-task navigator: MuZero whose model's weights are generated from a map.
+"""The paper's MMN, the map-conditioned multi-task navigator: MuZero whose model's weights are generated from a map.
 
-docs/agents/mmn.md describes the training, and how it differs from the paper.
+docs/agents/mmn-paper.md describes the training, and how it differs from the paper.
 """
 
 from __future__ import annotations
@@ -20,16 +20,15 @@ from ..common.actor import NetworkAgent
 from ..common.checkpoint import check_size, load_agent, load_into
 from ..common.layers import in_batches, marked_position, state_features
 from ..common.overrides import override
-from .config import MMNConfig, PaperConfig, PlanningConfig
+from .config import PaperConfig, PlanningConfig
 from .learner import MMNLearner
 from .network import NUM_ACTIONS, Code, Network
 from .paper import PaperNetwork
 from .planning import plan
-from .spatial import MMNNetwork
 
 # Contexts and states are computed as many at once, always, since PyTorch rounds differently at another batch size.
-_CONTEXTS_AT_ONCE = 16  # few are new in one step
-_STATES_AT_ONCE = 64
+CONTEXTS_AT_ONCE = 16  # few are new in one step
+STATES_AT_ONCE = 64
 
 
 @dataclasses.dataclass
@@ -40,13 +39,14 @@ class ActorState:
     code: Code | None  # of B contexts; None before the first step
 
 
-class MMN(NetworkAgent):
+class MMNPaper(NetworkAgent):
     """Acts by tree search in a latent model, whose weights a hypermodel generates from the context, once a leg."""
 
-    name: ClassVar[str] = "mmn"
-    default_config: ClassVar[PlanningConfig] = MMNConfig()
-    network_class: ClassVar[type[Network]] = MMNNetwork
-    config: PlanningConfig
+    name: ClassVar[str] = "mmn-paper"
+    default_config: ClassVar[PlanningConfig] = PaperConfig()
+    network_class: ClassVar[type[Network]] = PaperNetwork
+    learner_class: ClassVar[type[MMNLearner]] = MMNLearner
+    config: Any
     network: Network
 
     def __init__(self, config: PlanningConfig, context_size: int, seed: int = 0, device: str = "cpu"):
@@ -57,6 +57,11 @@ class MMN(NetworkAgent):
             torch.manual_seed(seed)
             self.network = self.network_class(config, context_size).to(device)
         self.explore_from(0, config.num_envs, seed)
+
+    @property
+    def keeps_anchor(self) -> bool:
+        """Whether displacements are measured from where the episode began, through all its legs."""
+        return self.config.keep_anchor
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
@@ -77,17 +82,17 @@ class MMN(NetworkAgent):
     def build_learner(
         cls, interface: Interface, mazes: Sequence[Maze], *, seed: int = 0, overrides: Mapping[str, str] | None = None
     ) -> MMNLearner:
-        """Returns a learner for an MMN, on a GPU if there is one."""
+        """Returns a learner for an agent of this class, on a GPU if there is one."""
         config = override(cls.default_config, overrides or {})
         device = "cuda" if torch.cuda.is_available() else "cpu"
-        return MMNLearner(cls(config, interface.context_size, seed, device), tuple(mazes), seed)
+        return cls.learner_class(cls(config, interface.context_size, seed, device), tuple(mazes), seed)
 
     @classmethod
     def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
-        """Returns tables for `mazebench bench`: the speed of the search and of the parts of an update."""
-        from .measure import search_table, update_table
+        """Returns the speed of the parts of an update; that of the search is measured with MMN."""
+        from .measure import update_table
 
-        return search_table(seconds) | update_table(seconds, cls.build_learner)
+        return update_table(seconds, cls.build_learner)
 
     def initial_state(self, batch_size: int) -> ActorState:
         """Returns a state without codes: `act` encodes a context where it is new."""
@@ -104,18 +109,19 @@ class MMN(NetworkAgent):
         """Returns actions `[B]`; the hypermodel runs only where a context is new."""
         new = np.flatnonzero(inputs.new_context)
         if len(new):
-            new_anchor = inputs.new_episode | (not self.config.keep_anchor)
+            new_anchor = inputs.new_episode | (not self.keeps_anchor)
             self._encode(inputs.observation, new, new_anchor, state)
         assert state.code is not None, "new_context must be set in an environment's first step"
         features = state_features(torch.from_numpy(inputs.observation["state"]), torch.from_numpy(state.origin))
-        device = self.network.support.device
-        latent = in_batches(self.network.encode, _STATES_AT_ONCE, features[:, None].to(device))
+        return self._planned(features, state.code, explore), state
+
+    def _planned(self, features: torch.Tensor, code: Code, explore: bool) -> np.ndarray:
+        """Returns actions `[B]` in states with features `[B, 9]`."""
+        latent = in_batches(self.network.encode, STATES_AT_ONCE, features[:, None].to(self.network.support.device))
         num_simulations = self.config.num_simulations if explore else self.config.num_eval_simulations
         noise = (self._rng, self._noise_scale) if explore else ()
-        action = plan(self.network, self.config, latent, state.code, num_simulations, *noise).action
-        if explore:
-            action = self._explored(action, NUM_ACTIONS)
-        return action, state
+        action = plan(self.network, self.config, latent, code, num_simulations, *noise).action
+        return self._explored(action, NUM_ACTIONS) if explore else action
 
     def _encode(self, observation: Observation, new: np.ndarray, new_anchor: np.ndarray, state: ActorState) -> None:
         """Writes the codes of the contexts at `new` into `state`; where no anchor is new, the old one is kept."""
@@ -129,24 +135,13 @@ class MMN(NetworkAgent):
         if state.code is not None:
             kept = self.network.reanchored(state.code.positions[rows, :2], moved, start)
             anchor = torch.where(torch.from_numpy(new_anchor[new, None]).to(device), start, kept)
-        code = in_batches(self.network.hypermodel, _CONTEXTS_AT_ONCE, context, anchor)
-        if state.code is None:
-            size = len(state.origin)
-            state.code = code._make(part.new_zeros(size, *part.shape[1:]) for part in code)
-        for whole, part in zip(state.code, code, strict=True):
-            whole[rows] = part
+        write_codes(state, rows, in_batches(self.network.hypermodel, CONTEXTS_AT_ONCE, context, anchor))
 
 
-class MMNPaper(MMN):
-    """The paper's MMN: all weights of the model are generated from one code of the context."""
-
-    name = "mmn-paper"
-    default_config = PaperConfig()
-    network_class = PaperNetwork
-
-    @classmethod
-    def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
-        """Returns the speed of the parts of an update; the search is that of MMN."""
-        from .measure import update_table
-
-        return update_table(seconds, cls.build_learner)
+def write_codes(state: ActorState, rows: torch.Tensor, code: Code) -> None:
+    """Writes codes into `rows` of a state's."""
+    if state.code is None:
+        size = len(state.origin)
+        state.code = code._make(part.new_zeros(size, *part.shape[1:]) for part in code)
+    for whole, part in zip(state.code, code, strict=True):
+        whole[rows] = part

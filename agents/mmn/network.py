@@ -44,7 +44,6 @@ class Roots(NamedTuple):
     value: torch.Tensor  # [G, K], its target
     exists: torch.Tensor  # [G, K] bool
     going: torch.Tensor  # [G, K] bool, whether the state exists and is not in the goal
-    visited: torch.Tensor  # [G, 1, M, M], the share of each cell of the map that was visited in this maze
 
 
 # The output of a hypermodel for G contexts: a NamedTuple of tensors [G, ...], the first of them `positions` [G, 4],
@@ -98,7 +97,10 @@ class Network(nn.Module, abc.ABC):
         """Returns the outputs of the heads."""
 
     def parameter_groups(self) -> list[dict[str, Any]]:
-        """Returns the optimizer's groups of parameters; `rate` multiplies the learning rate."""
+        """Returns the optimizer's groups of parameters.
+
+        `rate` multiplies the learning rate, and `constant_updates`, if given, stands for that of the config.
+        """
         return [{"params": list(self.parameters()), "rate": 1.0}]
 
     def extra_losses(self, roots: Roots, code: Code) -> Iterator[tuple[str, torch.Tensor, torch.Tensor]]:

@@ -1,5 +1,7 @@
 """The network of MMN: a row of generated weights for each cell of the map, and distances propagated over the map.
 
+Its hypermodel reads no map but a belief over the map (`belief.belief`).
+
 `G` is the number of contexts, `K` of latent states in each, `M` the side of the context, `H` the size of the
 transition's hidden layer, `P` the number of propagated distances, `T` of features of a cell.
 """
@@ -9,11 +11,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 from torch import nn
 from torch.nn import functional
 
-from ..common.layers import NUM_PLANES, NUM_WAVES, MapEncoder, steepness, waves
+from ..common.layers import NUM_WAVES, MapEncoder, marked_position, steepness, waves
+from .belief.belief import GOAL_HERE, NUM_BELIEFS, WALL, Belief
 from .compiled import spatial as compiled
 from .compiled.model import CompiledModel
 from .compiled.parts import Contexts, Linear, layer_of, linear_of
@@ -29,25 +33,31 @@ from .network import (
     Predictions,
     Roots,
     ahead_of,
-    marked_positions,
     moved_by,
+    rotate,
 )
 from .reading import read
+from .shortest_paths import cheapest_paths
 
 _DILATIONS = (1, 1, 1)  # of the map's convolutions
 _FIRST_COST = 2.0  # steps a cell, before anything is learned
-_BARRED = 100.0  # steps to enter a wall: longer than any detour
+_DETOUR = 12.0  # steps that a failed try costs
+_BARRED = 200.0  # steps to enter a wall, at most: longer than any detour
 _FAR = 1000.0  # steps; farther than any path
-_NUM_UNUSED = 1  # of the heads' outputs, which the shipped checkpoint has
+REACH = 30.0  # steps; how far goals are in training, and no farther than values are learned well
+_NEAR = 10.0  # steps; how far a goal that is brought nearer seems to be, at least
+_LONGEST = 100.0  # steps; longer distances count as this in the loss
+_LEAST_FREE = 0.1  # share of free cells around a position
 
 
 class Code(NamedTuple):
     """The output of the hypermodel for a context."""
 
     positions: torch.Tensor  # [G, 4], anchor and goal on the map, each (row, column)
-    weights: torch.Tensor  # [G, M * M, H + T], of each cell: a row of the first layer's, features for the heads
+    weights: torch.Tensor  # [G, M * M, H + T], of each cell: a row of the first layer's, features for the heads. The
+    # last ones are the ways to the goal, if the cell is free, and whether it is
     distance: torch.Tensor  # [G, P, M, M], learned steps to the goal
-    enterable: torch.Tensor  # [G, 1, M, M], logits that cells can be entered
+    free: torch.Tensor  # [G, 1, M, M], 1 where a cell is probably free
 
 
 class MMNNetwork(Network):
@@ -70,13 +80,49 @@ class MMNNetwork(Network):
         nn.init.zeros_(self.free_by_action.weight)
         self.ahead = nn.Linear(NUM_STOPPED, config.hidden)
         self.normalize = nn.LayerNorm(config.latent)
-        num_outputs = NUM_ACTIONS + self.num_bins + 1 + _NUM_UNUSED
+        num_outputs = NUM_ACTIONS + self.num_bins + 1
         self._make_heads(num_inputs + 2 + self.hypermodel.num_features, num_outputs, config)
-        self._weights = {name: getattr(config, f"{name}_weight") for name in ("localization", "distance", "visit")}
+        self.belief = Belief(config.belief_channels)
+        self._belief_rate, self._scale_updates = config.belief_rate, config.scale_updates
+        self._weights = {name: getattr(config, f"{name}_weight") for name in ("localization", "distance")}
+
+    def parameter_groups(self) -> list[dict[str, Any]]:
+        """Returns groups of their own for the belief and for the map's scale."""
+        of_belief = list(self.belief.parameters())
+        others = [parameter for name, parameter in self.named_parameters() if not name.startswith(("belief.", "scale"))]
+        return [
+            {"params": others, "rate": 1.0},
+            {"params": of_belief, "rate": self._belief_rate},
+            {"params": [self.scale], "rate": 1.0, "constant_updates": self._scale_updates},
+        ]
+
+    def on_map(self, vector: torch.Tensor) -> torch.Tensor:
+        """Returns vectors `[..., 2]` (row, column) on the map of those along x and y."""
+        return self._displacement(vector)
+
+    def metre(self) -> np.ndarray:
+        """Returns rows and columns (first axis) on the map of a metre in x and in y (second axis): `[2, 2]` float32."""
+        return np.ascontiguousarray(self.on_map(torch.eye(2, device=self.scale.device)).detach().cpu().numpy().T)
+
+    def velocity(self, features: torch.Tensor) -> torch.Tensor:
+        """Returns the velocities `[..., 2]` on the map of states with features `[..., 9]`, of a top speed of 1."""
+        return self.on_map(rotate(features[..., NUM_POSE:6], features[..., 2:NUM_POSE]))
+
+    def wished(self, features: torch.Tensor, action: torch.Tensor) -> torch.Tensor:
+        """Returns the velocities `[..., 2]` on the map after free motion, of a top speed of 1.
+
+        Args:
+          features: `[..., 9]`, of the states before the actions.
+          action: `[...]`.
+        """
+        free = self.free(features[..., NUM_POSE:NUM_BODY]) + self.free_by_action(action)
+        return self.on_map(rotate(free[..., 3:5], features[..., 2:NUM_POSE]))
 
     def look(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
-        """Returns rows of weights and features, interpolated."""
-        return read(self.locate(latent, code), code.weights, self.hypermodel.sharpness)
+        """Returns rows of weights and features, interpolated; ways are those of the free cells around."""
+        seen = read(self.locate(latent, code), code.weights, self.hypermodel.sharpness)
+        rest, ways, free = seen.split([seen.shape[-1] - self.hypermodel.num_ways - 1, self.hypermodel.num_ways, 1], -1)
+        return torch.cat([rest, ways / free.clamp(min=_LEAST_FREE), free], dim=-1)
 
     def first_layer(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
         """Returns the learned layer plus the generated rows."""
@@ -95,23 +141,19 @@ class MMNNetwork(Network):
         to_goal = (code.positions[:, None, 2:] - self.locate(latent, code)) / 10
         features = seen[..., -self.hypermodel.num_features :]
         out = self.heads(self.body(torch.cat([self._inputs(latent), to_goal, features], dim=-1)))
-        return Predictions(out[..., :NUM_ACTIONS], out[..., NUM_ACTIONS:-2], out[..., -2])
+        return Predictions(out[..., :NUM_ACTIONS], out[..., NUM_ACTIONS:-1], out[..., -1])
 
     def extra_losses(self, roots: Roots, code: Code) -> Iterator[tuple[str, torch.Tensor, torch.Tensor]]:
-        """Yields the losses beyond the paper.
-
-        The estimated position is compared with the true cell, propagated distances with values, and enterable cells
-        with those visited in this maze.
-        """
+        """Yields the losses beyond the paper: of the estimated position, and of propagated distances against values."""
         position = self.locate(roots.latent, code)
         error = (position - roots.position).abs().mean(dim=-1)
         yield "localization_loss", self._weights["localization"] * error, roots.exists
-        distances = code.distance.flatten(2).transpose(1, 2)
-        distance = read(position.detach(), distances, self.hypermodel.sharpness)  # [G, K, P]
+        # Of the cells around a position, those count that the body can be in.
+        distances = torch.cat([code.free * code.distance.clamp(max=_LONGEST), code.free], dim=1)
+        near = read(position.detach(), distances.flatten(2).transpose(1, 2), self.hypermodel.sharpness)
+        distance = near[..., :-1] / near[..., -1:].clamp(min=_LEAST_FREE)  # [G, K, P]
         error = functional.smooth_l1_loss(distance, -roots.value[..., None].expand_as(distance), reduction="none")
         yield "distance_loss", self._weights["distance"] * error.mean(dim=-1), roots.going
-        error = functional.binary_cross_entropy_with_logits(code.enterable, roots.visited, reduction="none")
-        yield "visit_loss", self._weights["visit"] * error, torch.ones_like(error)
 
     def compiled(self, code: Code, num_roots: int) -> CompiledModel:
         """Returns the model as kernels, with the weights as they are now."""
@@ -119,6 +161,7 @@ class MMNNetwork(Network):
         model = compiled.SpatialModel(
             Contexts(code.positions.numpy(), code.weights.numpy(), num_roots),
             self.num_bins,
+            self.hypermodel.num_ways,
             self.scale.detach().numpy(),
             steepness(self.hypermodel.sharpness.detach()).reshape(1).numpy(),
             linear_of(self.free),
@@ -139,68 +182,88 @@ class MMNNetwork(Network):
 
 
 class SpatialHypermodel(nn.Module):
-    """Generates a row of weights for each cell, for contexts of any size."""
+    """Generates a row of weights for each cell, for beliefs of any size."""
 
     def __init__(self, config: MMNConfig, num_inputs: int, num_outputs: int):
         super().__init__()
-        self.encoder = MapEncoder(config.channels, _DILATIONS)
-        num_encoded = config.channels + NUM_PLANES
+        self.encoder = MapEncoder(config.channels, _DILATIONS, NUM_BELIEFS)
+        num_encoded = config.channels + NUM_BELIEFS
         self.rows = nn.Conv2d(num_encoded, config.hidden, 1)
         self.propagation = Propagation(num_encoded, config.num_distances)
-        self.num_features = num_encoded + 5 * config.num_distances
+        self.num_ways = 5 * config.num_distances
+        self.num_features = num_encoded + self.num_ways + 1
         self.sharpness = nn.Parameter(torch.tensor(0.0))
         self.transition = _Transition(num_inputs, config.hidden, num_outputs)
 
-    def forward(self, context: torch.Tensor, anchor: torch.Tensor | None = None) -> Code:
-        """Returns the code of contexts `[G, 4, M, M]`.
+    def forward(self, belief: torch.Tensor, anchor: torch.Tensor, position: torch.Tensor | None = None) -> Code:
+        """Returns the code of beliefs `[G, 2, M, M]`.
 
-        Displacements are measured from `anchor` `[G, 2]`, a position (row, column), by default the marked start.
+        Args:
+          belief: see `Belief.probabilities`.
+          anchor: `[G, 2]`, the position (row, column) from which displacements are measured.
+          position: `[G, 2]`, the body's, in acting: goals that are farther from it than those of training are brought
+            nearer.
         """
-        features = torch.cat([self.encoder(context), context], dim=1)
+        likely = most_likely(belief)
+        features = torch.cat([self.encoder(likely), likely], dim=1)
         rows = self.rows(features)  # [G, H, M, M]
-        distance, enterable = self.propagation(features, context[:, 2:3])
-        features = torch.cat([features, self.propagation.slopes(distance)], dim=1)
+        distance = self.propagation(features, belief)
+        own = distance if position is None else brought_nearer(distance, position)
+        free = 1 - likely[:, WALL : WALL + 1]
+        ways = torch.cat([self.propagation.slopes(distance), (own / 30).clamp(max=4)], dim=1)
+        features = torch.cat([features, free * ways, free], dim=1)
         table = torch.cat([rows, features], dim=1).flatten(2).transpose(1, 2)  # [G, M * M, H + T]
-        return Code(marked_positions(context, anchor), table, distance, enterable)
+        goal = marked_position(belief[:, GOAL_HERE])
+        return Code(torch.cat([anchor, goal], dim=-1), table, distance, free)
 
 
 class Propagation(nn.Module):
-    """Distances to the goal on a map whose costs are learned: shortest paths by repeated relaxation.
+    """Distances to the goal on a map whose costs are learned: shortest paths.
 
-    Value propagation with max-pooling (Nardelli et al. 2019, MVProp), with sums of costs instead of products of
-    discounts. The cost to leave a cell is learned through the resulting distances; whether a cell can be entered is
-    learned from the cells that were visited.
+    Value propagation (Nardelli et al. 2019, MVProp), with sums of costs instead of products of discounts. The cost to
+    leave a cell is learned through the resulting distances. A cell that may be wall costs a detour for each failed try
+    that is expected before it is entered: the odds that it is wall. So does ending at a cell in which the goal may be.
     """
 
     def __init__(self, num_features: int, num_distances: int):
         super().__init__()
-        self.enterable = nn.Conv2d(num_features, 1, 1)
         self.cost = nn.Conv2d(num_features, num_distances, 1)
 
-    def forward(self, features: torch.Tensor, goal: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Returns distances `[G, P, M, M]`, and logits `[G, 1, M, M]` that cells can be entered.
-
-        Args:
-          features: `[G, C, M, M]`, of the map.
-          goal: `[G, 1, M, M]`, 1 at the goal.
-        """
-        enterable = self.enterable(features)
-        cost = functional.softplus(_FIRST_COST + self.cost(features)) + _BARRED * torch.sigmoid(-enterable.detach())
-        distance = (_FAR * (goal < 1)).expand_as(cost)
-        for _ in range(2 * goal.shape[-1]):
-            nearness = torch.maximum(
-                functional.max_pool2d(-distance, (3, 1), 1, (1, 0)), functional.max_pool2d(-distance, (1, 3), 1, (0, 1))
-            )
-            distance = torch.minimum(distance, cost - nearness)
-        return distance, enterable
+    def forward(self, features: torch.Tensor, belief: torch.Tensor) -> torch.Tensor:
+        """Returns distances `[G, P, M, M]`, from features `[G, C, M, M]` of beliefs `[G, 2, M, M]`."""
+        wall, goal = belief[:, WALL : WALL + 1], belief[:, GOAL_HERE : GOAL_HERE + 1]
+        cost = functional.softplus(_FIRST_COST + self.cost(features)) + _failed_tries(1 - wall, _BARRED)
+        begin = _failed_tries(goal, _FAR).expand_as(cost)
+        return cheapest_paths(cost.flatten(0, 1), begin.flatten(0, 1)).unflatten(0, cost.shape[:2])
 
     @staticmethod
     def slopes(distance: torch.Tensor) -> torch.Tensor:
-        """Returns `[G, 5 P, M, M]`: the neighbours' distances minus a cell's own, and its own, of order one."""
+        """Returns `[G, 4 P, M, M]`: the neighbours' distances minus a cell's own, of order one."""
         padded = functional.pad(distance, (1, 1, 1, 1), value=_FAR)
         neighbours = (padded[..., :-2, 1:-1], padded[..., 2:, 1:-1], padded[..., 1:-1, :-2], padded[..., 1:-1, 2:])
-        slopes = [((neighbour - distance) / 3).clamp(-2, 2) for neighbour in neighbours]
-        return torch.cat([*slopes, (distance / 30).clamp(max=4)], dim=1)
+        return torch.cat([((neighbour - distance) / 3).clamp(-2, 2) for neighbour in neighbours], dim=1)
+
+
+def most_likely(belief: torch.Tensor) -> torch.Tensor:
+    """Returns the most probable maze and goal of beliefs `[G, 2, M, M]`, as ones and zeros."""
+    return torch.stack([belief[:, WALL] > 0.5, belief[:, GOAL_HERE] == 1], dim=1).to(belief.dtype)
+
+
+def distance_at(position: torch.Tensor, distance: torch.Tensor) -> torch.Tensor:
+    """Returns the distances `[G, P]` of the cells at positions `[G, 2]`, of those of all cells `[G, P, M, M]`."""
+    row, column = position.round().clamp(0, distance.shape[-1] - 1).long().unbind(-1)
+    return distance[torch.arange(len(distance), device=distance.device), :, row, column]
+
+
+def brought_nearer(distance: torch.Tensor, position: torch.Tensor) -> torch.Tensor:
+    """Returns distances `[G, P, M, M]`, less by what is too far from `position` `[G, 2]` to the goal."""
+    excess = (distance_at(position, distance) - REACH).clamp(min=0)[..., None, None]
+    return torch.where(excess > 0, (distance - excess).clamp(min=_NEAR), distance)
+
+
+def _failed_tries(chance: torch.Tensor, most: float) -> torch.Tensor:
+    """Returns the steps that are expected to be lost, at most `most`, until one of several tries succeeds."""
+    return (_DETOUR * (1 - chance) / chance.clamp(min=1e-6)).clamp(max=most)
 
 
 class _Transition(nn.Module):

@@ -26,6 +26,7 @@ from .parts import (
     scratch,
 )
 
+_LEAST_FREE = np.float32(0.1)  # as in `spatial`
 _FREQUENCIES = (np.float32(0.25), np.float32(0.5), np.float32(1.0), np.float32(2.0))  # of `layers.waves`
 
 
@@ -34,6 +35,7 @@ class SpatialModel(NamedTuple):
 
     contexts: Contexts
     num_bins: int  # of categorical values
+    num_ways: int  # numbers of a cell that are read of free cells only
     scale: np.ndarray
     sharpness: np.ndarray  # [1], after softplus
     free: Linear
@@ -94,6 +96,10 @@ def arrive(model: SpatialModel, first: int, embeddings: np.ndarray, index: int, 
         positions = contexts.positions[c]
         row, column = locate(model.scale, positions, latent)
         read(row, column, contexts.table[c], model.sharpness[0], seen[b])
+        last = seen.shape[1] - 1
+        free = max(seen[b, last], _LEAST_FREE)
+        for i in range(last - model.num_ways, last):
+            seen[b, i] /= free
         for i in range(num_latent - 2):
             x[i] = latent[2 + i]
         k = num_latent - 2

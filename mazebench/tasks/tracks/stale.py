@@ -42,22 +42,28 @@ class Stale(Track):
 
     def check(self, maze: Maze, levels: Sequence[int]) -> None:
         swaps = SWAPS[max(levels) - 1]
-        rooms, pillars = maze.walls[1::2, 1::2], maze.walls[::2, ::2]
-        if maze.size % 2 == 0 or rooms.any() or not pillars.all():
+        if not _has_corridors(maze.walls):
             raise InputError(
                 f"{maze.name}: track 'stale' needs a maze of corridors, with an odd number of cells a side: rooms with "
                 "odd row and column are free, cells with even row and column are walls"
             )
-        is_open = _is_open(maze.walls)
-        # Two more, because start and goal may be doors.
-        movable = min(int((~is_open).sum()), int(is_open.sum()) - 2)
+        movable = num_movable(maze.walls)
         if movable < swaps:
-            raise InputError(f"{maze.name}: track 'stale' needs {swaps} doors that can move, found {max(movable, 0)}")
+            raise InputError(f"{maze.name}: track 'stale' needs {swaps} doors that can move, found {movable}")
 
     def facts(self, walls: np.ndarray, shown: ShownMap, ends: tuple[Cell, Cell]) -> dict[str, bool]:
         """Returns as `blocked` whether a shortest path on the map leads through a wall of the world."""
         path = path_through_walls(shown.walls, *ends)
         return {"blocked": bool(walls[tuple(np.transpose(path))].any())}
+
+
+def num_movable(walls: np.ndarray) -> int:
+    """Returns how many doors of a maze can be closed while others are opened; 0 if it is no maze of corridors."""
+    if not _has_corridors(walls):
+        return 0
+    is_open = _is_open(walls)
+    # Two more, because start and goal may be doors.
+    return max(0, min(int((~is_open).sum()), int(is_open.sum()) - 2))
 
 
 def move_doors(walls: np.ndarray, num_swaps: int, keep: Iterable[Cell], rng: np.random.Generator) -> np.ndarray:
@@ -95,6 +101,10 @@ def move_doors(walls: np.ndarray, num_swaps: int, keep: Iterable[Cell], rng: np.
                 return moved
         weight *= _ADAPTATION if num_new < 0 else 1 / _ADAPTATION if num_old < 0 else 1
     raise InputError(f"found no maze with {num_swaps} doors moved; give a larger maze")
+
+
+def _has_corridors(walls: np.ndarray) -> bool:
+    return len(walls) % 2 == 1 and not walls[1::2, 1::2].any() and bool(walls[::2, ::2].all())
 
 
 class _Doors(NamedTuple):

@@ -1,0 +1,198 @@
+"""MMN: it plans on what it believes of the maze, where the shown map is the prior.
+
+docs/agents/mmn.md describes the training, and how it differs from the paper.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import torch
+
+from mazebench.agent import Inputs, Interface, Observation
+
+from ...common.layers import in_batches, marked_position, state_features
+from ..config import MMNConfig, PlanningConfig
+from ..learner import MMNLearner
+from ..mmn import CONTEXTS_AT_ONCE, ActorState, MMNPaper, write_codes
+from ..network import Network
+from ..spatial import REACH, MMNNetwork, distance_at
+from .belief import GOAL_HERE, MAP, NUM_BELIEFS, NUM_SHOWN, START, WALL, probabilities
+from .displacement import Displacement
+from .evidence import NUM_EVIDENCE, PASSED, SENSED, Readings, place
+from .framing import framed
+from .learner import BeliefLearner
+from .scan_match import find_pose, is_odometry
+
+_AWAY = 3.0  # cells from where a goal was brought nearer, at which it is brought nearer again
+_SURPRISING = 0.1  # how much evidence must change where it contradicts the belief, before the belief is revised
+
+
+@dataclasses.dataclass
+class BeliefState(ActorState):
+    """The state of acting in B environments: `origin` is that of displacements, always 0."""
+
+    displacement: Displacement
+    turn: (
+        np.ndarray
+    )  # [B] float32, rad, from the frame of the observed pose to that of the map; 0 unless it is odometry
+    anchor: np.ndarray  # [B, 2] float32, the position on the map where the episode began
+    shown: np.ndarray  # [B, 3, M, M] float32, the map and the marks of the leg
+    evidence: np.ndarray  # [B, 2, M, M] float32
+    weighed: np.ndarray  # [B, 2, M, M] float32, the evidence when the belief was last revised
+    belief: np.ndarray  # [B, 2, M, M] float32
+    revised_at: np.ndarray  # [B, 2] float32, the position when the belief was last revised
+    is_far: np.ndarray  # [B] bool, whether the goal had to be brought nearer then
+    wished: np.ndarray  # [B, 2] float32, the velocity on the map after this step without obstacles; 0 at first
+
+
+class MMN(MMNPaper):
+    """Acts by tree search in a latent model, whose weights a hypermodel generates from a belief over the map."""
+
+    name: ClassVar[str] = "mmn"
+    default_config: ClassVar[PlanningConfig] = MMNConfig()
+    network_class: ClassVar[type[Network]] = MMNNetwork
+    learner_class: ClassVar[type[MMNLearner]] = BeliefLearner
+    keeps_anchor = True
+    network: MMNNetwork
+    _size: int  # M, the side of the map that is believed in, in cells
+
+    def __init__(self, config: PlanningConfig, context_size: int, seed: int = 0, device: str = "cpu"):
+        super().__init__(config, context_size, seed, device)
+        self._size = context_size
+
+    @classmethod
+    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
+        """Returns the agent of a checkpoint, by default of the one that ships.
+
+        Raises:
+          InputError: if the checkpoint can't be used here.
+        """
+        agent = super().build(interface, seed=seed, checkpoint=checkpoint)
+        agent._size = min(interface.size, interface.context_size)
+        return agent
+
+    @classmethod
+    def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
+        """Returns tables for `mazebench bench`: the speed of the search and of the parts of an update."""
+        from ..measure import search_table
+
+        return search_table(seconds) | super().measure(seconds)
+
+    def initial_state(self, batch_size: int) -> BeliefState:
+        """Returns a state without beliefs: `act` forms one where a context is new."""
+
+        def planes(number: int) -> np.ndarray:
+            return np.zeros((batch_size, number, self._size, self._size), dtype=np.float32)
+
+        def vectors() -> np.ndarray:
+            return np.zeros((batch_size, 2), dtype=np.float32)
+
+        maps = planes(NUM_SHOWN), planes(NUM_EVIDENCE), planes(NUM_EVIDENCE), planes(NUM_BELIEFS)
+        turn = np.zeros(batch_size, dtype=np.float32)
+        is_far = np.zeros(batch_size, dtype=bool)
+        return BeliefState(
+            vectors(), None, Displacement(batch_size), turn, vectors(), *maps, vectors(), is_far, vectors()
+        )
+
+    @torch.no_grad()
+    def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, BeliefState]:
+        """Returns actions `[B]`; the hypermodel runs where a context is new, or evidence contradicts the belief."""
+        for row in np.flatnonzero(inputs.new_context).tolist():
+            self._begin_leg(row, inputs, state)
+        observed = inputs.observation["state"].copy()
+        observed[:, :2] = moved = _turned(state.displacement.update(observed, inputs.new_episode), state.turn)
+        observed[:, 5] += state.turn
+        features = state_features(torch.from_numpy(observed), torch.zeros(len(observed), 2))
+        position = state.anchor + self.network.on_map(self._tensor(moved)).cpu().numpy()
+        self._note(inputs, features, observed[:, 5], position, state)
+        has_moved = np.abs(position - state.revised_at).sum(axis=1) > _AWAY
+        revised = inputs.new_context | _surprised(state) | (state.is_far & has_moved)
+        if inputs.active is not None:
+            revised = revised & inputs.active
+        self._revise(np.flatnonzero(revised), position, state)
+        assert state.code is not None, "new_context must be set in an environment's first step"
+        action = self._planned(features, state.code, explore)
+        state.wished = self.network.wished(self._tensor(features), self._tensor(action).long()).cpu().numpy()
+        return action, state
+
+    def _begin_leg(self, row: int, inputs: Inputs, state: BeliefState) -> None:
+        """Takes in a new context, and in a new episode forgets the evidence and the anchor."""
+        state.shown[row] = framed(inputs.observation["context"][row], self._size)
+        state.evidence[row, PASSED] = 0.0
+        if inputs.new_episode[row]:
+            state.evidence[row], state.wished[row] = 0.0, 0.0
+            state.turn[row] = self._find_heading(inputs.observation, row, state.shown[row])
+            state.anchor[row] = marked_position(torch.from_numpy(state.shown[row : row + 1, START]))[0]
+
+    def _find_heading(self, observation: Observation, row: int, shown: np.ndarray) -> float:
+        """Returns the heading (rad) at which an episode begins where the pose is odometry, else 0.
+
+        Marks the start that it finds if none is marked on the `shown` map.
+        """
+        if "lidar" not in observation or not is_odometry(observation["state"][row]):
+            return 0.0
+        marked = shown[START] > 0
+        cells = np.argwhere(marked if marked.any() else shown[MAP] < 0.5)
+        cell, heading = find_pose(shown[MAP], observation["lidar"][row], cells, self.network.metre())
+        shown[START][cell] = 1
+        return heading
+
+    def _note(
+        self, inputs: Inputs, features: torch.Tensor, yaw: np.ndarray, position: np.ndarray, state: BeliefState
+    ) -> None:
+        """Adds what is observed to the evidence."""
+        batch_size = len(position)
+        readings = Readings(
+            np.arange(batch_size),
+            np.ones(batch_size, dtype=bool),
+            position,
+            self.network.velocity(self._tensor(features)).cpu().numpy(),
+            state.wished,
+            yaw,
+            inputs.observation.get("lidar", np.zeros((batch_size, 0), dtype=np.float32)),
+        )
+        place(state.evidence, readings, self.network.metre())
+
+    def _revise(self, rows: np.ndarray, position: np.ndarray, state: BeliefState) -> None:
+        """Writes beliefs and codes of the contexts at `rows`."""
+        if not len(rows):
+            return
+        arrays = state.shown[rows], state.evidence[rows], state.anchor[rows], position[rows]
+        believed, code = self._believed(*(self._tensor(array) for array in arrays))
+        state.belief[rows], state.weighed[rows] = believed.cpu().numpy(), state.evidence[rows]
+        farthest = distance_at(self._tensor(position[rows]), code.distance).amax(dim=-1)
+        state.revised_at[rows], state.is_far[rows] = position[rows], (farthest > REACH).cpu().numpy()
+        write_codes(state, torch.from_numpy(rows).to(believed.device), code)
+
+    def _believed(
+        self, shown: torch.Tensor, evidence: torch.Tensor, anchor: torch.Tensor, position: torch.Tensor
+    ) -> tuple[torch.Tensor, Any]:
+        """Returns beliefs `[K, 2, M, M]` and codes of K contexts."""
+        belief = self.network.belief
+
+        def believe(shown: torch.Tensor, evidence: torch.Tensor) -> torch.Tensor:
+            return probabilities(belief(shown, evidence))
+
+        believed = in_batches(believe, CONTEXTS_AT_ONCE, shown, evidence)
+        return believed, in_batches(self.network.hypermodel, CONTEXTS_AT_ONCE, believed, anchor, position)
+
+    def _tensor(self, array: np.ndarray | torch.Tensor) -> torch.Tensor:
+        return torch.as_tensor(array).to(self.network.support.device)
+
+
+def _turned(vector: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Returns vectors `[B, 2]`, turned by angles `[B]` (rad)."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.stack([cosine * vector[:, 0] - sine * vector[:, 1], sine * vector[:, 0] + cosine * vector[:, 1]], axis=1)
+
+
+def _surprised(state: BeliefState) -> np.ndarray:
+    """Returns `[B]` bool: where evidence that came since the belief was revised contradicts it."""
+    sensed, before = state.evidence[:, SENSED], state.weighed[:, SENSED]
+    contradicts = np.abs(sensed - before) * np.abs((sensed > 0) - state.belief[:, WALL])
+    missed = (state.evidence[:, PASSED] - state.weighed[:, PASSED]) * state.belief[:, GOAL_HERE]
+    return np.maximum(contradicts, missed).max(axis=(1, 2)) > _SURPRISING

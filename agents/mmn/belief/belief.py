@@ -1,0 +1,78 @@
+"""The belief over a maze: for each cell, the probability that it is wall, and that the goal is in it.
+
+`G` is the number of contexts, `M` the side of the map.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import nn
+from torch.nn import functional
+
+from .evidence import NUM_EVIDENCE, PASSED, SENSED
+
+NUM_SHOWN = 3
+MAP, GOAL, START = range(NUM_SHOWN)  # the planes of a shown map
+NUM_BELIEFS = 2
+WALL, GOAL_HERE = range(NUM_BELIEFS)  # the planes of a belief
+
+_DILATIONS = (1, 1, 2, 2, 4, 4, 1, 1)  # of the convolutions
+# Logits before anything is learned: of what is shown, of what is sensed, and of the goal where it is shown.
+_SHOWN, _SENSED, _SHOWN_GOAL = 6.0, 12.0, 10.0
+_NUM_INPUTS = NUM_SHOWN + NUM_EVIDENCE + 3  # how much is sensed of each cell, and whether row and column are odd
+_SENSED_WEIGHT = 9.0  # of a sensed cell in the loss, beside the 1 of all cells: there, the map can be caught out
+
+
+class Belief(nn.Module):
+    """Weighs the shown map against the evidence; before anything is learned, it trusts both, and the evidence more."""
+
+    def __init__(self, channels: int):
+        super().__init__()
+        self.trust = nn.Parameter(torch.tensor([_SHOWN, _SENSED, _SHOWN_GOAL, _SHOWN_GOAL]))
+        self.inputs = nn.Conv2d(_NUM_INPUTS, channels, 3, padding=1)
+        self.layers = nn.ModuleList(
+            nn.Conv2d(channels, channels, 3, padding=dilation, dilation=dilation) for dilation in _DILATIONS
+        )
+        self.outputs = nn.Conv2d(channels, NUM_BELIEFS, 1)
+        for parameter in self.outputs.parameters():
+            nn.init.zeros_(parameter)
+
+    def forward(self, shown: torch.Tensor, evidence: torch.Tensor) -> torch.Tensor:
+        """Returns logits `[G, 2, M, M]`: that a cell is wall; and of a softmax over cells, that the goal is in it.
+
+        Args:
+          shown: `[G, 3, M, M]`, the map, and the marks of goal and start.
+          evidence: `[G, 2, M, M]`, of the episode.
+        """
+        odd = torch.arange(shown.shape[-1], device=shown.device) % 2
+        lattice = torch.stack(torch.broadcast_tensors(odd[:, None], odd)).to(shown.dtype)
+        known = evidence[:, SENSED : SENSED + 1].abs()
+        features = self.inputs(torch.cat([shown, evidence, known, lattice.expand(len(shown), -1, -1, -1)], dim=1))
+        for layer in self.layers:
+            features = features + layer(functional.relu(features))
+        of_map, of_sensed, of_goal, of_passed = self.trust
+        wall = of_map * (2 * shown[:, MAP] - 1) + of_sensed * evidence[:, SENSED]
+        goal = of_goal * shown[:, GOAL] - of_passed * evidence[:, PASSED]
+        return torch.stack([wall, goal], dim=1) + self.outputs(functional.relu(features))
+
+
+def probabilities(logits: torch.Tensor) -> torch.Tensor:
+    """Returns `[G, 2, M, M]`: the probability of wall, and that of the goal as a share of its most probable cell's."""
+    goal = logits[:, GOAL_HERE]
+    return torch.stack([torch.sigmoid(logits[:, WALL]), torch.exp(goal - goal.amax(dim=(-2, -1), keepdim=True))], dim=1)
+
+
+def belief_losses(logits: torch.Tensor, sensed: torch.Tensor, wall: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
+    """Returns the cross-entropies of wall and of goal, `[2]`, means over the contexts.
+
+    Args:
+      logits: `[G, 2, M, M]`, of `Belief`.
+      sensed: `[G, M, M]`, the evidence from -1 to 1.
+      wall: `[G, M, M]`, 1 where the maze has a wall.
+      goal: `[G]` int, the goal's cell, row * M + column; negative where it is outside of the map.
+    """
+    weight = 1 + _SENSED_WEIGHT * sensed.abs()
+    errors = functional.binary_cross_entropy_with_logits(logits[:, WALL], wall, reduction="none")
+    of_wall = (weight * errors).sum() / weight.sum()
+    of_goal = functional.cross_entropy(logits[:, GOAL_HERE].flatten(1), goal, ignore_index=-1)
+    return torch.stack([of_wall, of_goal])

@@ -1,0 +1,103 @@
+"""Prints an agent's success rates on held-out 13 x 13 mazes whose shown maps, or observed poses, are wrong.
+
+Call it as `python benchmarks/wrong_maps.py AGENT [CHECKPOINT...] [--rows NAME,...] [--seed N]`. Each row is a task.
+Each checkpoint is a column with 95 % intervals over mazes and episodes. The mazes are of no split; another seed draws
+other ones. The tracks are played with a lidar, the other tasks without.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import pathlib
+import time
+
+import numpy as np
+
+from mazebench.agent import Agent, Interface
+from mazebench.agent_loading import load_agent_class
+from mazebench.evaluation.chunk import run_trials
+from mazebench.evaluation.intervals import mean_interval
+from mazebench.evaluation.trials import draw_trials
+from mazebench.maps.generators import generate
+from mazebench.tasks.registry import make_spec
+from mazebench.tasks.spec import TaskSpec
+
+_SIZE = 13
+_NUM_MAZES = 40
+_HIERARCHICAL = {"task": "hierarchical"}
+# Options of each task; those of the local task that have no distances are played at 4, 8 and 12 cells.
+ROWS = {
+    "clean": {"distances": tuple(range(1, 16))},
+    "far": {"distances": (16, 20, 24)},
+    "flip .1": {"map_flip": 0.1},
+    "flip .2": {"map_flip": 0.2},
+    "hier": _HIERARCHICAL,
+    "hier .05": _HIERARCHICAL | {"map_flip": 0.05},
+    "hier .1": _HIERARCHICAL | {"map_flip": 0.1},
+    "hier .2": _HIERARCHICAL | {"map_flip": 0.2},
+    "warp .1": {"map_warp": 0.1},
+    "warp .2": {"map_warp": 0.2},
+    "noise 1 m": {"position_noise": 1.0},
+    **{
+        f"{track} {level}": {"task": track, "level": (level,), "sensors": ("lidar",)}
+        for track in ("stale", "sketch", "lost")
+        for level in (1, 2, 3)
+    },
+}
+_EPISODES = 2  # a maze and distance
+
+
+def held_out_task(options: dict, seed: int, num_mazes: int) -> TaskSpec:
+    """Returns the task of a row in mazes that are drawn like the benchmark's."""
+    options = dict(options)
+    task = options.pop("task", "local")
+    if task == "local":
+        options.setdefault("distances", (4, 8, 12))
+    spec = make_spec(task, _SIZE, **options)
+    streams = np.random.SeedSequence([seed, _SIZE]).spawn(num_mazes)
+    mazes = [generate("dfs", _SIZE, np.random.default_rng(stream), f"held-out-{i}") for i, stream in enumerate(streams)]
+    return dataclasses.replace(spec, mazes=tuple(mazes))
+
+
+def outcomes(agent: Agent, spec: TaskSpec, needs_truth: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the success and the maze of each episode."""
+    trials = list(enumerate(draw_trials(spec, 1 if len(spec.distances) > 9 else _EPISODES)))
+    ended = [
+        (outcome.success, outcome.trial.episode.maze)
+        for some in run_trials(agent, spec, trials, len(trials), needs_truth=needs_truth)
+        for outcome in some
+    ]
+    success, maze = np.array(ended).T
+    return success.astype(float), maze
+
+
+def main() -> None:
+    """Prints the table."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("agent")
+    parser.add_argument("checkpoints", nargs="*", type=pathlib.Path)
+    parser.add_argument("--rows", default=",".join(ROWS), help="names of rows, with commas between")
+    parser.add_argument("--seed", type=int, default=30_000)
+    parser.add_argument("--mazes", type=int, default=_NUM_MAZES)
+    given = parser.parse_args()
+    agent_class = load_agent_class(given.agent)
+    for name, options in ROWS.items():
+        if name not in given.rows.split(","):
+            continue
+        cells, begin = [], time.perf_counter()
+        for checkpoint in given.checkpoints or [None]:
+            spec = held_out_task(options, given.seed, given.mazes)
+            if spec.track is None:
+                spec = dataclasses.replace(spec, context_size=agent_class.context_size(_SIZE))
+            spec = dataclasses.replace(spec, sensors=tuple({*spec.sensors, *agent_class.needs_sensors}))
+            interface = Interface(spec.task, _SIZE, spec.context_size, sensors=spec.sensors)
+            agent = agent_class.build(interface, checkpoint=checkpoint)
+            success, maze = outcomes(agent, spec, agent_class.needs_truth)
+            estimate = mean_interval(success, maze)
+            cells.append(f"{estimate.value:.3f} [{estimate.low:.2f}, {estimate.high:.2f}]")
+        print(f"{name:24}", "  ".join(cells), f" ({time.perf_counter() - begin:.0f} s)", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,343 @@
+"""What MMN believes of a maze: evidence, wrong maps, the displacement, and when the belief is revised."""
+
+import numpy as np
+import pytest
+import torch
+from acting import inputs_of
+from mazebench_agents.mmn import MMN
+from mazebench_agents.mmn.belief.belief import GOAL, GOAL_HERE, MAP, START, WALL, Belief, belief_losses, probabilities
+from mazebench_agents.mmn.belief.displacement import Displacement
+from mazebench_agents.mmn.belief.evidence import PASSED, SENSED, Readings, place
+from mazebench_agents.mmn.belief.framing import framed
+from mazebench_agents.mmn.belief.scan_match import find_pose, is_odometry
+from mazebench_agents.mmn.belief.wrong_maps import wrong_map
+from mazebench_agents.mmn.shortest_paths import cheapest_paths
+from test_mmn import CONFIGS, a_context, make_learner
+
+from mazebench.agent import Interface
+from mazebench.errors import InputError
+from mazebench.maps.generators import generate
+from mazebench.tasks.context import build_context
+from mazebench.tasks.tracks.sketch import draw_by_hand
+from mazebench.tasks.tracks.stale import num_movable
+from mazebench.world.lidar import MAX_RANGE, Lidar
+
+METRE = np.array([[0, -1], [1, 0]], dtype=np.float32)  # a cell a metre, y up
+
+
+@pytest.fixture(scope="module")
+def mazes():
+    return tuple(generate("dfs", 7, np.random.default_rng(index), f"m{index}") for index in range(3))
+
+
+def planes(size=7):
+    return np.zeros((1, 2, size, size), dtype=np.float32)
+
+
+def a_reading(position, velocity=(0, 0), wished=(0, 0), yaw=0.0, ranges=(), on_leg=True):
+    row = (np.array([values], dtype=np.float32) for values in (position, velocity, wished, yaw))
+    lidar = np.array([ranges], dtype=np.float32).reshape(1, -1)
+    return Readings(np.zeros(1, dtype=np.int64), np.array([on_leg]), *row, lidar)
+
+
+def test_cell_of_the_body_is_free_and_passed():
+    evidence = planes()
+    place(evidence, a_reading((2.2, 3.3)), METRE)
+    assert evidence[0, SENSED, 2, 3] < -0.3
+    assert evidence[0, PASSED, 2, 3] == 1
+    assert np.count_nonzero(evidence) == 2
+    place(evidence, a_reading((4.0, 1.0), on_leg=False), METRE)
+    assert evidence[0, PASSED].sum() == 1
+    before = evidence.copy()
+    place(evidence, a_reading((2.45, 5.0)), METRE)  # too near to the edge to tell the cell
+    place(evidence, a_reading((-3.0, 9.0)), METRE)  # outside
+    np.testing.assert_array_equal(evidence, before)
+
+
+@pytest.mark.parametrize(
+    ("position", "velocity", "is_wall"),
+    [
+        ((2.0, 3.3), (0.0, 0.1), True),
+        ((2.0, 3.3), (0.0, 0.8), False),  # not stopped
+        ((2.0, 3.0), (0.0, 0.1), False),  # far from the edge
+        ((2.45, 3.3), (0.0, 0.1), False),  # beside the corner of two cells
+    ],
+)
+def test_body_that_is_slower_than_it_wished_was_stopped_by_a_wall(position, velocity, is_wall):
+    evidence = planes()
+    place(evidence, a_reading(position, velocity, wished=(0.0, 0.9)), METRE)
+    assert (evidence[0, SENSED, 2, 4] > 0) == is_wall
+
+
+def test_rays_pass_through_free_cells_and_end_at_walls(mazes):
+    size, lidar = mazes[0].size, Lidar(mazes)
+    for index, maze in enumerate(mazes):
+        evidence = planes(size)
+        for row, column in np.argwhere(~maze.walls)[::3]:
+            x, y, yaw = column + 0.6, size - row - 0.45, 0.3 * row
+            ranges = lidar.ranges(np.array([index]), np.array([[x, y, yaw]]))[0]
+            place(evidence, a_reading((size - y - 0.5, x - 0.5), yaw=yaw, ranges=ranges), METRE)
+        sensed = evidence[0, SENSED]
+        told = np.abs(sensed) > 0.3
+        assert told.sum() > 0.8 * size**2
+        np.testing.assert_array_equal(sensed[told] > 0, maze.walls[told])
+
+
+def test_ray_that_meets_nothing_tells_of_no_wall():
+    evidence = planes(13)
+    place(evidence, a_reading((6.0, 6.0), ranges=[MAX_RANGE] * 32), METRE)
+    assert evidence.max(initial=0) == 1  # the body's own cell, passed
+    assert (evidence[0, SENSED] <= 0).all()
+
+
+def test_belief_is_the_shown_map_and_what_was_sensed_before_anything_is_learned():
+    torch.manual_seed(0)
+    shown = a_context(batch=3)[:, [0, 2, 3]]
+    evidence = torch.zeros(3, 2, 7, 7)
+    believed = probabilities(Belief(8)(shown, evidence))
+    torch.testing.assert_close(believed, shown[:, [MAP, GOAL]], atol=0.003, rtol=0)
+    evidence[:, SENSED, 2, 2], evidence[:, SENSED, 3, 3] = 1, -1
+    evidence[0, PASSED, 1, 5] = 1  # where the goal is marked
+    believed = probabilities(Belief(8)(shown, evidence))
+    assert (believed[:, WALL, 2, 2] > 0.99).all()
+    assert (believed[:, WALL, 3, 3] < 0.01).all()
+    assert believed[0, GOAL_HERE].min() == 1  # nowhere more than elsewhere
+
+
+def test_losses_of_a_belief_by_hand():
+    logits = torch.zeros(2, 2, 3, 3)
+    logits[0, WALL, 0, 0] = 2.0
+    sensed, wall = torch.zeros(2, 3, 3), torch.zeros(2, 3, 3)
+    sensed[0, 0, 0], wall[0, 0, 0] = -1.0, 1.0  # 10 times the weight of another cell
+    of_wall, of_goal = belief_losses(logits, sensed, wall, torch.tensor([4, -1]))
+    even, surer = np.log(2), np.log1p(np.exp(-2))
+    assert of_wall.item() == pytest.approx((17 * even + 10 * surer) / 27)
+    assert of_goal.item() == pytest.approx(np.log(9))  # a goal outside of the map does not count
+
+
+def test_evidence_at_replay_comes_from_the_past_alone(mazes):
+    """What is written into the replay after a sample's earliest step changes nothing of its evidence."""
+    learner = make_learner(mazes)
+    learner.actor.network.scale.data.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))
+    sample = learner.sample()
+    anchor = np.stack(np.divmod(sample.anchor, 7), axis=-1)
+    past = sample.past
+    assert past.exists[:, -1].all()
+    first = sample.state[:, :, 0]
+    steps_of = (past.state[:, -1:] == first).all(axis=-1)
+    assert steps_of.any(axis=1).all()  # the last row of the past is the earliest step of the group
+
+    replay, rng = learner._replay, np.random.default_rng(0)
+    state = learner._rng.bit_generator.state
+    before = learner._evidence(sample, anchor)
+    sequences = {name: rng.normal(size=getattr(sample, name).shape) for name in ("state",)}
+    learner._rng.bit_generator.state = state
+    np.testing.assert_array_equal(learner._evidence(sample._replace(**sequences), anchor), before)
+    assert replay.num_rows
+    assert np.count_nonzero(before)
+
+
+def test_past_of_a_sample_ends_at_its_earliest_step_and_stays_in_its_trajectory(mazes):
+    learner = make_learner(mazes, steps=60)
+    replay = learner._replay
+    for _ in range(20):
+        sample = learner.sample()
+        env, index = np.divmod(sample.row, replay._length)
+        for g in range(len(env)):
+            kept = sample.past.state[g][sample.past.exists[g]]
+            rows = np.flatnonzero(replay._trajectory[env[g]] == replay._trajectory[env[g], index[g]])
+            stored = replay._state[env[g], rows]
+            np.testing.assert_array_equal(kept, stored[: len(kept)][-len(kept) :])  # from the trajectory's first row on
+            steps = sample.state[g, :, 0]
+            positions = [int(np.flatnonzero((stored == step).all(axis=1))[0]) for step in steps]
+            assert len(kept) == min(positions) + 1
+
+
+def test_positions_are_believed_where_they_are_exact_and_filtered_where_they_are_noisy():
+    rng = np.random.default_rng(0)
+    filtered = Displacement(2)
+    true, errors = np.zeros(2), []
+    for step in range(150):
+        velocity = np.array([np.cos(step / 20), np.sin(step / 20)])
+        state = np.zeros((2, 12), dtype=np.float32)
+        state[:, 5] = 0.7
+        turn = np.array([[np.cos(0.7), np.sin(0.7)], [-np.sin(0.7), np.cos(0.7)]])
+        state[:, 6:8] = turn @ velocity
+        true = true + 0.16 * velocity * (step > 0)
+        state[:, :2] = np.array([5.0, 8.0]) + true
+        state[1, :2] += rng.normal(size=2)
+        moved = filtered.update(state, np.full(2, step == 0))
+        np.testing.assert_allclose(moved[0], true, atol=1e-5)
+        errors.append(np.linalg.norm(moved[1] - true))
+    assert np.mean(errors) < 0.35
+    assert filtered.update(state, np.ones(2, dtype=bool)).tolist() == [[0, 0], [0, 0]]
+
+
+def test_drawing_of_more_pixels_than_cells_is_framed_to_its_cells():
+    rng = np.random.default_rng(1)
+    agreement, marks = [], []
+    for _ in range(20):
+        maze = generate("dfs", 13, rng, "m")
+        cells = [tuple(map(int, cell)) for cell in rng.permutation(np.argwhere(~maze.walls))[:2]]
+        drawing = draw_by_hand(13, 0.5, rng)
+        picture = drawing.picture(maze.walls)
+        context = build_context(picture, *(drawing.pixel(cell, picture) for cell in cells), 26)
+        shown = framed(context, 13)
+        agreement.append(((shown[MAP] > 0.5) == maze.walls).mean())
+        for plane, cell in ((START, cells[0]), (GOAL, cells[1])):
+            marks.append(np.abs(np.argwhere(shown[plane])[0] - cell).max())
+    assert np.mean(agreement) > 0.8
+    assert np.mean(np.array(marks) <= 1) == 1
+
+
+def test_wrong_maps_keep_the_marks_in_free_cells_and_say_how_they_are_displaced():
+    rng = np.random.default_rng(0)
+    maze = generate("dfs", 13, rng, "m")
+    free = [tuple(map(int, cell)) for cell in np.argwhere(~maze.walls)]
+    shares = []
+    for _ in range(200):
+        start, goal, anchor = (free[index] for index in rng.choice(len(free), 3))
+        shown, shift = wrong_map(maze.walls, start, goal, anchor, rng)
+        assert shown.shape == (3, 13, 13)
+        assert (shown[[GOAL, START]].sum(axis=(1, 2)) == 1).all()
+        assert np.abs(shift).max() <= 4
+        shares.append(((shown[MAP] > 0.5) != maze.walls).mean())
+    assert 0.05 < np.mean(shares) < 0.3
+
+
+def test_maze_without_movable_doors_is_drawn_wrong_all_the_same():
+    walls = np.pad(np.zeros((4, 4), dtype=bool), 1, constant_values=True)
+    assert num_movable(walls) == 0
+    for seed in range(20):
+        wrong_map(walls, (1, 1), (4, 4), (2, 2), np.random.default_rng(seed))
+
+
+def test_learner_wants_contexts_of_the_mazes_size(mazes):
+    with pytest.raises(InputError, match="contexts of the mazes' size, found mazes of 7 and a context of 5"):
+        MMN.build_learner(Interface("local", 7, 5), mazes)
+
+
+def an_agent(size=7):
+    torch.manual_seed(0)
+    agent = MMN(CONFIGS["mmn"], size)
+    with torch.no_grad():
+        agent.network.scale.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))
+    return agent
+
+
+def move(state, x, y):
+    """Moves bodies from the origin, with the velocity that this takes."""
+    state[:, :2] = x, y
+    state[:, 6:8] = 2 * x / 0.16, 2 * y / 0.16
+
+
+def test_belief_is_revised_where_evidence_contradicts_it_and_only_there(monkeypatch):
+    agent = an_agent()
+    context = np.zeros((2, 4, 7, 7), dtype=np.float32)
+    context[:, 2, 1, 5] = context[:, 3, 5, 1] = 1
+    context[0, 0, 5, 2] = 1  # a wall is shown in front of the first body, none in front of the second
+    state = np.zeros((2, 12), dtype=np.float32)
+    memory = agent.initial_state(2)
+    _, memory = agent.act(inputs_of({"state": state, "context": context}, np.ones(2, dtype=bool)), memory)
+    revised = []
+    revise = agent._revise
+    monkeypatch.setattr(agent, "_revise", lambda rows, *rest: (revised.append(rows.tolist()), revise(rows, *rest)))
+    move(state, 1.0, 0.0)  # both bodies are a cell further right now
+    for _ in range(2):
+        _, memory = agent.act(inputs_of({"state": state, "context": context}, np.zeros(2, dtype=bool)), memory)
+    assert revised[0] == [0]
+    assert memory.evidence[0, SENSED, 5, 2] < 0
+    assert np.abs(memory.belief[0] - memory.belief[1]).max() > 0
+
+
+def test_anchor_and_evidence_last_through_the_landmarks_of_an_episode():
+    agent = an_agent()
+    context = a_context(batch=2).numpy()
+    context[:, :2] = 0
+    state = np.zeros((2, 12), dtype=np.float32)
+    memory = agent.initial_state(2)
+    every = np.ones(2, dtype=bool)
+    _, memory = agent.act(inputs_of({"state": state, "context": context}, every), memory)
+    move(state, 0.8, 1.1)
+    context[:, 3] = 0
+    context[:, 3, 4, 3] = 1  # not where the body is
+    _, memory = agent.act(inputs_of({"state": state, "context": context}, every, np.array([False, True])), memory)
+    np.testing.assert_array_equal(memory.anchor, [[5, 1], [4, 3]])
+    assert (memory.evidence[:, SENSED] != 0).sum(axis=(1, 2)).tolist() == [2, 1]
+    assert (memory.evidence[:, PASSED] != 0).sum(axis=(1, 2)).tolist() == [1, 1]
+
+
+def test_goal_is_believed_elsewhere_where_the_body_has_passed_it(monkeypatch):
+    agent = an_agent()
+    with torch.no_grad():  # a belief that has learned that the goal is not where the body was
+        agent.network.belief.forward = lambda shown, evidence: torch.stack(
+            [torch.full_like(shown[:, 0], -9.0), 5 * shown[:, GOAL] - 9 * evidence[:, PASSED]], dim=1
+        )
+    context = np.zeros((1, 4, 7, 7), dtype=np.float32)
+    context[:, 2, 5, 2] = context[:, 3, 5, 1] = 1
+    state = np.zeros((1, 12), dtype=np.float32)
+    memory = agent.initial_state(1)
+    _, memory = agent.act(inputs_of({"state": state, "context": context}, np.ones(1, dtype=bool)), memory)
+    assert memory.belief[0, GOAL_HERE].argmax() == 5 * 7 + 2
+    move(state, 1.0, 0.0)
+    _, memory = agent.act(inputs_of({"state": state, "context": context}, np.zeros(1, dtype=bool)), memory)
+    assert memory.belief[0, GOAL_HERE, 5, 2] < 0.05
+
+
+def test_cheapest_paths_and_their_gradients_by_relaxation():
+    torch.manual_seed(0)
+    cost = (torch.rand(4, 6, 6) + 0.5).requires_grad_()
+    begin = torch.full((4, 6, 6), 100.0)
+    begin[:, 1, 4], begin[:, 5, 0] = 0.0, 2.0
+    weight = torch.rand(4, 6, 6)
+    distance = begin
+    for _ in range(40):
+        padded = torch.nn.functional.pad(distance, (1, 1, 1, 1), value=1000.0)
+        beside = (padded[:, :-2, 1:-1], padded[:, 2:, 1:-1], padded[:, 1:-1, :-2], padded[:, 1:-1, 2:])
+        distance = torch.minimum(distance, cost + torch.stack(beside).amin(dim=0))
+    found = cheapest_paths(cost, begin)
+    torch.testing.assert_close(found, distance)
+    (expected,) = torch.autograd.grad((distance * weight).sum(), cost)
+    (gradient,) = torch.autograd.grad((found * weight).sum(), cost)
+    torch.testing.assert_close(gradient, expected)
+
+
+def test_first_reading_of_the_lidar_tells_the_heading_and_mostly_the_cell():
+    mazes = tuple(generate("dfs", 13, np.random.default_rng(index), f"m{index}") for index in range(10))
+    rng, lidar = np.random.default_rng(0), Lidar(mazes)
+    turned, found = [], []
+    for index, maze in enumerate(mazes):
+        cells = np.argwhere(~maze.walls)
+        for row, column in rng.permutation(cells)[:5]:
+            yaw = rng.uniform(-np.pi, np.pi)
+            ranges = lidar.ranges(np.array([index]), np.array([[column + 0.5, 13 - row - 0.5, yaw]]))[0]
+            shown = maze.walls.astype(np.float32)
+            _, heading = find_pose(shown, ranges, np.array([[row, column]]), METRE)
+            turned.append(np.abs(np.angle(np.exp(1j * (heading - yaw)))))
+            cell, _ = find_pose(shown, ranges, cells, METRE)
+            found.append(cell == (row, column))
+    assert np.mean(np.array(turned) < 0.1) > 0.85  # elsewhere the walls look alike in two directions
+    assert np.mean(found) > 0.5
+
+
+def test_pose_at_the_origin_is_odometry():
+    state = np.zeros(12, dtype=np.float32)
+    assert is_odometry(state)
+    state[5] = 0.1
+    assert not is_odometry(state)
+
+
+@pytest.mark.parametrize("is_marked", [True, False])
+def test_motion_told_by_odometry_is_turned_to_the_map(is_marked, mazes):
+    agent, maze = an_agent(), mazes[0]
+    yaw, cell = 0.9, tuple(np.argwhere(~maze.walls)[7])
+    ranges = Lidar(mazes).ranges(np.array([0]), np.array([[cell[1] + 0.5, 7 - cell[0] - 0.5, yaw]]))
+    context = build_context(maze.walls, cell, (1, 1), 7)[None]
+    if not is_marked:
+        context[:, 3] = 0
+    state = np.zeros((1, 12), dtype=np.float32)
+    observation = {"state": state, "context": context, "lidar": ranges.astype(np.float32)}
+    memory = agent.initial_state(1)
+    _, memory = agent.act(inputs_of(observation, np.ones(1, dtype=bool)), memory)
+    assert memory.turn[0] == pytest.approx(yaw, abs=0.1)
+    np.testing.assert_array_equal(memory.anchor[0], cell)
