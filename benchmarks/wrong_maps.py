@@ -29,7 +29,7 @@ _HIERARCHICAL = {"task": "hierarchical"}
 # Options of each task; those of the local task that have no distances are played at 4, 8 and 12 cells.
 ROWS = {
     "clean": {"distances": tuple(range(1, 16))},
-    "far": {"distances": (16, 20, 24)},
+    "far": {"distances": (16, 20)},
     "flip .1": {"map_flip": 0.1},
     "flip .2": {"map_flip": 0.2},
     "hier": _HIERARCHICAL,
