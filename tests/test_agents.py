@@ -20,6 +20,7 @@ from mazebench.evaluation.checked_agent import CheckedAgent
 from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.trials import select_trials
 from mazebench.maps.benchmark import load_mazes
+from mazebench.maps.generators import generate
 from mazebench.tasks.registry import make_spec
 from mazebench.tasks.spec import TaskSpec
 from mazebench.testing import ConformanceError, check_agent
@@ -285,7 +286,8 @@ class TestConformance:
         interface = Interface("hierarchical", 7, agent_class.context_size(7), sensors=agent_class.needs_sensors)
         if issubclass(agent_class, LearningAgent):
             # Untrained: the contract does not depend on what it learned.
-            agent_class.build_learner(interface, load_mazes(13, "train")[:1]).save(tmp_path, {})
+            mazes = (generate("dfs", 7, np.random.default_rng(0), "m"),)
+            agent_class.build_learner(interface, mazes).save(tmp_path, {})
             checkpoint = tmp_path / "agent.safetensors"
         check_agent(agent_class, interface, checkpoint)
 

@@ -21,7 +21,9 @@ def train(
     context: typer.Context,
     agent: Annotated[
         str,
-        typer.Option(help="A learning agent, such as mmn, mmn-paper, mah, mah-paper or dqn, or module:Class."),
+        typer.Option(
+            help="A learning agent: dqn, mah, mah-paper, mmn, mmn-paper or another installed one, or module:Class."
+        ),
     ],
     values: dict[str, Any],
     out: Annotated[

@@ -17,7 +17,7 @@ from mazebench.agent import Inputs, Interface, Observation
 from ...common.layers import in_batches, marked_position, state_features
 from ..config import MMNConfig, PlanningConfig
 from ..learner import MMNLearner
-from ..mmn import CONTEXTS_AT_ONCE, ActorState, MMNPaper, write_codes
+from ..mmn import CONTEXTS_AT_ONCE, STATES_AT_ONCE, ActorState, MMNPaper, write_codes
 from ..network import Network
 from ..spatial import REACH, MMNNetwork, distance_at
 from .belief import GOAL_HERE, MAP, NUM_BELIEFS, NUM_SHOWN, START, WALL, probabilities
@@ -116,7 +116,8 @@ class MMN(MMNPaper):
         self._revise(np.flatnonzero(revised), position, state)
         assert state.code is not None, "new_context must be set in an environment's first step"
         action = self._planned(features, state.code, explore)
-        state.wished = self.network.wished(self._tensor(features), self._tensor(action).long()).cpu().numpy()
+        taken = self._tensor(features), self._tensor(action).long()
+        state.wished = in_batches(self.network.wished, STATES_AT_ONCE, *taken).cpu().numpy()
         return action, state
 
     def _begin_leg(self, row: int, inputs: Inputs, state: BeliefState) -> None:
@@ -136,7 +137,7 @@ class MMN(MMNPaper):
         if "lidar" not in observation or not is_odometry(observation["state"][row]):
             return 0.0
         marked = shown[START] > 0
-        cells = np.argwhere(marked if marked.any() else shown[MAP] < 0.5)
+        cells = np.argwhere(marked if marked.any() else shown[MAP] <= max(0.5, shown[MAP].min()))
         cell, heading = find_pose(shown[MAP], observation["lidar"][row], cells, self.network.metre())
         shown[START][cell] = 1
         return heading
