@@ -121,14 +121,14 @@ class Network(nn.Module, abc.ABC):
 
     def locate(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
         """Returns the estimated positions `[G, K, 2]` (row, column) of latent states on the map."""
-        return code.positions[:, None, :2] + self._displacement(latent[..., :2])
+        return code.positions[:, None, :2] + self.on_map(latent[..., :2])
 
     def reanchored(self, anchor: torch.Tensor, moved: torch.Tensor, start: torch.Tensor) -> torch.Tensor:
         """Returns `anchor` `[G, 2]`, shifted just enough that the estimated position lies in the `start` cell.
 
         The estimated position is that of a body displaced by `moved` `[G, 2]` (m) from the anchor.
         """
-        position = anchor + self._displacement(moved)
+        position = anchor + self.on_map(moved)
         return anchor + torch.clamp(position, start - 0.5, start + 0.5) - position
 
     def step_all(self, latent: torch.Tensor, first: torch.Tensor, code: Code) -> torch.Tensor:
@@ -142,7 +142,7 @@ class Network(nn.Module, abc.ABC):
         """Returns the means `[G, K]` of categorical values, in steps."""
         return torch.softmax(value_logits, dim=-1) @ self.support
 
-    def _displacement(self, moved: torch.Tensor) -> torch.Tensor:
+    def on_map(self, moved: torch.Tensor) -> torch.Tensor:
         """Returns displacements `[..., 2]` on the map (row, column) of those in metres (x, y)."""
         return _SCALE_RATE * (moved[..., None] * self.scale).sum(-2)
 

@@ -96,10 +96,6 @@ class MMNNetwork(Network):
             {"params": [self.scale], "rate": 1.0, "constant_updates": self._scale_updates},
         ]
 
-    def on_map(self, vector: torch.Tensor) -> torch.Tensor:
-        """Returns vectors `[..., 2]` (row, column) on the map of those along x and y."""
-        return self._displacement(vector)
-
     def metre(self) -> np.ndarray:
         """Returns rows and columns (first axis) on the map of a metre in x and in y (second axis): `[2, 2]` float32."""
         return np.ascontiguousarray(self.on_map(torch.eye(2, device=self.scale.device)).detach().cpu().numpy().T)
@@ -199,7 +195,7 @@ class SpatialHypermodel(nn.Module):
         """Returns the code of beliefs `[G, 2, M, M]`.
 
         Args:
-          belief: see `Belief.probabilities`.
+          belief: see `belief.probabilities`.
           anchor: `[G, 2]`, the position (row, column) from which displacements are measured.
           position: `[G, 2]`, the body's, in acting: goals that are farther from it than those of training are brought
             nearer.

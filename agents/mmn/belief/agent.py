@@ -21,7 +21,7 @@ from ..mmn import CONTEXTS_AT_ONCE, STATES_AT_ONCE, ActorState, MMNPaper, write_
 from ..network import Network
 from ..spatial import REACH, MMNNetwork, distance_at
 from .belief import GOAL_HERE, MAP, NUM_BELIEFS, NUM_SHOWN, START, WALL, probabilities
-from .displacement import Displacement
+from .displacement import Displacement, turned
 from .evidence import NUM_EVIDENCE, PASSED, SENSED, Readings, place
 from .framing import framed
 from .learner import BeliefLearner
@@ -36,9 +36,7 @@ class BeliefState(ActorState):
     """The state of acting in B environments: `origin` is that of displacements, always 0."""
 
     displacement: Displacement
-    turn: (
-        np.ndarray
-    )  # [B] float32, rad, from the frame of the observed pose to that of the map; 0 unless it is odometry
+    turn: np.ndarray  # [B] float32, rad, from the observed pose's frame to the map's; 0 unless it is odometry
     anchor: np.ndarray  # [B, 2] float32, the position on the map where the episode began
     shown: np.ndarray  # [B, 3, M, M] float32, the map and the marks of the leg
     evidence: np.ndarray  # [B, 2, M, M] float32
@@ -104,7 +102,7 @@ class MMN(MMNPaper):
         for row in np.flatnonzero(inputs.new_context).tolist():
             self._begin_leg(row, inputs, state)
         observed = inputs.observation["state"].copy()
-        observed[:, :2] = moved = _turned(state.displacement.update(observed, inputs.new_episode), state.turn)
+        observed[:, :2] = moved = turned(state.displacement.update(observed, inputs.new_episode), state.turn)
         observed[:, 5] += state.turn
         features = state_features(torch.from_numpy(observed), torch.zeros(len(observed), 2))
         position = state.anchor + self.network.on_map(self._tensor(moved)).cpu().numpy()
@@ -183,12 +181,6 @@ class MMN(MMNPaper):
 
     def _tensor(self, array: np.ndarray | torch.Tensor) -> torch.Tensor:
         return torch.as_tensor(array).to(self.network.support.device)
-
-
-def _turned(vector: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Returns vectors `[B, 2]`, turned by angles `[B]` (rad)."""
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return np.stack([cosine * vector[:, 0] - sine * vector[:, 1], sine * vector[:, 0] + cosine * vector[:, 1]], axis=1)
 
 
 def _surprised(state: BeliefState) -> np.ndarray:

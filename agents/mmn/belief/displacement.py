@@ -35,7 +35,7 @@ class Displacement:
           state: what is observed.
           begins: `[B]` bool, whether an episode begins.
         """
-        position, velocity = state[:, :2].astype(np.float64), planar_velocity(state)
+        position, velocity = state[:, :2].astype(np.float64), turned(state[:, 6:8], state[:, 5])
         self._first[begins], self._squares[begins], self._num_steps[begins] = position[begins], 0.0, 0.0
         goes = ~begins
         moved = _STEP_TIME * (self._velocity + velocity) / 2
@@ -58,8 +58,7 @@ class Displacement:
         return np.where(exact, position - self._first, self._mean[:, 0]).astype(np.float32)
 
 
-def planar_velocity(state: np.ndarray) -> np.ndarray:
-    """Returns velocities `[..., 2]` (m/s) along x and y of states `[..., 12]`, whose velocities are the body's own."""
-    yaw, forward, left = state[..., 5], state[..., 6], state[..., 7]
-    cosine, sine = np.cos(yaw), np.sin(yaw)
-    return np.stack([cosine * forward - sine * left, sine * forward + cosine * left], axis=-1)
+def turned(vector: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Returns vectors `[B, 2]`, turned by angles `[B]` (rad)."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.stack([cosine * vector[:, 0] - sine * vector[:, 1], sine * vector[:, 0] + cosine * vector[:, 1]], axis=1)
