@@ -12,15 +12,13 @@ import sys
 import numpy as np
 import torch
 from mazebench_agents.mmn import MMN
-from mazebench_agents.mmn.belief.belief import GOAL, MAP
-from mazebench_agents.mmn.belief.framing import framed
+from mazebench_agents.mmn.belief.wrong_maps import planes_of
 from mazebench_agents.mmn.learner import MMNLearner
 from mazebench_agents.mmn.spatial import MMNNetwork
 
 from mazebench.agent import Interface
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze
-from mazebench.tasks.context import build_context
 from mazebench.tasks.registry import make_spec
 from mazebench.training.run_folder import RunFolder
 
@@ -56,9 +54,9 @@ def values_by_distance(network: MMNNetwork, mazes: tuple[Maze, ...], rng: np.ran
     for maze in mazes:
         free = np.argwhere(~maze.walls)
         goal = tuple(free[rng.integers(len(free))].tolist())
-        shown = torch.from_numpy(framed(build_context(maze.walls, goal, goal, maze.size), maze.size))
+        exact = torch.from_numpy(planes_of(maze.walls, goal))
         anchors = torch.from_numpy(free).float()
-        code = network.hypermodel(shown[[MAP, GOAL]].expand(len(free), -1, -1, -1), anchors)
+        code = network.hypermodel(exact.expand(len(free), -1, -1, -1), anchors)
         features = torch.zeros(len(free), 1, 9)
         features[..., 3] = 1.0  # the cosine of yaw
         latent = network.encode(features)

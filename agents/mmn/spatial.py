@@ -17,7 +17,7 @@ from torch import nn
 from torch.nn import functional
 
 from ..common.layers import NUM_WAVES, MapEncoder, marked_position, steepness, waves
-from .belief.belief import GOAL_HERE, NUM_BELIEFS, WALL, Belief
+from .belief.belief import GOAL, NUM_PLANES, WALL, Belief
 from .compiled import spatial as compiled
 from .compiled.model import CompiledModel
 from .compiled.parts import Contexts, Linear, layer_of, linear_of
@@ -182,8 +182,8 @@ class SpatialHypermodel(nn.Module):
 
     def __init__(self, config: MMNConfig, num_inputs: int, num_outputs: int):
         super().__init__()
-        self.encoder = MapEncoder(config.channels, _DILATIONS, NUM_BELIEFS)
-        num_encoded = config.channels + NUM_BELIEFS
+        self.encoder = MapEncoder(config.channels, _DILATIONS, NUM_PLANES)
+        num_encoded = config.channels + NUM_PLANES
         self.rows = nn.Conv2d(num_encoded, config.hidden, 1)
         self.propagation = Propagation(num_encoded, config.num_distances)
         self.num_ways = 5 * config.num_distances
@@ -209,7 +209,7 @@ class SpatialHypermodel(nn.Module):
         ways = torch.cat([self.propagation.slopes(distance), (own / 30).clamp(max=4)], dim=1)
         features = torch.cat([features, free * ways, free], dim=1)
         table = torch.cat([rows, features], dim=1).flatten(2).transpose(1, 2)  # [G, M * M, H + T]
-        goal = marked_position(belief[:, GOAL_HERE])
+        goal = marked_position(belief[:, GOAL])
         return Code(torch.cat([anchor, goal], dim=-1), table, distance, free)
 
 
@@ -227,7 +227,7 @@ class Propagation(nn.Module):
 
     def forward(self, features: torch.Tensor, belief: torch.Tensor) -> torch.Tensor:
         """Returns distances `[G, P, M, M]`, from features `[G, C, M, M]` of beliefs `[G, 2, M, M]`."""
-        wall, goal = belief[:, WALL : WALL + 1], belief[:, GOAL_HERE : GOAL_HERE + 1]
+        wall, goal = belief[:, WALL : WALL + 1], belief[:, GOAL : GOAL + 1]
         cost = functional.softplus(_FIRST_COST + self.cost(features)) + _failed_tries(1 - wall, _BARRED)
         begin = _failed_tries(goal, _FAR).expand_as(cost)
         return cheapest_paths(cost.flatten(0, 1), begin.flatten(0, 1)).unflatten(0, cost.shape[:2])
@@ -242,7 +242,7 @@ class Propagation(nn.Module):
 
 def most_likely(belief: torch.Tensor) -> torch.Tensor:
     """Returns the most probable maze and goal of beliefs `[G, 2, M, M]`, as ones and zeros."""
-    return torch.stack([belief[:, WALL] > 0.5, belief[:, GOAL_HERE] == 1], dim=1).to(belief.dtype)
+    return torch.stack([belief[:, WALL] > 0.5, belief[:, GOAL] == 1], dim=1).to(belief.dtype)
 
 
 def distance_at(position: torch.Tensor, distance: torch.Tensor) -> torch.Tensor:

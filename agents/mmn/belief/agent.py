@@ -14,13 +14,13 @@ import torch
 
 from mazebench.agent import Inputs, Interface, Observation
 
-from ...common.layers import in_batches, marked_position, state_features
+from ...common.layers import in_batches, state_features
 from ..config import MMNConfig, PlanningConfig
 from ..learner import MMNLearner
 from ..mmn import CONTEXTS_AT_ONCE, STATES_AT_ONCE, ActorState, MMNPaper, write_codes
 from ..network import Network
 from ..spatial import REACH, MMNNetwork, distance_at
-from .belief import GOAL_HERE, MAP, NUM_BELIEFS, NUM_SHOWN, START, WALL, probabilities
+from .belief import GOAL, NUM_PLANES, WALL, probabilities
 from .displacement import Displacement, turned
 from .evidence import NUM_EVIDENCE, PASSED, SENSED, Readings, place
 from .framing import framed
@@ -28,6 +28,7 @@ from .learner import BeliefLearner
 from .scan_match import find_pose, is_odometry
 
 _AWAY = 3.0  # cells from where a goal was brought nearer, at which it is brought nearer again
+_ROUNDING = 1e-3  # m, of positions as float32
 _SURPRISING = 0.1  # how much evidence must change where it contradicts the belief, before the belief is revised
 
 
@@ -37,8 +38,8 @@ class BeliefState(ActorState):
 
     displacement: Displacement
     turn: np.ndarray  # [B] float32, rad, from the observed pose's frame to the map's; 0 unless it is odometry
-    anchor: np.ndarray  # [B, 2] float32, the position on the map where the episode began
-    shown: np.ndarray  # [B, 3, M, M] float32, the map and the marks of the leg
+    anchor: np.ndarray  # [B, 2] float32, the position where the episode began
+    shown: np.ndarray  # [B, 2, M, M] float32, the map, and the mark of the leg's goal
     evidence: np.ndarray  # [B, 2, M, M] float32
     weighed: np.ndarray  # [B, 2, M, M] float32, the evidence when the belief was last revised
     belief: np.ndarray  # [B, 2, M, M] float32
@@ -57,6 +58,7 @@ class MMN(MMNPaper):
     keeps_anchor = True
     network: MMNNetwork
     _size: int  # M, the side of the map that is believed in, in cells
+    _points_tell: bool = True  # whether a cell of that map is a metre, so that the position tells the cell
 
     def __init__(self, config: PlanningConfig, context_size: int, seed: int = 0, device: str = "cpu"):
         super().__init__(config, context_size, seed, device)
@@ -71,6 +73,7 @@ class MMN(MMNPaper):
         """
         agent = super().build(interface, seed=seed, checkpoint=checkpoint)
         agent._size = min(interface.size, interface.context_size)
+        agent._points_tell = agent._size == interface.size and interface.cell_size == 1.0
         return agent
 
     @classmethod
@@ -89,7 +92,7 @@ class MMN(MMNPaper):
         def vectors() -> np.ndarray:
             return np.zeros((batch_size, 2), dtype=np.float32)
 
-        maps = planes(NUM_SHOWN), planes(NUM_EVIDENCE), planes(NUM_EVIDENCE), planes(NUM_BELIEFS)
+        maps = planes(NUM_PLANES), planes(NUM_EVIDENCE), planes(NUM_EVIDENCE), planes(NUM_PLANES)
         turn = np.zeros(batch_size, dtype=np.float32)
         is_far = np.zeros(batch_size, dtype=bool)
         return BeliefState(
@@ -120,25 +123,35 @@ class MMN(MMNPaper):
 
     def _begin_leg(self, row: int, inputs: Inputs, state: BeliefState) -> None:
         """Takes in a new context, and in a new episode forgets the evidence and the anchor."""
-        state.shown[row] = framed(inputs.observation["context"][row], self._size)
+        state.shown[row], starts = framed(inputs.observation["context"][row], self._size)
         state.evidence[row, PASSED] = 0.0
         if inputs.new_episode[row]:
             state.evidence[row], state.wished[row] = 0.0, 0.0
-            state.turn[row] = self._find_heading(inputs.observation, row, state.shown[row])
-            state.anchor[row] = marked_position(torch.from_numpy(state.shown[row : row + 1, START]))[0]
+            pose = self._first_pose(inputs.observation, row, state.shown[row, WALL], starts)
+            state.anchor[row], state.turn[row] = pose
 
-    def _find_heading(self, observation: Observation, row: int, shown: np.ndarray) -> float:
-        """Returns the heading (rad) at which an episode begins where the pose is odometry, else 0.
+    def _first_pose(
+        self, observation: Observation, row: int, walls: np.ndarray, starts: np.ndarray
+    ) -> tuple[np.ndarray | tuple[int, int], float]:
+        """Returns the cell where an episode begins, and the angle (rad) from the observed pose's frame to the map's.
 
-        Marks the start that it finds if none is marked on the `shown` map.
+        An episode begins in the centre of a cell, so a position that is a cell's centre is believed. Any other one is
+        noisy, or the origin of odometry. Then the marked start is believed. The lidar tells the heading of odometry
+        and, if no start is marked, the cell.
+
+        Args:
+          observation: the first one of the episode in environment `row`, and others.
+          walls: `[M, M]` float32, the shown map.
+          starts: `[S, 2]` int, the marked starts, one or none.
         """
-        if "lidar" not in observation or not is_odometry(observation["state"][row]):
-            return 0.0
-        marked = shown[START] > 0
-        cells = np.argwhere(marked if marked.any() else shown[MAP] <= max(0.5, shown[MAP].min()))
-        cell, heading = find_pose(shown[MAP], observation["lidar"][row], cells, self.network.metre())
-        shown[START][cell] = 1
-        return heading
+        observed = observation["state"][row]
+        cell = np.array([self._size - 0.5 - observed[1], observed[0] - 0.5])
+        if self._points_tell and np.abs(cell - np.rint(cell)).max() < _ROUNDING:
+            return cell, 0.0
+        if "lidar" in observation and is_odometry(observed):
+            cells = starts if len(starts) else np.argwhere(walls <= max(0.5, walls.min()))
+            return find_pose(walls, observation["lidar"][row], cells, self.network.metre())
+        return starts[0] if len(starts) else np.full(2, (self._size - 1) / 2), 0.0
 
     def _note(
         self, inputs: Inputs, features: torch.Tensor, yaw: np.ndarray, position: np.ndarray, state: BeliefState
@@ -187,5 +200,5 @@ def _surprised(state: BeliefState) -> np.ndarray:
     """Returns `[B]` bool: where evidence that came since the belief was revised contradicts it."""
     sensed, before = state.evidence[:, SENSED], state.weighed[:, SENSED]
     contradicts = np.abs(sensed - before) * np.abs((sensed > 0) - state.belief[:, WALL])
-    missed = (state.evidence[:, PASSED] - state.weighed[:, PASSED]) * state.belief[:, GOAL_HERE]
+    missed = (state.evidence[:, PASSED] - state.weighed[:, PASSED]) * state.belief[:, GOAL]
     return np.maximum(contradicts, missed).max(axis=(1, 2)) > _SURPRISING

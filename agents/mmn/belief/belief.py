@@ -11,15 +11,13 @@ from torch.nn import functional
 
 from .evidence import NUM_EVIDENCE, PASSED, SENSED
 
-NUM_SHOWN = 3
-MAP, GOAL, START = range(NUM_SHOWN)  # the planes of a shown map
-NUM_BELIEFS = 2
-WALL, GOAL_HERE = range(NUM_BELIEFS)  # the planes of a belief
+NUM_PLANES = 2
+WALL, GOAL = range(NUM_PLANES)  # the planes of a maze with its goal: as it is shown, as it is believed, as it is
 
 _DILATIONS = (1, 1, 2, 2, 4, 4, 1, 1)  # of the convolutions
 # Logits before anything is learned: of what is shown, of what is sensed, and of the goal where it is shown.
 _SHOWN, _SENSED, _SHOWN_GOAL = 6.0, 12.0, 10.0
-_NUM_INPUTS = NUM_SHOWN + NUM_EVIDENCE + 3  # how much is sensed of each cell, and whether row and column are odd
+_NUM_INPUTS = NUM_PLANES + NUM_EVIDENCE + 3  # how much is sensed of each cell, and whether row and column are odd
 _SENSED_WEIGHT = 9.0  # of a sensed cell in the loss, beside the 1 of all cells: there, the map can be caught out
 
 
@@ -33,7 +31,7 @@ class Belief(nn.Module):
         self.layers = nn.ModuleList(
             nn.Conv2d(channels, channels, 3, padding=dilation, dilation=dilation) for dilation in _DILATIONS
         )
-        self.outputs = nn.Conv2d(channels, NUM_BELIEFS, 1)
+        self.outputs = nn.Conv2d(channels, NUM_PLANES, 1)
         for parameter in self.outputs.parameters():
             nn.init.zeros_(parameter)
 
@@ -41,7 +39,7 @@ class Belief(nn.Module):
         """Returns logits `[G, 2, M, M]`: that a cell is wall; and of a softmax over cells, that the goal is in it.
 
         Args:
-          shown: `[G, 3, M, M]`, the map, and the marks of goal and start.
+          shown: `[G, 2, M, M]`, the map, and the goal's mark.
           evidence: `[G, 2, M, M]`, of the episode.
         """
         odd = torch.arange(shown.shape[-1], device=shown.device) % 2
@@ -51,28 +49,27 @@ class Belief(nn.Module):
         for layer in self.layers:
             features = features + layer(functional.relu(features))
         of_map, of_sensed, of_goal, of_passed = self.trust
-        wall = of_map * (2 * shown[:, MAP] - 1) + of_sensed * evidence[:, SENSED]
+        wall = of_map * (2 * shown[:, WALL] - 1) + of_sensed * evidence[:, SENSED]
         goal = of_goal * shown[:, GOAL] - of_passed * evidence[:, PASSED]
         return torch.stack([wall, goal], dim=1) + self.outputs(functional.relu(features))
 
 
 def probabilities(logits: torch.Tensor) -> torch.Tensor:
     """Returns `[G, 2, M, M]`: the probability of wall, and that of the goal as a share of its most probable cell's."""
-    goal = logits[:, GOAL_HERE]
+    goal = logits[:, GOAL]
     return torch.stack([torch.sigmoid(logits[:, WALL]), torch.exp(goal - goal.amax(dim=(-2, -1), keepdim=True))], dim=1)
 
 
-def belief_losses(logits: torch.Tensor, sensed: torch.Tensor, wall: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
+def belief_losses(logits: torch.Tensor, sensed: torch.Tensor, truth: torch.Tensor) -> torch.Tensor:
     """Returns the cross-entropies of wall and of goal, `[2]`, means over the contexts.
 
     Args:
       logits: `[G, 2, M, M]`, of `Belief`.
       sensed: `[G, M, M]`, the evidence from -1 to 1.
-      wall: `[G, M, M]`, 1 where the maze has a wall.
-      goal: `[G]` int, the goal's cell, row * M + column; negative where it is outside of the map.
+      truth: `[G, 2, M, M]`, 1 where the maze has a wall, 1 where its goal is.
     """
     weight = 1 + _SENSED_WEIGHT * sensed.abs()
-    errors = functional.binary_cross_entropy_with_logits(logits[:, WALL], wall, reduction="none")
+    errors = functional.binary_cross_entropy_with_logits(logits[:, WALL], truth[:, WALL], reduction="none")
     of_wall = (weight * errors).sum() / weight.sum()
-    of_goal = functional.cross_entropy(logits[:, GOAL_HERE].flatten(1), goal, ignore_index=-1)
+    of_goal = functional.cross_entropy(logits[:, GOAL].flatten(1), truth[:, GOAL].flatten(1))
     return torch.stack([of_wall, of_goal])

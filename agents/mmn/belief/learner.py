@@ -11,30 +11,28 @@ import numpy as np
 import torch
 
 from mazebench.errors import InputError
-from mazebench.maps.maze import Cell, Maze
+from mazebench.maps.maze import Maze
 from mazebench.world.lidar import Lidar
 
 from ...common import symmetry
 from ...common.layers import state_features
 from ...common.replay import SequenceSample
 from ..learner import MMNLearner
-from .belief import GOAL, MAP, belief_losses
+from .belief import belief_losses
 from .evidence import NUM_EVIDENCE, SENSED, Readings, place
-from .wrong_maps import Drawn, exact_map, wrong_map
+from .wrong_maps import planes_of, wrong_map
 
 _PAST = 120  # steps from which evidence is made
 _LONGEST_LEG = 40  # steps of the leg to the goal that have passed, at most
 _WITH_LIDAR = 0.4  # share of contexts in which the body has a lidar
-_OUTSIDE = -1
 
 
 class Pictured(NamedTuple):
-    """What the belief learns from: maps and evidence of a batch, and where walls and goals are."""
+    """What the belief learns from."""
 
-    shown: torch.Tensor  # [G, 3, M, M]
+    shown: torch.Tensor  # [G, 2, M, M], maps and marks of the goal
     evidence: torch.Tensor  # [G, 2, M, M]
-    wall: torch.Tensor  # [G, M, M]
-    goal: torch.Tensor  # [G] int, row * M + column; -1 if outside of the map
+    truth: torch.Tensor  # [G, 2, M, M], walls and goals of the mazes
 
 
 class BeliefLearner(MMNLearner):
@@ -58,47 +56,32 @@ class BeliefLearner(MMNLearner):
         turned, weight = self._draw_symmetry(), self._config.belief_weight
         pictured = self._pictured(sample, turned)
         logits = self.actor.network.belief(pictured.shown, pictured.evidence)
-        of_wall, of_goal = belief_losses(logits, pictured.evidence[:, SENSED], pictured.wall, pictured.goal)
-        maps = self._turned([exact_map(*task) for task in self._tasks(sample)], turned)
+        of_wall, of_goal = belief_losses(logits, pictured.evidence[:, SENSED], pictured.truth)
         marks = self._marks(sample.anchor, turned), self._positions(sample, turned)
-        losses, metrics = self._unrolled(self._batch(sample, turned, maps[:, [MAP, GOAL]], *marks))
+        losses, metrics = self._unrolled(self._batch(sample, turned, pictured.truth, *marks))
         return losses | {"wall_loss": weight * of_wall, "goal_place_loss": weight * of_goal}, metrics
-
-    def _tasks(self, sample: SequenceSample) -> list[tuple[np.ndarray, Cell, Cell]]:
-        """Returns walls, start and goal of each context."""
-        ends = zip(sample.maze.tolist(), sample.start.tolist(), sample.goal.tolist(), strict=True)
-        return [
-            (self._mazes[maze].walls, divmod(start, self._size), divmod(goal, self._size)) for maze, start, goal in ends
-        ]
 
     def _pictured(self, sample: SequenceSample, turned: int) -> Pictured:
         """Returns wrong maps, or those that were shown in training, with the evidence of the past."""
-        anchor = np.stack(np.divmod(sample.anchor, self._size), axis=-1)
-        drawn = []
-        for index, (walls, start, goal) in enumerate(self._tasks(sample)):
+        shown, truth = [], []
+        for index, maze in enumerate(sample.maze.tolist()):
+            walls = self._mazes[maze].walls
+            start, goal = (divmod(int(cell[index]), self._size) for cell in (sample.anchor, sample.goal))
+            truth.append(planes_of(walls, goal))
             if sample.shown is not None:
-                drawn.append(exact_map(sample.shown[index], start, goal))
+                shown.append(planes_of(sample.shown[index], goal))
             elif self._rng.random() < self._config.wrong_maps:
-                first = tuple(anchor[index].tolist())
-                drawn.append(wrong_map(walls, start, goal, first, self._rng))
+                shown.append(wrong_map(walls, start, goal, self._rng))
             else:
-                drawn.append(exact_map(walls, start, goal))
-        shift = np.stack([each.shift for each in drawn])
-        evidence = self._evidence(sample, anchor + shift)
-        walls = np.stack([_shifted(self._mazes[maze].walls, by) for maze, by in zip(sample.maze, shift, strict=True)])
-        wall = symmetry.turn_planes(torch.from_numpy(walls).float(), turned)
-        goals = torch.from_numpy(np.stack(np.divmod(sample.goal, self._size), axis=-1) + shift)
-        cells = symmetry.turn_cells(goals, self._size, turned)
-        inside = ((cells >= 0) & (cells < self._size)).all(dim=-1)
-        goal_place = torch.where(inside, cells[:, 0] * self._size + cells[:, 1], _OUTSIDE)
-        planes = symmetry.turn_planes(torch.from_numpy(evidence), turned)
-        device = self._device
-        return Pictured(self._turned(drawn, turned), planes.to(device), wall.to(device), goal_place.to(device))
+                shown.append(truth[-1])
+        planes = np.stack(shown), self._evidence(sample), np.stack(truth)
+        return Pictured(*(symmetry.turn_planes(torch.from_numpy(each), turned).to(self._device) for each in planes))
 
     @torch.no_grad()
-    def _evidence(self, sample: SequenceSample, anchor: np.ndarray) -> np.ndarray:
-        """Returns the evidence `[G, 2, M, M]` of the past, where displacements are measured from `anchor` `[G, 2]`."""
+    def _evidence(self, sample: SequenceSample) -> np.ndarray:
+        """Returns the evidence `[G, 2, M, M]` of the past."""
         past, network = sample.past, self.actor.network
+        anchor = np.stack(np.divmod(sample.anchor, self._size), axis=-1)
         features = state_features(torch.from_numpy(past.state), torch.from_numpy(sample.origin)[:, None])
         features = features.to(self._device)
         moved, velocity, wished = (
@@ -127,16 +110,3 @@ class BeliefLearner(MMNLearner):
             readings = Readings(rows[0], on_leg[rows], position, velocity[rows], wished[rows], state[:, 5], ranges)
             place(planes, readings, network.metre())
         return planes
-
-    def _turned(self, drawn: list[Drawn], turned: int) -> torch.Tensor:
-        return symmetry.turn_planes(torch.from_numpy(np.stack([each.shown for each in drawn])), turned).to(self._device)
-
-
-def _shifted(walls: np.ndarray, shift: np.ndarray) -> np.ndarray:
-    """Returns walls `[M, M]` displaced by `shift` (rows, columns); outside of the maze is wall."""
-    if not shift.any():
-        return walls
-    size = len(walls)
-    padded = np.pad(walls, size, constant_values=True)
-    row, column = np.clip(size - shift, 0, 2 * size)
-    return padded[row : row + size, column : column + size]
