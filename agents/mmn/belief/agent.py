@@ -132,7 +132,7 @@ class MMN(MMNPaper):
 
     def _first_pose(
         self, observation: Observation, row: int, walls: np.ndarray, starts: np.ndarray
-    ) -> tuple[np.ndarray | tuple[int, int], float]:
+    ) -> tuple[np.ndarray, float]:
         """Returns the cell where an episode begins, and the angle (rad) from the observed pose's frame to the map's.
 
         An episode begins in the centre of a cell, so a position that is a cell's centre is believed. Any other one is

@@ -6,10 +6,14 @@ import math
 
 import numpy as np
 
-from .evidence import NUM_EVIDENCE, SENSED, Readings, place
+from mazebench.world.lidar import MAX_RANGE
+
+from ...common.kernels import compiled
 
 _HEADINGS = 64  # that are tried
 _FINER = 16  # parts of the step between two of them, tried around the best one
+_SAMPLE = 0.5  # cells between the points of a ray that are looked at
+_BEHIND = 0.2  # cells behind the end of a ray, where the wall is
 
 
 def is_odometry(state: np.ndarray) -> bool:
@@ -27,22 +31,36 @@ def find_pose(walls: np.ndarray, ranges: np.ndarray, cells: np.ndarray, to_map: 
       to_map: `[2, 2]` float32, rows and columns (first axis) of a metre in x and in y (second axis).
     """
     step = 2 * math.pi / _HEADINGS
-    headings = np.arange(_HEADINGS) * step
-    fits = np.stack([_fits(walls, ranges, cell, headings, to_map) for cell in cells])
-    best, heading = np.unravel_index(fits.argmax(), fits.shape)
-    finer = headings[heading] + np.linspace(-step, step, 2 * _FINER + 1)
-    return cells[best], float(finer[_fits(walls, ranges, cells[best], finer, to_map).argmax()])
+    index, heading = _best(walls, ranges, cells, to_map, np.arange(_HEADINGS) * step)
+    finer = heading + np.linspace(-step, step, 2 * _FINER + 1)
+    _, heading = _best(walls, ranges, cells[index : index + 1], to_map, finer)
+    return cells[index], float(heading)
 
 
-def _fits(
-    walls: np.ndarray, ranges: np.ndarray, cell: np.ndarray, headings: np.ndarray, to_map: np.ndarray
-) -> np.ndarray:
-    """Returns how well the evidence of a reading at each of the headings `[H]` agrees with the map, `[H]`."""
-    number, size = len(headings), len(walls)
-    planes = np.zeros((number, NUM_EVIDENCE, size, size), dtype=np.float32)
-    still = np.zeros((number, 2), dtype=np.float32)
-    at = np.broadcast_to(np.asarray(cell, dtype=np.float32), still.shape)
-    scans = np.broadcast_to(ranges, (number, len(ranges)))
-    readings = Readings(np.arange(number), np.zeros(number, dtype=bool), at, still, still, headings, scans)
-    place(planes, readings, to_map)
-    return (planes[:, SENSED] * (2 * walls - 1)).sum(axis=(1, 2))
+@compiled
+def _best(
+    walls: np.ndarray, ranges: np.ndarray, cells: np.ndarray, to_map: np.ndarray, headings: np.ndarray
+) -> tuple[int, float]:
+    """Returns the index of the cell, and the heading, whose rays pass through the least wall and end at the most."""
+    size, num_rays = len(walls), len(ranges)
+    best, best_cell, best_heading = -math.inf, 0, 0.0
+    for i in range(len(cells)):
+        for heading in headings:
+            fit = 0.0
+            for j in range(num_rays):
+                angle = heading + 2 * math.pi * j / num_rays
+                x, y = math.cos(angle), math.sin(angle)
+                down, right = to_map[0, 0] * x + to_map[0, 1] * y, to_map[1, 0] * x + to_map[1, 1] * y
+                along = 0.0
+                while along < ranges[j]:
+                    r, c = round(cells[i, 0] + along * down), round(cells[i, 1] + along * right)
+                    if 0 <= r < size and 0 <= c < size:
+                        fit -= _SAMPLE * walls[r, c]
+                    along += _SAMPLE
+                if ranges[j] < MAX_RANGE:
+                    end = ranges[j] + _BEHIND
+                    r, c = round(cells[i, 0] + end * down), round(cells[i, 1] + end * right)
+                    fit += walls[r, c] if 0 <= r < size and 0 <= c < size else 1.0
+            if fit > best:
+                best, best_cell, best_heading = fit, i, heading
+    return best_cell, best_heading
