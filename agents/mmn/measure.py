@@ -1,4 +1,4 @@
-"""The speed of the search, compared with mctx's if that is installed, and of an update.
+"""The speed of the search, compared with mctx's if that is installed, of acting, and of an update.
 
 The search's network is a stand-in of MMN's size. Its transition has other weights in each row, as a hypermodel's has.
 """
@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 import torch
 
-from mazebench.agent import Interface
+from mazebench.agent import Agent, Interface
 from mazebench.errors import RunError
 from mazebench.maps.benchmark import load_mazes
+from mazebench.tasks.registry import make_spec
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 
@@ -38,6 +39,7 @@ NUM_BINS = 65  # of values in [-64, 0]
 NUM_SIMULATIONS = 16
 _HEADS = ("head_1", "head_2", "outputs")
 _CASES = (("gumbel", 1), ("gumbel", 64), ("gumbel", 256), ("puct", 64))  # policy, roots
+_NUM_ACTORS = 256
 _ROUNDS = 7  # in which the search and mctx are measured by turns
 # XLA would use a thread a core.
 _ONE_THREAD = {
@@ -105,7 +107,6 @@ def update_table(seconds: float, build_learner: Callable[..., MMNLearner]) -> di
     while not learner.num_updates_due(10**9):
         experience, state = collector.play(learner.actor, state)
         learner.observe(experience)
-    learner.update()
     parts = {
         "sample": "sampling",
         "_pictured": "wrong maps, evidence",
@@ -113,17 +114,39 @@ def update_table(seconds: float, build_learner: Callable[..., MMNLearner]) -> di
         "_targets": "targets",
         "_descend": "backward, optimizer",
     }
-    parts = {method: part for method, part in parts.items() if hasattr(learner, method)}
-    times = dict.fromkeys(parts.values(), 0.0) | {"losses": 0.0}
+    return {"the parts of an update, one thread": _divided(learner, parts, learner.update, "losses", seconds)}
+
+
+def acting_table(seconds: float, agent: Agent) -> dict[str, list[dict[str, Any]]]:
+    """Returns the milliseconds that each part of acting takes by title, where doors have moved and there is a lidar."""
+    task = make_spec("stale", level=(1,), sensors=("lidar",))
+    collector, state = Collector(task, _NUM_ACTORS, 0), agent.initial_state(_NUM_ACTORS)
+
+    def step() -> None:
+        nonlocal state
+        action, state = agent.act(collector.inputs, state)
+        collector.step(action)
+
+    parts = {"_note": "evidence", "_revise": "belief, hypermodel", "_planned": "search"}
+    title = f"the parts of acting in {_NUM_ACTORS} mazes with a lidar, on maps with moved doors, one thread"
+    return {title: _divided(agent, parts, step, "environments", seconds)}
+
+
+def _divided(
+    owner: Any, parts: dict[str, str], step: Callable[[], Any], rest: str, seconds: float
+) -> list[dict[str, Any]]:
+    """Returns the milliseconds of a `step` by part: `parts` names some methods of `owner`, `rest` what is left."""
+    step()
+    parts = {method: part for method, part in parts.items() if hasattr(owner, method)}
+    times = dict.fromkeys(parts.values(), 0.0)
     for method, part in parts.items():
-        setattr(learner, method, _timed(getattr(learner, method), times, part))
+        setattr(owner, method, _timed(getattr(owner, method), times, part))
     count, begin = 0, time.perf_counter()
     while (elapsed := time.perf_counter() - begin) < seconds:
-        learner.update()
+        step()
         count += 1
-    times["losses"] = elapsed - sum(times.values())
-    rows = [{"what": part, "ms": 1e3 * spent / count, "%": 100 * spent / elapsed} for part, spent in times.items()]
-    return {"the parts of an update, one thread": rows}
+    times[rest] = elapsed - sum(times.values())
+    return [{"what": part, "ms": 1e3 * spent / count, "%": 100 * spent / elapsed} for part, spent in times.items()]
 
 
 def _timed(function: Callable[..., Any], times: dict[str, float], part: str) -> Callable[..., Any]:

@@ -22,7 +22,7 @@ from ..common.layers import in_batches, marked_position, state_features
 from ..common.overrides import override
 from .config import PaperConfig, PlanningConfig
 from .learner import MMNLearner
-from .network import NUM_ACTIONS, Code, Network
+from .network import NUM_ACTIONS, Code, Network, rows_of
 from .paper import PaperNetwork
 from .planning import plan
 
@@ -113,10 +113,15 @@ class MMNPaper(NetworkAgent):
             self._encode(inputs.observation, new, new_anchor, state)
         assert state.code is not None, "new_context must be set in an environment's first step"
         features = state_features(torch.from_numpy(inputs.observation["state"]), torch.from_numpy(state.origin))
-        return self._planned(features, state.code, explore), state
+        return self._planned(features, state.code, inputs.active, explore), state
 
-    def _planned(self, features: torch.Tensor, code: Code, explore: bool) -> np.ndarray:
-        """Returns actions `[B]` in states with features `[B, 9]`."""
+    def _planned(self, features: torch.Tensor, code: Code, active: np.ndarray | None, explore: bool) -> np.ndarray:
+        """Returns actions `[B]` in states with features `[B, 9]`; 0 where an environment is not `active`."""
+        if active is not None and not active.all():
+            rows, action = torch.from_numpy(np.flatnonzero(active)), np.zeros(len(features), dtype=np.int64)
+            some = rows.to(code.positions.device)
+            action[rows] = self._planned(features[rows], rows_of(code, some), None, explore)
+            return action
         latent = in_batches(self.network.encode, STATES_AT_ONCE, features[:, None].to(self.network.support.device))
         num_simulations = self.config.num_simulations if explore else self.config.num_eval_simulations
         noise = (self._rng, self._noise_scale) if explore else ()

@@ -29,6 +29,7 @@ from .scan_match import find_pose, is_odometry
 
 _AWAY = 3.0  # cells from where a goal was brought nearer, at which it is brought nearer again
 _ROUNDING = 1e-3  # m, of positions as float32
+_PATIENCE = 6  # steps between two revisions on a leg, at least
 _SURPRISING = 0.1  # how much evidence must change where it contradicts the belief, before the belief is revised
 
 
@@ -44,6 +45,7 @@ class BeliefState(ActorState):
     weighed: np.ndarray  # [B, 2, M, M] float32, the evidence when the belief was last revised
     belief: np.ndarray  # [B, 2, M, M] float32
     revised_at: np.ndarray  # [B, 2] float32, the position when the belief was last revised
+    waited: np.ndarray  # [B] int, the steps since then
     is_far: np.ndarray  # [B] bool, whether the goal had to be brought nearer then
     wished: np.ndarray  # [B, 2] float32, the velocity on the map after this step without obstacles; 0 at first
 
@@ -78,10 +80,11 @@ class MMN(MMNPaper):
 
     @classmethod
     def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
-        """Returns tables for `mazebench bench`: the speed of the search and of the parts of an update."""
-        from ..measure import search_table
+        """Returns tables for `mazebench bench`: of the search, and of the parts of acting and of an update."""
+        from ..measure import acting_table, search_table
 
-        return search_table(seconds) | super().measure(seconds)
+        shipped = cls.build(Interface("local", 13, 13, sensors=("lidar",)))
+        return search_table(seconds) | acting_table(seconds, shipped) | super().measure(seconds)
 
     def initial_state(self, batch_size: int) -> BeliefState:
         """Returns a state without beliefs: `act` forms one where a context is new."""
@@ -94,10 +97,9 @@ class MMN(MMNPaper):
 
         maps = planes(NUM_PLANES), planes(NUM_EVIDENCE), planes(NUM_EVIDENCE), planes(NUM_PLANES)
         turn = np.zeros(batch_size, dtype=np.float32)
-        is_far = np.zeros(batch_size, dtype=bool)
-        return BeliefState(
-            vectors(), None, Displacement(batch_size), turn, vectors(), *maps, vectors(), is_far, vectors()
-        )
+        waited, is_far = np.zeros(batch_size, dtype=np.int64), np.zeros(batch_size, dtype=bool)
+        displacement = Displacement(batch_size)
+        return BeliefState(vectors(), None, displacement, turn, vectors(), *maps, vectors(), waited, is_far, vectors())
 
     @torch.no_grad()
     def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, BeliefState]:
@@ -111,12 +113,12 @@ class MMN(MMNPaper):
         position = state.anchor + self.network.on_map(self._tensor(moved)).cpu().numpy()
         self._note(inputs, features, observed[:, 5], position, state)
         has_moved = np.abs(position - state.revised_at).sum(axis=1) > _AWAY
-        revised = inputs.new_context | _surprised(state) | (state.is_far & has_moved)
-        if inputs.active is not None:
-            revised = revised & inputs.active
-        self._revise(np.flatnonzero(revised), position, state)
+        state.waited += 1
+        is_due = (state.waited >= _PATIENCE) & (_surprised(state) | (state.is_far & has_moved))
+        active = np.ones(len(moved), dtype=bool) if inputs.active is None else inputs.active
+        self._revise(np.flatnonzero((inputs.new_context | is_due) & active), position, state)
         assert state.code is not None, "new_context must be set in an environment's first step"
-        action = self._planned(features, state.code, explore)
+        action = self._planned(features, state.code, inputs.active, explore)
         taken = self._tensor(features), self._tensor(action).long()
         state.wished = in_batches(self.network.wished, STATES_AT_ONCE, *taken).cpu().numpy()
         return action, state
@@ -175,7 +177,7 @@ class MMN(MMNPaper):
             return
         arrays = state.shown[rows], state.evidence[rows], state.anchor[rows], position[rows]
         believed, code = self._believed(*(self._tensor(array) for array in arrays))
-        state.belief[rows], state.weighed[rows] = believed.cpu().numpy(), state.evidence[rows]
+        state.belief[rows], state.weighed[rows], state.waited[rows] = believed.cpu().numpy(), state.evidence[rows], 0
         farthest = distance_at(self._tensor(position[rows]), code.distance).amax(dim=-1)
         state.revised_at[rows], state.is_far[rows] = position[rows], (farthest > REACH).cpu().numpy()
         write_codes(state, torch.from_numpy(rows).to(believed.device), code)
