@@ -303,6 +303,19 @@ def test_actions_do_not_depend_on_what_else_is_in_the_batch(config):
         np.testing.assert_array_equal(actions(rows), together[rows])
 
 
+@OF_BOTH
+@pytest.mark.parametrize("active", [[False, True, False], [True, False, True]])
+def test_environments_that_rest_change_no_action_of_the_others(config, active):
+    agent = agent_class(config)(config, 7)
+    torch.manual_seed(1)
+    torch.nn.init.normal_(agent.network.heads.weight)
+    inputs = inputs_of(an_observation(3), np.ones(3, dtype=bool))
+    every, _ = agent.act(inputs, agent.initial_state(3))
+    assert every.all()  # no action is that of a resting environment
+    some, _ = agent.act(inputs._replace(active=np.array(active)), agent.initial_state(3))
+    np.testing.assert_array_equal(some, np.where(active, every, 0))
+
+
 def test_context_is_encoded_where_it_is_new_and_only_there():
     agent = MMN(small_config(), 7)
     observation = an_observation(3)

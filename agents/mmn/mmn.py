@@ -118,9 +118,9 @@ class MMNPaper(NetworkAgent):
     def _planned(self, features: torch.Tensor, code: Code, active: np.ndarray | None, explore: bool) -> np.ndarray:
         """Returns actions `[B]` in states with features `[B, 9]`; 0 where an environment is not `active`."""
         if active is not None and not active.all():
-            rows, action = torch.from_numpy(np.flatnonzero(active)), np.zeros(len(features), dtype=np.int64)
-            some = rows.to(code.positions.device)
-            action[rows] = self._planned(features[rows], rows_of(code, some), None, explore)
+            rows, action = torch.from_numpy(active), np.zeros(len(features), dtype=np.int64)
+            some = rows_of(code, rows.to(code.positions.device))
+            action[active] = self._planned(features[rows], some, None, explore)
             return action
         latent = in_batches(self.network.encode, STATES_AT_ONCE, features[:, None].to(self.network.support.device))
         num_simulations = self.config.num_simulations if explore else self.config.num_eval_simulations
