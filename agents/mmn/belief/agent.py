@@ -22,7 +22,7 @@ from ..network import Network
 from ..spatial import REACH, MMNNetwork, distance_at
 from .belief import GOAL, NUM_PLANES, WALL, probabilities
 from .displacement import Displacement, turned
-from .evidence import NUM_EVIDENCE, PASSED, SENSED, Readings, place
+from .evidence import FAILED, NUM_EVIDENCE, PASSED, SENSED, Readings, place
 from .framing import framed
 from .learner import BeliefLearner
 from .scan_match import find_pose, is_odometry
@@ -41,8 +41,8 @@ class BeliefState(ActorState):
     turn: np.ndarray  # [B] float32, rad, from the observed pose's frame to the map's; 0 unless it is odometry
     anchor: np.ndarray  # [B, 2] float32, the position where the episode began
     shown: np.ndarray  # [B, 2, M, M] float32, the map, and the mark of the leg's goal
-    evidence: np.ndarray  # [B, 2, M, M] float32
-    weighed: np.ndarray  # [B, 2, M, M] float32, the evidence when the belief was last revised
+    evidence: np.ndarray  # [B, 3, M, M] float32
+    weighed: np.ndarray  # [B, 3, M, M] float32, the evidence when the belief was last revised
     belief: np.ndarray  # [B, 2, M, M] float32
     revised_at: np.ndarray  # [B, 2] float32, the position when the belief was last revised
     waited: np.ndarray  # [B] int, the steps since then
@@ -189,7 +189,7 @@ class MMN(MMNPaper):
         belief = self.network.belief
 
         def believe(shown: torch.Tensor, evidence: torch.Tensor) -> torch.Tensor:
-            return probabilities(belief(shown, evidence))
+            return probabilities(belief(shown, evidence), evidence)
 
         believed = in_batches(believe, CONTEXTS_AT_ONCE, shown, evidence)
         return believed, in_batches(self.network.hypermodel, CONTEXTS_AT_ONCE, believed, anchor, position)
@@ -202,5 +202,7 @@ def _surprised(state: BeliefState) -> np.ndarray:
     """Returns `[B]` bool: where evidence that came since the belief was revised contradicts it."""
     sensed, before = state.evidence[:, SENSED], state.weighed[:, SENSED]
     contradicts = np.abs(sensed - before) * np.abs((sensed > 0) - state.belief[:, WALL])
-    missed = (state.evidence[:, PASSED] - state.weighed[:, PASSED]) * state.belief[:, GOAL]
-    return np.maximum(contradicts, missed).max(axis=(1, 2)) > _SURPRISING
+    came = state.evidence - state.weighed
+    missed = came[:, PASSED] * state.belief[:, GOAL]
+    stopped = came[:, FAILED] * (1 - state.belief[:, WALL])
+    return np.maximum(np.maximum(contradicts, missed), stopped).max(axis=(1, 2)) > _SURPRISING

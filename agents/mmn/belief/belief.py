@@ -9,7 +9,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from .evidence import NUM_EVIDENCE, PASSED, SENSED
+from .evidence import FAILED, PASSED, SENSED
 
 NUM_PLANES = 2
 WALL, GOAL = range(NUM_PLANES)  # the planes of a maze with its goal: as it is shown, as it is believed, as it is
@@ -17,7 +17,9 @@ WALL, GOAL = range(NUM_PLANES)  # the planes of a maze with its goal: as it is s
 _DILATIONS = (1, 1, 2, 2, 4, 4, 1, 1)  # of the convolutions
 # Logits before anything is learned: of what is shown, of what is sensed, and of the goal where it is shown.
 _SHOWN, _SENSED, _SHOWN_GOAL = 6.0, 12.0, 10.0
-_NUM_INPUTS = NUM_PLANES + NUM_EVIDENCE + 3  # how much is sensed of each cell, and whether row and column are odd
+_NUM_READ = 2  # planes of evidence that the network reads: SENSED and PASSED
+_NUM_INPUTS = NUM_PLANES + _NUM_READ + 3  # how much is sensed of each cell, and whether row and column are odd
+_LEAST_FREE = 1e-6  # probability that a cell is free
 _SENSED_WEIGHT = 9.0  # of a sensed cell in the loss, beside the 1 of all cells: there, the map can be caught out
 
 
@@ -40,12 +42,13 @@ class Belief(nn.Module):
 
         Args:
           shown: `[G, 2, M, M]`, the map, and the goal's mark.
-          evidence: `[G, 2, M, M]`, of the episode.
+          evidence: `[G, 3, M, M]`, of the episode.
         """
         odd = torch.arange(shown.shape[-1], device=shown.device) % 2
         lattice = torch.stack(torch.broadcast_tensors(odd[:, None], odd)).to(shown.dtype)
         known = evidence[:, SENSED : SENSED + 1].abs()
-        features = self.inputs(torch.cat([shown, evidence, known, lattice.expand(len(shown), -1, -1, -1)], dim=1))
+        read = evidence[:, :_NUM_READ]
+        features = self.inputs(torch.cat([shown, read, known, lattice.expand(len(shown), -1, -1, -1)], dim=1))
         for layer in self.layers:
             features = features + layer(functional.relu(features))
         of_map, of_sensed, of_goal, of_passed = self.trust
@@ -54,10 +57,20 @@ class Belief(nn.Module):
         return torch.stack([wall, goal], dim=1) + self.outputs(functional.relu(features))
 
 
-def probabilities(logits: torch.Tensor) -> torch.Tensor:
-    """Returns `[G, 2, M, M]`: the probability of wall, and that of the goal as a share of its most probable cell's."""
-    goal = logits[:, GOAL]
-    return torch.stack([torch.sigmoid(logits[:, WALL]), torch.exp(goal - goal.amax(dim=(-2, -1), keepdim=True))], dim=1)
+def probabilities(logits: torch.Tensor, evidence: torch.Tensor) -> torch.Tensor:
+    """Returns `[G, 2, M, M]`: the probability of wall, and that of the goal as a share of its most probable cell's.
+
+    The goal is in no wall. Each step in which a cell stopped the body counts as one more observation of a wall, beside the network's estimate,
+    which counts as one (Laplace's rule of succession). The network has no count of failed tries.
+
+    Args:
+      logits: `[G, 2, M, M]`, of `Belief`.
+      evidence: `[G, 3, M, M]`, from which they were computed.
+    """
+    failed = evidence[:, FAILED]
+    wall = (torch.sigmoid(logits[:, WALL]) + failed) / (1 + failed)
+    goal = logits[:, GOAL] + torch.log((1 - wall).clamp(min=_LEAST_FREE))
+    return torch.stack([wall, torch.exp(goal - goal.amax(dim=(-2, -1), keepdim=True))], dim=1)
 
 
 def belief_losses(logits: torch.Tensor, sensed: torch.Tensor, truth: torch.Tensor) -> torch.Tensor:

@@ -15,12 +15,13 @@ from mazebench.world.lidar import MAX_RANGE
 
 from ...common.kernels import compiled
 
-NUM_EVIDENCE = 2
-SENSED, PASSED = range(NUM_EVIDENCE)  # from -1, surely free, to 1, surely wall; 1 where the body was on this leg
+NUM_EVIDENCE = 3
+# From -1, surely free, to 1, surely wall; 1 where the body was on this leg; in how many steps a cell stopped the body.
+SENSED, PASSED, FAILED = range(NUM_EVIDENCE)
 
 _RATE = 0.4  # by which a reading moves SENSED of a cell towards -1 or 1
 _INSIDE = 0.4  # cells from the centre of a cell, along each axis, within which it is told from its neighbours
-_WISHED = 0.3  # of the top speed along an axis: what the body wanted at least, if a wall may have stopped it
+_WISHED = 0.15  # of the top speed along an axis: what the body wanted at least, if a wall may have stopped it
 _STOPPED = 0.5  # of the wished speed: what it has at most, if it was stopped
 _TOUCHING = 0.32  # cells from the body's centre to the wall that stops it; the body's radius is 0.15 m
 _CLEAR = 0.36  # cells aside from the centre of a cell, at most, where the body touches no corner of a wall
@@ -41,13 +42,13 @@ class Readings(NamedTuple):
 
 
 def place(planes: np.ndarray, readings: Readings, to_map: np.ndarray) -> None:
-    """Adds readings to the evidence `planes` `[G, 2, M, M]` float32.
+    """Adds readings to the evidence `planes` `[G, 3, M, M]` float32.
 
     The body is where it is, so its cell is free. A body that is slower than it wished, beside the edge of a cell, was
     stopped by a wall. A ray of the lidar passes through free cells and ends at a wall.
 
     Args:
-      planes: changed in place.
+      planes: changed in place; those of SENSED, PASSED and FAILED.
       readings: of any of the G contexts.
       to_map: `[2, 2]` float32, rows and columns (first axis) of a metre in x and in y (second axis).
     """
@@ -68,7 +69,7 @@ def _place(
 ) -> None:
     size, num_rays = planes.shape[2], ranges.shape[1]
     for k in range(len(context)):
-        sensed, passed = planes[context[k], SENSED], planes[context[k], PASSED]
+        sensed, passed, failed = planes[context[k], SENSED], planes[context[k], PASSED], planes[context[k], FAILED]
         row, column = position[k]
         r, c = round(row), round(column)
         if not (0 <= r < size and 0 <= c < size):
@@ -88,7 +89,10 @@ def _place(
                 and 0.5 - sign * ahead < _TOUCHING
                 and abs(aside) < _CLEAR
             ):
-                _mark(sensed, r + sign * (axis == 0), c + sign * (axis == 1), 1.0)
+                ahead_r, ahead_c = r + sign * (axis == 0), c + sign * (axis == 1)
+                if 0 <= ahead_r < size and 0 <= ahead_c < size:
+                    _mark(sensed, ahead_r, ahead_c, 1.0)
+                    failed[ahead_r, ahead_c] += 1.0
         for j in range(num_rays):
             angle = yaw[k] + 2 * math.pi * j / num_rays
             x, y = math.cos(angle), math.sin(angle)
