@@ -42,8 +42,8 @@ from .shortest_paths import cheapest_paths
 _DILATIONS = (1, 1, 1)  # of the map's convolutions
 _FIRST_COST = 2.0  # steps a cell, before anything is learned
 _DETOUR = 12.0  # steps that a failed try costs
-_BARRED = 200.0  # steps to enter a wall, at most: longer than any detour
-_FAR = 1000.0  # steps; farther than any path
+_BARRED = 1e4  # steps to enter a wall, at most: longer than any detour
+_FAR = 1e5  # steps; farther than any path
 REACH = 30.0  # steps; how far goals are in training, and no farther than values are learned well
 _NEAR = 10.0  # steps; how far a goal that is brought nearer seems to be, at least
 _LONGEST = 100.0  # steps; longer distances count as this in the loss
