@@ -8,7 +8,7 @@ from mazebench_agents.mmn import MMN
 from mazebench_agents.mmn.belief import agent as agent_module
 from mazebench_agents.mmn.belief.belief import GOAL, WALL, Belief, belief_losses, probabilities
 from mazebench_agents.mmn.belief.displacement import Displacement
-from mazebench_agents.mmn.belief.evidence import PASSED, SENSED, Readings, place
+from mazebench_agents.mmn.belief.evidence import FAILED, NUM_EVIDENCE, PASSED, SENSED, Readings, place
 from mazebench_agents.mmn.belief.framing import framed
 from mazebench_agents.mmn.belief.scan_match import find_pose, is_odometry
 from mazebench_agents.mmn.belief.wrong_maps import wrong_map
@@ -32,7 +32,7 @@ def mazes():
 
 
 def planes(size=7):
-    return np.zeros((1, 2, size, size), dtype=np.float32)
+    return np.zeros((1, NUM_EVIDENCE, size, size), dtype=np.float32)
 
 
 def a_reading(position, velocity=(0, 0), wished=(0, 0), yaw=0.0, ranges=(), on_leg=True):
@@ -68,6 +68,7 @@ def test_body_that_is_slower_than_it_wished_was_stopped_by_a_wall(position, velo
     evidence = planes()
     place(evidence, a_reading(position, velocity, wished=(0.0, 0.9)), METRE)
     assert (evidence[0, SENSED, 2, 4] > 0) == is_wall
+    assert evidence[0, FAILED].sum() == is_wall
 
 
 def test_rays_pass_through_free_cells_and_end_at_walls(mazes):
@@ -94,15 +95,30 @@ def test_ray_that_meets_nothing_tells_of_no_wall():
 def test_belief_is_the_shown_map_and_what_was_sensed_before_anything_is_learned():
     torch.manual_seed(0)
     shown = a_context(batch=3)[:, [0, 2]]
-    evidence = torch.zeros(3, 2, 7, 7)
-    believed = probabilities(Belief(8)(shown, evidence))
+    evidence = torch.zeros(3, NUM_EVIDENCE, 7, 7)
+    believed = probabilities(Belief(8)(shown, evidence), evidence)
     torch.testing.assert_close(believed, shown, atol=0.003, rtol=0)
     evidence[:, SENSED, 2, 2], evidence[:, SENSED, 3, 3] = 1, -1
     evidence[0, PASSED, 1, 5] = 1  # where the goal is marked
-    believed = probabilities(Belief(8)(shown, evidence))
+    believed = probabilities(Belief(8)(shown, evidence), evidence)
     assert (believed[:, WALL, 2, 2] > 0.99).all()
     assert (believed[:, WALL, 3, 3] < 0.01).all()
-    assert believed[0, GOAL].min() == 1  # nowhere more than elsewhere
+    is_free = believed[0, WALL] < 0.5
+    assert believed[0, GOAL][is_free].min() > 0.99  # nowhere more than elsewhere
+    assert believed[0, GOAL][~is_free].max() < 0.01
+
+
+def test_cell_that_stops_the_body_again_and_again_is_wall_and_has_no_goal():
+    logits, evidence = torch.zeros(1, 2, 7, 7), torch.zeros(1, NUM_EVIDENCE, 7, 7)
+    logits[:, GOAL, 2, 2], logits[:, GOAL, 4, 4] = 3.0, 1.0
+    believed = [probabilities(logits, evidence)]
+    for _ in range(8):
+        evidence[:, FAILED, 2, 2] += 1
+        believed.append(probabilities(logits, evidence))
+    wall = torch.stack([each[0, WALL, 2, 2] for each in believed])
+    torch.testing.assert_close(wall, (0.5 + torch.arange(9)) / (1 + torch.arange(9)))
+    assert believed[0][0, GOAL].argmax() == 2 * 7 + 2
+    assert believed[-1][0, GOAL].argmax() == 4 * 7 + 4
 
 
 def test_losses_of_a_belief_by_hand():

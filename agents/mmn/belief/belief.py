@@ -60,8 +60,8 @@ class Belief(nn.Module):
 def probabilities(logits: torch.Tensor, evidence: torch.Tensor) -> torch.Tensor:
     """Returns `[G, 2, M, M]`: the probability of wall, and that of the goal as a share of its most probable cell's.
 
-    The goal is in no wall. Each step in which a cell stopped the body counts as one more observation of a wall, beside the network's estimate,
-    which counts as one (Laplace's rule of succession). The network has no count of failed tries.
+    The goal is in no wall. Each step in which a cell stopped the body counts as one more observation of a wall, beside
+    the network's estimate, which counts as one (Laplace's rule of succession). The network reads no count of them.
 
     Args:
       logits: `[G, 2, M, M]`, of `Belief`.
