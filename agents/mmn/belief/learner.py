@@ -31,7 +31,7 @@ class Pictured(NamedTuple):
     """What the belief learns from."""
 
     shown: torch.Tensor  # [G, 2, M, M], maps and marks of the goal
-    evidence: torch.Tensor  # [G, 2, M, M]
+    evidence: torch.Tensor  # [G, 3, M, M]
     truth: torch.Tensor  # [G, 2, M, M], walls and goals of the mazes
 
 
@@ -79,7 +79,7 @@ class BeliefLearner(MMNLearner):
 
     @torch.no_grad()
     def _evidence(self, sample: SequenceSample) -> np.ndarray:
-        """Returns the evidence `[G, 2, M, M]` of the past."""
+        """Returns the evidence `[G, 3, M, M]` of the past."""
         past, network = sample.past, self.actor.network
         anchor = np.stack(np.divmod(sample.anchor, self._size), axis=-1)
         features = state_features(torch.from_numpy(past.state), torch.from_numpy(sample.origin)[:, None])
