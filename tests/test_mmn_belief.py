@@ -112,11 +112,11 @@ def test_cell_that_stops_the_body_again_and_again_is_wall_and_has_no_goal():
     logits, evidence = torch.zeros(1, 2, 7, 7), torch.zeros(1, NUM_EVIDENCE, 7, 7)
     logits[:, GOAL, 2, 2], logits[:, GOAL, 4, 4] = 3.0, 1.0
     believed = [probabilities(logits, evidence)]
-    for _ in range(8):
+    for _ in range(40):
         evidence[:, FAILED, 2, 2] += 1
         believed.append(probabilities(logits, evidence))
     wall = torch.stack([each[0, WALL, 2, 2] for each in believed])
-    torch.testing.assert_close(wall, (0.5 + torch.arange(9)) / (1 + torch.arange(9)))
+    torch.testing.assert_close(wall, (2 + torch.arange(41)) / (4 + torch.arange(41)))
     assert believed[0][0, GOAL].argmax() == 2 * 7 + 2
     assert believed[-1][0, GOAL].argmax() == 4 * 7 + 4
 

@@ -19,6 +19,7 @@ _DILATIONS = (1, 1, 2, 2, 4, 4, 1, 1)  # of the convolutions
 _SHOWN, _SENSED, _SHOWN_GOAL = 6.0, 12.0, 10.0
 _NUM_READ = 2  # planes of evidence that the network reads: SENSED and PASSED
 _NUM_INPUTS = NUM_PLANES + _NUM_READ + 3  # how much is sensed of each cell, and whether row and column are odd
+_PRIOR = 4.0  # observations that the network's estimate of a wall counts for
 _LEAST_FREE = 1e-6  # probability that a cell is free
 _SENSED_WEIGHT = 9.0  # of a sensed cell in the loss, beside the 1 of all cells: there, the map can be caught out
 
@@ -60,15 +61,15 @@ class Belief(nn.Module):
 def probabilities(logits: torch.Tensor, evidence: torch.Tensor) -> torch.Tensor:
     """Returns `[G, 2, M, M]`: the probability of wall, and that of the goal as a share of its most probable cell's.
 
-    The goal is in no wall. Each step in which a cell stopped the body counts as one more observation of a wall, beside
-    the network's estimate, which counts as one (Laplace's rule of succession). The network reads no count of them.
+    The goal is in no wall. Each step in which a cell stopped the body counts as one observation of a wall, beside the
+    network's estimate, which counts as four: the mean of a beta distribution. The network reads no count of them.
 
     Args:
       logits: `[G, 2, M, M]`, of `Belief`.
       evidence: `[G, 3, M, M]`, from which they were computed.
     """
     failed = evidence[:, FAILED]
-    wall = (torch.sigmoid(logits[:, WALL]) + failed) / (1 + failed)
+    wall = (_PRIOR * torch.sigmoid(logits[:, WALL]) + failed) / (_PRIOR + failed)
     goal = logits[:, GOAL] + torch.log((1 - wall).clamp(min=_LEAST_FREE))
     return torch.stack([wall, torch.exp(goal - goal.amax(dim=(-2, -1), keepdim=True))], dim=1)
 
