@@ -13,6 +13,7 @@ import numpy as np
 import torch
 
 from mazebench.agent import Inputs, Interface, Observation
+from mazebench.maps.maze import cell_to_point, point_to_cell
 
 from ...common.layers import in_batches, state_features
 from ..config import MMNConfig, PlanningConfig
@@ -147,8 +148,8 @@ class MMN(MMNPaper):
           starts: `[S, 2]` int, the marked starts, one or none.
         """
         observed = observation["state"][row]
-        cell = np.array([self._size - 0.5 - observed[1], observed[0] - 0.5])
-        if self._points_tell and np.abs(cell - np.rint(cell)).max() < _ROUNDING:
+        cell = point_to_cell(observed[:2], self._size)
+        if self._points_tell and np.abs(cell_to_point(cell, self._size) - observed[:2]).max() < _ROUNDING:
             return cell, 0.0
         if "lidar" in observation and is_odometry(observed):
             cells = starts if len(starts) else np.argwhere(walls <= max(0.5, walls.min()))
@@ -200,9 +201,8 @@ class MMN(MMNPaper):
 
 def _surprised(state: BeliefState) -> np.ndarray:
     """Returns `[B]` bool: where evidence that came since the belief was revised contradicts it."""
-    sensed, before = state.evidence[:, SENSED], state.weighed[:, SENSED]
-    contradicts = np.abs(sensed - before) * np.abs((sensed > 0) - state.belief[:, WALL])
     came = state.evidence - state.weighed
+    contradicts = np.abs(came[:, SENSED]) * np.abs((state.evidence[:, SENSED] > 0) - state.belief[:, WALL])
     missed = came[:, PASSED] * state.belief[:, GOAL]
     stopped = came[:, FAILED] * (1 - state.belief[:, WALL])
     return np.maximum(np.maximum(contradicts, missed), stopped).max(axis=(1, 2)) > _SURPRISING
