@@ -23,6 +23,10 @@ class InputError(ValueError):
         super().__init__(one_line(message))
 
 
+class UnplayableError(InputError):
+    """An agent can't play in the environments that it is to be built for. A suite leaves such a part out."""
+
+
 class RunError(RuntimeError):
     """A failure of a run whose input was good; the message says what happened and what is kept."""
 

@@ -1,32 +1,88 @@
-"""The parts of an agent that DQN and MMN share: parameters, exploration, and the checkpoint that ships."""
+"""What the agents that act by a network share: building and loading it, its parameters, and exploration."""
 
 from __future__ import annotations
 
 import pathlib
+from collections.abc import Mapping, Sequence
 from importlib import resources
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import torch
 
+from mazebench.agent import Interface
+from mazebench.maps.maze import Maze
 from mazebench.training.protocol import LearningAgent
+
+from .checkpoint import check_shapes, check_size, load_agent, load_into
+from .overrides import override
 
 
 class NetworkAgent(LearningAgent):
     """An agent that acts by a network; where it explores, environment i takes random actions at Ape-X's rate i."""
 
     name: ClassVar[str]
-    config: Any  # has num_envs, epsilon_base and epsilon_alpha
+    default_config: ClassVar[Any]  # a frozen dataclass that has num_envs, epsilon_base and epsilon_alpha
+    learner_class: ClassVar[Any]  # called with the agent, its mazes and a seed
+    learns_on_gpu: ClassVar[bool] = False  # whether the learner uses a GPU if there is one
+    config: Any
     network: Any  # a torch.nn.Module
     trained_size: int  # M of the contexts that the network was made for
+
+    def __init__(self, config: Any, context_size: int, seed: int = 0, device: str = "cpu"):
+        torch.set_num_threads(1)
+        self.config = config
+        self.trained_size = context_size
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            self.network = self.make_network(config, context_size).to(device)
+        self.explore_from(0, config.num_envs, seed)
+
+    @classmethod
+    def make_network(cls, config: Any, context_size: int) -> torch.nn.Module:
+        """Returns a new network of a config, for contexts of M x M."""
+        raise NotImplementedError
+
+    @classmethod
+    def serves_any_size(cls, config: Any) -> bool:
+        """Returns whether contexts may have another M than those of the training."""
+        return True
+
+    @classmethod
+    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
+        """Returns the agent of a checkpoint, by default of the one that ships.
+
+        Raises:
+          InputError: if the checkpoint can't be read, or is another agent's.
+          UnplayableError: if its network serves contexts of another size only.
+        """
+        path = cls.default_checkpoint() if checkpoint is None else checkpoint
+        tensors, config, trained_size = load_agent(path, cls.name, cls.default_config)
+        if not cls.serves_any_size(config):
+            check_size(cls.name, trained_size, interface.context_size)
+        check_shapes(path, lambda: cls.make_network(config, trained_size), tensors)
+        agent = cls(config, trained_size, seed)
+        load_into(path, agent.network, tensors)
+        return agent
+
+    @classmethod
+    def build_learner(
+        cls, interface: Interface, mazes: Sequence[Maze], *, seed: int = 0, overrides: Mapping[str, str] | None = None
+    ) -> Any:
+        """Returns a learner for an agent of this class."""
+        config = override(cls.default_config, overrides or {})
+        device = "cuda" if cls.learns_on_gpu and torch.cuda.is_available() else "cpu"
+        return cls.learner_class(cls(config, interface.context_size, seed, device), tuple(mazes), seed)
 
     def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
         """Begins a new stream of exploration, as the environments from `first_env` on of the learner's.
 
-        The rate of random actions falls from the first environment to the last (Horgan et al. 2018).
+        The rate of random actions falls from the first environment to the last (Horgan et al. 2018), and so does the
+        scale of the noise in the choice of actions, where an agent has such noise.
         """
         rung = (first_env + np.arange(num_envs)) / max(1, self.config.num_envs - 1)
         self._epsilon = self.config.epsilon_base ** (1 + self.config.epsilon_alpha * rung)
+        self._noise_scale = 1.0 - rung
         self._rng = np.random.default_rng(seed)
 
     def parameters(self) -> dict[str, np.ndarray]:

@@ -11,8 +11,9 @@ import safetensors
 import safetensors.torch
 import torch
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, UnplayableError
 from mazebench.maps.maze import MAX_SIZE
+from mazebench.renamed import describe_former
 from mazebench.storage.files import open_whole, read_at_most
 from mazebench.storage.json_files import parse_json
 
@@ -46,9 +47,11 @@ def load_checkpoint(path: pathlib.Path, agent: str) -> tuple[dict[str, torch.Ten
     except (safetensors.SafetensorError, ValueError, KeyError) as error:
         fault = str(error)[:120]
         raise InputError(f"{path}: expected a checkpoint of {FORMAT}, found a damaged one: {fault}") from error
-    if not isinstance(metadata, dict) or metadata.get("agent") != agent:
-        found = metadata.get("agent") if isinstance(metadata, dict) else metadata
-        raise InputError(f"{path}: expected a checkpoint of agent {agent!r}, found one of {str(found)[:80]!r}")
+    name, config = (metadata.get("agent"), metadata.get("config")) if isinstance(metadata, dict) else (metadata, None)
+    if former := describe_former(name, config):
+        raise InputError(f"{path}: expected a checkpoint of agent {agent!r}, found one of {former}")
+    if not isinstance(metadata, dict) or name != agent:
+        raise InputError(f"{path}: expected a checkpoint of agent {agent!r}, found one of {str(name)[:80]!r}")
     return tensors, metadata
 
 
@@ -69,16 +72,16 @@ def load_agent(path: pathlib.Path, agent: str, default: Config) -> tuple[dict[st
     return tensors, config, context_size
 
 
-def check_size(path: pathlib.Path, trained_size: int, size: int) -> None:
+def check_size(agent: str, trained_size: int, size: int) -> None:
     """Checks the side of contexts, for a network that serves those that it was trained on only.
 
     Raises:
-      InputError: if the sizes differ.
+      UnplayableError: if the sizes differ.
     """
     if size != trained_size:
-        raise InputError(
-            f"{path}: expected contexts of {trained_size} x {trained_size}, the only ones that its network serves, "
-            f"found {size} x {size}"
+        raise UnplayableError(
+            f"agent {agent!r}: its checkpoint reads maps of {trained_size} x {trained_size} only, found {size} x "
+            f"{size}; belief-planner reads maps of any size"
         )
 
 

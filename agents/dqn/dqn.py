@@ -6,20 +6,15 @@ docs/agents/dqn.md describes the training, and how it differs from the paper.
 from __future__ import annotations
 
 import dataclasses
-import pathlib
-from collections.abc import Mapping, Sequence
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 import torch
 
-from mazebench.agent import Inputs, Interface
-from mazebench.maps.maze import Maze
+from mazebench.agent import Inputs
 
 from ..common.actor import NetworkAgent
-from ..common.checkpoint import check_shapes, check_size, load_agent, load_into
 from ..common.layers import in_batches, state_features
-from ..common.overrides import override
 from .config import DQNConfig
 from .learner import DQNLearner
 from .network import NUM_ACTIONS, JoinedQNetwork, QNetwork, ReadingQNetwork
@@ -41,41 +36,23 @@ class DQN(NetworkAgent):
 
     name: ClassVar[str] = "dqn"
     default_config: ClassVar[DQNConfig] = DQNConfig(use_context=False)
+    learner_class: ClassVar[type[DQNLearner]] = DQNLearner
     config: DQNConfig
     network: QNetwork
 
-    def __init__(self, config: DQNConfig, context_size: int, seed: int = 0):
-        torch.set_num_threads(1)
-        self.config = config
-        self.trained_size = context_size
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
-            self.network = _network(config, context_size)
-        self.explore_from(0, config.num_envs, seed)
+    @classmethod
+    def make_network(cls, config: DQNConfig, context_size: int) -> QNetwork:
+        """Returns a new network."""
+        if not config.use_context:
+            return QNetwork(config.hidden)
+        if config.reading:
+            return ReadingQNetwork(config.hidden, config.channels)
+        return JoinedQNetwork(config.hidden, config.channels, context_size)
 
     @classmethod
-    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
-        """Returns the agent of a checkpoint, by default of the one that ships.
-
-        Raises:
-          InputError: if the checkpoint can't be used here.
-        """
-        path = cls.default_checkpoint() if checkpoint is None else checkpoint
-        tensors, config, trained_size = load_agent(path, cls.name, cls.default_config)
-        if config.use_context and not config.reading:
-            check_size(path, trained_size, interface.context_size)
-        check_shapes(path, lambda: _network(config, trained_size), tensors)
-        agent = cls(config, trained_size, seed)
-        load_into(path, agent.network, tensors)
-        return agent
-
-    @classmethod
-    def build_learner(
-        cls, interface: Interface, mazes: Sequence[Maze], *, seed: int = 0, overrides: Mapping[str, str] | None = None
-    ) -> DQNLearner:
-        """Returns a learner for an agent of this class."""
-        config = override(cls.default_config, overrides or {})
-        return DQNLearner(cls(config, interface.context_size, seed), tuple(mazes), seed)
+    def serves_any_size(cls, config: DQNConfig) -> bool:
+        """Returns whether the network reads the context at a position, or not at all."""
+        return config.reading or not config.use_context
 
     def initial_state(self, batch_size: int) -> ActorState:
         """Returns a state without codes: `act` encodes a context where it is new."""
@@ -116,11 +93,3 @@ class MAHPaper(DQN):
     default_config = DQNConfig(
         reading=False, n_step=1, num_goals=1, relabel_start=False, symmetries=False, localization_weight=0.0
     )
-
-
-def _network(config: DQNConfig, context_size: int) -> QNetwork:
-    if not config.use_context:
-        return QNetwork(config.hidden)
-    if config.reading:
-        return ReadingQNetwork(config.hidden, config.channels)
-    return JoinedQNetwork(config.hidden, config.channels, context_size)

@@ -1,6 +1,5 @@
-"""MMN: planning in a latent model, whose weights a hypermodel generates from the map."""
+"""MMN, after the paper: planning in a latent model, whose weights a hypermodel generates from the map."""
 
-from .belief.agent import MMN
-from .mmn import MMNPaper
+from .agent import MMN
 
-__all__ = ["MMN", "MMNPaper"]
+__all__ = ["MMN"]

@@ -26,11 +26,11 @@ from mazebench.tasks.registry import make_spec
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 
+from ..muzero.learner import MuZeroLearner
+from ..muzero.search import gumbel_muzero_policy, muzero_policy
 from .compiled import stand_in as compiled
 from .compiled.model import CompiledModel
 from .compiled.parts import Heads, layer_of
-from .learner import MMNLearner
-from .search import gumbel_muzero_policy, muzero_policy
 
 NUM_ACTIONS = 6
 LATENT = 64
@@ -95,7 +95,7 @@ def search_table(seconds: float) -> dict[str, list[dict[str, Any]]]:
     return {f"tree search, {NUM_SIMULATIONS} simulations, one thread": rows}
 
 
-def update_table(seconds: float, build_learner: Callable[..., MMNLearner]) -> dict[str, list[dict[str, Any]]]:
+def update_table(seconds: float, build_learner: Callable[..., MuZeroLearner]) -> dict[str, list[dict[str, Any]]]:
     """Returns the milliseconds that each part of an update takes by title, once the replay is filled enough to learn.
 
     Learners leave PyTorch one thread.

@@ -1,206 +1,230 @@
-"""What the networks of MMN and of MMN-paper share: an encoder of states, motion in a latent model, and heads.
+"""The network of MMN-paper: the weights of the transition are generated from the context.
 
-`G` is the number of contexts, `K` of latent states in each, `M` the side of the context, `D` the size of a latent
-state, `H` of the transition's hidden layer.
+`G` is the number of contexts, `K` of latent states in each, `M` the side of the context, `H` the size of the
+transition's hidden layer, `T` of the heads' code of the context, `C` the number of features of a cell.
 """
 
 from __future__ import annotations
 
-import abc
-from collections.abc import Iterator
+import math
 from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 from torch import nn
+from torch.nn import functional
 
-from ..common.layers import marked_position
+from ..common.layers import (
+    NUM_PLACE,
+    NUM_PLANES,
+    NUM_TO_GOAL,
+    PERIODS,
+    WIDTHS,
+    MapEncoder,
+    goal_code,
+    place_code,
+    steepness,
+)
+from ..muzero.network import (
+    NUM_ACTIONS,
+    NUM_BODY,
+    NUM_CHANGES,
+    NUM_FREE,
+    NUM_POSE,
+    NUM_STOPPED,
+    Network,
+    Predictions,
+    ahead_of,
+    marked_positions,
+    moved_by,
+)
+from ..muzero.reading import read
+from .compiled import mmn as compiled
 from .compiled.model import CompiledModel
-from .compiled.parts import Heads, layer_of
-from .config import PlanningConfig
+from .compiled.parts import Contexts, heads_of
+from .config import MMNConfig
 
-NUM_ACTIONS = 6
-NUM_POSE = 4  # x and y moved, sine and cosine of yaw: the first numbers of a latent state, as of state features
-NUM_BODY = 7  # and velocities forward, left and of yaw
-NUM_FREE = 6  # of a step in the body's frame: a move, a turn, velocities forward, left and of yaw
-NUM_STOPPED = 4  # in the map's: a move, velocities
-NUM_CHANGES = NUM_FREE + NUM_STOPPED
-_SCALE_RATE = 5.0  # the scale's parameters are multiplied by it, so that they are of the order of other weights
-_RARE = -4.0  # logit of being in the goal, before anything is learned
+_CHANNELS = 24  # of the map's convolutions
+_NEAR = (1, 1, 1, 1)  # dilations of the hypermodel's convolutions
+_FAR = (1, 1, 2, 2, 4, 4, 2, 1, 1)  # of the heads', which see 19 cells far, across a 13 x 13 map
+_FIRST_VALUE = -20.0  # steps; the middle of the values before anything is learned
+_FIRST_CHANGE = 0.1  # times the usual size: the transition's output before anything is learned
 
 
-class Predictions(NamedTuple):
-    """The outputs of the heads for latent states."""
+class Code(NamedTuple):
+    """The output of the hypermodel for a context, and what the heads get of the context."""
 
-    policy_logits: torch.Tensor  # [G, K, 6]
-    value_logits: torch.Tensor  # [G, K, bins], of whole values from 1 - bins to 0
-    goal_logit: torch.Tensor  # [G, K], of being in the goal cell, which ends the episode
-
-
-class Roots(NamedTuple):
-    """Encoded states from which the model is unrolled, for losses that a network adds to those of all networks."""
-
-    latent: torch.Tensor  # [G, K, D]
-    position: torch.Tensor  # [G, K, 2], the true cell on the map (row, column)
-    value: torch.Tensor  # [G, K], its target
-    exists: torch.Tensor  # [G, K] bool
-    going: torch.Tensor  # [G, K] bool, whether the state exists and is not in the goal
+    positions: torch.Tensor  # [G, 4], start and goal on the map, each (row, column)
+    weights: torch.Tensor  # [G, W], the transition's, but for those below
+    rows: torch.Tensor  # [G, M * M, H], the first layer's weights of each cell's position; no columns without them
+    task: torch.Tensor  # [G, T], the heads' code of the context
+    features: torch.Tensor  # [G, M * M, C], the heads' features of each cell; no columns without them
 
 
-# The output of a hypermodel for G contexts: a NamedTuple of tensors [G, ...], the first of them `positions` [G, 4],
-# anchor and goal on the map, each (row, column); the second `weights`, those that the hypermodel generates.
-Code = Any
+class MMNNetwork(Network):
+    """Has a transition of one hidden layer, all of whose weights are generated."""
 
+    hypermodel: Hypermodel
 
-class Network(nn.Module, abc.ABC):
-    """The paper's e (`encode`), h (`hypermodel`), f (`first_layer`, then `step`) and g (`predict`).
-
-    A latent state holds the displacement from an anchor (m), heading, velocities and a learned code of the motion. The
-    estimated position on the map is the anchor plus a learned linear map of the displacement. Subclasses have the
-    hypermodel, the transition, and the inputs of the heads.
-    """
-
-    support: torch.Tensor  # [bins], the values that a categorical value weighs
-    encoder: nn.Sequential
-    hypermodel: nn.Module  # called with contexts [G, 4, M, M] and anchors [G, 2], returns a Code
-    scale: nn.Parameter
-    body: nn.Sequential
-    heads: nn.Linear
-    serves_any_size: bool  # whether contexts may have another side than those of the training
-
-    def __init__(self, config: PlanningConfig, context_size: int):
-        """`context_size` is M, which the networks need whose hypermodel serves no other size."""
-        super().__init__()
-        self.latent_size = NUM_BODY + config.latent
-        self.num_bins = config.longest_value + 1
-        self.register_buffer("support", torch.arange(-config.longest_value, 1.0), persistent=False)
-        self.encoder = nn.Sequential(
-            nn.Linear(NUM_BODY - NUM_POSE, config.hidden),
-            nn.ReLU(inplace=True),
-            nn.Linear(config.hidden, config.latent),
-            nn.LayerNorm(config.latent),
-        )
-
-    @abc.abstractmethod
-    def look(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
-        """Returns what is read from the context at the positions of latent states, `[G, K, W]`."""
-
-    @abc.abstractmethod
-    def first_layer(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
-        """Returns the transition's first layer without the action, `[G, K, H]`."""
-
-    @abc.abstractmethod
-    def step(self, latent: torch.Tensor, first: torch.Tensor, action: torch.Tensor, code: Code) -> torch.Tensor:
-        """Returns the next latent states `[G, K, D]`, from the output of `first_layer` and actions `[G, K]`."""
-
-    @abc.abstractmethod
-    def predict(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> Predictions:
-        """Returns the outputs of the heads."""
+    def __init__(self, config: MMNConfig, context_size: int):
+        super().__init__(config, context_size)
+        self._size = context_size
+        num_inputs = NUM_BODY + config.latent + NUM_PLACE
+        self._shapes = _weight_shapes(num_inputs, config.hidden, NUM_CHANGES + config.latent)
+        self.hypermodel = Hypermodel(config, self._shapes, context_size)
+        self.scale = nn.Parameter(torch.zeros(2, 2))
+        num_inputs += NUM_TO_GOAL + config.task_code + self.hypermodel.num_features
+        self._make_heads(num_inputs, NUM_ACTIONS + self.num_bins + 1, config)
+        with torch.no_grad():
+            self.heads.bias[NUM_ACTIONS:-1] = -(self.support - _FIRST_VALUE).abs() / 3
+        self._rates = {"hypermodel.hyper.weight": config.hyper_rate, "scale": config.scale_rate}
 
     def parameter_groups(self) -> list[dict[str, Any]]:
-        """Returns the optimizer's groups of parameters.
+        """Returns groups of their own for the layer that generates weights, and for the map's scale."""
+        groups: list[dict[str, Any]] = [{"params": [], "rate": rate} for rate in (1.0, *self._rates.values())]
+        for name, parameter in self.named_parameters():
+            index = next((1 + i for i, prefix in enumerate(self._rates) if name.startswith(prefix)), 0)
+            groups[index]["params"].append(parameter)
+        return groups
 
-        `rate` multiplies the learning rate, and `constant_updates`, if given, stands for that of the config.
+    def look(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
+        """Returns a code of the estimated position, start and goal; then the rows and the features read there.
+
+        No gradient reaches the position from here: what tells goals apart, in `predict`, trains it.
         """
-        return [{"params": list(self.parameters()), "rate": 1.0}]
+        position = self.locate(latent, code).detach()
+        table = torch.cat([code.rows, code.features], dim=-1)
+        seen = read(position, table, self.hypermodel.sharpness)
+        return torch.cat([place_code(position, code.positions, self._size), seen], dim=-1)
 
-    def extra_losses(self, roots: Roots, code: Code) -> Iterator[tuple[str, torch.Tensor, torch.Tensor]]:
-        """Yields the name, the errors and their weights of the network's own losses."""
-        yield from ()
+    def first_layer(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
+        """Returns the layer with generated weights."""
+        weights = self._weights(code)
+        first = self._inputs(latent, seen) @ weights["inputs"] + weights["bias"]
+        if code.rows.shape[-1]:
+            first = first + seen[..., NUM_PLACE : NUM_PLACE + first.shape[-1]]
+        return first
 
-    @abc.abstractmethod
-    def compiled(self, code: Code, num_roots: int) -> CompiledModel:
-        """Returns the model as kernels for the search on a CPU from `num_roots` latent states in each context."""
-
-    def encode(self, features: torch.Tensor) -> torch.Tensor:
-        """Returns latent states `[G, K, D]` of state features `[G, K, 9]`; see `state_features`."""
-        return torch.cat([features[..., :NUM_BODY], self.encoder(features[..., NUM_POSE:NUM_BODY])], dim=-1)
-
-    def decode(self, latent: torch.Tensor) -> torch.Tensor:
-        """Returns the first seven state features `[G, K, 7]` of latent states."""
-        return latent[..., :NUM_BODY]
-
-    def locate(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
-        """Returns the estimated positions `[G, K, 2]` (row, column) of latent states on the map."""
-        return code.positions[:, None, :2] + self.on_map(latent[..., :2])
-
-    def reanchored(self, anchor: torch.Tensor, moved: torch.Tensor, start: torch.Tensor) -> torch.Tensor:
-        """Returns `anchor` `[G, 2]`, shifted just enough that the estimated position lies in the `start` cell.
-
-        The estimated position is that of a body displaced by `moved` `[G, 2]` (m) from the anchor.
-        """
-        position = anchor + self.on_map(moved)
-        return anchor + torch.clamp(position, start - 0.5, start + 0.5) - position
-
-    def step_all(self, latent: torch.Tensor, first: torch.Tensor, code: Code) -> torch.Tensor:
-        """Returns the next latent states `[G, 6 K, D]` of every action; those of one state are neighbours."""
-        num_states = latent.shape[1]
-        action = torch.arange(NUM_ACTIONS, device=latent.device).repeat(num_states).expand(len(latent), -1)
-        latent, first = (values.repeat_interleave(NUM_ACTIONS, dim=1) for values in (latent, first))
-        return self.step(latent, first, action, code)
-
-    def value(self, value_logits: torch.Tensor) -> torch.Tensor:
-        """Returns the means `[G, K]` of categorical values, in steps."""
-        return torch.softmax(value_logits, dim=-1) @ self.support
-
-    def on_map(self, moved: torch.Tensor) -> torch.Tensor:
-        """Returns displacements `[..., 2]` on the map (row, column) of those in metres (x, y)."""
-        return _SCALE_RATE * (moved[..., None] * self.scale).sum(-2)
-
-    def _compiled_heads(self) -> Heads:
-        modules: Any = (self.body[0], self.body[2], self.heads)
-        return Heads(*(layer_of(module.weight, module.bias) for module in modules))
-
-    def _make_heads(self, num_inputs: int, num_outputs: int, config: PlanningConfig) -> None:
-        """Makes `body` and `heads`, whose first outputs are those of policy and value; at first they are constant."""
-        self.body = nn.Sequential(
-            nn.Linear(num_inputs, config.head_hidden),
-            nn.ReLU(inplace=True),
-            nn.Linear(config.head_hidden, config.head_hidden),
-            nn.ReLU(inplace=True),
+    def step(self, latent: torch.Tensor, first: torch.Tensor, action: torch.Tensor, code: Code) -> torch.Tensor:
+        """Returns the next latent states."""
+        weights = self._weights(code)
+        chosen = functional.one_hot(action, NUM_ACTIONS).to(first.dtype)
+        free = (
+            latent[..., NUM_POSE:NUM_BODY] @ weights["free"] + weights["free_bias"] + chosen @ weights["free_actions"]
         )
-        self.heads = nn.Linear(config.head_hidden, num_outputs)
-        nn.init.zeros_(self.heads.weight)
-        nn.init.zeros_(self.heads.bias)
-        nn.init.constant_(self.heads.bias[NUM_ACTIONS + self.num_bins :], _RARE)
+        first = first + chosen @ weights["actions"] + ahead_of(free, latent) @ weights["ahead"]
+        hidden = functional.relu(functional.layer_norm(first, first.shape[-1:]))
+        body, motion = moved_by(latent, free, hidden @ weights["second"] + weights["second_bias"])
+        motion = functional.layer_norm(latent[..., NUM_BODY:] + motion, motion.shape[-1:])
+        return torch.cat([body, motion], dim=-1)
+
+    def predict(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> Predictions:
+        """Returns the outputs of the heads."""
+        to_goal = goal_code(self.locate(latent, code), code.positions[:, 2:])
+        task = code.task[:, None].expand(-1, latent.shape[1], -1)
+        features = seen[..., NUM_PLACE + code.rows.shape[-1] :]
+        out = self.heads(self.body(torch.cat([self._inputs(latent, seen), to_goal, task, features], dim=-1)))
+        return Predictions(out[..., :NUM_ACTIONS], out[..., NUM_ACTIONS:-1], out[..., -1])
+
+    def compiled(self, code: Code, num_roots: int) -> CompiledModel:
+        """Returns the model as kernels, with the weights as they are now."""
+        table = torch.cat([code.rows, code.features], dim=-1)
+        model = compiled.MMNModel(
+            Contexts(code.positions.numpy(), table.numpy(), num_roots),
+            self.num_bins,
+            self.scale.detach().numpy(),
+            steepness(self.hypermodel.sharpness.detach()).reshape(1).numpy(),
+            np.array(PERIODS, np.float32),
+            np.array(WIDTHS, np.float32),
+            compiled.Generated(**{name: part.contiguous().numpy() for name, part in self._weights(code).items()}),
+            code.task.numpy(),
+            heads_of(self.body, self.heads),
+        )
+        return CompiledModel(model, self._shapes["bias"][1], compiled.step, compiled.arrive)
+
+    def _inputs(self, latent: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
+        """Returns `[G, K, D + 34]`: the latent state, with 5 m as the unit of the displacement, and the places."""
+        return torch.cat([latent[..., 2:], latent[..., :2] / 5, seen[..., :NUM_PLACE]], dim=-1)
+
+    def _weights(self, code: Code) -> dict[str, torch.Tensor]:
+        """Returns the generated weights by name, each `[G, rows, columns]`."""
+        parts = code.weights.split([rows * columns for rows, columns in self._shapes.values()], dim=-1)
+        return {
+            name: part.unflatten(-1, shape) for (name, shape), part in zip(self._shapes.items(), parts, strict=True)
+        }
 
 
-def rows_of(code: Code, rows: slice | torch.Tensor) -> Code:
-    """Returns the codes of some of the contexts."""
-    return code._make(part[rows] for part in code)
+class Hypermodel(nn.Module):
+    """Generates the weights from a code of the whole context, of a fixed size, and a row for each cell's position.
 
-
-def marked_positions(context: torch.Tensor, anchor: torch.Tensor | None) -> torch.Tensor:
-    """Returns `[G, 4]`: the anchor, by default the marked start, and the marked goal."""
-    start, goal = (marked_position(context[:, plane]) for plane in (3, 2))
-    return torch.cat([start if anchor is None else anchor, goal], dim=-1)
-
-
-def ahead_of(free: torch.Tensor, latent: torch.Tensor) -> torch.Tensor:
-    """Returns `[G, K, 4]`, in the map's frame: the move and the velocity of free motion, given in the body's frame."""
-    heading = latent[..., 2:NUM_POSE]
-    return torch.cat([rotate(free[..., :2], heading), rotate(free[..., 3:5], heading)], dim=-1)
-
-
-def moved_by(latent: torch.Tensor, free: torch.Tensor, change: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """Returns the body `[G, K, 7]` after a step, and the change of the motion's code `[G, K, D - 7]`.
-
-    Args:
-      latent: `[G, K, D]`, before the step.
-      free: `[G, K, 6]`, the step in the body's frame without obstacles.
-      change: `[G, K, 10 + D - 7]`, what is added to it in the body's frame, then in the map's frame, along whose axes
-        walls stop the body, then to the motion's code.
+    At first the weights are those of an ordinary network, nearly equal for all contexts: Bias-HyperInit (Beck et al.
+    2022). The rows come from convolutions, so that patterns of walls that mazes share are learned once.
     """
-    heading = latent[..., 2:NUM_POSE]
-    in_body, in_map, motion = change.split([NUM_FREE, NUM_STOPPED, change.shape[-1] - NUM_CHANGES], dim=-1)
-    in_body = free + in_body
-    moved = latent[..., :2] + rotate(in_body[..., :2], heading) + in_map[..., :2]
-    turn = torch.stack([torch.sin(in_body[..., 2]), torch.cos(in_body[..., 2])], dim=-1)
-    turned = rotate(heading.flip(-1), turn).flip(-1)
-    planar = in_body[..., 3:5] + rotate(in_map[..., 2:], heading * heading.new_tensor([-1.0, 1.0]))
-    return torch.cat([moved, turned, planar, in_body[..., 5:]], dim=-1), motion
+
+    def __init__(self, config: MMNConfig, shapes: dict[str, tuple[int, int]], context_size: int):
+        super().__init__()
+        self.encoder = MapEncoder(_CHANNELS, _NEAR)
+        size = config.embedding
+        self.embedding = nn.Sequential(nn.Linear(_CHANNELS * context_size**2, size), nn.LayerNorm(size))
+        self.task = nn.Linear(size, config.task_code)
+        ordinary = torch.cat([_ordinary(name, shapes).flatten() for name in shapes])
+        self.shared: nn.Parameter | None = None
+        if config.hypermodel:
+            self.hyper = nn.Linear(size, len(ordinary))
+            with torch.no_grad():
+                self.hyper.bias.copy_(ordinary)
+        else:
+            self.shared = nn.Parameter(ordinary)
+            self.hyper = nn.Linear(size, config.hidden)
+        nn.init.normal_(self.hyper.weight, std=0.02 / math.sqrt(size))
+        num_encoded = _CHANNELS + NUM_PLANES
+        self.rows = nn.Conv2d(num_encoded, config.hidden, 1) if config.rows else None
+        self.reader = MapEncoder(_CHANNELS, _FAR) if config.reading else None
+        self.num_features = num_encoded * config.reading
+        self.sharpness = nn.Parameter(torch.tensor(0.0))
+
+    def forward(self, context: torch.Tensor, anchor: torch.Tensor | None = None) -> Code:
+        """Returns the code of contexts `[G, 4, M, M]`; displacements are measured from `anchor` `[G, 2]`."""
+        encoded = self.encoder(context)
+        embedding = self.embedding(encoded.flatten(1))
+        weights = self.hyper(embedding / math.sqrt(embedding.shape[-1]))
+        if self.shared is not None:  # the context's code is an input: it adds to the first layer alone
+            weights = torch.cat([weights, weights.new_zeros(len(weights), len(self.shared) - weights.shape[-1])], -1)
+            weights = weights + self.shared
+        rows = features = context[:, :0]
+        if self.rows is not None:
+            rows = self.rows(torch.cat([encoded, context], dim=1))
+        if self.reader is not None:
+            features = torch.cat([self.reader(context), context], dim=1)
+        rows, features = (planes.flatten(2).transpose(1, 2) for planes in (rows, features))
+        return Code(marked_positions(context, anchor), weights, rows, self.task(functional.relu(embedding)), features)
 
 
-def rotate(vector: torch.Tensor, heading: torch.Tensor) -> torch.Tensor:
-    """Returns vectors `[..., 2]`, turned by the angles whose sines and cosines are `heading` `[..., 2]`."""
-    (x, y), (sine, cosine) = vector.unbind(-1), heading.unbind(-1)
-    return torch.stack([cosine * x - sine * y, sine * x + cosine * y], dim=-1)
+def _weight_shapes(num_inputs: int, hidden: int, num_changes: int) -> dict[str, tuple[int, int]]:
+    """Returns the rows and columns of the transition's weights; those of the first layer's bias come first."""
+    return {
+        "bias": (1, hidden),
+        "inputs": (num_inputs, hidden),
+        "actions": (NUM_ACTIONS, hidden),
+        "ahead": (NUM_STOPPED, hidden),
+        "second": (hidden, num_changes),
+        "second_bias": (1, num_changes),
+        "free": (NUM_BODY - NUM_POSE, NUM_FREE),
+        "free_bias": (1, NUM_FREE),
+        "free_actions": (NUM_ACTIONS, NUM_FREE),
+    }
+
+
+def _ordinary(name: str, shapes: dict[str, tuple[int, int]]) -> torch.Tensor:
+    """Returns weights as an ordinary network has them at first: 0 for biases and for the free motion by action."""
+    rows, columns = shapes[name]
+    if name.endswith("bias") or name == "free_actions":
+        return torch.zeros(rows, columns)
+    num_inputs = {
+        "inputs": rows + NUM_ACTIONS,
+        "actions": shapes["inputs"][0] + NUM_ACTIONS,
+        "ahead": 3 * rows,
+        "free": 3 * rows,
+    }
+    scale = _FIRST_CHANGE if name == "second" else 1.0
+    return scale * torch.randn(rows, columns) / math.sqrt(num_inputs.get(name, rows))

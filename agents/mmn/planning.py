@@ -1,4 +1,4 @@
-"""Planning in the latent model: one step of lookahead, and tree search.
+"""Tree search in the latent model of MMN.
 
 `G` is the number of contexts, `K` of latent states in each, B = G K.
 """
@@ -8,34 +8,20 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from .config import PlanningConfig
-from .network import NUM_ACTIONS, Code, Network, Predictions
-from .search import Evaluation, Model, Root, SearchResult, gumbel_muzero_policy, muzero_policy
+from ..muzero.lookahead import outcome
+from ..muzero.network import NUM_ACTIONS, Code, Predictions
+from ..muzero.search import Evaluation, Model, Root, SearchResult, gumbel_muzero_policy, muzero_policy
+from .config import MMNConfig
+from .network import MMNNetwork
 
 _DIRICHLET_ALPHA = 0.3  # MuZero's, in its board games with the fewest actions
 _DIRICHLET_FRACTION = 0.25  # MuZero's
 
 
-def outcome(predictions: Predictions) -> tuple[torch.Tensor, torch.Tensor]:
-    """Returns reward and discount `[G, K]` of arriving in states: a goal ends the episode, any other step costs 1."""
-    discount = torch.sigmoid(-predictions.goal_logit)
-    return -discount, discount
-
-
-def lookahead(network: Network, latent: torch.Tensor, code: Code) -> torch.Tensor:
-    """Returns action values `[G, K, 6]` of latent states `[G, K, D]` by one step of the model."""
-    first = network.first_layer(latent, network.look(latent, code), code)
-    after = network.step_all(latent, first, code)
-    predictions = network.predict(after, network.look(after, code), code)
-    reward, discount = outcome(predictions)
-    qvalues = reward + discount * network.value(predictions.value_logits)
-    return qvalues.unflatten(1, (-1, NUM_ACTIONS))
-
-
 @torch.no_grad()
 def plan(
-    network: Network,
-    config: PlanningConfig,
+    network: MMNNetwork,
+    config: MMNConfig,
     latent: torch.Tensor,
     code: Code,
     num_simulations: int,
@@ -73,13 +59,13 @@ def plan(
     )
 
 
-def kernel_model(network: Network, latent: torch.Tensor, code: Code) -> tuple[Root, Model]:
+def kernel_model(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple[Root, Model]:
     """Returns roots and model of a search from latent states `[G, K, D]` on the CPU."""
     model = network.compiled(code, latent.shape[1])
     return model.root(latent.flatten(0, 1)), model
 
 
-def torch_model(network: Network, latent: torch.Tensor, code: Code) -> tuple[Root, Model]:
+def torch_model(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple[Root, Model]:
     """Returns roots and model of a search from latent states `[G, K, D]`."""
     predictions, embedding = _arrive(network, latent, code)
     value, shape = network.value(predictions.value_logits), latent.shape[:2]
@@ -101,7 +87,7 @@ def torch_model(network: Network, latent: torch.Tensor, code: Code) -> tuple[Roo
     return Root(_array(predictions.policy_logits.flatten(0, 1)), _array(value.flatten()), embedding), step
 
 
-def _arrive(network: Network, latent: torch.Tensor, code: Code) -> tuple[Predictions, torch.Tensor]:
+def _arrive(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple[Predictions, torch.Tensor]:
     """Returns predictions for latent states, and embeddings `[B, D + H]`: states and first layers."""
     seen = network.look(latent, code)
     embedding = torch.cat([latent, network.first_layer(latent, seen, code)], dim=-1)

@@ -12,8 +12,8 @@ import numpy as np
 import torch
 
 from ...common import kernels
-from ..search import Root, SearchableModel
-from ..tree import ROOT, Settings, expand_and_backward, simulate
+from ...muzero.search import Root, SearchableModel
+from ...muzero.tree import ROOT, Settings, expand_and_backward, simulate
 from .parts import kernel
 
 _TREES_AT_ONCE = 32  # so that what they read of their contexts stays in the processor's cache

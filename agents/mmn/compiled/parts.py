@@ -75,6 +75,11 @@ def layer_of(weight: torch.Tensor, bias: torch.Tensor) -> Layer:
     return Layer(panels.contiguous().numpy(), functional.pad(bias.detach(), (0, padding)).numpy())
 
 
+def heads_of(body: Any, heads: Any) -> Heads:
+    """Returns the layers of a network's `body` and `heads`."""
+    return Heads(*(layer_of(module.weight, module.bias) for module in (body[0], body[2], heads)))
+
+
 @kernel
 def affine(x: np.ndarray, layer: Layer, rectified: bool, out: np.ndarray) -> None:
     """Writes a layer's outputs for rows in number a multiple of 4; a row's sums are in the same order everywhere.

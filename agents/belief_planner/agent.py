@@ -1,6 +1,6 @@
-"""MMN: it plans on what it believes of the maze, where the shown map is the prior.
+"""The belief planner: it plans shortest paths over its belief of the maze, where the shown map is the prior.
 
-docs/agents/mmn.md describes the training, and how it differs from the paper.
+docs/agents/belief-planner.md says what of it is learned and what is written by hand.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ import torch
 from mazebench.agent import Inputs, Interface, Observation
 from mazebench.maps.maze import cell_to_point, point_to_cell
 
-from ...common.layers import in_batches, state_features
-from ..config import MMNConfig, PlanningConfig
-from ..learner import MMNLearner
-from ..mmn import CONTEXTS_AT_ONCE, STATES_AT_ONCE, ActorState, MMNPaper, write_codes
-from ..network import Network
-from ..spatial import REACH, MMNNetwork, distance_at
+from ..common.actor import NetworkAgent
+from ..common.layers import in_batches, state_features
+from ..mmn.planning import plan
+from ..muzero.network import CONTEXTS_AT_ONCE, NUM_ACTIONS, STATES_AT_ONCE, rows_of, with_codes
 from .belief import GOAL, NUM_PLANES, WALL, probabilities
+from .config import BeliefPlannerConfig
 from .displacement import Displacement, turned
 from .evidence import FAILED, NUM_EVIDENCE, PASSED, SENSED, Readings, place
 from .framing import framed
-from .learner import BeliefLearner
+from .learner import BeliefPlannerLearner
+from .network import REACH, BeliefPlannerNetwork, Code, distance_at
 from .scan_match import find_pose, is_odometry
 
 _AWAY = 3.0  # cells from where a goal was brought nearer, at which it is brought nearer again
@@ -35,9 +35,10 @@ _SURPRISING = 0.1  # how much evidence must change where it contradicts the beli
 
 
 @dataclasses.dataclass
-class BeliefState(ActorState):
-    """The state of acting in B environments: `origin` is that of displacements, always 0."""
+class ActorState:
+    """The state of acting in B environments."""
 
+    code: Code | None  # of B contexts; None before the first step
     displacement: Displacement
     turn: np.ndarray  # [B] float32, rad, from the observed pose's frame to the map's; 0 unless it is odometry
     anchor: np.ndarray  # [B, 2] float32, the position where the episode began
@@ -51,21 +52,26 @@ class BeliefState(ActorState):
     wished: np.ndarray  # [B, 2] float32, the velocity on the map after this step without obstacles; 0 at first
 
 
-class MMN(MMNPaper):
-    """Acts by tree search in a latent model, whose weights a hypermodel generates from a belief over the map."""
+class BeliefPlanner(NetworkAgent):
+    """Drives by a learned policy along shortest paths over a belief of the maze, which evidence revises."""
 
-    name: ClassVar[str] = "mmn"
-    default_config: ClassVar[PlanningConfig] = MMNConfig()
-    network_class: ClassVar[type[Network]] = MMNNetwork
-    learner_class: ClassVar[type[MMNLearner]] = BeliefLearner
-    keeps_anchor = True
-    network: MMNNetwork
+    name: ClassVar[str] = "belief-planner"
+    default_config: ClassVar[BeliefPlannerConfig] = BeliefPlannerConfig()
+    learner_class: ClassVar[type[BeliefPlannerLearner]] = BeliefPlannerLearner
+    learns_on_gpu = True
+    config: BeliefPlannerConfig
+    network: BeliefPlannerNetwork
     _size: int  # M, the side of the map that is believed in, in cells
     _points_tell: bool = True  # whether a cell of that map is a metre, so that the position tells the cell
 
-    def __init__(self, config: PlanningConfig, context_size: int, seed: int = 0, device: str = "cpu"):
+    def __init__(self, config: BeliefPlannerConfig, context_size: int, seed: int = 0, device: str = "cpu"):
         super().__init__(config, context_size, seed, device)
         self._size = context_size
+
+    @classmethod
+    def make_network(cls, config: BeliefPlannerConfig, context_size: int) -> BeliefPlannerNetwork:
+        """Returns a new network, which serves contexts of any size."""
+        return BeliefPlannerNetwork(config, context_size)
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
@@ -81,13 +87,10 @@ class MMN(MMNPaper):
 
     @classmethod
     def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
-        """Returns tables for `mazebench bench`: of the search, and of the parts of acting and of an update."""
-        from ..measure import acting_table, search_table
+        """Returns tables for `mazebench bench`: of the parts of acting, and of an update."""
+        return {}
 
-        shipped = cls.build(Interface("local", 13, 13, sensors=("lidar",)))
-        return search_table(seconds) | acting_table(seconds, shipped) | super().measure(seconds)
-
-    def initial_state(self, batch_size: int) -> BeliefState:
+    def initial_state(self, batch_size: int) -> ActorState:
         """Returns a state without beliefs: `act` forms one where a context is new."""
 
         def planes(number: int) -> np.ndarray:
@@ -100,10 +103,10 @@ class MMN(MMNPaper):
         turn = np.zeros(batch_size, dtype=np.float32)
         waited, is_far = np.zeros(batch_size, dtype=np.int64), np.zeros(batch_size, dtype=bool)
         displacement = Displacement(batch_size)
-        return BeliefState(vectors(), None, displacement, turn, vectors(), *maps, vectors(), waited, is_far, vectors())
+        return ActorState(None, displacement, turn, vectors(), *maps, vectors(), waited, is_far, vectors())
 
     @torch.no_grad()
-    def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, BeliefState]:
+    def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, ActorState]:
         """Returns actions `[B]`; the hypermodel runs where a context is new, or evidence contradicts the belief."""
         for row in np.flatnonzero(inputs.new_context).tolist():
             self._begin_leg(row, inputs, state)
@@ -124,7 +127,20 @@ class MMN(MMNPaper):
         state.wished = in_batches(self.network.wished, STATES_AT_ONCE, *taken).cpu().numpy()
         return action, state
 
-    def _begin_leg(self, row: int, inputs: Inputs, state: BeliefState) -> None:
+    def _planned(self, features: torch.Tensor, code: Code, active: np.ndarray | None, explore: bool) -> np.ndarray:
+        """Returns actions `[B]` in states with features `[B, 9]`; 0 where an environment is not `active`."""
+        if active is not None and not active.all():
+            rows, action = torch.from_numpy(active), np.zeros(len(features), dtype=np.int64)
+            some = rows_of(code, rows.to(code.positions.device))
+            action[active] = self._planned(features[rows], some, None, explore)
+            return action
+        latent = in_batches(self.network.encode, STATES_AT_ONCE, features[:, None].to(self.network.support.device))
+        num_simulations = self.config.num_simulations if explore else self.config.num_eval_simulations
+        noise = (self._rng, self._noise_scale) if explore else ()
+        action = plan(self.network, self.config, latent, code, num_simulations, *noise).action
+        return self._explored(action, NUM_ACTIONS) if explore else action
+
+    def _begin_leg(self, row: int, inputs: Inputs, state: ActorState) -> None:
         """Takes in a new context, and in a new episode forgets the evidence and the anchor."""
         state.shown[row], starts = framed(inputs.observation["context"][row], self._size)
         state.evidence[row, PASSED] = 0.0
@@ -157,7 +173,7 @@ class MMN(MMNPaper):
         return starts[0] if len(starts) else np.full(2, (self._size - 1) / 2), 0.0
 
     def _note(
-        self, inputs: Inputs, features: torch.Tensor, yaw: np.ndarray, position: np.ndarray, state: BeliefState
+        self, inputs: Inputs, features: torch.Tensor, yaw: np.ndarray, position: np.ndarray, state: ActorState
     ) -> None:
         """Adds what is observed to the evidence."""
         batch_size = len(position)
@@ -172,7 +188,7 @@ class MMN(MMNPaper):
         )
         place(state.evidence, readings, self.network.metre())
 
-    def _revise(self, rows: np.ndarray, position: np.ndarray, state: BeliefState) -> None:
+    def _revise(self, rows: np.ndarray, position: np.ndarray, state: ActorState) -> None:
         """Writes beliefs and codes of the contexts at `rows`."""
         if not len(rows):
             return
@@ -181,7 +197,7 @@ class MMN(MMNPaper):
         state.belief[rows], state.weighed[rows], state.waited[rows] = believed.cpu().numpy(), state.evidence[rows], 0
         farthest = distance_at(self._tensor(position[rows]), code.distance).amax(dim=-1)
         state.revised_at[rows], state.is_far[rows] = position[rows], (farthest > REACH).cpu().numpy()
-        write_codes(state, torch.from_numpy(rows).to(believed.device), code)
+        state.code = with_codes(state.code, len(state.waited), torch.from_numpy(rows).to(believed.device), code)
 
     def _believed(
         self, shown: torch.Tensor, evidence: torch.Tensor, anchor: torch.Tensor, position: torch.Tensor
@@ -199,7 +215,7 @@ class MMN(MMNPaper):
         return torch.as_tensor(array).to(self.network.support.device)
 
 
-def _surprised(state: BeliefState) -> np.ndarray:
+def _surprised(state: ActorState) -> np.ndarray:
     """Returns `[B]` bool: where evidence that came since the belief was revised contradicts it."""
     came = state.evidence - state.weighed
     contradicts = np.abs(came[:, SENSED]) * np.abs((state.evidence[:, SENSED] > 0) - state.belief[:, WALL])

@@ -8,7 +8,7 @@ import numpy as np
 
 from mazebench.world.lidar import MAX_RANGE
 
-from ...common.kernels import compiled
+from ..common.kernels import compiled
 
 _HEADINGS = 64  # that are tried
 _FINER = 16  # parts of the step between two of them, tried around the best one

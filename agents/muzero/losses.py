@@ -11,7 +11,7 @@ from typing import NamedTuple
 import torch
 from torch.nn import functional
 
-from .config import PlanningConfig
+from .config import MuZeroConfig
 from .network import Code, Network, Roots
 from .targets import cross_entropy, scale_gradient, two_hot
 
@@ -61,7 +61,7 @@ class Means:
 
 
 def unrolled_losses(
-    network: Network, config: PlanningConfig, batch: Batch, targets: Targets
+    network: Network, config: MuZeroConfig, batch: Batch, targets: Targets
 ) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor]]:
     """Returns losses by name, to be summed, and other scalars by name.
 
@@ -122,7 +122,7 @@ def unrolled_losses(
 
 def _add_model(
     losses: Means,
-    config: PlanningConfig,
+    config: MuZeroConfig,
     network: Network,
     latent: torch.Tensor,
     features: torch.Tensor,

@@ -17,12 +17,9 @@ from torch import nn
 from torch.nn import functional
 
 from ..common.layers import NUM_WAVES, MapEncoder, marked_position, steepness, waves
-from .belief.belief import GOAL, NUM_PLANES, WALL, Belief
-from .compiled import spatial as compiled
-from .compiled.model import CompiledModel
-from .compiled.parts import Contexts, Linear, layer_of, linear_of
-from .config import MMNConfig
-from .network import (
+from ..mmn.compiled.model import CompiledModel
+from ..mmn.compiled.parts import Contexts, Linear, heads_of, layer_of, linear_of
+from ..muzero.network import (
     NUM_ACTIONS,
     NUM_BODY,
     NUM_CHANGES,
@@ -36,7 +33,10 @@ from .network import (
     moved_by,
     rotate,
 )
-from .reading import read
+from ..muzero.reading import read
+from . import kernels as compiled
+from .belief import GOAL, NUM_PLANES, WALL, Belief
+from .config import BeliefPlannerConfig
 from .shortest_paths import cheapest_paths
 
 _DILATIONS = (1, 1, 1)  # of the map's convolutions
@@ -60,20 +60,19 @@ class Code(NamedTuple):
     free: torch.Tensor  # [G, 1, M, M], 1 where a cell is probably free
 
 
-class MMNNetwork(Network):
+class BeliefPlannerNetwork(Network):
     """Reads weights and features of the map at the estimated position.
 
     A step adds a change that is linear in the body's own frame, as free motion is, and the output of the transition
     network: a change in that frame, and one in the map's frame, along whose axes walls stop the body.
     """
 
-    hypermodel: SpatialHypermodel
-    serves_any_size = True
+    hypermodel: Hypermodel
 
-    def __init__(self, config: MMNConfig, context_size: int):
+    def __init__(self, config: BeliefPlannerConfig, context_size: int):
         super().__init__(config, context_size)
         num_inputs = NUM_BODY - 2 + config.latent + NUM_WAVES
-        self.hypermodel = SpatialHypermodel(config, num_inputs, NUM_CHANGES + config.latent)
+        self.hypermodel = Hypermodel(config, num_inputs, NUM_CHANGES + config.latent)
         self.scale = nn.Parameter(torch.zeros(2, 2))
         self.free = nn.Linear(NUM_BODY - NUM_POSE, NUM_FREE)
         self.free_by_action = nn.Embedding(NUM_ACTIONS, NUM_FREE)
@@ -168,7 +167,7 @@ class MMNNetwork(Network):
             layer_of(transition.later[0].weight, transition.later[0].bias),
             layer_of(transition.later[2].weight, transition.later[2].bias),
             Linear(self.normalize.weight.detach().numpy()[None], self.normalize.bias.detach().numpy()),
-            self._compiled_heads(),
+            heads_of(self.body, self.heads),
         )
         return CompiledModel(model, self.ahead.out_features, compiled.step, compiled.arrive)
 
@@ -177,10 +176,10 @@ class MMNNetwork(Network):
         return torch.cat([latent[..., 2:], waves(latent[..., :2])], dim=-1)
 
 
-class SpatialHypermodel(nn.Module):
+class Hypermodel(nn.Module):
     """Generates a row of weights for each cell, for beliefs of any size."""
 
-    def __init__(self, config: MMNConfig, num_inputs: int, num_outputs: int):
+    def __init__(self, config: BeliefPlannerConfig, num_inputs: int, num_outputs: int):
         super().__init__()
         self.encoder = MapEncoder(config.channels, _DILATIONS, NUM_PLANES)
         num_encoded = config.channels + NUM_PLANES

@@ -13,7 +13,7 @@ import numpy as np
 
 from mazebench.world.lidar import MAX_RANGE
 
-from ...common.kernels import compiled
+from ..common.kernels import compiled
 
 NUM_EVIDENCE = 3
 # From -1, surely free, to 1, surely wall; 1 where the body was on this leg; in how many steps a cell stopped the body.

@@ -1,4 +1,4 @@
-"""The model of MMN as kernels; they equal `spatial.MMNNetwork` up to rounding."""
+"""The model of MMN as kernels; they equal `spatial.BeliefPlannerNetwork` up to rounding."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .parts import (
+from ..mmn.compiled.parts import (
     TURN,
     Contexts,
     Heads,
@@ -31,7 +31,7 @@ _FREQUENCIES = (np.float32(0.25), np.float32(0.5), np.float32(1.0), np.float32(2
 
 
 class SpatialModel(NamedTuple):
-    """What the kernels of MMN take; see `spatial.MMNNetwork`."""
+    """What the kernels of MMN take; see `spatial.BeliefPlannerNetwork`."""
 
     contexts: Contexts
     num_bins: int  # of categorical values

@@ -1,4 +1,4 @@
-"""The learner of MMN: the belief learns from wrong maps and evidence, the rest from right maps.
+"""The learner of the belief planner: the belief learns from wrong maps and evidence, the rest from right maps.
 
 `G` is the number of contexts in a batch, `T` of past steps of each, `M` the side of the map.
 """
@@ -14,10 +14,10 @@ from mazebench.errors import InputError
 from mazebench.maps.maze import Maze
 from mazebench.world.lidar import Lidar
 
-from ...common import symmetry
-from ...common.layers import state_features
-from ...common.replay import SequenceSample
-from ..learner import MMNLearner
+from ..common import symmetry
+from ..common.layers import state_features
+from ..common.replay import SequenceSample
+from ..muzero.learner import MuZeroLearner
 from .belief import belief_losses
 from .evidence import NUM_EVIDENCE, SENSED, Readings, place
 from .wrong_maps import planes_of, wrong_map
@@ -35,11 +35,11 @@ class Pictured(NamedTuple):
     truth: torch.Tensor  # [G, 2, M, M], walls and goals of the mazes
 
 
-class BeliefLearner(MMNLearner):
+class BeliefPlannerLearner(MuZeroLearner):
     """Updates the network of its actor."""
 
     def __init__(self, actor: Any, mazes: tuple[Maze, ...], seed: int):
-        super().__init__(actor, mazes, seed)
+        super().__init__(actor, mazes, seed, keep_anchor=True)
         self._size = mazes[0].size
         if actor.trained_size != self._size:
             found = f"mazes of {self._size} and a context of {actor.trained_size} cells a side"

@@ -1,4 +1,4 @@
-"""The model of MMN-paper as kernels; they equal `paper.PaperNetwork` up to rounding."""
+"""The model of MMN-paper as kernels; they equal `paper.MMNNetwork` up to rounding."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .parts import (
 
 
 class Generated(NamedTuple):
-    """The transition's weights of each context; see `paper.PaperNetwork`."""
+    """The transition's weights of each context; see `paper.MMNNetwork`."""
 
     bias: np.ndarray  # [C, 1, H]
     inputs: np.ndarray  # [C, inputs, H]
@@ -41,8 +41,8 @@ class Generated(NamedTuple):
     free_actions: np.ndarray  # [C, 6, 6]
 
 
-class PaperModel(NamedTuple):
-    """What the kernels of MMN-paper take; see `paper.PaperNetwork`."""
+class MMNModel(NamedTuple):
+    """What the kernels of MMN-paper take; see `paper.MMNNetwork`."""
 
     contexts: Contexts  # the table's first columns, for the first layer, may be lacking
     num_bins: int
@@ -56,7 +56,7 @@ class PaperModel(NamedTuple):
 
 
 def step(
-    model: PaperModel,
+    model: MMNModel,
     first: int,
     embeddings: np.ndarray,
     parents: np.ndarray,
@@ -87,7 +87,7 @@ def step(
 
 
 @kernel
-def arrive(model: PaperModel, first: int, embeddings: np.ndarray, index: int, numbers: np.ndarray) -> None:
+def arrive(model: MMNModel, first: int, embeddings: np.ndarray, index: int, numbers: np.ndarray) -> None:
     """Writes the first layers, without bias, of the latent states in `embeddings[:, index]`, and the predictions."""
     contexts, num_rows = model.contexts, len(embeddings)
     num_inputs, num_hidden = model.generated.inputs.shape[1:]
