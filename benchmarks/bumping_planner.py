@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 import torch
-from mazebench_agents.mmn.shortest_paths import cheapest_paths
+from mazebench_agents.belief_planner.shortest_paths import cheapest_paths
 from mazebench_agents.planner import observation as planner
 from mazebench_agents.planner.pilot import Pilot
 

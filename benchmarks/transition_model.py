@@ -1,6 +1,6 @@
-"""Trains the model of MMN-paper alone on recorded transitions, and prints how much the map matters to its weights.
+"""Trains the model of MMN alone on recorded transitions, and prints how much the map matters to its weights.
 
-Call it as `python benchmarks/transition_model.py [UPDATES [KEY=VALUE ...]]`; keys are those of `PaperConfig`.
+Call it as `python benchmarks/transition_model.py [UPDATES [KEY=VALUE ...]]`; keys are those of `MMNConfig`.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import torch
 from mazebench_agents.common import symmetry
 from mazebench_agents.common.layers import state_features
 from mazebench_agents.common.overrides import override
-from mazebench_agents.mmn.config import PaperConfig
-from mazebench_agents.mmn.paper import Code, PaperNetwork
+from mazebench_agents.mmn.config import MMNConfig
+from mazebench_agents.mmn.network import Code, MMNNetwork
 
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import generate
@@ -98,7 +98,7 @@ def draw(mazes: tuple[Maze, ...], recorded: list[Transitions], turned: int, rng:
     )
 
 
-def errors(network: PaperNetwork, batch: Batch, code: Code) -> tuple[torch.Tensor, torch.Tensor]:
+def errors(network: MMNNetwork, batch: Batch, code: Code) -> tuple[torch.Tensor, torch.Tensor]:
     """Returns the errors `[G, K]` of the displacement (m) and of the rest of the body after one step."""
     latent = network.encode(batch.features)
     first = network.first_layer(latent, network.look(latent, code), code)
@@ -107,7 +107,7 @@ def errors(network: PaperNetwork, batch: Batch, code: Code) -> tuple[torch.Tenso
 
 
 @torch.no_grad()
-def compare(network: PaperNetwork, batches: list[Batch]) -> tuple[float, float]:
+def compare(network: MMNNetwork, batches: list[Batch]) -> tuple[float, float]:
     """Returns the mean errors (m) with the right weights, and with those of another maze."""
     own, other = [], []
     for batch in batches:
@@ -123,12 +123,12 @@ def main(num_updates: int, overrides: dict[str, str]) -> None:
     torch.set_num_threads(1)
     torch.manual_seed(0)
     rng = np.random.default_rng(0)
-    config = override(PaperConfig(), overrides)
+    config = override(MMNConfig(), overrides)
     held_out = tuple(generate("dfs", _SIZE, rng, f"held-out-{index}") for index in range(20))
     splits = {"train": load_mazes(_SIZE, "train"), "held out": held_out}
     recorded = {name: record(mazes, _NUM_STEPS[name], rng) for name, mazes in splits.items()}
     tests = {name: [draw(mazes, recorded[name], 0, rng) for _ in range(6)] for name, mazes in splits.items()}
-    network = PaperNetwork(config, _SIZE)
+    network = MMNNetwork(config, _SIZE)
     with torch.no_grad():
         network.scale.copy_(torch.tensor(_TRUE_SCALE))
     network.scale.requires_grad_(False)

@@ -17,8 +17,7 @@ from mazebench.maps.maze import cell_to_point, point_to_cell
 
 from ..common.actor import NetworkAgent
 from ..common.layers import in_batches, state_features
-from ..mmn.planning import plan
-from ..muzero.network import CONTEXTS_AT_ONCE, NUM_ACTIONS, STATES_AT_ONCE, rows_of, with_codes
+from ..muzero.network import CONTEXTS_AT_ONCE, NUM_ACTIONS, STATES_AT_ONCE, with_codes
 from .belief import GOAL, NUM_PLANES, WALL, probabilities
 from .config import BeliefPlannerConfig
 from .displacement import Displacement, turned
@@ -88,7 +87,10 @@ class BeliefPlanner(NetworkAgent):
     @classmethod
     def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
         """Returns tables for `mazebench bench`: of the parts of acting, and of an update."""
-        return {}
+        from ..muzero.measure import acting_table, update_table
+
+        shipped = cls.build(Interface("local", 13, 13, sensors=("lidar",)))
+        return acting_table(seconds, shipped) | update_table(seconds, cls.build_learner)
 
     def initial_state(self, batch_size: int) -> ActorState:
         """Returns a state without beliefs: `act` forms one where a context is new."""
@@ -107,7 +109,7 @@ class BeliefPlanner(NetworkAgent):
 
     @torch.no_grad()
     def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, ActorState]:
-        """Returns actions `[B]`; the hypermodel runs where a context is new, or evidence contradicts the belief."""
+        """Returns actions `[B]`; the belief is revised where a context is new, or where evidence contradicts it."""
         for row in np.flatnonzero(inputs.new_context).tolist():
             self._begin_leg(row, inputs, state)
         observed = inputs.observation["state"].copy()
@@ -122,23 +124,28 @@ class BeliefPlanner(NetworkAgent):
         active = np.ones(len(moved), dtype=bool) if inputs.active is None else inputs.active
         self._revise(np.flatnonzero((inputs.new_context | is_due) & active), position, state)
         assert state.code is not None, "new_context must be set in an environment's first step"
-        action = self._planned(features, state.code, inputs.active, explore)
+        action = np.where(active, self._chosen(features, state.code, explore), 0)
         taken = self._tensor(features), self._tensor(action).long()
         state.wished = in_batches(self.network.wished, STATES_AT_ONCE, *taken).cpu().numpy()
         return action, state
 
-    def _planned(self, features: torch.Tensor, code: Code, active: np.ndarray | None, explore: bool) -> np.ndarray:
-        """Returns actions `[B]` in states with features `[B, 9]`; 0 where an environment is not `active`."""
-        if active is not None and not active.all():
-            rows, action = torch.from_numpy(active), np.zeros(len(features), dtype=np.int64)
-            some = rows_of(code, rows.to(code.positions.device))
-            action[active] = self._planned(features[rows], some, None, explore)
-            return action
-        latent = in_batches(self.network.encode, STATES_AT_ONCE, features[:, None].to(self.network.support.device))
-        num_simulations = self.config.num_simulations if explore else self.config.num_eval_simulations
-        noise = (self._rng, self._noise_scale) if explore else ()
-        action = plan(self.network, self.config, latent, code, num_simulations, *noise).action
-        return self._explored(action, NUM_ACTIONS) if explore else action
+    def _chosen(self, features: torch.Tensor, code: Code, explore: bool) -> np.ndarray:
+        """Returns actions `[B]` by the policy in states with features `[B, 9]`.
+
+        Exploring, the first environment draws from the policy, and the last one takes its best action; those between
+        draw with less and less noise.
+        """
+        logits = in_batches(self._policy_logits, STATES_AT_ONCE, self._tensor(features)[:, None], *code)
+        scores = logits[:, 0].cpu().numpy()
+        if not explore:
+            return scores.argmax(axis=1)
+        noise = self._noise_scale[:, None] * self._rng.gumbel(size=scores.shape)
+        return self._explored((scores + noise).argmax(axis=1), NUM_ACTIONS)
+
+    def _policy_logits(self, features: torch.Tensor, *code: torch.Tensor) -> torch.Tensor:
+        """Returns logits `[K, 1, 6]` of states with features `[K, 1, 9]`, each with the parts of a code of its own."""
+        latent, whole = self.network.encode(features), Code(*code)
+        return self.network.predict(latent, self.network.look(latent, whole), whole).policy_logits
 
     def _begin_leg(self, row: int, inputs: Inputs, state: ActorState) -> None:
         """Takes in a new context, and in a new episode forgets the evidence and the anchor."""

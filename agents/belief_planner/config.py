@@ -13,7 +13,7 @@ from ..muzero.config import MuZeroConfig
 class BeliefPlannerConfig(MuZeroConfig):
     """The config of the belief planner."""
 
-    RANGES: ClassVar = MuZeroConfig.RANGES | {
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = MuZeroConfig.RANGES | {
         "channels": (1, 1024),
         "num_distances": (1, 64),
         "localization_weight": (0.0, math.inf),
@@ -36,13 +36,3 @@ class BeliefPlannerConfig(MuZeroConfig):
     scale_updates: int = 300  # before the learning rate of the map's scale falls: an error of it grows along the way
     belief_rate: float = 0.5  # times the learning rate, for the belief
     wrong_maps: float = 0.7  # share of wrong maps among those that the belief learns from
-
-    # For the check that the rename changes nothing
-    search: str = "gumbel"
-    num_simulations: int = 8
-    num_eval_simulations: int = 16
-    value_scale: float = 0.1
-    maxvisit_init: float = 10.0
-    n_step: int = 5
-    value_target: str = "tree_backup"
-    policy_target: str = "lookahead"

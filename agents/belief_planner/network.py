@@ -1,4 +1,4 @@
-"""The network of MMN: a row of generated weights for each cell of the map, and distances propagated over the map.
+"""The network of the belief planner: features of each cell of the map, and distances propagated over the map.
 
 Its hypermodel reads no map but a belief over the map (`belief.belief`).
 
@@ -16,9 +16,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from ..common.layers import NUM_WAVES, MapEncoder, marked_position, steepness, waves
-from ..mmn.compiled.model import CompiledModel
-from ..mmn.compiled.parts import Contexts, Linear, heads_of, layer_of, linear_of
+from ..common.layers import NUM_WAVES, MapEncoder, marked_position, waves
 from ..muzero.network import (
     NUM_ACTIONS,
     NUM_BODY,
@@ -34,7 +32,6 @@ from ..muzero.network import (
     rotate,
 )
 from ..muzero.reading import read
-from . import kernels as compiled
 from .belief import GOAL, NUM_PLANES, WALL, Belief
 from .config import BeliefPlannerConfig
 from .shortest_paths import cheapest_paths
@@ -149,27 +146,6 @@ class BeliefPlannerNetwork(Network):
         distance = near[..., :-1] / near[..., -1:].clamp(min=_LEAST_FREE)  # [G, K, P]
         error = functional.smooth_l1_loss(distance, -roots.value[..., None].expand_as(distance), reduction="none")
         yield "distance_loss", self._weights["distance"] * error.mean(dim=-1), roots.going
-
-    def compiled(self, code: Code, num_roots: int) -> CompiledModel:
-        """Returns the model as kernels, with the weights as they are now."""
-        transition: Any = self.hypermodel.transition
-        model = compiled.SpatialModel(
-            Contexts(code.positions.numpy(), code.weights.numpy(), num_roots),
-            self.num_bins,
-            self.hypermodel.num_ways,
-            self.scale.detach().numpy(),
-            steepness(self.hypermodel.sharpness.detach()).reshape(1).numpy(),
-            linear_of(self.free),
-            self.free_by_action.weight.detach().numpy(),
-            linear_of(self.ahead),
-            layer_of(transition.inputs.weight, transition.inputs.bias),
-            transition.actions.weight.detach().numpy(),
-            layer_of(transition.later[0].weight, transition.later[0].bias),
-            layer_of(transition.later[2].weight, transition.later[2].bias),
-            Linear(self.normalize.weight.detach().numpy()[None], self.normalize.bias.detach().numpy()),
-            heads_of(self.body, self.heads),
-        )
-        return CompiledModel(model, self.ahead.out_features, compiled.step, compiled.arrive)
 
     def _inputs(self, latent: torch.Tensor) -> torch.Tensor:
         """Returns `[G, K, D + 14]`: heading, velocities, the code of the motion, and waves of the displacement."""

@@ -113,9 +113,13 @@ def in_batches(function: Callable[..., Any], size: int, *inputs: torch.Tensor) -
     PyTorch rounds differently at another batch size. With a fixed one, a row's result depends on the row alone.
     """
     num_rows = len(inputs[0])
-    padding = -num_rows % size
-    padded = [torch.cat([values, values.new_zeros(padding, *values.shape[1:])]) for values in inputs]
-    results = [function(*part) for part in zip(*(values.split(size) for values in padded), strict=True)]
+
+    def part(begin: int) -> list[torch.Tensor]:
+        rows = [values[begin : begin + size] for values in inputs]
+        padding = size - len(rows[0])
+        return [torch.cat([row, row.new_zeros(padding, *row.shape[1:])]) for row in rows] if padding else rows
+
+    results = [function(*part(begin)) for begin in range(0, max(num_rows, 1), size)]
     if isinstance(results[0], torch.Tensor):
         return torch.cat(results)[:num_rows]
     return results[0]._make(torch.cat(parts)[:num_rows] for parts in zip(*results, strict=True))

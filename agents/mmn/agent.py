@@ -53,7 +53,8 @@ class MMN(NetworkAgent):
     @classmethod
     def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
         """Returns tables for `mazebench bench`: of the search, and of the parts of an update."""
-        from .measure import search_table, update_table
+        from ..muzero.measure import update_table
+        from .measure import search_table
 
         return search_table(seconds) | update_table(seconds, cls.build_learner)
 

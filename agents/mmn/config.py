@@ -13,7 +13,7 @@ from ..muzero.config import MuZeroConfig
 class MMNConfig(MuZeroConfig):
     """The config of MMN: the paper's choices where it states them, unless docs/agents/mmn.md says otherwise."""
 
-    RANGES: ClassVar = MuZeroConfig.RANGES | {
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = MuZeroConfig.RANGES | {
         "embedding": (1, 4096),
         "task_code": (1, 4096),
         "hyper_rate": (0.0, math.inf),
@@ -24,7 +24,7 @@ class MMNConfig(MuZeroConfig):
         "maxvisit_init": (0.0, math.inf),
         "n_step": (1, 1000),
     }
-    CHOICES: ClassVar = {
+    CHOICES: ClassVar[dict[str, tuple[str, ...]]] = {
         "search": ("gumbel", "puct"),
         "policy_target": ("lookahead", "search", "paper"),
         "value_target": ("tree_backup", "n_step"),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
 from typing import ClassVar
 
 from mazebench.errors import InputError
@@ -19,7 +18,7 @@ class MuZeroConfig:
     """
 
     # The lowest and the highest value of each key that is bounded, and the values of each key that has a few.
-    RANGES: ClassVar[Mapping[str, tuple[float, float]]] = {
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {
         "latent": (1, 1024),
         "hidden": (1, 4096),
         "head_hidden": (1, 8192),
@@ -46,7 +45,7 @@ class MuZeroConfig:
         "epsilon_base": (0.0, 1.0),
         "epsilon_alpha": (0.0, 1000.0),
     }
-    CHOICES: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    CHOICES: ClassVar[dict[str, tuple[str, ...]]] = {}
 
     # Networks
     latent: int = 32  # numbers of a latent state that are learned

@@ -1,4 +1,4 @@
-"""The parts of which the kernels of MMN's models consist: layers, motion, reading of the map, predictions.
+"""The parts of MMN's model as kernels: layers, motion, reading of the map, predictions.
 
 A row's results do not depend on the other rows.
 
@@ -33,13 +33,6 @@ kernel = functools.partial(kernels.compiled, fused=True)
 inlined = functools.partial(kernels.compiled, inline=True, fused=True)
 
 
-class Linear(NamedTuple):
-    """A linear layer."""
-
-    weight: np.ndarray  # [inputs, outputs] float32
-    bias: np.ndarray  # [outputs] float32
-
-
 class Layer(NamedTuple):
     """A linear layer for `affine`, in panels of 16 outputs; the last ones may be zeros."""
 
@@ -61,11 +54,6 @@ class Contexts(NamedTuple):
     positions: np.ndarray  # [C, 4], anchor and goal on the map, each (row, column)
     table: np.ndarray  # [C, M * M, H + T], of each cell: a row of the first layer's weights, features for the heads
     num_roots: int  # of each context
-
-
-def linear_of(module: Any) -> Linear:
-    """Returns the weights of a linear module."""
-    return Linear(module.weight.detach().T.contiguous().numpy(), module.bias.detach().numpy())
 
 
 def layer_of(weight: torch.Tensor, bias: torch.Tensor) -> Layer:

@@ -1,6 +1,6 @@
-"""Prints from which distances a training run of MMN has learned, and its values by distance.
+"""Prints from which distances a training run of belief-planner has learned, and its values by distance.
 
-Call it as `python benchmarks/mmn_values.py RUN`.
+Call it as `python benchmarks/belief_planner_values.py RUN`.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import sys
 
 import numpy as np
 import torch
-from mazebench_agents.mmn import MMN
-from mazebench_agents.mmn.belief.wrong_maps import planes_of
-from mazebench_agents.mmn.learner import MMNLearner
-from mazebench_agents.mmn.spatial import MMNNetwork
+from mazebench_agents.belief_planner import BeliefPlanner
+from mazebench_agents.belief_planner.network import BeliefPlannerNetwork
+from mazebench_agents.belief_planner.wrong_maps import planes_of
+from mazebench_agents.muzero.learner import MuZeroLearner
 
 from mazebench.agent import Interface
 from mazebench.maps.generators import generate
@@ -28,7 +28,9 @@ _MAZE_SEED = 777
 _FARTHEST = 20  # cells; values of farther ones are not printed
 
 
-def distances_learned_from(learner: MMNLearner, mazes: tuple[Maze, ...], num_batches: int = _NUM_BATCHES) -> np.ndarray:
+def distances_learned_from(
+    learner: MuZeroLearner, mazes: tuple[Maze, ...], num_batches: int = _NUM_BATCHES
+) -> np.ndarray:
     """Returns the distances `[n]` int, in cells, of the states of some batches from their goals, real or relabelled."""
     size = mazes[0].size
     fields: dict[tuple[int, int], np.ndarray] = {}
@@ -45,7 +47,9 @@ def distances_learned_from(learner: MMNLearner, mazes: tuple[Maze, ...], num_bat
 
 
 @torch.no_grad()
-def values_by_distance(network: MMNNetwork, mazes: tuple[Maze, ...], rng: np.random.Generator) -> dict[int, np.ndarray]:
+def values_by_distance(
+    network: BeliefPlannerNetwork, mazes: tuple[Maze, ...], rng: np.random.Generator
+) -> dict[int, np.ndarray]:
     """Returns values and learned distances `[n, 2]`, by true distance in cells.
 
     They are of bodies at rest in all cells, with one goal a maze.
@@ -73,7 +77,9 @@ def main(folder: pathlib.Path) -> None:
     config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
     mazes = make_spec("local", config["size"]).mazes
     overrides = {name: str(value) for name, value in config["agent_config"].items()}
-    learner = MMN.build_learner(Interface("local", config["size"], config["size"]), mazes, overrides=overrides)
+    learner = BeliefPlanner.build_learner(
+        Interface("local", config["size"], config["size"]), mazes, overrides=overrides
+    )
     with RunFolder(folder) as run:
         learner.load(run.checkpoints()[-1])
     shown = distances_learned_from(learner, mazes)
