@@ -38,12 +38,21 @@ class _Announcement(Listener):
 register("numba:compile", _Announcement())
 
 
-def compiled(function: Callable[..., Any], inline: bool = False, fused: bool = False) -> Callable[..., Any]:
+def compiled(
+    function: Callable[..., Any], inline: bool = False, fused: bool = False, nogil: bool = False
+) -> Callable[..., Any]:
     """Returns `function` as machine code, cached on disk if numba finds a folder that it can write to.
 
-    If `fused`, a product and a sum may become one operation with one rounding: faster, and other last bits.
+    If `fused`, a product and a sum may become one operation with one rounding: faster, and other last bits. If `nogil`,
+    several threads may run it at once.
     """
-    return _cached(numba.njit, function, forceinline=inline, **_options(fused))
+    return _cached(numba.njit, function, forceinline=inline, nogil=nogil, **_options(fused))
+
+
+def num_threads() -> int:
+    """Returns how many threads kernels may run in: the cores of this process, or what NUMBA_NUM_THREADS says."""
+    config: Any = numba.config
+    return config.NUMBA_NUM_THREADS
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:

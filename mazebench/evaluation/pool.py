@@ -76,7 +76,7 @@ class _Processes:
         self.num_workers = workers
         # Not forked: threads of the simulation may be running in this process.
         context = multiprocessing.get_context("spawn")
-        self._executor = concurrent.futures.ProcessPoolExecutor(workers, context, initializer=_end_with_parent)
+        self._executor = concurrent.futures.ProcessPoolExecutor(workers, context, initializer=_begin_worker)
         self._processes: list[multiprocessing.process.BaseProcess] = []
 
     def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Ended]]:
@@ -126,8 +126,10 @@ def _interrupts_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
-def _end_with_parent() -> None:
-    """Makes this worker end when its parent is killed and can't end it."""
+def _begin_worker() -> None:
+    """Leaves this worker one core, and makes it end when its parent is killed and can't end it."""
+    for variable in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):  # PyTorch and numba read them when they are imported
+        os.environ.setdefault(variable, "1")
 
     def wait() -> None:
         parent = multiprocessing.parent_process()

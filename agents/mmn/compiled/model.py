@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -14,9 +16,9 @@ import torch
 from ...common import kernels
 from ...muzero.search import Root, SearchableModel
 from ...muzero.tree import ROOT, Settings, expand_and_backward, simulate
-from .parts import kernel
 
-_TREES_AT_ONCE = 32  # so that what they read of their contexts stays in the processor's cache
+_kernel = functools.partial(kernels.compiled, fused=True, nogil=True)
+_TREES_AT_ONCE = 32  # a task for a thread; what they read of their contexts stays in the processor's cache
 
 
 class CompiledModel(SearchableModel):
@@ -47,29 +49,41 @@ class CompiledModel(SearchableModel):
     def search(
         self, tree: np.ndarray, gumbel: np.ndarray, visits: np.ndarray, settings: Settings, embedding: torch.Tensor
     ) -> None:
-        """Runs all simulations."""
-        _search(tree, gumbel, visits, settings, embedding.numpy(), self._step, self._model)
+        """Runs all simulations, on all cores where there are trees enough; results do not depend on their number."""
+        roots, shared = embedding.numpy(), (visits, settings, self._step, self._model)
+
+        def search_from(first: int) -> None:
+            some = slice(first, first + _TREES_AT_ONCE)
+            _search(tree[some], gumbel[some], roots[some], first, *shared)
+
+        firsts = range(0, len(tree), _TREES_AT_ONCE)
+        if (num_threads := min(len(firsts), kernels.num_threads())) == 1:
+            for first in firsts:
+                search_from(first)
+            return
+        with ThreadPoolExecutor(num_threads) as threads:
+            for ended in [threads.submit(search_from, first) for first in firsts]:
+                ended.result()
 
 
-@kernel
+@_kernel
 def _search(
     tree: np.ndarray,
     gumbel: np.ndarray,
+    roots: np.ndarray,
+    first: int,
     visits: np.ndarray,
     settings: Settings,
-    embeddings: np.ndarray,
     step: Callable[..., None],
     model: Any,
 ) -> None:
-    """Searches a few trees at a time."""
-    num_nodes = tree.shape[1]
-    actions, parents = np.empty(_TREES_AT_ONCE, np.int64), np.empty(_TREES_AT_ONCE, np.int64)
-    numbers = np.empty((_TREES_AT_ONCE, 3 + gumbel.shape[1]), np.float32)
-    states = np.empty((_TREES_AT_ONCE, num_nodes, embeddings.shape[1]), np.float32)
-    for first in range(0, len(tree), _TREES_AT_ONCE):
-        trees, noise = tree[first : first + _TREES_AT_ONCE], gumbel[first : first + _TREES_AT_ONCE]
-        states[: len(trees), ROOT] = embeddings[first : first + _TREES_AT_ONCE]
-        for index in range(1, num_nodes):
-            simulate(trees, index, noise, visits[index - 1], settings, actions, parents)
-            step(model, first, states[: len(trees)], parents, actions, index, numbers)
-            expand_and_backward(trees, index, numbers)
+    """Searches from neighbouring roots, of which `first` is the index of the first one."""
+    num_trees, num_nodes = tree.shape
+    actions, parents = np.empty(num_trees, np.int64), np.empty(num_trees, np.int64)
+    numbers = np.empty((num_trees, 3 + gumbel.shape[1]), np.float32)
+    states = np.empty((num_trees, num_nodes, roots.shape[1]), np.float32)
+    states[:, ROOT] = roots
+    for index in range(1, num_nodes):
+        simulate(tree, index, gumbel, visits[index - 1], settings, actions, parents)
+        step(model, first, states, parents, actions, index, numbers)
+        expand_and_backward(tree, index, numbers)
