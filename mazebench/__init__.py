@@ -14,7 +14,7 @@ from mazebench.envs.registration import register_environments
 if TYPE_CHECKING:
     from mazebench.agent import Agent, Inputs, SingleAgent
     from mazebench.envs.registration import make_vec
-    from mazebench.errors import InputError
+    from mazebench.errors import InputError, UnplayableError
     from mazebench.evaluation.evaluate import evaluate
     from mazebench.maps.arrays import maze_from_array
     from mazebench.maps.files import read_maze, read_mazes
@@ -39,6 +39,7 @@ _HOMES = {
     "MazeError": "mazebench.maps.maze",
     "SingleAgent": "mazebench.agent",
     "TaskSpec": "mazebench.tasks.spec",
+    "UnplayableError": "mazebench.errors",
     "evaluate": "mazebench.evaluation.evaluate",
     "generate": "mazebench.maps.generators",
     "load": "mazebench.tasks.registry",
@@ -58,6 +59,7 @@ __all__ = [
     "MazeError",
     "SingleAgent",
     "TaskSpec",
+    "UnplayableError",
     "evaluate",
     "generate",
     "load",

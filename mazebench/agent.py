@@ -65,6 +65,10 @@ class _Declarations:
           interface: the environments that it will act in.
           seed: of what is drawn when it is built, such as weights; draws in an episode belong to `Inputs.seed`.
           checkpoint: the file to read instead of `default_checkpoint()`; only for agents that learn.
+
+        Raises:
+          InputError: if the checkpoint can't be used.
+          UnplayableError: if the agent can't play in such environments; a suite leaves such a part out.
         """
         return cls()
 

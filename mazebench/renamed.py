@@ -42,6 +42,17 @@ def name_of_class(agent_class: str | None) -> str | None:
     return next((former.now for former in _FORMER if agent_class in former.classes), None)
 
 
+def describe_unfinished(config: Mapping[str, Any]) -> str | None:
+    """Describes the agent of an evaluation by the content of its `config.json`, which names no class.
+
+    Returns:
+      The present name and when it was written, in words; None for what was written under a present name. Since the
+      rename, the hash of an installed agent's code is written, too.
+    """
+    names = [former.now for former in _FORMER if config.get("agent") == former.name]
+    return f"{names[0]!r}, written before the rename" if names and not config.get("agent_code_sha256") else None
+
+
 def describe_former(agent: Any, config: Any) -> str | None:
     """Describes the agent that wrote a run or a checkpoint before it was renamed.
 

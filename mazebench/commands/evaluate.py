@@ -125,7 +125,9 @@ def _evaluate_suite(
 
     chosen = {name: values[name] for name in ("checkpoint", "seed")}
     with progress.evaluating(f"{suite}, {', '.join(agents)}", kept) as show:
-        summaries = suites.run_suite(suite, agents, folder, record=record, progress=show, **chosen, **running)
+        summaries = suites.run_suite(
+            suite, agents, folder, record=record, progress=show, warn=remark, **chosen, **running
+        )
     table.print_suite(summaries)
 
 

@@ -22,7 +22,7 @@ def train(
     agent: Annotated[
         str,
         typer.Option(
-            help="A learning agent: dqn, mah, mah-paper, mmn, mmn-paper or another installed one, or module:Class."
+            help="A learning agent: belief-planner, dqn, mah, mah-paper, mmn or another installed one, or module:Class."
         ),
     ],
     values: dict[str, Any],

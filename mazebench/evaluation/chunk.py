@@ -15,7 +15,7 @@ import numpy as np
 
 from mazebench.agent import Agent, Inputs
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.errors import InputError, RunError
+from mazebench.errors import InputError, RunError, UnplayableError
 from mazebench.evaluation.agent_inputs import agent_seed, true_state
 from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.metrics import spl
@@ -88,7 +88,7 @@ def run_whole_chunk(chunk: Chunk) -> list[Ended]:
     try:
         return [ended for step in run_chunk(chunk) for ended in step]
     except (InputError, RunError) as error:
-        kinds = (InputError, AgentError, RunError)
+        kinds = (UnplayableError, InputError, AgentError, RunError)
         raise next(kind for kind in kinds if isinstance(error, kind))(str(error)) from None
 
 

@@ -86,11 +86,20 @@ class Plan:
                 return None if size is None else size / told["context_size"]
         return None
 
-    def build_agent(self) -> CheckedAgent:
-        """Returns a new agent for the task, held to its contract."""
-        options = self.options
+    @property
+    def interface(self) -> Interface:
+        """The environments that the agent is built for."""
         task = self.task
-        interface = Interface(task.task, task.size, task.context_size, sensors=task.sensors, cell_size=task.cell_size)
+        return Interface(task.task, task.size, task.context_size, sensors=task.sensors, cell_size=task.cell_size)
+
+    def build_agent(self) -> CheckedAgent:
+        """Returns a new agent for the task, held to its contract.
+
+        Raises:
+          InputError: if the agent can't use its checkpoint.
+          UnplayableError: if the agent can't play the task.
+        """
+        options, interface = self.options, self.interface
         checkpoint = None if options.checkpoint is None else pathlib.Path(options.checkpoint)
         with calling(options.agent, "build"):
             agent = self.agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)

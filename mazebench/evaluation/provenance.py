@@ -70,14 +70,30 @@ def _mazes_hash(task: TaskSpec) -> str:
 
 
 def code_hash(options: EvalOptions, agent_class: type[Agent]) -> str | None:
-    """Returns the SHA-256 of the file of a `module:Class`, which may be edited between two sittings of a run.
+    """Returns the SHA-256 of an agent's code, which may be edited between two sittings of a run.
 
-    None for installed agents, and for classes of no file, as in a notebook.
+    It is that of the file of a `module:Class`, and that of all Python files of the package of an installed agent. None
+    for classes of no file, as in a notebook.
     """
     try:
-        return file_hash(inspect.getfile(agent_class)) if ":" in options.agent else None
+        file = inspect.getfile(agent_class)
     except (TypeError, OSError):
         return None
+    package = sys.modules[agent_class.__module__.partition(".")[0]]
+    if ":" in options.agent or not hasattr(package, "__path__"):
+        return file_hash(file)
+    return _package_hash(tuple(package.__path__))
+
+
+@functools.cache
+def _package_hash(folders: tuple[str, ...]) -> str:
+    """Returns the SHA-256 of the names and contents of all Python files below some folders."""
+    digest = hashlib.sha256()
+    for folder in map(pathlib.Path, folders):
+        for path in sorted(folder.rglob("*.py")):
+            content = path.read_bytes()
+            digest.update(f"{path.relative_to(folder).as_posix()} {len(content)}\n".encode() + content)
+    return digest.hexdigest()
 
 
 def file_hash(path: str | None) -> str | None:

@@ -86,8 +86,9 @@ class Provenance(_Stored):
     benchmark_manifest_sha256: str | None = None
     mazes_sha256: str | None = None
     checkpoint_sha256: str | None = None
+    agent_class: str | None = None  # as module:Class
     agent_package: str | None = None  # name and version; None for a `module:Class`
-    agent_code_sha256: str | None = None  # of the file of a `module:Class`; None for installed agents
+    agent_code_sha256: str | None = None  # of the package of an installed agent, of the file of a `module:Class`
     packages: dict[str, str | None] = {}
 
 

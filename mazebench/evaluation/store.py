@@ -27,6 +27,7 @@ from mazebench.evaluation.trajectories import (
     save_trajectories,
     to_json,
 )
+from mazebench.renamed import describe_unfinished
 from mazebench.storage.files import make_folder, open_to_write, open_whole, writing_to
 from mazebench.storage.json_files import read_json, repair_and_read_lines, write_json
 from mazebench.storage.locks import FolderLock
@@ -58,12 +59,14 @@ def load_finished(folder: pathlib.Path) -> Summary:
 def check_same_run(folder: pathlib.Path, plan: Plan) -> None:
     """Raises `InputError` unless `folder` holds the run of `plan`; the message names the first difference."""
     before = read_json(folder / CONFIG)
+    if isinstance(before, dict) and (former := describe_unfinished(before)):
+        raise InputError(f"{folder}: holds a run of {former}; name another folder")
     for key, value in json.loads(json.dumps(plan.identity)).items():
         found = before.get(key) if isinstance(before, dict) else before
-        if found == value:
+        if found == value or (key == "agent_code_sha256" and found is None):  # which was not noted before the rename
             continue
         if key == "agent_code_sha256" and found and value:
-            raise InputError(f"{folder}: holds another run: its agent's file was changed since; name another folder")
+            raise InputError(f"{folder}: holds another run: its agent's code was changed since; name another folder")
         raise InputError(f"{folder}: holds another run: its {key} is {str(found)[:200]}, this one's {value}")
 
 

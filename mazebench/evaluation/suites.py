@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from mazebench.errors import InputError, unknown
+from mazebench.agent import Interface
+from mazebench.errors import InputError, UnplayableError, unknown
 from mazebench.evaluation.evaluate import Progress, run_plan
 from mazebench.evaluation.options import NUM_ENVS, EvalOptions, RunOptions
 from mazebench.evaluation.plan import Plan, make_plan
@@ -79,8 +80,11 @@ def run_suite(
     workers: int = 0,
     ray_address: str | None = None,
     progress: Progress = lambda ended, of: None,
+    warn: Callable[[str], None] = lambda line: None,
 ) -> list[Summary]:
     """Runs what is left of a suite for some agents; returns the summaries by agent and then in the suite's order.
+
+    Parts that an agent can't play are left out.
 
     Args:
       suite: a name in `SUITES`.
@@ -90,10 +94,12 @@ def run_suite(
       seed: of what the agents draw.
       record: write trajectories; None writes them, but does not run finished parts again that have none.
       resume, num_envs, workers, ray_address, progress: as for `evaluate`.
+      warn: called with a line on the parts that an agent can't play.
 
     Raises:
       InputError: if a name is unknown, an agent named twice, a checkpoint given to several agents, or the folder holds
         something else.
+      UnplayableError: if an agent can play no part.
       RunError: if an agent or a worker failed; what ended until then is kept.
     """
     writes = False if record is None else record
@@ -110,6 +116,7 @@ def run_suite(
     make_folder(out)
     with FolderLock(out), open_pool(workers, ray_address) as pool:
         _prepare(out, suite, agents, seed, plans, resume)
+        plans = _playable(plans, suite, warn)
         total = sum(len(plan.trials) for plan in plans.values())
         summaries, before = [], 0
         for (folder, part), plan in plans.items():
@@ -127,6 +134,35 @@ def run_suite(
             summaries.append(summary)
             before += len(plan.trials)
     return summaries
+
+
+def _playable(
+    plans: dict[tuple[str, str], Plan], suite: str, warn: Callable[[str], None]
+) -> dict[tuple[str, str], Plan]:
+    """Returns the plans that their agents can play, and warns of the others in a line an agent.
+
+    Raises:
+      UnplayableError: if one agent can play no part.
+    """
+    refusals: dict[tuple[str, Interface], str | None] = {}  # an agent is built once for equal environments
+    left_out: dict[str, dict[str, str]] = {}  # reasons by folder and part
+    for (folder, part), plan in plans.items():
+        key = folder, plan.interface
+        if key not in refusals:
+            try:
+                plan.build_agent()
+            except UnplayableError as error:
+                refusals[key] = str(error)
+            else:
+                refusals[key] = None
+        if reason := refusals[key]:
+            left_out.setdefault(folder, {})[part] = reason
+    for folder, reasons in left_out.items():
+        reason = next(iter(reasons.values()))
+        if len(reasons) == sum(each == folder for each, _ in plans):
+            raise UnplayableError(f"{reason}; it can play no part of the suite {suite!r}")
+        warn(f"{reason}; left out: {', '.join(reasons)}")
+    return {(folder, part): plan for (folder, part), plan in plans.items() if part not in left_out.get(folder, {})}
 
 
 def _prepare(

@@ -24,8 +24,8 @@ _SUFFIXES = {TABLES: tuple(_FORMS), FIGURES: (".png", ".pdf")}
 _AGENT_ORDER = (
     "oracle",
     "navigator",
+    "belief-planner",
     "mmn",
-    "mmn-paper",
     "mah",
     "mah-paper",
     "dqn",
