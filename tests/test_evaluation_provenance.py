@@ -13,7 +13,7 @@ from mazebench import __version__
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.options import EvalOptions, make_task
-from mazebench.evaluation.provenance import checkpoint_metadata, provenance
+from mazebench.evaluation.provenance import checkpoint_metadata, code_hash, provenance
 from mazebench.maps.benchmark import manifest_hash
 
 
@@ -37,7 +37,8 @@ def test_versions_options_and_machine_are_in_the_summary(tmp_path):
     assert found["context_size"] == 13
     assert (found["checkpoint_sha256"], found["checkpoint_metadata"]) == (None, None)
     assert found["agent_class"].startswith("mazebench_agents.planner.")
-    assert (found["agent_package"], found["agent_code_sha256"]) == (f"mazebench-mujoco {__version__}", None)
+    assert found["agent_package"] == f"mazebench-mujoco {__version__}"
+    assert len(found["agent_code_sha256"]) == 64
     options = {"agent": "planner", "distances": [1, 2], "episodes_per_distance": 1, "map_flip": 0.0, "seed": 3}
     assert options.items() <= found["options"].items()
     assert found["packages"]["mazebench-mujoco"] == __version__
@@ -62,6 +63,23 @@ def test_an_agent_at_hand_is_named_by_the_hash_of_its_file(tmp_path, monkeypatch
     found = provenance(options, load_agent_class(name), make_task(options)).model_dump()
     assert found["agent_code_sha256"] == hashlib.sha256(code.encode()).hexdigest()
     assert (found["agent_class"], found["agent_package"]) == (name, None)
+
+
+def test_an_installed_agent_is_named_by_the_hash_of_all_python_files_of_its_package(tmp_path, monkeypatch):
+    package = tmp_path / "packaged_at_hand"
+    package.mkdir()
+    (package / "__init__.py").write_text(
+        f"{IMPORTS}from .deep import act\n\n\nclass Mine(SingleAgent):\n    act = act\n"
+    )
+    (package / "deep.py").write_text("def act(self, observation):\n    return 0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    agent_class = load_agent_class("packaged_at_hand:Mine")
+    found = code_hash(EvalOptions("mine"), agent_class)
+    expected = hashlib.sha256()
+    for name in ("__init__.py", "deep.py"):
+        content = (package / name).read_bytes()
+        expected.update(f"{name} {len(content)}\n".encode() + content)
+    assert found == expected.hexdigest()
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import shutil
 import pytest
 from run_folders import IMPORTS, RECORDED, Killed, files_of, kill_after, results_of, summary_of
 
-from mazebench.errors import InputError, RunError
+from mazebench.errors import InputError, RunError, UnplayableError
 from mazebench.evaluation.comparison import compare_folders
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
@@ -128,6 +128,54 @@ class TestResume:
         run_suite("tiny", ["planner"], out, resume=True)
         for agent in BOTH:
             assert results_of(out / agent) == results_of(tiny_run / agent)
+
+
+PARTIAL = """
+class Partial(SingleAgent):
+    @classmethod
+    def build(cls, interface, *, seed=0, checkpoint=None):
+        if interface.task == "hierarchical" or interface.size > LARGEST:
+            raise UnplayableError(f"agent 'Partial': plays local goals only, found {interface.task}")
+        return cls()
+
+    def act(self, observation):
+        return 0
+"""
+
+
+class TestPartsThatCannotBePlayed:
+    @pytest.fixture
+    def mixed(self, monkeypatch):
+        parts = (
+            *TINY[:2],
+            Part("corners", {"task": "hierarchical"}),
+            Part("flips", {"task": "hierarchical", "map_flip": 0.1}),
+        )
+        monkeypatch.setitem(SUITES, "mixed", parts)
+
+    def write_agent(self, tmp_path, monkeypatch, largest):
+        code = f"{IMPORTS}from mazebench import UnplayableError\nLARGEST = {largest}\n{PARTIAL}"
+        (tmp_path / f"partial_{largest}.py").write_text(code)
+        monkeypatch.syspath_prepend(tmp_path)
+        return f"partial_{largest}:Partial"
+
+    @pytest.mark.parametrize("workers", [0, 1])
+    def test_they_are_left_out_and_named(self, mixed, tmp_path, monkeypatch, workers):
+        said = []
+        agent = self.write_agent(tmp_path, monkeypatch, 13)
+        summaries = run_suite("mixed", [agent, "random"], tmp_path / "out", workers=workers, warn=said.append)
+        assert said == ["agent 'Partial': plays local goals only, found hierarchical; left out: corners, flips"]
+        played = [(summary.agent, summary.part) for summary in summaries]
+        assert played[:2] == [(agent, "near"), (agent, "noise-0.5")]
+        assert len(played) == 6
+        folder = agent.replace(":", "-")
+        assert sorted(path.name for path in (tmp_path / "out" / folder).iterdir()) == ["near", "noise-0.5"]
+        found = compare_folders(tmp_path / "out" / folder, tmp_path / "out" / "random")
+        assert list(found.parts) == ["near", "noise-0.5"]
+
+    def test_an_agent_that_can_play_none_is_refused(self, mixed, tmp_path, monkeypatch):
+        with pytest.raises(UnplayableError, match="it can play no part of the suite 'mixed'"):
+            run_suite("mixed", [self.write_agent(tmp_path, monkeypatch, 3)], tmp_path / "out")
 
 
 class TestRefused:

@@ -103,7 +103,10 @@ def test_the_user_chooses_before_the_learner_does(tmp_path):
         ({"map_warp": 0.1}, "agent 'mah': learns only on maps of one pixel a cell .*; found map_warp"),
         ({"sensors": "lidar"}, "agent 'mah': reads no sensors, found lidar"),
         ({"distances": 60}, "expected distances of at most "),
-        ({"agent": "planner"}, "agent 'planner' doesn't learn; agents that do: dqn, mah, mah-paper, mmn, mmn-paper"),
+        (
+            {"agent": "planner"},
+            "agent 'planner' doesn't learn; agents that do: belief-planner, dqn, mah, mah-paper, mmn",
+        ),
     ],
 )
 def test_what_can_not_be_trained_is_refused_before_a_folder_is_made(tmp_path, changes, message):

@@ -1,6 +1,6 @@
 """The network of the belief planner: features of each cell of the map, and distances propagated over the map.
 
-Its hypermodel reads no map but a belief over the map (`belief.belief`).
+Its hypermodel reads no map but a belief over the map (`belief.Belief`).
 
 `G` is the number of contexts, `K` of latent states in each, `M` the side of the context, `H` the size of the
 transition's hidden layer, `P` the number of propagated distances, `T` of features of a cell.

@@ -91,7 +91,7 @@ def check_shapes(path: pathlib.Path, make: Callable[[], torch.nn.Module], tensor
     Raises:
       InputError: if a name or a shape differs; the message names the first.
     """
-    with torch.device("meta"):
+    with torch.random.fork_rng(devices=[]), torch.device("meta"):
         wanted = make().state_dict()
     _check_kinds(path, wanted, tensors)
 

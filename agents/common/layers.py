@@ -1,4 +1,4 @@
-"""Layers that the networks of DQN and MMN share: features of states and of maps, and codes of positions.
+"""Layers that the networks of the learned agents share: features of states and of maps, and codes of positions.
 
 `G` is the number of contexts, `K` of states in each, `M` the side of the context, `C` of channels.
 """

@@ -1,4 +1,4 @@
-"""The parts that the learners of DQN and MMN share: replay with hindsight, gradient steps, saving and loading."""
+"""The parts that all learners share: replay with hindsight, gradient steps, saving and loading."""
 
 from __future__ import annotations
 

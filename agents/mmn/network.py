@@ -87,6 +87,14 @@ class MMNNetwork(Network):
             groups[index]["params"].append(parameter)
         return groups
 
+    def reanchored(self, anchor: torch.Tensor, moved: torch.Tensor, start: torch.Tensor) -> torch.Tensor:
+        """Returns `anchor` `[G, 2]`, shifted just enough that the estimated position lies in the `start` cell.
+
+        The estimated position is that of a body displaced by `moved` `[G, 2]` (m) from the anchor.
+        """
+        position = anchor + self.on_map(moved)
+        return anchor + torch.clamp(position, start - 0.5, start + 0.5) - position
+
     def look(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
         """Returns a code of the estimated position, start and goal; then the rows and the features read there.
 
@@ -216,10 +224,13 @@ def _weight_shapes(num_inputs: int, hidden: int, num_changes: int) -> dict[str, 
 
 
 def _ordinary(name: str, shapes: dict[str, tuple[int, int]]) -> torch.Tensor:
-    """Returns weights as an ordinary network has them at first: 0 for biases and for the free motion by action."""
+    """Returns weights as an ordinary network has them at first: 0 for biases and for the free motion by action.
+
+    They are numbers also while shapes are checked on the meta device, where arithmetic takes PyTorch seconds to load.
+    """
     rows, columns = shapes[name]
     if name.endswith("bias") or name == "free_actions":
-        return torch.zeros(rows, columns)
+        return torch.zeros(rows, columns, device="cpu")
     num_inputs = {
         "inputs": rows + NUM_ACTIONS,
         "actions": shapes["inputs"][0] + NUM_ACTIONS,
@@ -227,4 +238,4 @@ def _ordinary(name: str, shapes: dict[str, tuple[int, int]]) -> torch.Tensor:
         "free": 3 * rows,
     }
     scale = _FIRST_CHANGE if name == "second" else 1.0
-    return scale * torch.randn(rows, columns) / math.sqrt(num_inputs.get(name, rows))
+    return scale * torch.randn(rows, columns, device="cpu") / math.sqrt(num_inputs.get(name, rows))

@@ -1,4 +1,4 @@
-"""MMN's losses: the model is unrolled from encoded states, and compared with experience and with planned targets.
+"""The losses of a learned model, unrolled from encoded states: against experience, and against planned targets.
 
 `G` is the number of contexts in a batch, `S` of sequences in each, `L` of steps of a sequence, so L + 1 of states. A
 root is a state from which the model is unrolled for `K` steps; `R` roots belong to a context.

@@ -10,6 +10,7 @@ import abc
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 from torch import nn
 
@@ -72,7 +73,8 @@ class Network(nn.Module, abc.ABC):
         super().__init__()
         self.latent_size = NUM_BODY + config.latent
         self.num_bins = config.longest_value + 1
-        self.register_buffer("support", torch.arange(-config.longest_value, 1.0), persistent=False)
+        values = np.arange(-config.longest_value, 1, dtype=np.float32)
+        self.register_buffer("support", torch.from_numpy(values), persistent=False)
         self.encoder = nn.Sequential(
             nn.Linear(NUM_BODY - NUM_POSE, config.hidden),
             nn.ReLU(inplace=True),
@@ -118,14 +120,6 @@ class Network(nn.Module, abc.ABC):
     def locate(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
         """Returns the estimated positions `[G, K, 2]` (row, column) of latent states on the map."""
         return code.positions[:, None, :2] + self.on_map(latent[..., :2])
-
-    def reanchored(self, anchor: torch.Tensor, moved: torch.Tensor, start: torch.Tensor) -> torch.Tensor:
-        """Returns `anchor` `[G, 2]`, shifted just enough that the estimated position lies in the `start` cell.
-
-        The estimated position is that of a body displaced by `moved` `[G, 2]` (m) from the anchor.
-        """
-        position = anchor + self.on_map(moved)
-        return anchor + torch.clamp(position, start - 0.5, start + 0.5) - position
 
     def step_all(self, latent: torch.Tensor, first: torch.Tensor, code: Code) -> torch.Tensor:
         """Returns the next latent states `[G, 6 K, D]` of every action; those of one state are neighbours."""

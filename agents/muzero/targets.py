@@ -1,4 +1,4 @@
-"""The targets of MMN's values, as functions without networks and replay.
+"""The targets of values, as functions without networks and replay.
 
 `T` is the number of steps of a sequence, which has T + 1 states.
 """

@@ -143,9 +143,10 @@ def _configurations(entry: Entry) -> set[tuple[str | None, str | None]]:
 
 
 def _origin(entry: Entry) -> str:
-    """Returns where the agent comes from: its package and version, or the hash of its file."""
+    """Returns where the agent comes from: its package and version, or its file, and the hash of its code."""
     origins = [summary.provenance for summary in entry.summaries]
-    names = {origin.agent_package or f"file {(origin.agent_code_sha256 or 'unknown')[:8]}" for origin in origins}
+    parts = [(each.agent_package or "file", (each.agent_code_sha256 or "")[:8]) for each in origins]
+    names = {" ".join(filter(None, each)) for each in parts}
     return escape_markdown(", ".join(sorted(names)))
 
 

@@ -1,19 +1,21 @@
-"""What MMN believes of a maze: evidence, wrong maps, the displacement, and when the belief is revised."""
+"""What BeliefPlanner believes of a maze: evidence, wrong maps, the displacement, and when the belief is revised."""
 
 import numpy as np
 import pytest
 import torch
 from acting import inputs_of
-from mazebench_agents.mmn import MMN
-from mazebench_agents.mmn.belief import agent as agent_module
-from mazebench_agents.mmn.belief.belief import GOAL, WALL, Belief, belief_losses, probabilities
-from mazebench_agents.mmn.belief.displacement import Displacement
-from mazebench_agents.mmn.belief.evidence import FAILED, NUM_EVIDENCE, PASSED, SENSED, Readings, place
-from mazebench_agents.mmn.belief.framing import framed
-from mazebench_agents.mmn.belief.scan_match import find_pose, is_odometry
-from mazebench_agents.mmn.belief.wrong_maps import wrong_map
-from mazebench_agents.mmn.shortest_paths import cheapest_paths
-from test_mmn import CONFIGS, a_context, make_learner
+from mazebench_agents.belief_planner import BeliefPlanner
+from mazebench_agents.belief_planner import agent as agent_module
+from mazebench_agents.belief_planner.belief import GOAL, WALL, Belief, belief_losses, probabilities
+from mazebench_agents.belief_planner.displacement import Displacement
+from mazebench_agents.belief_planner.evidence import FAILED, NUM_EVIDENCE, PASSED, SENSED, Readings, place
+from mazebench_agents.belief_planner.framing import framed
+from mazebench_agents.belief_planner.network import BeliefPlannerNetwork, Propagation, brought_nearer
+from mazebench_agents.belief_planner.scan_match import find_pose, is_odometry
+from mazebench_agents.belief_planner.shortest_paths import cheapest_paths
+from mazebench_agents.belief_planner.wrong_maps import wrong_map
+from mazebench_agents.muzero.network import rotate
+from test_muzero import CONFIGS, a_context, an_observation, code_of, make_learner, small_config
 
 from mazebench.agent import Interface
 from mazebench.errors import InputError
@@ -231,12 +233,12 @@ def test_maze_without_movable_doors_is_drawn_wrong_all_the_same():
 
 def test_learner_wants_contexts_of_the_mazes_size(mazes):
     with pytest.raises(InputError, match="contexts of the mazes' size, found mazes of 7 and a context of 5"):
-        MMN.build_learner(Interface("local", 7, 5), mazes)
+        BeliefPlanner.build_learner(Interface("local", 7, 5), mazes)
 
 
 def an_agent(size=7):
     torch.manual_seed(0)
-    agent = MMN(CONFIGS["mmn"], size)
+    agent = BeliefPlanner(CONFIGS["belief-planner"], size)
     with torch.no_grad():
         agent.network.scale.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))
     return agent
@@ -296,7 +298,7 @@ def test_anchor_and_evidence_last_through_the_landmarks_of_an_episode():
 )
 def test_episode_begins_where_the_position_says_or_else_where_the_start_is_marked(x, size, cell_size, expected):
     interface = Interface("local", size, 7, cell_size=cell_size)
-    agent = MMN.build(interface)
+    agent = BeliefPlanner.build(interface)
     context = np.zeros((1, 4, 7, 7), dtype=np.float32)
     context[:, 2, 1, 5] = context[:, 3, 5, 1] = 1
     state = np.zeros((1, 12), dtype=np.float32)
@@ -382,3 +384,110 @@ def test_motion_told_by_odometry_is_turned_to_the_map(is_marked, mazes):
     _, memory = agent.act(inputs_of(observation, np.ones(1, dtype=bool)), memory)
     assert memory.turn[0] == pytest.approx(yaw, abs=0.1)
     np.testing.assert_array_equal(memory.anchor[0], cell)
+
+
+def make_propagation():
+    """Costs a step to leave a cell whose feature is 0; those whose feature is 1 can't be entered."""
+    propagation = Propagation(1, 1)
+    with torch.no_grad():
+        propagation.cost.weight.zero_()
+        propagation.cost.bias.fill_(np.log(np.e - 1) - 2)  # softplus(2 + bias) = 1
+    return propagation
+
+
+def believed(wall, goal):
+    """The belief `[1, 2, M, M]` with a goal."""
+    planes = torch.zeros(1, 2, *wall.shape)
+    planes[0, 0] = wall
+    planes[0, 1][goal] = 1
+    return planes
+
+
+def test_propagation_with_equal_costs_is_the_distance_on_the_grid():
+    belief = believed(torch.tensor([[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 0.0]]), (2, 0))
+    distance = make_propagation()(torch.zeros(1, 1, 3, 3), belief)[0, 0]
+    torch.testing.assert_close(distance[0], torch.tensor([6.0, 5.0, 4.0]))  # around the wall
+    torch.testing.assert_close(distance[2], torch.tensor([0.0, 1.0, 2.0]))
+    slopes = Propagation.slopes(distance[None, None])[0]  # up, down, left, right
+    torch.testing.assert_close(slopes[:, 0, 1], torch.tensor([2.0, 2.0, 1 / 3, -1 / 3]))
+
+
+@pytest.mark.parametrize(("chance", "expected"), [(0.1, 2 + 12 / 9), (0.5, 6.0)])
+def test_cell_that_may_be_wall_costs_the_tries_that_fail_or_the_way_around_it(chance, expected):
+    belief = believed(torch.tensor([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]), (2, 0))
+    belief[0, 0, 1, 0] = chance  # between the start, above, and the goal
+    distance = make_propagation()(torch.zeros(1, 1, 3, 3), belief)[0, 0]
+    assert distance[0, 0].item() == pytest.approx(expected)
+
+
+def test_goal_that_may_be_in_two_cells_is_sought_in_the_nearer_one_unless_it_is_improbable():
+    belief = believed(torch.zeros(1, 9)[:, :].expand(9, 9), (0, 8))
+    for chance, expected in ((0.5, 14.0), (0.9, 3 + 12 / 9)):  # relative to that of the far cell, 14 cells away
+        belief[0, 1, 6, 3] = chance
+        distance = make_propagation()(torch.zeros(1, 1, 9, 9), belief)[0, 0]
+        assert distance[6, 0].item() == pytest.approx(min(expected, 3 + 12 * (1 / chance - 1)))
+
+
+def test_goals_out_of_reach_are_brought_nearer_and_the_way_stays_the_same():
+    distance = torch.arange(0.0, 90.0, 10.0).reshape(1, 1, 3, 3)
+    near, far = (brought_nearer(distance, torch.tensor([cell])) for cell in ([1.0, 0.0], [2.0, 2.0]))
+    torch.testing.assert_close(near, distance)
+    torch.testing.assert_close(far.flatten(), torch.tensor([10.0, 10, 10, 10, 10, 10, 10, 20, 30]))
+
+
+def test_network_with_the_true_scale_looks_where_the_agent_is():
+    network = BeliefPlannerNetwork(small_config(), 7)
+    with torch.no_grad():
+        network.scale.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))  # times 5: a cell a metre, y up
+        network.hypermodel.sharpness.fill_(20.0)
+    code = code_of(network, a_context())
+    moved = torch.tensor([[[0.0, 0.0], [2.0, 0.0], [1.0, 3.0]]])
+    latent = torch.cat([moved, torch.zeros(1, 3, network.latent_size - 2)], dim=-1)
+    seen = network.look(latent, code)
+    for k, (row, column) in enumerate([(5, 1), (5, 3), (2, 2)]):
+        torch.testing.assert_close(seen[0, k], code.weights[0, row * 7 + column])
+
+
+def test_free_motion_is_the_same_wherever_the_body_heads():
+    """Where the transition network says nothing, a step turned with the body is the step."""
+    torch.manual_seed(0)
+    network = BeliefPlannerNetwork(small_config(), 7)
+    torch.nn.init.normal_(network.free_by_action.weight)
+    for last in (network.hypermodel.transition.later[-1].weight, network.hypermodel.transition.later[-1].bias):
+        torch.nn.init.zeros_(last)
+    code = code_of(network, a_context())
+    features = torch.randn(1, 1, 9)
+    yaw = torch.tensor(0.4)
+
+    def moved_and_heading(yaw):
+        features[..., 2:4] = torch.stack([torch.sin(yaw), torch.cos(yaw)])
+        latent = network.encode(features)
+        first = network.first_layer(latent, network.look(latent, code), code)
+        after = network.step(latent, first, torch.tensor([[3]]), code)
+        return after[0, 0, :2] - latent[0, 0, :2], after[0, 0, 2:4], after[0, 0, 4:7]
+
+    quarter = torch.tensor([1.0, 0.0])  # sine and cosine of a quarter turn
+    (moved, heading, velocities), turned = moved_and_heading(yaw), moved_and_heading(yaw + np.pi / 2)
+    torch.testing.assert_close(turned[0], rotate(moved, quarter))
+    torch.testing.assert_close(turned[1].flip(-1), rotate(heading.flip(-1), quarter))
+    torch.testing.assert_close(turned[2], velocities)
+    torch.testing.assert_close(heading.norm(), torch.tensor(1.0))
+
+
+def test_context_is_encoded_where_it_is_new_and_only_there():
+    agent = BeliefPlanner(small_config(), 7)
+    observation = an_observation(3)
+    _, state = agent.act(inputs_of(observation, np.ones(3, dtype=bool)), agent.initial_state(3))
+    before = [part.clone() for part in state.code]
+    observation["context"] = a_context(seed=9, batch=3).numpy()
+    _, state = agent.act(inputs_of(observation, np.array([False, True, False])), state)
+    for old, new in zip(before, state.code, strict=True):
+        assert torch.equal(old[[0, 2]], new[[0, 2]])
+    assert not torch.equal(before[1][1], state.code.weights[1])
+
+
+def test_spatial_agent_serves_maps_of_any_size(tmp_path, mazes):
+    make_learner(mazes).save(tmp_path, {})
+    agent = BeliefPlanner.build(Interface("local", 21, 21), checkpoint=tmp_path / "agent.safetensors")
+    actions, _ = agent.act(inputs_of(an_observation(2, size=21), np.ones(2, dtype=bool)), agent.initial_state(2))
+    assert actions.shape == (2,)

@@ -6,7 +6,8 @@ import pathlib
 import numpy as np
 import pytest
 import torch
-from mazebench_agents.mmn import measure, search
+from mazebench_agents.mmn import measure
+from mazebench_agents.muzero import search
 
 torch.set_num_threads(1)  # two that share a core with other tests wait for each other
 

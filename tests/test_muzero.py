@@ -1,0 +1,232 @@
+"""What the agents with a learned model share: hypermodels, the model, its learner, and acting on them."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+from acting import inputs_of
+from mazebench_agents.belief_planner import BeliefPlanner
+from mazebench_agents.belief_planner.config import BeliefPlannerConfig
+from mazebench_agents.belief_planner.network import BeliefPlannerNetwork
+from mazebench_agents.common.layers import marked_position
+from mazebench_agents.mmn import MMN
+from mazebench_agents.mmn.config import MMNConfig
+from mazebench_agents.muzero.lookahead import lookahead
+from small_world import learn
+
+from mazebench.agent import Interface
+from mazebench.maps.generators import generate
+from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
+from mazebench.tasks.spec import TaskSpec
+from mazebench.training.experience import Collector
+
+SMALL = {"hidden": 16, "head_hidden": 16, "latent": 8, "groups": 4, "num_envs": 8, "min_rows": 100}
+CONFIGS = {
+    "belief-planner": BeliefPlannerConfig(**SMALL, channels=8),
+    "mmn": MMNConfig(**SMALL, embedding=8, task_code=8),
+    "mmn, one code": MMNConfig(**SMALL, embedding=8, task_code=8, rows=False, reading=False),
+    "mmn, no hypermodel": MMNConfig(**SMALL, embedding=8, task_code=8, rows=False, hypermodel=False),
+}
+OF_ALL = pytest.mark.parametrize("config", CONFIGS.values(), ids=CONFIGS)
+OF_BOTH = pytest.mark.parametrize("config", list(CONFIGS.values())[:2], ids=list(CONFIGS)[:2])
+
+
+def agent_class(config):
+    return BeliefPlanner if isinstance(config, BeliefPlannerConfig) else MMN
+
+
+def small_config(**values):
+    return dataclasses.replace(CONFIGS["belief-planner"], **values)
+
+
+def a_context(seed=0, size=7, batch=1):
+    """Mazes with a start and a goal."""
+    rng = np.random.default_rng(seed)
+    context = np.zeros((batch, 4, size, size), dtype=np.float32)
+    context[:, :2] = rng.random((batch, 2, size, size)) < 0.4
+    context[:, 2, 1, size - 2] = context[:, 3, size - 2, 1] = 1
+    return torch.from_numpy(context)
+
+
+def code_of(network, context):
+    """What the hypermodel makes of contexts; that of BeliefPlanner reads what is believed of them."""
+    if not isinstance(network, BeliefPlannerNetwork):
+        return network.hypermodel(context)
+    return network.hypermodel(context[:, [GLOBAL_MAP, GOAL]], marked_position(context[:, START]))
+
+
+def make_learner(mazes, config=CONFIGS["belief-planner"], seed=0, steps=100):
+    """A small learner that has seen some steps of random driving."""
+    overrides = {name: str(value) for name, value in dataclasses.asdict(config).items()}
+    size = mazes[0].size
+    learner = agent_class(config).build_learner(Interface("local", size, size), mazes, seed=seed, overrides=overrides)
+    spec = TaskSpec(mazes=mazes, distances=(1, 2, 3), **learner.task_options())
+    collector = Collector(spec, learner.num_envs, seed=seed)
+    rng = np.random.default_rng(seed)
+    for _ in range(steps):
+        learner.observe(collector.step(rng.integers(6, size=learner.num_envs)))
+    return learner
+
+
+@pytest.fixture(scope="module")
+def mazes():
+    return tuple(generate("dfs", 7, np.random.default_rng(index), f"m{index}") for index in range(3))
+
+
+@OF_ALL
+def test_another_map_gives_other_transition_weights_and_predictions(config):
+    torch.manual_seed(0)
+    network = agent_class(config)(config, 7).network
+    first, second = code_of(network, a_context(0)), code_of(network, a_context(1))
+    assert not torch.equal(first.weights, second.weights)
+    latent = network.encode(torch.randn(1, 5, 9))
+
+    def next_latent(code):
+        return network.step(
+            latent, network.first_layer(latent, network.look(latent, code), code), torch.arange(5)[None], code
+        )
+
+    assert not torch.allclose(next_latent(first), next_latent(second), atol=1e-6)
+
+
+@OF_ALL
+def test_task_and_model_losses_reach_the_hypermodels_weights(config, mazes):
+    """The paper's point: psi learns from both, and through the transition network whose weights it predicts."""
+    learner = make_learner(mazes, config)
+    network = learner.actor.network
+    with torch.no_grad():  # heads that are zero pass nothing on
+        network.heads.weight.normal_(std=0.1)
+    losses, _ = learner._losses(learner.sample())
+    psi = (network.hypermodel.rows if isinstance(config, BeliefPlannerConfig) else network.hypermodel.hyper).weight
+    for loss in ("value_loss", "policy_loss", "goal_loss", "model_loss"):
+        (gradient,) = torch.autograd.grad(losses[loss], psi, retain_graph=True)
+        assert gradient.abs().sum() > 0, loss
+
+
+@OF_ALL
+def test_lookahead_is_every_action_of_the_model_by_itself(config):
+    torch.manual_seed(0)
+    network = agent_class(config)(config, 7).network
+    torch.nn.init.normal_(network.heads.weight)
+    code = code_of(network, a_context(batch=2))
+    latent = network.encode(torch.randn(2, 3, 9))
+    qvalues = lookahead(network, latent, code)
+    first = network.first_layer(latent, network.look(latent, code), code)
+    for action in range(6):
+        after = network.step(latent, first, torch.full((2, 3), action), code)
+        out = network.predict(after, network.look(after, code), code)
+        # -1 and the value, unless it ends there
+        expected = torch.sigmoid(-out.goal_logit) * (network.value(out.value_logits) - 1)
+        torch.testing.assert_close(qvalues[..., action], expected)
+
+
+@pytest.mark.parametrize(
+    "config",
+    [*CONFIGS.values(), dataclasses.replace(CONFIGS["mmn"], value_target="tree_backup", policy_target="lookahead")],
+)
+def test_same_seed_gives_the_same_first_updates(config, mazes):
+    learners = [make_learner(mazes, config) for _ in range(2)]
+    for _ in range(5):
+        first, second = (learner.update() for learner in learners)
+        assert first == second
+    assert all(np.isfinite(list(first.values())))
+
+
+def test_what_tells_early_whether_a_run_will_work_is_logged(mazes):
+    both = {"value_loss", "policy_loss", "goal_loss", "model_loss", "gradient_norm", "value_error", "value"}
+    mmn, paper = (set(make_learner(mazes, CONFIGS[name]).update()) for name in ("belief-planner", "mmn"))
+    assert mmn == both | {"model_error_1", "model_error_4", "map_ratio"} | {
+        f"{name}_loss" for name in ("localization", "distance", "wall", "goal_place")
+    }
+    assert paper == both | {"model_error_1", "model_error_5", "map_ratio"}
+
+
+def test_learner_goes_on_as_if_it_had_not_been_saved(tmp_path, mazes):
+    learner = make_learner(mazes)
+    for _ in range(3):
+        learner.update()
+    learner.save(tmp_path, {})
+    expected = [learner.update() for _ in range(3)]
+    resumed = make_learner(mazes, seed=1, steps=1)
+    resumed.load(tmp_path)
+    assert [resumed.update() for _ in range(3)] == expected
+
+
+@OF_ALL
+def test_saved_and_built_agent_acts_identically(config, tmp_path, mazes):
+    learner = make_learner(mazes, config)
+    learner.update()
+    learner.save(tmp_path, {})
+    agent = type(learner.actor).build(Interface("local", 7, 7), checkpoint=tmp_path / "agent.safetensors")
+    observation = an_observation(40)
+    first = np.ones(40, dtype=bool)
+    expected, _ = learner.actor.act(inputs_of(observation, first), learner.actor.initial_state(40))
+    actions, _ = agent.act(inputs_of(observation, first), agent.initial_state(40))
+    np.testing.assert_array_equal(actions, expected)
+
+
+def an_observation(batch, size=7):
+    rng = np.random.default_rng(0)
+    return {
+        "state": rng.normal(size=(batch, 12)).astype(np.float32),
+        "context": a_context(batch=batch, size=size).numpy(),
+    }
+
+
+@OF_BOTH
+def test_actions_do_not_depend_on_what_else_is_in_the_batch(config):
+    agent = agent_class(config)(config, 7, seed=2)
+    torch.nn.init.normal_(agent.network.heads.weight)
+    observation = an_observation(77)
+
+    def actions(rows):
+        part = {key: value[rows] for key, value in observation.items()}
+        return agent.act(inputs_of(part, np.ones(len(rows), dtype=bool)), agent.initial_state(len(rows)))[0]
+
+    together = actions(np.arange(77))
+    for rows in (np.array([76]), np.arange(40, 77), np.random.default_rng(0).permutation(77)):
+        np.testing.assert_array_equal(actions(rows), together[rows])
+
+
+@OF_BOTH
+@pytest.mark.parametrize("active", [[False, True, False], [True, False, True]])
+def test_environments_that_rest_change_no_action_of_the_others(config, active):
+    agent = agent_class(config)(config, 7)
+    torch.manual_seed(1)
+    torch.nn.init.normal_(agent.network.heads.weight)
+    inputs = inputs_of(an_observation(3), np.ones(3, dtype=bool))
+    every, _ = agent.act(inputs, agent.initial_state(3))
+    assert every.all()  # no action is that of a resting environment
+    some, _ = agent.act(inputs._replace(active=np.array(active)), agent.initial_state(3))
+    np.testing.assert_array_equal(some, np.where(active, every, 0))
+
+
+def test_belief_planner_after_a_minute_beats_random_in_a_small_maze():
+    """The learning test: goals 3 and 4 cells away in 25 steps."""
+    values = {
+        "channels": 16,
+        "hidden": 64,
+        "num_envs": 64,
+        "groups": 12,
+        "min_rows": 2000,
+        "steps_per_update": 64,
+        "learning_rate": 4e-3,
+        "target_rate": 0.2,
+        "longest_value": 25,
+        "hindsight_mean_offset": 8,
+        "hindsight_window": 30,
+    }
+    before, after = learn(BeliefPlanner, 5, (3, 4), 700, values)
+    assert before < 0.4
+    assert after > 0.8
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+def test_first_update_on_a_gpu_is_that_on_a_cpu(mazes, monkeypatch):
+    on_gpu = make_learner(mazes)
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    on_cpu = make_learner(mazes)
+    found, expected = on_gpu.update(), on_cpu.update()
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value, rel=0.05, abs=1e-3), name
