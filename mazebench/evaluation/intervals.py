@@ -46,14 +46,16 @@ def wilson_interval(rate: float, num_trials: float) -> tuple[float, float]:
 def mean_interval(values: np.ndarray, mazes: np.ndarray) -> Estimate:
     """Returns the mean of values in [0, 1], successes or SPL, with Wilson's interval at the effective sample size.
 
-    The effective sample size is E / d (Korn and Graubard 1998; Dean and Pagano 2015), with the design effect
+    The effective sample size is E / d (Korn and Graubard 1998; Dean and Pagano 2015). The design effect d is estimated
+    by a formula of our own, which shrinks the usual one, S / (E p (1 - p)), toward a default:
 
         d = (S + w d0^2) / (E p (1 - p) + w d0),    at most m,    w = 2.
 
-    p is the mean, S the sum over mazes of the squared deviations of the mazes' sums (`_squares_by_maze`), m the mean
-    number of episodes that an episode shares its maze with, itself included, and d0 = 1 + (m - 1) 0.1 the design effect
-    for the default correlation (Kish 1965). E p (1 - p) is S as it is expected for independent successes. The data
-    prevail where failures and successes are many, the default where either is rare.
+    docs/metrics.md has a simulation of its coverage. p is the mean, S the sum over mazes of the squared deviations of
+    the mazes' sums (`_squares_by_maze`), m the mean number of episodes that an episode shares its maze with, itself
+    included, and d0 = 1 + (m - 1) 0.1 the design effect for the default correlation (Kish 1965). E p (1 - p) is S as it
+    is expected for independent successes. The data prevail where failures and successes are many, the default where
+    either is rare.
 
     With one maze the episodes are taken as independent, and the interval speaks of that maze only.
 
@@ -70,10 +72,11 @@ def mean_interval(values: np.ndarray, mazes: np.ndarray) -> Estimate:
 
 
 def difference_interval(differences: np.ndarray, mazes: np.ndarray) -> Estimate:
-    """Returns the mean of paired differences in [-1, 1] with the adjusted interval of Bonett and Price (2012).
+    """Returns the mean of paired differences in [-1, 1] with an adjusted interval after Bonett and Price (2012).
 
-    They add a pair that is won and one that is lost before they compute the usual interval. Here both count for d0
-    episodes, the default design effect of `mean_interval`, and S is over mazes as there:
+    They add a pair that is won and one that is lost before they compute the usual interval. The version for mazes is
+    our own: both pairs count for d0 episodes, the default design effect of `mean_interval`, and S is over mazes as
+    there.
 
         mean~ = sum / (E + 2 d0),    variance = (S + d0^2 ((1 - mean~)^2 + (1 + mean~)^2)) / (E + 2 d0)^2.
 
