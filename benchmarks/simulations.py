@@ -1,6 +1,6 @@
 """Prints what search adds at decision time: success rates on held-out mazes by kind and number of simulations.
 
-Call it as `python benchmarks/simulations.py AGENT [CHECKPOINT...] [--searches KIND:N,...] [--seed N] [--mazes N]`.
+Call it as `python benchmarks/simulations.py AGENT [CHECKPOINT...] [--searches KIND:N,...]`; `--help` lists the rest.
 Rates are means over the checkpoints, with 95 % intervals over mazes and episodes. The mazes are of no split; they are
 neither those on which training runs are watched nor those of `wrong_maps.py`.
 """

@@ -49,8 +49,8 @@ def describe_unfinished(config: Mapping[str, Any]) -> str | None:
       The present name and when it was written, in words; None for what was written under a present name. Since the
       rename, the hash of an installed agent's code is written, too.
     """
-    names = [former.now for former in _FORMER if config.get("agent") == former.name]
-    return f"{names[0]!r}, written before the rename" if names and not config.get("agent_code_sha256") else None
+    now = next((former.now for former in _FORMER if config.get("agent") == former.name), None)
+    return f"{now!r}, written before the rename" if now and not config.get("agent_code_sha256") else None
 
 
 def describe_former(agent: Any, config: Any) -> str | None:

@@ -436,7 +436,7 @@ def test_goals_out_of_reach_are_brought_nearer_and_the_way_stays_the_same():
 
 
 def test_network_with_the_true_scale_looks_where_the_agent_is():
-    network = BeliefPlannerNetwork(small_config(), 7)
+    network = BeliefPlannerNetwork(small_config())
     with torch.no_grad():
         network.scale.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))  # times 5: a cell a metre, y up
         network.hypermodel.sharpness.fill_(20.0)
@@ -451,7 +451,7 @@ def test_network_with_the_true_scale_looks_where_the_agent_is():
 def test_free_motion_is_the_same_wherever_the_body_heads():
     """Where the transition network says nothing, a step turned with the body is the step."""
     torch.manual_seed(0)
-    network = BeliefPlannerNetwork(small_config(), 7)
+    network = BeliefPlannerNetwork(small_config())
     torch.nn.init.normal_(network.free_by_action.weight)
     for last in (network.hypermodel.transition.later[-1].weight, network.hypermodel.transition.later[-1].bias):
         torch.nn.init.zeros_(last)
@@ -486,7 +486,7 @@ def test_context_is_encoded_where_it_is_new_and_only_there():
     assert not torch.equal(before[1][1], state.code.weights[1])
 
 
-def test_spatial_agent_serves_maps_of_any_size(tmp_path, mazes):
+def test_agent_serves_maps_of_any_size(tmp_path, mazes):
     make_learner(mazes).save(tmp_path, {})
     agent = BeliefPlanner.build(Interface("local", 21, 21), checkpoint=tmp_path / "agent.safetensors")
     actions, _ = agent.act(inputs_of(an_observation(2, size=21), np.ones(2, dtype=bool)), agent.initial_state(2))

@@ -175,7 +175,8 @@ class TestPartsThatCannotBePlayed:
 
     def test_an_agent_that_can_play_none_is_refused(self, mixed, tmp_path, monkeypatch):
         with pytest.raises(UnplayableError, match="it can play no part of the suite 'mixed'"):
-            run_suite("mixed", [self.write_agent(tmp_path, monkeypatch, 3)], tmp_path / "out")
+            run_suite("mixed", ["random", self.write_agent(tmp_path, monkeypatch, 3)], tmp_path / "out")
+        assert not (tmp_path / "out").exists()
 
 
 class TestRefused:

@@ -10,6 +10,8 @@ import pytest
 
 pytest.importorskip("numba")
 
+from mazebench_agents.common import kernels
+
 CODE = """
 import numpy as np
 from mazebench_agents.navigator.driving import is_clear
@@ -33,3 +35,12 @@ def test_a_compilation_is_announced_once_and_cached(tmp_path):
         "mazebench: compiling the agent's kernels, which numba's cache lacks; this takes some seconds\n",
         "",
     ]
+
+
+@pytest.mark.parametrize(("given", "expected"), [("3", 3), ("2,4", 2), ("", None), ("0", None), ("many", None)])
+def test_kernels_run_in_as_many_threads_as_the_environment_says(given, expected, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", given)
+    assert kernels.num_threads() == (expected or len(os.sched_getaffinity(0)))
+    with kernels.one_thread():
+        assert kernels.num_threads() == 1
+    assert os.environ["OMP_NUM_THREADS"] == given

@@ -92,7 +92,7 @@ def test_agent_with_one_code_a_context_says_which_sizes_it_serves(tmp_path, maze
         MMN.build(Interface("local", 13, 13), checkpoint=tmp_path / "agent.safetensors")
 
 
-def test_paper_has_what_the_paper_states():
+def test_config_has_what_the_paper_states():
     paper = MMNConfig()
     assert paper.value_target == "n_step"
     assert (paper.model_weight, paper.relabel_start, paper.n_step) == (1, False, 5)

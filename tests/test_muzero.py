@@ -135,11 +135,11 @@ def test_same_seed_gives_the_same_first_updates(config, mazes):
 
 def test_what_tells_early_whether_a_run_will_work_is_logged(mazes):
     both = {"value_loss", "policy_loss", "goal_loss", "model_loss", "gradient_norm", "value_error", "value"}
-    mmn, paper = (set(make_learner(mazes, CONFIGS[name]).update()) for name in ("belief-planner", "mmn"))
-    assert mmn == both | {"model_error_1", "model_error_4", "map_ratio"} | {
+    planner, mmn = (set(make_learner(mazes, CONFIGS[name]).update()) for name in ("belief-planner", "mmn"))
+    assert planner == both | {"model_error_1", "model_error_4", "map_ratio"} | {
         f"{name}_loss" for name in ("localization", "distance", "wall", "goal_place")
     }
-    assert paper == both | {"model_error_1", "model_error_5", "map_ratio"}
+    assert mmn == both | {"model_error_1", "model_error_5", "map_ratio"}
 
 
 def test_learner_goes_on_as_if_it_had_not_been_saved(tmp_path, mazes):

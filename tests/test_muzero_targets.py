@@ -1,4 +1,4 @@
-"""BeliefPlanner's targets and losses, by numbers one can do by hand."""
+"""Targets and losses of a learned model, by numbers one can do by hand."""
 
 import math
 
@@ -105,7 +105,7 @@ SMALL = BeliefPlannerConfig(channels=4, num_distances=1, hidden=8, head_hidden=8
 def test_losses_of_an_untrained_network_by_hand():
     """Its heads are zero: uniform values over ten bins, uniform policies, the goal at a logit of -4."""
     batch, targets = make_batch(SMALL)
-    losses, metrics = unrolled_losses(BeliefPlannerNetwork(SMALL, 7), SMALL, batch, targets)
+    losses, metrics = unrolled_losses(BeliefPlannerNetwork(SMALL), SMALL, batch, targets)
     assert losses["value_loss"].item() == pytest.approx(math.log(10), rel=1e-5)
     assert losses["policy_loss"].item() == pytest.approx(math.log(6), rel=1e-5)
     assert losses["goal_loss"].item() == pytest.approx(math.log(1 + math.exp(-4)), rel=1e-4)
@@ -121,7 +121,7 @@ def test_map_ratio_compares_the_weights_of_two_mazes():
     batch.features[..., 0] = torch.stack([steps, -steps])[:, None]  # a metre a step, forwards and backwards
     batch.context[0, 0, 3, 3] = 1  # a wall ahead in one of the two
     torch.manual_seed(3)
-    network = BeliefPlannerNetwork(SMALL, 7)
+    network = BeliefPlannerNetwork(SMALL)
     _, metrics = unrolled_losses(network, SMALL, batch, targets)
     assert metrics["map_ratio"].item() != 1.0
     torch.nn.init.zeros_(network.hypermodel.rows.weight)
@@ -133,7 +133,7 @@ def test_losses_stop_counting_at_the_goal():
     """The goal in the second state: its end is learned, but neither a value nor a policy there, nor anything later."""
     batch, targets = make_batch(SMALL, at_goal_step=1)
     torch.manual_seed(0)
-    network = BeliefPlannerNetwork(SMALL, 7)
+    network = BeliefPlannerNetwork(SMALL)
     losses, _ = unrolled_losses(network, SMALL, batch, targets)
     later = batch._replace(features=batch.features.clone())
     later.features[:, :, 2:] = 5.0
@@ -146,7 +146,7 @@ def test_losses_stop_counting_at_the_goal():
 
 def test_model_loss_by_hand():
     """A network whose transition changes nothing, where the body in truth moved by (0.3, -0.1) metres in each step."""
-    network = BeliefPlannerNetwork(SMALL, 7)
+    network = BeliefPlannerNetwork(SMALL)
     with torch.no_grad():
         for parameter in network.hypermodel.transition.later[-1].parameters():
             parameter.zero_()

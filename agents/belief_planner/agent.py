@@ -70,7 +70,7 @@ class BeliefPlanner(NetworkAgent):
     @classmethod
     def make_network(cls, config: BeliefPlannerConfig, context_size: int) -> BeliefPlannerNetwork:
         """Returns a new network, which serves contexts of any size."""
-        return BeliefPlannerNetwork(config, context_size)
+        return BeliefPlannerNetwork(config)
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:

@@ -66,8 +66,8 @@ class BeliefPlannerNetwork(Network):
 
     hypermodel: Hypermodel
 
-    def __init__(self, config: BeliefPlannerConfig, context_size: int):
-        super().__init__(config, context_size)
+    def __init__(self, config: BeliefPlannerConfig):
+        super().__init__(config)
         num_inputs = NUM_BODY - 2 + config.latent + NUM_WAVES
         self.hypermodel = Hypermodel(config, num_inputs, NUM_CHANGES + config.latent)
         self.scale = nn.Parameter(torch.zeros(2, 2))

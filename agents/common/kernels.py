@@ -6,13 +6,15 @@ are kept in a folder that is named after the contents of the file and of the mod
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import inspect
 import multiprocessing
+import os
 import pathlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numba
@@ -50,9 +52,24 @@ def compiled(
 
 
 def num_threads() -> int:
-    """Returns how many threads kernels may run in: the cores of this process, or what NUMBA_NUM_THREADS says."""
-    config: Any = numba.config
-    return config.NUMBA_NUM_THREADS
+    """Returns how many threads kernels may run in: what OMP_NUM_THREADS says, else the cores of this process."""
+    given = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
+    if given.isdecimal() and int(given):
+        return int(given)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """Lets kernels run in one thread in the block, as a measurement of speed wants."""
+    given = os.environ.get("OMP_NUM_THREADS")
+    os.environ["OMP_NUM_THREADS"] = "1"
+    try:
+        yield
+    finally:
+        del os.environ["OMP_NUM_THREADS"]
+        if given is not None:
+            os.environ["OMP_NUM_THREADS"] = given
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -21,6 +21,7 @@ import torch
 
 from mazebench.errors import RunError
 
+from ..common import kernels
 from ..muzero.search import gumbel_muzero_policy, muzero_policy
 from .compiled import stand_in as compiled
 from .compiled.model import CompiledModel
@@ -81,7 +82,7 @@ def search_table(seconds: float) -> dict[str, list[dict[str, Any]]]:
     num_threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        with _mctx() as mctx:
+        with kernels.one_thread(), _mctx() as mctx:
             rows = [_row(policy, batch_size, seconds / _ROUNDS, mctx) for policy, batch_size in _CASES]
     finally:
         torch.set_num_threads(num_threads)

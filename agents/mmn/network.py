@@ -1,4 +1,4 @@
-"""The network of MMN-paper: the weights of the transition are generated from the context.
+"""The network of MMN: the weights of the transition are generated from the context.
 
 `G` is the number of contexts, `K` of latent states in each, `M` the side of the context, `H` the size of the
 transition's hidden layer, `T` of the heads' code of the context, `C` the number of features of a cell.
@@ -67,7 +67,7 @@ class MMNNetwork(Network):
     hypermodel: Hypermodel
 
     def __init__(self, config: MMNConfig, context_size: int):
-        super().__init__(config, context_size)
+        super().__init__(config)
         self._size = context_size
         num_inputs = NUM_BODY + config.latent + NUM_PLACE
         self._shapes = _weight_shapes(num_inputs, config.hidden, NUM_CHANGES + config.latent)

@@ -1,1 +1,1 @@
-"""The parts of MuZero that the agents with a learned model share: search, losses, targets, learner."""
+"""The parts of MuZero: a network with a latent model, its losses and learner, and search, which MMN alone uses."""

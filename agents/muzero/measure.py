@@ -14,6 +14,7 @@ from mazebench.tasks.registry import make_spec
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 
+from ..common import kernels
 from .learner import MuZeroLearner
 
 _NUM_ACTORS = 256
@@ -38,7 +39,8 @@ def update_table(seconds: float, build_learner: Callable[..., MuZeroLearner]) ->
         "_targets": "targets",
         "_descend": "backward, optimizer",
     }
-    return {"the parts of an update, one thread": _divided(learner, parts, learner.update, "losses", seconds)}
+    with kernels.one_thread():
+        return {"the parts of an update, one thread": _divided(learner, parts, learner.update, "losses", seconds)}
 
 
 def acting_table(seconds: float, agent: Agent) -> dict[str, list[dict[str, Any]]]:

@@ -63,13 +63,12 @@ class Network(nn.Module, abc.ABC):
 
     support: torch.Tensor  # [bins], the values that a categorical value weighs
     encoder: nn.Sequential
-    hypermodel: nn.Module  # called with contexts [G, 4, M, M] and anchors [G, 2], returns a Code
+    hypermodel: nn.Module  # called with contexts, or beliefs, and anchors [G, 2], returns a Code
     scale: nn.Parameter
     body: nn.Sequential
     heads: nn.Linear
 
-    def __init__(self, config: MuZeroConfig, context_size: int):
-        """`context_size` is M, which the networks need whose hypermodel serves no other size."""
+    def __init__(self, config: MuZeroConfig):
         super().__init__()
         self.latent_size = NUM_BODY + config.latent
         self.num_bins = config.longest_value + 1

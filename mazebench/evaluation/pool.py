@@ -128,8 +128,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
 def _begin_worker() -> None:
     """Leaves this worker one core, and makes it end when its parent is killed and can't end it."""
-    for variable in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):  # PyTorch and numba read them when they are imported
-        os.environ.setdefault(variable, "1")
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # PyTorch reads it when it is imported, our kernels when they run
 
     def wait() -> None:
         parent = multiprocessing.parent_process()

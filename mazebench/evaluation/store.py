@@ -66,7 +66,8 @@ def check_same_run(folder: pathlib.Path, plan: Plan) -> None:
         if found == value or (key == "agent_code_sha256" and found is None):  # which was not noted before the rename
             continue
         if key == "agent_code_sha256" and found and value:
-            raise InputError(f"{folder}: holds another run: its agent's code was changed since; name another folder")
+            what = "file" if ":" in str(before.get("agent")) else "package"
+            raise InputError(f"{folder}: holds another run: its agent's {what} was changed since; name another folder")
         raise InputError(f"{folder}: holds another run: its {key} is {str(found)[:200]}, this one's {value}")
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from mazebench.agent import Interface
-from mazebench.errors import InputError, UnplayableError, unknown
+from mazebench.errors import InputError, RunError, UnplayableError, unknown
 from mazebench.evaluation.evaluate import Progress, run_plan
 from mazebench.evaluation.options import NUM_ENVS, EvalOptions, RunOptions
 from mazebench.evaluation.plan import Plan, make_plan
@@ -113,10 +113,10 @@ def run_suite(
         for agent, folder in _folders(agents).items()
         for part in SUITES[suite]
     }
+    plans = _playable(plans, out, suite, warn)
     make_folder(out)
     with FolderLock(out), open_pool(workers, ray_address) as pool:
         _prepare(out, suite, agents, seed, plans, resume)
-        plans = _playable(plans, suite, warn)
         total = sum(len(plan.trials) for plan in plans.values())
         summaries, before = [], 0
         for (folder, part), plan in plans.items():
@@ -137,7 +137,7 @@ def run_suite(
 
 
 def _playable(
-    plans: dict[tuple[str, str], Plan], suite: str, warn: Callable[[str], None]
+    plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str, warn: Callable[[str], None]
 ) -> dict[tuple[str, str], Plan]:
     """Returns the plans that their agents can play, and warns of the others in a line an agent.
 
@@ -147,15 +147,12 @@ def _playable(
     refusals: dict[tuple[str, Interface], str | None] = {}  # an agent is built once for equal environments
     left_out: dict[str, dict[str, str]] = {}  # reasons by folder and part
     for (folder, part), plan in plans.items():
+        if is_finished(out / folder / part):
+            continue
         key = folder, plan.interface
         if key not in refusals:
-            try:
-                plan.build_agent()
-            except UnplayableError as error:
-                refusals[key] = str(error)
-            else:
-                refusals[key] = None
-        if reason := refusals[key]:
+            refusals[key] = _refusal(plan)
+        if (reason := refusals[key]) is not None:
             left_out.setdefault(folder, {})[part] = reason
     for folder, reasons in left_out.items():
         reason = next(iter(reasons.values()))
@@ -163,6 +160,17 @@ def _playable(
             raise UnplayableError(f"{reason}; it can play no part of the suite {suite!r}")
         warn(f"{reason}; left out: {', '.join(reasons)}")
     return {(folder, part): plan for (folder, part), plan in plans.items() if part not in left_out.get(folder, {})}
+
+
+def _refusal(plan: Plan) -> str | None:
+    """Returns why the agent of a plan can't play it; None if it can, or fails in another way when its turn comes."""
+    try:
+        plan.build_agent()
+    except UnplayableError as error:
+        return str(error)
+    except (InputError, RunError):
+        pass
+    return None
 
 
 def _prepare(

@@ -139,7 +139,8 @@ def _mean(mean: Estimate | None) -> str:
 def _configurations(entry: Entry) -> set[tuple[str | None, str | None]]:
     """Returns what played: the hashes of checkpoints, and of the files of agents that are not installed."""
     origins = [summary.provenance for summary in entry.summaries]
-    return {(origin.checkpoint_sha256, origin.agent_code_sha256) for origin in origins}
+    is_file = ":" in entry.agent
+    return {(origin.checkpoint_sha256, origin.agent_code_sha256 if is_file else None) for origin in origins}
 
 
 def _origin(entry: Entry) -> str:

@@ -1,4 +1,4 @@
-"""The model of MMN-paper as kernels; they equal `paper.MMNNetwork` up to rounding."""
+"""The model of MMN as kernels; they equal `network.MMNNetwork` up to rounding."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .parts import (
 
 
 class Generated(NamedTuple):
-    """The transition's weights of each context; see `paper.MMNNetwork`."""
+    """The transition's weights of each context; see `network.MMNNetwork`."""
 
     bias: np.ndarray  # [C, 1, H]
     inputs: np.ndarray  # [C, inputs, H]
@@ -42,7 +42,7 @@ class Generated(NamedTuple):
 
 
 class MMNModel(NamedTuple):
-    """What the kernels of MMN-paper take; see `paper.MMNNetwork`."""
+    """What the kernels of MMN take; see `network.MMNNetwork`."""
 
     contexts: Contexts  # the table's first columns, for the first layer, may be lacking
     num_bins: int

@@ -57,7 +57,7 @@ class CompiledModel(SearchableModel):
             _search(tree[some], gumbel[some], roots[some], first, *shared)
 
         firsts = range(0, len(tree), _TREES_AT_ONCE)
-        if (num_threads := min(len(firsts), kernels.num_threads())) == 1:
+        if (num_threads := min(len(firsts), kernels.num_threads())) <= 1:
             for first in firsts:
                 search_from(first)
             return

@@ -24,7 +24,7 @@ ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 TURN = np.float32(2 * math.pi)
 _NORM_EPSILON = np.float32(1e-5)  # PyTorch's
-_SCALE_RATE = np.float32(5.0)  # of `network.Network`
+_SCALE_RATE = np.float32(5.0)  # of `muzero.network.Network`
 _NEGLIGIBLE = np.float32(-20.0)  # logits so far below the highest have no weight in float32
 _ROWS_AT_ONCE = 4  # in a product, and
 _PANEL = 2 * LANES  # columns, whose sums are then in registers
@@ -183,7 +183,7 @@ def act(
     by_action: np.ndarray,
     hidden: np.ndarray,
 ) -> None:
-    """Writes the first layer with the action; see `network.ahead_of`."""
+    """Writes the first layer with the action; see `muzero.network.ahead_of`."""
     move_x, move_y = rotated(free[0], free[1], embedding[2], embedding[3])
     speed_x, speed_y = rotated(free[3], free[4], embedding[2], embedding[3])
     for j in range(len(hidden)):
@@ -202,7 +202,7 @@ def locate(scale: np.ndarray, positions: np.ndarray, latent: np.ndarray) -> tupl
 
 @kernel
 def read(row: np.float32, column: np.float32, table: np.ndarray, sharpness: np.float32, out: np.ndarray) -> None:
-    """Writes a row of the table, interpolated as `reading.read` does."""
+    """Writes a row of the table, interpolated as `muzero.reading.read` does."""
     size = round(math.sqrt(len(table)))
     near = np.empty((2, 4), np.float32)
     first = np.empty(2, np.int64)
@@ -231,7 +231,7 @@ def read(row: np.float32, column: np.float32, table: np.ndarray, sharpness: np.f
 
 @inlined
 def move(latent: np.ndarray, free: np.ndarray, change: np.ndarray, after: np.ndarray) -> None:
-    """Writes the body after a step; see `network.moved_by`."""
+    """Writes the body after a step; see `muzero.network.moved_by`."""
     sine, cosine = latent[2], latent[3]
     x, y = rotated(free[0] + change[0], free[1] + change[1], sine, cosine)
     after[0] = latent[0] + x + change[6]
