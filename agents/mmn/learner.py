@@ -25,10 +25,10 @@ class MMNLearner(MuZeroLearner):
     def _targets(self, batch: Batch) -> Targets:
         """Returns the targets of the batch by the target network; its goals are real or relabelled."""
         network, config = self._target, self._config
-        if config.value_target == "tree_backup" or config.policy_target == "lookahead":
-            value, policy = super()._targets(batch)
         code = network.hypermodel(batch.context, batch.anchor)
         latent = network.encode(batch.features.flatten(1, 2))
+        if config.value_target == "tree_backup" or config.policy_target == "lookahead":
+            value, policy = self._lookahead_targets(batch, latent, code)
         if config.value_target == "n_step":
             bootstrap = network.value(self._predict(network, latent, code).value_logits)
             bootstrap = bootstrap.unflatten(1, batch.exists.shape[1:])

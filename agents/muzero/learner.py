@@ -18,6 +18,7 @@ from ..common.learner import HindsightLearner
 from ..common.replay import SequenceSample
 from .lookahead import lookahead
 from .losses import Batch, Targets, unrolled_losses
+from .network import Code
 from .targets import tree_backup_returns
 
 
@@ -92,9 +93,12 @@ class MuZeroLearner(HindsightLearner):
     @torch.no_grad()
     def _targets(self, batch: Batch) -> Targets:
         """Returns the targets of the batch by one step of the target network's model; goals are real or relabelled."""
+        code = self._target.hypermodel(batch.context, batch.anchor)
+        return self._lookahead_targets(batch, self._target.encode(batch.features.flatten(1, 2)), code)
+
+    def _lookahead_targets(self, batch: Batch, latent: torch.Tensor, code: Code) -> Targets:
+        """Returns values by tree backup and policies by lookahead; states and codes are the target network's."""
         network, config = self._target, self._config
-        code = network.hypermodel(batch.context, batch.anchor)
-        latent = network.encode(batch.features.flatten(1, 2))
         with torch.autocast(self._device.type, torch.bfloat16, enabled=_has_fast_bfloat16(self._device)):
             qvalues = lookahead(network, latent, code).float().unflatten(1, batch.exists.shape[1:])
         policy = torch.softmax(qvalues / config.temperature, dim=-1)
