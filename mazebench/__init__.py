@@ -13,7 +13,7 @@ from mazebench.envs.registration import register_environments
 
 if TYPE_CHECKING:
     from mazebench.agent import Agent, Inputs, SingleAgent
-    from mazebench.envs.registration import make_vec
+    from mazebench.envs.registration import load, make_vec
     from mazebench.errors import InputError, UnplayableError
     from mazebench.evaluation.evaluate import evaluate
     from mazebench.maps.arrays import maze_from_array
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from mazebench.maps.generators import generate
     from mazebench.maps.maze import Maze, MazeError
     from mazebench.tasks.episode import Episode
-    from mazebench.tasks.registry import load, make_spec
+    from mazebench.tasks.registry import make_spec
     from mazebench.tasks.spec import TaskSpec
 
 __version__ = "0.1.0"
@@ -29,7 +29,7 @@ __version__ = "0.1.0"
 # Gymnasium 1.x has no plugins: a package's ids are known once it is imported.
 register_environments()
 
-# Imported when first used: MuJoCo and dm_control take over a second to load.
+# Imported when first used: MuJoCo takes long to load.
 _HOMES = {
     "Agent": "mazebench.agent",
     "Episode": "mazebench.tasks.episode",
@@ -42,7 +42,7 @@ _HOMES = {
     "UnplayableError": "mazebench.errors",
     "evaluate": "mazebench.evaluation.evaluate",
     "generate": "mazebench.maps.generators",
-    "load": "mazebench.tasks.registry",
+    "load": "mazebench.envs.registration",
     "make_spec": "mazebench.tasks.registry",
     "maze_from_array": "mazebench.maps.arrays",
     "make_vec": "mazebench.envs.registration",

@@ -14,9 +14,15 @@ SPEC = TaskSpec(mazes=load_mazes(13, "train")[:2])
 
 
 def test_ratio_of_an_environment_to_the_bare_simulation_is_measured():
-    row = bench._ratio("dm_env", 1, *bench._dm_env_pair(SPEC), seconds=0.05, rounds=2)
+    row = bench._ratio("Gymnasium", 1, *bench._gym_pair(SPEC), seconds=0.05, rounds=2)
     assert row["steps/s"] > 0
     assert 0 < row["ratio"] < 2
+
+
+def test_a_step_of_the_gymnasium_environment_is_measured_in_parts():
+    rows = bench._gym_rows(SPEC, seconds=0.05)
+    assert [row["what"] for row in rows] == ["simulation", "task", "observation", "info", "resets"]
+    assert sum(row["% of the step"] for row in rows) == pytest.approx(100)
 
 
 def test_resets_are_measured():

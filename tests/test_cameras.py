@@ -8,10 +8,10 @@ import pytest
 from dm_env import specs
 from rendering import run_with_egl
 
+from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.tasks.navigation import Environment
 from mazebench.tasks.registry import make_spec
 
 

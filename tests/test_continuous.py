@@ -10,12 +10,12 @@ import simple_mazes
 from dm_env import specs
 from gymnasium.utils import env_checker
 
+from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.maze import Maze, cell_to_point
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.navigation import Environment
 from mazebench.tasks.registry import make_spec
 from mazebench.testing import check_environment
 from mazebench.world.mjcf import ACTIONS, BODY_RADIUS, TOP_SPEED, TURN_RATE, action_controls, velocity_controls

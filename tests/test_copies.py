@@ -14,11 +14,11 @@ from gymnasium import wrappers
 from rendering import run_with_egl
 
 import mazebench
+from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.maps.generators import generate
-from mazebench.tasks.navigation import Environment
 from mazebench.tasks.registry import make_spec
 
 TASKS: dict[str, dict[str, Any]] = {
@@ -199,7 +199,7 @@ class TestStates:
     def test_gymnasium_goes_back_to_a_state(self):
         env = MazeEnv(make_spec("lost", size=13, level=3), seed=1)
         env.reset()
-        actions = [int(action) for action in actions_of(env.environment, seed=1)]
+        actions = [int(action) for action in actions_of(mazebench.load(), seed=1)]
         for action in actions[:30]:
             env.step(action)
         state = env.get_state()

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from pages import ROOT, read
 
+from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.tasks.context import GOAL, START
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
 
 PAGE = read(ROOT / "docs" / "tasks.md")

@@ -13,13 +13,13 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers import vector as wrappers
 from simple_mazes import corridor
 
+from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.navigation import Environment
 from mazebench.tasks.registry import make_spec
 from mazebench.tasks.spec import TaskSpec
 

@@ -33,12 +33,11 @@ LAYERS = {name: layer for layer, names in enumerate(ORDER) for name in names}
 WALLS = {
     "mujoco": (
         "mazebench/world",
-        "mazebench/tasks",
         "mazebench/envs",
         "mazebench/play/viewer.py",
         "mazebench/bench",
     ),
-    "dm_control": ("mazebench/world", "mazebench/tasks", "mazebench/envs", "mazebench/bench"),
+    "dm_control": ("mazebench/envs/dm_control.py",),
     "torch": ("agents",),
     "gymnasium": ("mazebench/envs", "mazebench/bench"),
     "numba": ("agents/common/kernels.py", "agents/common/lanes.py"),
@@ -52,7 +51,7 @@ FOLDERS = {"mazebench": "mazebench", "mazebench_agents": "agents", "mazebench_as
 OVERRIDES = {
     "initialize_episode", "before_step", "after_step", "get_observation", "get_reward", "get_termination",
     "action_spec", "observation_spec", "reward_spec", "reset", "step", "render", "close", "close_extras",
-    "forward",
+    "after_reset", "full_state", "set_full_state", "observation", "forward",
     "show", "state_error", "picture", "pixel", "points", "distances", "time_limit", "check", "facts", "read",
 }  # fmt: skip
 

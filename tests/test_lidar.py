@@ -13,12 +13,12 @@ from dm_env import specs
 from hypothesis import strategies
 
 import mazebench
+from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.maps.generators import STYLES, generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
-from mazebench.tasks.navigation import Environment
 from mazebench.tasks.registry import make_spec
 from mazebench.world.lidar import MAX_RANGE, NUM_RAYS, Lidar, ray_ends
 from mazebench.world.mjcf import BODY_HEIGHT, maze_spec

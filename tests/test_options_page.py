@@ -61,7 +61,7 @@ def test_the_tables_of_options_follow_from_the_code():
     ("index", "function", "others"),
     [
         (0, registry.make_spec, None),
-        (3, registry.load, registry.make_spec),
+        (3, registration.load, registry.make_spec),
         (4, registration.make_env, None),
         (4, registration.make_goal_env, None),
         (5, registration.make_vec, None),

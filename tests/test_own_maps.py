@@ -42,7 +42,7 @@ from mazebench.world.export import wall_mesh
 from mazebench.world.lidar import Lidar
 from mazebench.world.mjcf import STEPS_PER_ACTION, action_controls
 from mazebench.world.models import models_of
-from mazebench.world.physics import Physics
+from mazebench.world.simulation import MujocoSimulation
 
 ROOM = "#######\n#.....#\n#.....#\n#.....#\n#.....#\n#.....#\n#######\n"
 
@@ -94,14 +94,14 @@ class TestScale:
         maze = dfs()
         paths = []
         for each in (maze, doubled(maze)):
-            physics = Physics.of_maze(models_of((each,))[0])
-            with physics.reset_context():
-                physics.place_agent(maze.point(maze.free_cells[0]), 0.3)
+            simulation = MujocoSimulation(models_of((each,))[0])
+            with simulation.reset_context():
+                simulation.place_agent(maze.point(maze.free_cells[0]), 0.3)
             path = []
             for action in (0, 0, 0, 4, 4, 0, 0, 2, 2, 1, 0, 0, 0, 5, 0, 0):
-                physics.set_controls(action_controls()[action])
-                physics.step(STEPS_PER_ACTION)
-                path.append(physics.position())
+                simulation.set_controls(action_controls()[action])
+                simulation.step(STEPS_PER_ACTION)
+                path.append(simulation.position())
             paths.append(path)
         np.testing.assert_array_equal(*paths)
 

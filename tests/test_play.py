@@ -49,7 +49,7 @@ def corridor() -> Maze:
 def game(corridor) -> Game:
     """From (1, 1), where the body looks at the goal in (1, 3)."""
     game = Game(make_spec(maps=corridor, distances=[2]), seed=0)
-    game.environment.task.set_next_episode(Episode(0, (1, 1), (1, 3), 0.0, 0))
+    game.env.task.choose_episode(episode=Episode(0, (1, 1), (1, 3), 0.0, 0))
     game.next_episode()
     return game
 
@@ -65,15 +65,15 @@ class TestGame:
             for pressed in (key, name):
                 game.restart()
                 game.press(pressed)
-                states.append(game.time_step.observation["state"])
+                states.append(game.observation["state"])
             game.restart()
-            np.testing.assert_array_equal(states, [game.environment.step(action).observation["state"]] * 2)
+            np.testing.assert_array_equal(states, [game.env.step(action)[0]["state"]] * 2)
         assert (LETTERS["a"], LETTERS["d"]) == (2, 3)
 
     def test_other_keys_do_nothing(self, game):
         for key in ("x", "", "escape", "W"):
             game.press(key)
-        assert (game.environment.task.steps, game.num_episodes) == (0, 2)
+        assert (game.env.task.steps, game.num_episodes) == (0, 2)
 
     def test_the_goal_is_reported_and_a_key_starts_again(self, game):
         for _ in range(20):
@@ -81,7 +81,7 @@ class TestGame:
         assert game.status().startswith("GOAL REACHED after 4 steps")
         assert game.outcome() == "1 of 2 episodes ended at the goal"
         game.press("r")
-        assert (game.environment.task.episode.start, game.environment.task.steps) == ((1, 1), 0)
+        assert (game.env.task.episode.start, game.env.task.steps) == ((1, 1), 0)
         assert len(game.path) == 1
 
     def test_the_end_of_time_is_reported(self, corridor):
@@ -92,7 +92,7 @@ class TestGame:
 
     def test_the_status_names_the_next_landmark(self):
         game = Game(make_spec("hierarchical", landmark_distance=5), seed=0)
-        assert game.landmarks == game.environment.task.route.cells[1:-1]
+        assert game.landmarks == game.env.task.route.cells[1:-1]
         assert "landmark 1" in game.status()
 
 
@@ -112,18 +112,18 @@ class TestPictures:
     def test_the_map_is_the_one_that_an_agent_is_shown(self):
         game = Game(make_spec("local", 13, map_flip=0.3), seed=0)
         seen = draw_map(game, 1, 1).styles == Style.WALL
-        np.testing.assert_array_equal(seen, game.environment.task.shown_map.walls)
+        np.testing.assert_array_equal(seen, game.env.task.shown_map.walls)
         assert (seen != game.walls).any()
         np.testing.assert_array_equal(draw_world(game, 1, 1).styles == Style.WALL, game.walls)
 
     def test_rays_of_the_range_sensor_are_drawn_up_to_the_walls(self, corridor):
         game = Game(make_spec(maps=corridor, distances=[2], sensors="lidar"), seed=0)
-        game.environment.task.set_next_episode(Episode(0, (1, 1), (1, 3), 0.0, 0))
+        game.env.task.choose_episode(episode=Episode(0, (1, 1), (1, 3), 0.0, 0))
         game.next_episode()
         assert text(draw_world(game, 1, 2).glyphs) == ["##########", "##:→::G:##", *["##########"] * 3]
         assert ":" not in "".join(text(draw_map(game, 1, 2).glyphs))
         game.press("q")
-        np.testing.assert_allclose(np.hypot(*(game.rays - game.path[-1]).T), game.time_step.observation["lidar"])
+        np.testing.assert_allclose(np.hypot(*(game.rays - game.path[-1]).T), game.observation["lidar"])
 
     @pytest.mark.parametrize(("width", "height"), [(100, 40), (56, 18), (24, 10), (1, 1)])
     @pytest.mark.parametrize("size", [13, 21, 101])
@@ -208,9 +208,9 @@ def keys_to_the_goal(maze: Maze, seed: int) -> str:
     game, agent = Game(make_spec(maps=maze, distances=[2]), seed), load_agent_class("planner-closed-loop")
     planner, keys = agent.build(Interface("local", maze.size, maze.size)), ""
     state = planner.initial_state(1)
-    while not game.time_step.last():
-        observation = {key: game.time_step.observation[key][None] for key in ("state", "context")}
-        actions, state = planner.act(inputs_of(observation, np.array([game.environment.task.is_first])), state)
+    while not game.ended:
+        observation = {key: game.observation[key][None] for key in ("state", "context")}
+        actions, state = planner.act(inputs_of(observation, np.array([game.env.task.is_first])), state)
         keys += LETTER_OF[int(actions[0])]
         game.press(keys[-1])
     return keys
@@ -266,7 +266,7 @@ class TestTerminal:
 class TestViewer:
     def test_rays_of_the_range_sensor_are_drawn_in_the_world(self, corridor):
         game = Game(make_spec(maps=corridor, distances=[2], sensors="lidar"), seed=0)
-        scene = mujoco.MjvScene(game.environment.physics.model.ptr, maxgeom=40)
+        scene = mujoco.MjvScene(game.env.simulation.model, maxgeom=40)
         viewer._draw_rays(scene, game)
         assert scene.ngeom == 32
         middles = [geom.pos[:2] for geom in scene.geoms[:32]]

@@ -7,10 +7,10 @@ from mazebench_agents.common import symmetry
 from mazebench_agents.common.layers import state_features
 from simple_mazes import field
 
+from mazebench.envs.dm_control import Environment
 from mazebench.maps.generators import generate
 from mazebench.tasks.context import build_context
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import mazebench
+from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.tasks.navigation import Environment
 
 ID = "mazebench/Local-13-v1"
 MAKERS = {

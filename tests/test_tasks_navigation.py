@@ -14,10 +14,10 @@ from rendering import run_with_egl
 from simple_mazes import field
 
 import mazebench
+from mazebench.envs.dm_control import Environment
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.navigation import Environment
 from mazebench.testing import ConformanceError, check_environment
 from mazebench.world.mjcf import TURN_RATE
 

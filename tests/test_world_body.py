@@ -11,7 +11,7 @@ from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze, point_to_cell
 from mazebench.world.mjcf import ACTIONS, BODY_HEIGHT, BODY_RADIUS, STEPS_PER_ACTION, action_controls
 from mazebench.world.models import MazeModels
-from mazebench.world.physics import Physics
+from mazebench.world.simulation import MujocoSimulation
 
 STEPS_PER_FRAME = 2
 FRAMES_PER_ACTION = 10
@@ -42,23 +42,23 @@ FIELD = open_maze(25)
 MIDDLE = np.array([12.5, 12.5])
 
 
-def physics_at(maze: Maze, position, yaw: float = 0.0, velocity=(0.0, 0.0)) -> Physics:
-    physics = Physics.of_maze(MazeModels([maze])[0])
-    with physics.reset_context():
-        physics.place_agent(np.asarray(position), yaw)
-        physics.data.qvel[:2] = velocity
-    return physics
+def physics_at(maze: Maze, position, yaw: float = 0.0, velocity=(0.0, 0.0)) -> MujocoSimulation:
+    simulation = MujocoSimulation(MazeModels([maze])[0])
+    with simulation.reset_context():
+        simulation.place_agent(np.asarray(position), yaw)
+        simulation.data.qvel[:2] = velocity
+    return simulation
 
 
-def trajectory(physics: Physics, action: str | None, num_steps: int, nstep: int = 1) -> np.ndarray:
+def trajectory(simulation: MujocoSimulation, action: str | None, num_steps: int, nstep: int = 1) -> np.ndarray:
     """`[num_steps + 1, 6]`: x, y, yaw and their rates, now and after every `nstep` steps; None lets the body coast."""
-    physics.data.ctrl[:] = 0
+    simulation.data.ctrl[:] = 0
     if action is not None:
-        physics.set_controls(CONTROLS[ACTIONS.index(action)])
-    rows = [np.r_[physics.data.qpos, physics.data.qvel]]
+        simulation.set_controls(CONTROLS[ACTIONS.index(action)])
+    rows = [np.r_[simulation.data.qpos, simulation.data.qvel]]
     for _ in range(num_steps):
-        physics.step(nstep)
-        rows.append(np.r_[physics.data.qpos, physics.data.qvel])
+        simulation.step(nstep)
+        rows.append(np.r_[simulation.data.qpos, simulation.data.qvel])
     return np.array(rows)
 
 
@@ -99,9 +99,9 @@ class TestDriving:
     @pytest.mark.parametrize("action", DRIVES)
     @pytest.mark.parametrize("yaw", YAWS)
     def test_speed_when_cruising(self, action, yaw):
-        physics = physics_at(FIELD, MIDDLE, yaw)
-        trajectory(physics, action, 150)
-        assert physics.speed() == pytest.approx(LAB_TOP_SPEED, rel=0.001)
+        simulation = physics_at(FIELD, MIDDLE, yaw)
+        trajectory(simulation, action, 150)
+        assert simulation.speed() == pytest.approx(LAB_TOP_SPEED, rel=0.001)
 
     @pytest.mark.parametrize("yaw", YAWS)
     def test_distance_when_stopping_from_top_speed(self, yaw):
@@ -111,9 +111,9 @@ class TestDriving:
         assert np.hypot(*steps[-1, 3:5]) < 0.001
 
     def test_speed_when_drive_is_reversed(self):
-        physics = physics_at(FIELD, MIDDLE)
-        trajectory(physics, "forward", 150)
-        frames = trajectory(physics, "backward", 100, STEPS_PER_FRAME)
+        simulation = physics_at(FIELD, MIDDLE)
+        trajectory(simulation, "forward", 150)
+        frames = trajectory(simulation, "backward", 100, STEPS_PER_FRAME)
         assert np.all(np.diff(frames[:, 3]) <= ROUNDING)
         assert frames[-1, 3] == pytest.approx(-LAB_TOP_SPEED, rel=0.001)
 
@@ -130,16 +130,16 @@ class TestTurning:
 
     @pytest.mark.parametrize("action", ["look_left", "look_right"])
     def test_yaw_when_let_go(self, action):
-        physics = physics_at(FIELD, MIDDLE)
-        trajectory(physics, action, 20)
-        frames = trajectory(physics, None, 10, STEPS_PER_FRAME)
+        simulation = physics_at(FIELD, MIDDLE)
+        trajectory(simulation, action, 20)
+        frames = trajectory(simulation, None, 10, STEPS_PER_FRAME)
         assert abs(frames[1, 5]) < 0.02 * TURN / 0.016
         assert abs(frames[-1, 2] - frames[0, 2]) < 0.1 * TURN
 
     def test_velocity_when_turning_at_speed(self):
         # Turning does not steer what is in motion: the body coasts on in the old direction.
-        physics = physics_at(FIELD, MIDDLE, velocity=(LAB_TOP_SPEED, 0))
-        steps = trajectory(physics, "look_left", STEPS_PER_ACTION)
+        simulation = physics_at(FIELD, MIDDLE, velocity=(LAB_TOP_SPEED, 0))
+        steps = trajectory(simulation, "look_left", STEPS_PER_ACTION)
         np.testing.assert_allclose(steps[:, 4], 0, atol=ROUNDING)
         assert np.all(np.diff(steps[:, 3]) < 0)
 
@@ -171,8 +171,8 @@ class TestWalls:
     def test_slide_when_boxes_meet_in_a_flat_wall(self, heading):
         # The L's right face is made of two boxes, that of its foot and that of its stem.
         maze = open_maze(15, np.s_[8, 2:5], np.s_[8:14, 4])
-        physics = physics_at(maze, (5.3, 2.5), heading)
-        steps = trajectory(physics, "forward", 400)
+        simulation = physics_at(maze, (5.3, 2.5), heading)
+        steps = trajectory(simulation, "forward", 400)
         along = steps[(steps[:, 1] > 4) & (steps[:, 1] < 6.5)]
         assert along[:, 0].max() < 5.25
         assert np.ptp(along[:, 0]) < 0.005
@@ -237,12 +237,12 @@ class TestFixedFreedoms:
         rng = np.random.default_rng(3)
         maze = generate("dfs", 9, rng)
         row, column = maze.free_cells[0]
-        physics = physics_at(maze, (column + 0.5, maze.size - row - 0.5), 0.7)
+        simulation = physics_at(maze, (column + 0.5, maze.size - row - 0.5), 0.7)
         for _ in range(200):
-            physics.set_controls(CONTROLS[rng.integers(len(ACTIONS))])
-            physics.step(STEPS_PER_ACTION)
-            state = physics.state()
+            simulation.set_controls(CONTROLS[rng.integers(len(ACTIONS))])
+            simulation.step(STEPS_PER_ACTION)
+            state = simulation.state()
             np.testing.assert_allclose(state[2:5], (BODY_HEIGHT / 2, 0, 0), atol=1e-12)  # z, roll, pitch
             np.testing.assert_allclose(state[[8, 9, 10]], 0, atol=1e-12)  # velocity up, roll and pitch rates
-            upright = physics.named.data.xmat["agent"].reshape(3, 3)[2]
+            upright = simulation.data.body("agent").xmat.reshape(3, 3)[2]
             np.testing.assert_allclose(upright, (0, 0, 1), atol=1e-12)

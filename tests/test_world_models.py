@@ -15,7 +15,7 @@ from mazebench.maps.text import parse_maze
 from mazebench.world.export import write_mjcf
 from mazebench.world.mjcf import ACTIONS, STEPS_PER_ACTION, action_controls
 from mazebench.world.models import _MAZE_FIELDS, MazeModels, copy_maze
-from mazebench.world.physics import Physics
+from mazebench.world.simulation import MujocoSimulation
 
 CONTROLS = action_controls()
 GOLDEN = pathlib.Path(__file__).parent / "golden" / "maze-5.xml"
@@ -80,14 +80,14 @@ class TestMazeModels:
 
 def drive(model: mujoco.MjModel) -> np.ndarray:
     """`[200, 2]` positions of a body that acts at random, each action a few steps long."""
-    physics, rng = Physics.of_maze(model), np.random.default_rng(7)
+    simulation, rng = MujocoSimulation(model), np.random.default_rng(7)
     action, positions = 0, []
     for _ in range(200):
         if rng.random() < 0.3:
             action = int(rng.integers(len(ACTIONS)))
-        physics.set_controls(CONTROLS[action])
-        physics.step(STEPS_PER_ACTION)
-        positions.append(physics.position())
+        simulation.set_controls(CONTROLS[action])
+        simulation.step(STEPS_PER_ACTION)
+        positions.append(simulation.position())
     return np.array(positions)
 
 
@@ -95,23 +95,23 @@ class TestCopyMaze:
     @pytest.mark.parametrize("textures", [False, True])
     def test_a_copied_maze_is_the_same_model(self, textures):
         models = MazeModels(mazes(4), textures)
-        physics = Physics.of_maze(models[0])
-        target = physics.model.ptr
+        simulation = MujocoSimulation(models[0])
+        target = simulation.model
         for index in (1, 2, 3, 0):
             copy_maze(models[index], target)
             assert differences(models[index], target) == set()
 
     def test_a_maze_swapped_in_gives_the_same_trajectory(self):
         models = MazeModels(mazes(5, count=2))
-        physics = Physics.of_maze(models[0])
-        with physics.reset_context():
-            physics.load_maze(models[1])
-            physics.data.qpos[:] = models[1].key_qpos[0]
-        fresh = Physics.of_maze(models[1])
-        for swapped in (physics, fresh):
+        simulation = MujocoSimulation(models[0])
+        with simulation.reset_context():
+            simulation.load_maze(models[1])
+            simulation.data.qpos[:] = models[1].key_qpos[0]
+        fresh = MujocoSimulation(models[1])
+        for swapped in (simulation, fresh):
             swapped.set_controls(CONTROLS[ACTIONS.index("forward")])
             swapped.step(500)
-        np.testing.assert_array_equal(physics.data.qpos, fresh.data.qpos)
+        np.testing.assert_array_equal(simulation.data.qpos, fresh.data.qpos)
 
 
 class TestMjcf:

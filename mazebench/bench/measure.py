@@ -6,7 +6,6 @@ Each ratio is the median over rounds in which the two sides take turns, so that 
 from __future__ import annotations
 
 import dataclasses
-import logging
 import math
 import os
 import resource
@@ -14,6 +13,7 @@ import statistics
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import Any
 
 import mujoco
@@ -28,12 +28,11 @@ from mazebench.errors import InputError
 from mazebench.evaluation.table import print_table
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import generate
-from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 from mazebench.training.protocol import LearningAgent
 from mazebench.world.backend import RenderingError
-from mazebench.world.mjcf import ACTIONS, PHYSICS_TIMESTEP, STEPS_PER_ACTION, action_controls
+from mazebench.world.mjcf import ACTIONS, STEPS_PER_ACTION, action_controls
 from mazebench.world.models import models_of
 
 _SIZES = (13, 21, 51, 101)
@@ -43,6 +42,7 @@ _MAZES_PER_SIZE = 8
 _PICTURE_ENVS = 16
 _TITLES = {
     "environments": "agent steps a second, beside the bare simulation's",
+    "gymnasium": "where a step of the Gymnasium environment goes",
     "training": "training, and where its time goes",
     "resets": "resets",
     "pictures": "pictures as observations, 64 pixels a side",
@@ -71,11 +71,13 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
     results["environments"] = [
         _ratio("vector, 256 environments, all threads", 256, *_vector_pair(spec, 256, 0), seconds, rounds),
         _ratio("vector, 256 environments, 1 thread", 256, *_vector_pair(spec, 256, 1), seconds, rounds),
-        _ratio("dm_env, 1 environment", 1, *_dm_env_pair(spec), seconds, rounds),
         _ratio("Gymnasium, 1 environment", 1, *_gym_pair(spec), seconds, rounds),
     ]
-    say("dm_control's own random maze")
-    results["environments"].append(_random_maze_row(spec, seconds, rounds))
+    if find_spec("dm_control"):
+        row = _ratio("dm_control, 1 environment", 1, *_dm_control_pair(spec), seconds, rounds)
+        results["environments"].append(row)
+    say("a step of the Gymnasium environment")
+    results["gymnasium"] = _gym_rows(spec, seconds * rounds)
     say("training")
     results["training"] = _training_rows(spec, seconds * rounds)
     say("what agents measure themselves")
@@ -166,7 +168,9 @@ def _bare_loop(spec: TaskSpec, actions: list[int]) -> Step:
     return step
 
 
-def _dm_env_pair(spec: TaskSpec) -> tuple[Step, Step]:
+def _dm_control_pair(spec: TaskSpec) -> tuple[Step, Step]:
+    from mazebench.envs.dm_control import Environment
+
     actions = _random_actions(1)[:, 0].tolist()
     environment = Environment(spec, 0)
     environment.reset()
@@ -186,34 +190,39 @@ def _gym_pair(spec: TaskSpec) -> tuple[Step, Step]:
     return step, _bare_loop(spec, actions)
 
 
-def _random_maze_row(spec: TaskSpec, seconds: float, rounds: int) -> dict[str, Any]:
-    """dm_control's RandomMazeWithTargets with a rolling ball, as many physics steps an action as here."""
-    # Its warning of a walker without a free joint means nothing here.
-    logging.getLogger("absl").setLevel(logging.ERROR)
-    from dm_control import composer
-    from dm_control.locomotion.arenas import mazes
-    from dm_control.locomotion.tasks import random_goal_maze
-    from dm_control.locomotion.walkers import jumping_ball
-
-    arena = mazes.RandomMazeWithTargets(
-        x_cells=13, y_cells=13, xy_scale=1.0, z_height=1.0, max_rooms=4, room_max_size=5, spawns_per_room=1
-    )
-    walker = jumping_ball.RollingBallWithHead()
-    task = random_goal_maze.NullGoalMaze(
-        walker=walker,
-        maze_arena=arena,
-        physics_timestep=PHYSICS_TIMESTEP,
-        control_timestep=PHYSICS_TIMESTEP * STEPS_PER_ACTION,
-    )
-    # Without its camera: rendering would be nearly all of its time.
-    walker.observables.egocentric_camera.enabled = False
-    environment = composer.Environment(task, time_limit=1e9, random_state=0)
-    environment.reset()
-    low, high = environment.action_spec().minimum, environment.action_spec().maximum
-    forces = np.random.default_rng(0).uniform(low, high, size=(512, len(low)))
-    bare = _bare_loop(spec, _random_actions(1)[:, 0].tolist())
-    what = "dm_control RandomMazeWithTargets, rolling ball"
-    return _ratio(what, 1, lambda count: environment.step(forces[count % 512]), bare, seconds, rounds)
+def _gym_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
+    """Returns where the time of a step of the Gymnasium environment goes, resets included."""
+    actions = _random_actions(1)[:, 0].tolist()
+    env = MazeEnv(spec, 0)
+    env.reset()
+    task, simulation = env.task, env.simulation
+    times = dict.fromkeys(("simulation", "task", "observation", "info", "resets"), 0.0)
+    count = 0
+    while sum(times.values()) < seconds:
+        marks = [time.perf_counter()]
+        task.before_step(actions[count % len(actions)], simulation)
+        marks.append(time.perf_counter())
+        simulation.step(STEPS_PER_ACTION)
+        marks.append(time.perf_counter())
+        task.after_step(simulation)
+        ended = task.get_termination(simulation) is not None
+        marks.append(time.perf_counter())
+        env.observation()
+        marks.append(time.perf_counter())
+        env.info()
+        marks.append(time.perf_counter())
+        if ended:
+            env.reset()
+        marks.append(time.perf_counter())
+        parts = ("task", "simulation", "task", "observation", "info", "resets")
+        for part, begin, end in zip(parts, marks, marks[1:], strict=False):
+            times[part] += end - begin
+        count += 1
+    total = sum(times.values())
+    return [
+        {"what": part, "us a step": 1e6 * value / count, "% of the step": 100 * value / total}
+        for part, value in times.items()
+    ]
 
 
 def _training_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
@@ -288,13 +297,13 @@ def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -
 def _resets(spec: TaskSpec, count: int) -> list[dict[str, Any]]:
     """Milliseconds a reset; models are compiled before, as after the first episodes of a run."""
     _compile(spec)
-    environment = Environment(spec, 0)
-    one_maze = Environment(TaskSpec(mazes=spec.mazes[:1]), 0)
-    env = MazeVectorEnv(spec, 256, seed=0)
+    env = MazeEnv(spec, 0)
+    one_maze = MazeEnv(TaskSpec(mazes=spec.mazes[:1]), 0)
+    envs = MazeVectorEnv(spec, 256, seed=0)
     rows = [
-        ("dm_env, another maze", _milliseconds(lambda: environment.reset(), count)),
-        ("dm_env, the same maze", _milliseconds(lambda: one_maze.reset(), count)),
-        ("vector of 256, an environment, another maze", _milliseconds(lambda: env.reset(), max(3, count // 20)) / 256),
+        ("Gymnasium, another maze", _milliseconds(lambda: env.reset(), count)),
+        ("Gymnasium, the same maze", _milliseconds(lambda: one_maze.reset(), count)),
+        ("vector of 256, an environment, another maze", _milliseconds(lambda: envs.reset(), max(3, count // 20)) / 256),
     ]
     return [{"what": what, "ms": value} for what, value in rows]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import dm_env
 import gymnasium
 import numpy as np
 
@@ -14,7 +13,7 @@ from mazebench.envs.gym import MazeEnv
 from mazebench.errors import InputError
 from mazebench.tasks.context import GOAL, NUM_PLANES
 from mazebench.tasks.spec import TaskSpec
-from mazebench.world.physics import STATE_SIZE
+from mazebench.world.simulation import STATE_SIZE
 
 _SHOWN_PLANES = [plane for plane in range(NUM_PLANES) if plane != GOAL]
 
@@ -70,14 +69,13 @@ class GoalMazeEnv(MazeEnv):
         steps = info["steps"] if isinstance(info, Mapping) else np.array([each["steps"] for each in info])
         return (steps >= self.task_spec.time_limit) & ~self.compute_terminated(achieved_goal, desired_goal, info)
 
-    def _observation(self, time_step: dm_env.TimeStep) -> dict[str, np.ndarray]:
-        shown = super()._observation(time_step)
-        maze = self.task_spec.mazes[self.environment.task.episode.maze]
-        cell = maze.cell(self.environment.physics.position())
+    def observation(self) -> dict[str, np.ndarray]:
+        shown = super().observation()
+        maze = self.task_spec.mazes[self.task.maze]
         planes = shown.pop("context")[_SHOWN_PLANES]
         return {
             "observation": np.concatenate([shown.pop("state"), planes.ravel()]),
-            "achieved_goal": maze.point(cell).astype(np.float32),
-            "desired_goal": maze.point(self.environment.task.route.goal).astype(np.float32),
+            "achieved_goal": maze.point(maze.cell(self.simulation.position())).astype(np.float32),
+            "desired_goal": maze.point(self.task.route.goal).astype(np.float32),
             **shown,
         }

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import dm_env
 import gymnasium
 import numpy as np
 
@@ -14,10 +13,12 @@ from mazebench.envs.env_spec import JsonSpec
 from mazebench.errors import InputError, unknown
 from mazebench.tasks.arguments import Arguments
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.navigation import Environment, EnvironmentState
+from mazebench.tasks.navigation import EnvironmentState, Navigation
 from mazebench.tasks.spec import TaskSpec
+from mazebench.world.mjcf import STEPS_PER_ACTION
 from mazebench.world.models import models_of
 from mazebench.world.rendering import Cameras
+from mazebench.world.simulation import MujocoSimulation
 
 
 class MazeEnv(JsonSpec, gymnasium.Env):
@@ -45,8 +46,10 @@ class MazeEnv(JsonSpec, gymnasium.Env):
           InputError: if an argument is not allowed.
         """
         arguments = Arguments(render_mode=render_mode, camera=camera)
-        self.environment = Environment(task_spec, seed)
+        self.task = Navigation(task_spec, seed)
         self.task_spec = task_spec
+        self.simulation = MujocoSimulation(models_of(task_spec.mazes)[0])
+        self._needs_reset = True
         self.render_mode = render_mode
         self.observation_space = spaces.observation_space(task_spec)
         self.action_space = spaces.action_space(task_spec)
@@ -63,8 +66,11 @@ class MazeEnv(JsonSpec, gymnasium.Env):
           InputError: if `options` hold anything but an episode.
         """
         super().reset(seed=seed)
-        time_step = self.environment.reset(seed, _episode_of(options))
-        return self._observation(time_step), self._info()
+        self.task.choose_episode(seed, _episode_of(options))
+        with self.simulation.reset_context():
+            self.task.initialize_episode(self.simulation)
+        self._needs_reset = False
+        return self.observation(), self.info()
 
     def step(self, action: int | np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         """Takes one agent step of 0.16 s.
@@ -73,12 +79,15 @@ class MazeEnv(JsonSpec, gymnasium.Env):
           gymnasium.error.ResetNeeded: before the first reset and after the end of an episode.
           InputError: if there is no such action.
         """
-        if self.environment.needs_reset:
+        if self._needs_reset:
             raise gymnasium.error.ResetNeeded("expected a call to reset() before this step()")
-        time_step = self.environment.step(action)
-        ended = time_step.last()
-        terminated = ended and time_step.discount == 0.0
-        return self._observation(time_step), time_step.reward, terminated, ended and not terminated, self._info()
+        task, simulation = self.task, self.simulation
+        task.before_step(action, simulation)
+        simulation.step(STEPS_PER_ACTION)
+        task.after_step(simulation)
+        discount = task.get_termination(simulation)
+        self._needs_reset = discount is not None
+        return self.observation(), task.get_reward(simulation), discount == 0.0, discount == 1.0, self.info()
 
     def render(self) -> np.ndarray | None:
         """Returns `[480, 480, 3]` uint8 of the current state if `render_mode` is "rgb_array", else None."""
@@ -86,38 +95,49 @@ class MazeEnv(JsonSpec, gymnasium.Env):
             return None
         if self._cameras is None:
             self._cameras = Cameras(models_of(self.task_spec.mazes, self.task_spec.textures), (self._camera,))
-        data = self.environment.physics.data
-        return self._cameras.take(self.environment.task.maze, data.qpos, data.mocap_pos[0])[self._camera]
+        data = self.simulation.data
+        return self._cameras.take(self.task.maze, data.qpos, data.mocap_pos[0])[self._camera]
 
     def close(self) -> None:
         if self._cameras is not None:
             self._cameras.close()
-        self.environment.close()
+        self.task.close()
 
     def get_state(self) -> EnvironmentState:
-        """Returns the state that `set_state` goes back to; see `Environment.get_state`."""
-        return self.environment.get_state()
+        """Returns this moment of the environment, to go back to with `set_state` as often as you like."""
+        return self.task.get_state(self.simulation)._replace(needs_reset=self._needs_reset)
 
     def set_state(self, state: EnvironmentState) -> None:
-        """Goes back to a state, bit for bit; see `Environment.set_state`."""
-        self.environment.set_state(state)
+        """Goes back to a state of this environment, or of another one of the same task.
+
+        From there, the same actions lead to the same steps bit for bit, and so do the episodes that follow.
+
+        Raises:
+          InputError: if it is a state of an environment with other mazes.
+        """
+        self.task.set_state(state, self.simulation)
+        self._needs_reset = state.needs_reset
 
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {"_cameras": None}  # a copy opens some of its own
 
-    def _observation(self, time_step: dm_env.TimeStep) -> dict[str, np.ndarray]:
-        return {key: time_step.observation[key] for key in ("state", "context", *self.task_spec.sensors)}
+    def observation(self) -> dict[str, np.ndarray]:
+        """Returns what `step` returns of the present moment; noise is drawn anew."""
+        observation = self.task.get_observation(self.simulation)
+        observation.pop("is_first", None)  # it is in `info`
+        return observation
 
-    def _info(self) -> dict[str, Any]:
-        task = self.environment.task
+    def info(self) -> dict[str, Any]:
+        """Returns the `info` of the present moment."""
+        task = self.task
         return {
             "is_first": task.is_first,
             "success": task.success,
             "steps": task.steps,
             "path_length": task.path_length,
-            "position": self.environment.physics.position(),
-            "yaw": self.environment.physics.yaw(),
-            "maze": task.episode.maze,
+            "position": self.simulation.position(),
+            "yaw": self.simulation.yaw(),
+            "maze": task.maze,
             "landmark": task.route.leg,
         }
 

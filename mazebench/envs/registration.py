@@ -1,4 +1,7 @@
-"""The Gymnasium ids, such as `mazebench/Local-13-v1` and `mazebench/Stale-13-v2`; `import mazebench` registers them."""
+"""What makes environments: `load`, `make_vec`, and the Gymnasium ids, such as `mazebench/Local-13-v1`.
+
+`import mazebench` registers the ids.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,12 @@ import gymnasium
 
 from mazebench.maps import BENCHMARK_SIZES
 from mazebench.tasks import TASK_VERSION, TRACKS_VERSION
-from mazebench.world.backend import load_mujoco
+from mazebench.world.backend import load_dm_control, load_mujoco
 
 if TYPE_CHECKING:
     from gymnasium.vector import AutoresetMode
 
+    from mazebench.envs.dm_control import Environment
     from mazebench.envs.goal import GoalMazeEnv
     from mazebench.envs.gym import MazeEnv
     from mazebench.envs.vector import MazeVectorEnv
@@ -61,6 +65,23 @@ def _register(env_id: str, options: dict[str, Any]) -> None:
             vector_entry_point="mazebench.envs.registration:make_vec",
             kwargs=options,
         )
+
+
+def load(
+    task: str = "local", size: int | None = None, split: str = "train", seed: int | None = None, **options: Any
+) -> Environment:
+    """Returns a dm_control environment of a navigation task; `options` are those of `mazebench.make_spec`.
+
+    Its first episode is the one of `reset(seed=seed)`. `env.physics` and `env.task` are a
+    `mazebench.envs.dm_control.Physics` and a `mazebench.tasks.navigation.Navigation`.
+
+    Raises:
+      InputError: if an option is unknown or not allowed, or dm_control is not installed.
+    """
+    load_dm_control()
+    from mazebench.envs.dm_control import Environment
+
+    return Environment(_task_spec(task, {"size": size, "split": split, **options}, ("seed",)), seed)
 
 
 def make_env(

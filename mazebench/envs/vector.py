@@ -32,8 +32,8 @@ from mazebench.world.angles import wrap_angle
 from mazebench.world.batch import open_batch
 from mazebench.world.mjcf import STEPS_PER_ACTION
 from mazebench.world.models import models_of
-from mazebench.world.physics import STATE_SIZE, states_from_sensors
 from mazebench.world.rendering import Cameras
+from mazebench.world.simulation import STATE_SIZE, states_from_sensors
 
 # Returns the next episode of environment i, or None: then the environment rests, which means that it is not stepped any
 # more.

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mazebench.agent import Inputs
+from mazebench.envs.gym import MazeEnv
 from mazebench.errors import InputError, unknown
 from mazebench.evaluation.agent_inputs import agent_seed, true_state
 from mazebench.evaluation.options import EvalOptions
@@ -19,13 +20,13 @@ from mazebench.evaluation.plan import make_plan
 from mazebench.maps.image import draw_grid, draw_rays, write_image
 from mazebench.storage.files import open_whole, writing_to
 from mazebench.tasks.context import resized_map
-from mazebench.tasks.navigation import Environment
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.lidar import ray_ends
 from mazebench.world.models import models_of
 from mazebench.world.rendering import CAMERAS, Cameras
 
 MAP, LIDAR = "map", "lidar"
+_CODEC = "vp09"  # VP9, which browsers play
 _FRAMES_PER_SECOND = 1 / 0.16  # one an agent step: the film runs in real time
 
 
@@ -66,33 +67,34 @@ def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[l
     trial, episode = plan.trials[number], plan.trials[number].episode
     maze = plan.task.mazes[episode.maze]
     agent = plan.build_agent()
-    environment = Environment(plan.task)
-    task = environment.task
-    time_step = environment.reset(episode=episode)
+    env = MazeEnv(plan.task)
+    observation, info = env.reset(options={"episode": episode})
     state = agent.initial_state(1)
     seed = np.array([agent_seed(options.seed, number)])
-    scene = _Scene(environment, plan.task, views, pixels)
+    scene = _Scene(env, views, pixels)
     frames: list[np.ndarray] = []
+    ended = False
     try:
         while True:
             scene.record_position()
-            if is_film or time_step.last():
-                frames.append(scene.draw(time_step.observation))
-            if time_step.last():
+            if is_film or ended:
+                frames.append(scene.draw(observation))
+            if ended:
                 break
-            observation = {name: value[None] for name, value in time_step.observation.items() if name != "is_first"}
             truth = None
             if plan.agent_class.needs_truth:
-                physics = environment.physics
-                truth = true_state(plan.task, [episode], physics.position()[None], np.array([physics.yaw()]))
-            new_episode, new_context = np.array([time_step.first()]), np.array([task.is_first])
-            actions, state = agent.act(Inputs(observation, new_episode, new_context, seed, truth), state)
-            time_step = environment.step(int(actions[0]))
+                truth = true_state(plan.task, [episode], info["position"][None], np.array([info["yaw"]]))
+            batch = {name: value[None] for name, value in observation.items()}
+            new_episode, new_context = np.array([info["steps"] == 0]), np.array([info["is_first"]])
+            actions, state = agent.act(Inputs(batch, new_episode, new_context, seed, truth), state)
+            observation, _, terminated, truncated, info = env.step(int(actions[0]))
+            ended = terminated or truncated
     finally:
         scene.close()
-    ending = "reached the goal" if task.success else "ran out of time"
+        env.close()
+    ending = "reached the goal" if info["success"] else "ran out of time"
     return frames, (
-        f"{options.agent} {ending} after {task.steps} steps and {task.path_length:.2f} m "
+        f"{options.agent} {ending} after {info['steps']} steps and {info['path_length']:.2f} m "
         f"(shortest {trial.shortest_path:.2f} m) in maze {maze.name}, from {episode.start} to {episode.goal}"
     )
 
@@ -114,20 +116,19 @@ def _views(view: str, task_spec: TaskSpec) -> tuple[str, ...]:
 class _Scene:
     """The views of a running episode, side by side in one picture."""
 
-    environment: Environment
-    task_spec: TaskSpec
+    env: MazeEnv
     views: tuple[str, ...]
     pixels: int
 
     def __post_init__(self) -> None:
         self._path: list[np.ndarray] = []
         names = tuple(view for view in self.views if view in CAMERAS)
-        models = models_of(self.task_spec.mazes, self.task_spec.textures)
+        models = models_of(self.env.task_spec.mazes, self.env.task_spec.textures)
         self._cameras = Cameras(models, names, self.pixels) if names else None
 
     def record_position(self) -> None:
         """Adds the body's position to the driven path."""
-        self._path.append(self.environment.physics.position())
+        self._path.append(self.env.simulation.position())
 
     def draw(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
         """Returns a picture `[H, W, 3]` uint8 of the current state, in which `observation` was made.
@@ -143,8 +144,8 @@ class _Scene:
             self._cameras.close()
 
     def _take(self, cameras: Cameras) -> dict[str, np.ndarray]:
-        data = self.environment.physics.data
-        return cameras.take(self.environment.task.maze, data.qpos, data.mocap_pos[0])
+        data = self.env.simulation.data
+        return cameras.take(self.env.task.maze, data.qpos, data.mocap_pos[0])
 
     def _drawing(self, view: str, observation: Mapping[str, np.ndarray]) -> np.ndarray:
         picture = self._map() if view == MAP else self._rays(observation[LIDAR])
@@ -152,7 +153,7 @@ class _Scene:
 
     def _map(self) -> np.ndarray:
         """Returns a picture of the map that the agent is shown, some two times as large as a view."""
-        task, side = self.environment.task, self.task_spec.context_size
+        task, side = self.env.task, self.env.task_spec.context_size
         seen = task.shown_map.seen_walls()
         walls, size = resized_map(seen, side), len(seen)
         pixels = (task.shown_map.seen_cell(cell) for cell in (task.episode.start, task.episode.goal))
@@ -162,16 +163,16 @@ class _Scene:
 
     def _rays(self, ranges: np.ndarray) -> np.ndarray:
         """Returns a picture of the true maze with the rays of the range sensor, some two times as large as a view."""
-        physics, episode = self.environment.physics, self.environment.task.episode
-        walls = self.task_spec.mazes[episode.maze].walls
+        simulation, episode = self.env.simulation, self.env.task.episode
+        walls = self.env.task_spec.mazes[episode.maze].walls
         cell_pixels = self._cell_pixels(walls)
         picture = draw_grid(walls, cell_pixels, episode.start, episode.goal, self._to_cells(self._path))
-        pose = np.array([*physics.position(), physics.yaw()])
+        pose = np.array([*simulation.position(), simulation.yaw()])
         draw_rays(picture, cell_pixels, self._to_cells(pose[:2]), self._to_cells(ray_ends(pose, ranges)))
         return picture
 
     def _to_cells(self, points: ArrayLike) -> np.ndarray:  # [..., 2] m
-        return np.asarray(points) / self.task_spec.cell_size
+        return np.asarray(points) / self.env.task_spec.cell_size
 
     def _cell_pixels(self, walls: np.ndarray) -> int:
         return 2 * self.pixels // len(walls) + 1
@@ -196,7 +197,7 @@ def _write_mp4(frames: list[np.ndarray], out: pathlib.Path) -> None:
     height, width = frames[0].shape[:2]
     with tempfile.TemporaryDirectory() as folder:
         film = pathlib.Path(folder) / "film.mp4"
-        writer = cv2.VideoWriter(str(film), cv2.VideoWriter.fourcc(*"mp4v"), _FRAMES_PER_SECOND, (width, height))
+        writer = cv2.VideoWriter(str(film), cv2.VideoWriter.fourcc(*_CODEC), _FRAMES_PER_SECOND, (width, height))
         for frame in frames:
             writer.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
         writer.release()

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import dm_env
 import numpy as np
 
+from mazebench.envs.gym import MazeEnv
 from mazebench.maps.maze import Cell
-from mazebench.tasks.navigation import Environment
+from mazebench.tasks.episode import Episode
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.lidar import ray_ends
 
@@ -27,7 +27,7 @@ class Game:
     def __init__(self, task_spec: TaskSpec, seed: int):
         """Begins the first episode of `seed`."""
         self.task_spec = task_spec
-        self.environment = Environment(task_spec, seed)
+        self.env = MazeEnv(task_spec, seed)
         self.num_episodes = 0
         self.num_reached = 0
         self.next_episode()
@@ -43,42 +43,44 @@ class Game:
 
     def next_episode(self) -> None:
         """Begins another episode."""
-        self._begin(self.environment.reset())
+        self._begin()
 
     def restart(self) -> None:
         """Begins the same episode again."""
-        self._begin(self.environment.reset(episode=self.environment.task.episode))
+        self._begin(self.env.task.episode)
 
-    def _begin(self, time_step: dm_env.TimeStep) -> None:
-        self.time_step = time_step
+    def _begin(self, episode: Episode | None = None) -> None:
+        self.observation, _ = self.env.reset(options={"episode": episode})
+        self.ended = False
         self.num_episodes += 1
-        self.path = [self.environment.physics.position()]  # [2] m each: where the body was
+        self.path = [self.env.simulation.position()]  # [2] m each: where the body was
 
     def act(self, action: int) -> None:
         """Takes one agent step, unless the episode has ended."""
-        if self.time_step.last():
+        if self.ended:
             return
-        self.time_step = self.environment.step(action)
-        self.path.append(self.environment.physics.position())
-        self.num_reached += self.environment.task.success
+        self.observation, _, terminated, truncated, _ = self.env.step(action)
+        self.ended = terminated or truncated
+        self.path.append(self.env.simulation.position())
+        self.num_reached += terminated
 
     @property
     def walls(self) -> np.ndarray:
         """`[N, N]` bool: the true walls."""
-        return self.task_spec.mazes[self.environment.task.episode.maze].walls
+        return self.task_spec.mazes[self.env.task.episode.maze].walls
 
     @property
     def context(self) -> np.ndarray:
         """`[4, M, M]` float32: the context that an agent would get."""
-        return self.time_step.observation["context"]
+        return self.observation["context"]
 
     @property
     def rays(self) -> np.ndarray | None:
         """`[32, 2]` m: where the rays of the range sensor end; None if the task does not have it."""
         if LIDAR not in self.task_spec.sensors:
             return None
-        pose = np.array([*self.path[-1], self.environment.physics.yaw()])
-        return ray_ends(pose, self.time_step.observation[LIDAR])
+        pose = np.array([*self.path[-1], self.env.simulation.yaw()])
+        return ray_ends(pose, self.observation[LIDAR])
 
     def to_cells(self, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
         """Returns `[..., 2]` points in metres in cells, in which pictures are drawn."""
@@ -87,12 +89,12 @@ class Game:
     @property
     def landmarks(self) -> list[Cell]:
         """The landmarks that are still to be reached before the goal, as cells of the true maze."""
-        task = self.environment.task
+        task = self.env.task
         return [] if task.spec.task == "local" else task.route.cells[task.route.leg + 1 : -1]
 
     def title(self) -> str:
         """Returns a line that describes the episode."""
-        task = self.environment.task
+        task = self.env.task
         maze, episode = self.task_spec.mazes[task.episode.maze], task.episode
         distance = maze.distance(episode.start, episode.goal)
         scale = "" if maze.cell_size == 1 else f" of {maze.cell_size:g} m"
@@ -100,14 +102,14 @@ class Game:
 
     def status(self) -> str:
         """Returns a line that describes the state of the episode."""
-        task, physics = self.environment.task, self.environment.physics
+        task, simulation = self.env.task, self.env.simulation
         driven = f"{task.steps} steps, {task.path_length:.2f} m"
-        if self.time_step.last():
+        if self.ended:
             return f"GOAL REACHED after {driven}" if task.success else f"OUT OF TIME after {driven}"
-        x, y = self.time_step.observation["state"][:2]
-        heading = math.degrees(physics.yaw())
+        x, y = self.observation["state"][:2]
+        heading = math.degrees(simulation.yaw())
         left = task.route.deadline - task.steps
-        where = f"x {x:.2f}  y {y:.2f} m  heading {heading:+.0f} deg  {physics.speed():.2f} m/s"
+        where = f"x {x:.2f}  y {y:.2f} m  heading {heading:+.0f} deg  {simulation.speed():.2f} m/s"
         return f"{where}  {driven}, {left} steps left" + (f", landmark {task.route.leg + 1}" if self.landmarks else "")
 
     def outcome(self) -> str:

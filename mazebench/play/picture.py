@@ -77,7 +77,7 @@ def draw(game: Game, width: int, height: int, plain: bool = False) -> Characters
 
 def draw_world(game: Game, rows: int, columns: int, plain: bool = False) -> Characters:
     """Returns the true maze with the path and the rays of the range sensor, `rows` x `columns` characters a cell."""
-    task, size = game.environment.task, game.task_spec.size
+    task, size = game.env.task, game.task_spec.size
     styles = np.where(game.walls, Style.WALL, Style.FLOOR).repeat(rows, axis=0).repeat(columns, axis=1)
     path = game.to_cells(game.path) * [columns, -rows] + [0, size * rows]
     if game.rays is not None:
@@ -90,7 +90,7 @@ def draw_world(game: Game, rows: int, columns: int, plain: bool = False) -> Char
             _mark(styles, cell, style, rows, columns)
     panel = _characters(styles)
     x, y = path[-1].astype(int)
-    octant = round(game.environment.physics.yaw() / (math.pi / 4)) % 8
+    octant = round(game.env.simulation.yaw() / (math.pi / 4)) % 8
     panel.glyphs[y, x], panel.styles[y, x] = (_PLAIN_ARROWS if plain else _ARROWS)[octant], Style.BODY
     return panel
 

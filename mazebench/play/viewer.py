@@ -31,8 +31,7 @@ def play(game: Game) -> None:
       InputError: if no window can be opened.
     """
     viewer_module = _import_viewer()
-    physics = game.environment.physics
-    model, data = physics.model.ptr, physics.data.ptr
+    model, data = game.env.simulation.model, game.env.simulation.data
     keys: queue.SimpleQueue[int] = queue.SimpleQueue()
     try:
         viewer = viewer_module.launch_passive(

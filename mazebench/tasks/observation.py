@@ -14,7 +14,7 @@ from mazebench.tasks.perturbations.base import StateError
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.base import Sensor, Worlds
 from mazebench.tasks.spec import TaskSpec
-from mazebench.world.physics import STATE_SIZE
+from mazebench.world.simulation import STATE_SIZE
 
 
 def observation_specs(spec: TaskSpec) -> dict[str, specs.Array]:

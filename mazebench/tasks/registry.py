@@ -1,9 +1,9 @@
-"""From options to tasks and environments: `make_spec` and `load`."""
+"""From options to tasks: `make_spec`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mazebench.errors import InputError, unknown
 from mazebench.maps.options import MAP_OPTIONS, MapOptions
@@ -14,10 +14,6 @@ from mazebench.tasks.options import EVAL_DISTANCES, TASKS, TaskOptions
 from mazebench.tasks.own import own_task
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.tracks import TRACKS
-from mazebench.world.backend import load_mujoco
-
-if TYPE_CHECKING:
-    from mazebench.tasks.navigation import Environment
 
 
 def make_spec(
@@ -68,18 +64,3 @@ def check_names(options: Iterable[str], arguments: Iterable[str] = ()) -> None:
     for name in options:
         if name not in known:
             raise unknown("option", name, known)
-
-
-def load(
-    task: str = "local", size: int | None = None, split: str = "train", seed: int | None = None, **options: Any
-) -> Environment:
-    """Returns a dm_control environment of a navigation task; `options` are those of `make_spec`.
-
-    Its first episode is the one of `reset(seed=seed)`. `env.physics` and `env.task` are a
-    `mazebench.world.physics.Physics` and a `mazebench.tasks.navigation.Navigation`.
-    """
-    load_mujoco()
-    from mazebench.tasks.navigation import Environment
-
-    check_names(options, ("seed",))
-    return Environment(make_spec(task, size, split, **options), seed)

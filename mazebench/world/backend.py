@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes.util
+import importlib
+import importlib.util
 import os
 import sys
 
@@ -18,15 +20,34 @@ class RenderingError(InputError):
 
 
 def load_mujoco() -> None:
-    """Imports MuJoCo and dm_control, and with them the rendering backend.
+    """Imports MuJoCo, and with it the rendering backend.
 
     Raises:
-      RenderingError: if they can't load the backend that the environment variable MUJOCO_GL names.
+      RenderingError: if it can't load the backend that the environment variable MUJOCO_GL names.
     """
+    _load("mujoco")
+
+
+def load_dm_control() -> None:
+    """Imports dm_control, and with it the rendering backend.
+
+    Raises:
+      RenderingError: if it can't load the backend that the environment variable MUJOCO_GL names.
+      InputError: if dm_control is not installed.
+    """
+    if importlib.util.find_spec("dm_control") is None:
+        raise InputError(
+            "mazebench.load needs dm_control, which is not installed: pip install lxml && pip install --no-deps "
+            "dm-control (its requirement labmaze, which is not needed here, has no wheels for Python 3.13 and later)"
+        )
+    _load("dm_control.mujoco")
+
+
+def _load(module: str) -> None:
     if "MUJOCO_GL" not in os.environ:
-        return  # they take what there is
+        return  # it takes what there is
     try:
-        import mazebench.world.physics  # noqa: F401
+        importlib.import_module(module)
     # The kind of error depends on the backend.
     except (AttributeError, ImportError, OSError, RuntimeError) as error:
         raise rendering_error(error) from None  # it says all

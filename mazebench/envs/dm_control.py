@@ -1,0 +1,104 @@
+"""A navigation task as a dm_control environment. Only this module imports dm_control."""
+
+from __future__ import annotations
+
+import copy
+import warnings
+
+import dm_env
+import mujoco
+import numpy as np
+from dm_env import specs
+
+from mazebench.tasks.episode import Episode
+from mazebench.tasks.navigation import EnvironmentState, Navigation
+from mazebench.tasks.spec import TaskSpec
+from mazebench.world.mjcf import STEPS_PER_ACTION
+from mazebench.world.models import models_of
+from mazebench.world.simulation import FULL_STATE, Simulation
+
+with warnings.catch_warnings():
+    # dm_control tries every rendering backend when imported, and GLFW warns if there is no display.
+    warnings.filterwarnings("ignore", message=".*GLFWError.*|.*DISPLAY.*")
+    from dm_control.mujoco import engine, wrapper
+    from dm_control.rl import control
+
+
+control.Task.register(Navigation)  # it has all methods of one
+
+
+class Physics(Simulation, engine.Physics):
+    """One maze and the body in it; `load_maze` exchanges the maze but keeps MjData and rendering context."""
+
+    @classmethod
+    def of_maze(cls, model: mujoco.MjModel) -> Physics:
+        """Returns a simulation of a copy of `model`, with the body in the maze's first free cell."""
+        physics = cls.from_model(wrapper.MjModel(copy.copy(model)))
+        with physics.reset_context():
+            physics.data.qpos[:] = physics.model.key_qpos[0]
+        return physics
+
+    def after_reset(self) -> None:
+        """Computes what follows from positions and velocities, after a reset and in a new copy."""
+        super().after_reset()
+        self._update()  # dm_control leaves the actuators' velocities at 0, which is wrong in a copy of a moving body
+
+    def full_state(self) -> np.ndarray:
+        return self.get_state(FULL_STATE)
+
+    def set_full_state(self, state: np.ndarray) -> None:
+        self.set_state(state, FULL_STATE)
+        self._update()
+
+    def _update(self) -> None:
+        """Computes what follows from positions and velocities, as dm_control does at the end of a step."""
+        mujoco.mj_step1(self.model.ptr, self.data.ptr)
+
+
+class Environment(control.Environment):
+    """A dm_control Environment whose `reset` also takes a seed, or the episode to play."""
+
+    physics: Physics
+    task: Navigation
+
+    def __init__(self, spec: TaskSpec, seed: int | None = None):
+        """Opens the environment; `seed` is that of the first reset.
+
+        Raises:
+          InputError: if `seed` is not a natural number, or `spec` not a `TaskSpec`.
+        """
+        task = Navigation(spec, seed)
+        # The task judges the time limit itself, so that a goal reached on the last step is a termination.
+        super().__init__(Physics.of_maze(models_of(spec.mazes)[0]), task, n_sub_steps=STEPS_PER_ACTION)
+
+    def reset(self, seed: int | None = None, episode: Episode | None = None) -> dm_env.TimeStep:
+        """Starts an episode: the next one of the environment's stream, the first one of `seed`'s, or `episode`."""
+        self.task.choose_episode(seed, episode)
+        return super().reset()
+
+    @property
+    def needs_reset(self) -> bool:
+        """Whether no episode is under way; `step` would then start one."""
+        return self._reset_next_step
+
+    def get_state(self) -> EnvironmentState:
+        """Returns this moment of the environment, to go back to with `set_state` as often as you like."""
+        return self.task.get_state(self.physics)._replace(needs_reset=self.needs_reset)
+
+    def set_state(self, state: EnvironmentState) -> None:
+        """Goes back to a state of this environment, or of another one of the same task.
+
+        From there, the same actions lead to the same time steps bit for bit, and so do the episodes that follow. The
+        observation at the state itself is the one that was returned before `get_state`.
+
+        Raises:
+          InputError: if it is a state of an environment with other mazes.
+        """
+        self.task.set_state(state, self.physics)
+        self._reset_next_step = state.needs_reset
+
+    def close(self) -> None:
+        self.task.close()
+
+    def reward_spec(self) -> specs.BoundedArray:
+        return specs.BoundedArray((), float, -1.0, 0.0, name="reward")

@@ -1,0 +1,128 @@
+"""The body in a maze: placing it, driving it and reading its state, on MuJoCo's own bindings."""
+
+from __future__ import annotations
+
+import abc
+import copy
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mazebench.world.angles import wrap_angle
+from mazebench.world.mjcf import NUM_SENSORS
+from mazebench.world.models import copy_maze
+
+STATE_SIZE = 12
+FULL_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)  # all that MuJoCo's next step depends on
+
+
+class Simulation(abc.ABC):
+    """One maze and the body in it, as a task places and reads them.
+
+    `model` and `data` are MuJoCo's, or dm_control's wrappers, which have the same arrays.
+    """
+
+    model: Any
+    data: Any
+
+    def load_maze(self, model: mujoco.MjModel) -> None:
+        """Changes to the maze of `model`, which must come from the same `MazeModels`."""
+        copy_maze(model, self.model)
+
+    def place_agent(self, position: np.ndarray, yaw: float) -> None:
+        """Moves the body to `position` (`[2]`, m) and `yaw` (rad); call it within `reset_context()`."""
+        self.data.qpos[:] = (*position, yaw)
+
+    def place_goal(self, position: np.ndarray) -> None:
+        """Moves the goal marker to `position` (`[2]`, m)."""
+        self.data.mocap_pos[0] = (*position, 0.0)
+
+    def set_controls(self, controls: np.ndarray) -> None:
+        """Sets the controls (`[5]`) of the four drives and the turn; see `mjcf.action_controls`."""
+        self.data.ctrl[:] = controls
+
+    def position(self) -> np.ndarray:
+        """Returns the body's centre (x, y) in metres: `[2]` float."""
+        return self.data.qpos[:2].copy()
+
+    def yaw(self) -> float:
+        """Returns the body's heading in [-pi, pi) rad, counter-clockwise from +x."""
+        return wrap_angle(float(self.data.qpos[2]))
+
+    def speed(self) -> float:
+        """Returns the body's speed in the plane in m/s."""
+        return float(np.hypot(self.data.qvel[0], self.data.qvel[1]))
+
+    def state(self) -> np.ndarray:
+        """Returns the state, `[12]` float64; see `states_from_sensors`."""
+        return states_from_sensors(self.data.sensordata)
+
+    @abc.abstractmethod
+    def full_state(self) -> np.ndarray:
+        """Returns all that the simulation's future depends on, except the maze: `[S]` float64, MuJoCo's own vector."""
+
+    @abc.abstractmethod
+    def set_full_state(self, state: np.ndarray) -> None:
+        """Goes back to what `full_state` returned, exactly, in the same maze."""
+
+
+class MujocoSimulation(Simulation):
+    """A simulation on MuJoCo's bindings and nothing else."""
+
+    def __init__(self, model: mujoco.MjModel):
+        """Copies `model` and puts the body into the maze's first free cell."""
+        self.model = copy.copy(model)
+        self.data = mujoco.MjData(self.model)
+        with self.reset_context():
+            self.data.qpos[:] = model.key_qpos[0]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _resumed, (self.model, self.full_state())
+
+    @contextmanager
+    def reset_context(self) -> Iterator[None]:
+        """Resets the simulation, lets its user place the body, and computes what follows from that."""
+        mujoco.mj_resetData(self.model, self.data)
+        yield
+        mujoco.mj_step1(self.model, self.data)
+
+    def step(self, num_steps: int) -> None:
+        """Takes physics steps; afterwards, what follows from positions and velocities is current.
+
+        Each step's second half comes first, as in dm_control: the first half was computed when the controls were set.
+        """
+        mujoco.mj_step2(self.model, self.data)
+        mujoco.mj_step(self.model, self.data, num_steps - 1)
+        mujoco.mj_step1(self.model, self.data)
+
+    def full_state(self) -> np.ndarray:
+        state = np.empty(mujoco.mj_stateSize(self.model, FULL_STATE))
+        mujoco.mj_getState(self.model, self.data, state, FULL_STATE)
+        return state
+
+    def set_full_state(self, state: np.ndarray) -> None:
+        mujoco.mj_setState(self.model, self.data, state, FULL_STATE)
+        mujoco.mj_step1(self.model, self.data)
+
+
+def _resumed(model: mujoco.MjModel, state: np.ndarray) -> MujocoSimulation:
+    """Returns a simulation of `model` that goes on from a full state."""
+    simulation = MujocoSimulation(model)
+    simulation.set_full_state(state)
+    return simulation
+
+
+def states_from_sensors(sensors: np.ndarray) -> np.ndarray:
+    """Returns `[..., 12]` float64 states from `[..., 10]` sensor values.
+
+    A state is, in this order: position x, y, z (m); orientation roll, pitch, yaw (rad, yaw in [-pi, pi)); linear
+    velocity forward, left, up in the body's frame (m/s); angular velocity about the body's x, y, z (rad/s).
+    """
+    states = np.zeros((*sensors.shape[:-1], STATE_SIZE))
+    states[..., :3] = sensors[..., :3]
+    states[..., 5] = wrap_angle(sensors[..., 3])
+    states[..., 6:] = sensors[..., 4:NUM_SENSORS]
+    return states
