@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from mazebench.errors import InputError
 from mazebench.maps.generators import STYLES, dfs_walls, generate
@@ -57,6 +58,18 @@ def test_an_even_size_is_refused_on_the_odd_lattice(style, size):
 
 def test_obstacles_may_have_an_even_size():
     assert generate("obstacles", 14, np.random.default_rng(0)).size == 14
+
+
+@pytest.mark.parametrize("size", [5, 9, 13, 21, 51])
+def test_rooms_has_rooms_of_9_or_15_cells_and_no_dead_ends(size):
+    for seed in range(10):
+        free = ~generate("rooms", size, np.random.default_rng(seed)).walls
+        neighbours = ndimage.convolve(free.astype(int), [[0, 1, 0], [1, 0, 1], [0, 1, 0]])
+        assert (neighbours[free] >= 2).all()
+        # Only in rooms are 3 x 3 cells free.
+        rooms, num_rooms = ndimage.label(ndimage.binary_opening(free, np.ones((3, 3))))
+        assert 1 <= num_rooms <= max(1, (size // 6) ** 2)
+        assert set(np.bincount(rooms.ravel())[1:]) <= {9, 15}
 
 
 def test_an_unknown_style_is_refused():

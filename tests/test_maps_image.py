@@ -349,7 +349,10 @@ def test_picture_is_refused_when_it_shows_no_plan(image):
             lambda image: thin_line_plan(8, 40, 2, 2, 0),
             "filled walls as thick as a cell, found only lines between 8 x 8 cells; read them with --walls lines",
         ),
-        (lambda image: thin_line_plan(12, 30, 3, 3, 0), r"\(are the walls lines\? read them with --walls lines\)$"),
+        (
+            lambda image: thin_line_plan(12, 30, 3, 3, 0),
+            r"\(are the walls lines\? read them with --walls lines; a floor plan with thin walls needs --pixel-size",
+        ),
     ],
     ids=["white", "black", "inverted", "inverted paper", "lines", "thicker lines"],
 )
@@ -480,5 +483,5 @@ def test_a_maze_of_lines_between_rooms_is_read_when_asked_for(seed, rows, column
 
 def test_a_picture_without_lines_is_refused_as_a_maze_of_lines(maze):
     for image in (np.full((200, 200), 255, np.uint8), np.random.default_rng(0).integers(0, 256, (50, 50), np.uint8)):
-        with pytest.raises(MazeError, match="expected rooms in a square grid with lines as walls"):
+        with pytest.raises(MazeError, match=r"expected rooms in a square grid with lines .* needs --pixel-size"):
             maze_from_image(image, walls="lines")

@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 
 import mazebench
 from mazebench.errors import InputError
-from mazebench.maps.files import read_maze, read_mazes
+from mazebench.maps.files import read_maze, read_mazes, read_placed
 from mazebench.maps.generators import generate
+from mazebench.maps.image import draw_maze, write_image
 from mazebench.maps.maze import Maze, MazeError, cell_to_point
 from mazebench.maps.options import MapOptions
 from mazebench.maps.ros import read_occupancy, read_ros_maze, write_ros_map
@@ -175,8 +176,8 @@ class TestMaze:
         assert read_maze(path) == Maze(expected, cell_size=0.4)
         assert capsys.readouterr().err == (
             "mazebench: map: 40 x 40 pixels of 0.05 m as cells of 0.4 m; "
-            "agents drive surely in cells from 0.5 m, try --cell-size 0.5; "
             "the maze's lower left corner is (1, 1) m on the map, so its point (x, y) is (x - 1, y - 1) m in the maze\n"
+            "mazebench: map: agents drive surely in cells from 0.5 m, try --cell-size 0.5\n"
         )
         assert read_maze(path, cell_size=0.5).size == 5
         assert "surely" not in capsys.readouterr().err
@@ -193,25 +194,23 @@ class TestMaze:
         picture[20:29, 40:50] = 254  # a door of 0.9 m, which is no whole cell of 0.5 m wide
         path = write_map(tmp_path, picture, resolution=0.05)
         read_maze(path, cell_size=0.5)
-        assert (
-            "9 of 18 free cells (50 %) closed that can't be reached from the others; "
-            "doors narrower than two cells (1 m) may close, try a smaller --cell-size; 5 x 9"
-        ) in capsys.readouterr().err
+        remarks = capsys.readouterr().err
+        assert "; 9 of 18 free cells (50 %) closed that can't be reached from the others; 5 x 9" in remarks
+        assert remarks.endswith(
+            "mazebench: map: doors narrower than two cells (1 m) may close, try a smaller --cell-size\n"
+        )
         read_maze(path)
-        assert "; doors narrower than two cells (0.8 m) may close; 7 x 12" in capsys.readouterr().err  # none is smaller
+        assert "doors narrower than two cells (0.8 m) may close\n" in capsys.readouterr().err  # none is smaller
 
     def test_unknown_cells_and_inflation_are_named_where_they_may_have_closed_rooms(self, tmp_path, capsys):
         path = write_map(tmp_path, drawn("######### #...?...# #...#...# #...#...# #########"))
         read_maze(path)
-        assert (
-            "(50 %) closed that can't be reached from the others; unknown cells are wall, try --unknown free; 5 x"
-            in (capsys.readouterr().err)
-        )
+        assert "mazebench: map: unknown cells are wall, try --unknown free\n" in capsys.readouterr().err
         read_maze(path, unknown="free")
         assert "closed" not in capsys.readouterr().err
         path = write_map(tmp_path, drawn("######### #...#...# #.......# #...#...# #########", pixels=3))
         read_maze(path, inflate=2.0)
-        assert "; walls are inflated, try a smaller --inflate; " in capsys.readouterr().err
+        assert ": walls are inflated, try a smaller --inflate\n" in capsys.readouterr().err
 
     def test_walls_are_inflated_by_metres(self, tmp_path):
         picture = np.full((9, 9), 254, np.uint8)
@@ -308,6 +307,89 @@ class TestRoundTrip:
         assert (metadata["occupied_thresh"], metadata["free_thresh"]) == (0.65, 0.196)
         assert (tmp_path / "plan.pgm").read_bytes().startswith(b"P5\n")
         assert (read_occupancy(tmp_path / "plan.yaml").states[2] == [100, 100, 100, 0, 100]).all()
+
+
+def two_rooms(margin: int = 0) -> np.ndarray:
+    """A floor plan of 4 x 2.4 m with 50 pixels a metre: walls of 4 pixels and a door of 0.9 m between two rooms."""
+    plan = np.full((120, 200), 255, np.uint8)
+    plan[[*range(4), *range(-4, 0)]] = plan[:, [*range(4), *range(-4, 0)]] = 0
+    plan[:, 100:104] = 0
+    plan[40:85, 100:104] = 255
+    return np.pad(plan, margin, constant_values=255)
+
+
+class TestFloorPlan:
+    EXPECTED = "##########\n#....#...#\n#........#\n#........#\n#....#...#\n" + 5 * "##########\n"
+
+    def write(self, folder, plan, name="plan.png"):
+        cv2.imwrite(str(folder / name), plan)
+        return folder / name
+
+    def test_a_plan_is_read_as_a_map_of_ros_with_such_pixels(self, tmp_path, capsys):
+        maze = read_maze(self.write(tmp_path, two_rooms()), pixel_size=0.02)
+        assert maze == Maze(parse_maze(self.EXPECTED).walls, cell_size=0.4)
+        assert capsys.readouterr().err == (
+            "mazebench: plan: 200 x 120 pixels of 0.02 m as cells of 0.4 m; "
+            "6 x 10 cells padded with wall to 10 x 10; the maze's lower left corner is (0, -1.6) m on the map, "
+            "so its point (x, y) is (x, y + 1.6) m in the maze\n"
+            "mazebench: plan: agents drive surely in cells from 0.5 m, try --cell-size 0.5\n"
+        )
+        assert maze == read_maze(write_map(tmp_path, two_rooms(), resolution=0.02))
+        assert read_maze(tmp_path / "plan.png", pixel_size=0.02, cell_size=0.8).size == 5
+
+    def test_the_paper_around_a_plan_is_cut_off(self, tmp_path):
+        path = self.write(tmp_path, two_rooms(margin=33))
+        placed = read_placed(path, None, MapOptions(pixel_size=0.02))
+        assert placed.maze == read_maze(self.write(tmp_path, two_rooms(), "cut.png"), pixel_size=0.02)
+        assert placed.origin == pytest.approx((0.66, 0.66 - 1.6, 0.0))
+
+    def test_marks_in_colour_are_floor_and_gray_is_unknown(self, tmp_path):
+        plan = cv2.cvtColor(two_rooms(), cv2.COLOR_GRAY2BGR)
+        plan[45:55, 45:55] = (0, 0, 255)
+        path = self.write(tmp_path, plan)
+        assert read_maze(path, pixel_size=0.02) == Maze(parse_maze(self.EXPECTED).walls, cell_size=0.4)
+        plan[45:55, 45:55] = 128
+        path = self.write(tmp_path, plan)
+        assert read_maze(path, pixel_size=0.02).walls[2, 2]
+        assert not read_maze(path, pixel_size=0.02, unknown="free").walls[2, 2]
+
+    def test_a_door_that_closes_is_answered_with_what_to_try(self, tmp_path, capsys):
+        plan = two_rooms()
+        cv2.ellipse(plan, (102, 40), (45, 45), 0, 0, 90, 0, 1)
+        cv2.line(plan, (102, 40), (147, 40), 0, 1)
+        read_maze(self.write(tmp_path, plan), pixel_size=0.02)
+        assert "; text, furniture and door swings on a plan are walls too, erase them\n" in capsys.readouterr().err
+
+    @pytest.mark.parametrize(
+        ("name", "options", "message"),
+        [
+            ("plan.png", {"walls": "lines"}, "walls belongs to pictures without a pixel_size, found pixel_size 0.02"),
+            ("blank.png", {}, "blank: expected dark walls on light paper, found none"),
+            ("plan.txt", {}, "pixel_size belongs to pictures, found .*plan.txt"),
+            ("plan.npy", {}, "pixel_size belongs to pictures, found .*plan.npy"),
+            ("map.yaml", {}, "pixel_size belongs to pictures, found .*map.yaml"),
+        ],
+    )
+    def test_a_pixel_size_is_refused_where_it_makes_no_sense(self, name, options, message, tmp_path):
+        self.write(tmp_path, two_rooms())
+        self.write(tmp_path, np.full((50, 50), 255, np.uint8), "blank.png")
+        with pytest.raises(InputError, match=f"^{message}$"):
+            read_maze(tmp_path / name, pixel_size=0.02, **options)
+
+    def test_a_plan_without_a_pixel_size_is_answered_with_its_width(self, tmp_path, capsys):
+        walls = np.zeros((90, 120), dtype=bool)
+        walls[[0, -1]] = walls[:, [0, -1]] = walls[40, 3:] = True
+        path = self.write(tmp_path, np.where(walls, 0, 255).astype(np.uint8))
+        remark = (
+            "mazebench: plan: read as 120 m wide and 90 m high, with a cell of 1 m for the width of a wall; if it is"
+        )
+        read_maze(path)
+        assert remark in capsys.readouterr().err
+        read_maze(path, cell_size=0.5)
+        assert "read as" not in capsys.readouterr().err
+        write_image(draw_maze(generate("dfs", 121, np.random.default_rng(0)), 4), tmp_path / "dfs.png")
+        read_maze(tmp_path / "dfs.png")
+        assert capsys.readouterr().err == ""
 
 
 class TestRefusal:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import pathlib
 from typing import Any
 
+import numpy as np
+
 from mazebench.errors import InputError, held_remarks, remark
 from mazebench.maps.arrays import read_array_maze
 from mazebench.maps.image import read_image_maze
 from mazebench.maps.maze import Maze, resized
 from mazebench.maps.occupancy import PlacedMaze
 from mazebench.maps.options import OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions
-from mazebench.maps.ros import ROS_SUFFIXES, map_of_picture, picture_of, place_ros_maze
+from mazebench.maps.ros import ROS_SUFFIXES, map_of_picture, picture_of, place_floor_plan, place_ros_maze
 from mazebench.maps.text import read_text_maze
 
 IMAGE_SUFFIXES = (
@@ -23,6 +25,8 @@ ARRAY_SUFFIXES = (".npy",)
 # In the order in which they are read if a folder holds one map in several: those come first that say the cells' size.
 SUFFIXES = (*ROS_SUFFIXES, *TEXT_SUFFIXES, *ARRAY_SUFFIXES, *IMAGE_SUFFIXES)
 MAX_FILES = 10_000
+# Of a floor plan that is read as a picture of cells: cells a side, and the free share of them. Mazes have more walls.
+_MANY_CELLS, _MOSTLY_FREE = 100, 0.8
 
 
 def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any) -> Maze:
@@ -60,11 +64,16 @@ def read_all(path: pathlib.Path, options: MapOptions) -> tuple[Maze, ...]:
     if not path.is_dir():
         return (read_placed(path, None, options).maze,)
     files = _map_files(path)
-    with held_remarks() as lines:
-        mazes = tuple(read_placed(file, None, options).maze for file in files)
-    if lines:
-        remark(lines[0] if len(mazes) == 1 else f"{len(lines)} of {len(mazes)} maps were changed, such as {lines[0]}")
-    return mazes
+    if len(files) == 1:
+        return (read_placed(files[0], None, options).maze,)
+    mazes, remarks = [], []
+    for file in files:
+        with held_remarks() as lines:
+            mazes.append(read_placed(file, None, options).maze)
+        remarks.extend(lines[:1])
+    if remarks:
+        remark(f"{len(remarks)} of {len(mazes)} maps were changed, such as {remarks[0]}")
+    return tuple(mazes)
 
 
 def read_placed(path: pathlib.Path, size: int | None, options: MapOptions) -> PlacedMaze:
@@ -78,13 +87,32 @@ def read_placed(path: pathlib.Path, size: int | None, options: MapOptions) -> Pl
         placed = place_ros_maze(path, options)
     elif suffix in ARRAY_SUFFIXES:
         placed = PlacedMaze(read_array_maze(path, options))
+    elif options.pixel_size is not None:
+        placed = place_floor_plan(path, options.pixel_size, options)
+    elif suffix in IMAGE_SUFFIXES:
+        options.require_defaults(OCCUPANCY_OPTIONS, "ROS maps, arrays and pictures with a pixel_size", f"{path}")
+        maze = read_image_maze(path, size, options.walls)
+        if options.cell_size is None:
+            _remark_on_thin_walls(maze)
+        placed = PlacedMaze(resized(maze, options.cell_size))
     else:
         options.require_defaults(OCCUPANCY_OPTIONS, "ROS maps and arrays", f"{path}")
-        maze = read_image_maze(path, size, options.walls) if suffix in IMAGE_SUFFIXES else read_text_maze(path)
-        placed = PlacedMaze(resized(maze, options.cell_size))
+        placed = PlacedMaze(resized(read_text_maze(path), options.cell_size))
     if size not in (None, placed.maze.size):
         raise InputError(f"{path}: expected a maze of size {size}, found size {placed.maze.size}")
     return placed
+
+
+def _remark_on_thin_walls(maze: Maze) -> None:
+    """Says how large a maze is if its picture may be a floor plan in which each wall is as wide as a cell."""
+    free = ~maze.walls
+    inside = free[np.ix_(free.any(axis=1), free.any(axis=0))]
+    rows, columns = np.add(inside.shape, 2)  # with the outer walls
+    if max(rows, columns) > _MANY_CELLS and inside.mean() > _MOSTLY_FREE:
+        remark(
+            f"{maze.name}: read as {columns} m wide and {rows} m high, with a cell of 1 m for the width of a wall; "
+            "if it is a floor plan, --pixel-size sets its scale"
+        )
 
 
 def _map_files(folder: pathlib.Path) -> list[pathlib.Path]:

@@ -179,7 +179,7 @@ def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maz
     """
     if size is not None and not MIN_SIZE <= size <= MAX_SIZE:
         raise InputError(f"{name}: expected a size of {MIN_SIZE} to {MAX_SIZE} cells, found {size}")
-    gray = _to_gray(image, name)
+    gray = to_gray(image, name)
     if walls == "lines":
         return square_maze(read_lines(gray, size, name), name)
     try:
@@ -235,8 +235,12 @@ def _decode(content: bytes) -> np.ndarray | None:
     return cv2.cvtColor(image, cv2.COLOR_BGRA2RGBA if image.shape[2] == 4 else cv2.COLOR_BGR2RGB)
 
 
-def _to_gray(image: np.ndarray, name: str) -> np.ndarray:
-    """Returns the luminance of a picture on white paper: `[H, W]` uint8."""
+def to_gray(image: np.ndarray, name: str) -> np.ndarray:
+    """Returns the luminance of a picture on white paper, without its marks in colour: `[H, W]` uint8.
+
+    Raises:
+      MazeError: if `image` is not of a kind that `maze_from_image` takes, or too small.
+    """
     shape = image.shape
     if not (len(shape) == 2 or shape[2:] in ((3,), (4,))) or image.dtype not in (np.uint8, np.uint16):
         raise MazeError(f"{name}: expected a gray, RGB or RGBA picture of uint8 or uint16, found {shape} {image.dtype}")

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from mazebench.maps.cell_grid import CORE, core_bounds, fit_grid
-from mazebench.maps.drawing import WORKING_SIDE, deskew, flatten, frames, ink_of
+from mazebench.maps.drawing import THIN_WALLS, WORKING_SIDE, deskew, flatten, frames, ink_of
 from mazebench.maps.maze import MAX_SIZE, MazeError
 
 _NEARLY_BEST = 0.9  # share of the best fit
@@ -57,7 +57,9 @@ def read_lines(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
             walls[1:-2:2, 2:-1:2] | walls[3::2, 2:-1:2] | walls[2:-1:2, 1:-2:2] | walls[2:-1:2, 3::2]
         )
         return walls
-    raise MazeError(f"{name}: expected rooms in a square grid with lines as walls between them, found none")
+    raise MazeError(
+        f"{name}: expected rooms in a square grid with lines as walls between them, found none; {THIN_WALLS}"
+    )
 
 
 def _line_shares(lines: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

@@ -73,24 +73,26 @@ def place_maze(grid: OccupancyGrid, options: MapOptions, name: str) -> PlacedMaz
     below = len(grid.states) - top - (row + maze.size) * pixels  # pixels from the map's lower edge up to the maze's
     x, y = ((left + column * pixels) * grid.resolution, below * grid.resolution)
     origin = _moved(grid.origin, x, y)
-    changes = list(grid.changes)
+    changes, hints = list(grid.changes), []
     if pixels > 1:
         height, width = grid.states.shape
         changes.append(f"{width} x {height} pixels of {grid.resolution:g} m as cells of {cell_size:g} m")
     if cell_size < _SURE_CELL_SIZE:
         sure = math.ceil(_SURE_CELL_SIZE / grid.resolution - _TOLERANCE) * grid.resolution
-        changes.append(f"agents drive surely in cells from {_SURE_CELL_SIZE:g} m, try --cell-size {sure:g}")
+        hints.append(f"agents drive surely in cells from {_SURE_CELL_SIZE:g} m, try --cell-size {sure:g}")
     if num_closed:
         share = num_closed / num_free
         part = f"{num_closed:,} of {num_free:,} free cells ({100 * share:.0f} %)"
         changes.append(f"{part} closed that can't be reached from the others")
         if share > _MANY_CLOSED:
-            changes.extend(_reasons_to_close(states, pixels, grid.resolution, options))
+            hints.extend(_reasons_to_close(states, pixels, grid.resolution, options))
     if walls.shape != maze.walls.shape:
         changes.append(f"{walls.shape[0]} x {walls.shape[1]} cells padded with wall to {maze.size} x {maze.size}")
     if changes:
         changes.append(_describe_corner(origin))
         remark(f"{name}: {'; '.join(changes)}")
+    if hints:
+        remark(f"{name}: {'; '.join(hints)}")
     return PlacedMaze(maze, origin)
 
 
@@ -139,6 +141,8 @@ def _reasons_to_close(states: np.ndarray, pixels: int, resolution: float, option
     if pixels > 1:
         remedy = ", try a smaller --cell-size" if pixels > _fewest_pixels(resolution) else ""
         yield f"doors narrower than two cells ({2 * pixels * resolution:g} m) may close{remedy}"
+    if options.pixel_size is not None:
+        yield "text, furniture and door swings on a plan are walls too, erase them"
     if options.unknown == "wall" and (_walls(states, "wall") != _walls(states, "free")).any():
         yield "unknown cells are wall, try --unknown free"
     if options.inflate:

@@ -19,8 +19,8 @@ class MapOptions(Options):
 
     cell_size: float | None = option(
         None,
-        "Metres per cell of your own maps. A ROS map is coarsened to such cells; if not given, to the smallest of at "
-        "least 0.4 m. Other maps have cells of 1 m if not given.",
+        "Metres per cell of your own maps. A ROS map, or a picture with pixel_size, is coarsened to such cells; if not "
+        "given, to the smallest of at least 0.4 m. Other maps have cells of 1 m if not given.",
         lowest=0.01,
         highest=100,
     )
@@ -29,6 +29,13 @@ class MapOptions(Options):
         "Walls in a picture are rows of filled cells, or lines between rooms; R x C rooms become 2 R + 1 by 2 C + 1 "
         "cells.",
         choices=("filled", "lines"),
+    )
+    pixel_size: float | None = option(
+        None,
+        "Metres per pixel of a picture of a floor plan, which may have thin walls. It is read as a ROS map is: dark is "
+        "wall, light is free.",
+        lowest=0.001,
+        highest=100,
     )
     unknown: str = option(
         "wall",
@@ -42,6 +49,11 @@ class MapOptions(Options):
         lowest=0,
         highest=10,
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.pixel_size is not None:
+            self.require_defaults(("walls",), "pictures without a pixel_size", f"pixel_size {self.pixel_size:g}")
 
     def require_defaults(self, names: Iterable[str], expected: str, found: str) -> None:
         """Raises `InputError` if one of the options `names` has another value than its default.
@@ -58,6 +70,6 @@ class MapOptions(Options):
 
 # Those for which a map must say what is unknown, or have pixels smaller than cells.
 OCCUPANCY_OPTIONS = ("unknown", "inflate")
-PICTURE_OPTIONS = ("walls",)
+PICTURE_OPTIONS = ("walls", "pixel_size")
 MAP_OPTIONS = tuple(options_of(MapOptions))
 NO_OPTIONS = MapOptions()

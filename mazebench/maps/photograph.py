@@ -10,9 +10,10 @@ import cv2
 import numpy as np
 
 from mazebench.maps.cell_grid import core_bounds, fit_grid
-from mazebench.maps.drawing import dark_and_light, deskew, flatten, frames, ink_of
+from mazebench.maps.drawing import THIN_WALLS, dark_and_light, deskew, flatten, frames, ink_of
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, MazeError, require_connected
 
+_READ_LINES = f"read them with --walls lines; {THIN_WALLS}"
 MIN_SIDE = 3  # cells on the shorter side of a plan: wall, floor, wall
 # On synthetic photographs of 13 and 21 cells the true N had a fit of 0.6 to 0.95, any other N at most 0.39.
 _MIN_FIT = 0.4
@@ -66,8 +67,7 @@ def _read_rectangle(drawing: np.ndarray, fine: np.ndarray, size: int | None, nam
     in_words = f"{shape[0]} x {shape[1]} cells"
     if light - dark < _MIN_CONTRAST:
         raise MazeError(
-            f"{name}: expected filled walls as thick as a cell, found only lines between {in_words}; "
-            "read them with --walls lines"
+            f"{name}: expected filled walls as thick as a cell, found only lines between {in_words}; {_READ_LINES}"
         )
     clarity = np.abs(cores - (dark + light) / 2) / (light - dark)
     clarity[[0, -1], :] = clarity[:, [0, -1]] = 1
@@ -94,7 +94,7 @@ def _advice(ink: np.ndarray, size: int | None) -> str:
     if size is not None:
         return f"are there {size} cells a side?"
     if np.count_nonzero(ink) < _MIN_INK * ink.size:
-        return "are the walls lines? read them with --walls lines"
+        return f"are the walls lines? {_READ_LINES}"
     return "give the number of cells on the longer side"
 
 

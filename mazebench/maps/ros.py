@@ -15,8 +15,8 @@ import pydantic
 import yaml
 
 from mazebench.errors import InputError
-from mazebench.maps.image import read_picture
-from mazebench.maps.maze import Maze
+from mazebench.maps.image import read_picture, to_gray
+from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, PlacedMaze, place_maze
 from mazebench.maps.options import MapOptions
 from mazebench.storage.files import open_whole, read_at_most
@@ -61,6 +61,34 @@ def read_ros_maze(path: str | pathlib.Path, **options: Any) -> PlacedMaze:
 def place_ros_maze(path: str | pathlib.Path, options: MapOptions) -> PlacedMaze:
     """Reads a map of ROS as `read_ros_maze` does."""
     return place_maze(read_occupancy(path), options, pathlib.Path(path).stem)
+
+
+def place_floor_plan(path: pathlib.Path, pixel_size: float, options: MapOptions) -> PlacedMaze:
+    """Reads a picture of a floor plan as a map of ROS with pixels of `pixel_size` m and the usual thresholds.
+
+    Marks in colour are floor. The paper around the plan is cut off. The lower left corner of the picture is the origin
+    of the map.
+
+    Raises:
+      InputError: if the file can't be read.
+      MazeError: if there is no legal maze in it.
+    """
+    metadata = _Metadata(
+        image=path.name,
+        resolution=pixel_size,
+        origin=(0, 0, 0),
+        negate=False,
+        occupied_thresh=_OCCUPIED_THRESH,
+        free_thresh=_FREE_THRESH,
+        mode="trinary",
+    )
+    states = _states(to_gray(read_picture(path), path.stem), metadata)
+    rows, columns = (np.flatnonzero((states == OCCUPIED).any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        raise MazeError(f"{path.stem}: expected dark walls on light paper, found none")
+    corner = np.array([columns[0], len(states) - 1 - rows[-1]]) * pixel_size
+    plan = states[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    return place_maze(OccupancyGrid(plan, pixel_size, (*corner.tolist(), 0.0)), options, path.stem)
 
 
 def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:

@@ -61,6 +61,7 @@ def _own_maze(item: object, name: str, options: MapOptions) -> Maze:
     if isinstance(item, np.ndarray):
         return read_array(item, name, options)
     if not isinstance(item, Maze):
-        raise InputError(f"expected a Maze or an array in maps, found {type(item).__name__}")
+        hint = "; wrap rows of numbers in np.array" if isinstance(item, list) else ""
+        raise InputError(f"expected a Maze or an array in maps, found {type(item).__name__}{hint}")
     options.require_defaults(OCCUPANCY_OPTIONS, "ROS maps and arrays", f"the maze {item.name!r}")
     return resized(item, options.cell_size)

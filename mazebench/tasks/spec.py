@@ -34,7 +34,7 @@ class TaskSpec(TaskOptions):
         if self.cell_size < MIN_CELL_SIZE:
             raise InputError(
                 f"{self.mazes[0].name}: expected cells of at least {MIN_CELL_SIZE} m, through which the body passes, "
-                f"found {self.cell_size} m"
+                f"found {self.cell_size} m; a floor plan with thin walls needs --pixel-size, its metres a pixel"
             )
         if self.time_limit == 0:
             object.__setattr__(self, "time_limit", TIME_LIMIT)
