@@ -6,11 +6,12 @@ import csv
 import io
 import re
 
+import numpy as np
 import pytest
 from made_results import edit_records, edit_summary, make_result, of_own_mazes, read_summary
 
 from mazebench.errors import InputError, one_line
-from mazebench.report.provenance import provenance_rows
+from mazebench.report.provenance import HEAD, provenance_rows
 from mazebench.report.reference import paper_columns
 from mazebench.report.report import write_report
 from mazebench.report.results import read_results
@@ -303,7 +304,7 @@ class TestForms:
 
     def test_latex_of_many_long_names_stands_in_blocks_with_names_in_lines(self):
         names = [f"mylab.planners.variant-{number}:Planner" for number in range(13)]
-        latex = to_latex(table_of(*names))
+        latex = to_latex(table_of(*names), "success_rate")
         assert latex.count(r"\begin{table}") == latex.count(r"\caption") == 1
         assert [line for line in latex.splitlines() if line.startswith(r"\begin{tabular}")] == [
             r"\begin{tabular}{lrrrr}",
@@ -313,10 +314,12 @@ class TestForms:
         assert r"\begin{tabular}[b]{@{}r@{}}mylab.planners. \\{} variant-7:Planner\end{tabular}" in latex
 
     def test_latex(self):
-        latex = to_latex(table_of("mah_2 & 50%"))
+        latex = to_latex(table_of("mah_2 & 50%"), "success_rate")
         assert r"distance & mah\_2 \& 50\% \\" in latex
         assert r"2 & 0.50 [0.25, 0.75] \\" in latex
         assert latex.count(r"\begin{tabular}") == latex.count(r"\end{tabular}") == 1
+        assert r"\caption{A title: success rate. A note. The brackets are 95 \% intervals.}" in latex
+        assert r"\label{tab:made-success-rate}" in latex
 
     @pytest.mark.parametrize("text", ["a|b", "<script>", "[x](y)", "`x`", "two\nlines", "*b*"])
     def test_markdown_shows_marks_as_text(self, text):
@@ -331,8 +334,10 @@ class TestFiles:
         tables = {path.stem for path in (report / "tables").iterdir() if path.suffix == ".csv"}
         assert tables >= {"local-13", "local-15", "size-local", "hierarchical-13", "flip-hierarchical-13", "all"}
         assert tables >= {"warp-0.1-local-13", "warp-local-13", "noise-local-13", "train-local-13", "splits-local-13"}
-        for folder, suffixes in (("tables", (".md", ".csv", ".tex")), ("figures", (".png", ".pdf"))):
-            names = {path.name for path in (report / folder).iterdir()}
+        metrics = {f"{table}-{metric}.tex" for table in tables for metric in ("success-rate", "spl", "spl-grid")}
+        assert {path.name for path in (report / "tables").glob("*.tex")} == metrics
+        for folder, suffixes in (("tables", (".md", ".csv")), ("figures", (".png", ".pdf"))):
+            names = {path.name for path in (report / folder).iterdir() if path.suffix != ".tex"}
             stems = {name.removesuffix(suffixes[0]) for name in names if name.endswith(suffixes[0])}
             assert names == {stem + suffix for stem in stems for suffix in suffixes}
         figures = {path.name for path in (report / "figures").iterdir()}
@@ -357,7 +362,7 @@ class TestFiles:
         for name in ("report.html.tmp", "tables/old.csv.tmp", "figures/old.pdf.tmp"):
             (tmp_path / "out" / name).touch()
         write_report([tmp_path / "b"], tmp_path / "out", silent)
-        assert {path.stem for path in (tmp_path / "out" / "tables").iterdir()} == {"hierarchical-13", "all"}
+        assert {path.stem for path in (tmp_path / "out" / "tables").glob("*.md")} == {"hierarchical-13", "all"}
         assert list((tmp_path / "out").rglob("*.tmp")) == []
 
     def test_a_folder_that_another_process_writes_to_is_refused(self, results, tmp_path):
@@ -374,3 +379,7 @@ class TestFiles:
         rows = provenance_rows(read_results([results], silent))
         assert [row[:6] for row in rows] == [(agent, "8", "28", str(results / agent), "none", "0") for agent in AGENTS]
         assert rows[0][-1] == "mazebench eval --agent mah"
+
+    def test_provenance_names_the_versions_of_the_packages(self, results):
+        for row in provenance_rows(read_results([results], silent)):
+            assert row[HEAD.index("versions")] == f"mazebench-mujoco 0.1.0, numpy {np.__version__}"

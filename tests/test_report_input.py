@@ -116,6 +116,31 @@ class TestLabels:
         make_result(tmp_path / "e", "dqn", num_mazes=1)
         assert read(tmp_path) == (["mah aa11bb", "mah cc33dd", "random seed 0", "random seed 1", "dqn"], [])
 
+    def test_names_replace_those_of_agents_everywhere(self, run, tmp_path):
+        make_result(run / "other", "lab.agents:Bold", num_mazes=2)
+        write_report([run], tmp_path / "out", lambda line: None, [("ours", "lab.agents:Bold")])
+        files = [path for path in (tmp_path / "out").rglob("*") if path.suffix in (".md", ".csv", ".tex", ".html")]
+        assert len(files) > 5
+        for path in files:
+            text = path.read_text()
+            assert "ours" in text
+            assert text.count("lab.agents:Bold") == (path.name in ("report.md", "report.html"))  # in the command
+
+    def test_results_of_one_agent_get_names_by_their_folders(self, tmp_path):
+        for name, checkpoint in (("a", "aa11bb22"), ("b", "cc33dd44")):
+            make_result(tmp_path / name / "local-13", "mah", num_mazes=1, checkpoint=checkpoint)
+        names = [("first", str(tmp_path / "a")), ("second", str(tmp_path / "b" / "local-13"))]
+        results = read_results([tmp_path], pytest.fail, names)
+        assert [result.label for result in results] == ["first", "second"]
+
+    def test_a_name_of_nothing_and_one_of_two_agents_are_refused(self, run):
+        make_result(run / "other", "dqn", num_mazes=2)
+        with pytest.raises(InputError, match="unknown agent or folder 'mmn'; available: dqn, mah"):
+            read_results([run], pytest.fail, [("ours", "mmn")])
+        for names in ([("ours", "dqn"), ("ours", "mah")], [("dqn", "mah")], [("ours", str(run))]):
+            with pytest.raises(InputError, match=rf"expected one agent called '{names[0][0]}', found dqn, mah"):
+                read_results([run], pytest.fail, names)
+
     def test_privileged_agents_are_marked_in_tables_and_on_the_page(self, run, tmp_path):
         make_result(run / "oracle", "oracle", num_mazes=2, privileged=True)
         assert read(run) == (["mah", "oracle (privileged)"], [])
@@ -156,7 +181,7 @@ class TestRefused:
         assert not (tmp_path / "out").exists()
         status, output, errors = command(run, tmp_path / "none", "--out", tmp_path / "out")
         assert status == 0
-        assert output == f"1 results of mah: {tmp_path / 'out' / 'report.html'}, {tmp_path / 'out' / 'report.md'}\n"
+        assert output == f"1 result of mah: {tmp_path / 'out' / 'report.html'}, {tmp_path / 'out' / 'report.md'}\n"
         assert errors == (
             f"mazebench: {tmp_path / 'none'}: expected results of `mazebench eval`, found nothing there; skipped\n"
         )

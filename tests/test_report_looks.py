@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import pytest
-from made_results import make_result, of_own_mazes
+from made_results import edit_summary, make_result, of_own_mazes
 from matplotlib.image import imread
 
+from mazebench.evaluation.paper import reference
 from mazebench.maps import colors
 from mazebench.report.figures.curves import draw_curves
 from mazebench.report.figures.style import WIDTH, finish, new_figure
 from mazebench.report.figures.trajectories import draw_gallery
 from mazebench.report.galleries import build_galleries
-from mazebench.report.looks import agent_looks, shorten, wrap
+from mazebench.report.looks import PAPER_MARKERS, agent_looks, shorten, wrap
 from mazebench.report.results import read_results
 from mazebench.report.tables import build_tables
 
@@ -47,6 +48,26 @@ class TestLooks:
     def test_up_to_twelve_agents_have_markers_of_their_own(self):
         assert len({look.marker for look in agent_looks(TWELVE).values()}) == 12
 
+    def test_what_the_paper_printed_looks_like_no_agent_and_not_alike(self, tmp_path):
+        labels = ["mmn", "mah", "dqn", "random"]
+        for agent in labels:
+            make_result(tmp_path / agent, agent, "hierarchical", num_mazes=1, record=False)
+        table = build_tables(read_results([tmp_path], print), labels)[0]
+        axes = new_figure(WIDTH, 2.0).add_subplot()
+        draw_curves(axes, table, "spl_grid", agent_looks(labels))
+        assert [column.label for column in table.columns] == [*labels, *PAPER_MARKERS]
+        curves = [line for line in axes.lines if line.get_marker() not in ("None", "|", "_")]
+        looks = {(line.get_color(), line.get_marker()) for line in curves}
+        assert len(looks) == 8
+        assert not {color for color, marker in looks if marker in PAPER_MARKERS.values()} & {
+            color for color, marker in looks if marker not in PAPER_MARKERS.values()
+        }
+
+    def test_all_agents_of_the_paper_have_a_marker(self):
+        printed = {f"{agent} (paper)" for table in reference()["tables"] for agent in table["agents"]}
+        assert printed == set(PAPER_MARKERS)
+        assert len(set(PAPER_MARKERS.values())) == len(PAPER_MARKERS)
+
 
 class TestLegends:
     def test_it_stands_below_the_axes_within_the_figure_with_every_name_once(self, tmp_path):
@@ -76,6 +97,14 @@ class TestCurves:
         bars = [container.lines[2][0].get_segments()[0] for container in axes.containers]
         (left, low), (_, high) = bars[0]
         assert (0.4 < low < 0.7, high, bars[1][0][0] - left) == (True, 1.0, pytest.approx(0.12))
+
+    def test_the_star_of_an_untrained_scale_is_in_the_legend(self, tmp_path):
+        folder = make_result(tmp_path / "mah", "mah", track="lost", num_mazes=2, record=False)
+        edit_summary(folder, untrained_scale=True)
+        table = next(t for t in build_tables(read_results([tmp_path], print), ["mah"]) if t.name == "track-lost")
+        axes = new_figure(WIDTH, 2.0).add_subplot()
+        draw_curves(axes, table, "success_rate", agent_looks(["mah"]))
+        assert "never trained on maps of this scale" in axes.get_legend_handles_labels()[1]
 
 
 class TestTrajectories:

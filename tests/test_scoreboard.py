@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pathlib
 import subprocess
 import sys
 
@@ -10,17 +11,19 @@ from made_results import edit_records, edit_summary, make_result, read_summary
 
 from mazebench.errors import InputError
 from mazebench.evaluation.results import SUITE
-from mazebench.report.scoreboard import BEGIN, END, read_entries, to_markdown, write_scoreboard
+from mazebench.report.scoreboard import BEGIN, END, check, kept_entries, read_entries, to_markdown, write_scoreboard
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.tracks import TRACKS
 
+PAGE = pathlib.Path(__file__).parent.parent / "docs" / "scoreboard.md"
 PARTS = [(track, level) for track in TRACKS for level in (1, 2, 3)]
 
 
-def make_part(folder, agent, track, level, successes=200, **options):
+def make_part(folder, agent, track, level, successes=200, code="c" * 64, **options):
     """Writes the result of an agent that reaches the first `successes` of the 200 goals."""
     part = make_result(folder / f"{track}-{level}", agent, track=track, level=level, record=False, **options)
-    edit_summary(part, provenance=read_summary(part)["provenance"] | {"agent_package": "made-up 1.0"})
+    origin = {"agent_package": "made-up 1.0", "agent_code_sha256": code}
+    edit_summary(part, provenance=read_summary(part)["provenance"] | origin)
 
     def edit(record):
         success = record["episode"] < successes
@@ -30,10 +33,16 @@ def make_part(folder, agent, track, level, successes=200, **options):
     return edit_records(part, edit)
 
 
-def rows(folders):
-    """The cells of each line of the scoreboard of some folders."""
-    lines = to_markdown(read_entries(folders)).splitlines()
-    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
+def rows(entries):
+    """The cells of each line of a scoreboard."""
+    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in to_markdown(entries).splitlines()]
+
+
+@pytest.fixture
+def page(tmp_path):
+    """A page without entries."""
+    (tmp_path / "page.md").write_text(f"before\n{BEGIN}old\n{END}after\n")
+    return tmp_path / "page.md"
 
 
 @pytest.fixture(scope="module")
@@ -53,37 +62,57 @@ def suite(tmp_path_factory):
 
 class TestTable:
     def test_a_row_is_an_agent_and_a_column_a_track_and_level(self, suite):
-        head, _, whole, part = rows([suite])
+        head, _, part, whole = rows(read_entries([suite]))
         assert head == ["agent", "mean", *(f"{track} {level}" for track, level in PARTS), "configurations", "from"]
         # In 8 of 12 parts all goals are reached, in 4 half of them.
         assert whole[1].startswith("0.83 [0.")
         assert whole[0] == "whole (privileged)"
-        assert whole[2:] == [*["1.00", "1.00", "0.50"] * 4, "1", "made-up 1.0"]
-        assert part == ["part", *[""] * 4, "0.25", "0.25\\*", *[""] * 7, "2", "made-up 1.0"]
+        assert whole[2:] == [*["1.00", "1.00", "0.50"] * 4, "1", "made-up 1.0 cccccccc"]
+        assert part == ["part", *[""] * 4, "0.25", "0.25\\*", *[""] * 7, "2", "made-up 1.0 cccccccc"]
 
     def test_a_folder_of_one_agent_gives_one_row(self, suite):
-        assert rows([suite / "part"])[2:] == rows([suite])[3:]
-        assert [row[0] for row in rows([suite / "part" / "lost-1", suite / "whole"])[2:]] == [
-            "whole (privileged)",
+        assert read_entries([suite / "part"]) == read_entries([suite])[:1]
+        assert [entry.agent for entry in read_entries([suite / "part" / "lost-1", suite / "whole"])] == [
             "part",
+            "whole",
         ]
 
 
 class TestPage:
-    def test_the_table_stands_between_two_comments(self, suite, tmp_path):
-        page = tmp_path / "page.md"
-        page.write_text(f"before\n{BEGIN}old\n{END}after\n")
+    def test_the_table_stands_between_two_comments(self, suite, page):
         write_scoreboard(read_entries([suite]), page)
         written = page.read_text()
-        assert written == f"before\n{BEGIN}{to_markdown(read_entries([suite]))}{END}after\n"
+        assert [entry.agent for entry in kept_entries(page)] == ["whole", "part"]
+        assert written == f"before\n{BEGIN}{to_markdown(kept_entries(page))}{END}after\n"
         write_scoreboard(read_entries([suite]), page)
         assert page.read_text() == written
+
+    def test_a_new_entry_leaves_the_others(self, suite, page):
+        for agent in ("whole", "part"):
+            write_scoreboard(read_entries([suite / agent]), page)
+        assert [row[0] for row in rows(kept_entries(page))[2:]] == ["whole (privileged)", "part"]
+
+    def test_an_entry_replaces_one_of_the_same_agent_code_and_checkpoint_only(self, page, tmp_path):
+        for name, successes, code in (("a", 20, "c"), ("b", 40, "c"), ("c", 60, "d")):
+            make_part(tmp_path / name, "x", "lost", 1, successes, code * 64)
+            write_scoreboard(read_entries([tmp_path / name]), page)
+        assert sorted(entry.parts["lost 1"].success_rate for entry in kept_entries(page)) == [0.2, 0.3]
+
+    def test_the_page_of_the_docs_is_made_from_the_kept_entries(self):
+        assert f"{BEGIN}{to_markdown(kept_entries(PAGE))}{END}" in PAGE.read_text(encoding="utf-8")
+
+    def test_a_file_that_is_no_entry_is_named(self, page):
+        page.with_suffix("").mkdir()
+        (page.with_suffix("") / "x.json").write_text("{}")
+        with pytest.raises(InputError, match=r"x\.json: expected an entry of the scoreboard, found agent: "):
+            write_scoreboard([], page)
 
     def test_a_page_without_the_comments_is_left_as_it_is(self, suite, tmp_path):
         page = tmp_path / "page.md"
         page.write_text("nothing\n")
         with pytest.raises(InputError, match=r"page\.md: expected the lines <!-- scoreboard begins --> and "):
             write_scoreboard(read_entries([suite / "part"]), page)
+        assert [path.name for path in tmp_path.iterdir()] == ["page.md"]
         assert page.read_text() == "nothing\n"
 
     def test_bad_input_ends_the_command_with_one_line_and_status_2(self, tmp_path):
@@ -93,7 +122,36 @@ class TestPage:
         assert (run.returncode, run.stderr) == (2, said)
 
 
+class TestCheck:
+    def test_a_complete_entry_is_told_in_one_line(self, suite):
+        [line] = check(suite / "whole")
+        assert line.startswith(f"{suite / 'whole'}: a complete entry of whole, all 12 parts, mean 0.83 [")
+
+    def test_missing_parts_are_named(self, suite):
+        with pytest.raises(
+            InputError, match="expected all 12 parts, found 2; missing: stale 1, stale 2, stale 3, lost 3"
+        ):
+            check(suite)
+
+    def test_nothing_is_written(self, suite, tmp_path):
+        command = [sys.executable, "-m", "mazebench.report.scoreboard", "--check", str(suite / "whole")]
+        run = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+        assert (run.returncode, run.stderr, len(run.stdout.splitlines())) == (0, "", 1)
+        assert list(tmp_path.iterdir()) == []
+
+
 class TestRefused:
+    def test_a_result_of_other_episodes_than_the_frozen_ones(self, tmp_path):
+        part = make_part(tmp_path, "x", "lost", 1)
+        edit_records(part, lambda record: record | {"seed": record["seed"] + (record["episode"] == 7)})
+        with pytest.raises(InputError, match=r"lost-1: expected the frozen episode 7, found another one"):
+            read_entries([tmp_path])
+
+    def test_a_result_without_the_hash_of_the_code(self, tmp_path):
+        make_part(tmp_path, "x", "lost", 1, code=None)
+        with pytest.raises(InputError, match=r"lost-1: expected the hash of the agent's code, found none"):
+            read_entries([tmp_path])
+
     def test_a_result_that_is_not_of_a_track(self, tmp_path):
         make_result(tmp_path / "run", record=False)
         with pytest.raises(InputError, match=r"run: expected eval episodes of a track, found eval local"):

@@ -8,20 +8,54 @@ from typing import Annotated
 import typer
 
 from mazebench import stopping
-from mazebench.errors import remark
+from mazebench.errors import InputError, remark
 
 
 def report(
     results: Annotated[
-        list[pathlib.Path], typer.Argument(help="Evaluation folders, runs of suites, or folders above them.")
+        list[pathlib.Path],
+        typer.Argument(help="Evaluation folders, runs of suites, training runs, or folders above them."),
     ],
     out: Annotated[pathlib.Path, typer.Option(help="Folder for the report; an earlier report in it is replaced.")],
+    name: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=AGENT", help="What the report calls an agent, or the agent of a folder; repeatable."
+        ),
+    ] = None,
 ) -> None:
-    """Make tables, figures and a page to explore every episode from results of `mazebench eval`."""
-    from mazebench.report.document import DOCUMENT, PAGE
-    from mazebench.report.report import write_report
+    """Make tables, figures and a page to explore every episode from results of `mazebench eval`.
 
+    Of training runs, make figures of what they learned over their steps.
+    """
+    from mazebench.report.document import DOCUMENT, PAGE, counted
+    from mazebench.report.folders import find_folders
+
+    try:
+        from mazebench.report.learning_curves import find_runs, write_learning_curves
+        from mazebench.report.report import write_report
+    except ImportError as error:
+        raise InputError(f"the report needs {error.name}, which the extra [report] installs (docs/start.md)") from error
+    names = [_parse_name(text) for text in name or ()]
+    runs = find_runs(results)
+    has_results = bool(find_folders(results, warn=lambda line: None))
     with stopping.stoppable(lambda: (f"the report in {out} is not whole; make it again",)):
-        reported = write_report(results, out, warn=remark)
+        if runs and not has_results:
+            if names:
+                raise InputError("expected --name with results of `mazebench eval`, found training runs")
+            drawn = write_learning_curves(runs, out, warn=remark)
+            print(f"{counted(len(drawn), 'training run')}: {out / DOCUMENT}")
+            return
+        if runs:
+            remark(f"{counted(len(runs), 'training run')} left out beside results; report them by themselves")
+        reported = write_report(results, out, warn=remark, names=names)
     agents = sorted({result.label for result in reported})
-    print(f"{len(reported)} results of {', '.join(agents)}: {out / PAGE}, {out / DOCUMENT}")
+    print(f"{counted(len(reported), 'result')} of {', '.join(agents)}: {out / PAGE}, {out / DOCUMENT}")
+
+
+def _parse_name(text: str) -> tuple[str, str]:
+    """Returns the name and what it is of."""
+    name, _, what = text.partition("=")
+    if not name or not what:
+        raise InputError(f"expected --name NAME=AGENT, found {text!r}")
+    return name, what

@@ -18,7 +18,13 @@ const MARKERS = [
   "M0-1.4L.4-.5 1.3-.4.6.2.8 1.1 0 .6-.8 1.1-.6.2-1.3-.4-.4-.5z",
   "M0-1.2L1-.6V.6L0 1.2-1 .6V-.6z",
 ];
-const CROSS = "M-1-1L1 1M1-1L-1 1";
+// Strokes, of what the paper printed.
+const PAPER_MARKERS = {
+  "MMN (paper)": "M-1-1L1 1M1-1L-1 1",
+  "MAH (paper)": "M-1.2 0H1.2M0-1.2V1.2",
+  "DQN (paper)": "M0 0V1.3M0 0L-1.1-.7M0 0L1.1-.7",
+  "Random (paper)": "M0 0V-1.3M0 0L-1.1 .7M0 0L1.1 .7",
+};
 const DASHES = ["none", "7 3", "9 3 2 3"];
 const PAPER_DASH = "2 4";
 const MIN_CURVE = 4; // points of a curve with bands, as in figures/curves.py
@@ -42,14 +48,16 @@ function breakable(name) {
   return name.match(/(?:[^.:_/\\-]|[.:_/\\-]\d)*[.:_/\\-]*/g).filter(Boolean).flatMap((part) => [part, element("wbr")]);
 }
 
-// How an agent is drawn. The paper's agents have the colours of our agents with the same names.
+// How an agent, or what the paper printed of one, is drawn.
 function lookOf(label) {
-  const isPaper = !data.labels.includes(label);
-  const place = data.labels.indexOf(isPaper ? label.replace(/ \(paper\)$/, "").toLowerCase() : label);
+  const place = data.labels.indexOf(label);
+  if (place < 0) {
+    const color = "var(--ink)";
+    return { color, dash: PAPER_DASH, marker: { d: PAPER_MARKERS[label], fill: "none", stroke: color }, width: 1.2, half: 3.5 };
+  }
   const count = data.palette.length;
   const rank = place % count;
-  const color = place < 0 ? "var(--ink)" : data.palette[rank];
-  if (isPaper) return { color, dash: PAPER_DASH, marker: { d: CROSS, fill: "none", stroke: color }, width: 1.2, half: 3.5 };
+  const color = data.palette[rank];
   const dash = DASHES[Math.min(Math.floor(place / count), DASHES.length - 1)];
   const marker = { d: MARKERS[place % MARKERS.length], fill: color };
   // The later an agent is drawn, the finer its line: where two agree, both are seen.
@@ -328,11 +336,15 @@ function buildCharts() {
   }).observe(host);
 }
 
+function counted(count, noun) {
+  return `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
+}
+
 function buildHead() {
   const agents = data.labels.length > 6 ? `${data.labels.length} agents` : data.labels.join(", ");
   const count = data.results.reduce((sum, result) => sum + result.episodes, 0);
   document.getElementById("subtitle").textContent =
-    `Benchmark ${data.benchmark}; ${agents}; ${count.toLocaleString("en")} episodes in ${data.results.length} results.`;
+    `Benchmark ${data.benchmark}; ${agents}; ${counted(count, "episode")} in ${counted(data.results.length, "result")}.`;
   document.getElementById("source").textContent = `The paper: ${data.citation}. ${data.paperNote}`;
   if (data.warnings.length) {
     const warnings = document.getElementById("warnings");

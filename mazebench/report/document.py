@@ -34,7 +34,8 @@ def build_document(
     lines = [
         "# mazebench report",
         f"Benchmark {benchmark_versions(results)}; {escape_markdown(', '.join(labels))}; "
-        f"{count:,} episodes in {len(results)} results. [{PAGE}]({PAGE}) has interactive charts and every episode.",
+        f"{counted(count, 'episode')} in {counted(len(results), 'result')}. "
+        f"[{PAGE}]({PAGE}) has interactive charts and every episode.",
         "Means with 95 % intervals, which allow for the likeness of episodes in one maze. Columns marked (paper) are "
         f"the values printed in {escape_markdown(citation())}. {reference()['note']}",
         *(f"- {escape_markdown(warning)}" for warning in warnings),
@@ -43,14 +44,20 @@ def build_document(
     for table in tables:
         lines += [f"## {escape_markdown(table.title)}", escape_markdown(table.note), to_markdown(table)]
         if table.name in left:
-            lines.append(_picture(left.pop(table.name)))
+            lines.append(show_picture(left.pop(table.name)))
     for picture in left.values():
-        lines += [f"## {escape_markdown(picture.title)}", escape_markdown(picture.note), _picture(picture)]
+        lines += [f"## {escape_markdown(picture.title)}", escape_markdown(picture.note), show_picture(picture)]
     lines += ["## Results and provenance", _provenance(results)]
     return "\n\n".join(line.rstrip("\n") for line in lines if line) + "\n"
 
 
-def _picture(picture: Picture) -> str:
+def counted(count: int, noun: str) -> str:
+    """Returns "1 result" or "2 results"."""
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def show_picture(picture: Picture) -> str:
+    """Returns the Markdown that shows a figure."""
     return f"![{escape_markdown(picture.title)}]({FIGURES}/{picture.name}.png)"
 
 

@@ -17,7 +17,10 @@ from mazebench.tasks.tracks import TRACKS
 _MAX_COLUMNS = 5  # episodes of a gallery
 _MAX_ROWS = 8  # agents; further ones get galleries of their own
 _DISTANCE = 10  # cells, of local episodes: the farthest that the paper prints; less where there is none
-_NOTE = "The episodes in which the agents' outcomes differ most, of as many mazes as there are: a choice, no sample."
+_NOTE = (
+    "We picked the episodes in which the agents differ most, from different mazes if possible. "
+    "They are not a random sample."
+)
 
 # An episode, whoever drives: maze, start, goal, seed.
 Key = tuple[str, int, int, int, int, int]
@@ -124,7 +127,7 @@ def _keys(result: ReportedResult) -> list[Key]:
 def _most_telling(
     results: Sequence[ReportedResult], found: Sequence[dict[Key, int]], common: Sequence[Key]
 ) -> list[Key]:
-    """Returns the episodes in which the agents' outcomes differ most, of as many mazes as there are, in protocol order.
+    """Returns the episodes in which the agents differ most, from different mazes if possible, in protocol order.
 
     A maze gives a second episode only where every maze gives one.
     """

@@ -12,6 +12,9 @@ PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#4
 # As matplotlib calls them; charts.js has the same in the same order. With the colours they repeat after 84 agents.
 MARKERS = "os^Dv<>PXp*h"
 DASHES = ("-", "--", "-.")  # of the first agents with each colour, of the next, and of the others; dots are the paper's
+# Of what the paper printed: one colour that no agent has, and strokes where agents have areas; charts.js has the same.
+PAPER_COLOR = "#222222"
+PAPER_MARKERS = {"MMN (paper)": "x", "MAH (paper)": "+", "DQN (paper)": "1", "Random (paper)": "2"}
 _MOST_CHARACTERS = 120  # of a name in a figure
 # Where a line may end: behind blanks and the marks in names, but not in numbers; in a longer word, before a capital.
 _WORDS, _HUMPS = re.compile(r"(?<=[\s.:_/\\-])(?!\d)|(?<=\s)"), re.compile(r"(?<=[a-z0-9])(?=[A-Z])")

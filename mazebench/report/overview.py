@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from mazebench.report.measures import make_table
 from mazebench.report.results import ReportedResult
-from mazebench.report.rows import Row, common_distances, format_distances, setting_row
+from mazebench.report.rows import DISTANCES_NOTE, Row, common_distances, format_distances, setting_row
 from mazebench.report.settings import Setting
 from mazebench.report.table import Table
 
@@ -19,8 +19,7 @@ def overview(results: Sequence[ReportedResult], labels: Sequence[str]) -> Table:
         group = [result for result in results if result.setting == setting]
         has_namesake = sum(str(other) == str(setting) for other in settings) > 1
         rows[_name(setting, group, has_namesake)] = setting_row(setting, group)
-    note = "All episodes of each result; where results have other distances, those at the distances that all have."
-    return make_table("all", "All results", note, "setting", rows, (), results, labels)
+    return make_table("all", "All results", DISTANCES_NOTE, "setting", rows, (), results, labels)
 
 
 def _name(setting: Setting, results: Sequence[ReportedResult], has_namesake: bool) -> str:

@@ -42,9 +42,10 @@ def _common_folder(paths: Sequence[str]) -> str:
 
 def _origin(result: ReportedResult) -> tuple[str, ...]:
     """Returns checkpoint, seed, versions, machine and command; empty texts for what the result does not say."""
-    said = result.summary.provenance.model_extra or {}
-    packages, machine, command = (said.get(key) for key in ("packages", "machine", "command"))
-    versions = [f"{name} {packages[name]}" for name in _PACKAGES if isinstance(packages, dict) and packages.get(name)]
+    provenance = result.summary.provenance
+    said = provenance.model_extra or {}
+    machine, command = said.get("machine"), said.get("command")
+    versions = [f"{name} {provenance.packages[name]}" for name in _PACKAGES if provenance.packages.get(name)]
     return (
         result.checkpoint[:12] if result.checkpoint else "none",
         str(result.seed),

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, unknown
 from mazebench.evaluation.metrics import by_fact
 from mazebench.evaluation.records import Record, Summary, column
 from mazebench.evaluation.results import load_result
@@ -82,13 +82,18 @@ class ReportedResult:
         return self.summary.benchmark, self.summary.provenance.benchmark_manifest_sha256 or ""
 
 
-def read_results(paths: Iterable[pathlib.Path], warn: Warn) -> list[ReportedResult]:
+def read_results(
+    paths: Iterable[pathlib.Path], warn: Warn, names: Sequence[tuple[str, str]] = ()
+) -> list[ReportedResult]:
     """Returns all results at or below `paths`, one for each agent and setting, with labels; at least one.
 
-    Calls `warn` with one line about each thing that is skipped.
+    Args:
+      paths: evaluation folders, or folders above them.
+      warn: called with one line about each thing that is skipped.
+      names: what agents are called in the report: pairs of a name and an agent, or the folder of an agent's results.
 
     Raises:
-      InputError: if there is no result, or some are not of the installed benchmark.
+      InputError: if there is no result, some are not of the installed benchmark, or a name fits no agent.
     """
     results = []
     for folder in find_folders(paths, warn):
@@ -97,9 +102,10 @@ def read_results(paths: Iterable[pathlib.Path], warn: Warn) -> list[ReportedResu
         except InputError as error:
             warn(f"{error}; skipped")
     if not results:
-        raise InputError(f"expected results of `mazebench eval` in {', '.join(map(str, paths))}, found none to report")
+        where = ", ".join(map(str, paths))
+        raise InputError(f"expected results of `mazebench eval` or `mazebench train` in {where}, found none to report")
     _require_installed_benchmark(results)
-    return _drop_repeats(_label(results), warn)
+    return _drop_repeats(_label(_rename(results, names)), warn)
 
 
 def _read_result(folder: pathlib.Path, warn: Warn) -> ReportedResult:
@@ -136,6 +142,28 @@ def _read_trajectories(folder: pathlib.Path, episodes: Episodes, setting: Settin
         warn(f"{path}: expected a pose for the start and for each step, found others; reported without paths")
         return None
     return trajectories
+
+
+def _rename(results: list[ReportedResult], names: Sequence[tuple[str, str]]) -> list[ReportedResult]:
+    agents = [result.summary.agent for result in results]
+    renamed = list(agents)
+    for name, what in names:
+        folder = pathlib.Path(what).resolve()
+        chosen = [place for place, agent in enumerate(agents) if agent == what] or [
+            place for place, result in enumerate(results) if result.folder.resolve().is_relative_to(folder)
+        ]
+        if not chosen:
+            raise unknown("agent or folder", what, set(agents))
+        for place in chosen:
+            renamed[place] = name
+    for name, _ in names:
+        called = sorted({agent for agent, now in zip(agents, renamed, strict=True) if now == name})
+        if len(called) > 1:
+            raise InputError(f"expected one agent called {name!r}, found {', '.join(called)}")
+    return [
+        dataclasses.replace(result, summary=result.summary.model_copy(update={"agent": name}))
+        for result, name in zip(results, renamed, strict=True)
+    ]
 
 
 def _label(results: list[ReportedResult]) -> list[ReportedResult]:

@@ -14,6 +14,10 @@ from mazebench.report.settings import Setting
 
 # Chooses the episodes (`[E]` bool) of a result that a row is about; none of a result that is not in the row.
 Row = Callable[[ReportedResult], np.ndarray]
+# On rows of one setting each.
+DISTANCES_NOTE = (
+    "Means over all episodes. If results cover different distances, only the distances that all of them cover count."
+)
 
 
 def distance_rows(results: Sequence[ReportedResult]) -> dict[str, Row]:

@@ -1,55 +1,85 @@
-"""The scoreboard of the tracks: one table of agents, made from the folders of their results.
+"""The scoreboard of the tracks: one table of agents, made from the entries that the repository keeps.
 
-`python -m mazebench.report.scoreboard RESULTS... docs/scoreboard.md` writes it into a page, between two comments.
+`python -m mazebench.report.scoreboard RESULTS... docs/scoreboard.md` keeps an entry of each agent in RESULTS in the
+folder docs/scoreboard, one file each, and writes the table of all entries into the page, between two comments. With
+`--check`, it says whether RESULTS are complete entries, and writes nothing.
 """
 
 from __future__ import annotations
 
-import dataclasses
+import argparse
+import hashlib
 import pathlib
+import re
 import sys
 from collections.abc import Iterable, Sequence
 
-from mazebench.errors import InputError, remark
-from mazebench.evaluation.intervals import Estimate, mean_interval
-from mazebench.evaluation.records import Summary, column
+import pydantic
+
+from mazebench.errors import InputError, describe_fault, remark
+from mazebench.evaluation.intervals import mean_interval
+from mazebench.evaluation.records import Name, Share, column
 from mazebench.evaluation.results import SUITE, Result, find_parts, load_result, read_suite
 from mazebench.evaluation.trials import frozen_trials
-from mazebench.maps.benchmark import TRACKS_VERSION, manifest_hash
+from mazebench.maps.benchmark import TRACKS_VERSION, load_track_mazes, manifest_hash
 from mazebench.report.table_forms import escape_markdown
-from mazebench.storage.files import open_whole
+from mazebench.storage.files import make_folder, open_whole, read_at_most
+from mazebench.storage.json_files import write_json
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 
 BEGIN, END = "<!-- scoreboard begins -->\n", "<!-- scoreboard ends -->\n"
 UNTRAINED = "\\*"  # behind the success rates of an agent that learned on maps of another scale
 
-_PARTS = tuple((track, level) for track in TRACKS for level in LEVELS)
+_PARTS = tuple(f"{track} {level}" for track in TRACKS for level in LEVELS)
+_MAX_ENTRY_BYTES = 2**16
 
 
-@dataclasses.dataclass(frozen=True)
-class Entry:
-    """The results of one agent on some of the tracks, by track and level."""
+class _Kept(pydantic.BaseModel):
+    """Base of what an entry's file holds."""
 
-    agent: str
-    results: dict[tuple[str, int], Result]
+    model_config = pydantic.ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Part(_Kept):
+    """The success rate in the frozen episodes of one track and level."""
+
+    success_rate: Share
+    untrained_scale: bool = False
+
+
+class Configuration(_Kept):
+    """What played."""
+
+    package: str | None  # name and version; None for an agent of a file
+    code_sha256: str  # of the package or the file; its first letters in entries read off an earlier page
+    checkpoint_sha256: str | None  # None also in entries read off an earlier page
+
+
+class Entry(_Kept):
+    """The results of one agent on some of the tracks."""
+
+    agent: Name
+    privileged: bool
+    parts: dict[str, Part]  # by track and level, as "stale 1"
+    mean: tuple[Share, Share, Share] | None  # of all episodes, with its 95 % interval; None if parts are missing
+    configurations: tuple[Configuration, ...]
 
     @property
-    def mean(self) -> Estimate | None:
-        """The success rate in all episodes of all tracks and levels, each with as many; None if some are missing."""
-        if len(self.results) < len(_PARTS):
-            return None
-        records = [record for result in self.results.values() for record in result.records]
-        return mean_interval(column(records, "success"), column(records, "maze"))
+    def file_name(self) -> str:
+        """A name that entries of the same agent, code and checkpoints share."""
+        played = [each.model_dump_json() for each in self.configurations]
+        identity = hashlib.sha256("\n".join([self.agent, *sorted(played)]).encode()).hexdigest()
+        return f"{re.sub(r'[^A-Za-z0-9_]+', '-', self.agent)}-{identity[:8]}.json"
 
     @property
-    def summaries(self) -> list[Summary]:
-        """The summaries of all results."""
-        return [result.summary for result in self.results.values()]
+    def missing(self) -> list[str]:
+        """The parts that were not played."""
+        return [part for part in _PARTS if part not in self.parts]
 
 
 def read_entries(paths: Iterable[pathlib.Path]) -> list[Entry]:
-    """Returns the entries in some folders, the highest mean first, those without one last.
+    """Returns the entries that folders of results make.
 
     Args:
       paths: runs of the suite `tracks`, agents' folders in them, or folders with evaluations of one agent.
@@ -57,26 +87,42 @@ def read_entries(paths: Iterable[pathlib.Path]) -> list[Entry]:
     Raises:
       InputError: if a folder holds anything else than one agent's results of whole tracks, each once.
     """
-    entries = [_read_entry(folder) for path in paths for folder in _agents_folders(path)]
-    return sorted(entries, key=lambda entry: (-entry.mean.value if entry.mean else 1.0, entry.agent))
+    return [_make_entry(folder) for path in paths for folder in _agents_folders(path)]
+
+
+def kept_entries(page: pathlib.Path) -> list[Entry]:
+    """Returns the entries that are kept beside a page, the highest mean first, those without one last.
+
+    Raises:
+      InputError: if a file is not an entry.
+    """
+    entries = []
+    for path in page.with_suffix("").glob("*.json"):
+        try:
+            entries.append(Entry.model_validate_json(read_at_most(path, _MAX_ENTRY_BYTES, "file")))
+        except pydantic.ValidationError as error:
+            raise InputError(f"{path}: expected an entry of the scoreboard, found {describe_fault(error)}") from error
+    return sorted(entries, key=lambda e: (-e.mean[0] if e.mean else 1.0, not e.privileged, e.agent, e.file_name))
 
 
 def to_markdown(entries: Sequence[Entry]) -> str:
     """Returns the scoreboard as a table in Markdown."""
-    names = (f"{track} {level}" for track, level in _PARTS)
-    lines = [["agent", "mean", *names, "configurations", "from"]]
+    lines = [["agent", "mean", *_PARTS, "configurations", "from"]]
     lines.append(["---"] * len(lines[0]))
     for entry in entries:
-        rates = (_rate(entry.results.get(part)) for part in _PARTS)
-        lines.append([_name(entry), _mean(entry.mean), *rates, str(len(_configurations(entry))), _origin(entry)])
+        name = escape_markdown(entry.agent) + (" (privileged)" if entry.privileged else "")
+        rates = (_rate(entry.parts.get(part)) for part in _PARTS)
+        lines.append([name, _mean(entry), *rates, str(len(entry.configurations)), _origin(entry)])
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
-def write_scoreboard(entries: Sequence[Entry], page: pathlib.Path) -> None:
-    """Writes the scoreboard into `page`, in the place of the one that is there.
+def write_scoreboard(entries: Iterable[Entry], page: pathlib.Path) -> None:
+    """Keeps `entries` beside `page`, and writes the table of all that are kept in the place of the one that is there.
+
+    An entry replaces one of the same agent, code and checkpoints.
 
     Raises:
-      InputError: if the page can't be read, or has no place for a scoreboard.
+      InputError: if the page can't be read, or has no place for a scoreboard; no entry is kept then.
     """
     try:
         text = page.read_text(encoding="utf-8")
@@ -86,77 +132,132 @@ def write_scoreboard(entries: Sequence[Entry], page: pathlib.Path) -> None:
     _, end, after = rest.partition(END)
     if not begin or not end:
         raise InputError(f"{page}: expected the lines {BEGIN.strip()} and {END.strip()}, found no such lines")
+    make_folder(page.with_suffix(""))
+    for entry in entries:
+        write_json(page.with_suffix("") / entry.file_name, entry.model_dump(exclude_defaults=True))
     with open_whole(page) as file:
-        file.write(f"{before}{begin}{to_markdown(entries)}{end}{after}".encode())
+        file.write(f"{before}{begin}{to_markdown(kept_entries(page))}{end}{after}".encode())
+
+
+def check(path: pathlib.Path) -> list[str]:
+    """Returns a line about each complete entry that a folder of results makes.
+
+    Raises:
+      InputError: if the results are no entry, or not a complete one.
+    """
+    lines = []
+    for folder in _agents_folders(path):
+        entry = _make_entry(folder)
+        if entry.missing:
+            found, missing = len(entry.parts), ", ".join(entry.missing)
+            raise InputError(f"{folder}: expected all {len(_PARTS)} parts, found {found}; missing: {missing}")
+        lines.append(f"{folder}: a complete entry of {entry.agent}, all {len(_PARTS)} parts, mean {_mean(entry)}")
+    return lines
 
 
 def _agents_folders(path: pathlib.Path) -> list[pathlib.Path]:
     return [path / folder for folder in read_suite(path).folders.values()] if (path / SUITE).is_file() else [path]
 
 
-def _read_entry(folder: pathlib.Path) -> Entry:
-    results: dict[tuple[str, int], Result] = {}
+def _make_entry(folder: pathlib.Path) -> Entry:
+    results: dict[str, Result] = {}
     for result in map(load_result, find_parts(folder).values()):
         part = _part(result)
         if part in results:
-            raise InputError(f"{folder}: expected one result of {part[0]} {part[1]}, found two")
+            raise InputError(f"{folder}: expected one result of {part}, found two")
         results[part] = result
-    agents = sorted({result.summary.agent for result in results.values()})
+    summaries = [result.summary for result in results.values()]
+    agents = sorted({summary.agent for summary in summaries})
     if len(agents) > 1:
         raise InputError(f"{folder}: expected results of one agent, found those of {', '.join(agents)}")
-    return Entry(agents[0], results)
+    mean = None
+    if len(results) == len(_PARTS):  # each has as many episodes
+        records = [record for result in results.values() for record in result.records]
+        estimate = mean_interval(column(records, "success"), column(records, "maze"))
+        mean = estimate.value, estimate.low, estimate.high
+    return Entry(
+        agent=agents[0],
+        privileged=any(summary.privileged for summary in summaries),
+        parts={
+            part: Part(
+                success_rate=results[part].summary.overall.success_rate,
+                untrained_scale=results[part].summary.untrained_scale,
+            )
+            for part in _PARTS
+            if part in results
+        },
+        mean=mean,
+        configurations=tuple(dict.fromkeys(map(_configuration, results.values()))),
+    )
 
 
-def _part(result: Result) -> tuple[str, int]:
+def _part(result: Result) -> str:
     """Returns track and level of a result; raises `InputError` if it is not of all their frozen episodes."""
     summary = result.summary
-    part = (summary.track or summary.task, summary.level or 0)
+    part = f"{summary.track or summary.task} {summary.level or ''}".strip()
     if part not in _PARTS or summary.split != "eval":
-        raise InputError(f"{result.folder}: expected eval episodes of a track, found {summary.split} {part[0]}")
+        raise InputError(f"{result.folder}: expected eval episodes of a track, found {summary.split} {part}")
     if summary.provenance.benchmark_manifest_sha256 != manifest_hash(TRACKS_VERSION):
         raise InputError(f"{result.folder}: expected results of the installed benchmark, found those of another one")
-    expected = len(frozen_trials("local", summary.size, TRACKS_VERSION))
-    if summary.episodes != expected:
-        raise InputError(f"{result.folder}: expected {expected} episodes, found {summary.episodes}")
+    trials = frozen_trials("local", summary.size, TRACKS_VERSION)
+    if summary.episodes != len(trials):
+        raise InputError(f"{result.folder}: expected {len(trials)} episodes, found {summary.episodes}")
+    mazes = load_track_mazes(summary.size, "eval")
+    for record, trial in zip(result.records, trials, strict=True):
+        episode = trial.episode
+        frozen = mazes[episode.maze].name, episode.start, episode.goal, episode.seed
+        if (record.maze, record.start, record.goal, record.seed) != frozen:
+            raise InputError(f"{result.folder}: expected the frozen episode {record.episode}, found another one")
     return part
 
 
-def _name(entry: Entry) -> str:
-    privileged = any(summary.privileged for summary in entry.summaries)
-    return escape_markdown(entry.agent) + (" (privileged)" if privileged else "")
+def _configuration(result: Result) -> Configuration:
+    origin = result.summary.provenance
+    if origin.agent_code_sha256 is None:
+        raise InputError(f"{result.folder}: expected the hash of the agent's code, found none; evaluate it again")
+    return Configuration(
+        package=origin.agent_package, code_sha256=origin.agent_code_sha256, checkpoint_sha256=origin.checkpoint_sha256
+    )
 
 
-def _rate(result: Result | None) -> str:
-    if result is None:
+def _rate(part: Part | None) -> str:
+    return "" if part is None else f"{part.success_rate:.2f}{UNTRAINED if part.untrained_scale else ''}"
+
+
+def _mean(entry: Entry) -> str:
+    if entry.mean is None:
         return ""
-    return f"{result.summary.overall.success_rate:.2f}{UNTRAINED if result.summary.untrained_scale else ''}"
-
-
-def _mean(mean: Estimate | None) -> str:
-    return "" if mean is None else f"{mean.value:.2f} [{mean.low:.2f}, {mean.high:.2f}]"
-
-
-def _configurations(entry: Entry) -> set[tuple[str | None, str | None]]:
-    """Returns what played: the hashes of checkpoints, and of the files of agents that are not installed."""
-    origins = [summary.provenance for summary in entry.summaries]
-    is_file = ":" in entry.agent
-    return {(origin.checkpoint_sha256, origin.agent_code_sha256 if is_file else None) for origin in origins}
+    value, low, high = entry.mean
+    return f"{value:.2f} [{low:.2f}, {high:.2f}]"
 
 
 def _origin(entry: Entry) -> str:
     """Returns where the agent comes from: its package and version, or its file, and the hash of its code."""
-    origins = [summary.provenance for summary in entry.summaries]
-    parts = [(each.agent_package or "file", (each.agent_code_sha256 or "")[:8]) for each in origins]
-    names = {" ".join(filter(None, each)) for each in parts}
+    names = {f"{each.package or 'file'} {each.code_sha256[:8]}" for each in entry.configurations}
     return escape_markdown(", ".join(sorted(names)))
 
 
-if __name__ == "__main__":
-    if len(sys.argv) < 3:
-        sys.exit("usage: python -m mazebench.report.scoreboard RESULTS... PAGE.md")
-    *folders, target = map(pathlib.Path, sys.argv[1:])
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Runs the command; bad input ends it with one line and status 2."""
+    parser = argparse.ArgumentParser(
+        prog="python -m mazebench.report.scoreboard",
+        description="Adds results to the scoreboard in PAGE, or checks them.",
+        usage="%(prog)s [RESULTS...] PAGE.md\n       %(prog)s --check RESULTS...",
+    )
+    parser.add_argument("--check", action="store_true", help="say whether RESULTS are complete entries; write nothing")
+    parser.add_argument("paths", nargs="+", type=pathlib.Path, metavar="RESULTS", help="runs of the suite `tracks`")
+    options = parser.parse_args(arguments)
     try:
-        write_scoreboard(read_entries(folders), target)
+        if options.check:
+            for path in options.paths:
+                print(*check(path), sep="\n")
+        else:
+            *folders, page = options.paths
+            write_scoreboard(read_entries(folders), page)
     except InputError as error:
         remark(str(error))
         sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

@@ -63,25 +63,28 @@ def to_csv(table: Table) -> str:
     return file.getvalue()
 
 
-def to_latex(table: Table) -> str:
-    """Returns a `table` environment for each metric, no wider than the text; it needs booktabs and graphicx.
+def to_latex(table: Table, metric: str) -> str:
+    """Returns a `table` environment of one metric, no wider than the text; it needs booktabs and graphicx.
 
     Many columns stand in several blocks below one another.
     """
-    parts = []
-    for metric, name in table.metrics.items():
-        columns = table.columns_of(metric)
-        num_blocks = -(-len(columns) // _LATEX_COLUMNS)
-        blocks = (
-            columns[len(columns) * n // num_blocks : len(columns) * (n + 1) // num_blocks] for n in range(num_blocks)
-        )
-        parts.append(
-            "\\begin{table}\n\\centering\n"
-            f"\\caption{{{escape_latex(f'{table.title}: {name}. {table.note}')}}}\n"
-            + "\\par\\medskip\n".join(_latex_block(table, metric, block) for block in blocks)
-            + "\\end{table}\n"
-        )
-    return "\n".join(parts)
+    columns = table.columns_of(metric)
+    num_blocks = -(-len(columns) // _LATEX_COLUMNS)
+    blocks = (columns[len(columns) * n // num_blocks : len(columns) * (n + 1) // num_blocks] for n in range(num_blocks))
+    caption = f"{table.title}: {METRIC_NAMES[metric]}. {table.note}".strip()
+    if any(cell and cell.low is not None for column in columns for cell in column.cells[metric]):
+        caption += " The brackets are 95 % intervals."
+    return (
+        f"\\begin{{table}}\n\\centering\n\\caption{{{escape_latex(caption)}}}\n"
+        f"\\label{{tab:{latex_name(table, metric)}}}\n"
+        + "\\par\\medskip\n".join(_latex_block(table, metric, block) for block in blocks)
+        + "\\end{table}\n"
+    )
+
+
+def latex_name(table: Table, metric: str) -> str:
+    """Returns the name of the file of one metric, which is also its label."""
+    return f"{table.name}-{metric}".replace("_", "-")
 
 
 def escape_markdown(text: str) -> str:

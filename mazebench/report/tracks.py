@@ -6,11 +6,9 @@ from collections.abc import Iterator, Sequence
 
 from mazebench.report.measures import make_table
 from mazebench.report.results import ReportedResult
-from mazebench.report.rows import Row, level_rows
+from mazebench.report.rows import DISTANCES_NOTE, Row, level_rows
 from mazebench.report.table import Table
 from mazebench.tasks.tracks import TRACKS
-
-_NOTE = "All episodes of each level; where results have other distances, those at the distances that all have."
 
 
 def track_tables(results: Sequence[ReportedResult], labels: Sequence[str]) -> Iterator[Table]:
@@ -20,7 +18,7 @@ def track_tables(results: Sequence[ReportedResult], labels: Sequence[str]) -> It
     if groups:
         rows = {f"{name} {level}": row for name, group in groups.items() for level, row in level_rows(group).items()}
         played = [result for group in groups.values() for result in group]
-        yield make_table("tracks", "Tracks", _NOTE, "track and level", rows, (), played, labels)
+        yield make_table("tracks", "Tracks", DISTANCES_NOTE, "track and level", rows, (), played, labels)
     for name, group in groups.items():
         levels = level_rows(group)
         meanings = "; ".join(f"{level}: {TRACKS[name].levels[int(level) - 1]}" for level in levels)

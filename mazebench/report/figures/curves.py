@@ -10,13 +10,11 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 
-from mazebench.report.figures.style import NAME_CHARACTERS, STYLE, WIDTH, finish, new_figure, panel_grid
-from mazebench.report.looks import PALETTE, Look, wrap
+from mazebench.report.figures.style import NAME_CHARACTERS, STYLE, UNTRAINED_KEY, WIDTH, finish, new_figure, panel_grid
+from mazebench.report.looks import PALETTE, PAPER_COLOR, PAPER_MARKERS, Look, wrap
 from mazebench.report.results import METRICS
-from mazebench.report.table import UNTRAINED_MARK, Cell, Column, Table
+from mazebench.report.table import UNTRAINED_MARK, Cell, Table
 
-_PAPER_MARKERS = "x+12"
-_PAPER_COLOR = "#222222"
 _DODGE, _DODGES = 0.12, 0.72  # of the smallest step between levels: two agents are so far apart, all of them at most
 _MIN_CURVE = 4  # points of a curve with bands; fewer have bars, since bands over one point are not seen
 _BAND, _BANDS = 0.16, 0.9  # opacity of a band, and of all bands together at most
@@ -59,14 +57,14 @@ def draw_curves(axes: Axes, table: Table, metric: str, looks: Mapping[str, Look]
     for index, column in enumerate(ours):
         shift = 0.0 if is_curve else (index - (len(ours) - 1) / 2) * dodge
         _draw_curve(axes, x + shift, column.cells[metric][: len(x)], looks[column.label], band)
-    for index, column in enumerate(column for column in table.columns_of(metric) if column.is_paper):
+    for column in (column for column in table.columns_of(metric) if column.is_paper):
         points = [(at, cell.value) for at, cell in zip(x, column.cells[metric], strict=False) if cell]
         axes.plot(
             *np.array(points).T,
             linestyle=":",
             linewidth=0.9,
-            color=_paper_color(column, looks),
-            marker=_PAPER_MARKERS[index % len(_PAPER_MARKERS)],
+            color=PAPER_COLOR,
+            marker=PAPER_MARKERS[column.label],
             markersize=5.5,
             label=column.label,
             zorder=4,
@@ -78,12 +76,6 @@ def draw_curves(axes: Axes, table: Table, metric: str, looks: Mapping[str, Look]
     if not is_curve or len(x) <= 5:
         every = 1 if len(x) <= 8 else 2
         axes.set_xticks(x[::every], table.rows[: len(x) : every])
-
-
-def _paper_color(column: Column, looks: Mapping[str, Look]) -> str:
-    """Returns the colour of the agent with the same name as the paper's agent."""
-    namesake = looks.get(column.label.partition(" ")[0].lower())
-    return namesake.color if namesake else _PAPER_COLOR
 
 
 def _draw_curve(axes: Axes, x: np.ndarray, cells: Sequence[Cell | None], look: Look, band: float | None) -> None:
@@ -100,6 +92,7 @@ def _draw_curve(axes: Axes, x: np.ndarray, cells: Sequence[Cell | None], look: L
     for at, cell in zip(x, cells, strict=True):
         if cell and cell.is_untrained_scale:
             axes.annotate(UNTRAINED_MARK, (at, cell.value), (3, 1), textcoords="offset points")
+            axes.plot([], [], linestyle="", marker=(6, 2, 0), markersize=5, color="black", label=UNTRAINED_KEY)
     if band is not None:
         axes.fill_between(x[there], low, high, color=look.color, alpha=band, linewidth=0)
         axes.plot(x[there], value, **style)

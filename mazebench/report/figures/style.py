@@ -16,6 +16,7 @@ from mazebench.storage.files import open_whole
 WIDTH = 7.0  # inches, of a page's text
 LINE = 0.16  # inches, of a line of text
 NAME_CHARACTERS = 40  # in a line of a legend, so that two names stand side by side
+UNTRAINED_KEY = "never trained on maps of this scale"  # in legends
 _DPI = 200
 _MAX_PANELS_IN_ROW = 3
 _MAX_LEGEND_COLUMNS = 6
@@ -77,12 +78,12 @@ def _widest_legend(figure: Figure, handles: Sequence[Any]) -> Legend:
 
 
 def _curve_handles(figure: Figure) -> list[Any]:
-    """Returns the legend's entries of all curves, each once, the paper's last."""
+    """Returns the legend's entries of all curves, each once, the paper's and the star's last."""
     named: dict[str, Any] = {}
     for axes in figure.axes:
         handles, names = axes.get_legend_handles_labels()
         named |= dict(zip(names, handles, strict=True))
-    return [named[name] for name in sorted(named, key=lambda name: name.endswith("(paper)"))]
+    return [named[name] for name in sorted(named, key=lambda name: (name == UNTRAINED_KEY, name.endswith("(paper)")))]
 
 
 def save(figure: Figure, path: pathlib.Path) -> None:

@@ -1,0 +1,151 @@
+"""Learning curves: the success rates and losses that training runs logged, over their agent steps."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import pathlib
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.ticker import EngFormatter
+
+from mazebench.errors import InputError
+from mazebench.report.document import DOCUMENT, FIGURES, Picture, show_picture
+from mazebench.report.figures.style import NAME_CHARACTERS, STYLE, WIDTH, finish, new_figure, panel_grid
+from mazebench.report.folders import Warn
+from mazebench.report.looks import Look, agent_looks, wrap
+from mazebench.report.report import new_report, write_text
+from mazebench.report.table_forms import escape_markdown
+from mazebench.storage.json_files import parse_json, read_json, read_lines
+from mazebench.training.run_folder import CHECKPOINTS, CONFIG, METRICS
+
+_STEPS = "env_steps"
+_SUCCESS, _LOSS = "success_rate_", "_loss"  # how the names of such metrics begin, and end
+_MARKS = 12  # on a curve
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """What a training run logged."""
+
+    name: str
+    config: dict[str, Any]
+    lines: tuple[dict[str, float], ...]  # metrics by name; success rates are in the lines of milestones only
+
+    def last(self, metric: str) -> str:
+        """Returns the last value of a metric in words; nothing if there is none."""
+        values = [line[metric] for line in self.lines if metric in line]
+        return f"{values[-1]:.2f}" if values else ""
+
+
+def find_runs(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
+    """Returns the folders of training runs at or below `paths`, each once. Hidden folders are left out."""
+    found = {}
+    for path in paths:
+        for folder, subfolders, files in os.walk(path):
+            if CONFIG in files and CHECKPOINTS in subfolders:
+                found[pathlib.Path(folder).resolve()] = pathlib.Path(folder)
+            subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
+    return list(found.values())
+
+
+def write_learning_curves(folders: Sequence[pathlib.Path], out: pathlib.Path, warn: Warn) -> list[Run]:
+    """Writes figures of all runs and a document with them to the folder `out`, and returns the runs.
+
+    Args:
+      folders: of training runs, at least one.
+      out: an empty or new folder, or one with an earlier report, which is replaced.
+      warn: called with one line about each run that is skipped.
+
+    Raises:
+      InputError: if no run has logged anything, or `out` can't be used.
+    """
+    runs = [run for folder, name in zip(folders, _names(folders), strict=True) if (run := _read(folder, name, warn))]
+    if not runs:
+        raise InputError("expected training runs with metrics, found none to report")
+    looks = agent_looks([run.name for run in runs])
+    metrics = list(dict.fromkeys(metric for run in runs for line in run.lines for metric in line))
+    rates = sorted((metric for metric in metrics if metric.startswith(_SUCCESS)), key=lambda rate: (len(rate), rate))
+    losses = [metric for metric in metrics if metric.endswith(_LOSS)]
+    success = Picture("success", "Success rate by distance", "On held-out mazes, at each milestone.")
+    loss = Picture("losses", "Losses", f"Of the training, as {METRICS} has them.")
+    lines = ["# Learning curves", _table(runs, rates)]
+    with new_report(out):
+        for picture, panels in (
+            (success, {rate: f"distance {rate.removeprefix(_SUCCESS)}" for rate in rates}),
+            (loss, {name: name.replace("_", " ") for name in losses}),
+        ):
+            if panels:
+                _draw(runs, looks, panels, picture, out / FIGURES / picture.name)
+                lines += [f"## {picture.title}", picture.note, show_picture(picture)]
+        write_text(out / DOCUMENT, "\n\n".join(lines) + "\n")
+    return runs
+
+
+def _names(folders: Sequence[pathlib.Path]) -> list[str]:
+    """Returns the folders' names, as short as they can be while no two are alike."""
+    whole = [folder.resolve() for folder in folders]
+    common = whole[0].parent if len(whole) == 1 else os.path.commonpath(whole)
+    return [str(folder.relative_to(common)) for folder in whole]
+
+
+def _read(folder: pathlib.Path, name: str, warn: Warn) -> Run | None:
+    """Returns what a run logged, but for a line that is written just now; nothing if it logged nothing yet."""
+    try:
+        config = read_json(folder / CONFIG)
+        lines = tuple(filter(None, map(_parse, read_lines(folder / METRICS))))
+    except InputError as error:
+        warn(f"{error}; skipped")
+        return None
+    if not lines or not isinstance(config, dict):
+        warn(f"{folder}: expected a training run with metrics, found none yet; skipped")
+        return None
+    return Run(name, config, lines)
+
+
+def _parse(line: bytes) -> dict[str, float]:
+    """Returns the numbers of a line; nothing if it has no steps."""
+    try:
+        found = parse_json(line)
+    except ValueError:
+        return {}
+    if not isinstance(found, dict) or _STEPS not in found:
+        return {}
+    return {name: value for name, value in found.items() if type(value) in (int, float)}
+
+
+def _table(runs: Sequence[Run], rates: Sequence[str]) -> str:
+    head = ("run", "agent", "seed", "agent steps", "updates", *(f"success, {rate[len(_SUCCESS) :]}" for rate in rates))
+    lines = [head, ("---",) * len(head)]
+    for run in runs:
+        of_config = [escape_markdown(str(run.config.get(key, ""))) for key in ("agent", "seed")]
+        counts = [f"{run.lines[-1].get(name, 0):,}" for name in (_STEPS, "updates")]
+        lines.append((escape_markdown(run.name), *of_config, *counts, *map(run.last, rates)))
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines).rstrip()
+
+
+def _draw(
+    runs: Sequence[Run], looks: Mapping[str, Look], panels: Mapping[str, str], picture: Picture, path: pathlib.Path
+) -> None:
+    """Draws a panel for each metric, with a curve for each run."""
+    with mpl.rc_context(STYLE):
+        rows, columns = panel_grid(len(panels))
+        figure = new_figure(WIDTH, 0.2 + 1.9 * rows)
+        for index, (metric, name) in enumerate(panels.items()):
+            axes = figure.add_subplot(rows, columns, index + 1)
+            for run in runs:
+                points = [(line[_STEPS], line[metric]) for line in run.lines if metric in line]
+                look = looks[run.name]
+                style: dict[str, Any] = {"color": look.color, "marker": look.marker, "linestyle": look.dashes}
+                style |= {"markersize": 3, "linewidth": 1.2, "markevery": -(-len(points) // _MARKS) or 1}
+                axes.plot(
+                    *zip(*points, strict=True) if points else ((), ()), label=wrap(look.name, NAME_CHARACTERS), **style
+                )
+            axes.set_title(name, loc="left")
+            axes.set_xlabel("agent steps")
+            axes.xaxis.set_major_formatter(EngFormatter(sep=""))
+            if metric.startswith(_SUCCESS):
+                axes.set_ylim(-0.05, 1.05)
+        finish(figure, picture.title, path)
