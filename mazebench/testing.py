@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import itertools
 from collections.abc import Iterator, Sequence
@@ -24,7 +25,6 @@ _SIZE = 7
 _NUM_MAZES = 3  # of different paths between their corners, so that episodes side by side end at different steps
 _TIME_LIMIT = 5  # steps a leg: whatever an agent does, all landmarks come up
 _ORDER = ((0, 3), (1, 4), (2, 5))  # the episodes' numbers in three slots, each slot's one after another
-_YAW = 5  # index in the state
 
 
 class ConformanceError(AssertionError):
@@ -148,28 +148,29 @@ class _Trial:
             return None if number is None else self._episodes[number]
 
         env = MazeVectorEnv(self._task_spec, num_slots, num_threads=1, episode_source=next_episode)
-        observation, info = env.reset()
-        new_episode = np.ones(num_slots, dtype=bool)
-        state = agent.initial_state(num_slots)
-        while any(number is not None for number in running):
-            seed = np.array([agent_seed(0, number or 0) for number in running])
-            inputs = Inputs(observation, new_episode, info["is_first"], seed)
-            if self._agent_class.needs_truth:
-                truth = true_state(self._task_spec, env.episodes, info["position"], observation["state"][:, _YAW])
-                inputs = inputs._replace(truth=truth)
-            before = _arrays(inputs)
-            taken, state = agent.act(inputs, state)
-            for name, array in _arrays(inputs).items():
-                _require(
-                    np.array_equal(array, before[name]),
-                    f"agent {self.name!r}: expected act() to leave inputs.{name} as it was; change a copy",
-                )
-            for number, action in zip(running, taken.tolist(), strict=True):
-                if number is not None:
-                    actions.setdefault(number, []).append(action)
-            observation, _, terminated, truncated, info = env.step(taken)
-            new_episode = (terminated | truncated) & [number is not None for number in running]
-            yield
+        with contextlib.closing(env):
+            observation, info = env.reset()
+            new_episode = np.ones(num_slots, dtype=bool)
+            state = agent.initial_state(num_slots)
+            while any(number is not None for number in running):
+                seed = np.array([agent_seed(0, number or 0) for number in running])
+                inputs = Inputs(observation, new_episode, info["is_first"], seed)
+                if self._agent_class.needs_truth:
+                    truth = true_state(self._task_spec, env.episodes, info["position"], info["yaw"])
+                    inputs = inputs._replace(truth=truth)
+                before = _arrays(inputs)
+                taken, state = agent.act(inputs, state)
+                for name, array in _arrays(inputs).items():
+                    _require(
+                        np.array_equal(array, before[name]),
+                        f"agent {self.name!r}: expected act() to leave inputs.{name} as it was; change a copy",
+                    )
+                for number, action in zip(running, taken.tolist(), strict=True):
+                    if number is not None:
+                        actions.setdefault(number, []).append(action)
+                observation, _, terminated, truncated, info = env.step(taken)
+                new_episode = (terminated | truncated) & [number is not None for number in running]
+                yield
 
 
 def _arrays(inputs: Inputs) -> dict[str, np.ndarray]:

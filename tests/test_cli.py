@@ -172,7 +172,10 @@ BAD_INPUT = [
     ((*TINY, "--maps", "{bad}/open.txt"), "open: expected a closed border, found cell (2, 4) free"),
     # the others
     (("compare", "{bad}/used"), "Missing argument 'B'"),
-    (("train", "--agent", "mah", "--ray", "auto"), "without --workers this process collects by itself; found --ray"),
+    (
+        ("train", "--agent", "mah", "--ray-address", "auto"),
+        "without --workers this process collects by itself; found --ray-address",
+    ),
     (("render",), "Missing option '--out'"),
     (("render", "--out", "film.avi"), "unknown suffix '.avi'; available: .gif, .mp4, .png"),
     (("render", "--out", "x.png", "--pixels", "10"), "Invalid value for '--pixels'"),

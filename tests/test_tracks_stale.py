@@ -30,7 +30,10 @@ def grid(*lines: str) -> np.ndarray:
 def test_as_many_doors_open_as_close_and_nothing_else_changes(size, seed, swaps):
     rng = np.random.default_rng(seed)
     walls = dfs_walls(size, rng)
-    moved = move_doors(walls, swaps, [], rng)
+    try:
+        moved = move_doors(walls, swaps, [], rng)
+    except InputError:  # a maze of 4 x 4 rooms can have too few walls that may open
+        hypothesis.reject()
     assert (moved & ~walls).sum() == (walls & ~moved).sum() == swaps
     rows, columns = np.nonzero(moved != walls)
     assert ((rows + columns) % 2 == 1).all()  # a room and a pillar are an even number of cells from the corner

@@ -53,8 +53,11 @@ def evaluate(
         int, typer.Option(min=0, help="Processes; 0 runs in this one, and with --ray on all its CPUs.")
     ] = 0,
     ray: Annotated[
+        bool, typer.Option("--ray", help="Run the workers on Ray; without an address, on this machine.")
+    ] = False,
+    ray_address: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="Address of a Ray cluster for the workers; auto, or local for a new one."),
+        typer.Option(metavar="ADDRESS", help="Of a Ray cluster for the workers; auto finds one that runs here."),
     ] = None,
 ) -> None:
     """Evaluate agents on unseen mazes: success rate and SPL with 95 % intervals."""
@@ -65,7 +68,7 @@ def evaluate(
     refuse_ignored(
         context,
         (suite is not None, f"the suite {suite!r} has evaluations of its own", TASK_CHOICES),
-        (bool(workers) or ray is not None, "the agent acts in other processes", ("show_traceback",)),
+        (bool(workers or ray or ray_address), "the agent acts in other processes", ("show_traceback",)),
     )
     refuse_ignored_by_task(context, values)
     if resume and out is None:
@@ -77,7 +80,8 @@ def evaluate(
         begun = folder.is_dir() and any(folder.iterdir())
         print(f"resuming {folder}" if begun else f"nothing to resume in {folder}; starting a new run")
     kept = progress.Kept()
-    running = {"resume": resume, "num_envs": num_envs, "workers": workers, "ray_address": ray}
+    running: dict[str, Any] = {"resume": resume, "num_envs": num_envs, "workers": workers}
+    running["ray_address"] = ray_address or ("local" if ray else None)
 
     def how_to_go_on() -> tuple[str, ...]:
         if kept.of is None and not folder.exists():

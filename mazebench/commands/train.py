@@ -42,7 +42,7 @@ def train(
 
     refuse_ignored(
         context,
-        (not values["workers"], "without --workers this process collects by itself", ("ray",)),
+        (not values["workers"], "without --workers this process collects by itself", ("ray_address",)),
         (values["track"] is None, *NO_TRACK),
         (values["track"] is not None, *TRACK),
         (not has_camera(values["sensors"]), *NO_CAMERA),

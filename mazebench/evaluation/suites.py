@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import pathlib
 from collections.abc import Callable, Sequence
@@ -114,8 +115,10 @@ def run_suite(
         for part in SUITES[suite]
     }
     plans = _playable(plans, out, suite, warn)
-    make_folder(out)
-    with FolderLock(out), open_pool(workers, ray_address) as pool:
+    with contextlib.ExitStack() as stack:
+        pool = stack.enter_context(open_pool(workers, ray_address))  # first: if it is refused, no folder is made
+        make_folder(out)
+        stack.enter_context(FolderLock(out))
         _prepare(out, suite, agents, seed, plans, resume)
         total = sum(len(plan.trials) for plan in plans.values())
         summaries, before = [], 0

@@ -53,7 +53,7 @@ class TrainOptions(TaskOptions):
     )
     eval_mazes: int = option(20, "Held-out mazes of an evaluation, with 10 episodes in each.", lowest=1)
     workers: int = option(0, "Ray actors that collect; 0 collects in this process.", lowest=0)
-    ray: str | None = option(None, "Address of a Ray cluster for the workers; local if not given.")
+    ray_address: str | None = option(None, "Address of a Ray cluster for the workers; local if not given.")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -62,8 +62,8 @@ class TrainOptions(TaskOptions):
                 raise InputError(f"expected {name} {value!r} in a training, found {getattr(self, name)!r}")
         if self.minutes is None and self.env_steps is None:
             raise InputError("expected --minutes or --env-steps, found neither")
-        if self.ray is not None and not self.workers:
-            raise InputError("--ray needs --workers, the number of actors on the cluster")
+        if self.ray_address is not None and not self.workers:
+            raise InputError("--ray-address needs --workers, the number of actors on the cluster")
 
     @property
     def chosen_task(self) -> dict[str, Any]:
