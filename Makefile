@@ -1,5 +1,8 @@
 # Two commands do everything on a fresh machine: `make eval` and `make test`.
-PYTHON ?= python3.11
+# With which Python .venv is made; the first of PYTHONS that works if none is given. torch's wheel for 3.11 is the smallest.
+PYTHON ?= $(shell for python in $(PYTHONS); do \
+  "$$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo "$$python" && break; done)
+PYTHONS := python3.11 python3.12 python3.13 python3.14 python3
 BIN := .venv/bin
 AGENT ?= mmn
 
@@ -8,8 +11,10 @@ AGENT ?= mmn
 # Installs an extra: `agents` is what an evaluation needs, `dev` has everything. Made anew where it may have changed.
 # Modules become bytecode when they are first imported, unless Python may not keep it: then pip makes it.
 .venv/installed-%: pyproject.toml constraints.txt
-	@echo "Installing mazebench[$*] into .venv: a minute or two, and as long as the downloads take."
-	$(PYTHON) -m venv .venv
+	@python="$(PYTHON)"; test "$$python" || { echo "make: expected Python 3.11 or later with its module venv, found none;" \
+	  "looked for $(PYTHONS); name yours: make PYTHON=/path/to/python" >&2; exit 1; }; \
+	echo "Installing mazebench[$*] into .venv with $$("$$python" --version): some minutes, and as long as downloads take."; \
+	"$$python" -m venv .venv
 	$(BIN)/pip install $(if $(PYTHONDONTWRITEBYTECODE),,--no-compile) --disable-pip-version-check -c constraints.txt -e '.[$*]'
 	touch .venv/installed-agents $@  # dev includes agents
 

@@ -23,7 +23,7 @@ from mazebench.maps.ros import write_ros_map
 from mazebench.maps.text import write_text_maze
 
 EVERY_PAGE = pytest.mark.parametrize("page", PAGES, ids=name_of)
-LANGUAGES = {"python", "sh", "text", "toml", "json", "yaml"}
+LANGUAGES = {"python", "sh", "text", "toml", "json", "yaml", "bibtex"}
 COMMANDS = typer.main.get_command(cli.app).commands
 # Quick, and without a checkpoint.
 PLAIN_AGENTS = {"random", "planner", "planner-closed-loop"}
@@ -151,6 +151,7 @@ def reader(tmp_path, monkeypatch, capsys):
     monkeypatch.syspath_prepend(tmp_path)
     maze = generate("dfs", 9, np.random.default_rng(0))
     write_image(draw_maze(maze), "plan.png")
+    write_image(draw_maze(maze, 50), "office.png")
     pathlib.Path("plans").mkdir()
     write_text_maze(maze, "plans/plan.txt")
     write_ros_map(maze, "map.yaml")
