@@ -45,7 +45,7 @@ def shortened(text: str, most: int = 300) -> str:
 def unknown(kind: str, name: object, available: Iterable[object]) -> InputError:
     """Returns the error of an unknown name, which lists the known ones."""
     names = ", ".join(sorted(str(item) for item in available)) or "none"
-    return InputError(f"unknown {kind} {str(name)[:80]!r}; available: {names}")
+    return InputError(f"unknown {kind} {repr(name)[:80]}; available: {names}")
 
 
 def remark(line: str) -> None:

@@ -87,7 +87,7 @@ def test_the_user_chooses_before_the_learner_does(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"size": 14}, "unknown size '14'"),
+        ({"size": 14}, "unknown size 14"),
         ({"pairs": "foo"}, "unknown pairs 'foo'; available: fixed, random"),
         ({"minutes": 0}, "expected minutes from 0.01 to 527040, found 0"),
         ({"minutes": float("inf")}, "expected minutes from 0.01 to 527040, found inf"),

@@ -24,6 +24,11 @@ class Arguments(Options):
     num_envs: int = option(1, "Environments side by side.", lowest=1)
     num_threads: int = option(0, "Threads of the simulation; 0 uses all cores.", lowest=0)
 
+    def __post_init__(self) -> None:
+        if self.render_mode == "human":
+            raise InputError("expected render_mode 'rgb_array', found 'human'; `mazebench play` opens a window")
+        super().__post_init__()
+
 
 def require_task_spec(task_spec: TaskSpec) -> None:
     """Raises `InputError` unless `task_spec` is one, which a task's name, for example, is not."""
