@@ -6,7 +6,7 @@ PYTHONS := python3.11 python3.12 python3.13 python3.14 python3
 BIN := .venv/bin
 AGENT ?= mmn
 
-.PHONY: eval test docs check check-full release pythons bench clean
+.PHONY: eval test test-slow docs check check-full release pythons bench clean
 
 # Installs an extra: `agents` is what an evaluation needs, `dev` has everything. Made anew where it may have changed.
 # Modules become bytecode when they are first imported, unless Python may not keep it: then pip makes it.
@@ -35,8 +35,11 @@ check: .venv/installed-dev
 	$(MAKE) docs
 	$(MAKE) test
 
-check-full: check
-	$(BIN)/pytest -m slow
+# The tests that `make test` leaves out: kills, full disks, busy machines.
+test-slow: .venv/installed-dev
+	$(BIN)/pytest -n auto -m slow
+
+check-full: check test-slow
 	$(MAKE) pythons
 
 # Into dist/, checked.

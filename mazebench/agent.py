@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import functools
 import pathlib
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -189,8 +190,12 @@ class _SingleAgents(Agent):
 
 def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
     """Returns `declared` itself if it is an `Agent`, else an `Agent` that runs the `SingleAgent` in B environments."""
-    if issubclass(declared, Agent):
-        return declared
+    return declared if issubclass(declared, Agent) else _running(declared)
+
+
+@functools.cache  # so that a class and its import by name give one and the same
+def _running(declared: type[SingleAgent]) -> type[Agent]:
+    """Returns an `Agent` that runs a `SingleAgent`."""
     # Named as the class that it wraps, for messages and provenance.
     names = ("__module__", "__qualname__", "__doc__", "needs_truth", "needs_sensors")
     attributes = {name: getattr(declared, name) for name in names}

@@ -54,7 +54,7 @@ def load_agent_class(name: str) -> type[Agent]:
     if name not in entry_points:
         if now := present_name(name):
             raise InputError(f"agent {name!r} is now {now!r}")
-        raise unknown("agent", name, entry_points)
+        raise InputError(f"{unknown('agent', name, entry_points)}; one of your own is named as module:Class")
     try:
         loaded = entry_points[name].load()
     except ModuleNotFoundError as error:

@@ -73,7 +73,7 @@ def _check_acting(trial: _Trial) -> None:
     check(
         "when built anew from the same seed",
         trial.play(_ORDER),
-        "draw random numbers only from generators made of inputs.seed",
+        "make weights in build() from its seed, and draw random numbers only from generators made of inputs.seed",
     )
     check(
         "when another batch is played by turns",

@@ -18,6 +18,8 @@ from mazebench.errors import InputError, UnplayableError
 from mazebench.evaluation.agent_inputs import true_state
 from mazebench.evaluation.checked_agent import CheckedAgent
 from mazebench.evaluation.chunk import run_trials
+from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.plan import make_plan
 from mazebench.evaluation.trials import select_trials
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import generate
@@ -318,7 +320,10 @@ class TestConformance:
             (NoState, r"expected act\(\) to return \(actions, state\), found "),
             (HalvesTheMap, r"expected act\(\) to leave inputs\.observation\['context'\] as it was; change a copy$"),
             (ClearsTheMarks, r"expected act\(\) to leave inputs\.new_context as it was; change a copy$"),
-            (Unseeded, SAME + r"when built anew from the same seed, found others; draw random numbers only from "),
+            (
+                Unseeded,
+                SAME + r"when built anew from the same seed, found others; make weights in build\(\) from its seed, ",
+            ),
             (GlobalDraws, SAME + r"when built anew from the same seed, found others; "),
             (NeverResets, SAME + r"after another episode, found others; begin anew where inputs\.new_episode is set$"),
             (ResetsAll, SAME),
@@ -337,7 +342,7 @@ class TestConformance:
             (NamedMethod, r"expected context_size\(\) to be a classmethod, found a method of its objects$"),
             (Stranger, r"expected a subclass of mazebench\.Agent or mazebench\.SingleAgent, found one of object$"),
             (Motionless, r"expected a class with act\(\), found none$"),
-            (AloneReturnsNothing, r"expected act\(\) to return integer actions, found object$"),
+            (AloneReturnsNothing, r"expected act\(\) to return integer actions, found None$"),
             (AloneReturnsAnArray, r"expected act\(\) to return 3 actions, one an environment, found shape \(3, 1\)$"),
             (AloneWithAGlobal, SAME),
         ],
@@ -434,7 +439,10 @@ class TestLoading:
     @pytest.mark.parametrize(
         ("name", "message"),
         [
-            ("plannr", r"^unknown agent 'plannr'; available: .*planner, planner-closed-loop"),
+            (
+                "plannr",
+                r"^unknown agent 'plannr'; available: .*planner, planner-closed-loop.*; .* named as module:Class$",
+            ),
             ("no_such_module:Agent", r"^agent 'no_such_module:Agent': expected module:Class .* No module named"),
             ("json:Agent", r"^agent 'json:Agent': expected module:Class .* module 'json' has no attribute 'Agent'$"),
             ("json:JSONDecoder", r"^agent 'json:JSONDecoder': expected a subclass of .*, found one of object$"),
@@ -511,7 +519,28 @@ class TestPlanners:
 OF_ONE_SIZE = ("mmn", "mah-paper")  # agents whose code of a context has a fixed size
 
 
+class Small(Counting):
+    """Asks for the same map whatever the size of the mazes is."""
+
+    @classmethod
+    def context_size(cls, size):
+        return 13
+
+
 class TestTracks:
+    def test_an_agent_that_asks_for_one_size_is_refused_where_a_track_shows_another(self):
+        assert make_plan(EvalOptions("mine:Small", track="stale"), Small).build_agent().name == "mine:Small"
+        plan = make_plan(EvalOptions("mine:Small", track="sketch"), Small)
+        message = r"context_size\(\) asks for maps of 13 x 13 only; the track 'sketch' shows 26 x 26$"
+        with pytest.raises(UnplayableError, match=message):
+            plan.build_agent()
+
+    def test_a_track_that_shows_another_map_than_asked_for_is_remarked(self):
+        remark = "navigator asks for a map of 51 x 51; the track 'far' shows 21 x 21 to all agents"
+        assert make_plan(EvalOptions("navigator", track="far", level=3)).remark == remark
+        assert make_plan(EvalOptions("navigator", track="far")).remark is None
+        assert make_plan(EvalOptions("random", track="far", level=3)).remark is None
+
     @pytest.mark.parametrize("name", agent_names())
     @pytest.mark.parametrize("level", [1, 2, 3])
     @pytest.mark.parametrize("track", ["lost", "far"])

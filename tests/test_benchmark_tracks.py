@@ -31,7 +31,6 @@ from mazebench.tasks.tracks.base import LEVELS
 PLAYED = [(name, level) for name in TRACKS for level in LEVELS]
 
 
-@pytest.mark.slow
 def test_one_command_makes_the_files_byte_for_byte(tmp_path):
     freeze_tracks(tmp_path)
     made = {path.name: path.read_bytes() for path in tmp_path.iterdir()}

@@ -105,17 +105,6 @@ def test_bytes_do_not_depend_on_workers(reference, tmp_path, name):
     assert result.summary.overall.spl_ci95 == summarize(result.records)[0].spl_ci95
 
 
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")
-def test_bytes_do_not_depend_on_ray(reference, tmp_path):
-    pytest.importorskip("ray")
-    from mazebench.evaluation.cluster import Cluster
-
-    with Cluster("local", 2):
-        for name in SETTINGS:
-            assert run(name, tmp_path / name, num_envs=5, workers=2, ray_address="local") == reference[name]
-
-
 def run_commands(folder: pathlib.Path, surroundings: dict[str, str], **options: Any) -> dict[str, str]:
     """Returns the SHA-256 of what `COMMANDS` write in a process of its own, below a working directory `folder`."""
     folder.mkdir(parents=True)

@@ -112,7 +112,6 @@ def browser(tmp_path_factory):
 
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 class TestInBrowser:
-    @pytest.mark.slow
     @pytest.mark.parametrize("width", [390, 1280], ids=["phone", "desktop"])
     def test_pages_when_a_window_is_narrow_or_wide(self, browser, pages, width):
         browser.resize(width, 800)

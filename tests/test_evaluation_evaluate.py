@@ -15,7 +15,7 @@ import pytest
 from run_folders import FEW, FILES, IMPORTS, RECORDED, Killed, files_of, kill_after, records_of, results_of, summary_of
 
 from mazebench.agent import Agent, SingleAgent
-from mazebench.errors import InputError
+from mazebench.errors import InputError, UnplayableError
 from mazebench.evaluation.chunk import Chunk, run_chunk
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.options import EvalOptions
@@ -338,6 +338,15 @@ class TestRefused:
             evaluate(**{"agent": "random", "out": tmp_path / "out", **FEW, **options})
         assert "\n" not in str(refused.value)
         assert list(tmp_path.iterdir()) == []
+
+    def test_an_agent_that_cannot_play_leaves_no_folder(self, tmp_path):
+        with pytest.raises(UnplayableError, match="its checkpoint reads maps of 13 x 13 only, found 15 x 15"):
+            evaluate("mmn", tmp_path / "out", size=15, **FEW)
+        assert list(tmp_path.iterdir()) == []
+
+    def test_an_object_in_place_of_a_class_is_refused(self):
+        with pytest.raises(InputError, match="expected the name of an agent or its class, found an object of Ahead"):
+            evaluate(Ahead(), **FEW)
 
 
 class TestMaps:

@@ -27,6 +27,10 @@ class Mortal(Agent):
     def act(self, inputs, state, explore=False):
         return np.zeros(len(inputs.seed), dtype=int), state
 
+class Alone(SingleAgent):
+    def act(self, observation):
+        return 0
+
 class Failing(Agent):
     def act(self, inputs, state, explore=False):
         raise ValueError("several\\nlines")
@@ -67,6 +71,11 @@ def test_a_killed_worker_is_named_and_what_ended_is_kept(tmp_path):
     assert calls[0] == (80, 160)
     evaluate("pool_at_hand:Mortal", tmp_path / "unbroken", **FEW)
     assert records_of(out) == records_of(tmp_path / "unbroken")
+
+
+@pytest.mark.usefixtures("_agents_at_hand")
+def test_a_single_agent_acts_in_workers_by_its_name():
+    assert evaluate("pool_at_hand:Alone", workers=1, **FEW).overall == evaluate("pool_at_hand:Alone", **FEW).overall
 
 
 @pytest.mark.usefixtures("_agents_at_hand")

@@ -37,6 +37,25 @@ def test_a_compilation_is_announced_once_and_cached(tmp_path):
     ]
 
 
+WITH_RAYS = """
+import sys
+import numpy as np
+from mazebench.world import lidar
+
+lidar.NUM_RAYS = int(sys.argv[1])
+from mazebench_agents.navigator import scans
+
+print(scans.predict(np.zeros((5, 5), dtype=bool), np.full((1, 3), 2.5)).shape[1])
+"""
+
+
+def test_a_constant_of_another_module_that_changes_is_compiled_anew(tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    for num_rays in ("32", "8", "32"):
+        command = [sys.executable, "-c", WITH_RAYS, num_rays]
+        assert subprocess.run(command, env=environment, capture_output=True, text=True).stdout.split() == [num_rays]
+
+
 @pytest.mark.parametrize(("given", "expected"), [("3", 3), ("2,4", 2), ("", None), ("0", None), ("many", None)])
 def test_kernels_run_in_as_many_threads_as_the_environment_says(given, expected, monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", given)

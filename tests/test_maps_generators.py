@@ -81,6 +81,18 @@ def test_dfs_of_seed_0_stays_as_it_is():
     assert format_maze(generate("dfs", 7, np.random.default_rng(0))) == DFS_7_OF_SEED_0
 
 
+@pytest.mark.parametrize(
+    ("size", "rng", "message"),
+    [
+        ("13", np.random.default_rng(0), "expected a size of 5 to 255 cells, found '13'"),
+        (13, 0, r"expected rng as a numpy\.random\.Generator, found int"),
+    ],
+)
+def test_arguments_of_another_type_are_refused(size, rng, message):
+    with pytest.raises(InputError, match=message):
+        generate("dfs", size, rng)
+
+
 @pytest.mark.parametrize("size", [5, 7, 13, 21, 63])
 def test_dfs_without_openings_is_a_tree(size):
     maze = Maze(dfs_walls(size, np.random.default_rng(1), openings=0))

@@ -177,7 +177,8 @@ class TestMaze:
         assert capsys.readouterr().err == (
             "mazebench: map: 40 x 40 pixels of 0.05 m as cells of 0.4 m; "
             "the maze's lower left corner is (1, 1) m on the map, so its point (x, y) is (x - 1, y - 1) m in the maze\n"
-            "mazebench: map: agents drive surely in cells from 0.5 m, try --cell-size 0.5\n"
+            "mazebench: map: agents drive surely in cells from 0.5 m; if doors are at least 1 m wide, "
+            "try --cell-size 0.5\n"
         )
         assert read_maze(path, cell_size=0.5).size == 5
         assert "surely" not in capsys.readouterr().err
@@ -332,7 +333,8 @@ class TestFloorPlan:
             "mazebench: plan: 200 x 120 pixels of 0.02 m as cells of 0.4 m; "
             "6 x 10 cells padded with wall to 10 x 10; the maze's lower left corner is (0, -1.6) m on the map, "
             "so its point (x, y) is (x, y + 1.6) m in the maze\n"
-            "mazebench: plan: agents drive surely in cells from 0.5 m, try --cell-size 0.5\n"
+            "mazebench: plan: agents drive surely in cells from 0.5 m; if doors are at least 1 m wide, "
+            "try --cell-size 0.5\n"
         )
         assert maze == read_maze(write_map(tmp_path, two_rooms(), resolution=0.02))
         assert read_maze(tmp_path / "plan.png", pixel_size=0.02, cell_size=0.8).size == 5

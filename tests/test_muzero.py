@@ -217,7 +217,7 @@ def test_belief_planner_after_a_minute_beats_random_in_a_small_maze():
         "hindsight_mean_offset": 8,
         "hindsight_window": 30,
     }
-    before, after = learn(BeliefPlanner, 5, (3, 4), 700, values)
+    before, after = learn(BeliefPlanner, 5, (3, 4), 1000, values)
     assert before < 0.4
     assert after > 0.8
 

@@ -219,7 +219,6 @@ def test_considered_visits_by_hand():
     assert search.considered_visits(6, 4) == [0] * 4
 
 
-@pytest.mark.slow
 def test_speed_of_the_search_beside_mctx_is_measured():
     pytest.importorskip("mctx")
     (rows,) = measure.search_table(0.1).values()

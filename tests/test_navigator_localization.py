@@ -210,6 +210,15 @@ class TestLocalization:
             belief = localization.update(belief, walls, reading, ranges)
             assert is_right(belief, pose)
 
+    def test_a_body_that_no_scan_explains_keeps_its_pose_where_the_map_has_no_other_free_cell(self):
+        maze, walls = dfs_maze(0), np.ones((SIZE, SIZE), dtype=bool)
+        (ranges,) = scans_at(maze, [(*cell_to_point(maze.free_cells[0], SIZE), 0.3)])
+        assert not np.isnan(scans.wall_frame(ranges)).any()
+        belief = localization.begin(walls, only((6, 6)), np.zeros(3), ranges, heading=0.3)
+        for _ in range(6):
+            belief = localization.update(belief, walls, np.zeros(3), ranges)
+        assert belief.weights.tolist() == [1.0]
+
     def test_beliefs_of_several_bodies_are_independent(self):
         mazes = [dfs_maze(seed) for seed in range(2)]
         tours = [tour(maze, 30, np.random.default_rng(seed)) for seed, maze in enumerate(mazes)]
@@ -256,6 +265,13 @@ class TestDisambiguate:
         assert path[0] == (6, 6)
         assert np.abs(np.diff(path, axis=0)).sum(axis=1).tolist() == [1] * (len(path) - 1)
         assert np.abs(seen[0] - seen[1]).max() > 0.3
+
+    @pytest.mark.parametrize("x", [0.5, -3.0, 12.5, 20.0])
+    def test_cells_beyond_the_edge_of_the_map_are_no_way(self, x):
+        maze = corridor_with_niche()
+        (belief,) = beliefs_along(maze, [(6.5, 6.5, 0.0)], only((6, 6)))
+        belief.poses[0, :2] = x, 6.5
+        assert set(disambiguate(belief, maze.walls)[1:]) <= set(map(tuple, maze.free_cells.tolist()))
 
     def test_a_known_pose_needs_no_way(self):
         maze = corridor_with_niche()

@@ -207,16 +207,23 @@ class TestAgents:
         assert all(outcome.success for outcome in outcomes)
 
     def test_a_scale_on_which_an_agent_did_not_learn_is_remarked(self, tmp_path):
-        (tmp_path / "large.txt").write_text(format_maze(generate("dfs", 31, np.random.default_rng(0))))
+        (tmp_path / "fine.txt").write_text(format_maze(generate("dfs", 13, np.random.default_rng(0))))
         told: list[str] = []
-        options = {"maps": str(tmp_path / "large.txt"), "distances": (1,), "episodes_per_distance": 1}
+        options = {"maps": str(tmp_path / "fine.txt"), "cell_size": 2.0, "distances": (1,), "episodes_per_distance": 1}
         summary = mazebench.evaluate("mah", warn=told.append, **options)
         assert summary.untrained_scale
         assert told == [
-            "mah learned on maps of 1 m a cell; here its map of 21 x 21 cells shows 31 x 31 cells of 1 m, 1.48 m a cell"
+            "mah learned on maps of 1 m a cell and may fail here: its map of 13 x 13 cells shows 13 x 13 cells of 2 m, "
+            "2 m a cell"
         ]
         mazebench.evaluate("planner", warn=told.append, **options)
         assert len(told) == 1
+
+    @pytest.mark.parametrize("name", ["belief-planner", "mah", "dqn"])
+    def test_learned_agents_that_read_any_map_get_one_of_the_mazes_own_cells(self, tmp_path, name):
+        (tmp_path / "large.txt").write_text(format_maze(generate("dfs", 31, np.random.default_rng(0))))
+        plan = make_plan(EvalOptions(name, maps=str(tmp_path / "large.txt")))
+        assert (plan.task.context_size, plan.untrained_scale, plan.remark) == (31, False, None)
 
     def test_a_map_that_is_coarser_than_the_mazes_is_remarked(self, tmp_path):
         (tmp_path / "large.txt").write_text(format_maze(generate("dfs", 31, np.random.default_rng(0))))

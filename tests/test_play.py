@@ -287,7 +287,6 @@ class TestViewer:
         assert result.returncode == 2
         assert result.stderr == "mazebench: can't open a window on this display; play with --terminal\n"
 
-    @pytest.mark.slow
     def test_the_window_takes_keys(self):
         if not (shutil.which("Xvfb") and shutil.which("xdotool")):
             pytest.skip("needs Xvfb and xdotool")

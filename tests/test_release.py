@@ -25,7 +25,8 @@ def test_citation_when_compared_with_what_its_format_requires():
         assert all(
             author.keys() <= {"name", "given-names", "family-names", "affiliation"} for author in cited["authors"]
         )
-        assert not cited.keys() & {"doi", "url"}, "none is known"
+    assert not CITATION.keys() & {"doi", "url"}, "none is known"
+    assert PAPER["url"].rpartition("/")[2] in PAPER["identifiers"][0]["value"]
 
 
 def test_paper_when_compared_with_the_reference_numbers_source():

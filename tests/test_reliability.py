@@ -87,11 +87,10 @@ class TestKill:
         assert results_of(tmp_path / "run") == results_of(unbroken("short"))
 
     @slow
-    @pytest.mark.parametrize("seed", range(3))
     @pytest.mark.parametrize("workers", [0, 2])
-    def test_an_evaluation_killed_at_any_moment_resumes_to_the_same_bytes(self, unbroken, tmp_path, workers, seed):
-        rng = np.random.default_rng([1, workers, seed])
-        run_through_kills(rng, tmp_path / "run", [*LONG, "--workers", str(workers)], num_kills=5, most_bytes=100_000)
+    def test_an_evaluation_killed_at_any_moment_resumes_to_the_same_bytes(self, unbroken, tmp_path, workers):
+        rng = np.random.default_rng([1, workers])
+        run_through_kills(rng, tmp_path / "run", [*LONG, "--workers", str(workers)], num_kills=4, most_bytes=100_000)
         assert results_of(tmp_path / "run") == results_of(unbroken("long"))
 
     @slow
@@ -112,9 +111,8 @@ class TestKill:
         assert results_of(tmp_path / "run") == results_of(unbroken("long"))
 
     @slow
-    @pytest.mark.parametrize("seed", range(3))
-    def test_a_killed_training_resumes_to_the_same_bytes(self, unbroken, tmp_path, seed):
-        rng, folder, num_kills = np.random.default_rng([6, seed]), tmp_path / "run", 0
+    def test_a_killed_training_resumes_to_the_same_bytes(self, unbroken, tmp_path):
+        rng, folder, num_kills = np.random.default_rng([6, 0]), tmp_path / "run", 0
         for sitting in range(5):
             process = start(*LEARN, "--out", folder, *(["--resume"] if sitting else []))
             wanted = num_metrics(folder) + int(rng.integers(0, 2))
@@ -131,7 +129,6 @@ class TestKill:
         assert (status, errors) == (0, "")
         assert learned_in(folder) == learned_in(unbroken("learn"))
 
-    @slow
     def test_half_a_checkpoint_is_ignored(self, unbroken, tmp_path):
         folder = shutil.copytree(unbroken("learn"), tmp_path / "run")
         half = folder / "checkpoints" / f"{STEPS + 800:012d}.tmp"
@@ -142,7 +139,6 @@ class TestKill:
         assert run(*LEARN, "--out", folder, "--resume")[0] == 0
         assert learned_in(folder) == learned_in(unbroken("learn"))
 
-    @slow
     def test_no_half_written_maze_is_left(self, tmp_path):
         words = ["generate", "--count", "200", "--format", "txt,png"]
         process = start(*words, "--out", tmp_path / "killed")
@@ -155,10 +151,10 @@ class TestKill:
         assert {name: whole[name] for name in killed if not name.endswith(".tmp")}.items() <= killed.items()
 
 
-@slow
 class TestRay:
     """Ray prints lines of its own among a command's errors, so these tests only look for ours."""
 
+    @slow
     def test_training_goes_on_when_actors_are_killed(self, tmp_path):
         pytest.importorskip("ray")
         many = 80_000  # as it goes on while an actor is replaced, which takes seconds
@@ -177,9 +173,10 @@ class TestRay:
         assert steps[-1] >= many
         assert metrics[-1]["updates"] == (steps[-1] - 400) // 32
 
+    @slow
     def test_evaluation_goes_on_when_tasks_are_killed(self, unbroken, tmp_path):
         pytest.importorskip("ray")
-        process = start(*LONG, "--ray", "local", "--workers", "2", "--out", tmp_path / "run")
+        process = start(*LONG, "--ray", "--workers", "2", "--out", tmp_path / "run")
         rng = np.random.default_rng(8)
         for kill in range(3):
             wait_until(lambda kill=kill: num_bytes(tmp_path) > 50_000 * kill, process)
@@ -190,7 +187,7 @@ class TestRay:
 
     def test_nothing_is_left_running_when_stopped_while_ray_starts(self, tmp_path):
         pytest.importorskip("ray")
-        process = start(*LONG, "--ray", "local", "--workers", "2", "--out", "run", cwd=tmp_path)
+        process = start(*LONG, "--ray", "--workers", "2", "--out", "run", cwd=tmp_path)
         wait_until(lambda: any("gcs_server" in command_line(pid) for pid in descendants(process.pid)), process)
         started = descendants(process.pid)
         process.send_signal(signal.SIGTERM)
@@ -198,20 +195,6 @@ class TestRay:
         assert process.returncode == 143, errors
         assert "mazebench: terminated; " in errors
         wait_until(lambda: not any(map(is_running, started)))
-
-    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-    def test_a_stopped_training_goes_on_with_the_command_it_prints(self, tmp_path, number):
-        pytest.importorskip("ray")
-        process = start(*LEARN, "--workers", "2", "--out", tmp_path / "run")
-        wait_until(lambda: num_metrics(tmp_path) > 0, process)
-        started = descendants(process.pid)
-        line = stop(process, number)
-        assert " steps is kept in " in line
-        wait_until(lambda: not any(map(is_running, started)))
-        go_on(line, tmp_path)
-        steps = [line["env_steps"] for line in metrics_of(tmp_path / "run")]
-        assert steps == sorted(set(steps))
-        assert steps[-1] >= STEPS
 
 
 def kill_ray_worker(process: subprocess.Popen, num: int, rng: np.random.Generator) -> None:
@@ -245,7 +228,7 @@ class TestFullDisk:
     @slow
     def test_a_disk_may_fill_at_any_point_of_an_evaluation(self, disk: Disk, unbroken):
         statuses = []
-        for kilobytes in (0, *range(4, 340, 28)):
+        for kilobytes in (0, *range(4, 340, 56)):
             disk.leave(kilobytes)
             status, _, errors = run(*SHORT, "--out", disk.path / "run")
             statuses.append(status)
@@ -262,7 +245,7 @@ class TestFullDisk:
     @slow
     def test_a_disk_may_fill_at_any_point_of_a_training(self, disk: Disk, unbroken):
         statuses = []
-        for kilobytes in (0, 8, 48, 56, 100, 260, 500, 700):
+        for kilobytes in (0, 48, 100, 500):
             disk.leave(kilobytes)
             status, _, errors = run(*LEARN, "--out", disk.path / "run")
             statuses.append(status)
@@ -272,9 +255,8 @@ class TestFullDisk:
             assert run(*LEARN, "--out", disk.path / "run", "--resume")[0] == 0
             assert learned_in(disk.path / "run") == learned_in(unbroken("learn"))
             shutil.rmtree(disk.path / "run")
-        assert statuses == [2] + 7 * [1]
+        assert statuses == [2, 1, 1, 1]
 
-    @slow
     def test_a_training_that_cannot_save_names_its_last_checkpoint(self, tmp_path):
         def limit() -> None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
@@ -295,7 +277,7 @@ class TestFullDisk:
         assert len(written) == 2
         assert written.items() <= files_of(tmp_path / "whole").items()
 
-    @pytest.mark.parametrize("suffix", ["mp4", pytest.param("gif", marks=slow)])
+    @pytest.mark.parametrize("suffix", ["mp4", "gif"])
     def test_the_film_from_before_is_kept_when_the_disk_fills(self, disk: Disk, suffix):
         film = disk.path / f"film.{suffix}"
         film.write_bytes(b"an earlier film")
@@ -307,7 +289,6 @@ class TestFullDisk:
         assert sorted(path.name for path in disk.path.iterdir()) == ["filler", film.name]
         assert film.read_bytes() == b"an earlier film"
 
-    @slow
     def test_a_full_disk_ends_a_report_with_one_line(self, disk: Disk, unbroken):
         disk.leave(20)
         status, _, errors = run("report", unbroken("short"), "--out", disk.path / "report")
@@ -317,7 +298,7 @@ class TestFullDisk:
 class TestReadOnly:
     @pytest.mark.parametrize(
         "words",
-        [SHORT, pytest.param(SUITE, marks=slow), pytest.param(LEARN, marks=slow), ["generate"]],
+        [SHORT, SUITE, LEARN, ["generate"]],
         ids=lambda words: " ".join(words[:2]),
     )
     def test_a_read_only_folder_is_named_in_one_line(self, disk: Disk, words):
@@ -329,7 +310,6 @@ class TestReadOnly:
         assert line.startswith(f"mazebench: {disk.path / 'out'}")
         assert "Read-only file system" in line
 
-    @slow
     def test_read_only_results_can_be_read(self, disk: Disk, unbroken, tmp_path):
         shutil.copytree(unbroken("short"), disk.path / "whole")
         shutil.copytree(unbroken("short"), disk.path / "half")
@@ -346,7 +326,7 @@ class TestReadOnly:
 
 
 class TestTwoProcesses:
-    @pytest.mark.parametrize("name", ["short", pytest.param("suite", marks=slow), pytest.param("learn", marks=slow)])
+    @pytest.mark.parametrize("name", ["short", "suite", pytest.param("learn", marks=slow)])
     def test_a_second_process_in_a_folder_is_refused(self, unbroken, tmp_path, name):
         words, folder = RUNS[name], tmp_path / "run"
         first = start(*words, "--out", folder)
@@ -406,7 +386,7 @@ class TestStop:
         go_on(line, tmp_path)
         assert results_of(folder) == results_of(unbroken("short"))
 
-    @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=slow)])
+    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
     def test_no_worker_is_left_when_stopped_while_they_start(self, tmp_path, number):
         process = start(*SHORT, "--workers", "2", "--out", "run", cwd=tmp_path)
         wait_until(lambda: workers_of(process), process)
@@ -416,21 +396,19 @@ class TestStop:
         wait_until(lambda: not any(map(is_running, started)))
 
     @slow
-    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-    def test_a_stopped_suite_goes_on_with_the_command_it_prints(self, unbroken, tmp_path, number):
+    def test_a_stopped_suite_goes_on_with_the_command_it_prints(self, unbroken, tmp_path):
         process = start(*SUITE, "--workers", "2", "--out", "run", cwd=tmp_path)
         wait_until(lambda: num_bytes(tmp_path) > 80_000, process)
-        line = stop(process, number)
+        line = stop(process, signal.SIGTERM)
         assert " of 420 episodes are kept in run; go on with: " in line
         go_on(line, tmp_path)
         assert results_of(tmp_path / "run") == results_of(unbroken("suite"))
 
     @slow
-    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-    def test_a_stopped_training_goes_on_with_the_command_it_prints(self, tmp_path, number):
+    def test_a_stopped_training_goes_on_with_the_command_it_prints(self, tmp_path):
         process = start(*LEARN, cwd=tmp_path)
         wait_until(lambda: num_metrics(tmp_path) > 1, process)
-        line = stop(process, number)
+        line = stop(process, signal.SIGTERM)
         folder = tmp_path / "runs" / "mah-13-0"
         steps = [int(path.name) for path in sorted(folder.glob("checkpoints/*"))]
         assert f"; the checkpoint at {steps[-1]:,} steps is kept in runs/mah-13-0; go on with: " in line
@@ -448,23 +426,21 @@ class TestStop:
         assert learned_in(tmp_path / "runs" / "mah-13-0") == learned_in(unbroken("learn"))
 
     @slow
-    @pytest.mark.parametrize("seed", range(3))
-    def test_a_training_that_is_stopped_twice_ends_at_once_and_goes_on(self, tmp_path, seed):
-        rng, folder = np.random.default_rng([8, seed]), tmp_path / "run"
+    def test_a_training_that_is_stopped_twice_ends_at_once_and_goes_on(self, tmp_path):
+        folder = tmp_path / "run"
         process = start(*LEARN, "--out", folder)
         wait_until(lambda: num_metrics(tmp_path) > 1, process)
         os.killpg(process.pid, signal.SIGINT)
-        time.sleep(rng.uniform(0, 0.05))
+        time.sleep(0.02)
         if process.poll() is None:
             stop(process, signal.SIGINT)
         assert run(*LEARN, "--out", folder, "--resume")[0] == 0
         assert [line["env_steps"] for line in metrics_of(folder)] == list(range(800, STEPS + 1, 800))
 
-    @slow
     def test_a_stopped_report_says_that_it_is_not_whole(self, unbroken, tmp_path):
         process = start("report", unbroken("short"), "--out", "report", cwd=tmp_path)
         wait_until(lambda: list(tmp_path.glob("report/figures/*")), process)
         line = stop(process, signal.SIGTERM)
-        assert "; the report in report is not whole; make it anew with: " in line
+        assert "; the report in report is not whole; make it again with: " in line
         go_on(line, tmp_path)
         assert (tmp_path / "report" / "report.html").exists()

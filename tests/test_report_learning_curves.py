@@ -38,7 +38,7 @@ def test_a_run_has_figures_and_a_row(tmp_path):
     text = report(tmp_path / "out", make_run(tmp_path / "mah-3"))
     head, _, row = (line for line in text.splitlines() if line.startswith("|"))
     assert head == "| run | agent | seed | agent steps | updates | success, 2 | success, 10 |"
-    assert row == "| mah-3 | mah | 3 | 2,000 | 7 | 0.75 | 0.50 |"
+    assert row == "| mah-3 | mah | 3 | 2,000 | 7 | 0.750 | 0.500 |"
     files = {path.name for path in (tmp_path / "out" / "figures").iterdir()}
     assert files == {"success.png", "success.pdf", "losses.png", "losses.pdf"}
     assert all(f"](figures/{name}.png)" in text for name in ("success", "losses"))

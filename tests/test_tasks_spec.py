@@ -97,6 +97,7 @@ class TestOptions:
         [
             ({"task": "locl"}, r"unknown task 'locl'; available: far, hierarchical, local, lost, sketch, stale"),
             ({"split": "test", "maps": None}, r"unknown split 'test'; available: eval, train"),
+            ({"size": 13.0, "maps": None}, r"expected size as a whole number, found 13\.0"),
             ({"size": 14, "maps": None}, r"unknown size 14; available: 13, 15, 17, 19, 21"),
             ({"size": 13}, r"expected mazes of size 13, found size 9"),
             ({"maps": ()}, r"expected at least one maze, found none"),

@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+import torch
 from faults import TINY
 from simple_mazes import field
 
@@ -16,10 +17,12 @@ from mazebench import stopping
 from mazebench.agent import Agent
 from mazebench.errors import InputError
 from mazebench.tasks.spec import TaskSpec
+from mazebench.training import loop
 from mazebench.training.experience import Collector
 from mazebench.training.loop import TrainingError, train
 from mazebench.training.options import TrainOptions
 from mazebench.training.sitting import Status
+from mazebench.training.sources import InProcessSource
 
 
 def tiny_options(**changes):
@@ -110,7 +113,10 @@ def test_wrong_option_is_refused(tmp_path, changes, message):
 
 @pytest.mark.parametrize(
     ("changes", "message"),
-    [({}, "expected --minutes or --env-steps"), ({"env_steps": 100, "ray": "auto"}, "--ray needs --workers")],
+    [
+        ({}, "expected --minutes or --env-steps"),
+        ({"env_steps": 100, "ray_address": "auto"}, "--ray-address needs --workers"),
+    ],
 )
 def test_options_that_contradict_each_other_are_refused(changes, message):
     with pytest.raises(InputError, match=message):
@@ -189,6 +195,44 @@ def test_without_savepoints_a_stopped_run_goes_on_from_its_last_milestone_to_the
     assert_same_run(tmp_path, unbroken)
 
 
+def test_metrics_have_a_line_every_so_many_steps_with_the_losses_since_the_line_before(unbroken, tmp_path, monkeypatch):
+    monkeypatch.setattr(loop, "_STEPS_BETWEEN_LINES", 400)
+    options = tiny_options(env_steps=2400)
+    train(options, tmp_path / "whole")
+    lines = metrics(tmp_path / "whole")
+    assert [line["env_steps"] for line in lines] == [400, 800, 1200, 1600, 2000, 2400]
+    assert ["success_rate_2" in line for line in lines] == [False, True] * 3
+    assert "td_loss" not in lines[0]  # no update yet
+    updates = [line["updates"] for line in lines]
+    of_milestone = (updates[3] - updates[2]) * lines[3]["td_loss"] + (updates[2] - updates[1]) * lines[2]["td_loss"]
+    assert math.isclose(of_milestone / (updates[3] - updates[1]), metrics(unbroken)[1]["td_loss"])
+
+    stopped(options, tmp_path / "stopped", lambda status: status.env_steps == 1304)
+    train(options, tmp_path / "stopped", resume=True)
+    resumed = metrics(tmp_path / "stopped")
+    assert resumed[:3] == lines[:3]
+    assert [line["env_steps"] for line in resumed] == [line["env_steps"] for line in lines]
+    (tmp_path / "whole" / "checkpoints" / "000000002400").rename(tmp_path / "lost")
+    train(options, tmp_path / "whole", resume=True)
+    assert metrics(tmp_path / "whole") == lines
+
+
+class Faltering(InProcessSource):
+    """A source that brings nothing now and then, as one on Ray does where an actor died."""
+
+    def collect(self, seed):
+        for pieces in super().collect(seed):
+            yield pieces
+            yield []
+
+
+def test_a_step_is_saved_once_if_no_experience_came_since(tmp_path, monkeypatch):
+    open_source = lambda options, task, learner: Faltering(task, learner.actor, learner.num_envs)  # noqa: E731
+    monkeypatch.setattr(loop, "_open_source", open_source)
+    train(tiny_options(env_steps=40, checkpoint_minutes=1e-9), tmp_path)
+    assert checkpoints(tmp_path) == [0, 40]
+
+
 def test_second_signal_ends_the_run_without_a_savepoint(tmp_path):
     def report(status):
         if isinstance(status, Status) and status.env_steps == 1208:
@@ -207,6 +251,17 @@ def test_loss_that_is_not_finite_stops_the_run_with_the_last_checkpoint(tmp_path
         TrainingError, match=r"became (nan|inf|-inf) at update .*; last good checkpoint: .*000000000000"
     ):
         train(tiny_options(env_steps=100_000, overrides=tuple(overrides.items())), tmp_path)
+
+
+def test_training_leaves_pytorch_as_many_threads_as_it_had(tmp_path):
+    num_threads = torch.get_num_threads()
+    torch.set_num_threads(3)
+    try:
+        train(tiny_options(env_steps=480), tmp_path)
+        assert metrics(tmp_path)[-1]["updates"]
+        assert torch.get_num_threads() == 3
+    finally:
+        torch.set_num_threads(num_threads)
 
 
 def test_minutes_limit_a_sitting(tmp_path):

@@ -15,7 +15,8 @@ import torch
 from mazebench.agent import Inputs, Interface, Observation
 from mazebench.maps.maze import cell_to_point, point_to_cell
 
-from ..common.actor import NetworkAgent
+from ..common.actor import NetworkAgent, one_torch_thread
+from ..common.bounds import bounded
 from ..common.layers import in_batches, state_features
 from ..muzero.network import CONTEXTS_AT_ONCE, NUM_ACTIONS, STATES_AT_ONCE, with_codes
 from .belief import GOAL, NUM_PLANES, WALL, probabilities
@@ -108,8 +109,10 @@ class BeliefPlanner(NetworkAgent):
         return ActorState(None, displacement, turn, vectors(), *maps, vectors(), waited, is_far, vectors())
 
     @torch.no_grad()
+    @one_torch_thread()
     def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, ActorState]:
         """Returns actions `[B]`; the belief is revised where a context is new, or where evidence contradicts it."""
+        inputs = bounded(inputs)
         for row in np.flatnonzero(inputs.new_context).tolist():
             self._begin_leg(row, inputs, state)
         observed = inputs.observation["state"].copy()

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import pathlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
 from typing import Any, ClassVar, Self
 
@@ -18,6 +19,20 @@ from .checkpoint import check_shapes, check_size, load_agent, load_into
 from .overrides import override
 
 
+@contextlib.contextmanager
+def one_torch_thread() -> Iterator[None]:
+    """Leaves PyTorch one thread in the block, or in a function that it decorates; then the process has its own again.
+
+    Results then do not depend on the number of cores, and no thread waits for a core that other work keeps busy.
+    """
+    num_threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(num_threads)
+
+
 class NetworkAgent(LearningAgent):
     """An agent that acts by a network; where it explores, environment i takes random actions at Ape-X's rate i."""
 
@@ -30,7 +45,6 @@ class NetworkAgent(LearningAgent):
     trained_size: int  # M of the contexts that the network was made for
 
     def __init__(self, config: Any, context_size: int, seed: int = 0, device: str = "cpu"):
-        torch.set_num_threads(1)
         self.config = config
         self.trained_size = context_size
         with torch.random.fork_rng(devices=[]):
@@ -47,6 +61,11 @@ class NetworkAgent(LearningAgent):
     def serves_any_size(cls, config: Any) -> bool:
         """Returns whether contexts may have another M than those of the training."""
         return True
+
+    @classmethod
+    def context_size(cls, size: int) -> int:
+        """Returns N: the map at full resolution, a metre a cell as in the mazes of the training."""
+        return size
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:

@@ -1,7 +1,8 @@
 """Compilation of kernels to machine code, which is kept on disk.
 
 Numba notices when a kernel's file changes, but not when a module does that the kernel uses. So the kernels of a file
-are kept in a folder that is named after the contents of the file and of the modules of this package that it uses.
+are kept in a folder that is named after the contents of the file and of the modules of this package that it uses, and
+after the numbers that these have from elsewhere.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core.event import Listener, register
 
 from mazebench.errors import remark
@@ -117,6 +119,9 @@ def _digest(module: str) -> str:
     digest = hashlib.sha256()
     for name in sorted(_used_by(module)):
         digest.update(pathlib.Path(str(sys.modules[name].__file__)).read_bytes())
+        for value in vars(sys.modules[name]).values():
+            if isinstance(value, int | float | np.number | np.ndarray):  # which kernels keep as constants
+                digest.update(np.asarray(value).tobytes())
     return digest.hexdigest()[:16]
 
 

@@ -13,7 +13,8 @@ import torch
 
 from mazebench.agent import Inputs
 
-from ..common.actor import NetworkAgent
+from ..common.actor import NetworkAgent, one_torch_thread
+from ..common.bounds import bounded
 from ..common.layers import in_batches, state_features
 from .config import DQNConfig
 from .learner import DQNLearner
@@ -59,8 +60,10 @@ class DQN(NetworkAgent):
         return ActorState(np.zeros((batch_size, 2), dtype=np.float32), None)
 
     @torch.no_grad()
+    @one_torch_thread()
     def act(self, inputs: Inputs, state: ActorState, explore: bool = False) -> tuple[np.ndarray, ActorState]:
         """Returns actions `[B]`."""
+        inputs = bounded(inputs)
         observed = inputs.observation["state"]
         new = np.flatnonzero(inputs.new_context)
         if len(new):

@@ -12,7 +12,7 @@ from torch.nn import functional
 from mazebench.maps.maze import Maze
 
 from ..common import symmetry
-from ..common.actor import NetworkAgent
+from ..common.actor import NetworkAgent, one_torch_thread
 from ..common.layers import state_features
 from ..common.learner import HindsightLearner
 from ..common.replay import Sample
@@ -25,6 +25,7 @@ class DQNLearner(HindsightLearner):
         optimizer = torch.optim.Adam(actor.network.parameters(), lr=actor.config.learning_rate)
         super().__init__(actor, mazes, seed, optimizer, priority_exponent=actor.config.priority_exponent)
 
+    @one_torch_thread()
     def update(self) -> dict[str, float]:
         """Learns from one batch; returns its losses and other scalars by name."""
         config = self._config

@@ -13,7 +13,8 @@ import torch
 
 from mazebench.agent import Inputs, Observation
 
-from ..common.actor import NetworkAgent
+from ..common.actor import NetworkAgent, one_torch_thread
+from ..common.bounds import bounded
 from ..common.layers import in_batches, marked_position, state_features
 from ..muzero.network import CONTEXTS_AT_ONCE, NUM_ACTIONS, STATES_AT_ONCE, Code, rows_of, with_codes
 from .config import MMNConfig
@@ -63,8 +64,10 @@ class MMN(NetworkAgent):
         return ActorState(np.zeros((batch_size, 2), dtype=np.float32), None)
 
     @torch.no_grad()
+    @one_torch_thread()
     def act(self, inputs: Inputs, state: ActorState, explore: bool = False) -> tuple[np.ndarray, ActorState]:
         """Returns actions `[B]`; the hypermodel runs only where a context is new."""
+        inputs = bounded(inputs)
         new = np.flatnonzero(inputs.new_context)
         if len(new):
             new_anchor = inputs.new_episode | (not self.config.keep_anchor)

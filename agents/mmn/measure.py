@@ -22,6 +22,7 @@ import torch
 from mazebench.errors import RunError
 
 from ..common import kernels
+from ..common.actor import one_torch_thread
 from ..muzero.search import gumbel_muzero_policy, muzero_policy
 from .compiled import stand_in as compiled
 from .compiled.model import CompiledModel
@@ -79,13 +80,8 @@ def stand_in(batch_size: int) -> CompiledModel:
 
 def search_table(seconds: float) -> dict[str, list[dict[str, Any]]]:
     """Returns the simulations per second of CPU time by title, in about `seconds` for each figure."""
-    num_threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        with kernels.one_thread(), _mctx() as mctx:
-            rows = [_row(policy, batch_size, seconds / _ROUNDS, mctx) for policy, batch_size in _CASES]
-    finally:
-        torch.set_num_threads(num_threads)
+    with one_torch_thread(), kernels.one_thread(), _mctx() as mctx:
+        rows = [_row(policy, batch_size, seconds / _ROUNDS, mctx) for policy, batch_size in _CASES]
     return {f"tree search, {NUM_SIMULATIONS} simulations, one thread": rows}
 
 

@@ -13,6 +13,7 @@ import torch
 from mazebench.maps.maze import Maze
 
 from ..common import symmetry
+from ..common.actor import one_torch_thread
 from ..common.layers import state_features
 from ..common.learner import HindsightLearner
 from ..common.replay import SequenceSample
@@ -34,6 +35,7 @@ class MuZeroLearner(HindsightLearner):
         self._num_updates = np.zeros(1, dtype=np.int64)
         self._arrays |= {"num_updates": self._num_updates}
 
+    @one_torch_thread()
     def update(self) -> dict[str, float]:
         """Learns from one batch; returns its losses and, to judge a run early, other scalars by name."""
         config = self._config

@@ -21,10 +21,7 @@ _NUM_ACTORS = 256
 
 
 def update_table(seconds: float, build_learner: Callable[..., MuZeroLearner]) -> dict[str, list[dict[str, Any]]]:
-    """Returns the milliseconds that each part of an update takes by title, once the replay is filled enough to learn.
-
-    Learners leave PyTorch one thread.
-    """
+    """Returns the milliseconds that each part of an update takes by title, once the replay holds enough to learn."""
     learner = build_learner(Interface("local", 13, 13), load_mazes(13, "train"))
     collector = Collector(TaskSpec(mazes=load_mazes(13, "train"), **learner.task_options()), learner.num_envs, 0)
     learner.actor.explore_from(0, learner.num_envs, seed=0)

@@ -238,7 +238,8 @@ class _Fit:
         widths = widths_of_pixels(points, _WIDTHS[0])
         if blur:
             # A box as wide as one whose variance is that of the pixel's box and the point together.
-            widths = np.minimum(np.sqrt(widths**2 + 12 * blur * self._variances()), _WIDTHS[1])
+            widths = np.sqrt(widths**2 + 12 * blur * self._variances())
+        widths = np.minimum(widths, _WIDTHS[1])
         walls, thickening = special.expit(self.log_odds), float(self.parameters[-1])
         differences, slopes, deviations, evidence = compare(self.picture, points, widths, thickening, walls, noise)
         if walls_too:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mazebench.maps.maze import Cell, cell_of_point, cell_to_point
+from mazebench.maps.maze import Cell, cell_to_point
 
+from ..planner.observation import cell_of
 from . import scans
 from .localization import Belief
 
@@ -25,7 +26,7 @@ def disambiguate(belief: Belief, walls: np.ndarray) -> list[Cell]:
     """
     poses, weights = belief.poses[:_POSES], belief.weights[:_POSES] / belief.weights[:_POSES].sum()
     x, y, _ = belief.pose.tolist()
-    paths = _paths_nearby(walls, cell_of_point(x, y, len(walls)))
+    paths = _paths_nearby(walls, cell_of(x, y, len(walls)))
     points = cell_to_point(np.array([path[-1] for path in paths]), len(walls))
     seen = _scans_at(walls, poses, points, belief.reach)
     is_alike = (np.abs(seen[:, None] - seen) > _TELLING).sum(axis=-1) < _TELLING_RAYS  # [H, H, P]
@@ -49,13 +50,17 @@ def _scans_at(walls: np.ndarray, poses: np.ndarray, points: np.ndarray, reach: f
 
 
 def _paths_nearby(walls: np.ndarray, start: Cell) -> list[list[Cell]]:
-    """Returns shortest paths from `start` to itself and to the free cells up to `_NEARBY` cells away."""
+    """Returns shortest paths from `start` to itself and to the free cells up to `_NEARBY` cells away.
+
+    `start` is any cell of the map `walls` `[N, N]` bool. From one at its edge, the cells beyond count as walls.
+    """
     paths = {start: [start]}
     queue = [start]
+    walls = np.pad(walls, 1, constant_values=True)
     for cell in queue:
         row, column = cell
         for neighbour in ((row - 1, column), (row, column - 1), (row + 1, column), (row, column + 1)):
-            if len(paths[cell]) <= _NEARBY and neighbour not in paths and not walls[neighbour]:
+            if len(paths[cell]) <= _NEARBY and neighbour not in paths and not walls[neighbour[0] + 1, neighbour[1] + 1]:
                 paths[neighbour] = [*paths[cell], neighbour]
                 queue.append(neighbour)
     return list(paths.values())

@@ -92,8 +92,8 @@ def begin(
     ranges = np.asarray(ranges, dtype=np.float64)
     poses, weights = _poses_within(start_distribution, scans.wall_frame(ranges, reach))
     if heading is not None:
-        is_likely = np.abs(wrap_angle(poses[:, 2] - heading)) < math.pi / 4
-        poses, weights = poses[is_likely], weights[is_likely]
+        off = np.abs(wrap_angle(poses[:, 2] - heading))
+        poses, weights = poses[off == off.min()], weights[off == off.min()]
     reading = np.array(odometry, dtype=np.float64)
     belief = Belief(poses, weights, 1.0, reading, driven=_SCALE_PRIOR, moved=_SCALE_PRIOR, num_poor=0, reach=reach)
     return _weighted(belief, walls, ranges, goal)
@@ -188,10 +188,13 @@ def _weighted(belief: Belief, walls: np.ndarray, ranges: np.ndarray, goal: Cell 
 
 
 def _reconsidered(belief: Belief, walls: np.ndarray, frame: WallFrame) -> Belief:
-    """Returns a belief in which the likeliest pose has half of the probability, and all others on the map the rest."""
+    """Returns a belief in which the likeliest pose has half of the probability, and all others on the map the rest.
+
+    On a map without another free cell there are none, and the likeliest pose has all of it.
+    """
     others, _ = _poses_within((~walls).astype(np.float64), frame)
     apart = np.abs(others - belief.pose)
     turned = np.abs(wrap_angle(apart[:, 2]))
     others = others[(apart[:, :2].max(axis=1) > 0.5) | (turned > math.pi / 4)]
-    weights = np.concatenate([[0.5], np.full(len(others), 0.5 / len(others))])
+    weights = np.array([0.5, *[0.5 / max(len(others), 1)] * len(others)])
     return belief._replace(poses=np.concatenate([belief.poses[:1], others]), weights=weights, num_poor=0)

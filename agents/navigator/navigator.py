@@ -15,6 +15,7 @@ from mazebench.errors import InputError
 from mazebench.maps.maze import Cell
 from mazebench.world.lidar import MAX_RANGE
 
+from ..common.bounds import bounded
 from ..planner import observation
 from ..planner.observation import Body
 from ..planner.pilot import steer
@@ -90,6 +91,7 @@ class Navigator(Agent):
         self, inputs: Inputs, state: list[_Memory | None], explore: bool = False
     ) -> tuple[np.ndarray, list[_Memory | None]]:
         """Returns actions `[B]`, for one environment after the other."""
+        inputs = bounded(inputs)
         actions = np.zeros(len(state), dtype=np.int64)
         for slot, values in enumerate(inputs.observation["state"].tolist()):
             if inputs.active is not None and not inputs.active[slot]:

@@ -20,6 +20,7 @@ from ..common.kernels import compiled
 _DETOUR = 2.0
 _GOAL_DETOUR = 3.0  # cells by which a goal that is half as likely as another must be nearer to be searched before it
 _LARGEST_COST = 1e4  # cells; of a certain wall
+_UNLIKELY = 1e-9  # of the likeliest goal's probability, up to which a goal is too far to be searched on any map
 
 
 def cell_costs(walls: np.ndarray) -> np.ndarray:
@@ -38,7 +39,7 @@ def plan(walls: np.ndarray, goal: np.ndarray, start: Cell) -> list[Cell]:
     """
     size, cell = len(walls), start[0] * len(walls) + start[1]
     left_at_goal = np.full(goal.shape, np.inf)
-    possible = goal > 0
+    possible = goal > _UNLIKELY * goal.max()
     left_at_goal[possible] = _GOAL_DETOUR * (goal.max() / goal[possible] - 1)
     next_cell = ways_to_goal(cell_costs(walls), left_at_goal, cell)
     path = [start]

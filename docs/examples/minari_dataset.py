@@ -18,7 +18,9 @@ parser.add_argument("--episodes", type=int, default=100)
 parser.add_argument("--dataset", default="mazebench/local-13-planner-v0")
 arguments = parser.parse_args()
 if arguments.dataset in minari.list_local_datasets():
-    parser.error(f"{arguments.dataset} is there already; name another --dataset, or `minari delete {arguments.dataset}`")
+    parser.error(
+        f"{arguments.dataset} is there already; name another --dataset, or `minari delete {arguments.dataset}`"
+    )
 
 env = minari.DataCollector(gymnasium.make("mazebench/Local-13-v1"))
 planner = load_agent_class("planner").build(Interface("local", 13, 13))

@@ -11,6 +11,8 @@ import mazebench
 class PPOAgent(mazebench.Agent):
     """Draws its actions from the policy's distribution, with a random stream for each episode."""
 
+    needs_sensors = ("lidar",)
+
     @classmethod
     def build(cls, interface, *, seed=0, checkpoint=None):
         if checkpoint is None:

@@ -11,7 +11,9 @@ import numpy as np
 from mazebench.agent import Agent, Inputs
 from mazebench.agent_loading import source_line
 from mazebench.errors import InputError, RunError, shortened
+from mazebench.maps.benchmark import SIZES
 from mazebench.maps.maze import MAX_SIZE
+from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.spec import MIN_CONTEXT_SIZE
 
 
@@ -31,7 +33,9 @@ def calling(name: str, method: str) -> Iterator[None]:
         raise
     except (Exception, SystemExit) as error:  # other people's code may raise anything
         found = shortened(f"{type(error).__name__}: {error}").removesuffix(":")
-        raise AgentError(f"agent {name!r}: {method}() raised {found}{source_line(error)}") from error
+        is_sensor = isinstance(error, KeyError) and error.args and error.args[0] in SENSORS
+        way_out = f"; a sensor is observed with needs_sensors = ({error.args[0]!r},)" if is_sensor else ""
+        raise AgentError(f"agent {name!r}: {method}() raised {found}{source_line(error)}{way_out}") from error
 
 
 def context_size_of(name: str, agent_class: type[Agent], size: int) -> int:
@@ -46,6 +50,15 @@ def context_size_of(name: str, agent_class: type[Agent], size: int) -> int:
         expected = f"a whole number from {MIN_CONTEXT_SIZE} to {MAX_SIZE}"
         raise AgentError(f"agent {name!r}: expected context_size() to return {expected}, found {_short(found)}")
     return int(found)
+
+
+def only_context_size(name: str, agent_class: type[Agent], size: int) -> int | None:
+    """Returns the M that the agent `name` needs whatever the size of the mazes is; None if it depends on the size."""
+    try:
+        found = {context_size_of(name, agent_class, each) for each in (SIZES[0], SIZES[-1], size)}
+    except (InputError, RunError):  # not meant for mazes of all these sizes
+        return None
+    return found.pop() if len(found) == 1 else None
 
 
 class CheckedAgent(Agent):
@@ -75,12 +88,15 @@ class CheckedAgent(Agent):
 
     def _fault(self, actions: np.ndarray, batch_size: int) -> str | None:
         """Returns what was expected of `actions` and what was found; None if they are right."""
+        if actions.dtype == object:
+            wrong = next((value for value in actions.ravel() if not isinstance(value, int)), actions.dtype)
+            return f"integer actions, found {_short(wrong)}"
         if actions.shape != (batch_size,):
             return f"{batch_size} actions, one an environment, found shape {actions.shape}"
         if not np.issubdtype(actions.dtype, np.integer):
             return f"integer actions, found {actions.dtype}"
-        wrong = actions[(actions < 0) | (actions >= self._num_actions)]
-        return f"actions from 0 to {self._num_actions - 1}, found {wrong[0]}" if len(wrong) else None
+        illegal = actions[(actions < 0) | (actions >= self._num_actions)]
+        return f"actions from 0 to {self._num_actions - 1}, found {illegal[0]}" if len(illegal) else None
 
 
 def _short(value: object) -> str:

@@ -15,7 +15,7 @@ from mazebench.agent_loading import checked_agent_class, load_agent_class
 from mazebench.errors import InputError, unknown
 from mazebench.evaluation import metrics
 from mazebench.evaluation.chunk import Chunk
-from mazebench.evaluation.options import NUM_ENVS, EvalOptions, RunOptions
+from mazebench.evaluation.options import FIXED, NUM_ENVS, EvalOptions, RunOptions
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import Pool, open_pool
 from mazebench.evaluation.records import Summary
@@ -61,12 +61,14 @@ def evaluate(
       RunError: if the agent or a worker failed; what ended until then is kept.
     """
     RunOptions(resume=resume, record=record, num_envs=num_envs, workers=workers, ray_address=ray_address)
+    if not isinstance(agent, str | type):
+        raise InputError(f"expected the name of an agent or its class, found an object of {type(agent).__name__}")
     name = agent if isinstance(agent, str) else f"{agent.__module__}:{agent.__qualname__}"
     agent_class = load_agent_class(name) if isinstance(agent, str) else checked_agent_class(name, agent)
-    known = [field.name for field in dataclasses.fields(EvalOptions) if field.name != "agent"]
+    known = {field.name for field in dataclasses.fields(EvalOptions)} - {"agent"}
     for option in options:
         if option not in known:
-            raise unknown("option", option, known)
+            raise unknown("option", option, known - set(FIXED))
     if (workers or ray_address) and (name.startswith("__main__:") or load_agent_class(name) is not agent_class):
         raise InputError(f"expected a class that other processes can import by its name, found {name}")
     plan = make_plan(EvalOptions(name, **options), agent_class)

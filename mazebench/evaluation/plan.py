@@ -10,13 +10,14 @@ from typing import Any
 
 from mazebench.agent import Agent, Interface
 from mazebench.agent_loading import load_agent_class
-from mazebench.errors import InputError, held_remarks
-from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of
+from mazebench.errors import InputError, UnplayableError, held_remarks
+from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of, only_context_size
 from mazebench.evaluation.options import FIXED, EvalOptions, make_task
 from mazebench.evaluation.oracle import oracle_spl
 from mazebench.evaluation.provenance import provenance
 from mazebench.evaluation.records import Provenance
 from mazebench.evaluation.trials import Trial, draw_trials, select_track_trials, select_trials
+from mazebench.tasks.context import default_context_size
 from mazebench.tasks.perturbations import perturbation_levels
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.mjcf import maze_spec
@@ -56,19 +57,23 @@ class Plan:
     @property
     def remark(self) -> str | None:
         """What a user should know before the evaluation, in a line; None if there is nothing."""
-        task = self.task
-        if not self.untrained_scale:
-            if self.options.maps is None or task.track is not None or task.context_size >= task.size:
-                return None
+        task, agent, size = self.task, self.options.agent, _square(self.task.context_size)
+        is_coarse = task.track is None and task.context_size < task.size
+        way_out = "; context_size() of its class chooses another one (docs/agents.md)" if is_coarse else ""
+        if self.untrained_scale:
             return (
-                f"{self.options.agent} is shown the {task.size} x {task.size} cells as a map of {task.context_size} x "
-                f"{task.context_size}; context_size() of its class chooses another one (docs/agents.md)"
+                f"{agent} learned on maps of {self._learned_scale:g} m a cell and may fail here: its map of {size} "
+                f"cells shows {_square(task.size)} cells of {task.cell_size:g} m, {self._scale:.3g} m a cell{way_out}"
             )
-        return (
-            f"{self.options.agent} learned on maps of {self._learned_scale:g} m a cell; here its map of "
-            f"{task.context_size} x {task.context_size} cells shows {task.size} x {task.size} cells of "
-            f"{task.cell_size:g} m, {self._scale:.3g} m a cell"
-        )
+        if self.options.maps is not None and is_coarse:
+            return f"{agent} is shown the {_square(task.size)} cells as a map of {size}{way_out}"
+        if task.track is not None:
+            wanted = context_size_of(agent, self.agent_class, task.size)
+            if wanted not in (task.context_size, default_context_size(task.size)):
+                return (
+                    f"{agent} asks for a map of {_square(wanted)}; the track {task.track!r} shows {size} to all agents"
+                )
+        return None
 
     @property
     def _scale(self) -> float:  # m a cell of the context
@@ -101,6 +106,12 @@ class Plan:
         """
         options, interface = self.options, self.interface
         checkpoint = None if options.checkpoint is None else pathlib.Path(options.checkpoint)
+        only = only_context_size(options.agent, self.agent_class, interface.size)
+        if only is not None and only != interface.context_size:
+            raise UnplayableError(
+                f"agent {options.agent!r}: its context_size() asks for maps of {_square(only)} only; the track "
+                f"{self.task.track!r} shows {_square(interface.context_size)}"
+            )
         with calling(options.agent, "build"):
             agent = self.agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)
         return CheckedAgent(options.agent, agent, interface.num_actions)
@@ -162,6 +173,10 @@ def _select_trials(options: EvalOptions, task: TaskSpec) -> list[Trial]:
     if task.track is not None:
         return select_track_trials(task.mazes, *what)
     return select_trials(options.task, task.mazes, *what)
+
+
+def _square(side: int) -> str:
+    return f"{side} x {side}"
 
 
 @functools.lru_cache(maxsize=1)

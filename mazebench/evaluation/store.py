@@ -147,9 +147,18 @@ class Store:
     def __enter__(self) -> Store:
         return self
 
-    def __exit__(self, *exception: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *exception: object) -> None:
+        if kind is not None and issubclass(kind, InputError) and not self._ended:
+            self._clear()
         with contextlib.suppress(OSError):  # of a line that could not be written, which was reported
             self._opened.close()
+
+    def _clear(self) -> None:
+        """Removes what a run left that was refused before an episode ended, such as one that its agent can't play."""
+        with contextlib.suppress(OSError):  # the refusal matters more
+            (self.folder / JOURNAL).unlink()
+            (self.folder / CONFIG).unlink()
+            self.folder.rmdir()
 
 
 def _prepare(folder: pathlib.Path, plan: Plan, resume: bool) -> None:

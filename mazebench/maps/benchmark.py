@@ -54,6 +54,8 @@ def load_track_mazes(size: int, split: str) -> tuple[Maze, ...]:
 
 def _check_names(size: int, sizes: tuple[int, ...], split: str) -> None:
     """Raises `InputError` if there is no such size or split."""
+    if isinstance(size, str | float):
+        raise InputError(f"expected size as a whole number, found {size!r}")
     if size not in sizes:
         raise unknown("size", size, sizes)
     if split not in SPLITS:

@@ -30,8 +30,10 @@ def generate(style: str, size: int, rng: np.random.Generator, name: str | None =
     """
     if style not in STYLES:
         raise unknown("style", style, STYLES)
-    if not MIN_SIZE <= size <= MAX_SIZE:
-        raise InputError(f"expected a size of {MIN_SIZE} to {MAX_SIZE} cells, found {size}")
+    if not (isinstance(size, int | np.integer) and MIN_SIZE <= size <= MAX_SIZE):
+        raise InputError(f"expected a size of {MIN_SIZE} to {MAX_SIZE} cells, found {size!r}")
+    if not isinstance(rng, np.random.Generator):
+        raise InputError(f"expected rng as a numpy.random.Generator, found {type(rng).__name__}")
     return Maze(STYLES[style](size, rng), name or f"{style}-{size}")
 
 

@@ -22,7 +22,7 @@ from mazebench.maps.options import MapOptions
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 _TOLERANCE = 1e-3  # pixels by which a cell may miss a whole number of them
 _SURE_CELL_SIZE = 0.5  # m, from which agents that steer by their pose seldom miss a goal
-_MANY_CLOSED = 0.2  # share of the free cells of which a user would miss rooms
+_MANY_CLOSED = 0.05  # share of the free cells of which a user would miss rooms
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -79,7 +79,10 @@ def place_maze(grid: OccupancyGrid, options: MapOptions, name: str) -> PlacedMaz
         changes.append(f"{width} x {height} pixels of {grid.resolution:g} m as cells of {cell_size:g} m")
     if cell_size < _SURE_CELL_SIZE:
         sure = math.ceil(_SURE_CELL_SIZE / grid.resolution - _TOLERANCE) * grid.resolution
-        hints.append(f"agents drive surely in cells from {_SURE_CELL_SIZE:g} m, try --cell-size {sure:g}")
+        hints.append(
+            f"agents drive surely in cells from {_SURE_CELL_SIZE:g} m; if doors are at least {2 * sure:g} m wide, try "
+            f"--cell-size {sure:g}"
+        )
     if num_closed:
         share = num_closed / num_free
         part = f"{num_closed:,} of {num_free:,} free cells ({100 * share:.0f} %)"

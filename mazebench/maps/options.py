@@ -19,8 +19,8 @@ class MapOptions(Options):
 
     cell_size: float | None = option(
         None,
-        "Metres per cell of your own maps. A ROS map, or a picture with pixel_size, is coarsened to such cells; if not "
-        "given, to the smallest of at least 0.4 m. Other maps have cells of 1 m if not given.",
+        "Width of a cell of your own maps in metres. If not given, 1; for ROS maps and pictures with pixel_size, which "
+        "are coarsened to such cells, the smallest possible from 0.4.",
         lowest=0.01,
         highest=100,
     )
@@ -35,7 +35,7 @@ class MapOptions(Options):
         "Metres per pixel of a picture of a floor plan, which may have thin walls. It is read as a ROS map is: dark is "
         "wall, light is free.",
         lowest=0.001,
-        highest=100,
+        highest=0.5,  # so that pixels a metre are refused
     )
     unknown: str = option(
         "wall",

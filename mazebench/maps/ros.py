@@ -25,6 +25,7 @@ ROS_SUFFIXES = (".yaml", ".yml")
 _MAX_BYTES = 2**16  # of a YAML file
 _FREE_SHADE, _UNKNOWN_SHADE, _OCCUPIED_SHADE = 254, 205, 0  # that map_saver writes
 _OCCUPIED_THRESH, _FREE_THRESH = 0.65, 0.196  # with which map_server reads them back
+_MOSTLY_DARK = 0.8  # share of walls from which a floor plan is light on dark; mazes of corridors have up to 0.6
 
 
 class _Metadata(pydantic.BaseModel):
@@ -86,6 +87,10 @@ def place_floor_plan(path: pathlib.Path, pixel_size: float, options: MapOptions)
     rows, columns = (np.flatnonzero((states == OCCUPIED).any(axis=axis)) for axis in (1, 0))
     if not len(rows):
         raise MazeError(f"{path.stem}: expected dark walls on light paper, found none")
+    if (states == OCCUPIED).mean() > _MOSTLY_DARK:
+        raise MazeError(
+            f"{path.stem}: expected dark walls on light paper, found more dark than light; invert the picture"
+        )
     corner = np.array([columns[0], len(states) - 1 - rows[-1]]) * pixel_size
     plan = states[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     return place_maze(OccupancyGrid(plan, pixel_size, (*corner.tolist(), 0.0)), options, path.stem)

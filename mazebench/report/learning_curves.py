@@ -37,7 +37,7 @@ class Run:
     def last(self, metric: str) -> str:
         """Returns the last value of a metric in words; nothing if there is none."""
         values = [line[metric] for line in self.lines if metric in line]
-        return f"{values[-1]:.2f}" if values else ""
+        return f"{values[-1]:.3f}" if values else ""
 
 
 def find_runs(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:

@@ -16,13 +16,14 @@ class Counters(pydantic.BaseModel):
     env_steps: pydantic.NonNegativeInt
     updates: pydantic.NonNegativeInt
     milestone_steps: pydantic.NonNegativeInt  # env_steps of the last milestone
-    milestone_updates: pydantic.NonNegativeInt  # updates of the last milestone
+    logged_steps: pydantic.NonNegativeInt  # env_steps of the last line of metrics
+    logged_updates: pydantic.NonNegativeInt  # updates of that line
     loss_sums: dict[str, float]  # over the updates since then, by name
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> Self:
-        num_updates = self.updates - self.milestone_updates
-        if self.milestone_steps > self.env_steps or num_updates < bool(self.loss_sums):
+        num_updates = self.updates - self.logged_updates
+        if not self.milestone_steps <= self.logged_steps <= self.env_steps or num_updates < bool(self.loss_sums):
             raise ValueError("expected no milestone after the last step, and updates since then where there are losses")
         return self
 
@@ -40,14 +41,18 @@ class Counters(pydantic.BaseModel):
         sums = {name: self.loss_sums.get(name, 0.0) + value for name, value in losses.items()}
         return self.model_copy(update={"updates": self.updates + 1, "loss_sums": sums})
 
-    def at_milestone(self) -> Self:
-        """Returns the counters of a milestone here."""
-        changes = {"milestone_steps": self.env_steps, "milestone_updates": self.updates, "loss_sums": {}}
+    def after_line(self) -> Self:
+        """Returns the counters after a line of metrics was written here."""
+        changes = {"logged_steps": self.env_steps, "logged_updates": self.updates, "loss_sums": {}}
         return self.model_copy(update=changes)
 
+    def at_milestone(self) -> Self:
+        """Returns the counters of a milestone here, which has a line of metrics."""
+        return self.after_line().model_copy(update={"milestone_steps": self.env_steps})
+
     def mean_losses(self) -> dict[str, float]:
-        """Returns the means over the updates since the last milestone, by name."""
-        return {name: value / (self.updates - self.milestone_updates) for name, value in self.loss_sums.items()}
+        """Returns the means over the updates since the last line of metrics, by name."""
+        return {name: value / (self.updates - self.logged_updates) for name, value in self.loss_sums.items()}
 
 
-BEGINNING = Counters(env_steps=0, updates=0, milestone_steps=0, milestone_updates=0, loss_sums={})
+BEGINNING = Counters(env_steps=0, updates=0, milestone_steps=0, logged_steps=0, logged_updates=0, loss_sums={})

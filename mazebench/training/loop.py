@@ -34,6 +34,10 @@ from mazebench.training.run_folder import RunFolder, read_counters
 from mazebench.training.sitting import Report, Sitting, in_words
 from mazebench.training.sources import InProcessSource, Source
 
+# As many steps take less than a minute on two cores. They are counted, not timed, so that the same run writes the same
+# lines.
+_STEPS_BETWEEN_LINES = 5_000
+
 
 class TrainingError(RunError):
     """A run can't go on; its checkpoints are intact."""
@@ -65,6 +69,8 @@ def train(options: TrainOptions, out: pathlib.Path, resume: bool = False, report
             return
         if counters.env_steps:
             report(f"resuming {out} at {counters.env_steps:,} steps")
+        elif resume:
+            report(f"nothing to resume in {out}; starting a new run")
         report(f"{options.agent}: {learner.description()}")
         with stopping.postponing():
             TrainingLoop(options, folder, learner, task, source, held_out, counters, report).run()
@@ -104,6 +110,10 @@ class TrainingLoop:
         # New trajectories, so that a run that is resumed from this milestone goes on as the unbroken one did.
         source = self._source.collect(_mix(self._options.seed, self._counters.env_steps))
         while self._counters.env_steps < env_steps and not self._is_over():
+            line_steps = self._counters.logged_steps + _STEPS_BETWEEN_LINES
+            if line_steps <= self._counters.env_steps < env_steps - _STEPS_BETWEEN_LINES // 2:  # a milestone has a line
+                self._folder.log(self._counters, self._counters.mean_losses())
+                self._counters = self._counters.after_line()
             self._learn_from(next(source))
             self._report(self._sitting.status(self._counters))
             if self._is_savepoint_due():
@@ -137,14 +147,15 @@ class TrainingLoop:
         return seconds > 0 and (stopping.is_asked() or time.monotonic() >= self._saved_time + seconds)
 
     def _save(self) -> None:
-        _save(self._options, self._folder, self._learner, self._task, self._counters)
+        """Saves a checkpoint, unless the last one is of this very step: a source may have brought no experience."""
+        if self._counters.env_steps != self._saved_steps:
+            _save(self._options, self._folder, self._learner, self._task, self._counters)
         self._saved_steps, self._saved_time = self._counters.env_steps, time.monotonic()
 
     def _reach_milestone(self) -> None:
         """Saves, evaluates, and logs; a run that is stopped in the evaluation repeats it when it is resumed."""
         counters, status = self._counters, self._sitting.status(self._counters)
-        if counters.env_steps != self._saved_steps:
-            self._save()
+        self._save()
         rates = self._held_out.success_rates(self._learner.actor, self._show_evaluation)
         metrics = counters.mean_losses() | {f"success_rate_{distance}": rate for distance, rate in rates.items()}
         self._folder.make_milestone(counters, metrics)
@@ -178,7 +189,7 @@ def _open_source(options: TrainOptions, task: TaskSpec, learner: Learner) -> Sou
         return InProcessSource(task, learner.actor, learner.num_envs)
     from mazebench.training.distributed import RaySource
 
-    return RaySource(task, learner, options.workers, options.ray)
+    return RaySource(task, learner, options.workers, options.ray_address)
 
 
 def _begin_or_resume(
@@ -198,7 +209,7 @@ def _begin_or_resume(
         return BEGINNING
     counters = read_counters(checkpoints[-1])
     learner.load(checkpoints[-1])
-    folder.forget_metrics_after(counters.milestone_steps)
+    folder.forget_metrics_after(counters)
     return counters
 
 

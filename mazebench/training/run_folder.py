@@ -1,6 +1,6 @@
 """The folder of a training run: its config, metrics and checkpoints, written by one process at a time.
 
-A checkpoint is a milestone, whose metrics are logged, or a savepoint, from which a run that was stopped goes on.
+A checkpoint is a milestone, where the agent is evaluated, or a savepoint, from which a run that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -92,15 +92,19 @@ class RunFolder:
         Raises:
           RunError: if they can't be written; the checkpoints are intact.
         """
-        self._log(counters, metrics)
+        self.log(counters, metrics)
         path = self._checkpoint(counters) / _COUNTERS
         try:
             write_json(path, counters.at_milestone().model_dump())
         except OSError as error:
             raise self._cannot("save", path, error) from error
 
-    def _log(self, counters: Counters, metrics: Mapping[str, float]) -> None:
-        """Appends a line to the metrics, and writes them for TensorBoard."""
+    def log(self, counters: Counters, metrics: Mapping[str, float]) -> None:
+        """Appends a line to the metrics, and writes them for TensorBoard.
+
+        Raises:
+          RunError: if they can't be written; the checkpoints are intact.
+        """
         values = {"env_steps": counters.env_steps, "updates": counters.updates, **metrics}
         try:
             with open_to_write(self.path / METRICS, "a") as file:
@@ -112,11 +116,11 @@ class RunFolder:
         except (OSError, WriteError) as error:
             raise self._cannot("write", self.path, error) from error
 
-    def forget_metrics_after(self, env_steps: int) -> None:
-        """Removes the metrics of later milestones, which a resumed run reaches again."""
+    def forget_metrics_after(self, counters: Counters) -> None:
+        """Removes the metrics that a run writes again when it is resumed from the checkpoint at `counters`."""
         path = self.path / METRICS
         with writing_to(self.path):
-            kept = [line for line in repair_and_read_lines(path) if line.get("env_steps", 0) <= env_steps]
+            kept = [line for line in repair_and_read_lines(path) if line.get("env_steps", 0) <= counters.logged_steps]
             with open_whole(path) as file:
                 file.write("".join(map(to_line, kept)).encode("utf-8"))
 
