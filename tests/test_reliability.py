@@ -157,16 +157,16 @@ class TestRay:
     @slow
     def test_training_goes_on_when_actors_are_killed(self, tmp_path):
         pytest.importorskip("ray")
-        many = 80_000  # as it goes on while an actor is replaced, which takes seconds
+        many = 50_000  # as it goes on while an actor is replaced, which takes seconds
         process = start(*TRAIN, "--env-steps", str(many), "--workers", "2", "--out", tmp_path / "run")
         rng = np.random.default_rng(7)
-        for kill in range(3):
+        for kill in range(2):
             wait_until(lambda kill=kill: num_metrics(tmp_path) > kill, process)
             kill_ray_worker(process, 2, rng)
         _, errors = process.communicate(timeout=PATIENCE)
         assert process.returncode == 0, errors
         # Ray itself replaces an actor that is killed before it is ready.
-        assert 0 < errors.count("died; it is replaced") <= 3, errors
+        assert 0 < errors.count("died; it is replaced") <= 2, errors
         metrics = metrics_of(tmp_path / "run")
         steps = [line["env_steps"] for line in metrics]
         assert steps == sorted(set(steps))
@@ -245,7 +245,7 @@ class TestFullDisk:
     @slow
     def test_a_disk_may_fill_at_any_point_of_a_training(self, disk: Disk, unbroken):
         statuses = []
-        for kilobytes in (0, 48, 100, 500):
+        for kilobytes in (0, 56, 500):
             disk.leave(kilobytes)
             status, _, errors = run(*LEARN, "--out", disk.path / "run")
             statuses.append(status)
@@ -255,7 +255,7 @@ class TestFullDisk:
             assert run(*LEARN, "--out", disk.path / "run", "--resume")[0] == 0
             assert learned_in(disk.path / "run") == learned_in(unbroken("learn"))
             shutil.rmtree(disk.path / "run")
-        assert statuses == [2, 1, 1, 1]
+        assert statuses == [2, 1, 1]
 
     def test_a_training_that_cannot_save_names_its_last_checkpoint(self, tmp_path):
         def limit() -> None:
