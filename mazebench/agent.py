@@ -190,7 +190,7 @@ class _SingleAgents(Agent):
 
 def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
     """Returns `declared` itself if it is an `Agent`, else an `Agent` that runs the `SingleAgent` in B environments."""
-    return declared if issubclass(declared, Agent) else _running(declared)
+    return declared if issubclass(declared, Agent) else _running(declared)  # type: ignore[arg-type]  # of mypy, which takes its objects' hash
 
 
 @functools.cache  # so that a class and its import by name give one and the same

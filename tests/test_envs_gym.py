@@ -48,6 +48,14 @@ def corridor_env(**options) -> MazeEnv:
     return MazeEnv(make_spec(maps=corridor(), **options))
 
 
+def test_it_steps_without_dm_control():
+    program = (
+        "import sys; sys.modules['dm_control'] = None\nimport gymnasium, mazebench\n"
+        "env = gymnasium.make('mazebench/Local-13-v1'); env.reset(seed=0); env.step(0); print('done')"
+    )
+    assert subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout == "done\n"
+
+
 class TestRegistration:
     @pytest.mark.parametrize("name", ["mazebench/Local-13-v1", "mazebench/LocalGoal-13-v1", "mazebench/Far-31-v2"])
     def test_the_size_of_an_id_yields_to_maps_and_to_a_size(self, name):

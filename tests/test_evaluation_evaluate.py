@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
 import pathlib
 import shutil
@@ -15,6 +16,7 @@ import pytest
 from run_folders import FEW, FILES, IMPORTS, RECORDED, Killed, files_of, kill_after, records_of, results_of, summary_of
 
 from mazebench.agent import Agent, SingleAgent
+from mazebench.agent_loading import load_agent_class
 from mazebench.errors import InputError, UnplayableError
 from mazebench.evaluation.chunk import Chunk, run_chunk
 from mazebench.evaluation.evaluate import evaluate
@@ -343,6 +345,24 @@ class TestRefused:
         with pytest.raises(UnplayableError, match="its checkpoint reads maps of 13 x 13 only, found 15 x 15"):
             evaluate("mmn", tmp_path / "out", size=15, **FEW)
         assert list(tmp_path.iterdir()) == []
+
+    @pytest.mark.parametrize("finished", [True, False])
+    def test_a_refused_resumption_leaves_what_was_written(self, random_run, tmp_path, monkeypatch, finished):
+        folder = shutil.copytree(random_run, tmp_path / "run")
+        if not finished:
+            journal = [json.dumps({"record": record}) for record in records_of(folder)]
+            (folder / "journal.jsonl").write_text("\n".join(journal) + "\n")
+            for name in ("episodes.jsonl", "summary.json"):
+                (folder / name).unlink()
+        before = files_of(folder)
+
+        def refuse(*arguments, **options):
+            raise InputError("no")
+
+        monkeypatch.setattr(load_agent_class("random"), "build", classmethod(refuse))
+        with pytest.raises(InputError, match=r"^no$"):
+            evaluate("random", folder, resume=True, record=True, **FEW)
+        assert {name: content for name, content in files_of(folder).items() if name in before} == before
 
     def test_an_object_in_place_of_a_class_is_refused(self):
         with pytest.raises(InputError, match="expected the name of an agent or its class, found an object of Ahead"):

@@ -51,7 +51,7 @@ FOLDERS = {"mazebench": "mazebench", "mazebench_agents": "agents", "mazebench_as
 OVERRIDES = {
     "initialize_episode", "before_step", "after_step", "get_observation", "get_reward", "get_termination",
     "action_spec", "observation_spec", "reward_spec", "reset", "step", "render", "close", "close_extras",
-    "after_reset", "full_state", "set_full_state", "observation", "forward",
+    "after_reset", "full_state", "set_full_state", "forward",
     "show", "state_error", "picture", "pixel", "points", "distances", "time_limit", "check", "facts", "read",
 }  # fmt: skip
 

@@ -345,6 +345,17 @@ class TestFloorPlan:
         assert placed.maze == read_maze(self.write(tmp_path, two_rooms(), "cut.png"), pixel_size=0.02)
         assert placed.origin == pytest.approx((0.66, 0.66 - 1.6, 0.0))
 
+    def test_the_ground_beside_a_building_of_another_shape_is_no_floor(self, tmp_path):
+        plan = np.full((500, 500), 255, np.uint8)
+        corners = np.array([[20, 20], [220, 20], [220, 220], [420, 220], [420, 420], [20, 420]])
+        cv2.polylines(plan, [corners], True, 0, 5)
+        plan[480:484, 480:484] = 0  # a speck
+        maze = read_maze(self.write(tmp_path, plan), pixel_size=0.02)
+        assert maze.is_free((15, 3))
+        assert maze.is_free((15, 15))
+        assert not maze.is_free((3, 15))
+        assert maze.size == 21
+
     def test_marks_in_colour_are_floor_and_gray_is_unknown(self, tmp_path):
         plan = cv2.cvtColor(two_rooms(), cv2.COLOR_GRAY2BGR)
         plan[45:55, 45:55] = (0, 0, 255)

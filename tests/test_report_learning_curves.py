@@ -34,6 +34,15 @@ def report(out, *paths):
     return (out / "report.md").read_text()
 
 
+@pytest.mark.parametrize("line", ['{"env_steps":"x"}', '{"env_steps":1' + "0" * 400 + "}", "[1]", "{"])
+def test_a_damaged_line_is_left_out(tmp_path, line):
+    run = make_run(tmp_path / "mah-3")
+    expected = report(tmp_path / "before", run)
+    with (run / "metrics.jsonl").open("a") as file:
+        file.write(f"{line}\n")
+    assert report(tmp_path / "after", run) == expected
+
+
 def test_a_run_has_figures_and_a_row(tmp_path):
     text = report(tmp_path / "out", make_run(tmp_path / "mah-3"))
     head, _, row = (line for line in text.splitlines() if line.startswith("|"))

@@ -98,6 +98,18 @@ class TestPage:
             write_scoreboard(read_entries([tmp_path / name]), page)
         assert sorted(entry.parts["lost 1"].success_rate for entry in kept_entries(page)) == [0.2, 0.3]
 
+    def test_an_entry_that_would_lose_parts_is_refused(self, page, tmp_path):
+        for name, track in (("a", "lost"), ("b", "stale")):
+            make_part(tmp_path / name, "x", track, 1, 20, "c" * 64)
+        write_scoreboard(read_entries([tmp_path / "a"]), page)
+        before = page.read_text()
+        for paths in ([tmp_path / "b"], [tmp_path / "a", tmp_path / "b"]):
+            with pytest.raises(
+                InputError, match="x: expected all parts of its entry in one folder, found none of lost 1"
+            ):
+                write_scoreboard(read_entries(paths), page)
+        assert page.read_text() == before
+
     def test_the_page_of_the_docs_is_made_from_the_kept_entries(self):
         assert f"{BEGIN}{to_markdown(kept_entries(PAGE))}{END}" in PAGE.read_text(encoding="utf-8")
 
@@ -124,14 +136,19 @@ class TestPage:
 
 class TestCheck:
     def test_a_complete_entry_is_told_in_one_line(self, suite):
-        [line] = check(suite / "whole")
+        [line], is_complete = check(suite / "whole")
+        assert is_complete
         assert line.startswith(f"{suite / 'whole'}: a complete entry of whole, all 12 parts, mean 0.83 [")
 
     def test_missing_parts_are_named(self, suite):
-        with pytest.raises(
-            InputError, match="expected all 12 parts, found 2; missing: stale 1, stale 2, stale 3, lost 3"
-        ):
-            check(suite)
+        lines, are_complete = check(suite)
+        assert not are_complete
+        assert [
+            line
+            for line in lines
+            if "2 of 12 parts of part, no mean; missing: stale 1, stale 2, stale 3, lost 3" in line
+        ]
+        assert [line for line in lines if "a complete entry of whole" in line]
 
     def test_nothing_is_written(self, suite, tmp_path):
         command = [sys.executable, "-m", "mazebench.report.scoreboard", "--check", str(suite / "whole")]

@@ -207,9 +207,9 @@ def _gym_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
         task.after_step(simulation)
         ended = task.get_termination(simulation) is not None
         marks.append(time.perf_counter())
-        env.observation()
+        env._observation()
         marks.append(time.perf_counter())
-        env.info()
+        env._info()
         marks.append(time.perf_counter())
         if ended:
             env.reset()

@@ -24,9 +24,6 @@ with warnings.catch_warnings():
     from dm_control.rl import control
 
 
-control.Task.register(Navigation)  # it has all methods of one
-
-
 class Physics(Simulation, engine.Physics):
     """One maze and the body in it; `load_maze` exchanges the maze but keeps MjData and rendering context."""
 
@@ -55,11 +52,15 @@ class Physics(Simulation, engine.Physics):
         mujoco.mj_step1(self.model.ptr, self.data.ptr)
 
 
+class Task(Navigation, control.Task):
+    """The navigation task as a task of dm_control."""
+
+
 class Environment(control.Environment):
     """A dm_control Environment whose `reset` also takes a seed, or the episode to play."""
 
     physics: Physics
-    task: Navigation
+    task: Task
 
     def __init__(self, spec: TaskSpec, seed: int | None = None):
         """Opens the environment; `seed` is that of the first reset.
@@ -67,7 +68,7 @@ class Environment(control.Environment):
         Raises:
           InputError: if `seed` is not a natural number, or `spec` not a `TaskSpec`.
         """
-        task = Navigation(spec, seed)
+        task = Task(spec, seed)
         # The task judges the time limit itself, so that a goal reached on the last step is a termination.
         super().__init__(Physics.of_maze(models_of(spec.mazes)[0]), task, n_sub_steps=STEPS_PER_ACTION)
 

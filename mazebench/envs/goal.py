@@ -69,8 +69,8 @@ class GoalMazeEnv(MazeEnv):
         steps = info["steps"] if isinstance(info, Mapping) else np.array([each["steps"] for each in info])
         return (steps >= self.task_spec.time_limit) & ~self.compute_terminated(achieved_goal, desired_goal, info)
 
-    def observation(self) -> dict[str, np.ndarray]:
-        shown = super().observation()
+    def _observation(self) -> dict[str, np.ndarray]:
+        shown = super()._observation()
         maze = self.task_spec.mazes[self.task.maze]
         planes = shown.pop("context")[_SHOWN_PLANES]
         return {

@@ -70,7 +70,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         with self.simulation.reset_context():
             self.task.initialize_episode(self.simulation)
         self._needs_reset = False
-        return self.observation(), self.info()
+        return self._observation(), self._info()
 
     def step(self, action: int | np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         """Takes one agent step of 0.16 s.
@@ -87,7 +87,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         task.after_step(simulation)
         discount = task.get_termination(simulation)
         self._needs_reset = discount is not None
-        return self.observation(), task.get_reward(simulation), discount == 0.0, discount == 1.0, self.info()
+        return self._observation(), task.get_reward(simulation), discount == 0.0, discount == 1.0, self._info()
 
     def render(self) -> np.ndarray | None:
         """Returns `[480, 480, 3]` uint8 of the current state if `render_mode` is "rgb_array", else None."""
@@ -121,14 +121,12 @@ class MazeEnv(JsonSpec, gymnasium.Env):
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {"_cameras": None}  # a copy opens some of its own
 
-    def observation(self) -> dict[str, np.ndarray]:
-        """Returns what `step` returns of the present moment; noise is drawn anew."""
+    def _observation(self) -> dict[str, np.ndarray]:
         observation = self.task.get_observation(self.simulation)
         observation.pop("is_first", None)  # it is in `info`
         return observation
 
-    def info(self) -> dict[str, Any]:
-        """Returns the `info` of the present moment."""
+    def _info(self) -> dict[str, Any]:
         task = self.task
         return {
             "is_first": task.is_first,

@@ -6,13 +6,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
+from mazebench.errors import InputError
 from mazebench.maps import BENCHMARK_SIZES
 from mazebench.tasks import TASK_VERSION, TRACKS_VERSION
-from mazebench.world.backend import load_dm_control, load_mujoco
+from mazebench.world.backend import load_mujoco, loading_backend
 
 if TYPE_CHECKING:
     from gymnasium.vector import AutoresetMode
@@ -78,8 +80,13 @@ def load(
     Raises:
       InputError: if an option is unknown or not allowed, or dm_control is not installed.
     """
-    load_dm_control()
-    from mazebench.envs.dm_control import Environment
+    if find_spec("dm_control") is None:
+        raise InputError(
+            "mazebench.load needs dm_control, which is not installed: pip install --no-deps dm-control (it requires "
+            "labmaze, which is not needed here and has no wheels for Python 3.13 and later)"
+        )
+    with loading_backend():
+        from mazebench.envs.dm_control import Environment
 
     return Environment(_task_spec(task, {"size": size, "split": split, **options}, ("seed",)), seed)
 

@@ -33,7 +33,7 @@ def calling(name: str, method: str) -> Iterator[None]:
         raise
     except (Exception, SystemExit) as error:  # other people's code may raise anything
         found = shortened(f"{type(error).__name__}: {error}").removesuffix(":")
-        is_sensor = isinstance(error, KeyError) and error.args and error.args[0] in SENSORS
+        is_sensor = isinstance(error, KeyError) and str(error).strip("'") in SENSORS
         way_out = f"; a sensor is observed with needs_sensors = ({error.args[0]!r},)" if is_sensor else ""
         raise AgentError(f"agent {name!r}: {method}() raised {found}{source_line(error)}{way_out}") from error
 
@@ -89,7 +89,7 @@ class CheckedAgent(Agent):
     def _fault(self, actions: np.ndarray, batch_size: int) -> str | None:
         """Returns what was expected of `actions` and what was found; None if they are right."""
         if actions.dtype == object:
-            wrong = next((value for value in actions.ravel() if not isinstance(value, int)), actions.dtype)
+            wrong = next((value for value in actions.ravel() if not isinstance(value, int | np.integer)), actions.dtype)
             return f"integer actions, found {_short(wrong)}"
         if actions.shape != (batch_size,):
             return f"{batch_size} actions, one an environment, found shape {actions.shape}"

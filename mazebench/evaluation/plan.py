@@ -10,7 +10,7 @@ from typing import Any
 
 from mazebench.agent import Agent, Interface
 from mazebench.agent_loading import load_agent_class
-from mazebench.errors import InputError, UnplayableError, held_remarks
+from mazebench.errors import InputError, RunError, UnplayableError, held_remarks
 from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of, only_context_size
 from mazebench.evaluation.options import FIXED, EvalOptions, make_task
 from mazebench.evaluation.oracle import oracle_spl
@@ -68,7 +68,10 @@ class Plan:
         if self.options.maps is not None and is_coarse:
             return f"{agent} is shown the {_square(task.size)} cells as a map of {size}{way_out}"
         if task.track is not None:
-            wanted = context_size_of(agent, self.agent_class, task.size)
+            try:
+                wanted = context_size_of(agent, self.agent_class, task.size)
+            except (InputError, RunError):  # not meant for mazes of this size
+                return None
             if wanted not in (task.context_size, default_context_size(task.size)):
                 return (
                     f"{agent} asks for a map of {_square(wanted)}; the track {task.track!r} shows {size} to all agents"

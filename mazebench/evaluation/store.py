@@ -83,6 +83,7 @@ class Store:
           InputError: if the folder can't be written, is in use, holds another run or is damaged.
         """
         self.folder, self._plan = folder, plan
+        self._made_folder = not folder.exists()
         make_folder(folder)
         with contextlib.ExitStack() as opened, writing_to(folder):
             opened.enter_context(FolderLock(folder))
@@ -148,7 +149,7 @@ class Store:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *exception: object) -> None:
-        if kind is not None and issubclass(kind, InputError) and not self._ended:
+        if self._made_folder and not self._ended and kind is not None and issubclass(kind, InputError):
             self._clear()
         with contextlib.suppress(OSError):  # of a line that could not be written, which was reported
             self._opened.close()

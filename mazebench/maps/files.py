@@ -72,7 +72,7 @@ def read_all(path: pathlib.Path, options: MapOptions) -> tuple[Maze, ...]:
             mazes.append(read_placed(file, None, options).maze)
         remarks.extend(lines[:1])
     if remarks:
-        remark(f"{len(remarks)} of {len(mazes)} maps were changed, such as {remarks[0]}")
+        remark(f"{len(remarks)} of {len(mazes)} maps have remarks, such as {remarks[0]}")
     return tuple(mazes)
 
 

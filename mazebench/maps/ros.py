@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import pydantic
 import yaml
+from scipy import ndimage
 
 from mazebench.errors import InputError
 from mazebench.maps.image import read_picture, to_gray
@@ -25,6 +26,7 @@ ROS_SUFFIXES = (".yaml", ".yml")
 _MAX_BYTES = 2**16  # of a YAML file
 _FREE_SHADE, _UNKNOWN_SHADE, _OCCUPIED_SHADE = 254, 205, 0  # that map_saver writes
 _OCCUPIED_THRESH, _FREE_THRESH = 0.65, 0.196  # with which map_server reads them back
+_LEAST_INSIDE = 0.2  # share of a floor plan that is free inside of closed outer walls; less of it is a closed room
 _MOSTLY_DARK = 0.8  # share of walls from which a floor plan is light on dark; mazes of corridors have up to 0.6
 
 
@@ -67,8 +69,8 @@ def place_ros_maze(path: str | pathlib.Path, options: MapOptions) -> PlacedMaze:
 def place_floor_plan(path: pathlib.Path, pixel_size: float, options: MapOptions) -> PlacedMaze:
     """Reads a picture of a floor plan as a map of ROS with pixels of `pixel_size` m and the usual thresholds.
 
-    Marks in colour are floor. The paper around the plan is cut off. The lower left corner of the picture is the origin
-    of the map.
+    Marks in colour are floor. What lies outside of closed outer walls is unknown, and is cut off around the plan. The
+    lower left corner of the picture is the origin of the map.
 
     Raises:
       InputError: if the file can't be read.
@@ -84,16 +86,31 @@ def place_floor_plan(path: pathlib.Path, pixel_size: float, options: MapOptions)
         mode="trinary",
     )
     states = _states(to_gray(read_picture(path), path.stem), metadata)
-    rows, columns = (np.flatnonzero((states == OCCUPIED).any(axis=axis)) for axis in (1, 0))
-    if not len(rows):
+    if not (states == OCCUPIED).any():
         raise MazeError(f"{path.stem}: expected dark walls on light paper, found none")
     if (states == OCCUPIED).mean() > _MOSTLY_DARK:
         raise MazeError(
             f"{path.stem}: expected dark walls on light paper, found more dark than light; invert the picture"
         )
+    states = _without_surroundings(states)
+    rows, columns = (np.flatnonzero((states == OCCUPIED).any(axis=axis)) for axis in (1, 0))
     corner = np.array([columns[0], len(states) - 1 - rows[-1]]) * pixel_size
     plan = states[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     return place_maze(OccupancyGrid(plan, pixel_size, (*corner.tolist(), 0.0)), options, path.stem)
+
+
+def _without_surroundings(states: np.ndarray) -> np.ndarray:
+    """Returns states in which all that lies outside of the outer walls is unknown; as they are if these are open."""
+    light, _ = ndimage.label(np.pad(states != OCCUPIED, 1, constant_values=True))
+    inside = np.where(light[1:-1, 1:-1] == light[0, 0], UNKNOWN, states)
+    free = inside == FREE
+    rows, columns = (np.flatnonzero((states == OCCUPIED).any(axis=axis)) for axis in (1, 0))
+    if free.sum() < _LEAST_INSIDE * (rows[-1] + 1 - rows[0]) * (columns[-1] + 1 - columns[0]):
+        return states
+    # Specks and frames on the paper are dark, too; the walls are what touches free pixels.
+    dark, _ = ndimage.label(states == OCCUPIED, structure=np.ones((3, 3)))
+    walls = np.isin(dark, dark[ndimage.binary_dilation(free, np.ones((3, 3))) & (dark > 0)])
+    return np.where((dark > 0) & ~walls, UNKNOWN, inside)
 
 
 def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:

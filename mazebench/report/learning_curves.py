@@ -111,9 +111,10 @@ def _parse(line: bytes) -> dict[str, float]:
         found = parse_json(line)
     except ValueError:
         return {}
-    if not isinstance(found, dict) or _STEPS not in found:
+    if not isinstance(found, dict):
         return {}
-    return {name: value for name, value in found.items() if type(value) in (int, float)}
+    values = {name: value for name, value in found.items() if type(value) in (int, float) and abs(value) < 1e300}
+    return values if _STEPS in values else {}
 
 
 def _table(runs: Sequence[Run], rates: Sequence[str]) -> str:

@@ -122,7 +122,8 @@ def write_scoreboard(entries: Iterable[Entry], page: pathlib.Path) -> None:
     An entry replaces one of the same agent, code and checkpoints.
 
     Raises:
-      InputError: if the page can't be read, or has no place for a scoreboard; no entry is kept then.
+      InputError: if the page can't be read, or has no place for a scoreboard, or an entry lacks parts of the one that
+        it would replace; no entry is kept then.
     """
     try:
         text = page.read_text(encoding="utf-8")
@@ -132,6 +133,11 @@ def write_scoreboard(entries: Iterable[Entry], page: pathlib.Path) -> None:
     _, end, after = rest.partition(END)
     if not begin or not end:
         raise InputError(f"{page}: expected the lines {BEGIN.strip()} and {END.strip()}, found no such lines")
+    kept = {entry.file_name: entry for entry in kept_entries(page)}
+    for entry in (entries := list(entries)):
+        if lost := [part for part in kept.get(entry.file_name, entry).parts if part not in entry.parts]:
+            raise InputError(f"{entry.agent}: expected all parts of its entry in one folder, found none of {lost[0]}")
+        kept[entry.file_name] = entry
     make_folder(page.with_suffix(""))
     for entry in entries:
         write_json(page.with_suffix("") / entry.file_name, entry.model_dump(exclude_defaults=True))
@@ -139,20 +145,21 @@ def write_scoreboard(entries: Iterable[Entry], page: pathlib.Path) -> None:
         file.write(f"{before}{begin}{to_markdown(kept_entries(page))}{end}{after}".encode())
 
 
-def check(path: pathlib.Path) -> list[str]:
-    """Returns a line about each complete entry that a folder of results makes.
+def check(path: pathlib.Path) -> tuple[list[str], bool]:
+    """Returns a line about each entry that a folder of results makes, and whether all are complete.
 
     Raises:
-      InputError: if the results are no entry, or not a complete one.
+      InputError: if results are no entry.
     """
-    lines = []
+    lines, entries = [], []
     for folder in _agents_folders(path):
-        entry = _make_entry(folder)
+        entries.append(entry := _make_entry(folder))
         if entry.missing:
             found, missing = len(entry.parts), ", ".join(entry.missing)
-            raise InputError(f"{folder}: expected all {len(_PARTS)} parts, found {found}; missing: {missing}")
-        lines.append(f"{folder}: a complete entry of {entry.agent}, all {len(_PARTS)} parts, mean {_mean(entry)}")
-    return lines
+            lines.append(f"{folder}: {found} of {len(_PARTS)} parts of {entry.agent}, no mean; missing: {missing}")
+        else:
+            lines.append(f"{folder}: a complete entry of {entry.agent}, all {len(_PARTS)} parts, mean {_mean(entry)}")
+    return lines, not any(entry.missing for entry in entries)
 
 
 def _agents_folders(path: pathlib.Path) -> list[pathlib.Path]:
@@ -249,8 +256,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     try:
         if options.check:
-            for path in options.paths:
-                print(*check(path), sep="\n")
+            checked = [check(path) for path in options.paths]
+            print(*(line for lines, _ in checked for line in lines), sep="\n")
+            sys.exit(0 if all(are_complete for _, are_complete in checked) else 1)
         else:
             *folders, page = options.paths
             write_scoreboard(read_entries(folders), page)

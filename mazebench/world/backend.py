@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes.util
 import importlib
-import importlib.util
 import os
 import sys
+from collections.abc import Iterator
 
 from mazebench.errors import InputError
 
@@ -25,29 +26,17 @@ def load_mujoco() -> None:
     Raises:
       RenderingError: if it can't load the backend that the environment variable MUJOCO_GL names.
     """
-    _load("mujoco")
-
-
-def load_dm_control() -> None:
-    """Imports dm_control, and with it the rendering backend.
-
-    Raises:
-      RenderingError: if it can't load the backend that the environment variable MUJOCO_GL names.
-      InputError: if dm_control is not installed.
-    """
-    if importlib.util.find_spec("dm_control") is None:
-        raise InputError(
-            "mazebench.load needs dm_control, which is not installed: pip install lxml && pip install --no-deps "
-            "dm-control (its requirement labmaze, which is not needed here, has no wheels for Python 3.13 and later)"
-        )
-    _load("dm_control.mujoco")
-
-
-def _load(module: str) -> None:
     if "MUJOCO_GL" not in os.environ:
         return  # it takes what there is
+    with loading_backend():
+        importlib.import_module("mujoco")
+
+
+@contextlib.contextmanager
+def loading_backend() -> Iterator[None]:
+    """Turns what an import raises that can't load the rendering backend into a `RenderingError`."""
     try:
-        importlib.import_module(module)
+        yield
     # The kind of error depends on the backend.
     except (AttributeError, ImportError, OSError, RuntimeError) as error:
         raise rendering_error(error) from None  # it says all
