@@ -1,8 +1,6 @@
 """The throughput tables: that they can be measured, not what they say."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 
@@ -38,9 +36,18 @@ def test_the_range_sensor_is_measured():
 
 
 @pytest.mark.slow
-def test_bench_command_prints_json():
-    command = [sys.executable, "-m", "mazebench", "bench", "--quick", "--json"]
-    results = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+def test_all_tables_are_measured_and_printed(monkeypatch, capsys):
+    for name, value in {
+        "_QUICK_SECONDS": 0.01,
+        "_QUICK_ROUNDS": 1,
+        "_SIZES": (13,),
+        "_NUM_ENVS": (1, 2),
+        "_LIDAR_NUM_ENVS": (1,),
+    }.items():
+        monkeypatch.setattr(bench, name, value)
+    results = json.loads(json.dumps(bench.run(quick=True, say=lambda line: None)))
     assert {row["what"] for row in results["training"]} >= {"mah, 256 envs", "dqn, 256 envs"}
-    assert [row["what"] for row in results["num_envs"]][-1] == "4096 environments"
+    assert [row["what"] for row in results["num_envs"]][-1] == "2 environments"
     assert results["agents"]["mmn: tree search, 16 simulations, one thread"][0]["sims/s"] > 0
+    bench.print_tables(results)
+    assert "where a step of the Gymnasium environment goes" in capsys.readouterr().out

@@ -42,7 +42,7 @@ FIELD = open_maze(25)
 MIDDLE = np.array([12.5, 12.5])
 
 
-def physics_at(maze: Maze, position, yaw: float = 0.0, velocity=(0.0, 0.0)) -> MujocoSimulation:
+def simulation_at(maze: Maze, position, yaw: float = 0.0, velocity=(0.0, 0.0)) -> MujocoSimulation:
     simulation = MujocoSimulation(MazeModels([maze])[0])
     with simulation.reset_context():
         simulation.place_agent(np.asarray(position), yaw)
@@ -79,7 +79,7 @@ class TestDriving:
     @pytest.mark.parametrize("action", DRIVES)
     @pytest.mark.parametrize("yaw", YAWS)
     def test_speed_when_starting_from_rest(self, action, yaw):
-        frames = trajectory(physics_at(FIELD, MIDDLE, yaw), action, 12, STEPS_PER_FRAME)
+        frames = trajectory(simulation_at(FIELD, MIDDLE, yaw), action, 12, STEPS_PER_FRAME)
         direction = np.array([np.cos(yaw + BEARINGS[action]), np.sin(yaw + BEARINGS[action])])
         along = frames[:, 3:5] @ direction
         for frame, expected in LAB_SPEEDS.items():
@@ -90,7 +90,7 @@ class TestDriving:
 
     @pytest.mark.parametrize("action", DRIVES)
     def test_first_metre_when_starting_from_rest(self, action):
-        steps = trajectory(physics_at(FIELD, MIDDLE), action, 80)
+        steps = trajectory(simulation_at(FIELD, MIDDLE), action, 80)
         distances = np.hypot(*(steps[:, :2] - MIDDLE).T)
         assert np.interp(1.0, distances, np.arange(81)) / STEPS_PER_FRAME == pytest.approx(
             LAB_FRAMES_FOR_FIRST_METRE, rel=0.1
@@ -99,19 +99,19 @@ class TestDriving:
     @pytest.mark.parametrize("action", DRIVES)
     @pytest.mark.parametrize("yaw", YAWS)
     def test_speed_when_cruising(self, action, yaw):
-        simulation = physics_at(FIELD, MIDDLE, yaw)
+        simulation = simulation_at(FIELD, MIDDLE, yaw)
         trajectory(simulation, action, 150)
         assert simulation.speed() == pytest.approx(LAB_TOP_SPEED, rel=0.001)
 
     @pytest.mark.parametrize("yaw", YAWS)
     def test_distance_when_stopping_from_top_speed(self, yaw):
         velocity = LAB_TOP_SPEED * np.array([np.cos(yaw), np.sin(yaw)])
-        steps = trajectory(physics_at(FIELD, MIDDLE, yaw, velocity), None, 250)
+        steps = trajectory(simulation_at(FIELD, MIDDLE, yaw, velocity), None, 250)
         assert np.hypot(*(steps[-1, :2] - MIDDLE)) == pytest.approx(LAB_STOPPING_DISTANCE, rel=0.1)
         assert np.hypot(*steps[-1, 3:5]) < 0.001
 
     def test_speed_when_drive_is_reversed(self):
-        simulation = physics_at(FIELD, MIDDLE)
+        simulation = simulation_at(FIELD, MIDDLE)
         trajectory(simulation, "forward", 150)
         frames = trajectory(simulation, "backward", 100, STEPS_PER_FRAME)
         assert np.all(np.diff(frames[:, 3]) <= ROUNDING)
@@ -122,7 +122,7 @@ class TestTurning:
     @pytest.mark.parametrize(("action", "sign"), [("look_left", 1), ("look_right", -1)])
     @pytest.mark.parametrize("yaw", YAWS)
     def test_yaw_when_looking(self, action, sign, yaw):
-        frames = trajectory(physics_at(FIELD, MIDDLE, yaw), action, FRAMES_PER_ACTION, STEPS_PER_FRAME)
+        frames = trajectory(simulation_at(FIELD, MIDDLE, yaw), action, FRAMES_PER_ACTION, STEPS_PER_FRAME)
         assert frames[-1, 2] - yaw == pytest.approx(sign * np.deg2rad(21.12), rel=0.01)
         np.testing.assert_allclose(np.diff(frames[:, 2])[1:], sign * TURN, rtol=0.001)
         assert frames[1, 5] == pytest.approx(sign * TURN / 0.016, rel=0.02)  # the rate stands within a frame
@@ -130,7 +130,7 @@ class TestTurning:
 
     @pytest.mark.parametrize("action", ["look_left", "look_right"])
     def test_yaw_when_let_go(self, action):
-        simulation = physics_at(FIELD, MIDDLE)
+        simulation = simulation_at(FIELD, MIDDLE)
         trajectory(simulation, action, 20)
         frames = trajectory(simulation, None, 10, STEPS_PER_FRAME)
         assert abs(frames[1, 5]) < 0.02 * TURN / 0.016
@@ -138,7 +138,7 @@ class TestTurning:
 
     def test_velocity_when_turning_at_speed(self):
         # Turning does not steer what is in motion: the body coasts on in the old direction.
-        simulation = physics_at(FIELD, MIDDLE, velocity=(LAB_TOP_SPEED, 0))
+        simulation = simulation_at(FIELD, MIDDLE, velocity=(LAB_TOP_SPEED, 0))
         steps = trajectory(simulation, "look_left", STEPS_PER_ACTION)
         np.testing.assert_allclose(steps[:, 4], 0, atol=ROUNDING)
         assert np.all(np.diff(steps[:, 3]) < 0)
@@ -149,8 +149,8 @@ class TestWalls:
     def test_slide_when_coasting_along_a_wall(self, heading):
         # Against the left wall: what goes along it goes as far as in the open, so there is no friction.
         velocity = LAB_TOP_SPEED * np.array([np.cos(heading), np.sin(heading)])
-        at_wall = trajectory(physics_at(FIELD, (1.3, 12.5), 0.0, velocity), None, 250)
-        in_open = trajectory(physics_at(FIELD, MIDDLE, 0.0, velocity), None, 250)
+        at_wall = trajectory(simulation_at(FIELD, (1.3, 12.5), 0.0, velocity), None, 250)
+        in_open = trajectory(simulation_at(FIELD, MIDDLE, 0.0, velocity), None, 250)
         assert at_wall[:, 0].min() < 1.25
         np.testing.assert_allclose(at_wall[:, 1], in_open[:, 1], atol=1e-6)
 
@@ -159,19 +159,19 @@ class TestWalls:
         # How far a step takes the body past where the contact begins depends on where it comes from.
         velocity = LAB_TOP_SPEED * np.array([np.cos(heading), np.sin(heading)])
         for x in np.linspace(1.25, 1.35, 21):
-            steps = trajectory(physics_at(FIELD, (x, 12.5), 0.0, velocity), None, 100)
+            steps = trajectory(simulation_at(FIELD, (x, 12.5), 0.0, velocity), None, 100)
             assert steps[:, 3].max() < 0.05 * abs(velocity[0])
 
     @pytest.mark.parametrize("heading", np.deg2rad([100, 135, 180]))
     def test_gap_when_pressed_against_a_wall(self, heading):
-        steps = trajectory(physics_at(FIELD, (1.5, 12.5), heading), "forward", 150)
+        steps = trajectory(simulation_at(FIELD, (1.5, 12.5), heading), "forward", 150)
         assert -0.01 <= steps[-1, 0] - BODY_RADIUS - 1 <= 0.03
 
     @pytest.mark.parametrize("heading", np.deg2rad([100, 120, 150]))
     def test_slide_when_boxes_meet_in_a_flat_wall(self, heading):
         # The L's right face is made of two boxes, that of its foot and that of its stem.
         maze = open_maze(15, np.s_[8, 2:5], np.s_[8:14, 4])
-        simulation = physics_at(maze, (5.3, 2.5), heading)
+        simulation = simulation_at(maze, (5.3, 2.5), heading)
         steps = trajectory(simulation, "forward", 400)
         along = steps[(steps[:, 1] > 4) & (steps[:, 1] < 6.5)]
         assert along[:, 0].max() < 5.25
@@ -237,7 +237,7 @@ class TestFixedFreedoms:
         rng = np.random.default_rng(3)
         maze = generate("dfs", 9, rng)
         row, column = maze.free_cells[0]
-        simulation = physics_at(maze, (column + 0.5, maze.size - row - 0.5), 0.7)
+        simulation = simulation_at(maze, (column + 0.5, maze.size - row - 0.5), 0.7)
         for _ in range(200):
             simulation.set_controls(CONTROLS[rng.integers(len(ACTIONS))])
             simulation.step(STEPS_PER_ACTION)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import pathlib
 import tempfile
@@ -67,14 +68,12 @@ def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[l
     trial, episode = plan.trials[number], plan.trials[number].episode
     maze = plan.task.mazes[episode.maze]
     agent = plan.build_agent()
-    env = MazeEnv(plan.task)
-    observation, info = env.reset(options={"episode": episode})
     state = agent.initial_state(1)
     seed = np.array([agent_seed(options.seed, number)])
-    scene = _Scene(env, views, pixels)
     frames: list[np.ndarray] = []
     ended = False
-    try:
+    with contextlib.closing(MazeEnv(plan.task)) as env, contextlib.closing(_Scene(env, views, pixels)) as scene:
+        observation, info = env.reset(options={"episode": episode})
         while True:
             scene.record_position()
             if is_film or ended:
@@ -89,9 +88,6 @@ def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[l
             actions, state = agent.act(Inputs(batch, new_episode, new_context, seed, truth), state)
             observation, _, terminated, truncated, info = env.step(int(actions[0]))
             ended = terminated or truncated
-    finally:
-        scene.close()
-        env.close()
     ending = "reached the goal" if info["success"] else "ran out of time"
     return frames, (
         f"{options.agent} {ending} after {info['steps']} steps and {info['path_length']:.2f} m "

@@ -198,7 +198,7 @@ class Navigation:
         if self.spec.mazes[index : index + 1] != (state.maze,):
             raise InputError(f"expected a state of an environment with the same mazes, found one of {state.maze.name}")
         self._load_maze(simulation, index)
-        simulation.set_full_state(state.physics)
+        simulation.set_full_state(state.simulation)
         self.rng.bit_generator.state = state.rng
         self.__dict__.update(_copied(state.task))
 
@@ -211,7 +211,7 @@ class EnvironmentState(NamedTuple):
     """A moment of an environment. Its content is the environment's own matter; it can be pickled."""
 
     maze: Maze
-    physics: np.ndarray  # [S], see `Simulation.full_state`
+    simulation: np.ndarray  # [S], see `Simulation.full_state`
     rng: Mapping[str, Any]  # of NumPy's bit generator that draws episodes
     task: dict[str, Any]  # attributes of the `Navigation`
     needs_reset: bool = False
