@@ -1,5 +1,5 @@
 # Two commands do everything on a fresh machine: `make eval` and `make test`.
-# With which Python .venv is made; the first of PYTHONS that works if none is given. torch's wheel for 3.11 is the smallest.
+# With which Python .venv is made; the first of PYTHONS that works if none is given. CI uses 3.11.
 PYTHON ?= $(shell for python in $(PYTHONS); do \
   "$$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo "$$python" && break; done)
 PYTHONS := python3.11 python3.12 python3.13 python3.14 python3

@@ -38,9 +38,8 @@ def report(
         raise InputError(f"the report needs {error.name}, which the extra [report] installs (docs/start.md)") from error
     names = [_parse_name(text) for text in name or ()]
     runs = find_runs(results)
-    has_results = bool(find_folders(results, warn=lambda line: None))
     with stopping.stoppable(lambda: (f"the report in {out} is not whole; make it again",)):
-        if runs and not has_results:
+        if runs and not find_folders(results, warn=lambda line: None):
             if names:
                 raise InputError("expected --name with results of `mazebench eval`, found training runs")
             drawn = write_learning_curves(runs, out, warn=remark)

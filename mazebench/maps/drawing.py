@@ -10,7 +10,6 @@ from collections.abc import Iterator
 import cv2
 import numpy as np
 
-THIN_WALLS = "a floor plan with thin walls needs --pixel-size, its metres a pixel"  # of plans that can't be read
 WORKING_SIDE = 2400  # pixels; larger photographs are shrunk to it
 _LIGHT_SIDE = 128  # pixels of the small copy in which the light on the paper is estimated
 _MIN_LIGHT = 0.6  # of the brightest paper; a wide area darker than this is wall, not paper in the shade

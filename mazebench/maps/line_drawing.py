@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 
 from mazebench.maps.cell_grid import CORE, core_bounds, fit_grid
-from mazebench.maps.drawing import THIN_WALLS, WORKING_SIDE, deskew, flatten, frames, ink_of
+from mazebench.maps.drawing import WORKING_SIDE, deskew, flatten, frames, ink_of
 from mazebench.maps.maze import MAX_SIZE, MazeError
+from mazebench.maps.options import THIN_WALLS
 
 _NEARLY_BEST = 0.9  # share of the best fit
 _MIN_CLARITY = 0.2  # between the share of a boundary that is line, and a half

@@ -73,3 +73,4 @@ OCCUPANCY_OPTIONS = ("unknown", "inflate")
 PICTURE_OPTIONS = ("walls", "pixel_size")
 MAP_OPTIONS = tuple(options_of(MapOptions))
 NO_OPTIONS = MapOptions()
+THIN_WALLS = "a floor plan with thin walls needs --pixel-size, its metres a pixel"  # of plans that can't be read

@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 
 from mazebench.maps.cell_grid import core_bounds, fit_grid
-from mazebench.maps.drawing import THIN_WALLS, dark_and_light, deskew, flatten, frames, ink_of
+from mazebench.maps.drawing import dark_and_light, deskew, flatten, frames, ink_of
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, MazeError, require_connected
+from mazebench.maps.options import THIN_WALLS
 
 _READ_LINES = f"read them with --walls lines; {THIN_WALLS}"
 MIN_SIDE = 3  # cells on the shorter side of a plan: wall, floor, wall

@@ -93,10 +93,15 @@ def place_floor_plan(path: pathlib.Path, pixel_size: float, options: MapOptions)
             f"{path.stem}: expected dark walls on light paper, found more dark than light; invert the picture"
         )
     states = _without_surroundings(states)
-    rows, columns = (np.flatnonzero((states == OCCUPIED).any(axis=axis)) for axis in (1, 0))
-    corner = np.array([columns[0], len(states) - 1 - rows[-1]]) * pixel_size
-    plan = states[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    return place_maze(OccupancyGrid(plan, pixel_size, (*corner.tolist(), 0.0)), options, path.stem)
+    box = _box_of_walls(states)
+    corner = np.array([box[1].start, len(states) - box[0].stop]) * pixel_size
+    return place_maze(OccupancyGrid(states[box], pixel_size, (*corner.tolist(), 0.0)), options, path.stem)
+
+
+def _box_of_walls(states: np.ndarray) -> tuple[slice, slice]:
+    """Returns the rows and the columns from the first to the last with a wall; there is one."""
+    (box,) = ndimage.find_objects((states == OCCUPIED).astype(int))
+    return box
 
 
 def _without_surroundings(states: np.ndarray) -> np.ndarray:
@@ -104,8 +109,7 @@ def _without_surroundings(states: np.ndarray) -> np.ndarray:
     light, _ = ndimage.label(np.pad(states != OCCUPIED, 1, constant_values=True))
     inside = np.where(light[1:-1, 1:-1] == light[0, 0], UNKNOWN, states)
     free = inside == FREE
-    rows, columns = (np.flatnonzero((states == OCCUPIED).any(axis=axis)) for axis in (1, 0))
-    if free.sum() < _LEAST_INSIDE * (rows[-1] + 1 - rows[0]) * (columns[-1] + 1 - columns[0]):
+    if free.sum() < _LEAST_INSIDE * states[_box_of_walls(states)].size:
         return states
     # Specks and frames on the paper are dark, too; the walls are what touches free pixels.
     dark, _ = ndimage.label(states == OCCUPIED, structure=np.ones((3, 3)))

@@ -6,6 +6,7 @@ import dataclasses
 
 from mazebench.errors import InputError
 from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, Cell, Maze, corner_cells, require_one_size
+from mazebench.maps.options import THIN_WALLS
 from mazebench.tasks import TASK_VERSION, TRACKS_VERSION
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.options import ENDS, TIME_LIMIT, TaskOptions
@@ -34,7 +35,7 @@ class TaskSpec(TaskOptions):
         if self.cell_size < MIN_CELL_SIZE:
             raise InputError(
                 f"{self.mazes[0].name}: expected cells of at least {MIN_CELL_SIZE} m, through which the body passes, "
-                f"found {self.cell_size} m; a floor plan with thin walls needs --pixel-size, its metres a pixel"
+                f"found {self.cell_size} m; {THIN_WALLS}"
             )
         if self.time_limit == 0:
             object.__setattr__(self, "time_limit", TIME_LIMIT)
