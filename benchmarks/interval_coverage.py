@@ -2,7 +2,7 @@
 
 `R` is the number of simulated evaluations, `K` of mazes, `M` of episodes in each. The successes of one maze are
 beta-binomial: every maze draws a success rate of its own, so that two of its episodes have the given correlation.
-"new" is `mazebench.evaluation.intervals`, "old" the method that it replaced: a percentile bootstrap over mazes, with
+"new" is `mazebench.results.intervals`, "old" the method that it replaced: a percentile bootstrap over mazes, with
 Wilson's interval of independent episodes where all episodes ended alike. docs/metrics.md shows what this prints.
 """
 
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.evaluation.intervals import difference_interval, mean_interval, wilson_interval
+from mazebench.results.intervals import difference_interval, mean_interval, wilson_interval
 
 NUM_EVALUATIONS = 2000
 NUM_RESAMPLES = 2000

@@ -13,11 +13,11 @@ import tempfile
 from typing import Any
 
 import mazebench
-from mazebench.evaluation.oracle import oracle_key
-from mazebench.evaluation.results import load_result
-from mazebench.evaluation.trials import benchmark_task_sizes
 from mazebench.maps.benchmark import TRACKS_VERSION, VERSION
+from mazebench.results.oracle import oracle_key
+from mazebench.results.reading import load_result
 from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.trials import benchmark_task_sizes
 
 
 def main(path: pathlib.Path) -> None:

@@ -16,7 +16,7 @@ from wrong_maps import held_out_task, outcomes
 
 from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
-from mazebench.evaluation.intervals import mean_interval
+from mazebench.results.intervals import mean_interval
 
 _SIZE = 13
 _SEARCHES = "gumbel:0,gumbel:4,gumbel:16,gumbel:64,puct:4,puct:16,puct:64"

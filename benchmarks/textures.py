@@ -13,8 +13,8 @@ import numpy as np
 
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import generate
-from mazebench.maps.image import write_image
 from mazebench.maps.maze import Maze, cell_to_point
+from mazebench.maps.pictures import write_image
 from mazebench.world.models import MazeModels
 from mazebench.world.rendering import Cameras
 

@@ -15,17 +15,17 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.sparse import csgraph, csr_array
 
-from mazebench.evaluation.intervals import mean_interval
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
-from mazebench.evaluation.trials import Trial
 from mazebench.maps.maze import Cell, Maze, cell_to_point
+from mazebench.results.intervals import mean_interval
 from mazebench.tasks.context import resized_map
 from mazebench.tasks.imperfections import time_limit
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.trials import Trial
 
 SEEN_WITHIN = 5.0  # m
 SHOWN_WALL = 30.0  # cells; the cost of a wall that is shown but was not seen

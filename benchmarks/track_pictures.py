@@ -15,11 +15,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 import mazebench
-from mazebench.evaluation.results import load_result
-from mazebench.evaluation.trajectories import TRAJECTORIES, Trajectory, load_trajectories
 from mazebench.maps import colors
-from mazebench.maps.image import draw_grid
 from mazebench.maps.maze import Cell, Maze
+from mazebench.maps.pictures import draw_grid
+from mazebench.results.reading import load_result
+from mazebench.results.trajectories import TRAJECTORIES, Trajectory, load_trajectories
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 

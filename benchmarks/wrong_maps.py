@@ -17,11 +17,11 @@ import numpy as np
 from mazebench.agent import Agent, Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.chunk import run_trials
-from mazebench.evaluation.intervals import mean_interval
-from mazebench.evaluation.trials import draw_trials
 from mazebench.maps.generators import generate
+from mazebench.results.intervals import mean_interval
 from mazebench.tasks.registry import make_spec
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.trials import draw_trials
 
 _SIZE = 13
 _NUM_MAZES = 40

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from mazebench.envs.registration import load, make_vec
     from mazebench.errors import InputError, UnplayableError
     from mazebench.evaluation.evaluate import evaluate
-    from mazebench.maps.arrays import maze_from_array
     from mazebench.maps.files import read_maze, read_mazes
     from mazebench.maps.generators import generate
     from mazebench.maps.maze import Maze, MazeError
+    from mazebench.maps.readers.arrays import maze_from_array
     from mazebench.tasks.episode import Episode
     from mazebench.tasks.registry import make_spec
     from mazebench.tasks.spec import TaskSpec
@@ -44,7 +44,7 @@ _HOMES = {
     "generate": "mazebench.maps.generators",
     "load": "mazebench.envs.registration",
     "make_spec": "mazebench.tasks.registry",
-    "maze_from_array": "mazebench.maps.arrays",
+    "maze_from_array": "mazebench.maps.readers.arrays",
     "make_vec": "mazebench.envs.registration",
     "read_maze": "mazebench.maps.files",
     "read_mazes": "mazebench.maps.files",

@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.evaluation.metrics import spl, summarize, summarize_facts
 from mazebench.evaluation.recorder import Recorder
-from mazebench.evaluation.records import Record
-from mazebench.evaluation.results import EPISODES, SUMMARY
-from mazebench.evaluation.trajectories import TRAJECTORIES, Trajectory, pack_trajectories, save_trajectories
-from mazebench.evaluation.trials import Trial, select_track_trials, select_trials
 from mazebench.maps.benchmark import TRACKS_VERSION, VERSION, load_mazes, manifest_hash
 from mazebench.maps.maze import cell_to_point, path_through_walls
+from mazebench.results.metrics import spl, summarize, summarize_facts
+from mazebench.results.reading import EPISODES, SUMMARY
+from mazebench.results.records import Record
+from mazebench.results.trajectories import TRAJECTORIES, Trajectory, pack_trajectories, save_trajectories
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.observation import state_errors
 from mazebench.tasks.perturbations import perturbation_levels
 from mazebench.tasks.registry import make_spec
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.trials import Trial, select_track_trials, select_trials
 
 _STEP = 0.3  # m
 

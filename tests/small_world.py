@@ -9,9 +9,9 @@ from simple_mazes import field
 
 from mazebench.agent import Interface
 from mazebench.evaluation.chunk import run_trials
-from mazebench.evaluation.trials import select_trials
 from mazebench.maps.maze import Maze
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.trials import select_trials
 from mazebench.training.experience import Collector
 
 TIME_LIMIT = 25

@@ -20,11 +20,11 @@ from mazebench.evaluation.checked_agent import CheckedAgent
 from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
-from mazebench.evaluation.trials import select_trials
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import generate
 from mazebench.tasks.registry import make_spec
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.trials import select_trials
 from mazebench.testing import ConformanceError, check_agent
 from mazebench.training.protocol import LearningAgent
 

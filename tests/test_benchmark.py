@@ -12,13 +12,13 @@ from importlib import resources
 import numpy as np
 import pytest
 
+from benchmarks import freeze
 from mazebench.errors import InputError
-from mazebench.evaluation import freeze
-from mazebench.evaluation.trials import benchmark_task_sizes, episodes_file, frozen_trials, select_trials
 from mazebench.maps import benchmark
 from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS, load_mazes, mazes_file, read_asset
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.maze import canonical_bytes, cell_to_point
+from mazebench.tasks.trials import benchmark_task_sizes, episodes_file, frozen_trials, select_trials
 
 BODY_RADIUS = 0.15
 

@@ -6,10 +6,9 @@ import collections
 
 import pytest
 
-from mazebench.evaluation.freeze_tracks import freeze_tracks, shown_hash
+from benchmarks.freeze_tracks import freeze_tracks, shown_hash
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
-from mazebench.evaluation.trials import frozen_trials
 from mazebench.maps.benchmark import (
     MANIFEST,
     SIZES,
@@ -27,6 +26,7 @@ from mazebench.tasks.options import TaskOptions
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.trials import frozen_trials
 
 PLAYED = [(name, level) for name in TRACKS for level in LEVELS]
 

@@ -10,6 +10,7 @@ import simple_mazes
 from dm_env import specs
 from gymnasium.utils import env_checker
 
+from mazebench.constants import ACTIONS, TOP_SPEED
 from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
@@ -18,7 +19,7 @@ from mazebench.maps.maze import Maze, cell_to_point
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.registry import make_spec
 from mazebench.testing import check_environment
-from mazebench.world.mjcf import ACTIONS, BODY_RADIUS, TOP_SPEED, TURN_RATE, action_controls, velocity_controls
+from mazebench.world.mjcf import BODY_RADIUS, TURN_RATE, action_controls, velocity_controls
 
 MIDDLE = Episode(0, (20, 20), (35, 35), 0.0, 0)
 # The velocity that stands for each of the six actions.

@@ -13,8 +13,8 @@ import pytest
 from run_folders import results_of
 
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.evaluation.metrics import summarize
-from mazebench.evaluation.results import load_result
+from mazebench.results.metrics import summarize
+from mazebench.results.reading import load_result
 
 # Agents that draw, plan, correct themselves and ask a network, under every perturbation.
 SETTINGS: dict[str, dict[str, Any]] = {

@@ -18,8 +18,8 @@ from pages import PAGES, ROOT, Block, blocks, name_of, read
 
 from mazebench import cli
 from mazebench.maps.generators import generate
-from mazebench.maps.image import draw_maze, write_image
-from mazebench.maps.ros import write_ros_map
+from mazebench.maps.pictures import draw_maze, write_image
+from mazebench.maps.readers.ros import write_ros_map
 from mazebench.maps.text import write_text_maze
 
 EVERY_PAGE = pytest.mark.parametrize("page", PAGES, ids=name_of)

@@ -7,11 +7,11 @@ import pytest
 from made_results import make_record, make_result
 
 from mazebench.errors import InputError
-from mazebench.evaluation.comparison import Comparison, compare_folders, compare_results, to_json
-from mazebench.evaluation.intervals import difference_interval
-from mazebench.evaluation.metrics import summarize
-from mazebench.evaluation.records import Provenance, Record, Summary, TaskProvenance
-from mazebench.evaluation.results import Result
+from mazebench.results.comparison import Comparison, compare_folders, compare_results, to_json
+from mazebench.results.intervals import difference_interval
+from mazebench.results.metrics import summarize
+from mazebench.results.reading import Result
+from mazebench.results.records import Provenance, Record, Summary, TaskProvenance
 
 
 def record(index: int, maze: str, distance: int, success: bool, spl: float) -> Record:

@@ -22,11 +22,11 @@ from mazebench.evaluation.chunk import Chunk, run_chunk
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
-from mazebench.evaluation.results import load_result
-from mazebench.evaluation.trials import frozen_trials
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import generate
 from mazebench.maps.text import write_text_maze
+from mazebench.results.reading import load_result
+from mazebench.tasks.trials import frozen_trials
 
 PERTURBATIONS = ("map_flip", "map_warp", "position_noise")
 LEVELS = [{"position_noise": 0.5}, {"map_flip": 0.3}, {"map_warp": 0.2}]

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import strategies
 from scipy import stats
 
-from mazebench.evaluation.intervals import (
+from mazebench.results.intervals import (
     difference_interval,
     interquartile_mean,
     mean_interval,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from made_results import make_record
 
-from mazebench.evaluation.intervals import mean_interval
-from mazebench.evaluation.metrics import spl, summarize
+from mazebench.results.intervals import mean_interval
+from mazebench.results.metrics import spl, summarize
 
 
 def record(index=0, distance=1, maze="m", success=True, spl=1.0, spl_grid=1.0):

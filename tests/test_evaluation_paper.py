@@ -2,9 +2,9 @@
 
 import pytest
 
-from mazebench.evaluation.paper import printed, printed_mmn
-from mazebench.evaluation.records import Summary
-from mazebench.evaluation.table import print_summary
+from mazebench.commands.table import print_summary
+from mazebench.results.paper import printed, printed_mmn
+from mazebench.results.records import Summary
 
 
 def a_summary(**values) -> Summary:

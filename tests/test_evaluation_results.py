@@ -11,7 +11,7 @@ from run_folders import FEW, files_of, records_of, summary_of
 
 from mazebench.errors import InputError
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.evaluation.results import load_result
+from mazebench.results.reading import load_result
 
 
 @pytest.fixture(scope="module")

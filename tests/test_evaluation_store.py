@@ -19,9 +19,9 @@ from mazebench.evaluation.chunk import Chunk, Ended, run_chunk
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import Plan, make_plan
-from mazebench.evaluation.records import Summary
-from mazebench.evaluation.results import load_result
 from mazebench.evaluation.store import Store
+from mazebench.results.reading import load_result
+from mazebench.results.records import Summary
 
 # A run of an earlier version in the maze below: `mazebench eval --agent planner --distances 1,2,3`.
 EARLIER = pathlib.Path(__file__).with_name("golden") / "results-1"

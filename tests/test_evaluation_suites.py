@@ -10,11 +10,11 @@ import pytest
 from run_folders import IMPORTS, RECORDED, Killed, files_of, kill_after, results_of, summary_of
 
 from mazebench.errors import InputError, RunError, UnplayableError
-from mazebench.evaluation.comparison import compare_folders
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.evaluation.suites import SUITES, Part, run_suite
 from mazebench.maps.benchmark import SIZES
+from mazebench.results.comparison import compare_folders
 
 TINY = (
     Part("near", {"distances": (1, 2), "episodes_per_distance": 1}),

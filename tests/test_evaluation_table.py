@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from mazebench.evaluation.table import print_table
+from mazebench.commands.table import print_table
 
 HEAD = ["part", "n", "success rate", "SPL"]
 ROWS = [

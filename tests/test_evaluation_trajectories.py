@@ -12,7 +12,9 @@ from run_folders import FEW, FILES, RECORDED, records_of
 from mazebench.agent import SingleAgent
 from mazebench.errors import InputError
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.evaluation.trajectories import (
+from mazebench.maps.benchmark import TRACKS_VERSION, load_mazes
+from mazebench.maps.maze import cell_to_point, point_to_cell
+from mazebench.results.trajectories import (
     TRAJECTORIES,
     Trajectory,
     from_json,
@@ -21,12 +23,10 @@ from mazebench.evaluation.trajectories import (
     save_trajectories,
     to_json,
 )
-from mazebench.evaluation.trials import frozen_trials
-from mazebench.maps.benchmark import TRACKS_VERSION, load_mazes
-from mazebench.maps.maze import cell_to_point, point_to_cell
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.registry import make_spec
 from mazebench.tasks.shown_map import leg_context, show_map
+from mazebench.tasks.trials import frozen_trials
 
 HALF = np.float16(0.5)
 

@@ -16,12 +16,13 @@ import pytest
 ROOT = pathlib.Path(__file__).parent.parent
 # A module imports only from those of lines above it and its own.
 ORDER = (
-    {"errors", "options", "renamed", "stopping", "storage"},
+    {"constants", "errors", "options", "renamed", "stopping", "storage"},
     {"maps"},
     {"world"},
     {"tasks"},
     {"envs"},
     {"agent", "agent_loading"},
+    {"results"},
     {"evaluation"},
     {"training"},
     {"report"},

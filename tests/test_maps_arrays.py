@@ -7,10 +7,10 @@ import pytest
 
 import mazebench
 from mazebench.errors import InputError
-from mazebench.maps.arrays import maze_from_array, read_array_maze
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.options import NO_OPTIONS
+from mazebench.maps.readers.arrays import maze_from_array, read_array_maze
 
 WALLS = generate("dfs", 7, np.random.default_rng(0)).walls
 

@@ -8,7 +8,7 @@ import pytest
 from mazebench.errors import InputError
 from mazebench.maps.files import read_maze, read_mazes
 from mazebench.maps.generators import generate
-from mazebench.maps.image import draw_maze, write_image
+from mazebench.maps.pictures import draw_maze, write_image
 from mazebench.maps.text import write_text_maze
 
 

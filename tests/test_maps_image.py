@@ -16,8 +16,9 @@ from mazebench.maps import colors
 from mazebench.maps.files import read_maze
 from mazebench.maps.generators import generate
 from mazebench.maps.grids import largest_area
-from mazebench.maps.image import draw_maze, maze_from_image, read_image_maze, write_image
 from mazebench.maps.maze import Maze, MazeError
+from mazebench.maps.pictures import draw_maze, write_image
+from mazebench.maps.readers.image import maze_from_image, read_image_maze
 
 SEEDS = st.integers(0, 2**32 - 1)
 FEW = hypothesis.settings(max_examples=100, deadline=None)
@@ -392,7 +393,7 @@ def test_a_file_that_is_no_picture_is_named_in_one_line(content, found):
 
 
 def test_a_picture_of_too_many_pixels_is_refused(monkeypatch, maze):
-    monkeypatch.setattr("mazebench.maps.image._MAX_PIXELS", 208 * 208 - 1)
+    monkeypatch.setattr("mazebench.maps.readers.image._MAX_PIXELS", 208 * 208 - 1)
     with pytest.raises(InputError, match=r"plan\.png: expected at most 43263 pixels, found 208 x 208$"):
         read_bytes(encode(draw_maze(maze)))
 

@@ -20,10 +20,10 @@ import mazebench
 from mazebench.errors import InputError
 from mazebench.maps.files import read_maze, read_mazes, read_placed
 from mazebench.maps.generators import generate
-from mazebench.maps.image import draw_maze, write_image
 from mazebench.maps.maze import Maze, MazeError, cell_to_point
 from mazebench.maps.options import MapOptions
-from mazebench.maps.ros import read_occupancy, read_ros_maze, write_ros_map
+from mazebench.maps.pictures import draw_maze, write_image
+from mazebench.maps.readers.ros import read_occupancy, read_ros_maze, write_ros_map
 from mazebench.maps.text import parse_maze, write_text_maze
 from mazebench.world.formats import make_mazes, write_maze
 

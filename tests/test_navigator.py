@@ -13,12 +13,12 @@ from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.errors import InputError
 from mazebench.evaluation.chunk import Outcome, run_trials
-from mazebench.evaluation.trials import make_trial, select_track_trials, select_trials
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import dfs_walls, obstacles_walls
 from mazebench.maps.maze import Maze
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.trials import make_trial, select_track_trials, select_trials
 from mazebench.world.lidar import Lidar
 
 FREE, WALL = -1, 1

@@ -14,33 +14,34 @@ from simple_mazes import corridor, field
 import mazebench
 from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
+from mazebench.constants import STEPS_PER_ACTION
 from mazebench.envs.goal import GoalMazeEnv
 from mazebench.errors import InputError
 from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.evaluate import run_plan
-from mazebench.evaluation.film import film_episode
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.evaluation.pool import open_pool
-from mazebench.evaluation.results import load_result
-from mazebench.evaluation.trajectories import TRAJECTORIES, load_trajectories
-from mazebench.evaluation.trials import draw_trials
 from mazebench.maps.generators import generate
 from mazebench.maps.geodesic import DiscPaths
-from mazebench.maps.image import draw_maze
 from mazebench.maps.maze import Maze, corner_cells
+from mazebench.maps.pictures import draw_maze
 from mazebench.maps.text import format_maze
+from mazebench.play.film import film_episode
 from mazebench.play.game import Game
 from mazebench.play.picture import Style, draw_world
 from mazebench.report.report import write_report
 from mazebench.report.results import read_results
+from mazebench.results.reading import load_result
+from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.context import resized_map
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.registry import make_spec
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.trials import draw_trials
 from mazebench.world.export import wall_mesh
 from mazebench.world.lidar import Lidar
-from mazebench.world.mjcf import STEPS_PER_ACTION, action_controls
+from mazebench.world.mjcf import action_controls
 from mazebench.world.models import models_of
 from mazebench.world.simulation import MujocoSimulation
 

@@ -8,7 +8,7 @@ import re
 import yaml
 
 import mazebench
-from mazebench.evaluation.paper import reference
+from mazebench.results.paper import reference
 
 ROOT = pathlib.Path(__file__).parent.parent
 CITATION = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))

@@ -11,10 +11,10 @@ from run_folders import FEW, files_of
 
 from mazebench.agent_loading import load_agent_class
 from mazebench.errors import InputError
-from mazebench.evaluation.comparison import compare_folders
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.evaluation.results import load_result
 from mazebench.report.results import read_results
+from mazebench.results.comparison import compare_folders
+from mazebench.results.reading import load_result
 from mazebench.training.run_folder import RunFolder
 
 FORMER = {  # by former name: what it is called now, its classes, a part of its config

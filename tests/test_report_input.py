@@ -11,10 +11,10 @@ from made_results import edit_records, edit_summary, make_result, of_own_mazes, 
 
 from mazebench import cli
 from mazebench.errors import InputError
-from mazebench.evaluation.results import EPISODES, JOURNAL, SUMMARY
-from mazebench.evaluation.trajectories import TRAJECTORIES
 from mazebench.report.report import write_report
 from mazebench.report.results import read_results
+from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY
+from mazebench.results.trajectories import TRAJECTORIES
 
 
 @pytest.fixture

@@ -6,7 +6,6 @@ import pytest
 from made_results import edit_summary, make_result, of_own_mazes
 from matplotlib.image import imread
 
-from mazebench.evaluation.paper import reference
 from mazebench.maps import colors
 from mazebench.report.figures.curves import draw_curves
 from mazebench.report.figures.style import WIDTH, finish, new_figure
@@ -15,6 +14,7 @@ from mazebench.report.galleries import build_galleries
 from mazebench.report.looks import PAPER_MARKERS, agent_looks, shorten, wrap
 from mazebench.report.results import read_results
 from mazebench.report.tables import build_tables
+from mazebench.results.paper import reference
 
 LONG = [f"mylab.navigation.experiments.variant_{number}.agents:PlannerWithRecurrentMemory" for number in range(9)]
 TWELVE = ["mmn", "planner", "random", *LONG]

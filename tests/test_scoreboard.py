@@ -10,8 +10,8 @@ import pytest
 from made_results import edit_records, edit_summary, make_result, read_summary
 
 from mazebench.errors import InputError
-from mazebench.evaluation.results import SUITE
 from mazebench.report.scoreboard import BEGIN, END, check, kept_entries, read_entries, to_markdown, write_scoreboard
+from mazebench.results.reading import SUITE
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.tracks import TRACKS
 

@@ -15,10 +15,10 @@ import pytest
 from mazebench_agents.random_agent import RandomAgent
 
 import mazebench
+from mazebench.constants import TASK_VERSION, TRACKS_VERSION
 from mazebench.envs.dm_control import Environment
 from mazebench.evaluation.options import EvalOptions, make_task
 from mazebench.evaluation.provenance import provenance
-from mazebench.tasks import TASK_VERSION, TRACKS_VERSION
 
 GOLDEN = pathlib.Path(__file__).parent / "golden" / "episodes-v1.json"
 TASKS: dict[str, dict[str, Any]] = {

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 import mazebench
+from mazebench.constants import STEP_TIME
 from mazebench.envs.goal import GoalMazeEnv
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.tasks.registry import make_spec
-from mazebench.tasks.tracks.lost import STEP_TIME, Odometry, corrupted_odometry
+from mazebench.tasks.tracks.lost import Odometry, corrupted_odometry
 
 X, Y, YAW, FORWARD, LEFT, YAW_RATE = 0, 1, 5, 6, 7, 11  # indices in the state
 

@@ -7,9 +7,10 @@ import mujoco.batch
 import numpy as np
 import pytest
 
+from mazebench.constants import ACTIONS, STEPS_PER_ACTION
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze, point_to_cell
-from mazebench.world.mjcf import ACTIONS, BODY_HEIGHT, BODY_RADIUS, STEPS_PER_ACTION, action_controls
+from mazebench.world.mjcf import BODY_HEIGHT, BODY_RADIUS, action_controls
 from mazebench.world.models import MazeModels
 from mazebench.world.simulation import MujocoSimulation
 

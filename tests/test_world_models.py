@@ -9,11 +9,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from mazebench.constants import ACTIONS, STEPS_PER_ACTION
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 from mazebench.world.export import write_mjcf
-from mazebench.world.mjcf import ACTIONS, STEPS_PER_ACTION, action_controls
+from mazebench.world.mjcf import action_controls
 from mazebench.world.models import _MAZE_FIELDS, MazeModels, copy_maze
 from mazebench.world.simulation import MujocoSimulation
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from mazebench.constants import ACTIONS
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze
 from mazebench.storage.json_files import read_json
@@ -21,7 +22,6 @@ from mazebench.tasks.perturbations import active_perturbations
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Experience
-from mazebench.world.mjcf import ACTIONS
 
 from . import symmetry
 from .actor import NetworkAgent

@@ -22,17 +22,18 @@ import numpy as np
 
 from mazebench.agent import Interface
 from mazebench.agent_loading import agent_names, load_agent_class
+from mazebench.commands.table import print_table
+from mazebench.constants import ACTIONS, STEPS_PER_ACTION
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.evaluation.table import print_table
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import generate
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 from mazebench.training.protocol import LearningAgent
 from mazebench.world.backend import RenderingError
-from mazebench.world.mjcf import ACTIONS, STEPS_PER_ACTION, action_controls
+from mazebench.world.mjcf import action_controls
 from mazebench.world.models import models_of
 
 _SIZES = (13, 21, 51, 101)

@@ -27,7 +27,8 @@ def compare(
 
     They are of two agents, or of one agent at two levels of a track.
     """
-    from mazebench.evaluation import comparison, table
+    from mazebench.commands import table
+    from mazebench.results import comparison
 
     found = comparison.compare_folders(a, b)
     for line in found.notes:

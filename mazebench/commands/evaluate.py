@@ -109,7 +109,8 @@ def _evaluate_one(
     kept: progress.Kept,
     running: dict[str, Any],
 ) -> None:
-    from mazebench.evaluation import evaluate, table
+    from mazebench.commands import table
+    from mazebench.evaluation import evaluate
 
     with progress.evaluating(f"{agent}, {values['track'] or values['task']}", kept) as show:
         summary = evaluate.evaluate(agent, folder, record=record, progress=show, warn=remark, **running, **values)
@@ -125,7 +126,8 @@ def _evaluate_suite(
     kept: progress.Kept,
     running: dict[str, Any],
 ) -> None:
-    from mazebench.evaluation import suites, table
+    from mazebench.commands import table
+    from mazebench.evaluation import suites
 
     chosen = {name: values[name] for name in ("checkpoint", "seed")}
     with progress.evaluating(f"{suite}, {', '.join(agents)}", kept) as show:

@@ -6,10 +6,10 @@ from __future__ import annotations
 def list_() -> None:
     """List tasks, agents, sizes, maze styles and Gymnasium ids."""
     from mazebench.agent_loading import agent_names
+    from mazebench.constants import TASK_VERSION, TRACKS_VERSION
     from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS, VERSION
     from mazebench.maps.generators import STYLES
     from mazebench.options import options_of
-    from mazebench.tasks import TASK_VERSION, TRACKS_VERSION
     from mazebench.tasks.options import TASKS
     from mazebench.tasks.perturbations import Perturbations
     from mazebench.tasks.sensors import SENSORS

@@ -34,7 +34,7 @@ def render(
     refuse_ignored_by_task(context, values)
     values["distances"] = watched_distances(values) or ()
     load_mujoco(renders=view not in _DRAWN)
-    from mazebench.evaluation import film
+    from mazebench.play import film
 
     outcome = film.film_episode(EvalOptions(agent, **values), out, view, pixels)
     print(f"{out}: {outcome}")

@@ -10,10 +10,10 @@ import mujoco
 import numpy as np
 from dm_env import specs
 
+from mazebench.constants import STEPS_PER_ACTION
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.navigation import EnvironmentState, Navigation
 from mazebench.tasks.spec import TaskSpec
-from mazebench.world.mjcf import STEPS_PER_ACTION
 from mazebench.world.models import models_of
 from mazebench.world.simulation import FULL_STATE, Simulation
 

@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from mazebench.constants import STEP_TIME, STEPS_PER_ACTION
 from mazebench.envs import spaces
 from mazebench.envs.env_spec import JsonSpec
 from mazebench.errors import InputError, unknown
@@ -15,7 +16,6 @@ from mazebench.tasks.arguments import Arguments
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.navigation import EnvironmentState, Navigation
 from mazebench.tasks.spec import TaskSpec
-from mazebench.world.mjcf import STEPS_PER_ACTION
 from mazebench.world.models import models_of
 from mazebench.world.rendering import Cameras
 from mazebench.world.simulation import MujocoSimulation
@@ -29,7 +29,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
     agents must not use them), `maze` (index among the task's mazes) and `landmark` (number of legs done).
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 6.25}  # noqa: RUF012
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 1 / STEP_TIME}  # noqa: RUF012
 
     def __init__(
         self, task_spec: TaskSpec, seed: int | None = None, render_mode: str | None = None, camera: str = "top"

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
+from mazebench.constants import BENCHMARK_SIZES, TASK_VERSION, TRACKS_VERSION
 from mazebench.errors import InputError
-from mazebench.maps import BENCHMARK_SIZES
-from mazebench.tasks import TASK_VERSION, TRACKS_VERSION
 from mazebench.world.backend import load_mujoco, loading_backend
 
 if TYPE_CHECKING:

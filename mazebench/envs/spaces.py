@@ -6,10 +6,10 @@ import numpy as np
 from dm_env import specs
 from gymnasium import spaces
 
+from mazebench.constants import ACTIONS
 from mazebench.tasks.actions import VELOCITY_SIZE
 from mazebench.tasks.observation import observation_specs
 from mazebench.tasks.spec import TaskSpec
-from mazebench.world.mjcf import ACTIONS
 
 
 def observation_space(spec: TaskSpec) -> spaces.Dict:

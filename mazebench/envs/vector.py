@@ -15,6 +15,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
+from mazebench.constants import STEP_TIME, STEPS_PER_ACTION
 from mazebench.envs import spaces
 from mazebench.envs.env_spec import JsonSpec
 from mazebench.errors import InputError, unknown
@@ -30,7 +31,6 @@ from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.angles import wrap_angle
 from mazebench.world.batch import open_batch
-from mazebench.world.mjcf import STEPS_PER_ACTION
 from mazebench.world.models import models_of
 from mazebench.world.rendering import Cameras
 from mazebench.world.simulation import STATE_SIZE, states_from_sensors
@@ -63,7 +63,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
     `close` ends the threads. A process that is forked meanwhile can't use the environment, but can make its own.
     """
 
-    metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": ["rgb_array"], "render_fps": 6.25}  # noqa: RUF012
+    metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": ["rgb_array"], "render_fps": 1 / STEP_TIME}  # noqa: RUF012
 
     def __init__(
         self,

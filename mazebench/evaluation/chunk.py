@@ -18,16 +18,16 @@ from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError, RunError, UnplayableError
 from mazebench.evaluation.agent_inputs import agent_seed, true_state
 from mazebench.evaluation.checked_agent import AgentError
-from mazebench.evaluation.metrics import spl
 from mazebench.evaluation.plan import Plan
 from mazebench.evaluation.recorder import Recorder
-from mazebench.evaluation.records import Record
-from mazebench.evaluation.trajectories import Trajectory
-from mazebench.evaluation.trials import Trial
+from mazebench.results.metrics import spl
+from mazebench.results.records import Record
+from mazebench.results.trajectories import Trajectory
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.trials import Trial
 
 
 @dataclasses.dataclass(frozen=True)

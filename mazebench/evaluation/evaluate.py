@@ -13,13 +13,13 @@ from mazebench import stopping
 from mazebench.agent import Agent, SingleAgent
 from mazebench.agent_loading import checked_agent_class, load_agent_class
 from mazebench.errors import InputError, unknown
-from mazebench.evaluation import metrics
 from mazebench.evaluation.chunk import Chunk
 from mazebench.evaluation.options import FIXED, NUM_ENVS, EvalOptions, RunOptions
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import Pool, open_pool
-from mazebench.evaluation.records import Summary
 from mazebench.evaluation.store import Store, check_same_run, is_finished, load_finished
+from mazebench.results import metrics
+from mazebench.results.records import Summary
 
 _CHUNKS_PER_WORKER = 4  # so that no worker waits long for the last one,
 _LEAST_CHUNK = 64  # but not so many that their environments are few: agents act on all of them at once

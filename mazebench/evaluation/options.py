@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import pathlib
 
+from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import SPLITS, TRACKS_VERSION, VERSION
 from mazebench.maps.options import MAP_OPTIONS, MapOptions
@@ -16,7 +17,6 @@ from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.tracks import TRACKS
 
 NUM_ENVS = 256  # environments side by side in a process, unless another number is asked for
-EPISODES_PER_DISTANCE = 5
 # Options of a task for which evaluations have one value only.
 FIXED = {"pairs": "random", "num_goals": 1, "continuous": False, "context_size": 0}
 

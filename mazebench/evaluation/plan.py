@@ -13,13 +13,13 @@ from mazebench.agent_loading import load_agent_class
 from mazebench.errors import InputError, RunError, UnplayableError, held_remarks
 from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of, only_context_size
 from mazebench.evaluation.options import FIXED, EvalOptions, make_task
-from mazebench.evaluation.oracle import oracle_spl
 from mazebench.evaluation.provenance import provenance
-from mazebench.evaluation.records import Provenance
-from mazebench.evaluation.trials import Trial, draw_trials, select_track_trials, select_trials
+from mazebench.results.oracle import oracle_spl
+from mazebench.results.records import Provenance
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.perturbations import perturbation_levels
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.trials import Trial, draw_trials, select_track_trials, select_trials
 from mazebench.world.mjcf import maze_spec
 
 _FORMAT = 2  # of a folder of results while the run goes on

@@ -20,8 +20,8 @@ from mazebench.agent import Agent
 from mazebench.agent_loading import package_of
 from mazebench.errors import InputError
 from mazebench.evaluation.options import EvalOptions
-from mazebench.evaluation.records import Provenance
 from mazebench.maps.benchmark import manifest_hash
+from mazebench.results.records import Provenance
 from mazebench.storage.files import open_file
 from mazebench.storage.json_files import parse_json
 from mazebench.tasks.spec import TaskSpec

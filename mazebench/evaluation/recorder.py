@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mazebench.evaluation.trajectories import Trajectory
+from mazebench.results.trajectories import Trajectory
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.observation import state_errors

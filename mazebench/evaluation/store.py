@@ -17,9 +17,10 @@ import pydantic
 from mazebench.errors import InputError, RunError, describe_fault
 from mazebench.evaluation.chunk import Ended
 from mazebench.evaluation.plan import Plan
-from mazebench.evaluation.records import Record, Summary
-from mazebench.evaluation.results import CONFIG, EPISODES, JOURNAL, SUMMARY, load_result
-from mazebench.evaluation.trajectories import (
+from mazebench.renamed import describe_unfinished
+from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, SUMMARY, load_result
+from mazebench.results.records import Record, Summary
+from mazebench.results.trajectories import (
     TRAJECTORIES,
     from_json,
     load_trajectories,
@@ -27,7 +28,6 @@ from mazebench.evaluation.trajectories import (
     save_trajectories,
     to_json,
 )
-from mazebench.renamed import describe_unfinished
 from mazebench.storage.files import make_folder, open_to_write, open_whole, writing_to
 from mazebench.storage.json_files import read_json, repair_and_read_lines, write_json
 from mazebench.storage.locks import FolderLock

@@ -17,10 +17,10 @@ from mazebench.evaluation.evaluate import Progress, run_plan
 from mazebench.evaluation.options import NUM_ENVS, EvalOptions, RunOptions
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import open_pool
-from mazebench.evaluation.records import Summary
-from mazebench.evaluation.results import CONFIG, SUITE, Suite, read_suite
 from mazebench.evaluation.store import check_same_run, is_finished
 from mazebench.maps.benchmark import SIZES, manifest_hash
+from mazebench.results.reading import CONFIG, SUITE, Suite, read_suite
+from mazebench.results.records import Summary
 from mazebench.storage.files import make_folder, writing_to
 from mazebench.storage.json_files import write_json
 from mazebench.storage.locks import FolderLock

@@ -12,8 +12,8 @@ import json
 from importlib import resources
 from typing import Any
 
+from mazebench.constants import BENCHMARK_SIZES
 from mazebench.errors import InputError, unknown
-from mazebench.maps import BENCHMARK_SIZES
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from mazebench.errors import InputError, held_remarks, remark
-from mazebench.maps.arrays import read_array_maze
-from mazebench.maps.image import read_image_maze
 from mazebench.maps.maze import Maze, resized
-from mazebench.maps.occupancy import PlacedMaze
 from mazebench.maps.options import OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions
-from mazebench.maps.ros import ROS_SUFFIXES, map_of_picture, picture_of, place_floor_plan, place_ros_maze
+from mazebench.maps.readers.arrays import read_array_maze
+from mazebench.maps.readers.image import read_image_maze
+from mazebench.maps.readers.occupancy import PlacedMaze
+from mazebench.maps.readers.ros import ROS_SUFFIXES, map_of_picture, picture_of, place_floor_plan, place_ros_maze
 from mazebench.maps.text import read_text_maze
 
 IMAGE_SUFFIXES = (

@@ -8,11 +8,11 @@ from collections.abc import Iterable
 import numpy as np
 
 from mazebench.errors import InputError
-from mazebench.maps.arrays import read_array
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.files import read_all
 from mazebench.maps.maze import Maze, resized
 from mazebench.maps.options import MAP_OPTIONS, NO_OPTIONS, OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions
+from mazebench.maps.readers.arrays import read_array
 
 _DEFAULT_SIZE = 13
 

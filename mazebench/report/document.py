@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from mazebench.evaluation.paper import citation, reference
 from mazebench.report.provenance import HEAD, benchmark_versions, provenance_rows
 from mazebench.report.results import ReportedResult
 from mazebench.report.table import Table
 from mazebench.report.table_forms import escape_markdown, to_markdown
+from mazebench.results.paper import citation, reference
 
 DOCUMENT, PAGE, FIGURES = "report.md", "report.html", "figures"
 

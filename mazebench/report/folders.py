@@ -6,7 +6,7 @@ import os
 import pathlib
 from collections.abc import Callable, Iterable
 
-from mazebench.evaluation.results import EPISODES, JOURNAL, SUMMARY
+from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY
 
 # Called with one line about something that a report leaves out.
 Warn = Callable[[str], None]

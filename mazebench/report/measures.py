@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mazebench.evaluation.intervals import mean_interval
 from mazebench.report.results import METRICS, ReportedResult
 from mazebench.report.rows import Row
 from mazebench.report.table import METRIC_NAMES, SPL_RELATIVE, UNTRAINED_NOTE, Cell, Column, Table
+from mazebench.results.intervals import mean_interval
 
 
 def make_table(

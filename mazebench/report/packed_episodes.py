@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.evaluation.trajectories import Trajectories
 from mazebench.maps.maze import Cell
 from mazebench.report.mazes import shown_ends
 from mazebench.report.results import ReportedResult
+from mazebench.results.trajectories import Trajectories
 
 # explorer.js counts in the same units.
 _POSITION_UNITS = 32  # a cell; one unit is about a pixel on the screen

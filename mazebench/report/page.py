@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.evaluation.paper import citation, reference
 from mazebench.maps import colors
 from mazebench.report.distributions import Distribution, Violin
 from mazebench.report.looks import PALETTE
@@ -21,6 +20,7 @@ from mazebench.report.provenance import HEAD, benchmark_versions, provenance_row
 from mazebench.report.results import ReportedResult
 from mazebench.report.settings import Setting
 from mazebench.report.table import METRIC_NAMES, Cell, Table
+from mazebench.results.paper import citation, reference
 from mazebench.world.lidar import MAX_RANGE, NUM_RAYS
 
 

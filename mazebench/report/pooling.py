@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from mazebench.evaluation.intervals import Estimate, pool_runs, probability_of_improvement
 from mazebench.report.results import METRICS, ReportedResult
 from mazebench.report.rows import Row, distance_rows, level_rows, setting_rows
 from mazebench.report.settings import Setting, level_name
 from mazebench.report.table import Cell, Column, Table
+from mazebench.results.intervals import Estimate, pool_runs, probability_of_improvement
 
 NOTE = (
     "Mean and interquartile mean (IQM) of the mazes' scores in all training runs; P(A > B) is the share of pairs of "

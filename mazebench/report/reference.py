@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mazebench.evaluation.paper import printed
 from mazebench.report.results import METRICS
 from mazebench.report.table import Cell, Column
+from mazebench.results.paper import printed
 
 
 def paper_columns(task: str, size: int, rows: Sequence[float], num_rows: int, warped: bool = False) -> list[Column]:

@@ -12,13 +12,13 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from mazebench.errors import InputError, unknown
-from mazebench.evaluation.metrics import by_fact
-from mazebench.evaluation.records import Record, Summary, column
-from mazebench.evaluation.results import load_result
-from mazebench.evaluation.trajectories import TRAJECTORIES, Trajectories, load_trajectories
 from mazebench.maps.benchmark import TRACKS_VERSION, VERSION, manifest_hash
 from mazebench.report.folders import Warn, find_folders
 from mazebench.report.settings import Setting, make_setting
+from mazebench.results.metrics import by_fact
+from mazebench.results.reading import load_result
+from mazebench.results.records import Record, Summary, column
+from mazebench.results.trajectories import TRAJECTORIES, Trajectories, load_trajectories
 
 # Of each episode.
 METRICS = {"success_rate": "success rate", "spl": "SPL", "spl_grid": "SPL by grid distance"}

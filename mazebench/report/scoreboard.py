@@ -17,16 +17,16 @@ from collections.abc import Iterable, Sequence
 import pydantic
 
 from mazebench.errors import InputError, describe_fault, remark
-from mazebench.evaluation.intervals import mean_interval
-from mazebench.evaluation.records import Name, Share, column
-from mazebench.evaluation.results import SUITE, Result, find_parts, load_result, read_suite
-from mazebench.evaluation.trials import frozen_trials
 from mazebench.maps.benchmark import TRACKS_VERSION, load_track_mazes, manifest_hash
 from mazebench.report.table_forms import escape_markdown
+from mazebench.results.intervals import mean_interval
+from mazebench.results.reading import SUITE, Result, find_parts, load_result, read_suite
+from mazebench.results.records import Name, Share, column
 from mazebench.storage.files import make_folder, open_whole, read_at_most
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.trials import frozen_trials
 
 BEGIN, END = "<!-- scoreboard begins -->\n", "<!-- scoreboard ends -->\n"
 UNTRAINED = "\\*"  # behind the success rates of an agent that learned on maps of another scale

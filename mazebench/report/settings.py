@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from mazebench.errors import unknown
-from mazebench.evaluation.records import Record, Summary
 from mazebench.maps.benchmark import SIZES, SPLITS
 from mazebench.options import options_of
+from mazebench.results.records import Record, Summary
 from mazebench.tasks.options import ENDS, TaskOptions
 from mazebench.tasks.perturbations import Perturbations
 from mazebench.tasks.tracks import TRACKS

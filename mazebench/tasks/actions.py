@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from mazebench.constants import ACTIONS
 from mazebench.errors import InputError
-from mazebench.world.mjcf import ACTIONS, action_controls, velocity_controls
+from mazebench.world.mjcf import action_controls, velocity_controls
 
 VELOCITY_SIZE = 3  # forward, left, turn to the left
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from dm_env import specs
 
+from mazebench.constants import ACTIONS
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze
 from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_action, controls_of_velocities
@@ -20,7 +21,6 @@ from mazebench.tasks.route import Event, plan_route
 from mazebench.tasks.sensors.base import Worlds
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
-from mazebench.world.mjcf import ACTIONS
 from mazebench.world.models import models_of
 from mazebench.world.simulation import Simulation
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 
+from mazebench.constants import TASK_VERSION, TRACKS_VERSION
 from mazebench.errors import InputError
 from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, Cell, Maze, corner_cells, require_one_size
 from mazebench.maps.options import THIN_WALLS
-from mazebench.tasks import TASK_VERSION, TRACKS_VERSION
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.options import ENDS, TIME_LIMIT, TaskOptions
 from mazebench.tasks.places import cell_of_place

@@ -10,10 +10,10 @@ import numpy as np
 from mazebench.agent import Agent
 from mazebench.errors import InputError
 from mazebench.evaluation.chunk import run_trials
-from mazebench.evaluation.trials import select_trials
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.trials import select_trials
 
 _SEED = 20_000  # of mazes that are drawn like the benchmark's, and in none of its splits
 _DISTANCES = (2, 4, 6, 8, 10)  # of a task without a track, unless others are asked for

@@ -11,11 +11,11 @@ import numpy as np
 from mazebench.errors import InputError, unknown
 from mazebench.maps.files import read_placed
 from mazebench.maps.generators import generate
-from mazebench.maps.image import draw_maze, write_image
 from mazebench.maps.maze import Maze, resized
-from mazebench.maps.occupancy import PlacedMaze
 from mazebench.maps.options import OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions
-from mazebench.maps.ros import write_ros_map
+from mazebench.maps.pictures import draw_maze, write_image
+from mazebench.maps.readers.occupancy import PlacedMaze
+from mazebench.maps.readers.ros import write_ros_map
 from mazebench.maps.text import write_text_maze
 from mazebench.world.export import MESH_FORMATS, write_mesh, write_mjcf
 

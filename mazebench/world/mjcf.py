@@ -10,19 +10,14 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from mazebench.constants import ACTIONS, MAX_PIXELS, PHYSICS_TIMESTEP, TOP_SPEED
 from mazebench.maps import colors
 from mazebench.maps.covering import Rectangle, cover
 from mazebench.maps.maze import WALL_HEIGHT, Maze
-from mazebench.world import MAX_PIXELS
 
 BODY_RADIUS = 0.15  # DeepMind Lab's box is 30 x 30 x 56 units
 BODY_HEIGHT = 0.56
-TOP_SPEED = 3.2  # m/s
 TURN_RATE = np.deg2rad(2.112) / 0.016  # rad/s: 20 pixels of 0.1056 degrees a frame of 16 ms
-PHYSICS_TIMESTEP = 0.008  # s; at 16 ms a body at top speed sinks 5 cm into a wall
-STEPS_PER_ACTION = 20  # an action repeat of 10 frames, two physics steps each
-
-ACTIONS = ("forward", "backward", "strafe_left", "strafe_right", "look_left", "look_right")
 
 # A drive that is on adds the force gain * (speed - v) to linear damping; the two balance at TOP_SPEED.
 _DAMPING = 8.0

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from dm_env import specs
 
+from mazebench.constants import MAX_PIXELS
 from mazebench.maps.maze import Maze
 from mazebench.options import Options, option
-from mazebench.world import MAX_PIXELS
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -7,13 +7,13 @@ import math
 
 import numpy as np
 
+from mazebench.constants import STEP_TIME
 from mazebench.maps.maze import Cell
 from mazebench.tasks.context import LOCAL_MAP, START
 from mazebench.tasks.perturbations.base import ShownMap, StateError
 from mazebench.tasks.tracks.base import Track
 from mazebench.world.angles import wrap_angle
 
-STEP_TIME = 0.16  # s, of an agent step; a constant here, so that reading options does not load MuJoCo
 _SCALES = (0.9, 1.1)  # lowest and highest of an episode's scale
 _HEADING_WALK = math.radians(2.0)  # rad per root second
 

@@ -9,9 +9,9 @@ from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
-from mazebench.evaluation.comparison import Row
-from mazebench.evaluation.paper import printed_mmn
-from mazebench.evaluation.records import Figures, Summary
+from mazebench.results.comparison import Row
+from mazebench.results.paper import printed_mmn
+from mazebench.results.records import Figures, Summary
 
 _NAME_CHARACTERS = 12  # in a line, at least, before a name is wrapped
 _ANY_WIDTH = 10_000

@@ -16,10 +16,10 @@ import yaml
 from scipy import ndimage
 
 from mazebench.errors import InputError
-from mazebench.maps.image import read_picture, to_gray
 from mazebench.maps.maze import Maze, MazeError
-from mazebench.maps.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, PlacedMaze, place_maze
 from mazebench.maps.options import MapOptions
+from mazebench.maps.readers.image import read_picture, to_gray
+from mazebench.maps.readers.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, PlacedMaze, place_maze
 from mazebench.storage.files import open_whole, read_at_most
 
 ROS_SUFFIXES = (".yaml", ".yml")

@@ -8,10 +8,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from mazebench.maps.cell_grid import CORE, core_bounds, fit_grid
-from mazebench.maps.drawing import WORKING_SIDE, deskew, flatten, frames, ink_of
 from mazebench.maps.maze import MAX_SIZE, MazeError
 from mazebench.maps.options import THIN_WALLS
+from mazebench.maps.readers.cell_grid import CORE, core_bounds, fit_grid
+from mazebench.maps.readers.drawing import WORKING_SIDE, deskew, flatten, frames, ink_of
 
 _NEARLY_BEST = 0.9  # share of the best fit
 _MIN_CLARITY = 0.2  # between the share of a boundary that is line, and a half

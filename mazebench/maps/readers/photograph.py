@@ -9,10 +9,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from mazebench.maps.cell_grid import core_bounds, fit_grid
-from mazebench.maps.drawing import dark_and_light, deskew, flatten, frames, ink_of
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, MazeError, require_connected
 from mazebench.maps.options import THIN_WALLS
+from mazebench.maps.readers.cell_grid import core_bounds, fit_grid
+from mazebench.maps.readers.drawing import dark_and_light, deskew, flatten, frames, ink_of
 
 _READ_LINES = f"read them with --walls lines; {THIN_WALLS}"
 MIN_SIDE = 3  # cells on the shorter side of a plan: wall, floor, wall

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mazebench.agent import Inputs
+from mazebench.constants import STEP_TIME
 from mazebench.envs.gym import MazeEnv
 from mazebench.errors import InputError, unknown
 from mazebench.evaluation.agent_inputs import agent_seed, true_state
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
-from mazebench.maps.image import draw_grid, draw_rays, write_image
+from mazebench.maps.pictures import draw_grid, draw_rays, write_image
 from mazebench.storage.files import open_whole, writing_to
 from mazebench.tasks.context import resized_map
 from mazebench.tasks.spec import TaskSpec
@@ -28,7 +29,7 @@ from mazebench.world.rendering import CAMERAS, Cameras
 
 MAP, LIDAR = "map", "lidar"
 _CODEC = "vp09"  # VP9, which browsers play
-_FRAMES_PER_SECOND = 1 / 0.16  # one an agent step: the film runs in real time
+_FRAMES_PER_SECOND = 1 / STEP_TIME  # one an agent step: the film runs in real time
 
 
 def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int) -> str:

@@ -1,4 +1,4 @@
-"""Makes benchmark v1: `python -m mazebench.evaluation.freeze DIR` writes its files byte for byte as they ship."""
+"""Makes benchmark v1: `python -m benchmarks.freeze DIR` writes its files byte for byte as they ship."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.evaluation.trials import COLUMNS, Trial, benchmark_task_sizes, episodes_file, select_trials
 from mazebench.maps.benchmark import MANIFEST, MAZES_PER_SPLIT, SIZES, SPLITS, VERSION, mazes_file
 from mazebench.maps.generators import DFS_OPENINGS, dfs_walls
 from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
+from mazebench.tasks.trials import COLUMNS, Trial, benchmark_task_sizes, episodes_file, select_trials
 
 _MAZE_SEED = 1  # of version v1; with the size it seeds the stream that all its mazes are drawn from
 _EPISODE_SEED = 0
@@ -76,5 +76,5 @@ def format_manifest(version: str, generator: dict[str, Any], files: dict[str, st
 
 if __name__ == "__main__":
     if len(sys.argv) != 2:
-        sys.exit("usage: python -m mazebench.evaluation.freeze DIR")
+        sys.exit("usage: python -m benchmarks.freeze DIR")
     freeze(pathlib.Path(sys.argv[1]))

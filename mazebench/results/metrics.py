@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.evaluation.intervals import mean_interval
-from mazebench.evaluation.records import Figures, Record, column
+from mazebench.results.intervals import mean_interval
+from mazebench.results.records import Figures, Record, column
 
 # What a summary calls a metric, and the field of a record that it is the mean of.
 METRICS = {"success_rate": "success", "spl": "spl", "spl_grid": "spl_grid"}

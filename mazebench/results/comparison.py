@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from mazebench.errors import InputError
-from mazebench.evaluation.intervals import Estimate, difference_interval
-from mazebench.evaluation.metrics import METRICS, by_distance
-from mazebench.evaluation.records import Record, Summary, column
-from mazebench.evaluation.results import Result, find_parts, load_result
+from mazebench.results.intervals import Estimate, difference_interval
+from mazebench.results.metrics import METRICS, by_distance
+from mazebench.results.records import Record, Summary, column
+from mazebench.results.reading import Result, find_parts, load_result
 
 _SAME_EPISODE = ("maze", "start", "goal", "seed", "distance")  # fields of records that must be equal
 

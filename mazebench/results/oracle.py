@@ -7,7 +7,7 @@ import json
 from collections.abc import Sequence
 from importlib import resources
 
-from mazebench.evaluation.trials import Trial, frozen_trials
+from mazebench.tasks.trials import Trial, frozen_trials
 from mazebench.maps.benchmark import VERSION
 
 

@@ -7,7 +7,7 @@ import json
 from importlib import resources
 from typing import Any
 
-from mazebench.evaluation.records import Summary
+from mazebench.results.records import Summary
 
 
 @functools.cache

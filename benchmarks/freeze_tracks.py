@@ -1,6 +1,6 @@
 """Makes benchmark v2, the mazes and episodes of the tracks, byte for byte as they ship.
 
-`python -m mazebench.evaluation.freeze_tracks DIR` writes its files.
+`python -m benchmarks.freeze_tracks DIR` writes its files.
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from mazebench.evaluation.freeze import format_manifest, format_trials
-from mazebench.evaluation.trials import Trial, episodes_file, make_trial
+from benchmarks.freeze import format_manifest, format_trials
 from mazebench.maps.benchmark import (
     MANIFEST,
     MAZES_PER_SPLIT,
@@ -33,6 +32,7 @@ from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.trials import Trial, episodes_file, make_trial
 
 _SEED = 2  # of version v2; with the size it seeds the streams that mazes and episodes are drawn from
 _EPISODES_PER_MAZE = 10
@@ -121,5 +121,5 @@ def _distances(size: int) -> tuple[int, ...]:
 
 if __name__ == "__main__":
     if len(sys.argv) != 2:
-        sys.exit("usage: python -m mazebench.evaluation.freeze_tracks DIR")
+        sys.exit("usage: python -m benchmarks.freeze_tracks DIR")
     freeze_tracks(pathlib.Path(sys.argv[1]))

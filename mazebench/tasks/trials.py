@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from mazebench.evaluation.options import EPISODES_PER_DISTANCE
+from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, TRACKS_VERSION, VERSION, read_asset
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.maze import Cell, Maze

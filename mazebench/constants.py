@@ -1,0 +1,21 @@
+"""Numbers that many modules need.
+
+This module imports nothing: `import mazebench` registers an environment for each size and must load no library.
+"""
+
+BENCHMARK_SIZES = (13, 15, 17, 19, 21)  # cells on a side of benchmark v1's mazes
+
+# The version of what an episode is. Gymnasium's ids end with it, and docs/release.md says when it grows.
+TASK_VERSION = 1
+TRACKS_VERSION = 2  # of the tracks
+
+EPISODES_PER_DISTANCE = 5  # of an evaluation, in each maze
+
+ACTIONS = ("forward", "backward", "strafe_left", "strafe_right", "look_left", "look_right")
+NUM_ACTIONS = len(ACTIONS)
+PHYSICS_TIMESTEP = 0.008  # s; at 16 ms a body at top speed sinks 5 cm into a wall
+STEPS_PER_ACTION = 20  # an action repeat of 10 frames, two physics steps each
+STEP_TIME = PHYSICS_TIMESTEP * STEPS_PER_ACTION  # s, of an agent step
+TOP_SPEED = 3.2  # m/s
+
+MAX_PIXELS = 1280  # a side of a picture
