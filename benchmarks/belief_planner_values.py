@@ -12,14 +12,13 @@ import sys
 import numpy as np
 import torch
 from mazebench_agents.belief_planner import BeliefPlanner
+from mazebench_agents.belief_planner.learner import BeliefPlannerLearner
 from mazebench_agents.belief_planner.network import BeliefPlannerNetwork
 from mazebench_agents.belief_planner.wrong_maps import planes_of
-from mazebench_agents.muzero.learner import MuZeroLearner
 
-from mazebench.agent import Interface
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze
-from mazebench.tasks.registry import make_spec
+from mazebench.tasks.build import make_spec
 from mazebench.training.run_folder import RunFolder
 
 _NUM_BATCHES = 150
@@ -29,14 +28,16 @@ _FARTHEST = 20  # cells; values of farther ones are not printed
 
 
 def distances_learned_from(
-    learner: MuZeroLearner, mazes: tuple[Maze, ...], num_batches: int = _NUM_BATCHES
+    learner: BeliefPlannerLearner, mazes: tuple[Maze, ...], num_batches: int = _NUM_BATCHES
 ) -> np.ndarray:
     """Returns the distances `[n]` int, in cells, of the states of some batches from their goals, real or relabelled."""
-    size = mazes[0].size
+    size, config = mazes[0].size, learner.actor.config
     fields: dict[tuple[int, int], np.ndarray] = {}
     found = []
     for _ in range(num_batches):
-        sample = learner.sample()
+        sample = learner.replay.sample_sequences(
+            config.groups, config.sequences, config.sequence_steps, hindsight=learner.hindsight, rng=learner.rng
+        )
         for key, cells, exists in zip(
             zip(sample.maze.tolist(), sample.goal.tolist(), strict=True), sample.cell, sample.exists, strict=True
         ):
@@ -75,14 +76,12 @@ def values_by_distance(
 def main(folder: pathlib.Path) -> None:
     """Prints both for the last checkpoint in the run folder `folder`."""
     config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
-    mazes = make_spec("local", config["size"]).mazes
+    task = make_spec("local", config["size"], context_size=config["size"])
     overrides = {name: str(value) for name, value in config["agent_config"].items()}
-    learner = BeliefPlanner.build_learner(
-        Interface("local", config["size"], config["size"]), mazes, overrides=overrides
-    )
+    learner = BeliefPlanner.build_learner(task, overrides=overrides)
     with RunFolder(folder) as run:
         learner.load(run.checkpoints()[-1])
-    shown = distances_learned_from(learner, mazes)
+    shown = distances_learned_from(learner, task.mazes)
     print("states learned from that lie farther from their goal than")
     for distance in (5, 8, 10, 12, 15):
         print(f"  {distance:2d} cells: {(shown > distance).mean():.2%}")

@@ -12,11 +12,14 @@ import math
 import numpy as np
 import torch
 from mazebench_agents.belief_planner.shortest_paths import cheapest_paths
-from mazebench_agents.planner import observation as planner
-from mazebench_agents.planner.pilot import Pilot
+from mazebench_agents.robot.body import BACKWARD, FORWARD, LOOK_LEFT, STRAFE_LEFT, STRAFE_RIGHT, observed_body
+from mazebench_agents.robot.cells import marked_cell, nearest_cell, start_cell
+from mazebench_agents.robot.odometry import DeadReckoning
+from mazebench_agents.robot.pilot import Pilot
 
 from mazebench.agent import Observation, SingleAgent
-from mazebench.maps.maze import Cell
+from mazebench.maps.maze import Cell, cell_to_point
+from mazebench.tasks.context import GLOBAL_MAP, GOAL
 
 _SHOWN_WALL, _BUMPED, _BORDER = 10.0, 60.0, 1e6  # cells
 _STILL = 0.25  # m/s
@@ -24,10 +27,10 @@ _STEPS = 3  # of standing still while driving, that tell of a wall
 _POSITION_GAIN = 0.1  # weight of an observed position, as of `planner-closed-loop`
 _INSIDE = 0.35  # cells from the centre of a cell in which the body is for sure
 _DRIVES = {
-    planner.FORWARD: 0.0,
-    planner.BACKWARD: math.pi,
-    planner.STRAFE_LEFT: math.pi / 2,
-    planner.STRAFE_RIGHT: -math.pi / 2,
+    FORWARD: 0.0,
+    BACKWARD: math.pi,
+    STRAFE_LEFT: math.pi / 2,
+    STRAFE_RIGHT: -math.pi / 2,
 }
 
 
@@ -38,34 +41,34 @@ class BumpingPlanner(SingleAgent):
         """Takes in a new goal; in a new episode, the map too."""
         context = observation["context"]
         if self.new_episode:
-            self._cost = np.where(context[planner.GLOBAL_MAP] > 0.5, _SHOWN_WALL, 1.0)
+            self._cost = np.where(context[GLOBAL_MAP] > 0.5, _SHOWN_WALL, 1.0)
             self._cost[[0, -1]] = self._cost[:, [0, -1]] = _BORDER
-            self._still, self._action = 0, planner.LOOK_LEFT
-            self._position = planner.centre(planner.start_cell(context), len(self._cost))
-            self._velocity = (0.0, 0.0)
-        self._goal, self._pilot = planner.marked_cell(context[planner.GOAL]), None
+            self._still, self._action = 0, LOOK_LEFT
+            self._odometry: DeadReckoning | None = None
+            self._start = start_cell(context)
+        self._goal, self._pilot = marked_cell(context[GOAL]), None
 
     def act(self, observation: Observation) -> int:
         """Returns an action."""
-        body = planner.observed_body(observation["state"].tolist())
-        size, velocity = len(self._cost), body.velocity()
-        if self._action is not planner.LOOK_LEFT or self._pilot:
-            moved = [(old + new) / 2 * planner.STEP_TIME for old, new in zip(self._velocity, velocity, strict=True)]
-            x, y = (place + step for place, step in zip(self._position, moved, strict=True))
-            self._position = x + _POSITION_GAIN * (body.x - x), y + _POSITION_GAIN * (body.y - y)
-        self._velocity = velocity
-        cell = planner.cell_of(*self._position, size)
-        offset = np.subtract(self._position, planner.centre(cell, size))
+        observed, size = observed_body(observation["state"].tolist()), len(self._cost)
+        if self._odometry is None:
+            x, y = cell_to_point(self._start, size).tolist()
+            body = observed._replace(x=x, y=y)
+            self._odometry = DeadReckoning((x, y), body.velocity(), _POSITION_GAIN)
+        else:
+            body = self._odometry.update(observed)
+        cell = nearest_cell(body.x, body.y, size)
+        offset = np.array([body.x, body.y]) - cell_to_point(cell, size)
         if np.abs(offset).max() < _INSIDE:
             self._cost[cell] = 1.0
         if self._action in _DRIVES:
-            self._still = self._still + 1 if math.hypot(*velocity) < _STILL else 0
+            self._still = self._still + 1 if math.hypot(*body.velocity()) < _STILL else 0
         if self._still >= _STEPS:
             self._mark(cell, offset, body.yaw + _DRIVES[self._action])
             self._still, self._pilot = 0, None
         if self._pilot is None:
             self._pilot = Pilot.along(self._path(cell), size)
-        self._action = self._pilot.action(body._replace(x=self._position[0], y=self._position[1]))
+        self._action = self._pilot.action(body)
         return self._action
 
     def _mark(self, cell: Cell, offset: np.ndarray, heading: float) -> None:

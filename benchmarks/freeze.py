@@ -16,7 +16,10 @@ from mazebench.maps.benchmark import MANIFEST, MAZES_PER_SPLIT, SIZES, SPLITS, V
 from mazebench.maps.generators import DFS_OPENINGS, dfs_walls
 from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
-from mazebench.tasks.trials import COLUMNS, Trial, benchmark_task_sizes, episodes_file, select_trials
+from mazebench.tasks.build import make_spec
+from mazebench.tasks.options import EVAL_DISTANCES
+from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.trials import COLUMNS, Trial, benchmark_task_sizes, draw_trials, episodes_file
 
 _MAZE_SEED = 1  # of version v1; with the size it seeds the stream that all its mazes are drawn from
 _EPISODE_SEED = 0
@@ -32,12 +35,16 @@ def freeze(folder: pathlib.Path) -> None:
             chosen = mazes[size][index * MAZES_PER_SPLIT : (index + 1) * MAZES_PER_SPLIT]
             files[mazes_file(size, split)] = "\n".join(map(format_maze, chosen))
     for task, size, _ in benchmark_task_sizes():
-        trials = select_trials(task, mazes[size][MAZES_PER_SPLIT:], frozen=False, seed=_EPISODE_SEED)
+        trials = draw_trials(_task(task, mazes[size][MAZES_PER_SPLIT:]), seed=_EPISODE_SEED)
         files[episodes_file(task, size)] = format_trials(trials)
     generator = {"style": "dfs", "openings": DFS_OPENINGS, "seed": _MAZE_SEED, "episode_seed": _EPISODE_SEED}
     files[MANIFEST] = format_manifest(VERSION, generator, files)
     for name, text in files.items():
         folder.joinpath(name).write_bytes(text.encode("ascii"))
+
+
+def _task(task: str, mazes: list[Maze]) -> TaskSpec:
+    return make_spec(task, maps=mazes, distances=EVAL_DISTANCES if task == "local" else None)
 
 
 def draw_mazes(size: int) -> list[Maze]:

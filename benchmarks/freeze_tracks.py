@@ -27,9 +27,9 @@ from mazebench.maps.benchmark import (
 from mazebench.maps.generators import DFS_OPENINGS, dfs_walls
 from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.shown_map import leg_context, show_map
-from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 from mazebench.tasks.trials import Trial, episodes_file, make_trial
@@ -94,7 +94,7 @@ def draw_track_trials(mazes: list[Maze]) -> list[Trial]:
 
 def shown_hash(track: str, level: int, mazes: tuple[Maze, ...], trials: Sequence[Trial]) -> str:
     """Returns the SHA-256 of the contexts of the episodes of a track and level, with 8 bits a value."""
-    spec = TaskSpec(mazes=mazes, track=track, level=(level,), distances=TRACKS[track].distances(level))
+    spec = make_spec(track, maps=mazes, level=level, distances=TRACKS[track].distances(level))
     digest = hashlib.sha256()
     for trial in trials:
         episode = trial.episode

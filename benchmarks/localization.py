@@ -15,13 +15,14 @@ import time
 
 import numpy as np
 from mazebench_agents.navigator import exploration, localization
-from mazebench_agents.planner import observation
-from mazebench_agents.planner.observation import Body
-from mazebench_agents.planner.pilot import Pilot, steer
+from mazebench_agents.robot.body import YAW, Body, X, Y, observed_body
+from mazebench_agents.robot.cells import marked_cell, nearest_cell
+from mazebench_agents.robot.pilot import Pilot, steer
 
 import mazebench
 from mazebench.maps.generators import dfs_walls
 from mazebench.maps.maze import path_through_walls
+from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.world.angles import wrap_angle
 from mazebench.world.lidar import NUM_RAYS
 
@@ -37,9 +38,9 @@ class Driver:
 
     def __init__(self, policy: str, context: np.ndarray):
         self.policy = policy
-        self.walls = context[observation.GLOBAL_MAP] > 0.5
-        self.goal = observation.marked_cell(context[observation.GOAL])
-        start = context[observation.START]
+        self.walls = context[GLOBAL_MAP] > 0.5
+        self.goal = marked_cell(context[GOAL])
+        start = context[START]
         self.start_distribution = start / start.sum() if start.any() else ~self.walls / np.sum(~self.walls)
         self.belief: localization.Belief | None = None
         self.direction: float | None = None  # in the odometry's frame, of `wander`
@@ -47,14 +48,14 @@ class Driver:
 
     def act(self, state: np.ndarray, ranges: np.ndarray) -> int:
         """Updates the belief and returns an action."""
-        odometry = state[[observation.X, observation.Y, observation.YAW]]
+        odometry = state[[X, Y, YAW]]
         began = time.thread_time()
         if self.belief is None:
             self.belief = localization.begin(self.walls, self.start_distribution, odometry, ranges, self.goal)
         else:
             self.belief = localization.update(self.belief, self.walls, odometry, ranges, self.goal)
         self.seconds.append(time.thread_time() - began)
-        body = observation.observed_body(state.tolist())
+        body = observed_body(state.tolist())
         if self.policy == "wander":
             return self._wander(body, ranges)
         x, y, yaw = self.belief.pose.tolist()
@@ -66,7 +67,7 @@ class Driver:
             if len(path) > 1:
                 return path
         x, y, _ = self.belief.pose.tolist()
-        return path_through_walls(self.walls, observation.cell_of(x, y, SIZE), self.goal)
+        return path_through_walls(self.walls, nearest_cell(x, y, SIZE), self.goal)
 
     def _wander(self, body: Body, ranges: np.ndarray) -> int:
         """Drives straight on until a wall is near, then along the longest ray but backwards."""

@@ -14,7 +14,7 @@ from scipy import stats
 
 from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
-from mazebench.tasks.registry import make_spec
+from mazebench.tasks.build import make_spec
 from mazebench.training.held_out import HeldOutEvaluation
 
 _SIZE = 13

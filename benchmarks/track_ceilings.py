@@ -46,7 +46,7 @@ def main() -> None:
 
 
 def _row(track: str, level: int, split: str) -> str:
-    options = EvalOptions("oracle", track=track, level=level, split=split, episodes_per_distance=1)
+    options = EvalOptions.of("oracle", track=track, level=level, split=split, episodes_per_distance=1)
     plan = make_plan(options)
     trials = plan.trials if split == "eval" else _thinned(plan.trials, 400)
     outcomes = [_drive(plan.task, trial) for trial in trials]

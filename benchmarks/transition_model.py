@@ -19,8 +19,8 @@ from mazebench_agents.mmn.network import Code, MMNNetwork
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.context import build_context
-from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 
 _SIZE = 13
@@ -54,7 +54,7 @@ class Batch(NamedTuple):
 
 def record(mazes: tuple[Maze, ...], num_steps: int, rng: np.random.Generator) -> list[Transitions]:
     """Returns transitions of random driving, by maze."""
-    collector = Collector(TaskSpec(mazes=mazes, distances=(1, 2, 3, 4, 5), num_goals=1), _NUM_ENVS, seed=5)
+    collector = Collector(make_spec(maps=mazes, distances=(1, 2, 3, 4, 5)), _NUM_ENVS, seed=5)
     action = rng.integers(6, size=_NUM_ENVS)
     origin, start = np.zeros((_NUM_ENVS, 2), np.float32), np.zeros(_NUM_ENVS, np.int64)
     rows, before = [], None

@@ -19,7 +19,7 @@ from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.generators import generate
 from mazebench.results.intervals import mean_interval
-from mazebench.tasks.registry import make_spec
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.trials import draw_trials
 

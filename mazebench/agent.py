@@ -83,15 +83,6 @@ class _Declarations:
         """Returns the file that `build` reads if it is given none; None if the agent reads no checkpoint."""
         return None
 
-    @classmethod
-    def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
-        """Returns tables for `mazebench bench`, here none.
-
-        The tables are rows by title, and a row is its values by column, the first of which is "what". Each figure
-        should take about `seconds` to measure.
-        """
-        return {}
-
 
 class Agent(_Declarations):
     """Acts in B environments at once; the base class of all agents.
@@ -162,10 +153,6 @@ class _SingleAgents(Agent):
     @classmethod
     def default_checkpoint(cls) -> pathlib.Path | None:
         return cls.single_class.default_checkpoint()
-
-    @classmethod
-    def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
-        return cls.single_class.measure(seconds)
 
     def initial_state(self, batch_size: int) -> list[SingleAgent]:
         return [self._built] * batch_size

@@ -80,7 +80,7 @@ def checked_agent_class(name: str, loaded: Any) -> type[Agent]:
         raise InputError(f"agent {name!r}: {expected}, found {'one of ' if isinstance(loaded, type) else ''}{found}")
     if loaded.act in (Agent.act, SingleAgent.act):
         raise InputError(f"agent {name!r}: expected a class with act(), found none")
-    for method in ("build", "context_size", "default_checkpoint", "measure"):
+    for method in ("build", "context_size", "default_checkpoint"):
         if inspect.isfunction(inspect.getattr_static(loaded, method)):
             raise InputError(f"agent {name!r}: expected {method}() to be a classmethod, found a method of its objects")
     if not (isinstance(loaded.needs_sensors, tuple) and set(loaded.needs_sensors) <= set(SENSORS)):

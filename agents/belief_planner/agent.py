@@ -6,8 +6,7 @@ docs/agents/belief-planner.md says what of it is learned and what is written by 
 from __future__ import annotations
 
 import dataclasses
-import pathlib
-from typing import Any, ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -15,14 +14,14 @@ import torch
 from mazebench.agent import Inputs, Interface, Observation
 from mazebench.maps.maze import cell_to_point, point_to_cell
 
-from ..common.actor import NetworkAgent, one_torch_thread
-from ..common.bounds import bounded
+from ..common.actor import NetworkAgent, acting
 from ..common.layers import in_batches, state_features
 from ..muzero.network import CONTEXTS_AT_ONCE, NUM_ACTIONS, STATES_AT_ONCE, with_codes
+from ..robot.body import YAW, X, Y
+from ..robot.odometry import Displacement, turned
 from .belief import GOAL, NUM_PLANES, WALL, probabilities
 from .config import BeliefPlannerConfig
-from .displacement import Displacement, turned
-from .evidence import FAILED, NUM_EVIDENCE, PASSED, SENSED, Readings, place
+from .evidence import FAILED, NUM_EVIDENCE, PASSED, SENSED, Readings, add_readings
 from .framing import framed
 from .learner import BeliefPlannerLearner
 from .network import REACH, BeliefPlannerNetwork, Code, distance_at
@@ -30,7 +29,7 @@ from .scan_match import find_pose, is_odometry
 
 _AWAY = 3.0  # cells from where a goal was brought nearer, at which it is brought nearer again
 _ROUNDING = 1e-3  # m, of positions as float32
-_PATIENCE = 6  # steps between two revisions on a leg, at least
+PATIENCE = 6  # steps between two revisions on a leg, at least
 _SURPRISING = 0.1  # how much evidence must change where it contradicts the belief, before the belief is revised
 
 
@@ -61,89 +60,107 @@ class BeliefPlanner(NetworkAgent):
     learns_on_gpu = True
     config: BeliefPlannerConfig
     network: BeliefPlannerNetwork
-    _size: int  # M, the side of the map that is believed in, in cells
-    _points_tell: bool = True  # whether a cell of that map is a metre, so that the position tells the cell
 
-    def __init__(self, config: BeliefPlannerConfig, context_size: int, seed: int = 0, device: str = "cpu"):
-        super().__init__(config, context_size, seed, device)
-        self._size = context_size
+    def __init__(
+        self,
+        config: BeliefPlannerConfig,
+        context_size: int,
+        seed: int = 0,
+        device: str = "cpu",
+        *,
+        interface: Interface | None = None,
+    ):
+        super().__init__(config, context_size, seed, device, interface=interface)
+        # M, the side of the map that is believed in, in cells.
+        self._size = min(self.interface.size, self.interface.context_size)
+        # Whether a cell of that map is a metre, so that the position tells the cell.
+        self._points_tell = self._size == self.interface.size and self.interface.cell_size == 1.0
 
     @classmethod
     def make_network(cls, config: BeliefPlannerConfig, context_size: int) -> BeliefPlannerNetwork:
         """Returns a new network, which serves contexts of any size."""
         return BeliefPlannerNetwork(config)
 
-    @classmethod
-    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
-        """Returns the agent of a checkpoint, by default of the one that ships.
-
-        Raises:
-          InputError: if the checkpoint can't be used here.
-        """
-        agent = super().build(interface, seed=seed, checkpoint=checkpoint)
-        agent._size = min(interface.size, interface.context_size)
-        agent._points_tell = agent._size == interface.size and interface.cell_size == 1.0
-        return agent
-
-    @classmethod
-    def measure(cls, seconds: float) -> dict[str, list[dict[str, Any]]]:
-        """Returns tables for `mazebench bench`: of the parts of acting, and of an update."""
-        from ..muzero.measure import acting_table, update_table
-
-        shipped = cls.build(Interface("local", 13, 13, sensors=("lidar",)))
-        return acting_table(seconds, shipped) | update_table(seconds, cls.build_learner)
-
     def initial_state(self, batch_size: int) -> ActorState:
         """Returns a state without beliefs: `act` forms one where a context is new."""
 
-        def planes(number: int) -> np.ndarray:
-            return np.zeros((batch_size, number, self._size, self._size), dtype=np.float32)
+        def zeros(*shape: int) -> np.ndarray:
+            return np.zeros((batch_size, *shape), dtype=np.float32)
 
-        def vectors() -> np.ndarray:
-            return np.zeros((batch_size, 2), dtype=np.float32)
+        return ActorState(
+            code=None,
+            displacement=Displacement(batch_size),
+            turn=zeros(),
+            anchor=zeros(2),
+            shown=zeros(NUM_PLANES, self._size, self._size),
+            evidence=zeros(NUM_EVIDENCE, self._size, self._size),
+            weighed=zeros(NUM_EVIDENCE, self._size, self._size),
+            belief=zeros(NUM_PLANES, self._size, self._size),
+            revised_at=zeros(2),
+            waited=np.zeros(batch_size, dtype=np.int64),
+            is_far=np.zeros(batch_size, dtype=bool),
+            wished=zeros(2),
+        )
 
-        maps = planes(NUM_PLANES), planes(NUM_EVIDENCE), planes(NUM_EVIDENCE), planes(NUM_PLANES)
-        turn = np.zeros(batch_size, dtype=np.float32)
-        waited, is_far = np.zeros(batch_size, dtype=np.int64), np.zeros(batch_size, dtype=bool)
-        displacement = Displacement(batch_size)
-        return ActorState(None, displacement, turn, vectors(), *maps, vectors(), waited, is_far, vectors())
+    @acting
+    def act(self, inputs: Inputs, state: ActorState, explore: bool = False) -> tuple[np.ndarray, ActorState]:
+        """Returns actions `[B]`.
 
-    @torch.no_grad()
-    @one_torch_thread()
-    def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, ActorState]:
-        """Returns actions `[B]`; the belief is revised where a context is new, or where evidence contradicts it."""
-        inputs = bounded(inputs)
+        The belief is revised where a context is new, where evidence contradicts it, and where the body has left the
+        part of a large map in which the goal was brought nearer.
+        """
+        batch_size = len(inputs.new_context)
+        active = np.ones(batch_size, dtype=bool) if inputs.active is None else inputs.active
+
+        # A new context brings a map and a goal; a new episode forgets the evidence and tells where the body begins.
         for row in np.flatnonzero(inputs.new_context).tolist():
             self._begin_leg(row, inputs, state)
+
+        # How far the body has moved since the episode began, in the map's frame, and so where it is on the map.
         observed = inputs.observation["state"].copy()
-        observed[:, :2] = moved = turned(state.displacement.update(observed, inputs.new_episode), state.turn)
-        observed[:, 5] += state.turn
-        features = state_features(torch.from_numpy(observed), torch.zeros(len(observed), 2))
+        moved = turned(state.displacement.update(observed, inputs.new_episode), state.turn)
+        observed[:, [X, Y]] = moved
+        observed[:, YAW] += state.turn
+        features = self._tensor(state_features(torch.from_numpy(observed), torch.zeros(batch_size, 2)))
         position = state.anchor + self.network.on_map(self._tensor(moved)).cpu().numpy()
-        self._note(inputs, features, observed[:, 5], position, state)
-        has_moved = np.abs(position - state.revised_at).sum(axis=1) > _AWAY
+
+        # Evidence of walls and of the goal: where the body is, what has stopped it, and what the lidar sees.
+        readings = Readings(
+            context=np.arange(batch_size),
+            on_leg=np.ones(batch_size, dtype=bool),
+            position=position,
+            velocity=self.network.velocity(features).cpu().numpy(),
+            wished=state.wished,
+            yaw=observed[:, YAW],
+            ranges=inputs.observation.get("lidar", np.zeros((batch_size, 0), dtype=np.float32)),
+        )
+        add_readings(state.evidence, readings, self.network.metre())
+
+        # A new belief, and shortest paths over it, where the context is new or, after some steps on a leg, where
+        # evidence contradicts the belief, or the body is far from where the goal was brought nearer.
         state.waited += 1
-        is_due = (state.waited >= _PATIENCE) & (_surprised(state) | (state.is_far & has_moved))
-        active = np.ones(len(moved), dtype=bool) if inputs.active is None else inputs.active
-        self._revise(np.flatnonzero((inputs.new_context | is_due) & active), position, state)
+        is_away = np.abs(position - state.revised_at).sum(axis=1) > _AWAY
+        is_due = (state.waited >= PATIENCE) & (_surprised(state) | (state.is_far & is_away))
+        rows = np.flatnonzero((inputs.new_context | is_due) & active)
+        if len(rows):
+            self._revise(rows, position, state)
         assert state.code is not None, "new_context must be set in an environment's first step"
-        action = np.where(active, self._chosen(features, state.code, explore), 0)
-        taken = self._tensor(features), self._tensor(action).long()
-        state.wished = in_batches(self.network.wished, STATES_AT_ONCE, *taken).cpu().numpy()
-        return action, state
 
-    def _chosen(self, features: torch.Tensor, code: Code, explore: bool) -> np.ndarray:
-        """Returns actions `[B]` by the policy in states with features `[B, 9]`.
-
-        Exploring, the first environment draws from the policy, and the last one takes its best action; those between
-        draw with less and less noise.
-        """
-        logits = in_batches(self._policy_logits, STATES_AT_ONCE, self._tensor(features)[:, None], *code)
+        # The policy's best action along these paths. Exploring, the first environment draws from the policy, and the
+        # last one takes its best action; those between draw with less and less noise.
+        logits = in_batches(self._policy_logits, STATES_AT_ONCE, features[:, None], *state.code)
         scores = logits[:, 0].cpu().numpy()
-        if not explore:
-            return scores.argmax(axis=1)
-        noise = self._noise_scale[:, None] * self._rng.gumbel(size=scores.shape)
-        return self._explored((scores + noise).argmax(axis=1), NUM_ACTIONS)
+        if explore:
+            noise = self._noise_scale[:, None] * self._rng.gumbel(size=scores.shape)
+            action = self._explored((scores + noise).argmax(axis=1), NUM_ACTIONS)
+        else:
+            action = scores.argmax(axis=1)
+        action = np.where(active, action, 0)
+
+        # The velocity that this action brings where nothing stops the body, to compare with that of the next step.
+        wished = in_batches(self.network.wished, STATES_AT_ONCE, features, self._tensor(action).long())
+        state.wished = wished.cpu().numpy()
+        return action, state
 
     def _policy_logits(self, features: torch.Tensor, *code: torch.Tensor) -> torch.Tensor:
         """Returns logits `[K, 1, 6]` of states with features `[K, 1, 9]`, each with the parts of a code of its own."""
@@ -174,52 +191,31 @@ class BeliefPlanner(NetworkAgent):
           starts: `[S, 2]` int, the marked starts, one or none.
         """
         observed = observation["state"][row]
-        cell = point_to_cell(observed[:2], self._size)
-        if self._points_tell and np.abs(cell_to_point(cell, self._size) - observed[:2]).max() < _ROUNDING:
+        cell = point_to_cell(observed[[X, Y]], self._size)
+        if self._points_tell and np.abs(cell_to_point(cell, self._size) - observed[[X, Y]]).max() < _ROUNDING:
             return cell, 0.0
         if "lidar" in observation and is_odometry(observed):
             cells = starts if len(starts) else np.argwhere(walls <= max(0.5, walls.min()))
             return find_pose(walls, observation["lidar"][row], cells, self.network.metre())
         return starts[0] if len(starts) else np.full(2, (self._size - 1) / 2), 0.0
 
-    def _note(
-        self, inputs: Inputs, features: torch.Tensor, yaw: np.ndarray, position: np.ndarray, state: ActorState
-    ) -> None:
-        """Adds what is observed to the evidence."""
-        batch_size = len(position)
-        readings = Readings(
-            np.arange(batch_size),
-            np.ones(batch_size, dtype=bool),
-            position,
-            self.network.velocity(self._tensor(features)).cpu().numpy(),
-            state.wished,
-            yaw,
-            inputs.observation.get("lidar", np.zeros((batch_size, 0), dtype=np.float32)),
-        )
-        place(state.evidence, readings, self.network.metre())
-
     def _revise(self, rows: np.ndarray, position: np.ndarray, state: ActorState) -> None:
-        """Writes beliefs and codes of the contexts at `rows`."""
-        if not len(rows):
-            return
-        arrays = state.shown[rows], state.evidence[rows], state.anchor[rows], position[rows]
-        believed, code = self._believed(*(self._tensor(array) for array in arrays))
-        state.belief[rows], state.weighed[rows], state.waited[rows] = believed.cpu().numpy(), state.evidence[rows], 0
-        farthest = distance_at(self._tensor(position[rows]), code.distance).amax(dim=-1)
-        state.revised_at[rows], state.is_far[rows] = position[rows], (farthest > REACH).cpu().numpy()
-        state.code = with_codes(state.code, len(state.waited), torch.from_numpy(rows).to(believed.device), code)
-
-    def _believed(
-        self, shown: torch.Tensor, evidence: torch.Tensor, anchor: torch.Tensor, position: torch.Tensor
-    ) -> tuple[torch.Tensor, Any]:
-        """Returns beliefs `[K, 2, M, M]` and codes of K contexts."""
-        belief = self.network.belief
+        """Writes beliefs and codes of the contexts at `rows` `[K]`, for bodies at positions `[B, 2]`."""
+        shown, evidence, anchor, here = map(
+            self._tensor, (state.shown[rows], state.evidence[rows], state.anchor[rows], position[rows])
+        )
 
         def believe(shown: torch.Tensor, evidence: torch.Tensor) -> torch.Tensor:
-            return probabilities(belief(shown, evidence), evidence)
+            return probabilities(self.network.belief(shown, evidence), evidence)
 
-        believed = in_batches(believe, CONTEXTS_AT_ONCE, shown, evidence)
-        return believed, in_batches(self.network.hypermodel, CONTEXTS_AT_ONCE, believed, anchor, position)
+        belief = in_batches(believe, CONTEXTS_AT_ONCE, shown, evidence)
+        code = in_batches(self.network.hypermodel, CONTEXTS_AT_ONCE, belief, anchor, here)
+        state.code = with_codes(state.code, len(state.waited), torch.from_numpy(rows).to(belief.device), code)
+
+        state.belief[rows], state.weighed[rows] = belief.cpu().numpy(), state.evidence[rows]
+        state.waited[rows], state.revised_at[rows] = 0, position[rows]
+        farthest = distance_at(here, code.distance).amax(dim=-1)
+        state.is_far[rows] = (farthest > REACH).cpu().numpy()
 
     def _tensor(self, array: np.ndarray | torch.Tensor) -> torch.Tensor:
         return torch.as_tensor(array).to(self.network.support.device)

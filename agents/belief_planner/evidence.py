@@ -13,7 +13,7 @@ import numpy as np
 
 from mazebench.world.lidar import MAX_RANGE
 
-from ..common.kernels import compiled
+from ..common.kernels import compiled, inlined
 
 NUM_EVIDENCE = 3
 # From -1, surely free, to 1, surely wall; 1 where the body was on this leg; in how many steps a cell stopped the body.
@@ -41,81 +41,87 @@ class Readings(NamedTuple):
     ranges: np.ndarray  # [K, R] float32, m; R = 0 without lidar
 
 
-def place(planes: np.ndarray, readings: Readings, to_map: np.ndarray) -> None:
+@compiled
+def add_readings(planes: np.ndarray, readings: Readings, to_map: np.ndarray) -> None:
     """Adds readings to the evidence `planes` `[G, 3, M, M]` float32.
-
-    The body is where it is, so its cell is free. A body that is slower than it wished, beside the edge of a cell, was
-    stopped by a wall. A ray of the lidar passes through free cells and ends at a wall.
 
     Args:
       planes: changed in place; those of SENSED, PASSED and FAILED.
       readings: of any of the G contexts.
       to_map: `[2, 2]` float32, rows and columns (first axis) of a metre in x and in y (second axis).
     """
-    _place(planes, *readings, to_map)
+    for k in range(len(readings.context)):
+        evidence, position = planes[readings.context[k]], readings.position[k]
+        if _is_on(evidence[SENSED], round(position[0]), round(position[1])):
+            _add_body(evidence, position, readings.on_leg[k])
+            _add_contacts(evidence, position, readings.velocity[k], readings.wished[k])
+            _add_scan(evidence[SENSED], position, readings.yaw[k], readings.ranges[k], to_map)
 
 
-@compiled
-def _place(
-    planes: np.ndarray,
-    context: np.ndarray,
-    on_leg: np.ndarray,
-    position: np.ndarray,
-    velocity: np.ndarray,
-    wished: np.ndarray,
-    yaw: np.ndarray,
-    ranges: np.ndarray,
-    to_map: np.ndarray,
-) -> None:
-    size, num_rays = planes.shape[2], ranges.shape[1]
-    for k in range(len(context)):
-        sensed, passed, failed = planes[context[k], SENSED], planes[context[k], PASSED], planes[context[k], FAILED]
-        row, column = position[k]
-        r, c = round(row), round(column)
-        if not (0 <= r < size and 0 <= c < size):
+@inlined
+def _add_body(evidence: np.ndarray, position: np.ndarray, on_leg: bool) -> None:
+    """Adds that the cell of the body is free, and passed on this leg, if `position` `[2]` is in its middle."""
+    row, column = round(position[0]), round(position[1])
+    if abs(position[0] - row) < _INSIDE and abs(position[1] - column) < _INSIDE:
+        _move(evidence[SENSED], row, column, -1.0)
+        if on_leg:
+            evidence[PASSED, row, column] = 1.0
+
+
+@inlined
+def _add_contacts(evidence: np.ndarray, position: np.ndarray, velocity: np.ndarray, wished: np.ndarray) -> None:
+    """Adds walls that stop the body: it is slower than wished along an axis, and beside the edge of its cell there."""
+    row, column = round(position[0]), round(position[1])
+    from_centre = position[0] - row, position[1] - column
+    for axis in range(2):
+        ahead, aside = from_centre[axis], from_centre[1 - axis]
+        sign = 1 if wished[axis] > 0 else -1
+        speed = sign * wished[axis]
+        is_slow = speed > _WISHED and sign * velocity[axis] < _STOPPED * speed
+        is_beside = 0.5 - sign * ahead < _TOUCHING and abs(aside) < _CLEAR
+        if is_slow and is_beside:
+            wall_row, wall_column = row + sign * (axis == 0), column + sign * (axis == 1)
+            if _is_on(evidence[SENSED], wall_row, wall_column):
+                _move(evidence[SENSED], wall_row, wall_column, 1.0)
+                evidence[FAILED, wall_row, wall_column] += 1.0
+
+
+@inlined
+def _add_scan(sensed: np.ndarray, position: np.ndarray, yaw: float, ranges: np.ndarray, to_map: np.ndarray) -> None:
+    """Adds that the rays of a scan `[R]` pass through free cells and end at walls."""
+    for j in range(len(ranges)):
+        # The direction on the map, in cells for a metre, then as a unit vector.
+        angle = yaw + 2 * math.pi * j / len(ranges)
+        x, y = math.cos(angle), math.sin(angle)
+        down, right = to_map[0, 0] * x + to_map[0, 1] * y, to_map[1, 0] * x + to_map[1, 1] * y
+        per_metre = math.hypot(down, right)
+        if per_metre < 1e-3:
             continue
-        from_row, from_column = row - r, column - c
-        if abs(from_row) < _INSIDE and abs(from_column) < _INSIDE:
-            sensed[r, c] += _RATE * (-1 - sensed[r, c])
-            if on_leg[k]:
-                passed[r, c] = 1.0
-        for axis in range(2):
-            ahead, aside = (from_row, from_column) if axis == 0 else (from_column, from_row)
-            sign = 1 if wished[k, axis] > 0 else -1
-            speed = sign * wished[k, axis]
-            if (
-                speed > _WISHED
-                and sign * velocity[k, axis] < _STOPPED * speed
-                and 0.5 - sign * ahead < _TOUCHING
-                and abs(aside) < _CLEAR
-            ):
-                ahead_r, ahead_c = r + sign * (axis == 0), c + sign * (axis == 1)
-                if 0 <= ahead_r < size and 0 <= ahead_c < size:
-                    _mark(sensed, ahead_r, ahead_c, 1.0)
-                    failed[ahead_r, ahead_c] += 1.0
-        for j in range(num_rays):
-            angle = yaw[k] + 2 * math.pi * j / num_rays
-            x, y = math.cos(angle), math.sin(angle)
-            down, right = to_map[0, 0] * x + to_map[0, 1] * y, to_map[1, 0] * x + to_map[1, 1] * y
-            per_metre = math.hypot(down, right)
-            if per_metre < 1e-3:
-                continue
-            length = ranges[k, j] * per_metre
-            down, right = down / per_metre, right / per_metre
-            last_r, last_c = -1, -1
-            for i in range(int(length / _SAMPLE) + 1):
-                at_row, at_column = row + i * _SAMPLE * down, column + i * _SAMPLE * right
-                last_r, last_c = round(at_row), round(at_column)
-                if abs(at_row - last_r) < _INSIDE and abs(at_column - last_c) < _INSIDE:
-                    _mark(sensed, last_r, last_c, -1.0)
-            if ranges[k, j] < MAX_RANGE:
-                end = length + _BEHIND
-                end_r, end_c = round(row + end * down), round(column + end * right)
-                if end_r != last_r or end_c != last_c:
-                    _mark(sensed, end_r, end_c, 1.0)
+        length = ranges[j] * per_metre
+        down, right = down / per_metre, right / per_metre
+
+        # Cells are free in whose middle a point of the ray lies.
+        row, column = -1, -1
+        for i in range(int(length / _SAMPLE) + 1):
+            at_row, at_column = position[0] + i * _SAMPLE * down, position[1] + i * _SAMPLE * right
+            row, column = round(at_row), round(at_column)
+            if abs(at_row - row) < _INSIDE and abs(at_column - column) < _INSIDE and _is_on(sensed, row, column):
+                _move(sensed, row, column, -1.0)
+
+        # The cell behind its end is a wall, unless the last point lies in it as well.
+        if ranges[j] < MAX_RANGE:
+            end = length + _BEHIND
+            end_row, end_column = round(position[0] + end * down), round(position[1] + end * right)
+            if (end_row != row or end_column != column) and _is_on(sensed, end_row, end_column):
+                _move(sensed, end_row, end_column, 1.0)
 
 
-@compiled
-def _mark(sensed: np.ndarray, row: int, column: int, found: float) -> None:
-    if 0 <= row < len(sensed) and 0 <= column < len(sensed):
-        sensed[row, column] += _RATE * (found - sensed[row, column])
+@inlined
+def _is_on(sensed: np.ndarray, row: int, column: int) -> bool:
+    return 0 <= row < len(sensed) and 0 <= column < len(sensed)
+
+
+@inlined
+def _move(sensed: np.ndarray, row: int, column: int, found: float) -> None:
+    """Moves SENSED of a cell on the map towards what was found: -1, free, or 1, a wall."""
+    sensed[row, column] += _RATE * (found - sensed[row, column])

@@ -60,6 +60,9 @@ class Code(NamedTuple):
 class BeliefPlannerNetwork(Network):
     """Reads weights and features of the map at the estimated position.
 
+    The agent acts by `belief`, `hypermodel`, `encode`, `look`, `predict`, `velocity` and `wished`. The rest is for
+    learning: the model's `step`, and losses. What the hypermodel makes of a map is a table by cell, no network.
+
     A step adds a change that is linear in the body's own frame, as free motion is, and the output of the transition
     network: a change in that frame, and one in the map's frame, along whose axes walls stop the body.
     """

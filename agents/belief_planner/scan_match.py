@@ -8,7 +8,8 @@ import numpy as np
 
 from mazebench.world.lidar import MAX_RANGE
 
-from ..common.kernels import compiled
+from ..common.kernels import compiled, inlined
+from ..robot.body import YAW, X, Y
 
 _HEADINGS = 64  # that are tried
 _FINER = 16  # parts of the step between two of them, tried around the best one
@@ -18,7 +19,7 @@ _BEHIND = 0.2  # cells behind the end of a ray, where the wall is
 
 def is_odometry(state: np.ndarray) -> bool:
     """Returns whether an episode's first state `[12]` has its pose at the origin, which is outside of all mazes."""
-    return not state[[0, 1, 5]].any()
+    return not state[[X, Y, YAW]].any()
 
 
 def find_pose(walls: np.ndarray, ranges: np.ndarray, cells: np.ndarray, to_map: np.ndarray) -> tuple[np.ndarray, float]:
@@ -42,25 +43,35 @@ def _best(
     walls: np.ndarray, ranges: np.ndarray, cells: np.ndarray, to_map: np.ndarray, headings: np.ndarray
 ) -> tuple[int, float]:
     """Returns the index of the cell, and the heading, whose rays pass through the least wall and end at the most."""
-    size, num_rays = len(walls), len(ranges)
     best, best_cell, best_heading = -math.inf, 0, 0.0
     for i in range(len(cells)):
         for heading in headings:
-            fit = 0.0
-            for j in range(num_rays):
-                angle = heading + 2 * math.pi * j / num_rays
-                x, y = math.cos(angle), math.sin(angle)
-                down, right = to_map[0, 0] * x + to_map[0, 1] * y, to_map[1, 0] * x + to_map[1, 1] * y
-                along = 0.0
-                while along < ranges[j]:
-                    r, c = round(cells[i, 0] + along * down), round(cells[i, 1] + along * right)
-                    if 0 <= r < size and 0 <= c < size:
-                        fit -= _SAMPLE * walls[r, c]
-                    along += _SAMPLE
-                if ranges[j] < MAX_RANGE:
-                    end = ranges[j] + _BEHIND
-                    r, c = round(cells[i, 0] + end * down), round(cells[i, 1] + end * right)
-                    fit += walls[r, c] if 0 <= r < size and 0 <= c < size else 1.0
+            fit = _fit(walls, ranges, cells[i], to_map, heading)
             if fit > best:
                 best, best_cell, best_heading = fit, i, heading
     return best_cell, best_heading
+
+
+@inlined
+def _fit(walls: np.ndarray, ranges: np.ndarray, cell: np.ndarray, to_map: np.ndarray, heading: float) -> float:
+    """Returns the wall behind the ends of rays, less that on the way to them, in cells; beyond the map is wall."""
+    fit = 0.0
+    for j in range(len(ranges)):
+        angle = heading + 2 * math.pi * j / len(ranges)
+        x, y = math.cos(angle), math.sin(angle)
+        down, right = to_map[0, 0] * x + to_map[0, 1] * y, to_map[1, 0] * x + to_map[1, 1] * y
+        along = 0.0
+        while along < ranges[j]:
+            fit -= _SAMPLE * _wall_at(walls, cell[0] + along * down, cell[1] + along * right, 0.0)
+            along += _SAMPLE
+        if ranges[j] < MAX_RANGE:
+            end = ranges[j] + _BEHIND
+            fit += _wall_at(walls, cell[0] + end * down, cell[1] + end * right, 1.0)
+    return fit
+
+
+@inlined
+def _wall_at(walls: np.ndarray, row: float, column: float, beyond: float) -> float:
+    """Returns the share of wall in the cell at a position, `beyond` if there is none."""
+    r, c = round(row), round(column)
+    return walls[r, c] if 0 <= r < len(walls) and 0 <= c < len(walls) else beyond

@@ -1,36 +1,17 @@
-"""Cheapest paths on grids, with gradients.
+"""Gradients of the costs of cheapest paths.
 
 `K` is the number of grids, `M` their side.
 """
 
 from __future__ import annotations
 
-import heapq
 from typing import Any
 
 import numpy as np
 import torch
 
 from ..common.kernels import compiled
-
-_NONE = -1
-
-
-class _CheapestPaths(torch.autograd.Function):
-    """The gradient of a distance is that of the costs along its path."""
-
-    @staticmethod
-    def forward(ctx: Any, cost: torch.Tensor, begin: torch.Tensor) -> torch.Tensor:
-        arrays = (values.detach().cpu().float().contiguous().numpy() for values in (cost, begin))
-        distance, order, following = _search(*arrays)
-        ctx.paths = order, following
-        return torch.from_numpy(distance).to(cost.device)
-
-    @staticmethod
-    def backward(ctx: Any, *gradients: torch.Tensor) -> tuple[torch.Tensor, None]:
-        (gradient,) = gradients
-        passed = _pass_back(gradient.cpu().float().contiguous().numpy(), *ctx.paths)
-        return torch.from_numpy(passed).to(gradient.device), None
+from ..robot.shortest_paths import cheapest_ways
 
 
 def cheapest_paths(cost: torch.Tensor, begin: torch.Tensor) -> torch.Tensor:
@@ -46,48 +27,45 @@ def cheapest_paths(cost: torch.Tensor, begin: torch.Tensor) -> torch.Tensor:
     return _CheapestPaths.apply(cost, begin)
 
 
-@compiled
-def _search(cost: np.ndarray, begin: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns distances; then `[K, M * M]`: the cells from near to far, and the next cell on the path of each."""
-    num_grids, size = len(cost), cost.shape[1]
-    distance = begin.copy()
-    order = np.empty((num_grids, size * size), np.int32)
-    following = np.full((num_grids, size * size), _NONE, np.int32)
-    for k in range(num_grids):
-        here = distance[k]
-        queue = [(here[i // size, i % size], i) for i in range(size * size)]
-        heapq.heapify(queue)
-        done = np.zeros(size * size, np.bool_)
-        count = 0
-        while count < size * size:
-            near, i = heapq.heappop(queue)
-            if done[i]:
-                continue
-            done[i] = True
-            order[k, count] = i
-            count += 1
-            row, column = i // size, i % size
-            for down, right in ((-1, 0), (1, 0), (0, -1), (0, 1)):
-                r, c = row + down, column + right
-                if 0 <= r < size and 0 <= c < size:
-                    reached = near + cost[k, r, c]
-                    if reached < here[r, c]:
-                        here[r, c] = reached
-                        following[k, r * size + c] = i
-                        heapq.heappush(queue, (reached, r * size + c))
-    return distance, order, following
+class _CheapestPaths(torch.autograd.Function):
+    """The gradient of a distance is that of the costs along its path."""
+
+    @staticmethod
+    def forward(ctx: Any, cost: torch.Tensor, begin: torch.Tensor) -> torch.Tensor:
+        arrays = (values.detach().cpu().float().contiguous().numpy() for values in (cost, begin))
+        distance, *ctx.paths = _cheapest_ways(*arrays)
+        return torch.from_numpy(distance).to(cost.device)
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: torch.Tensor) -> tuple[torch.Tensor, None]:
+        (gradient,) = gradients
+        passed = _pass_back(gradient.cpu().float().contiguous().numpy(), *ctx.paths)
+        return torch.from_numpy(passed).to(gradient.device), None
 
 
 @compiled
-def _pass_back(gradient: np.ndarray, order: np.ndarray, following: np.ndarray) -> np.ndarray:
-    """Returns the gradients of costs, given those of distances."""
-    num_grids, size = len(gradient), gradient.shape[1]
-    passed = gradient.copy().reshape(num_grids, size * size)
+def _cheapest_ways(leaving: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns the parts of `Ways` of K grids, `[K, M, M]` and twice `[K, M * M]`; entering a cell costs nothing."""
+    num_grids, size = end.shape[:2]
+    cost, entering = np.empty_like(end), np.zeros_like(end[0])
+    following, order = np.empty((2, num_grids, size * size), np.int32)
     for k in range(num_grids):
-        for j in range(size * size - 1, -1, -1):
-            i = order[k, j]
-            if following[k, i] == _NONE:
-                passed[k, i] = 0.0  # the path ends here at once, and costs nothing more
+        cost[k], following[k], order[k] = cheapest_ways(entering, leaving[k], end[k])
+    return cost, following, order
+
+
+@compiled
+def _pass_back(gradient: np.ndarray, following: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """Returns the gradients `[K, M, M]` of costs, given those of distances.
+
+    `following` and `order` are `[K, M * M]` int, as in `Ways`.
+    """
+    num_grids, num_cells = order.shape
+    passed = gradient.copy().reshape(num_grids, num_cells)
+    for k in range(num_grids):
+        for cell in order[k, ::-1]:  # from far to near
+            if following[k, cell] == cell:
+                passed[k, cell] = 0.0  # the path ends here at once, and costs nothing more
             else:
-                passed[k, following[k, i]] += passed[k, i]
+                passed[k, following[k, cell]] += passed[k, cell]
     return passed.reshape(gradient.shape)

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import pathlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from importlib import resources
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 import torch
 
-from mazebench.agent import Interface
-from mazebench.maps.maze import Maze
-from mazebench.training.protocol import LearningAgent
+from mazebench.agent import Inputs, Interface
+from mazebench.tasks.spec import TaskSpec
+from mazebench.training.protocol import Learner, LearningAgent
 
+from .bounds import bounded
 from .checkpoint import check_shapes, check_size, load_agent, load_into
 from .overrides import override
 
@@ -33,20 +35,47 @@ def one_torch_thread() -> Iterator[None]:
         torch.set_num_threads(num_threads)
 
 
+_Act = TypeVar("_Act", bound=Callable[..., Any])
+
+
+def acting(act: _Act) -> _Act:
+    """Decorates `act` of an agent with a network: numbers are bounded, and PyTorch keeps no gradients in one thread."""
+
+    @functools.wraps(act)
+    def bounded_act(self: Any, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, Any]:
+        with torch.no_grad(), one_torch_thread():
+            return act(self, bounded(inputs), state, explore)
+
+    return bounded_act  # type: ignore[return-value]
+
+
 class NetworkAgent(LearningAgent):
     """An agent that acts by a network; where it explores, environment i takes random actions at Ape-X's rate i."""
 
     name: ClassVar[str]
     default_config: ClassVar[Any]  # a frozen dataclass that has num_envs, epsilon_base and epsilon_alpha
-    learner_class: ClassVar[Any]  # called with the agent, its mazes and a seed
+    learner_class: ClassVar[Any]  # called with the agent, the task to learn in and a seed
     learns_on_gpu: ClassVar[bool] = False  # whether the learner uses a GPU if there is one
     config: Any
     network: Any  # a torch.nn.Module
     trained_size: int  # M of the contexts that the network was made for
+    interface: Interface  # the environments that it acts in
 
-    def __init__(self, config: Any, context_size: int, seed: int = 0, device: str = "cpu"):
+    def __init__(
+        self, config: Any, context_size: int, seed: int = 0, device: str = "cpu", *, interface: Interface | None = None
+    ):
+        """Makes an agent with a new network.
+
+        Args:
+          config: of the type of `default_config`.
+          context_size: M of the contexts that the network is made for.
+          seed: of the network's parameters, and of exploration.
+          device: of the network.
+          interface: the environments to act in, by default mazes of M x M cells of a metre.
+        """
         self.config = config
         self.trained_size = context_size
+        self.interface = interface or Interface("local", context_size, context_size)
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             self.network = self.make_network(config, context_size).to(device)
@@ -80,18 +109,21 @@ class NetworkAgent(LearningAgent):
         if not cls.serves_any_size(config):
             check_size(cls.name, trained_size, interface.context_size)
         check_shapes(path, lambda: cls.make_network(config, trained_size), tensors)
-        agent = cls(config, trained_size, seed)
+        agent = cls(config, trained_size, seed, interface=interface)
         load_into(path, agent.network, tensors)
         return agent
 
     @classmethod
-    def build_learner(
-        cls, interface: Interface, mazes: Sequence[Maze], *, seed: int = 0, overrides: Mapping[str, str] | None = None
-    ) -> Any:
+    def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:
+        """Returns the number of goals of an episode, as configured."""
+        return {"num_goals": override(cls.default_config, overrides or {}).num_goals}
+
+    @classmethod
+    def build_learner(cls, task: TaskSpec, *, seed: int = 0, overrides: Mapping[str, str] | None = None) -> Learner:
         """Returns a learner for an agent of this class."""
         config = override(cls.default_config, overrides or {})
         device = "cuda" if cls.learns_on_gpu and torch.cuda.is_available() else "cpu"
-        return cls.learner_class(cls(config, interface.context_size, seed, device), tuple(mazes), seed)
+        return cls.learner_class(cls(config, task.context_size, seed, device), task, seed)
 
     def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
         """Begins a new stream of exploration, as the environments from `first_env` on of the learner's.

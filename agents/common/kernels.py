@@ -2,7 +2,7 @@
 
 Numba notices when a kernel's file changes, but not when a module does that the kernel uses. So the kernels of a file
 are kept in a folder that is named after the contents of the file and of the modules of this package that it uses, and
-after the numbers that these have from elsewhere.
+after the numbers that these hold, imported ones too.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import multiprocessing
 import os
 import pathlib
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -22,7 +23,7 @@ import numba
 import numpy as np
 from numba.core.event import Listener, register
 
-from mazebench.errors import remark
+from mazebench.errors import Remark
 
 
 class _Announcement(Listener):
@@ -32,7 +33,11 @@ class _Announcement(Listener):
 
     def on_start(self, event):
         if self.is_due:
-            remark("compiling the agent's kernels, which numba's cache lacks; this takes some seconds")
+            warnings.warn(
+                "compiling the agent's kernels, which numba's cache lacks; this takes some seconds",
+                Remark,
+                stacklevel=2,
+            )
         self.is_due = False
 
     def on_end(self, event):
@@ -79,19 +84,6 @@ def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     return compiled(function, inline=True)
 
 
-def first_class(function: Callable[..., Any], arguments: tuple[Any, ...], fused: bool = False) -> Any:
-    """Returns `function`, which has no result, as machine code that kernels may take as an argument.
-
-    The types are those of `arguments`.
-    """
-    return _first_class(function, numba.types.void(*(numba.typeof(argument) for argument in arguments)), fused)
-
-
-@functools.cache
-def _first_class(function: Callable[..., Any], signature: Any, fused: bool) -> Any:
-    return _cached(functools.partial(numba.cfunc, signature), function, **_options(fused))
-
-
 def _options(fused: bool) -> dict[str, Any]:
     return {"error_model": "numpy", "fastmath": {"contract"} if fused else False}
 
@@ -120,8 +112,9 @@ def _digest(module: str) -> str:
     for name in sorted(_used_by(module)):
         digest.update(pathlib.Path(str(sys.modules[name].__file__)).read_bytes())
         for value in vars(sys.modules[name]).values():
-            if isinstance(value, int | float | np.number | np.ndarray):  # which kernels keep as constants
-                digest.update(np.asarray(value).tobytes())
+            values = value if isinstance(value, tuple) else (value,)
+            if all(isinstance(each, int | float | np.number | np.ndarray) for each in values):  # kernels keep them
+                digest.update(b"".join(np.asarray(each).tobytes() for each in values))
     return digest.hexdigest()[:16]
 
 

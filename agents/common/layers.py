@@ -17,6 +17,8 @@ NUM_PLANES = 4
 NUM_WAVES = 16
 _FREQUENCIES = (0.25, 0.5, 1.0, 2.0)  # per metre, octaves
 PERIODS = (24.0, 12.0, 6.0, 4.0, 3.0, 2.0, 1.0)  # cells, of the waves that code a position
+DISPLACEMENT_UNIT = 5.0  # m, of displacements among the inputs of a network
+WAY_UNIT = 10.0  # cells, of ways to the goal
 NUM_PLACE = 6 + 4 * len(PERIODS)
 WIDTHS = (0.5, 2.0, 8.0, 32.0)  # square cells, of the bells that code the distance to the goal
 NUM_TO_GOAL = 2 + len(WIDTHS)
@@ -82,14 +84,14 @@ def goal_code(position: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
     """Returns `[G, K, 6]`: tens of cells from positions `[G, K, 2]` to goals `[G, 2]`, and bells of the distance."""
     to_goal = goal[:, None] - position
     bells = torch.exp(-(to_goal**2).sum(dim=-1, keepdim=True) / torch.tensor(WIDTHS, device=position.device))
-    return torch.cat([to_goal / 10, bells], dim=-1)
+    return torch.cat([to_goal / WAY_UNIT, bells], dim=-1)
 
 
 def state_features(state: torch.Tensor, origin: torch.Tensor) -> torch.Tensor:
     """Returns features `[..., 9]` of states `[..., 12]`.
 
     They are x and y since `origin` `[..., 2]` (m), the sine and cosine of yaw, three velocities, and x and y again,
-    divided by five. The other numbers of a state never vary (docs/tasks.md).
+    in units of 5 m. The other numbers of a state never vary (docs/tasks.md).
     """
     yaw = state[..., 5]
     return torch.cat(
@@ -99,7 +101,7 @@ def state_features(state: torch.Tensor, origin: torch.Tensor) -> torch.Tensor:
             torch.cos(yaw)[..., None],
             state[..., 6:8] / 3.2,
             state[..., 11:12] / 2.3,
-            (state[..., :2] - origin) / 5.0,
+            (state[..., :2] - origin) / DISPLACEMENT_UNIT,
         ],
         dim=-1,
     )

@@ -3,33 +3,39 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
 import pydantic
 
 from mazebench.errors import InputError, unknown
+from mazebench.options import fields_of
 
 Config = TypeVar("Config")
 
 
 def override(config: Config, values: Mapping[str, Any]) -> Config:
-    """Returns `config`, a frozen dataclass, with its values replaced by `values`, each converted to its field's type.
+    """Returns `config`, of a class made by `mazebench.options.options`, with some of its values replaced.
+
+    Args:
+      config: unchanged.
+      values: by name; text is converted to the field's type.
 
     Raises:
-      InputError: if a name is unknown, or a value is not of its field's type.
+      InputError: if a name is unknown, or a value is not of its field's type or range.
     """
-    types = {field.name: field.type for field in dataclasses.fields(config)}  # type: ignore[arg-type]
-    known = {name: {"bool": bool, "int": int, "float": float, "str": str}[str(kind)] for name, kind in types.items()}
+    kind: Any = type(config)
+    fields = fields_of(kind)
     typed: dict[str, Any] = {}
     for name, value in values.items():
-        if name not in known:
-            raise unknown("config key", name, known)
+        if name not in fields:
+            raise unknown("config key", name, fields)
         try:
-            typed[name] = pydantic.TypeAdapter(known[name]).validate_python(value)
+            typed[name] = pydantic.TypeAdapter(fields[name].kind).validate_python(value)
         except pydantic.ValidationError as error:
-            raise InputError(f"config key {name!r}: expected {types[name]}, found {str(value)[:80]!r}") from error
-        if not math.isfinite(typed[name] if isinstance(typed[name], float) else 0):
-            raise InputError(f"config key {name!r}: expected a finite number, found {typed[name]}")
-    return dataclasses.replace(config, **typed)  # type: ignore[type-var]
+            expected = fields[name].kind_text
+            raise InputError(f"config key {name!r}: expected {expected}, found {str(value)[:80]!r}") from error
+    try:
+        return dataclasses.replace(config, **typed)  # type: ignore[type-var]
+    except InputError as error:
+        raise InputError(f"config: {error}") from error

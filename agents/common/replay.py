@@ -118,8 +118,15 @@ class _Groups(NamedTuple):
 class Replay:
     """A ring of rows for each of B environments."""
 
-    def __init__(self, num_envs: int, capacity: int, priority_exponent: float = 0.0):
-        """`capacity` is the number of rows of all environments together."""
+    def __init__(self, num_envs: int, capacity: int, priority_exponent: float = 0.0, *, map_size: int = 0):
+        """Makes an empty replay.
+
+        Args:
+          num_envs: B.
+          capacity: the number of rows of all environments together.
+          priority_exponent: of the errors in the priorities (Schaul et al. 2016); with 0, all rows are drawn alike.
+          map_size: N, if the map that each trajectory is shown is kept, read from contexts of N x N; else 0.
+        """
         self._length = max(2, capacity // num_envs)  # rows of one environment
         self._num_envs = num_envs
         shape = (num_envs, self._length)
@@ -142,16 +149,11 @@ class Replay:
         self._current_anchor = np.zeros(num_envs, dtype=np.int64)  # the cell where its trajectory started
         self._current_anchor_origin = np.zeros((num_envs, 2), dtype=np.float32)
         self._tree = SumTree(num_envs * self._length)
-        self._map_size = 0  # N; 0 where no maps are kept
+        self._map_size = map_size
         # Bits of the maps, by trajectory; no more trajectories are stored than rows.
-        self._maps = np.zeros((num_envs, self._length, 0), dtype=np.uint8)
+        self._maps = np.zeros((num_envs, self._length, (map_size**2 + 7) // 8), dtype=np.uint8)
         self._exponent = priority_exponent
         self._largest_priority = 1.0
-
-    def keep_maps(self, size: int) -> None:
-        """Makes the empty replay keep the map that each trajectory is shown; contexts have its `size`, N x N."""
-        self._map_size = size
-        self._maps = np.zeros((self._num_envs, self._length, (size * size + 7) // 8), dtype=np.uint8)
 
     @property
     def num_rows(self) -> int:
@@ -260,7 +262,14 @@ class Replay:
         self._next[envs] += 1
 
     def sample(
-        self, num_groups: int, num_steps: int, n: int, hindsight: Hindsight, rng: np.random.Generator, beta: float = 0.0
+        self,
+        num_groups: int,
+        num_steps: int,
+        n: int,
+        *,
+        hindsight: Hindsight,
+        rng: np.random.Generator,
+        beta: float = 0.0,
     ) -> Sample:
         """Draws groups by priority and relabels a share of them with goals that were reached later in the trajectory.
 
@@ -279,20 +288,20 @@ class Replay:
         env, steps, goal = group.env[:, None], group.steps, group.goal[:, None]
         reward, discount, last = self._returns(env, steps, goal, n)
         return Sample(
-            group.row,
-            self._weights(group.row, beta),
-            group.maze,
-            group.start,
-            group.goal,
-            group.origin,
-            self._cell[env, steps].astype(np.int64),
-            self._state[env, steps],
-            self._action[env, steps].astype(np.int64),
-            reward,
-            discount,
-            self._state[env, last],
-            (self._cell[env, steps] != goal) & (last != steps),
-            self._shown_walls(group),
+            row=group.row,
+            weight=self._weights(group.row, beta),
+            maze=group.maze,
+            start=group.start,
+            goal=group.goal,
+            origin=group.origin,
+            cell=self._cell[env, steps].astype(np.int64),
+            state=self._state[env, steps],
+            action=self._action[env, steps].astype(np.int64),
+            reward=reward,
+            discount=discount,
+            next_state=self._state[env, last],
+            valid=(self._cell[env, steps] != goal) & (last != steps),
+            shown=self._shown_walls(group),
         )
 
     def sample_sequences(
@@ -300,6 +309,7 @@ class Replay:
         num_groups: int,
         num_sequences: int,
         num_steps: int,
+        *,
         hindsight: Hindsight,
         rng: np.random.Generator,
         beta: float = 0.0,
@@ -310,6 +320,8 @@ class Replay:
         `num_past` is T, of `Past`.
         """
         group = self._draw_groups(num_groups, num_sequences, hindsight, rng)
+
+        # From the first row of each sequence on, as long as its trajectory goes.
         env = group.env[:, None]
         index, going = group.steps, np.ones(group.steps.shape, dtype=bool)
         indices, exists = [index], [going]
@@ -320,20 +332,20 @@ class Replay:
             exists.append(going)
         env, steps = env[..., None], np.stack(indices, axis=-1)
         return SequenceSample(
-            group.row,
-            self._weights(group.row, beta),
-            group.maze,
-            group.start,
-            group.goal,
-            group.relabelled,
-            group.anchor,
-            group.origin,
-            self._state[env, steps],
-            self._cell[env, steps].astype(np.int64),
-            np.maximum(self._action[env, steps[..., :-1]], 0).astype(np.int64),
-            np.stack(exists, axis=-1),
-            self._shown_walls(group),
-            self._past(group, num_past),
+            row=group.row,
+            weight=self._weights(group.row, beta),
+            maze=group.maze,
+            start=group.start,
+            goal=group.goal,
+            relabelled=group.relabelled,
+            anchor=group.anchor,
+            origin=group.origin,
+            state=self._state[env, steps],
+            cell=self._cell[env, steps].astype(np.int64),
+            action=np.maximum(self._action[env, steps[..., :-1]], 0).astype(np.int64),
+            exists=np.stack(exists, axis=-1),
+            shown=self._shown_walls(group),
+            past=self._past(group, num_past),
         )
 
     def _past(self, group: _Groups, num_rows: int) -> Past:
@@ -350,13 +362,19 @@ class Replay:
         """Draws the rows of groups, and relabels a share of them."""
         row = self._tree.sample(num_groups, rng)
         env, index = np.divmod(row, self._length)
+
+        # The goal: that of the leg, or the cell that the trajectory reached some steps later.
         offset = np.minimum(rng.geometric(1 / hindsight.mean_offset, size=num_groups), hindsight.window)
         reached = self._forward(env, index, offset)
         relabelled = rng.random(num_groups) < hindsight.ratio
         goal = np.where(relabelled, self._cell[env, reached], self._goal[env, index]).astype(np.int64)
+
+        # The steps: the drawn one, and others in a window before the goal is reached, or around the drawn one.
         end = np.where(relabelled, reached, self._forward(env, index, np.full_like(index, hindsight.window // 2)))
         part = self._trajectory if hindsight.relabel_start else self._leg
         steps = self._draw_steps(env, index, end, part, num_steps, hindsight.window, rng)
+
+        # Where the context starts, and from where displacements are measured.
         start, origin = self._start[env, index].astype(np.int64), self._origin[env, index]
         if hindsight.relabel_start:
             first = self._earliest(env, index, steps)
@@ -366,8 +384,17 @@ class Replay:
         anchor = start
         if hindsight.keep_anchor:
             anchor, origin = self._anchor[env, index].astype(np.int64), self._anchor_origin[env, index]
-        maze = self._maze[env, index].astype(np.int64)
-        return _Groups(row, env, steps, maze, start, goal, relabelled, anchor, origin)
+        return _Groups(
+            row=row,
+            env=env,
+            steps=steps,
+            maze=self._maze[env, index].astype(np.int64),
+            start=start,
+            goal=goal,
+            relabelled=relabelled,
+            anchor=anchor,
+            origin=origin,
+        )
 
     def _shown_walls(self, group: _Groups) -> np.ndarray | None:
         if not self._map_size:

@@ -1,5 +1,5 @@
-"""The paper's two model-free agents."""
+"""The paper's model-free agent without context, and the Q-learning that it shares with MAH."""
 
-from .dqn import DQN, MAH, MAHPaper
+from .agent import DQN
 
-__all__ = ["DQN", "MAH", "MAHPaper"]
+__all__ = ["DQN"]

@@ -9,78 +9,83 @@ import numpy as np
 import torch
 from torch.nn import functional
 
-from mazebench.maps.maze import Maze
+from mazebench.tasks.spec import TaskSpec
 
 from ..common import symmetry
 from ..common.actor import NetworkAgent, one_torch_thread
+from ..common.descent import Descent, in_numbers
 from ..common.layers import state_features
 from ..common.learner import HindsightLearner
-from ..common.replay import Sample
 
 
 class DQNLearner(HindsightLearner):
     """Updates the Q-network of its actor."""
 
-    def __init__(self, actor: NetworkAgent, mazes: tuple[Maze, ...], seed: int):
-        optimizer = torch.optim.Adam(actor.network.parameters(), lr=actor.config.learning_rate)
-        super().__init__(actor, mazes, seed, optimizer, priority_exponent=actor.config.priority_exponent)
+    def __init__(self, actor: NetworkAgent, task: TaskSpec, seed: int):
+        config = actor.config
+        descent = Descent(
+            actor.network,
+            torch.optim.Adam(actor.network.parameters(), lr=config.learning_rate),
+            max_gradient_norm=config.max_gradient_norm,
+            target_rate=config.target_rate,
+        )
+        super().__init__(actor, task, seed, descent, priority_exponent=config.priority_exponent)
 
     @one_torch_thread()
     def update(self) -> dict[str, float]:
         """Learns from one batch; returns its losses and other scalars by name."""
-        config = self._config
-        sample = self._replay.sample(
-            config.groups, config.steps, config.n_step, self._hindsight, self._rng, config.importance_exponent
+        config, network, target_network = self.actor.config, self.actor.network, self.descent.target
+
+        # Some rows of the replay, most of their goals relabelled, as they are in the turned world.
+        sample = self.replay.sample(
+            config.groups,
+            config.steps,
+            config.n_step,
+            hindsight=self.hindsight,
+            rng=self.rng,
+            beta=config.importance_exponent,
         )
-        turned = self._draw_symmetry()
-        code, target_code = self._codes(sample, turned)
-        target = self._targets(sample, turned, code, target_code)
-        features = self._features(sample.state, sample.origin, turned)
+        turned = int(self.rng.integers(symmetry.NUM_SYMMETRIES)) if config.symmetries else 0
+        features = _turned_features(sample.state, sample.origin, turned)
+        next_features = _turned_features(sample.next_state, sample.origin, turned)
         action = torch.from_numpy(symmetry.turn_actions(np.maximum(sample.action, 0), turned))
-        q_tm1 = self.actor.network(features, code).gather(-1, action[..., None])[..., 0]
+
+        # Their contexts, encoded by both networks; none without context.
+        code = target_code = None
+        if config.use_context:
+            contexts = self.maps.contexts(sample, turned)
+            code = network.encode(contexts)
+            with torch.no_grad():
+                target_code = target_network.encode(contexts)
+
+        # Targets, clipped to the values that are possible.
+        with torch.no_grad():
+            target = double_q_target(
+                r_t=torch.from_numpy(sample.reward),
+                discount_t=torch.from_numpy(sample.discount),
+                q_t_value=target_network(next_features, target_code),
+                q_t_selector=network(next_features, code),
+            ).clamp(-config.longest_value, 0.0)
+
+        # Losses.
+        q_tm1 = network(features, code).gather(-1, action[..., None])[..., 0]
         valid = torch.from_numpy(sample.valid).float()
         weight = torch.from_numpy(sample.weight)[:, None] * valid
         td_loss = (weight * functional.smooth_l1_loss(q_tm1, target, reduction="none")).sum() / valid.sum().clamp(min=1)
         metrics = {"td_loss": td_loss, "q": q_tm1.mean()}
         loss = td_loss
         if code is not None and config.reading:
-            metrics["localization_error"] = self._localization_error(sample, turned, features, code)
+            # In cells, of the estimated positions on the map.
+            error = network.locate(features[..., :2], code) - self.maps.positions(sample.cell, turned)
+            metrics["localization_error"] = error.abs().mean()
             loss = loss + config.localization_weight * metrics["localization_error"]
-        metrics["gradient_norm"] = self._descend(loss)
+
+        metrics["gradient_norm"] = self.descent.step(loss)
+
         # The first step of a group is the row that was drawn. A row that was not learned from keeps its priority.
         seen = sample.valid[:, 0]
-        self._replay.update_priorities(sample.row[seen], (q_tm1 - target).detach().numpy()[seen, 0])
-        return {name: float(value.detach()) for name, value in metrics.items()}
-
-    def _features(self, state: np.ndarray, origin: np.ndarray, turned: int) -> torch.Tensor:
-        features = state_features(torch.from_numpy(state), torch.from_numpy(origin)[:, None])
-        return symmetry.turn_features(features, turned)
-
-    def _codes(self, sample: Sample, turned: int) -> tuple[torch.Tensor | None, torch.Tensor | None]:
-        """Returns the turned contexts of a sample, encoded by the network and by the target network."""
-        if not self._config.use_context:
-            return None, None
-        planes = self._contexts(sample, turned)
-        with torch.no_grad():
-            target_code = self._target.encode(planes)
-        return self.actor.network.encode(planes), target_code
-
-    @torch.no_grad()
-    def _targets(
-        self, sample: Sample, turned: int, code: torch.Tensor | None, target_code: torch.Tensor | None
-    ) -> torch.Tensor:
-        """Returns n-step double-Q targets `[G, K]` (van Hasselt et al. 2016), clipped to the possible values."""
-        features = self._features(sample.next_state, sample.origin, turned)
-        q_selector, q_value = self.actor.network(features, code), self._target(features, target_code)
-        reward, discount = torch.from_numpy(sample.reward), torch.from_numpy(sample.discount)
-        return double_q_target(reward, discount, q_value, q_selector).clamp(-self._config.longest_value, 0.0)
-
-    def _localization_error(
-        self, sample: Sample, turned: int, features: torch.Tensor, code: torch.Tensor
-    ) -> torch.Tensor:
-        """Returns the mean error, in cells, of the network's estimated positions on the map."""
-        true_position = self._positions(sample, turned)
-        return (self.actor.network.locate(features[..., :2], code) - true_position).abs().mean()
+        self.replay.update_priorities(sample.row[seen], (q_tm1 - target).detach().numpy()[seen, 0])
+        return in_numbers(metrics)
 
 
 def double_q_target(
@@ -96,3 +101,9 @@ def double_q_target(
     """
     best = q_t_selector.argmax(dim=-1, keepdim=True)
     return r_t + discount_t * q_t_value.gather(-1, best)[..., 0]
+
+
+def _turned_features(state: np.ndarray, origin: np.ndarray, turned: int) -> torch.Tensor:
+    """Returns features `[G, K, 9]` of states `[G, K, 12]` in the turned world."""
+    features = state_features(torch.from_numpy(state), torch.from_numpy(origin)[:, None])
+    return symmetry.turn_features(features, turned)

@@ -1,4 +1,8 @@
-"""The learner of MMN, with the targets of values and policies that its config names."""
+"""The learner of MMN: sequences with goals relabelled in hindsight, a model that is unrolled along them, and targets of
+values and policies that the config names.
+
+`G` is the number of contexts in a batch, `S` of sequences in each, `L` of steps of a sequence, so L + 1 of states.
+"""
 
 from __future__ import annotations
 
@@ -6,50 +10,85 @@ from typing import Any
 
 import torch
 
-from mazebench.maps.maze import Maze
+from mazebench.tasks.spec import TaskSpec
 
-from ..muzero.learner import MuZeroLearner
-from ..muzero.losses import Batch, Targets
-from ..muzero.network import Code, Network, Predictions, rows_of
-from ..muzero.targets import n_step_returns
+from ..common import symmetry
+from ..common.actor import one_torch_thread
+from ..common.descent import Descent, in_numbers
+from ..common.learner import HindsightLearner
+from ..muzero.batches import Batch, make_batch
+from ..muzero.lookahead import lookahead_targets
+from ..muzero.losses import unrolled_losses
+from ..muzero.network import Code, Predictions, rows_of
+from ..muzero.targets import Targets, n_step_returns
+from .config import MMNConfig
+from .network import MMNNetwork
 from .planning import plan
 
 
-class MMNLearner(MuZeroLearner):
+class MMNLearner(HindsightLearner):
     """Updates the network of its actor."""
 
-    def __init__(self, actor: Any, mazes: tuple[Maze, ...], seed: int):
-        super().__init__(actor, mazes, seed, actor.config.keep_anchor)
+    def __init__(self, actor: Any, task: TaskSpec, seed: int):
+        config = actor.config
+        groups = actor.network.parameter_groups()
+        descent = Descent(
+            actor.network,
+            torch.optim.AdamW(groups, lr=config.learning_rate, weight_decay=config.weight_decay),
+            max_gradient_norm=config.max_gradient_norm,
+            target_rate=config.target_rate,
+            constant_steps=config.constant_updates,
+        )
+        super().__init__(actor, task, seed, descent, keep_anchor=config.keep_anchor)
 
-    @torch.no_grad()
-    def _targets(self, batch: Batch) -> Targets:
-        """Returns the targets of the batch by the target network; its goals are real or relabelled."""
-        network, config = self._target, self._config
-        code = network.hypermodel(batch.context, batch.anchor)
-        latent = network.encode(batch.features.flatten(1, 2))
-        if config.value_target == "tree_backup" or config.policy_target == "lookahead":
-            value, policy = self._lookahead_targets(batch, latent, code)
-        if config.value_target == "n_step":
-            bootstrap = network.value(self._predict(network, latent, code).value_logits)
-            bootstrap = bootstrap.unflatten(1, batch.exists.shape[1:])
-            value = n_step_returns(bootstrap, batch.at_goal, batch.exists, config.n_step)
-        if config.policy_target != "lookahead":
-            policy = self._searched(batch, latent, code)
-        return Targets(value.clamp(-config.longest_value, 0.0), policy)
+    @one_torch_thread()
+    def update(self) -> dict[str, float]:
+        """Learns from one batch; returns its losses and, to judge a run early, other scalars by name."""
+        config, network = self.actor.config, self.actor.network
 
-    def _searched(self, batch: Batch, latent: torch.Tensor, code: Code) -> torch.Tensor:
-        """Returns policies `[G, S, L + 1, 6]` by search.
+        # Some sequences of the replay, most of their goals relabelled, as they are in the turned world.
+        sample = self.replay.sample_sequences(
+            config.groups, config.sequences, config.sequence_steps, hindsight=self.hindsight, rng=self.rng
+        )
+        turned = int(self.rng.integers(symmetry.NUM_SYMMETRIES)) if config.symmetries else 0
+        contexts = self.maps.contexts(sample, turned)
+        batch = make_batch(sample, maps=self.maps, turned=turned, context=contexts, device=network.support.device)
 
-        With the policy target "paper", relabelled contexts get the network's own policy instead.
-        """
-        network, config = self._target, self._config
-        policy = torch.softmax(self._predict(network, latent, code).policy_logits, dim=-1)
+        # Targets of values and policies in all states, by the target network.
+        targets = targets_of(self.descent.target, config, batch)
+
+        # Losses of the model, unrolled from some of the states.
+        losses, metrics = unrolled_losses(network, config, batch, targets)
+
+        metrics["gradient_norm"] = self.descent.step(torch.stack(list(losses.values())).sum())
+        return in_numbers(losses | metrics)
+
+
+@torch.no_grad()
+def targets_of(network: MMNNetwork, config: MMNConfig, batch: Batch) -> Targets:
+    """Returns the targets of a batch by the target network; the batch's goals are real or relabelled."""
+    code = network.hypermodel(batch.context, batch.anchor)
+    latent = network.encode(batch.features.flatten(1, 2))  # [G, S (L + 1), D]
+
+    if config.value_target == "tree_backup" or config.policy_target == "lookahead":
+        value, policy = lookahead_targets(network, config, batch, latent, code)
+
+    if config.value_target == "n_step":
+        bootstrap = network.value(_predict(network, latent, code).value_logits).unflatten(1, batch.exists.shape[1:])
+        value = n_step_returns(bootstrap, batch.at_goal, batch.exists, config.n_step)
+
+    if config.policy_target != "lookahead":
+        policy = torch.softmax(_predict(network, latent, code).policy_logits, dim=-1)
+        # With the policy target "paper", relabelled contexts keep the network's own policy.
         searched = ~batch.relabelled if config.policy_target == "paper" else torch.ones_like(batch.relabelled)
         if searched.any():
             result = plan(network, config, latent[searched], rows_of(code, searched), config.num_simulations)
             weights = torch.from_numpy(result.action_weights).to(policy.device)
             policy[searched] = weights.unflatten(0, (-1, policy.shape[1]))
-        return policy.unflatten(1, batch.features.shape[1:3])
+        policy = policy.unflatten(1, batch.exists.shape[1:])
 
-    def _predict(self, network: Network, latent: torch.Tensor, code: Code) -> Predictions:
-        return network.predict(latent, network.look(latent, code), code)
+    return Targets(value.clamp(-config.longest_value, 0.0), policy)
+
+
+def _predict(network: MMNNetwork, latent: torch.Tensor, code: Code) -> Predictions:
+    return network.predict(latent, network.look(latent, code), code)

@@ -9,21 +9,18 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
 import torch
 from torch import nn
 from torch.nn import functional
 
 from ..common.layers import (
+    DISPLACEMENT_UNIT,
     NUM_PLACE,
     NUM_PLANES,
     NUM_TO_GOAL,
-    PERIODS,
-    WIDTHS,
     MapEncoder,
     goal_code,
     place_code,
-    steepness,
 )
 from ..muzero.network import (
     NUM_ACTIONS,
@@ -39,9 +36,6 @@ from ..muzero.network import (
     moved_by,
 )
 from ..muzero.reading import read
-from .compiled import mmn as compiled
-from .compiled.model import CompiledModel
-from .compiled.parts import Contexts, heads_of
 from .config import MMNConfig
 
 _CHANNELS = 24  # of the map's convolutions
@@ -62,12 +56,17 @@ class Code(NamedTuple):
 
 
 class MMNNetwork(Network):
-    """Has a transition of one hidden layer, all of whose weights are generated."""
+    """Has a transition of one hidden layer, all of whose weights are generated.
+
+    It learns, and on a GPU it acts. On a CPU, searches use `kernel_model.py`, which computes the same: a change of what
+    acts is made in both.
+    """
 
     hypermodel: Hypermodel
 
     def __init__(self, config: MMNConfig, context_size: int):
         super().__init__(config)
+        self.hidden_size = config.hidden
         self._size = context_size
         num_inputs = NUM_BODY + config.latent + NUM_PLACE
         self._shapes = _weight_shapes(num_inputs, config.hidden, NUM_CHANGES + config.latent)
@@ -105,9 +104,16 @@ class MMNNetwork(Network):
         seen = read(position, table, self.hypermodel.sharpness)
         return torch.cat([place_code(position, code.positions, self._size), seen], dim=-1)
 
+    def generated(self, code: Code) -> dict[str, torch.Tensor]:
+        """Returns the transition's weights by name, each `[G, rows, columns]`, but for the rows of cells."""
+        parts = code.weights.split([rows * columns for rows, columns in self._shapes.values()], dim=-1)
+        return {
+            name: part.unflatten(-1, shape) for (name, shape), part in zip(self._shapes.items(), parts, strict=True)
+        }
+
     def first_layer(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
         """Returns the layer with generated weights."""
-        weights = self._weights(code)
+        weights = self.generated(code)
         first = self._inputs(latent, seen) @ weights["inputs"] + weights["bias"]
         if code.rows.shape[-1]:
             first = first + seen[..., NUM_PLACE : NUM_PLACE + first.shape[-1]]
@@ -115,7 +121,7 @@ class MMNNetwork(Network):
 
     def step(self, latent: torch.Tensor, first: torch.Tensor, action: torch.Tensor, code: Code) -> torch.Tensor:
         """Returns the next latent states."""
-        weights = self._weights(code)
+        weights = self.generated(code)
         chosen = functional.one_hot(action, NUM_ACTIONS).to(first.dtype)
         free = (
             latent[..., NUM_POSE:NUM_BODY] @ weights["free"] + weights["free_bias"] + chosen @ weights["free_actions"]
@@ -134,32 +140,9 @@ class MMNNetwork(Network):
         out = self.heads(self.body(torch.cat([self._inputs(latent, seen), to_goal, task, features], dim=-1)))
         return Predictions(out[..., :NUM_ACTIONS], out[..., NUM_ACTIONS:-1], out[..., -1])
 
-    def compiled(self, code: Code, num_roots: int) -> CompiledModel:
-        """Returns the model as kernels, with the weights as they are now."""
-        table = torch.cat([code.rows, code.features], dim=-1)
-        model = compiled.MMNModel(
-            Contexts(code.positions.numpy(), table.numpy(), num_roots),
-            self.num_bins,
-            self.scale.detach().numpy(),
-            steepness(self.hypermodel.sharpness.detach()).reshape(1).numpy(),
-            np.array(PERIODS, np.float32),
-            np.array(WIDTHS, np.float32),
-            compiled.Generated(**{name: part.contiguous().numpy() for name, part in self._weights(code).items()}),
-            code.task.numpy(),
-            heads_of(self.body, self.heads),
-        )
-        return CompiledModel(model, self._shapes["bias"][1], compiled.step, compiled.arrive)
-
     def _inputs(self, latent: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
         """Returns `[G, K, D + 34]`: the latent state, with 5 m as the unit of the displacement, and the places."""
-        return torch.cat([latent[..., 2:], latent[..., :2] / 5, seen[..., :NUM_PLACE]], dim=-1)
-
-    def _weights(self, code: Code) -> dict[str, torch.Tensor]:
-        """Returns the generated weights by name, each `[G, rows, columns]`."""
-        parts = code.weights.split([rows * columns for rows, columns in self._shapes.values()], dim=-1)
-        return {
-            name: part.unflatten(-1, shape) for (name, shape), part in zip(self._shapes.items(), parts, strict=True)
-        }
+        return torch.cat([latent[..., 2:], latent[..., :2] / DISPLACEMENT_UNIT, seen[..., :NUM_PLACE]], dim=-1)
 
 
 class Hypermodel(nn.Module):

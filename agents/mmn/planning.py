@@ -10,8 +10,10 @@ import torch
 
 from ..muzero.lookahead import outcome
 from ..muzero.network import NUM_ACTIONS, Code, Predictions
-from ..muzero.search import Evaluation, Model, Root, SearchResult, gumbel_muzero_policy, muzero_policy
+from ..muzero.search import RecurrentFn, Root, SearchResult, gumbel_muzero_policy, muzero_policy
+from ..muzero.tree import Evaluation
 from .config import MMNConfig
+from .kernel_model import kernel_model
 from .network import MMNNetwork
 
 _DIRICHLET_ALPHA = 0.3  # MuZero's, in its board games with the fewest actions
@@ -59,40 +61,32 @@ def plan(
     )
 
 
-def kernel_model(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple[Root, Model]:
-    """Returns roots and model of a search from latent states `[G, K, D]` on the CPU."""
-    model = network.compiled(code, latent.shape[1])
-    return model.root(latent.flatten(0, 1)), model
+def torch_model(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple[Root, RecurrentFn]:
+    """Returns roots and model of a search from latent states `[G, K, D]` on any device."""
+    shape, sizes = latent.shape[:2], [network.latent_size, network.hidden_size]
 
+    def arrive(latent: torch.Tensor) -> tuple[Predictions, torch.Tensor]:
+        """Returns predictions for latent states, and embeddings `[B, D + H]`: states and first layers."""
+        seen = network.look(latent, code)
+        embedding = torch.cat([latent, network.first_layer(latent, seen, code)], dim=-1)
+        return network.predict(latent, seen, code), embedding.flatten(0, 1)
 
-def torch_model(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple[Root, Model]:
-    """Returns roots and model of a search from latent states `[G, K, D]`."""
-    predictions, embedding = _arrive(network, latent, code)
-    value, shape = network.value(predictions.value_logits), latent.shape[:2]
-
-    def step(embedding: torch.Tensor, action: np.ndarray) -> Evaluation:
-        latent, first = embedding.unflatten(0, shape).split(
-            [network.latent_size, embedding.shape[-1] - network.latent_size], dim=-1
-        )
+    def step(embedding: torch.Tensor, action: np.ndarray) -> tuple[Evaluation, torch.Tensor]:
+        latent, first = embedding.unflatten(0, shape).split(sizes, dim=-1)
         chosen = torch.from_numpy(action).to(embedding.device).unflatten(0, shape)
-        predictions, after = _arrive(network, network.step(latent, first, chosen, code), code)
+        predictions, after = arrive(network.step(latent, first, chosen, code))
         reward, discount = outcome(predictions)
         value = network.value(predictions.value_logits)
-        scalars = torch.stack([reward, discount, value], dim=-1)
-        numbers = _array(
-            torch.cat([scalars, predictions.policy_logits], dim=-1).flatten(0, 1)
-        )  # [B, 9], copied at once
-        return Evaluation(numbers[:, 0], numbers[:, 1], numbers[:, 3:], numbers[:, 2], after)
+        return Evaluation(*_arrays(reward, discount, predictions.policy_logits, value)), after
 
-    return Root(_array(predictions.policy_logits.flatten(0, 1)), _array(value.flatten()), embedding), step
+    predictions, embedding = arrive(latent)
+    prior_logits, value = _arrays(predictions.policy_logits, network.value(predictions.value_logits))
+    return Root(prior_logits, value, embedding), step
 
 
-def _arrive(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple[Predictions, torch.Tensor]:
-    """Returns predictions for latent states, and embeddings `[B, D + H]`: states and first layers."""
-    seen = network.look(latent, code)
-    embedding = torch.cat([latent, network.first_layer(latent, seen, code)], dim=-1)
-    return network.predict(latent, seen, code), embedding.flatten(0, 1)
-
-
-def _array(tensor: torch.Tensor) -> np.ndarray:
-    return tensor.float().cpu().numpy()
+def _arrays(*tensors: torch.Tensor) -> list[np.ndarray]:
+    """Returns tensors `[G, K, ...]` as arrays `[B, ...]`, copied from their device at once."""
+    rows = [tensor.flatten(0, 1) for tensor in tensors]
+    copied = torch.cat([row.reshape(len(row), -1) for row in rows], dim=1).float().cpu()
+    parts = copied.split([row[0].numel() for row in rows], dim=1)
+    return [part.reshape(row.shape).contiguous().numpy() for part, row in zip(parts, rows, strict=True)]

@@ -1,1 +1,1 @@
-"""The parts of MuZero: a network with a latent model, its losses and learner, and search, which MMN alone uses."""
+"""The parts of MuZero: a network with a latent model, its targets and losses, and search, which MMN alone uses."""

@@ -6,39 +6,17 @@ root is a state from which the model is unrolled for `K` steps; `R` roots belong
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import torch
 from torch.nn import functional
 
+from .batches import Batch
 from .config import MuZeroConfig
 from .network import Code, Network, Roots
-from .targets import cross_entropy, scale_gradient, two_hot
+from .targets import Targets, cross_entropy, scale_gradient, two_hot
 
 _HIDDEN_GRADIENT = 0.5  # of an unrolled state at each step: MuZero's
 _OTHER_MAP = "model_error_other_map"
 _MOVED_WEIGHT = 2.0  # of an error of metres moved, beside one of the body's motion
-
-
-class Batch(NamedTuple):
-    """A sample as tensors, rotated or mirrored."""
-
-    context: torch.Tensor  # [G, ..., M, M], what the hypermodel reads: contexts, or beliefs
-    anchor: torch.Tensor  # [G, 2], the position (row, column) from which displacements are measured
-    maze: torch.Tensor  # [G], the index of the maze
-    relabelled: torch.Tensor  # [G] bool
-    features: torch.Tensor  # [G, S, L + 1, 9]
-    position: torch.Tensor  # [G, S, L + 1, 2], the true cell on the map (row, column)
-    action: torch.Tensor  # [G, S, L]
-    exists: torch.Tensor  # [G, S, L + 1] bool, whether the sequence goes as far without reaching the goal before
-    at_goal: torch.Tensor  # [G, S, L + 1] bool, whether the goal is reached here; later states do not exist
-
-
-class Targets(NamedTuple):
-    """The targets of the heads for the states of a batch."""
-
-    value: torch.Tensor  # [G, S, L + 1]
-    policy: torch.Tensor  # [G, S, L + 1, 6]
 
 
 class Means:

@@ -26,7 +26,7 @@ NUM_CHANGES = NUM_FREE + NUM_STOPPED
 # Contexts and states are computed as many at once, always, since PyTorch rounds differently at another batch size.
 CONTEXTS_AT_ONCE = 16  # few are new in one step
 STATES_AT_ONCE = 64
-_SCALE_RATE = 5.0  # the scale's parameters are multiplied by it, so that they are of the order of other weights
+SCALE_RATE = 5.0  # the scale's parameters are multiplied by it, so that they are of the order of other weights
 _RARE = -4.0  # logit of being in the goal, before anything is learned
 
 
@@ -133,7 +133,7 @@ class Network(nn.Module, abc.ABC):
 
     def on_map(self, moved: torch.Tensor) -> torch.Tensor:
         """Returns displacements `[..., 2]` on the map (row, column) of those in metres (x, y)."""
-        return _SCALE_RATE * (moved[..., None] * self.scale).sum(-2)
+        return SCALE_RATE * (moved[..., None] * self.scale).sum(-2)
 
     def _make_heads(self, num_inputs: int, num_outputs: int, config: MuZeroConfig) -> None:
         """Makes `body` and `heads`, whose first outputs are those of policy and value; at first they are constant."""

@@ -11,6 +11,8 @@ import torch
 
 from ..common.layers import steepness
 
+REACH = 2  # cells; those that are nearer than this, in rows and in columns, count
+
 
 def read(position: torch.Tensor, table: torch.Tensor, sharpness: torch.Tensor) -> torch.Tensor:
     """Returns rows of tables `[G, M * M, R]`, interpolated at positions (row, column) `[G, K, 2]`: `[G, K, R]`.
@@ -23,7 +25,7 @@ def read(position: torch.Tensor, table: torch.Tensor, sharpness: torch.Tensor) -
     sharpness = steepness(sharpness)
     if position.shape[1] > 1:  # one product for all positions of a map
         return _outer(_nearness(position, torch.arange(size, device=position.device), sharpness)) @ table
-    cells = position.floor()[..., None] + torch.arange(-1, 3, device=position.device)  # [G, 1, 2, 4]
+    cells = position.floor()[..., None] + torch.arange(1 - REACH, 1 + REACH, device=position.device)  # [G, 1, 2, 4]
     inside = (cells >= 0) & (cells < size)
     row, column = cells.clamp(0, size - 1).long().unbind(-2)
     index = (row[..., :, None] * size + column[..., None, :]).flatten(1)  # [G, 16]
@@ -37,7 +39,7 @@ def _nearness(
 ) -> torch.Tensor:
     """Returns soft one-hots `[G, K, 2, n]` of positions `[G, K, 2]` over n rows and columns; 0 two or more away."""
     distance = (position[..., None] - cells) ** 2
-    near = distance < 4
+    near = distance < REACH**2
     if inside is not None:
         near = near & inside
     return torch.softmax((-sharpness * distance).masked_fill(~near, -torch.inf), dim=-1)

@@ -9,16 +9,19 @@ noise.
 
 from __future__ import annotations
 
-import abc
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 
+from ..common import kernels
 from . import tree as trees
-from .tree import ROOT, Settings
+from .tree import ROOT, Evaluation, Settings
+
+_TREES_AT_ONCE = 32  # a task for a thread; what they read of their contexts stays in the processor's cache
 
 
 class Root(NamedTuple):
@@ -27,16 +30,6 @@ class Root(NamedTuple):
     prior_logits: np.ndarray  # [B, A] float32
     value: np.ndarray  # [B] float32
     embedding: torch.Tensor  # [B, D], on any device
-
-
-class Evaluation(NamedTuple):
-    """The model's predictions for one step in B states, and for the states that it leads to."""
-
-    reward: np.ndarray  # [B] float32
-    discount: np.ndarray  # [B] float32, of the value after the step; 0 where the episode ends in it
-    prior_logits: np.ndarray  # [B, A] float32
-    value: np.ndarray  # [B] float32
-    embedding: torch.Tensor  # [B, D]
 
 
 class SearchResult(NamedTuple):
@@ -49,29 +42,25 @@ class SearchResult(NamedTuple):
     value: np.ndarray  # [B] float32, the mean over the root's visits
 
 
-# Evaluates actions [B] int64 in the states of embeddings [B, D]; both are the search's, and valid during the call.
-RecurrentFn = Callable[[torch.Tensor, np.ndarray], Evaluation]
+# Evaluates actions [B] int64 in the states of embeddings [B, D], and returns the embeddings that they lead to. Its
+# arguments are the search's, and valid during the call.
+RecurrentFn = Callable[[torch.Tensor, np.ndarray], tuple[Evaluation, torch.Tensor]]
 
 
-class SearchableModel(abc.ABC):
-    """A model that runs the simulations itself."""
+class KernelModel(NamedTuple):
+    """A model that consists of kernels, which run the simulations themselves.
 
-    @abc.abstractmethod
-    def search(
-        self, tree: np.ndarray, gumbel: np.ndarray, visits: np.ndarray, settings: Settings, embedding: torch.Tensor
-    ) -> None:
-        """Runs all simulations of trees with expanded roots.
+    `search(model, first, tree, gumbel, visits, settings, embeddings)` runs those of some neighbouring roots, of which
+    `first` is the index of the first one. Their trees `[n, N]` have expanded roots; `gumbel` `[n, A]` float32 is added
+    to the scores of the roots' actions; `visits` `[N - 1]` int64 are the visits of the actions that each simulation
+    considers at the roots; `embeddings` `[n, D]` float32 are the roots'.
+    """
 
-        Args:
-          tree: `[B, N]`.
-          gumbel: `[B, A]` float32, added to the scores of the roots' actions.
-          visits: `[N - 1]` int64; in each simulation, the visits of the actions that are considered at the roots.
-          settings: of the selection.
-          embedding: `[B, D]`, of the roots.
-        """
+    search: Callable[..., None]
+    model: Any
 
 
-Model = RecurrentFn | SearchableModel
+Model = RecurrentFn | KernelModel
 
 
 def gumbel_muzero_policy(
@@ -102,8 +91,13 @@ def gumbel_muzero_policy(
     batch_size, num_actions = root.prior_logits.shape
     noise = np.empty((batch_size, num_actions), np.float32)
     noise[:] = gumbel
-    scales = np.float32(value_scale), np.float32(maxvisit_init)
-    settings = Settings(False, *scales, rescale_values, use_mixed_value)
+    settings = Settings(
+        puct=False,
+        value_scale=np.float32(value_scale),
+        maxvisit_init=np.float32(maxvisit_init),
+        rescale_values=rescale_values,
+        use_mixed_value=use_mixed_value,
+    )
     visits = considered_visits(min(max_num_considered_actions, num_actions), num_simulations)
     tree = _search(root, model, num_simulations, noise, visits, settings)
     action = np.empty(batch_size, np.int64)
@@ -142,7 +136,7 @@ def muzero_policy(
     """
     prior = (1 - dirichlet_fraction) * _softmax(root.prior_logits) + dirichlet_fraction * dirichlet_noise
     noisy_root = root._replace(prior_logits=_log(prior.astype(np.float32)))
-    settings = Settings(True, pb_c_init=np.float32(pb_c_init), pb_c_base=np.float32(pb_c_base))
+    settings = Settings(puct=True, pb_c_init=np.float32(pb_c_init), pb_c_base=np.float32(pb_c_base))
     none = np.zeros(root.prior_logits.shape, np.float32)
     tree = _search(noisy_root, model, num_simulations, none, [0] * num_simulations, settings)
     visit_counts = tree["child_visits"][:, ROOT].copy()
@@ -178,25 +172,54 @@ def considered_visits(num_considered: int, num_simulations: int) -> list[int]:
 def _search(
     root: Root, model: Model, num_simulations: int, gumbel: np.ndarray, visits: list[int], settings: Settings
 ) -> np.ndarray:
-    """Returns trees `[B, N]` after `num_simulations` simulations; `gumbel` and `visits` are `SearchableModel`'s."""
+    """Returns trees `[B, N]` after `num_simulations` simulations; `gumbel` and `visits` are as in `KernelModel`."""
     batch_size, num_actions = root.prior_logits.shape
     tree = np.empty((batch_size, num_simulations + 1), trees.node_type(num_actions))
-    numbers = np.zeros((batch_size, 3 + num_actions), np.float32)  # see tree.expand_and_backward
-    numbers[:, 2], numbers[:, 3:] = root.value, root.prior_logits
-    trees.plant(tree, numbers)
-    if isinstance(model, SearchableModel):
-        model.search(tree, gumbel, np.array(visits, np.int64), settings, root.embedding)
+    trees.plant(tree, *map(np.ascontiguousarray, (root.prior_logits, root.value)))
+    if isinstance(model, KernelModel):
+        _search_by_kernels(tree, model, gumbel, np.array(visits, np.int64), settings, root.embedding.numpy())
         return tree
     actions, parents = np.empty((2, batch_size), np.int64)
     embeddings = root.embedding.new_empty((num_simulations + 1, *root.embedding.shape))  # [N, B, D]
     embeddings[ROOT] = root.embedding
     for index in range(1, num_simulations + 1):
+        # Descend from each root to an action that was not visited yet.
         trees.simulate(tree, index, gumbel, visits[index - 1], settings, actions, parents)
+
+        # Take these actions in the model.
         rows = torch.from_numpy(parents * batch_size + np.arange(batch_size)).to(embeddings.device)
-        after = model(embeddings.flatten(0, 1).index_select(0, rows), actions)
-        numbers[:, 0], numbers[:, 1], numbers[:, 3:], numbers[:, 2], embeddings[index] = after
-        trees.expand_and_backward(tree, index, numbers)
+        parent_embeddings = embeddings.flatten(0, 1).index_select(0, rows)  # [B, D]
+        evaluation, embeddings[index] = model(parent_embeddings, actions)
+
+        # Expand the nodes that they lead to, and update the values on the paths to the roots.
+        trees.expand(tree, index, Evaluation(*map(np.ascontiguousarray, evaluation)))
+        trees.backward(tree, index)
     return tree
+
+
+def _search_by_kernels(
+    tree: np.ndarray,
+    model: KernelModel,
+    gumbel: np.ndarray,
+    visits: np.ndarray,
+    settings: Settings,
+    embeddings: np.ndarray,
+) -> None:
+    """Runs all simulations, on all cores where there are trees enough; results do not depend on their number."""
+
+    def search_from(first: int) -> None:
+        some = slice(first, first + _TREES_AT_ONCE)
+        model.search(model.model, first, tree[some], gumbel[some], visits, settings, embeddings[some])
+
+    firsts = range(0, len(tree), _TREES_AT_ONCE)
+    num_threads = min(len(firsts), kernels.num_threads())
+    if num_threads <= 1:
+        for first in firsts:
+            search_from(first)
+        return
+    with ThreadPoolExecutor(num_threads) as threads:
+        for ended in [threads.submit(search_from, first) for first in firsts]:
+            ended.result()
 
 
 def _softmax(logits: np.ndarray) -> np.ndarray:

@@ -5,8 +5,17 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import torch
 from torch.nn import functional
+
+
+class Targets(NamedTuple):
+    """The targets of the heads for the states of a batch: of S sequences in each of G contexts."""
+
+    value: torch.Tensor  # [G, S, T + 1]
+    policy: torch.Tensor  # [G, S, T + 1, 6]
 
 
 def tree_backup_returns(

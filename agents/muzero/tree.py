@@ -25,7 +25,6 @@ _ONE = np.float32(1.0)
 _MINUS_INFINITY = np.float32(-np.inf)
 _TINY = np.finfo(np.float32).tiny
 _LEAST_RANGE = np.float32(1e-8)  # of values that are rescaled to [0, 1]
-_FIRST_LOGIT = 3  # of the numbers of a node
 _LEAST_SCORE = np.float32(-1e9)  # of an action that may be visited: above that of one that may not
 
 
@@ -51,6 +50,15 @@ def node_type(num_actions: int) -> np.dtype:
     )
 
 
+class Evaluation(NamedTuple):
+    """A model's predictions for one step from B states, and for the states that it leads to."""
+
+    reward: np.ndarray  # [B] float32
+    discount: np.ndarray  # [B] float32, of the value after the step; 0 where the episode ends in it
+    prior_logits: np.ndarray  # [B, A] float32
+    value: np.ndarray  # [B] float32
+
+
 class Settings(NamedTuple):
     """How actions are selected: by Gumbel MuZero or, with `puct`, by MuZero's bounds."""
 
@@ -63,11 +71,22 @@ class Settings(NamedTuple):
     pb_c_base: np.float32 = np.float32(0.0)
 
 
+@inlined
+def empty_evaluation(batch_size: int, num_actions: int) -> Evaluation:
+    """Returns an evaluation, whose numbers are not defined yet."""
+    return Evaluation(
+        np.empty(batch_size, np.float32),
+        np.empty(batch_size, np.float32),
+        np.empty((batch_size, num_actions), np.float32),
+        np.empty(batch_size, np.float32),
+    )
+
+
 @compiled
-def plant(tree: np.ndarray, numbers: np.ndarray) -> None:
-    """Expands the roots; of `numbers` as in `expand_and_backward`, reward and discount have no meaning."""
+def plant(tree: np.ndarray, prior_logits: np.ndarray, value: np.ndarray) -> None:
+    """Expands the roots, given the logits of their policies `[B, A]` and their values `[B]`."""
     for b in range(len(tree)):
-        _expand(tree[b, ROOT], numbers[b])
+        _expand(tree[b, ROOT], prior_logits[b], value[b])
 
 
 @compiled
@@ -109,16 +128,29 @@ def simulate(
 
 
 @compiled
-def expand_and_backward(tree: np.ndarray, index: int, numbers: np.ndarray) -> None:
-    """Expands the nodes that were attached last, and updates the mean values on their paths to the roots.
-
-    `numbers` `[B, 3 + A]` are the reward and the discount of the step to a node, its value, the logits of its policy.
-    """
+def expand(tree: np.ndarray, index: int, evaluation: Evaluation) -> None:
+    """Expands the nodes that were attached last, those of this index."""
     for b in range(len(tree)):
         node = tree[b, index]
-        node.reward, node.discount = numbers[b, 0], numbers[b, 1]
-        _expand(node, numbers[b])
-        _backward(tree, b, index)
+        node.reward, node.discount = evaluation.reward[b], evaluation.discount[b]
+        _expand(node, evaluation.prior_logits[b], evaluation.value[b])
+
+
+@compiled
+def backward(tree: np.ndarray, index: int) -> None:
+    """Updates the visits, q-values and mean values on the paths from the nodes of this index to the roots."""
+    for b in range(len(tree)):
+        child, value = index, tree[b, index].value
+        while child != ROOT:
+            node = tree[b, child]
+            parent, action = tree[b, node.parent], node.parent_action
+            parent.qvalues[action] = node.reward + node.discount * node.value
+            parent.child_visits[action] += 1
+            value = node.reward + node.discount * value
+            count = np.float32(parent.visits)
+            parent.value = (parent.value * count + value) / (count + _ONE)
+            parent.visits += 1
+            child = node.parent
 
 
 @compiled
@@ -162,29 +194,14 @@ def _attach(tree: np.ndarray, b: int, index: int, parent: int, action: int) -> N
 
 
 @inlined
-def _expand(node: Any, numbers: np.ndarray) -> None:
+def _expand(node: Any, prior_logits: np.ndarray, value: np.float32) -> None:
     node.visits = 1
-    node.raw_value = node.value = numbers[_FIRST_LOGIT - 1]
+    node.raw_value = node.value = value
     for a in range(len(node.children)):
         node.children[a] = UNVISITED
         node.child_visits[a] = 0
-        node.prior_logits[a] = numbers[_FIRST_LOGIT + a]
+        node.prior_logits[a] = prior_logits[a]
     _softmax(node.prior_logits, node.prior_probs)
-
-
-@inlined
-def _backward(tree: np.ndarray, b: int, index: int) -> None:
-    value = tree[b, index].value
-    while index != ROOT:
-        node = tree[b, index]
-        parent, action = tree[b, node.parent], node.parent_action
-        parent.qvalues[action] = node.reward + node.discount * node.value
-        parent.child_visits[action] += 1
-        value = node.reward + node.discount * value
-        count = np.float32(parent.visits)
-        parent.value = (parent.value * count + value) / (count + _ONE)
-        parent.visits += 1
-        index = node.parent
 
 
 @inlined

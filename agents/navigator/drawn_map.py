@@ -92,10 +92,13 @@ class Registration:
 
         A cell is marked by the pixel in which its centre lies, or if that is a wall, by the nearest free pixel.
         """
+        # Cells whose centres are drawn near the pixel.
         mark = np.clip(np.subtract(pixel, self.corner), 0, np.subtract(self.picture.shape, 1))
         centres, deviations = self._drawn_centres()
         off = np.sqrt(((centres - mark) ** 2).sum(axis=-1))
         near = off < _FARTHEST_MARK
+
+        # Where each of their centres may be drawn, and the share of that which the pixel would mark.
         places = centres[near][:, None] + _QUANTILES * deviations[near][:, None]
         marks = self._marks(places.reshape(-1, 2)).reshape(places.shape)
         marked = _UNEXPLAINED_MARK * np.exp(-(off**2) / 2)
@@ -148,6 +151,22 @@ def register(picture: np.ndarray, size: int, anchor: tuple[Cell, np.ndarray] | N
     return min(found, key=lambda registration: registration.residual)
 
 
+class _Anchor(NamedTuple):
+    """A pixel whose point is known, up to the errors of a mark."""
+
+    pixel: int  # index among P Q
+    point: np.ndarray  # [2] float
+
+    def add_to(self, hessian: np.ndarray, gradient: np.ndarray, points: np.ndarray, basis: np.ndarray) -> None:
+        """Adds to both what is known; a Cauchy loss, in case that the mark was moved. For the rest see `_Fit`."""
+        count = basis.shape[-1]
+        for axis, off in enumerate(self.point - points.reshape(-1, 2)[self.pixel]):
+            weight = 1 / _MARKED_POINT**2 / (1 + (off / _MARK_OFF) ** 2)
+            by_parameter, own = basis[axis, self.pixel], slice(axis * count, (axis + 1) * count)
+            hessian[own, own] += weight * np.outer(by_parameter, by_parameter)
+            gradient[own] += weight * off * by_parameter
+
+
 @dataclasses.dataclass
 class _Fit:
     """A registration under way."""
@@ -161,7 +180,7 @@ class _Fit:
     covariance: np.ndarray  # [2 D + 1, 2 D + 1] float, of the parameters
     log_odds: np.ndarray  # [N, N] float, of walls
     prior: np.ndarray  # [N, N] float, log odds of walls
-    anchor: tuple[int, np.ndarray] | None  # index of a pixel among P Q, and the point in it
+    anchor: _Anchor | None
 
     @classmethod
     def begin(cls, picture: np.ndarray, prior: np.ndarray, anchor: tuple[Cell, np.ndarray] | None) -> _Fit:
@@ -170,6 +189,8 @@ class _Fit:
         `prior` is `[N, N]` float, the log odds of walls.
         """
         size = len(prior)
+
+        # The box around what is free, and two pixels more.
         free = picture < max(0.5, picture.min() + 0.1)
         extents = [np.flatnonzero(free.any(axis=1 - axis))[[0, -1]] for axis in (0, 1)]
         crops, coordinates = [], []
@@ -178,28 +199,32 @@ class _Fit:
             crops.append(crop)
             coordinates.append(1 + (crop + 0.5 - first) * (size - 2) / (last + 1 - first))
         corner = (int(crops[0][0]), int(crops[1][0]))
+        nominal = np.stack(np.meshgrid(*coordinates, indexing="ij"), axis=-1)
         basis = _basis(coordinates[0], coordinates[1], size)
+
+        # What is known of the parameters: their prior, and the anchor.
         precision = np.ones(2 * basis.shape[-1] + 1)
         precision[-1] = 1 / _THICKENING**2
-        fit = cls(
+        covariance, own_anchor = np.diag(1 / precision), None
+        if anchor is not None:
+            (row, column), point = anchor
+            own_anchor = _Anchor((row - corner[0]) * len(crops[1]) + column - corner[1], np.asarray(point))
+            hessian = np.diag(precision)
+            own_anchor.add_to(hessian, np.zeros(len(precision)), nominal, basis)
+            covariance = np.linalg.inv(hessian)
+
+        return cls(
             picture=picture[np.ix_(*crops)],
             corner=corner,
-            nominal=np.stack(np.meshgrid(*coordinates, indexing="ij"), axis=-1),
+            nominal=nominal,
             basis=basis,
             precision=precision,
             parameters=np.zeros(len(precision)),
-            covariance=np.diag(1 / precision),
+            covariance=covariance,
             log_odds=prior.copy(),
             prior=prior,
-            anchor=None,
+            anchor=own_anchor,
         )
-        if anchor is not None:
-            (row, column), point = anchor
-            fit.anchor = ((row - corner[0]) * len(crops[1]) + column - corner[1], np.asarray(point))
-            hessian = np.diag(precision)
-            fit._add_anchor(hessian, np.zeros(len(precision)), fit.points())
-            fit.covariance = np.linalg.inv(hessian)
-        return fit
 
     def run(self, schedule: _Schedule) -> Registration:
         """Returns the registration after all steps of a schedule."""
@@ -234,41 +259,33 @@ class _Fit:
 
     def _step(self, noise: float, blur: float, walls_too: bool) -> np.ndarray:
         """Improves walls and parameters; returns `[P, Q]`, the differences of picture and expectation before."""
+        # The box that each pixel covers.
         points = self.points()
         widths = widths_of_pixels(points, _WIDTHS[0])
         if blur:
             # A box as wide as one whose variance is that of the pixel's box and the point together.
             widths = np.sqrt(widths**2 + 12 * blur * self._variances())
         widths = np.minimum(widths, _WIDTHS[1])
+
+        # Walls by mean field.
         walls, thickening = special.expit(self.log_odds), float(self.parameters[-1])
         differences, slopes, deviations, evidence = compare(self.picture, points, widths, thickening, walls, noise)
         if walls_too:
             log_odds = self.log_odds + _DAMPING * (self.prior + evidence - self.log_odds)
             self.log_odds = np.clip(log_odds, -_LARGEST_LOG_ODDS, _LARGEST_LOG_ODDS)
+
+        # Parameters by Gauss-Newton.
         hessian, gradient = normal_equations(self.basis, slopes, differences, deviations)
         hessian += np.diag(self.precision)
         gradient -= self.precision * self.parameters
-        self._add_anchor(hessian, gradient, points)
+        if self.anchor is not None:
+            self.anchor.add_to(hessian, gradient, points, self.basis)
         self.covariance = np.linalg.inv(hessian)
-        self._move(self.covariance @ gradient)
-        return differences
-
-    def _add_anchor(self, hessian: np.ndarray, gradient: np.ndarray, points: np.ndarray) -> None:
-        """Adds to both what is known of the anchor; a Cauchy loss, in case that the mark was moved."""
-        if self.anchor is None:
-            return
-        pixel, point = self.anchor
-        count = self.basis.shape[-1]
-        for axis, off in enumerate(point - points.reshape(-1, 2)[pixel]):
-            weight = 1 / _MARKED_POINT**2 / (1 + (off / _MARK_OFF) ** 2)
-            basis, own = self.basis[axis, pixel], slice(axis * count, (axis + 1) * count)
-            hessian[own, own] += weight * np.outer(basis, basis)
-            gradient[own] += weight * off * basis
-
-    def _move(self, step: np.ndarray) -> None:
+        step = self.covariance @ gradient
         largest = np.abs(self._shifts(step)).max()
         self.parameters = self.parameters + step * min(1.0, _LARGEST_STEP / max(largest, 1e-9))
         self.parameters[-1] = np.clip(self.parameters[-1], -_LARGEST_THICKENING, _LARGEST_THICKENING)
+        return differences
 
 
 def _corridor_prior(size: int) -> np.ndarray:

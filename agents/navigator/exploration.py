@@ -6,7 +6,7 @@ import numpy as np
 
 from mazebench.maps.maze import Cell, cell_to_point
 
-from ..planner.observation import cell_of
+from ..robot.cells import nearest_cell
 from . import scans
 from .localization import Belief
 
@@ -26,7 +26,7 @@ def disambiguate(belief: Belief, walls: np.ndarray) -> list[Cell]:
     """
     poses, weights = belief.poses[:_POSES], belief.weights[:_POSES] / belief.weights[:_POSES].sum()
     x, y, _ = belief.pose.tolist()
-    paths = _paths_nearby(walls, cell_of(x, y, len(walls)))
+    paths = _paths_nearby(walls, nearest_cell(x, y, len(walls)))
     points = cell_to_point(np.array([path[-1] for path in paths]), len(walls))
     seen = _scans_at(walls, poses, points, belief.reach)
     is_alike = (np.abs(seen[:, None] - seen) > _TELLING).sum(axis=-1) < _TELLING_RAYS  # [H, H, P]

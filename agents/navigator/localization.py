@@ -129,13 +129,16 @@ def _poses_within(distribution: np.ndarray, frame: WallFrame) -> tuple[np.ndarra
 
 def _moved(belief: Belief, odometry: np.ndarray, frame: WallFrame) -> Belief:
     """Returns the belief with all poses moved by the odometry's step, which a scan's wall frame corrects."""
+    # The odometry's step, forward + left j in the body's frame.
     step_x, step_y, turn = (odometry - belief.odometry).tolist()
-    measured = complex(step_x, step_y) * cmath.rect(1, -belief.odometry[2])  # forward + left j, in the body's frame
+    measured = complex(step_x, step_y) * cmath.rect(1, -belief.odometry[2])
+
     # All poses agree with the wall frame, so the first one's correction is everyone's.
     x, y, yaw = belief.poses[0].tolist()
     predicted = measured * cmath.rect(belief.moved / belief.driven, yaw)
     new_x, new_y, new_yaw = _aligned(x + predicted.real, y + predicted.imag, yaw + turn, frame)
     corrected = complex(new_x - x, new_y - y) * cmath.rect(1, -yaw)
+
     steps = corrected * np.exp(1j * belief.poses[:, 2])
     yaws = wrap_angle(belief.poses[:, 2] + new_yaw - yaw)
     return belief._replace(
@@ -168,16 +171,20 @@ def _turned(frame: WallFrame, turns: int) -> WallFrame:
 
 def _weighted(belief: Belief, walls: np.ndarray, ranges: np.ndarray, goal: Cell | None) -> Belief:
     """Returns the belief with weights after a scan, the likeliest pose first, without negligible ones."""
+    # What the scan says of each pose, and that no episode goes on in the goal.
     log_likelihoods, explained = scans.score(walls, belief.poses, ranges, belief.reach)
     log_weights = _MEMORY * np.log(belief.weights) + log_likelihoods
     if goal is not None:
         from_goal = np.abs(belief.poses[:, :2] - cell_to_point(goal, len(walls))).max(axis=1)
         log_weights[from_goal < _INSIDE] -= _AT_GOAL
     log_weights -= log_weights.max()
+
+    # The first pose stays the first one unless another one is clearly likelier.
     rank = log_weights.copy()
     rank[0] += _CLEARLY
     order = np.argsort(-rank, kind="stable")
     order = order[log_weights[order] > -_NEGLIGIBLE]
+
     weights = np.exp(log_weights[order])
     return belief._replace(
         poses=belief.poses[order],
@@ -188,13 +195,15 @@ def _weighted(belief: Belief, walls: np.ndarray, ranges: np.ndarray, goal: Cell 
 
 
 def _reconsidered(belief: Belief, walls: np.ndarray, frame: WallFrame) -> Belief:
-    """Returns a belief in which the likeliest pose has half of the probability, and all others on the map the rest.
-
-    On a map without another free cell there are none, and the likeliest pose has all of it.
-    """
+    """Returns a belief in which the likeliest pose has half of the probability, and all others on the map the rest."""
     others, _ = _poses_within((~walls).astype(np.float64), frame)
+
+    # Among them is the likeliest pose itself, up to what the scan's frame corrects.
     apart = np.abs(others - belief.pose)
-    turned = np.abs(wrap_angle(apart[:, 2]))
-    others = others[(apart[:, :2].max(axis=1) > 0.5) | (turned > math.pi / 4)]
-    weights = np.array([0.5, *[0.5 / max(len(others), 1)] * len(others)])
+    elsewhere, turned = apart[:, :2].max(axis=1) > 0.5, np.abs(wrap_angle(apart[:, 2])) > math.pi / 4
+    others = others[elsewhere | turned]
+
+    # `_weighted` normalizes, so that nothing is lost where there are no others: on a map without another free cell.
+    weights = np.full(1 + len(others), 0.5)
+    weights[1:] /= max(len(others), 1)
     return belief._replace(poses=np.concatenate([belief.poses[:1], others]), weights=weights, num_poor=0)

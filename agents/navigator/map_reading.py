@@ -13,7 +13,8 @@ import numpy as np
 from mazebench.maps.maze import Cell
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, START
 
-from ..planner.observation import Point, cell_of, marked_cell
+from ..robot.body import Point
+from ..robot.cells import marked_cell, nearest_cell
 from .cell_map import wall_probability
 from .coarse_map import read_coarse_map
 from .drawn_map import register
@@ -32,7 +33,7 @@ def read_map(context: np.ndarray, size: int, start_point: Point | None = None) -
 
     `start_point` is a point (x, y) in the start cell, in cells, if one is known.
     """
-    start = None if start_point is None else cell_of(*start_point, size)
+    start = None if start_point is None else nearest_cell(*start_point, size)
     if context.shape[-1] > size:
         return _read_drawing(context, size, start)
     if context.shape[-1] < size:

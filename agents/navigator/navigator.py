@@ -12,13 +12,13 @@ from scipy import ndimage
 
 from mazebench.agent import Agent, Inputs, Interface
 from mazebench.errors import InputError
-from mazebench.maps.maze import Cell
+from mazebench.maps.maze import Cell, cell_to_point
 from mazebench.world.lidar import MAX_RANGE
 
 from ..common.bounds import bounded
-from ..planner import observation
-from ..planner.observation import Body
-from ..planner.pilot import steer
+from ..robot.body import LOOK_LEFT, Body, observed_body
+from ..robot.cells import nearest_cell
+from ..robot.pilot import steer
 from . import driving
 from .exploration import disambiguate
 from .map_reading import MapReading, read_map
@@ -45,7 +45,7 @@ class _Memory:
     @property
     def cell(self) -> Cell:
         """The cell of the body."""
-        return observation.cell_of(self.pose.body.x, self.pose.body.y, len(self.searched))
+        return nearest_cell(self.pose.body.x, self.pose.body.y, len(self.searched))
 
     def forget(self) -> None:
         """Drops what was seen, because it was seen from elsewhere than believed."""
@@ -97,7 +97,7 @@ class Navigator(Agent):
             if inputs.active is not None and not inputs.active[slot]:
                 continue
             context, ranges = inputs.observation["context"][slot], self._ray_scale * inputs.observation["lidar"][slot]
-            observed, memory = observation.observed_body(values, self._cells_per_metre), state[slot]
+            observed, memory = observed_body(values, self._cells_per_metre), state[slot]
             if memory is None or inputs.new_episode[slot]:
                 memory = state[slot] = self._begin(context, observed, ranges)
             else:
@@ -126,12 +126,12 @@ def _act(memory: _Memory, ranges: np.ndarray, cells_per_metre: float) -> int:
     walls = memory.walls = memory.occupancy.probability()
     path = _telling_path(memory) or _path_to_goal(memory)
     if not path:
-        return observation.LOOK_LEFT  # which comes to rest, and waits
-    points = np.array([observation.centre(cell, len(walls)) for cell in path])
+        return LOOK_LEFT  # which comes to rest, and waits
+    points = cell_to_point(np.array(path), len(walls))
     blocked = walls > _BLOCKED
     blocked[tuple(np.transpose(path))] = False
-    coast_x, coast_y = body.coasting()
-    aim = driving.aim(blocked, points, body.x + coast_x, body.y + coast_y, cells_per_metre)
+    rest_x, rest_y = body.rest()
+    aim = driving.aim(blocked, points, rest_x, rest_y, cells_per_metre)
     return steer(body, aim, _LARGEST_MISALIGNMENT)
 
 

@@ -14,14 +14,14 @@ import numpy as np
 
 from mazebench.world.lidar import MAX_RANGE
 
-from ..common.kernels import compiled
+from ..common.kernels import compiled, inlined
+from ..robot import rays
 
 _RAY = 6.0  # log odds that one ray adds to a cell where the pose is sure
 _LARGEST = 12.0  # log odds: two rays' worth, so that errors can be undone
 _SURE = 3.0  # log odds of evidence, from which a cell counts as seen
 _EXACT = 0.02  # ends of rays this near to a corner or grazing a cell by less are not used
 _GRAZING = 0.1  # sine of the angle between a ray and a wall, below which its end is not used
-_SMALLEST = 1e-9  # instead of a direction's component of 0
 _BINS = np.array([0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98])  # of prior probabilities, within which the map errs alike
 _PRIOR_CELLS = 3.0  # seen cells that weigh as much as the prior when the map's reliability is estimated
 _LEAST = 1e-6  # count of cells of a kind, instead of none
@@ -40,14 +40,11 @@ class Occupancy:
         """Returns the estimate before anything was seen."""
         return cls(prior, np.zeros_like(prior), reach)
 
-    def see(self, x: float, y: float, yaw: float, ranges: np.ndarray, uncertainty: float = 0.0) -> bool:
-        """Takes in the ranges `[32]` seen from a pose; returns whether a cell's evidence changed.
-
-        `uncertainty` is the standard deviation of the position.
-        """
+    def see(self, x: float, y: float, yaw: float, ranges: np.ndarray, uncertainty: float = 0.0) -> None:
+        """Takes in the ranges `[32]` seen from a pose, whose position has the standard deviation `uncertainty`."""
         margin = _EXACT + 2 * uncertainty
         log_odds = _RAY / (1 + (uncertainty / _EXACT) ** 2)
-        return trace_rays(self.evidence, x, y, yaw, ranges, self.reach, margin, log_odds)
+        _trace_rays(self.evidence, x, y, yaw, ranges, self.reach, margin, log_odds)
 
     def probability(self) -> np.ndarray:
         """Returns `[N, N]` float: the probability of a wall in each cell."""
@@ -91,7 +88,7 @@ def posterior(prior: np.ndarray, evidence: np.ndarray, bins: np.ndarray, prior_c
 
 
 @compiled
-def trace_rays(
+def _trace_rays(
     evidence: np.ndarray,
     x: float,
     y: float,
@@ -100,56 +97,41 @@ def trace_rays(
     reach: float,
     margin: float,
     log_odds: float,
-) -> bool:
-    """Adds what the rays of a scan tell to `evidence` `[N, N]`; returns whether it changed.
+) -> None:
+    """Adds what the rays of a scan tell to `evidence` `[N, N]`.
 
     `margin` is how far a ray's end may be off. What could as well belong to another cell is not used.
     """
-    changed = False
     for i in range(len(ranges)):
         angle = yaw + 2 * math.pi * i / len(ranges)
         dx, dy, length = math.cos(angle), math.sin(angle), float(ranges[i])
-        changed |= _clear(evidence, x, y, dx, dy, length, margin, log_odds)
+        _clear(evidence, x, y, dx, dy, length, margin, log_odds)
         if length < reach:
-            changed |= _mark(evidence, x + length * dx, y + length * dy, dx, dy, margin, log_odds)
-    return changed
+            _mark(evidence, x + length * dx, y + length * dy, dx, dy, margin, log_odds)
 
 
 @compiled
 def _clear(
-    evidence: np.ndarray, x: float, y: float, dx: float, dy: float, reach: float, margin: float, log_odds: float
-) -> bool:
-    """Adds that the cells along a ray are free (Amanatides & Woo 1987, A fast voxel traversal algorithm).
+    evidence: np.ndarray, x: float, y: float, dx: float, dy: float, length: float, margin: float, log_odds: float
+) -> None:
+    """Adds that the cells along a ray of some length are free.
 
     A cell is free if the middle of the part of the ray in it is at least `margin` away from the cell's edges.
     """
-    size = len(evidence)
-    changed = False
-    column, level = math.floor(x), math.floor(y)  # level: the row counted from below
-    spacing_x, spacing_y = 1 / max(abs(dx), _SMALLEST), 1 / max(abs(dy), _SMALLEST)
-    next_x = (column + 1 - x if dx > 0 else x - column) * spacing_x
-    next_y = (level + 1 - y if dy > 0 else y - level) * spacing_y
-    entered = 0.0
-    while entered < reach and 0 <= column < size and 0 <= level < size:
-        left = min(next_x, next_y, reach)
+    ray, entered = rays.ray_from(x, y, dx, dy), 0.0
+    while entered < length and rays.is_on(ray, evidence):
+        left = min(rays.leaves_at(ray), length)
         middle = (entered + left) / 2
-        depth_x, depth_y = x + middle * dx - column, y + middle * dy - level
+        depth_x, depth_y = x + middle * dx - ray.column, y + middle * dy - ray.level
         if min(depth_x, 1 - depth_x, depth_y, 1 - depth_y) >= margin:
-            changed |= _add(evidence, size - 1 - level, column, -log_odds)
-        if next_x < next_y:
-            column += 1 if dx > 0 else -1
-            next_x += spacing_x
-        else:
-            level += 1 if dy > 0 else -1
-            next_y += spacing_y
-        entered = left
-    return changed
+            _add(evidence, ray.level, ray.column, -log_odds)
+        ray, entered = rays.in_next_cell(ray), left
 
 
 @compiled
 def _mark(
     evidence: np.ndarray, end_x: float, end_y: float, dx: float, dy: float, margin: float, log_odds: float
-) -> bool:
+) -> None:
     """Adds that a ray with direction (dx, dy) ends at a wall at (end_x, end_y).
 
     Walls begin at lines of the grid, so the end must be nearer than `margin` to one of them; near a corner, where two
@@ -158,17 +140,16 @@ def _mark(
     line_x, line_y = round(end_x), round(end_y)
     at_x, at_y = abs(end_x - line_x) < margin, abs(end_y - line_y) < margin
     if at_x == at_y or abs(dx if at_x else dy) < _GRAZING:
-        return False
+        return
     column = int(line_x) - (dx < 0) if at_x else math.floor(end_x)
     level = math.floor(end_y) if at_x else int(line_y) - (dy < 0)
     size = len(evidence)
-    if not (0 <= column < size and 0 <= level < size):
-        return False
-    return _add(evidence, size - 1 - level, column, log_odds)
+    if 0 <= column < size and 0 <= level < size:
+        _add(evidence, level, column, log_odds)
 
 
-@compiled
-def _add(evidence: np.ndarray, row: int, column: int, log_odds: float) -> bool:
-    before = evidence[row, column]
-    evidence[row, column] = min(max(before + log_odds, -_LARGEST), _LARGEST)
-    return evidence[row, column] != before
+@inlined
+def _add(evidence: np.ndarray, level: int, column: int, log_odds: float) -> None:
+    """Adds log odds to a cell; `level` is its row counted from below."""
+    row = len(evidence) - 1 - level
+    evidence[row, column] = min(max(evidence[row, column] + log_odds, -_LARGEST), _LARGEST)

@@ -9,8 +9,8 @@ import numpy as np
 from mazebench.maps.maze import Cell
 from mazebench.world.lidar import MAX_RANGE
 
-from ..planner import observation
-from ..planner.observation import Body, Point
+from ..robot.body import Body, Point
+from ..robot.odometry import DeadReckoning
 from . import localization
 from .localization import Belief
 from .map_reading import MapReading
@@ -72,28 +72,11 @@ class PoseEstimate:
         # start is known.
         walls, odometry = reading.walls > 0.5, observed
         if self.dead_reckoning is not None:
-            walls, odometry = seen_walls, self.dead_reckoning.move(observed)
+            walls, odometry = seen_walls, self.dead_reckoning.update(observed)
         before = self.belief.pose
         self.belief = localization.update(self.belief, walls, _pose(odometry), ranges, _only_cell(reading.goal))
         self.body = _placed(observed, self.belief)
         return bool(np.abs(self.belief.pose - before)[:2].max() > _JUMP)
-
-
-@dataclasses.dataclass
-class DeadReckoning:
-    """A position that adds up the velocities."""
-
-    position: Point  # cells
-    velocity: Point  # cells a second, at the last observation
-
-    def move(self, observed: Body) -> Body:
-        """Moves on by the mean velocity since the last observation; returns the observed body at the position."""
-        velocity = observed.velocity()
-        (x, y), half_step = self.position, observation.STEP_TIME / 2
-        x += half_step * (self.velocity[0] + velocity[0])
-        y += half_step * (self.velocity[1] + velocity[1])
-        self.position, self.velocity = (x, y), velocity
-        return observed._replace(x=x, y=y)
 
 
 def known_position(observed: Body) -> Point | None:

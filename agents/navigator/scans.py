@@ -14,6 +14,7 @@ import numpy as np
 from mazebench.world.lidar import MAX_RANGE, NUM_RAYS
 
 from ..common.kernels import compiled, inlined
+from ..robot import rays
 
 # The heading up to quarter turns (rad), x and y within a cell in the frame with that heading; see `wall_frame`.
 WallFrame = tuple[float, float, float]
@@ -67,29 +68,14 @@ def score(
 
 @inlined
 def _cast(walls: np.ndarray, x: float, y: float, along_x: float, along_y: float, reach: float) -> tuple[float, int]:
-    """Returns how far a ray gets, and the kind of face that it ends at (Amanatides & Woo 1987).
-
-    The cell in which it begins counts as free.
-    """
-    size = len(walls)
-    column, level = math.floor(x), math.floor(y)  # level: the row counted from below
-    right, up = (1 if along_x > 0 else -1), (1 if along_y > 0 else -1)
-    # Lengths along the ray between two lines of the grid, and to the first one.
-    spacing_x, spacing_y = 1 / max(abs(along_x), 1e-12), 1 / max(abs(along_y), 1e-12)
-    next_x = (column + 1 - x if right > 0 else x - column) * spacing_x
-    next_y = (level + 1 - y if up > 0 else y - level) * spacing_y
+    """Returns how far a ray gets, and the kind of face that it ends at; the cell in which it begins counts as free."""
+    ray = rays.ray_from(x, y, along_x, along_y)
     while True:
-        if next_x < next_y:
-            distance, face = next_x, _FACE_X
-            column += right
-            next_x += spacing_x
-        else:
-            distance, face = next_y, _FACE_Y
-            level += up
-            next_y += spacing_y
-        if distance >= reach or not (0 <= column < size and 0 <= level < size):
+        distance, face = rays.leaves_at(ray), _FACE_X if rays.leaves_sideways(ray) else _FACE_Y
+        ray = rays.in_next_cell(ray)
+        if distance >= reach or not rays.is_on(ray, walls):
             return reach, _NO_FACE
-        if walls[size - 1 - level, column]:
+        if walls[len(walls) - 1 - ray.level, ray.column]:
             return distance, face
 
 

@@ -1,11 +1,17 @@
-"""What the planners on a map have in common: they know its scale."""
+"""What the planners on a map have in common: they know its scale, and plan shortest paths on it."""
 
 from __future__ import annotations
 
 import pathlib
 from typing import Self
 
+import numpy as np
+
 from mazebench.agent import Agent, Interface
+from mazebench.maps.maze import Cell, path_through_walls
+from mazebench.tasks.context import GLOBAL_MAP, GOAL
+
+from ..robot.cells import marked_cell
 
 
 class MapPlanner(Agent):
@@ -23,3 +29,8 @@ class MapPlanner(Agent):
     def context_size(cls, size: int) -> int:
         """Returns N: the map at full resolution, whose cells are waypoints."""
         return size
+
+
+def plan(context: np.ndarray, start: Cell) -> list[Cell]:
+    """Returns a shortest path from `start` to the marked goal on the map of a context `[4, M, M]`."""
+    return path_through_walls(context[GLOBAL_MAP] > 0.5, start, marked_cell(context[GOAL]))

@@ -10,8 +10,9 @@ import numpy as np
 from mazebench.agent import Agent, Inputs, Interface
 from mazebench.maps.maze import path_through_walls
 
-from . import observation
-from .pilot import Pilot
+from ..robot.body import observed_body
+from ..robot.cells import nearest_cell
+from ..robot.pilot import Pilot
 
 
 class Oracle(Agent):
@@ -40,11 +41,11 @@ class Oracle(Agent):
         for slot in np.flatnonzero(inputs.new_context).tolist():
             x, y, _ = poses[slot]
             row, column = truth.goal[slot].tolist()
-            path = path_through_walls(truth.walls[slot], observation.cell_of(x, y, size), (row, column))
+            path = path_through_walls(truth.walls[slot], nearest_cell(x, y, size), (row, column))
             state[slot] = Pilot.along(path, size, self._cells_per_metre)
         actions = np.zeros(len(state), dtype=np.int64)
         for slot, values in enumerate(inputs.observation["state"].tolist()):
             x, y, yaw = poses[slot]
-            body = observation.observed_body(values, self._cells_per_metre)
+            body = observed_body(values, self._cells_per_metre)
             actions[slot] = state[slot].action(body._replace(x=x, y=y, yaw=yaw))
         return actions, state

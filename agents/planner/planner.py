@@ -13,12 +13,12 @@ import math
 import numpy as np
 
 from mazebench.agent import Inputs
-from mazebench.maps.maze import Cell
+from mazebench.maps.maze import Cell, cell_to_point
 from mazebench.world.angles import wrap_angle
 
-from . import observation
-from .map_planner import MapPlanner
-from .observation import Body
+from ..robot.body import FORWARD, LOOK_LEFT, LOOK_RIGHT, TURN_STEP, Body, observed_body
+from ..robot.cells import nearest_cell, start_cell
+from .map_planner import MapPlanner, plan
 
 
 @dataclasses.dataclass
@@ -36,22 +36,21 @@ class _Plan:
 
     def aim(self, body: Body, size: int) -> None:
         """Sets the turns that point the body at the target from where it will come to rest."""
-        x, y = observation.centre(self.target, size)
-        coast_x, coast_y = body.coasting()
-        bearing = math.atan2(y - body.y - coast_y, x - body.x - coast_x)
-        self.turns = round(wrap_angle(bearing - body.yaw) / observation.TURN_STEP)
+        (target_x, target_y), (x, y) = cell_to_point(self.target, size), body.rest()
+        bearing = math.atan2(target_y - y, target_x - x)
+        self.turns = round(wrap_angle(bearing - body.yaw) / TURN_STEP)
 
     def action(self, body: Body, size: int) -> int:
         """Turns as aimed, drives until the observed position is in the target, then aims at the next cell."""
-        arrived = not self.turns and observation.cell_of(body.x, body.y, size) == self.target
+        arrived = not self.turns and nearest_cell(body.x, body.y, size) == self.target
         if arrived and self.next < len(self.path) - 1:
             self.next += 1
             self.aim(body, size)
         if not self.turns:
-            return observation.FORWARD
+            return FORWARD
         left = self.turns > 0
         self.turns -= 1 if left else -1
-        return observation.LOOK_LEFT if left else observation.LOOK_RIGHT
+        return LOOK_LEFT if left else LOOK_RIGHT
 
 
 class Planner(MapPlanner):
@@ -66,8 +65,8 @@ class Planner(MapPlanner):
         contexts = inputs.observation["context"]
         size = contexts.shape[-1]
         states = inputs.observation["state"].tolist()
-        bodies = [observation.observed_body(values, self._cells_per_metre) for values in states]
+        bodies = [observed_body(values, self._cells_per_metre) for values in states]
         for slot in np.flatnonzero(inputs.new_context):
-            state[slot] = _Plan(observation.plan(contexts[slot], observation.start_cell(contexts[slot])))
+            state[slot] = _Plan(plan(contexts[slot], start_cell(contexts[slot])))
             state[slot].aim(bodies[slot], size)
-        return np.array([plan.action(body, size) for plan, body in zip(state, bodies, strict=True)]), state
+        return np.array([each.action(body, size) for each, body in zip(state, bodies, strict=True)]), state

@@ -20,15 +20,15 @@ import mujoco
 import mujoco.batch
 import numpy as np
 
-from mazebench.agent import Interface
 from mazebench.agent_loading import agent_names, load_agent_class
 from mazebench.commands.table import print_table
 from mazebench.constants import ACTIONS, STEPS_PER_ACTION
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import generate
+from mazebench.tasks.build import make_spec
+from mazebench.tasks.options import TRAIN_DISTANCES
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 from mazebench.training.protocol import LearningAgent
@@ -67,7 +67,7 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
     """
     seconds, rounds = (_QUICK_SECONDS, _QUICK_ROUNDS) if quick else (_SECONDS, _ROUNDS)
     results: dict[str, Any] = {"machine": {"cores": os.cpu_count(), "mujoco": mujoco.__version__}}
-    spec = TaskSpec(mazes=load_mazes(13, "train"))
+    spec = make_spec()
     say("environments beside the bare simulation")
     results["environments"] = [
         _ratio("vector, 256 environments, all threads", 256, *_vector_pair(spec, 256, 0), seconds, rounds),
@@ -81,8 +81,6 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
     results["gymnasium"] = _gym_rows(spec, seconds * rounds)
     say("training")
     results["training"] = _training_rows(spec, seconds * rounds)
-    say("what agents measure themselves")
-    results["agents"] = _agents_tables(seconds * rounds)
     say("resets")
     results["resets"] = _resets(spec, 20 if quick else 200)
     say("pictures")
@@ -99,8 +97,8 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
 def print_tables(results: dict[str, Any]) -> None:
     """Prints what `run` returned, for people."""
     print(f"{results['machine']['cores']} cores, MuJoCo {results['machine']['mujoco']}")
-    tables = {title: results[name] for name, title in _TITLES.items()} | results["agents"]
-    for title, rows in tables.items():
+    for name, title in _TITLES.items():
+        rows = results[name]
         if not rows:  # training, where no learning agent is installed; pictures, where nothing can be rendered
             continue
         cells = [
@@ -235,15 +233,6 @@ def _training_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
     ]
 
 
-def _agents_tables(seconds: float) -> dict[str, list[dict[str, Any]]]:
-    """Returns the tables of the agents that measure themselves, by title."""
-    return {
-        f"{name}: {title}": rows
-        for name, agent_class in _installed_agents()
-        for title, rows in agent_class.measure(seconds).items()
-    }
-
-
 def _installed_agents() -> Iterator[tuple[str, Any]]:
     """Yields the names and classes of the agents whose dependencies are installed."""
     for name in agent_names():
@@ -254,19 +243,17 @@ def _installed_agents() -> Iterator[tuple[str, Any]]:
 
 
 def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -> dict[str, Any]:
-    interface = Interface("local", spec.size, spec.context_size)
+    spec = dataclasses.replace(spec, **agent_class.task_options())
     try:
-        learner = agent_class.build_learner(interface, spec.mazes, overrides={"num_envs": "256"})
+        learner = agent_class.build_learner(spec, overrides={"num_envs": "256"})
     except InputError:  # it calls its number of environments by another name, or has none
-        learner = agent_class.build_learner(interface, spec.mazes)
-    spec = dataclasses.replace(spec, **learner.task_options())
-    learner.prepare(spec)
+        learner = agent_class.build_learner(spec)
     collector = Collector(spec, learner.num_envs, seed=0)
     learner.actor.explore_from(0, learner.num_envs, seed=0)
     state = learner.actor.initial_state(learner.num_envs)
     times = {"act": 0.0, "step": 0.0, "store": 0.0}
     count = 0
-    while sum(times.values()) < seconds or not learner.num_updates_due(10**9):  # until it may learn
+    while sum(times.values()) < seconds or learner.num_rows < learner.min_rows:  # until it may learn
         marks = [time.perf_counter()]
         actions, state = learner.actor.act(collector.inputs, state, explore=True)
         marks.append(time.perf_counter())
@@ -282,8 +269,7 @@ def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -
         learner.update()
         updates += 1
     collecting = sum(times.values()) / (count * learner.num_envs)  # seconds a step
-    # One more update falls due with each so many steps, whatever their number is by now.
-    learning = elapsed / updates * (learner.num_updates_due(10**9) / 10**9)
+    learning = elapsed / updates / learner.steps_per_update
     total = collecting + learning
     return {
         "what": f"{name}, {learner.num_envs} envs",
@@ -299,7 +285,7 @@ def _resets(spec: TaskSpec, count: int) -> list[dict[str, Any]]:
     """Milliseconds a reset; models are compiled before, as after the first episodes of a run."""
     _compile(spec)
     env = MazeEnv(spec, 0)
-    one_maze = MazeEnv(TaskSpec(mazes=spec.mazes[:1]), 0)
+    one_maze = MazeEnv(dataclasses.replace(spec, mazes=spec.mazes[:1]), 0)
     envs = MazeVectorEnv(spec, 256, seed=0)
     rows = [
         ("Gymnasium, another maze", _milliseconds(lambda: env.reset(), count)),
@@ -358,7 +344,7 @@ def _milliseconds(call: Callable[[], Any], count: int) -> float:
 def _size_row(size: int, seconds: float, rounds: int) -> dict[str, Any]:
     """Returns the speed of the vector environment in mazes of `size` cells a side; the context has the default size."""
     mazes = [generate("dfs", size, np.random.default_rng([size, index])) for index in range(_MAZES_PER_SIZE)]
-    spec = TaskSpec(mazes=tuple(mazes))
+    spec = make_spec(maps=mazes, distances=TRAIN_DISTANCES)
     begin = time.perf_counter()
     _compile(spec)
     compiled = (time.perf_counter() - begin) / len(mazes)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
+import logging
 import math
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-from mazebench.training.sitting import Report, Status, in_words
+from mazebench.training.sitting import Progress, Status, in_words
 
 _SECONDS_BETWEEN_LINES = 20  # so that there are two a minute even if steps take seconds
 
@@ -75,8 +76,11 @@ def _episodes_shown(title: str) -> Iterator[Callable[[int, int], None]]:
 
 
 @contextmanager
-def training() -> Iterator[Report]:
-    """Yields a function that prints lines and shows the status: below them on a terminal, now and then elsewhere."""
+def training() -> Iterator[Progress]:
+    """Yields a function that shows the status, and prints what a training logs.
+
+    On a terminal, the status stands below these lines; elsewhere it is printed now and then.
+    """
     from rich.console import Console
     from rich.live import Live
     from rich.progress_bar import ProgressBar
@@ -85,20 +89,51 @@ def training() -> Iterator[Report]:
 
     console = Console()
     if not console.is_terminal:
-        yield StatusLines()
+        lines = StatusLines()
+        with _logged("mazebench.training", lines.say):
+            yield lines
         return
     with Live(console=console) as live:
 
-        def show(status: Status | str) -> None:
-            if isinstance(status, str):
-                live.console.print(status, markup=False, highlight=False)
-            else:
-                shown = Table.grid()
-                shown.add_row(ProgressBar(total=1.0, completed=status.share))
-                shown.add_row(Text(describe(status, datetime.datetime.now())))
-                live.update(shown)
+        def say(line: str) -> None:
+            live.console.print(line, markup=False, highlight=False)
 
-        yield show
+        def show(status: Status) -> None:
+            shown = Table.grid()
+            shown.add_row(ProgressBar(total=1.0, completed=status.share))
+            shown.add_row(Text(describe(status, datetime.datetime.now())))
+            live.update(shown)
+
+        with _logged("mazebench.training", say):
+            yield show
+
+
+@contextmanager
+def _logged(name: str, say: Callable[[str], None]) -> Iterator[None]:
+    """Gives `say` what the logger called `name` logs in the block; warnings go to standard error."""
+    logger, handler = logging.getLogger(name), _Lines(say)
+    level = logger.level
+    logger.setLevel(logging.INFO)
+    logger.addHandler(handler)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(level)
+
+
+class _Lines(logging.Handler):
+    """Gives each message to a function, but warnings to standard error."""
+
+    def __init__(self, say: Callable[[str], None]):
+        super().__init__()
+        self._say = say
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.levelno >= logging.WARNING:
+            print(f"mazebench: {record.getMessage()}", file=sys.stderr)
+        else:
+            self._say(record.getMessage())
 
 
 class StatusLines:
@@ -109,14 +144,14 @@ class StatusLines:
         self._clock = clock
         self._printed = clock()
 
-    def __call__(self, status: Status | str) -> None:
-        if isinstance(status, str):
-            self._print(status)
-        elif self._clock() >= self._printed + _SECONDS_BETWEEN_LINES:
+    def __call__(self, status: Status) -> None:
+        """Prints the status, if it is time."""
+        if self._clock() >= self._printed + _SECONDS_BETWEEN_LINES:
             now = datetime.datetime.now()
-            self._print(f"{now:%H:%M:%S} {describe(status, now)}")
+            self.say(f"{now:%H:%M:%S} {describe(status, now)}")
 
-    def _print(self, line: str) -> None:
+    def say(self, line: str) -> None:
+        """Prints a line at once."""
         print(line, flush=True)
         self._printed = self._clock()
 

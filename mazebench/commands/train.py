@@ -10,13 +10,13 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import has_camera, load_mujoco
-from mazebench.commands.options import NO_CAMERA, NO_TRACK, TRACK, refuse_ignored, takes_options
+from mazebench.commands.options import NO_CAMERA, NO_TRACK, TRACK, chosen, refuse_ignored, takes_options
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import SIZES
-from mazebench.training.options import TRAIN_CHOICES, TrainOptions
+from mazebench.training.options import FIXED, TrainOptions
 
 
-@takes_options(TrainOptions, TRAIN_CHOICES)
+@takes_options(TrainOptions, without=FIXED)
 def train(
     context: typer.Context,
     agent: Annotated[
@@ -47,7 +47,7 @@ def train(
         (values["track"] is not None, *TRACK),
         (not has_camera(values["sensors"]), *NO_CAMERA),
     )
-    options = TrainOptions(agent, overrides=tuple(map(_parse_override, overrides or [])), **values)
+    options = chosen(TrainOptions, values, agent=agent, overrides=tuple(map(_parse_override, overrides or [])))
     folder = out or pathlib.Path("runs") / _folder_name(options)
 
     def how_to_go_on() -> tuple[str, ...]:
@@ -57,13 +57,14 @@ def train(
         again = "" if options.minutes is None else f" for another {options.minutes:g} minutes"
         return (f"the checkpoint at {int(last.name):,} steps is kept in {folder}; go on{again}", "--resume")
 
-    with stopping.stoppable(how_to_go_on), progress.training() as report:
-        loop.train(options, folder, resume, report)
+    with stopping.stoppable(how_to_go_on), progress.training() as show:
+        loop.train(options, folder, resume, show)
     print(f"run in {folder}; evaluate it by: mazebench eval --agent {agent} --checkpoint {folder}")
 
 
 def _folder_name(options: TrainOptions) -> str:
-    where = options.size or SIZES[0] if options.track is None else "-".join(map(str, (options.track, *options.level)))
+    track, level = options.task.track, options.task.level
+    where = options.size or SIZES[0] if track is None else "-".join(map(str, (track, *level)))
     return f"{options.agent.replace(':', '-')}-{where}-{options.seed}"
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import itertools
-import sys
+import logging
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -27,6 +27,8 @@ except ModuleNotFoundError as error:
 _STEPS_PER_CALL = 16  # environment steps an actor takes before it answers
 _CALLS_PER_PUBLISH = 4  # answers of an actor before it gets the newest network: 64 of its steps
 _MAX_FAILURES = 20  # of actors, before the run gives up
+
+_logger = logging.getLogger("mazebench.training")
 
 
 class _Player:
@@ -127,7 +129,7 @@ class RaySource:
         self._num_failures += 1
         if self._num_failures > _MAX_FAILURES:
             raise RunError(f"{_MAX_FAILURES} Ray actors died, the last of: {str(error).splitlines()[0]}") from error
-        print(f"mazebench: Ray actor {worker} died; it is replaced", file=sys.stderr)
+        _logger.warning("Ray actor %d died; it is replaced", worker)
         self._start(worker)
 
     def __enter__(self) -> RaySource:

@@ -13,7 +13,7 @@ from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.trials import select_trials
+from mazebench.tasks.trials import draw_trials
 
 _SEED = 20_000  # of mazes that are drawn like the benchmark's, and in none of its splits
 _DISTANCES = (2, 4, 6, 8, 10)  # of a task without a track, unless others are asked for
@@ -38,7 +38,7 @@ class HeldOutEvaluation:
         streams = np.random.SeedSequence([_SEED, task.size]).spawn(num_mazes)
         mazes = [_draw_maze(plain, f"held-out-{index}", stream) for index, stream in enumerate(streams)]
         self.task = dataclasses.replace(plain, mazes=tuple(mazes))
-        self.trials = list(enumerate(select_trials("local", mazes, False, self._distances, _EPISODES)))
+        self.trials = list(enumerate(draw_trials(self.task, _EPISODES)))
 
     def success_rates(self, agent: Agent, progress: Callable[[int, int], None]) -> dict[int, float]:
         """Returns the agent's success rate by distance in cells; it acts greedily.

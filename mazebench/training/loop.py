@@ -8,6 +8,7 @@ goes on unchanged; a run that is resumed from it begins new trajectories there, 
 from __future__ import annotations
 
 import dataclasses
+import logging
 import math
 import pathlib
 import time
@@ -17,13 +18,13 @@ from typing import Any
 import numpy as np
 
 from mazebench import stopping
-from mazebench.agent import Interface
 from mazebench.agent_loading import learning_agents, load_agent_class
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.checked_agent import context_size_of
-from mazebench.options import options_of
-from mazebench.tasks.options import TaskOptions
-from mazebench.tasks.registry import make_spec
+from mazebench.maps.options import MazeOptions
+from mazebench.options import fields_of, from_names
+from mazebench.tasks.build import build_task
+from mazebench.tasks.options import TaskOptions, Variants
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.counters import BEGINNING, Counters
 from mazebench.training.experience import Experience
@@ -31,22 +32,34 @@ from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.options import TrainOptions
 from mazebench.training.protocol import Learner, LearningAgent
 from mazebench.training.run_folder import RunFolder, read_counters
-from mazebench.training.sitting import Report, Sitting, in_words
+from mazebench.training.sitting import Progress, Sitting, in_words
 from mazebench.training.sources import InProcessSource, Source
 
 # As many steps take less than a minute on two cores. They are counted, not timed, so that the same run writes the same
 # lines.
-_STEPS_BETWEEN_LINES = 5_000
+STEPS_BETWEEN_LINES = 5_000
+
+
+_logger = logging.getLogger("mazebench.training")
 
 
 class TrainingError(RunError):
     """A run can't go on; its checkpoints are intact."""
 
 
-def train(options: TrainOptions, out: pathlib.Path, resume: bool = False, report: Report = lambda status: None) -> None:
+def train(
+    options: TrainOptions, out: pathlib.Path, resume: bool = False, progress: Progress = lambda status: None
+) -> None:
     """Trains an agent in the run folder `out`; from its last checkpoint if `resume`.
 
-    Under `mazebench.stopping.listening`, the first signal saves a savepoint and ends the training.
+    The logger "mazebench.training" says what happens. Under `mazebench.stopping.listening`, the first signal saves a
+    savepoint and ends the training.
+
+    Args:
+      options: what is trained, in which task, and for how long.
+      out: the run folder.
+      resume: whether to go on from its last checkpoint.
+      progress: called with the status after each step.
 
     Raises:
       InputError: if an option is wrong, or `out` can't be used.
@@ -55,25 +68,23 @@ def train(options: TrainOptions, out: pathlib.Path, resume: bool = False, report
     agent_class = load_agent_class(options.agent)
     if not issubclass(agent_class, LearningAgent):
         raise InputError(f"agent {options.agent!r} doesn't learn; agents that do: {', '.join(learning_agents())}")
-    task = _chosen_task(options, agent_class)
-    interface = Interface(task.task, task.size, task.context_size, sensors=task.sensors)
-    learner = agent_class.build_learner(interface, task.mazes, seed=options.seed, overrides=dict(options.overrides))
-    task = _with_wishes(task, learner.task_options(), options)
-    learner.prepare(task)
-    held_out = HeldOutEvaluation(task, options.eval_mazes, options.distances)
+    overrides = dict(options.overrides)
+    task = _training_task(options, agent_class, agent_class.task_options(overrides))
+    learner = agent_class.build_learner(task, seed=options.seed, overrides=overrides)
+    held_out = HeldOutEvaluation(task, options.eval_mazes, options.task.distances)
     # The source comes first: if the cluster can't be reached, no run is begun.
-    with _open_source(options, task, learner) as source, RunFolder(out) as folder:
+    with open_source(options, task, learner) as source, RunFolder(out) as folder:
         counters = _begin_or_resume(options, folder, learner, task, resume)
         if options.env_steps is not None and counters.env_steps >= options.env_steps and counters.is_milestone:
-            report(f"{out}: the run is finished, at {counters.env_steps:,} steps")
+            _logger.info("%s: the run is finished, at %s steps", out, f"{counters.env_steps:,}")
             return
         if counters.env_steps:
-            report(f"resuming {out} at {counters.env_steps:,} steps")
+            _logger.info("resuming %s at %s steps", out, f"{counters.env_steps:,}")
         elif resume:
-            report(f"nothing to resume in {out}; starting a new run")
-        report(f"{options.agent}: {learner.description()}")
+            _logger.info("nothing to resume in %s; starting a new run", out)
+        _logger.info("%s: %s", options.agent, learner.description())
         with stopping.postponing():
-            TrainingLoop(options, folder, learner, task, source, held_out, counters, report).run()
+            TrainingLoop(options, folder, learner, task, source, held_out, counters, progress).run()
 
 
 class TrainingLoop:
@@ -88,11 +99,11 @@ class TrainingLoop:
         source: Source,
         held_out: HeldOutEvaluation,
         counters: Counters,
-        report: Report,
+        progress: Progress,
     ):
         """Goes on from the checkpoint at `counters`, with a `learner` that is as it was there."""
         self._options, self._folder, self._learner, self._task, self._source = options, folder, learner, task, source
-        self._held_out, self._report = held_out, report
+        self._held_out, self._progress = held_out, progress
         self._counters = counters
         self._sitting = Sitting(options.minutes, options.env_steps, counters)
         self._saved_steps, self._saved_time = counters.env_steps, time.monotonic()
@@ -110,12 +121,12 @@ class TrainingLoop:
         # New trajectories, so that a run that is resumed from this milestone goes on as the unbroken one did.
         source = self._source.collect(_mix(self._options.seed, self._counters.env_steps))
         while self._counters.env_steps < env_steps and not self._is_over():
-            line_steps = self._counters.logged_steps + _STEPS_BETWEEN_LINES
-            if line_steps <= self._counters.env_steps < env_steps - _STEPS_BETWEEN_LINES // 2:  # a milestone has a line
+            line_steps = self._counters.logged_steps + STEPS_BETWEEN_LINES
+            if line_steps <= self._counters.env_steps < env_steps - STEPS_BETWEEN_LINES // 2:  # a milestone has a line
                 self._folder.log(self._counters, self._counters.mean_losses())
                 self._counters = self._counters.after_line()
             self._learn_from(next(source))
-            self._report(self._sitting.status(self._counters))
+            self._progress(self._sitting.status(self._counters))
             if self._is_savepoint_due():
                 self._save()
             stopping.check()
@@ -125,7 +136,7 @@ class TrainingLoop:
         for first_env, experience in pieces:
             self._learner.observe(experience, first_env)
             self._counters = self._counters.after_steps(len(experience.action))
-        for _ in range(self._learner.num_updates_due(self._counters.env_steps) - self._counters.updates):
+        for _ in range(num_updates_due(self._learner, self._counters.env_steps) - self._counters.updates):
             self._update()
 
     def _update(self) -> None:
@@ -160,31 +171,46 @@ class TrainingLoop:
         metrics = counters.mean_losses() | {f"success_rate_{distance}": rate for distance, rate in rates.items()}
         self._folder.make_milestone(counters, metrics)
         self._counters = counters.at_milestone()
-        self._report(f"{status.summary}: {in_words(metrics)}")
+        _logger.info("%s: %s", status.summary, in_words(metrics))
 
     def _show_evaluation(self, ended: int, of: int) -> None:
         stopping.check()
-        self._report(self._sitting.status(self._counters, evaluated=(ended, of)))
+        self._progress(self._sitting.status(self._counters, evaluated=(ended, of)))
 
 
-def _chosen_task(options: TrainOptions, agent_class: type[LearningAgent]) -> TaskSpec:
-    """Returns the task of `options`, with the context size that the agent needs, before the learner's own wishes."""
-    task = make_spec(size=options.size, **options.chosen_task)
-    if task.track is not None:
-        return task
-    return dataclasses.replace(task, context_size=context_size_of(options.agent, agent_class, task.size))
+def num_updates_due(learner: Learner, env_steps: int) -> int:
+    """Returns how many updates should have been made after `env_steps` agent steps; the replay ratio is fixed.
+
+    They are one a `steps_per_update` steps after the first `min_rows`; 0 until as many rows are stored, as after a
+    resume without the replay.
+    """
+    if learner.num_rows < learner.min_rows:
+        return 0
+    return max(0, env_steps - learner.min_rows) // learner.steps_per_update
 
 
-def _with_wishes(task: TaskSpec, wishes: dict[str, Any], options: TrainOptions) -> TaskSpec:
-    """Returns `task` with the options that the learner wants, where the user chose none."""
-    wishes = {name: value for name, value in wishes.items() if name not in options.chosen_task}
-    if task.track is not None or task.pairs == "fixed":
-        wishes["num_goals"] = 1  # a track has one goal, and so has a maze with a fixed pair
-    return dataclasses.replace(task, **wishes)
+def _training_task(options: TrainOptions, agent_class: type[LearningAgent], defaults: dict[str, Any]) -> TaskSpec:
+    """Returns the task of `options`; `defaults` are the learner's, by name, for what the user left as it was."""
+    fields = fields_of(TaskOptions)
+    left = {name for name in fields if getattr(options.task, name) == fields[name].default}
+    task = dataclasses.replace(options.task, **{name: defaults[name] for name in defaults if name in left})
+    variants = {name: defaults[name] for name in defaults if name in fields_of(Variants)} | {"pairs": options.pairs}
+    if task.track is not None or options.pairs == "fixed":
+        variants["num_goals"] = 1  # a track has one goal, and so has a maze with a fixed pair
+
+    def choose_context_size(size: int) -> int:
+        return context_size_of(options.agent, agent_class, size)
+
+    mazes = MazeOptions(size=options.size)
+    return build_task(task, mazes, from_names(Variants, variants), choose_context_size=choose_context_size)
 
 
-def _open_source(options: TrainOptions, task: TaskSpec, learner: Learner) -> Source:
-    """Raises `InputError` if workers are wanted, and Ray is not installed or its cluster can't be reached."""
+def open_source(options: TrainOptions, task: TaskSpec, learner: Learner) -> Source:
+    """Returns where experience comes from: this process, or the workers of `options` on Ray.
+
+    Raises:
+      InputError: if workers are wanted, and Ray is not installed or its cluster can't be reached.
+    """
     if not options.workers:
         return InProcessSource(task, learner.actor, learner.num_envs)
     from mazebench.training.distributed import RaySource
@@ -220,7 +246,7 @@ def _save(options: TrainOptions, folder: RunFolder, learner: Learner, task: Task
 
 def _origin(options: TrainOptions, task: TaskSpec) -> dict[str, Any]:
     """Returns what is trained, and in which task."""
-    values = {name: getattr(task, name) for name in options_of(TaskOptions)}
+    values = {name: getattr(task, name) for name in (*fields_of(TaskOptions), *fields_of(Variants))}
     return {"agent": options.agent, "size": task.size, "task": values, "seed": options.seed}
 
 

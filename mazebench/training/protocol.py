@@ -6,13 +6,12 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
 
-from mazebench.agent import Agent, Interface
-from mazebench.maps.maze import Maze
+from mazebench.agent import Agent
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Experience
 
@@ -27,19 +26,31 @@ class LearningAgent(Agent):
     learns = True
 
     @classmethod
-    def build_learner(
-        cls, interface: Interface, mazes: Sequence[Maze], *, seed: int = 0, overrides: Mapping[str, str] | None = None
-    ) -> Learner:
-        """Returns a new learner.
+    def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:
+        """Returns the options of the task that a learner is to collect in, unless the user asks for others; here none.
+
+        They are fields of `TaskOptions`, but not those that choose mazes or context size: `track` and `level`.
 
         Args:
-          interface: the environments to learn in.
-          mazes: their mazes; `Experience.maze` counts them.
-          seed: of all that is drawn.
           overrides: values of the agent's config as text, by name.
 
         Raises:
           InputError: if a name or a value in `overrides` is not of the config.
+        """
+        return {}
+
+    @classmethod
+    def build_learner(cls, task: TaskSpec, *, seed: int = 0, overrides: Mapping[str, str] | None = None) -> Learner:
+        """Returns a new learner, which is ready to learn.
+
+        Args:
+          task: the task to learn in, with its mazes; `Experience.maze` counts them.
+          seed: of all that is drawn.
+          overrides: values of the agent's config as text, by name.
+
+        Raises:
+          InputError: if a name or a value in `overrides` is not of the config, or the learner can't learn in `task`:
+            because its network does not take a sensor, say, or it needs exact maps.
         """
         raise NotImplementedError
 
@@ -64,6 +75,18 @@ class Learner(Protocol):
         """B."""
 
     @property
+    def min_rows(self) -> int:
+        """The first update is made after so many agent steps, once as many rows are stored."""
+
+    @property
+    def steps_per_update(self) -> int:
+        """Agent steps from one update to the next, of all environments together; scores do not depend on speed."""
+
+    @property
+    def num_rows(self) -> int:
+        """The number of rows of experience that are stored now."""
+
+    @property
     def actor(self) -> LearningAgent:
         """The agent, which acts with what is learned so far."""
 
@@ -73,24 +96,8 @@ class Learner(Protocol):
     def description(self) -> str:
         """Returns one line for people: the size of the network and of the replay."""
 
-    def task_options(self) -> dict[str, Any]:
-        """Returns the options of the task that the learner wants to collect with, unless the user asks for others.
-
-        They are fields of `TaskOptions`, but not those that choose mazes or context size: `track` and `level`.
-        """
-
-    def prepare(self, task: TaskSpec) -> None:
-        """Prepares to learn in `task`, before the first experience.
-
-        Raises:
-          InputError: if the learner can't, because its network does not take a sensor, or it needs exact maps.
-        """
-
     def observe(self, experience: Experience, first_env: int = 0) -> None:
         """Stores one step in the environments from `first_env` on."""
-
-    def num_updates_due(self, env_steps: int) -> int:
-        """Returns how many updates should have been made after `env_steps` agent steps; the replay ratio is fixed."""
 
     def update(self) -> dict[str, float]:
         """Learns from one batch; returns losses and other scalars by name."""

@@ -37,8 +37,8 @@ class Status:
         )
 
 
-# Called with the status after each step, and now and then with a line to print.
-Report = Callable[[Status | str], None]
+# Called with the status after each step.
+Progress = Callable[[Status], None]
 
 
 def in_words(values: Mapping[str, float]) -> str:

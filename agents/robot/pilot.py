@@ -6,34 +6,35 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-from mazebench.maps.maze import Cell
+import numpy as np
+
+from mazebench.maps.maze import Cell, cell_to_point
 from mazebench.world.angles import wrap_angle
 
-from . import observation
-from .observation import Body, Point
+from .body import BACKWARD, FORWARD, LOOK_LEFT, LOOK_RIGHT, STRAFE_LEFT, STRAFE_RIGHT, Body, Point
 
 _LOOKAHEAD = 0.8  # m along the path to the point aimed at
 _SEGMENTS_AHEAD = 3  # searched for the nearest one; with more, the nearest could be one of a parallel corridor
 _LARGEST_MISALIGNMENT = math.radians(20)  # between a drive and the aim, before the body turns
 # The headings of the four drives, in the order of their actions.
 _DRIVES = (
-    (observation.FORWARD, 0.0),
-    (observation.BACKWARD, math.pi),
-    (observation.STRAFE_LEFT, math.pi / 2),
-    (observation.STRAFE_RIGHT, -math.pi / 2),
+    (FORWARD, 0.0),
+    (BACKWARD, math.pi),
+    (STRAFE_LEFT, math.pi / 2),
+    (STRAFE_RIGHT, -math.pi / 2),
 )
 
 
 def steer(body: Body, aim: Point, largest_misalignment: float = _LARGEST_MISALIGNMENT) -> int:
     """Returns the drive nearest to the direction of `aim`, or a turn if it is off by more than that angle (rad)."""
     # Aimed from where the body would come to rest: aimed from where it is, it would overshoot and turn back.
-    coast_x, coast_y = body.coasting()
-    bearing = math.atan2(aim[1] - (body.y + coast_y), aim[0] - (body.x + coast_x)) - body.yaw
+    x, y = body.rest()
+    bearing = math.atan2(aim[1] - y, aim[0] - x) - body.yaw
     drive, heading = min(_DRIVES, key=lambda drive: abs(wrap_angle(bearing - drive[1])))
     misalignment = wrap_angle(bearing - heading)
     if abs(misalignment) <= largest_misalignment:
         return drive
-    return observation.LOOK_LEFT if misalignment > 0 else observation.LOOK_RIGHT
+    return LOOK_LEFT if misalignment > 0 else LOOK_RIGHT
 
 
 @dataclasses.dataclass
@@ -47,12 +48,12 @@ class Pilot:
     @classmethod
     def along(cls, path: Sequence[Cell], size: int, cells_per_metre: float = 1.0) -> Pilot:
         """Returns a pilot at the beginning of a path of cells on a map of `size` cells a side."""
-        return cls([observation.centre(cell, size) for cell in path], cells_per_metre * _LOOKAHEAD)
+        points = [(x, y) for x, y in cell_to_point(np.array(path), size).tolist()]
+        return cls(points, cells_per_metre * _LOOKAHEAD)
 
     def action(self, body: Body) -> int:
         """Returns the drive or turn that brings the body towards the aim."""
-        coast_x, coast_y = body.coasting()
-        return steer(body, self._aim(body.x + coast_x, body.y + coast_y))
+        return steer(body, self._aim(*body.rest()))
 
     def _aim(self, x: float, y: float) -> Point:
         """Returns the point `lookahead` ahead of (x, y) on the path, or the path's end if that is nearer."""

@@ -1,0 +1,72 @@
+"""The maps of the mazes that are trained in, turned by a symmetry, as networks read them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import torch
+
+from mazebench.errors import InputError
+from mazebench.tasks.context import build_context
+from mazebench.tasks.episode import sample_episode
+from mazebench.tasks.perturbations import active_perturbations
+from mazebench.tasks.shown_map import show_map
+from mazebench.tasks.spec import TaskSpec
+
+from . import symmetry
+from .replay import Sample, SequenceSample
+
+
+class TrainingMaps:
+    """The maps of a task's mazes; a symmetry of 0 leaves them as they are. `G` is the number of a sample's groups."""
+
+    def __init__(self, task: TaskSpec):
+        self.mazes = task.mazes
+        self.size = task.size  # N
+        self._context_size = task.context_size  # M
+
+    def contexts(self, sample: Sample | SequenceSample, turned: int) -> torch.Tensor:
+        """Returns the contexts `[G, 4, M, M]` of a sample's groups, turned by the symmetry `turned`."""
+        shown = [self.mazes[maze].walls for maze in sample.maze] if sample.shown is None else sample.shown
+        contexts = [
+            build_context(walls, divmod(start, self.size), divmod(goal, self.size), self._context_size)
+            for walls, start, goal in zip(shown, sample.start.tolist(), sample.goal.tolist(), strict=True)
+        ]
+        return symmetry.turn_planes(torch.from_numpy(np.stack(contexts)), turned)
+
+    def marks(self, cell: np.ndarray, turned: int) -> torch.Tensor:
+        """Returns the positions `[G, 2]` (row, column) at which turned contexts mark the cells `[G]`."""
+        marks = np.stack(np.divmod(cell, self.size), axis=-1) * self._context_size // self.size
+        return symmetry.turn_cells(torch.from_numpy(marks).float(), self._context_size, turned)
+
+    def positions(self, cell: np.ndarray, turned: int) -> torch.Tensor:
+        """Returns the positions `[..., 2]` (row, column) of true cells `[...]` on turned contexts."""
+        cells = torch.from_numpy(np.stack(np.divmod(cell, self.size), axis=-1)).float()
+        return symmetry.turn_cells(cells, self.size, turned) * (self._context_size / self.size)
+
+
+def shows_other_maps(task: TaskSpec, agent: str) -> bool:
+    """Returns whether the maps that `task` shows may be others than those of its mazes.
+
+    Raises:
+      InputError: if the maps are drawn or lack marks, or a sensor is asked for, which the network of `agent` does not
+        read.
+    """
+    name = f"agent {agent!r}"
+    if task.track is None and task.sensors:
+        raise InputError(f"{name}: reads no sensors, found {', '.join(task.sensors)}")
+    if task.track is None and not active_perturbations(task):
+        return False
+
+    episode = sample_episode(task, np.random.default_rng(0))
+    shown = [show_map(dataclasses.replace(task, level=(level,)), episode) for level in task.level]
+    if any(each.drawing is not None or each.hidden for each in shown):
+        found = "map_warp" if task.track is None else f"track {task.track!r}"
+        raise InputError(f"{name}: learns only on maps of one pixel a cell with start and goal marked; found {found}")
+    if task.context_size != task.size:
+        raise InputError(
+            f"{name}: learns on tracks and with perturbations from contexts of the maze's size {task.size}, "
+            f"found {task.context_size}"
+        )
+    return True

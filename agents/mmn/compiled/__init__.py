@@ -1,1 +1,0 @@
-"""MMN's models as kernels, for searches on a CPU."""

@@ -1,0 +1,44 @@
+"""The body: its actions, what a state tells of it, and where it comes to rest.
+
+Lengths are in cells of the map that the context shows, positions are (x, y) with x to the right and y up.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from mazebench.constants import NUM_ACTIONS
+
+X, Y, YAW, FORWARD_VELOCITY, LEFT_VELOCITY = 0, 1, 5, 6, 7  # indices in the state
+FORWARD, BACKWARD, STRAFE_LEFT, STRAFE_RIGHT, LOOK_LEFT, LOOK_RIGHT = range(NUM_ACTIONS)
+TURN_STEP = math.radians(21.12)  # of one look action
+COASTING_TIME = 0.125  # s; a body let go at speed v comes to rest after v * COASTING_TIME metres
+
+Point = tuple[float, float]  # x, y
+
+
+class Body(NamedTuple):
+    """Where a body is, and how it moves in its own frame."""
+
+    x: float
+    y: float
+    yaw: float  # rad
+    forward: float  # cells a second
+    left: float  # cells a second
+
+    def velocity(self) -> Point:
+        """Returns the velocity (x, y) on the map, in cells a second."""
+        cosine, sine = math.cos(self.yaw), math.sin(self.yaw)
+        return cosine * self.forward - sine * self.left, sine * self.forward + cosine * self.left
+
+    def rest(self) -> Point:
+        """Returns the point (x, y) at which the body comes to rest if it is let go now."""
+        velocity_x, velocity_y = self.velocity()
+        return self.x + COASTING_TIME * velocity_x, self.y + COASTING_TIME * velocity_y
+
+
+def observed_body(state: list[float], cells_per_metre: float = 1.0) -> Body:
+    """Returns the body as a state `[12]` has it, whose x and y are taken for a place on the map."""
+    x, y, forward, left = (cells_per_metre * state[index] for index in (X, Y, FORWARD_VELOCITY, LEFT_VELOCITY))
+    return Body(x=x, y=y, yaw=state[YAW], forward=forward, left=left)

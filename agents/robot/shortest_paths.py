@@ -1,0 +1,59 @@
+"""Cheapest paths on a grid, by Dijkstra's algorithm.
+
+`N` is the number of cells on a side; cell (row, column) has the index row * N + column.
+"""
+
+from __future__ import annotations
+
+import heapq
+from typing import NamedTuple
+
+import numpy as np
+
+from ..common.kernels import compiled
+
+
+class Ways(NamedTuple):
+    """A cheapest way from each cell of a grid to an end."""
+
+    cost: np.ndarray  # [N, N] float, of the way; infinite without one
+    following: np.ndarray  # [N * N] int32, the next cell on the way; the cell itself where the way ends
+    order: np.ndarray  # [N * N] int32, the cells from near to far
+
+
+@compiled
+def cheapest_ways(entering: np.ndarray, leaving: np.ndarray, end: np.ndarray) -> Ways:
+    """Returns the cheapest ways through cells side by side.
+
+    A step costs what leaving a cell costs and what entering the next one costs. Of equal ways, the one is taken whose
+    next cell is nearer to its end, and of these the one whose next cell has the lower index.
+
+    Args:
+      entering: `[N, N]` float, the costs of entering each cell, at least 0.
+      leaving: `[N, N]` float, the costs of leaving it; one of both is more than 0.
+      end: `[N, N]` float, what it costs if the way ends in a cell; infinite where none does.
+    """
+    size = len(end)
+    least = end.copy()
+    following = np.arange(size * size).astype(np.int32)
+    order = np.empty(size * size, np.int32)
+    num_done = 0
+
+    # The search begins at the ends. What is popped is settled, so that cells come from near to far.
+    queue = [(least[cell // size, cell % size], cell) for cell in range(size * size)]
+    heapq.heapify(queue)
+    while queue:
+        near, cell = heapq.heappop(queue)
+        row, column = cell // size, cell % size
+        if near > least[row, column]:
+            continue  # a cheaper way was found after this one
+        order[num_done] = cell
+        num_done += 1
+        for down, right in ((-1, 0), (0, -1), (1, 0), (0, 1)):
+            r, c = row + down, column + right
+            if 0 <= r < size and 0 <= c < size:
+                through = near + entering[row, column] + leaving[r, c]
+                if through < least[r, c]:
+                    least[r, c], following[r * size + c] = through, cell
+                    heapq.heappush(queue, (through, r * size + c))
+    return Ways(least, following, order)
