@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import pathlib
+import warnings
 from typing import Annotated
 
 import typer
 
 from mazebench import stopping
-from mazebench.errors import InputError, remark
+from mazebench.errors import InputError, Remark
 
 
 def report(
@@ -28,26 +29,29 @@ def report(
 
     Of training runs, make figures of what they learned over their steps.
     """
-    from mazebench.report.document import DOCUMENT, PAGE, counted
-    from mazebench.report.folders import find_folders
-
     try:
+        from mazebench.report.document import DOCUMENT, PAGE, counted
         from mazebench.report.learning_curves import find_runs, write_learning_curves
         from mazebench.report.report import write_report
+        from mazebench.report.results import folders_below
     except ImportError as error:
         raise InputError(f"the report needs {error.name}, which the extra [report] installs (docs/start.md)") from error
     names = [_parse_name(text) for text in name or ()]
     runs = find_runs(results)
     with stopping.stoppable(lambda: (f"the report in {out} is not whole; make it again",)):
-        if runs and not find_folders(results, warn=lambda line: None):
+        if runs and not any(map(folders_below, results)):
             if names:
                 raise InputError("expected --name with results of `mazebench eval`, found training runs")
-            drawn = write_learning_curves(runs, out, warn=remark)
+            drawn = write_learning_curves(runs, out)
             print(f"{counted(len(drawn), 'training run')}: {out / DOCUMENT}")
             return
         if runs:
-            remark(f"{counted(len(runs), 'training run')} left out beside results; report them by themselves")
-        reported = write_report(results, out, warn=remark, names=names)
+            warnings.warn(
+                f"{counted(len(runs), 'training run')} left out beside results; report them by themselves",
+                Remark,
+                stacklevel=2,
+            )
+        reported = write_report(results, out, names)
     agents = sorted({result.label for result in reported})
     print(f"{counted(len(reported), 'result')} of {', '.join(agents)}: {out / PAGE}, {out / DOCUMENT}")
 

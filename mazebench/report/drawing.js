@@ -1,21 +1,15 @@
 "use strict";
 // What the explorer draws: maps, paths, what the range sensor measures.
 
-const POSITION_UNITS = 32; // a cell
-const YAW_UNITS = 256; // a turn
-const PLASMA = [[13, 8, 135], [126, 3, 168], [204, 71, 120], [248, 149, 64], [240, 220, 50]];
-
 function colors() {
   const style = getComputedStyle(document.documentElement);
   return (name) => style.getPropertyValue(`--${name}`).trim();
 }
 
-// On a dark floor the ramp begins brighter.
-function plasma(share) {
+// The colour of a share of the time, as in the figures. On a dark floor the ramp begins brighter.
+function timeColor(share) {
   const darkest = matchMedia("(prefers-color-scheme: dark)").matches ? 0.3 : 0;
-  const at = Math.min(darkest + (1 - darkest) * share, 0.9999) * (PLASMA.length - 1);
-  const [low, high] = [PLASMA[Math.floor(at)], PLASMA[Math.floor(at) + 1]];
-  return `rgb(${low.map((value, index) => Math.round(value + (at % 1) * (high[index] - value))).join(",")})`;
+  return data.timeColors[Math.round((darkest + (1 - darkest) * share) * (data.timeColors.length - 1))];
 }
 
 function prepare(canvas, size) {
@@ -88,8 +82,8 @@ function drawGoal(pen, cell, side, radius, color) {
 }
 
 // Where a pose lies on a canvas whose unit is a cell: there, y goes down from the upper edge of the maze.
-const placeOf = ({ x, y }, time, size) => [x[time] / POSITION_UNITS, size - y[time] / POSITION_UNITS];
-const angleOf = ({ yaw }, time) => (2 * Math.PI * yaw[time]) / YAW_UNITS; // counter-clockwise
+const placeOf = ({ x, y }, time, size) => [x[time] / data.units.position, size - y[time] / data.units.position];
+const angleOf = ({ yaw }, time) => (2 * Math.PI * yaw[time]) / data.units.yaw; // counter-clockwise
 
 // A path up to a time in the colours of time, and behind it the rest, and the body.
 function drawPath(pen, path, time, size, color) {
@@ -104,7 +98,7 @@ function drawPath(pen, path, time, size, color) {
   pen.stroke();
   pen.lineWidth = 0.14 * scale;
   for (let index = 1; index <= time; index++) {
-    pen.strokeStyle = plasma(index / Math.max(count - 1, 1));
+    pen.strokeStyle = timeColor(index / Math.max(count - 1, 1));
     pen.beginPath();
     pen.moveTo(...place(index - 1));
     pen.lineTo(...place(index));
@@ -116,7 +110,7 @@ function drawPath(pen, path, time, size, color) {
 // A disc of the body's radius and its nose; the canvas has y down, so the angle comes negated.
 function drawBody(pen, x, y, angle, scale, color) {
   pen.beginPath();
-  pen.arc(x, y, 0.15 * scale, 0, 2 * Math.PI);
+  pen.arc(x, y, data.units.body * scale, 0, 2 * Math.PI);
   pen.fillStyle = color("body");
   pen.fill();
   pen.lineWidth = 0.08 * scale;
@@ -129,7 +123,7 @@ function drawBody(pen, x, y, angle, scale, color) {
 
 // What a range sensor measures, in cells: the first ray points straight ahead, the others follow counter-clockwise.
 function rangesOf(walls, size, path, time, { rays, range }) {
-  const at = [path.x[time] / POSITION_UNITS, path.y[time] / POSITION_UNITS];
+  const at = [path.x[time] / data.units.position, path.y[time] / data.units.position];
   const angle = (ray) => angleOf(path, time) + (2 * Math.PI * ray) / rays;
   return Array.from({ length: rays }, (_, ray) => rayLength(walls, size, at, angle(ray), range));
 }

@@ -1,9 +1,7 @@
 "use strict";
 // The episode explorer. A result's episodes and paths are packed and unpacked only when picked.
 
-const STEP_SECONDS = 0.16;
 const MAX_LISTED = 2000;
-const LARGEST_DEFAULT_CONTEXT = 21; // cells a side of an agent's map, unless it asks for more
 
 const byId = (id) => document.getElementById(id);
 const inCells = (count) => `${count} ${count === 1 ? "cell" : "cells"}`;
@@ -39,33 +37,19 @@ function unpack(number) {
     const [trial, maps] = await once(trials, result.trials, () => inflate(`trials-${result.trials}`));
     const [drive, bytes] = await inflate(`drives-${number}`);
     const columns = { ...trial, ...drive };
-    columns.spl = columns.success.map((_, index) => splOf(columns, index, columns.shortest[index]));
-    columns.splGrid = columns.success.map((_, index) => splOf(columns, index, result.cellSize * columns.distance[index]));
-    const observed = result.odometry ? unpackPoses(bytes.subarray(5 * result.poses), result.poses) : null;
-    return { columns, maps, path: unpackPoses(bytes, result.poses), observed };
+    const changes = new Int16Array(bytes.slice().buffer);
+    const observed = result.odometry ? unpackPoses(changes.subarray(3 * result.poses), result.poses) : null;
+    return { columns, maps, path: unpackPoses(changes, result.poses), observed };
   });
 }
 
-function splOf(columns, index, shortest) {
-  if (!columns.success[index]) return 0;
-  return shortest > 0 ? shortest / Math.max(shortest, columns.driven[index]) : 1;
-}
-
-// Poses are differences from one to the next: a byte plane each of low and high bytes of x and y (zigzag), then yaw.
-function unpackPoses(bytes, poses) {
-  const x = new Int32Array(poses);
-  const y = new Int32Array(poses);
-  const yaw = new Uint8Array(poses);
-  const difference = (plane, index) => {
-    const value = bytes[plane * poses + index] | (bytes[(plane + 1) * poses + index] << 8);
-    return (value >>> 1) ^ -(value & 1);
+// All x, all y and all yaw, each as its change from the pose before.
+function unpackPoses(changes, poses) {
+  const sums = (axis) => {
+    let sum = 0;
+    return Int32Array.from(changes.subarray(axis * poses, (axis + 1) * poses), (change) => (sum += change));
   };
-  for (let index = 0, dx = 0, dy = 0, turn = 0; index < poses; index++) {
-    x[index] = dx += difference(0, index);
-    y[index] = dy += difference(2, index);
-    yaw[index] = turn += bytes[4 * poses + index];
-  }
-  return { x, y, yaw };
+  return { x: sums(0), y: sums(1), yaw: sums(2) };
 }
 
 function wallsOf(bytes, size) {
@@ -130,7 +114,7 @@ function shownMap({ columns, maps }, result, index, real) {
     shownStart: (columns.shownStart || columns.start)[index],
     shownGoal: (columns.shownGoal || columns.goal)[index],
     isDrawn: isTrack ? result.picture > 0 : Boolean(columns.shownStart),
-    context: isTrack || side <= LARGEST_DEFAULT_CONTEXT ? side : Math.min(result.context, side),
+    context: result.context,
   };
 }
 
@@ -265,7 +249,7 @@ function writeNumbers() {
     ["distance", inCells(current.distance)],
     ["shortest path", `${current.shortest.toFixed(2)} m`],
     ["driven", `${current.driven.toFixed(2)} m`],
-    ["time", `${current.steps} steps, ${(current.steps * STEP_SECONDS).toFixed(1)} s`],
+    ["time", `${current.steps} steps, ${(current.steps * data.units.step).toFixed(1)} s`],
     ["SPL", current.spl.toFixed(2)],
     ["SPL by grid distance", current.splGrid.toFixed(2)],
     ["seed", String(current.seed)],
@@ -413,10 +397,11 @@ function moveTo(time) {
   const { x, y, yaw } = current.path;
   view.time = Math.max(0, Math.min(x.length - 1, time));
   byId("time").value = String(view.time);
-  const metres = (value) => ((current.cellSize * value) / POSITION_UNITS).toFixed(2);
-  const degrees = ((Math.round((360 * (yaw[view.time] || 0)) / YAW_UNITS) + 180) % 360) - 180;
+  const metres = (value) => ((current.cellSize * value) / data.units.position).toFixed(2);
+  const turn = (yaw[view.time] || 0) / data.units.yaw; // counts whole turns too
+  const degrees = Math.round(360 * (turn - Math.floor(turn + 0.5)));
   const text = x.length
-    ? `step ${view.time} of ${current.steps}, ${(view.time * STEP_SECONDS).toFixed(2)} s, x ${metres(x[view.time])} y ${metres(y[view.time])} m, heading ${degrees}°`
+    ? `step ${view.time} of ${current.steps}, ${(view.time * data.units.step).toFixed(2)} s, x ${metres(x[view.time])} y ${metres(y[view.time])} m, heading ${degrees}°`
     : "no path recorded";
   byId("clock").value = text;
   byId("time").setAttribute("aria-valuetext", text);
@@ -438,7 +423,7 @@ function play() {
   const began = performance.now();
   byId("play").textContent = "Pause";
   const frame = (now) => {
-    const steps = ((now - began) / 1000 / STEP_SECONDS) * Number(byId("speed").value);
+    const steps = ((now - began) / 1000 / data.units.step) * Number(byId("speed").value);
     moveTo(from + Math.floor(Math.max(steps, 0)));
     if (view.time < view.current.path.x.length - 1) view.timer = requestAnimationFrame(frame);
     else stop();

@@ -5,19 +5,17 @@ from __future__ import annotations
 import dataclasses
 import os
 import pathlib
-from collections.abc import Iterable, Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Sequence
 from typing import Any
 
-import matplotlib as mpl
-from matplotlib.ticker import EngFormatter
-
-from mazebench.errors import InputError
+from mazebench.errors import InputError, Remark
 from mazebench.report.document import DOCUMENT, FIGURES, Picture, show_picture
-from mazebench.report.figures.style import NAME_CHARACTERS, STYLE, WIDTH, finish, new_figure, panel_grid
-from mazebench.report.folders import Warn
-from mazebench.report.looks import Look, agent_looks, wrap
+from mazebench.report.figures.draw import draw_figure
+from mazebench.report.figures.figure import Figure, Panel, Point, Series
+from mazebench.report.looks import all_looks
 from mazebench.report.report import new_report, write_text
-from mazebench.report.table_forms import escape_markdown
+from mazebench.report.table import escape_markdown
 from mazebench.storage.json_files import parse_json, read_json, read_lines
 from mazebench.training.run_folder import CHECKPOINTS, CONFIG, METRICS
 
@@ -51,35 +49,36 @@ def find_runs(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
     return list(found.values())
 
 
-def write_learning_curves(folders: Sequence[pathlib.Path], out: pathlib.Path, warn: Warn) -> list[Run]:
+def write_learning_curves(folders: Sequence[pathlib.Path], out: pathlib.Path) -> list[Run]:
     """Writes figures of all runs and a document with them to the folder `out`, and returns the runs.
+
+    It warns with a `Remark` of each run that is skipped.
 
     Args:
       folders: of training runs, at least one.
       out: an empty or new folder, or one with an earlier report, which is replaced.
-      warn: called with one line about each run that is skipped.
 
     Raises:
       InputError: if no run has logged anything, or `out` can't be used.
     """
-    runs = [run for folder, name in zip(folders, _names(folders), strict=True) if (run := _read(folder, name, warn))]
+    runs = [run for folder, name in zip(folders, _names(folders), strict=True) if (run := _read(folder, name))]
     if not runs:
         raise InputError("expected training runs with metrics, found none to report")
-    looks = agent_looks([run.name for run in runs])
+    looks = all_looks([run.name for run in runs])
     metrics = list(dict.fromkeys(metric for run in runs for line in run.lines for metric in line))
     rates = sorted((metric for metric in metrics if metric.startswith(_SUCCESS)), key=lambda rate: (len(rate), rate))
     losses = [metric for metric in metrics if metric.endswith(_LOSS)]
-    success = Picture("success", "Success rate by distance", "On held-out mazes, at each milestone.")
-    loss = Picture("losses", "Losses", f"Of the training, as {METRICS} has them.")
+    of_rates = tuple(_panel(runs, rate, f"distance {rate.removeprefix(_SUCCESS)}") for rate in rates)
+    of_losses = tuple(_panel(runs, loss, loss.replace("_", " ")) for loss in losses)
     lines = ["# Learning curves", _table(runs, rates)]
     with new_report(out):
-        for picture, panels in (
-            (success, {rate: f"distance {rate.removeprefix(_SUCCESS)}" for rate in rates}),
-            (loss, {name: name.replace("_", " ") for name in losses}),
+        for name, title, note, panels in (
+            ("success", "Success rate by distance", "On held-out mazes, at each milestone.", of_rates),
+            ("losses", "Losses", f"Of the training, as {METRICS} has them.", of_losses),
         ):
             if panels:
-                _draw(runs, looks, panels, picture, out / FIGURES / picture.name)
-                lines += [f"## {picture.title}", picture.note, show_picture(picture)]
+                draw_figure(Figure(name, title, note, panels, looks, panel_height=1.9), out / FIGURES / name)
+                lines += [f"## {title}", note, show_picture(Picture(name, title, note))]
         write_text(out / DOCUMENT, "\n\n".join(lines) + "\n")
     return runs
 
@@ -91,16 +90,16 @@ def _names(folders: Sequence[pathlib.Path]) -> list[str]:
     return [str(folder.relative_to(common)) for folder in whole]
 
 
-def _read(folder: pathlib.Path, name: str, warn: Warn) -> Run | None:
+def _read(folder: pathlib.Path, name: str) -> Run | None:
     """Returns what a run logged, but for a line that is written just now; nothing if it logged nothing yet."""
     try:
         config = read_json(folder / CONFIG)
         lines = tuple(filter(None, map(_parse, read_lines(folder / METRICS))))
     except InputError as error:
-        warn(f"{error}; skipped")
+        warnings.warn(f"{error}; skipped", Remark, stacklevel=2)
         return None
     if not lines or not isinstance(config, dict):
-        warn(f"{folder}: expected a training run with metrics, found none yet; skipped")
+        warnings.warn(f"{folder}: expected a training run with metrics, found none yet; skipped", Remark, stacklevel=2)
         return None
     return Run(name, config, lines)
 
@@ -127,26 +126,11 @@ def _table(runs: Sequence[Run], rates: Sequence[str]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in lines).rstrip()
 
 
-def _draw(
-    runs: Sequence[Run], looks: Mapping[str, Look], panels: Mapping[str, str], picture: Picture, path: pathlib.Path
-) -> None:
-    """Draws a panel for each metric, with a curve for each run."""
-    with mpl.rc_context(STYLE):
-        rows, columns = panel_grid(len(panels))
-        figure = new_figure(WIDTH, 0.2 + 1.9 * rows)
-        for index, (metric, name) in enumerate(panels.items()):
-            axes = figure.add_subplot(rows, columns, index + 1)
-            for run in runs:
-                points = [(line[_STEPS], line[metric]) for line in run.lines if metric in line]
-                look = looks[run.name]
-                style: dict[str, Any] = {"color": look.color, "marker": look.marker, "linestyle": look.dashes}
-                style |= {"markersize": 3, "linewidth": 1.2, "markevery": -(-len(points) // _MARKS) or 1}
-                axes.plot(
-                    *zip(*points, strict=True) if points else ((), ()), label=wrap(look.name, NAME_CHARACTERS), **style
-                )
-            axes.set_title(name, loc="left")
-            axes.set_xlabel("agent steps")
-            axes.xaxis.set_major_formatter(EngFormatter(sep=""))
-            if metric.startswith(_SUCCESS):
-                axes.set_ylim(-0.05, 1.05)
-        finish(figure, picture.title, path)
+def _panel(runs: Sequence[Run], metric: str, title: str) -> Panel:
+    """Returns a curve for each run."""
+    series = []
+    for run in runs:
+        points = tuple(Point(line[_STEPS], line[metric]) for line in run.lines if metric in line)
+        series.append(Series(run.name, points, mark_every=-(-len(points) // _MARKS) or 1))
+    is_rate = metric.startswith(_SUCCESS)
+    return Panel(title, "agent steps", tuple(series), y_range=(-0.05, 1.05) if is_rate else None)

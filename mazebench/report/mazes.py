@@ -10,9 +10,9 @@ from mazebench.maps.benchmark import load_mazes, load_track_mazes
 from mazebench.maps.maze import Cell, Maze
 from mazebench.report.results import ReportedResult
 from mazebench.report.settings import known_levels
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.shown_map import show_map
-from mazebench.tasks.spec import TaskSpec
 
 
 def real_walls(result: ReportedResult, maze: str, results: Sequence[ReportedResult]) -> np.ndarray | None:
@@ -30,7 +30,7 @@ def real_walls(result: ReportedResult, maze: str, results: Sequence[ReportedResu
         if not is_same or other.trajectories is None:
             continue
         if other.setting.is_exact or other.trajectories.picture is not None:
-            episode = np.flatnonzero(other.episodes.maze == other.episodes.mazes.index(maze))[0]
+            episode = np.flatnonzero(other.episodes.maze == maze)[0]
             return other.trajectories[int(episode)].shown
     return None
 
@@ -44,24 +44,20 @@ def shown_ends(result: ReportedResult, results: Sequence[ReportedResult]) -> tup
     if not setting.perturbations:
         return None
     mazes = []
-    for name in result.episodes.mazes:
+    names = result.episodes.maze.unique().tolist()
+    for name in names:
         walls = real_walls(result, name, results)
         mazes.append(Maze(_open_room(setting.size) if walls is None else walls, name))
-    task = TaskSpec(task=setting.task, mazes=tuple(mazes), distances=(1,), **known_levels(dict(setting.perturbations)))
+    task = make_spec(setting.task, maps=mazes, distances=(1,), **known_levels(dict(setting.perturbations)))
     starts, goals = [], []
     is_same = True
-    for maze, start, goal, seed in zip(*_columns(result), strict=True):
-        shown = show_map(task, Episode(maze, start, goal, 0.0, seed))
+    episodes = result.episodes
+    for maze, start, goal, seed in zip(*(episodes[name] for name in ("maze", "start", "goal", "seed")), strict=True):
+        shown = show_map(task, Episode(names.index(maze), start, goal, 0.0, seed))
         is_same &= shown.drawing is None
         starts.append(shown.seen_cell(start))
         goals.append(shown.seen_cell(goal))
     return None if is_same else (starts, goals)
-
-
-def _columns(result: ReportedResult) -> tuple[list[int], list[Cell], list[Cell], list[int]]:
-    episodes = result.episodes
-    start, goal = ([(row, column) for row, column in cells.tolist()] for cells in (episodes.start, episodes.goal))
-    return episodes.maze.tolist(), start, goal, episodes.seed.tolist()
 
 
 def _open_room(size: int) -> np.ndarray:

@@ -1,19 +1,16 @@
-"""Tables filled with the metrics of results over the episodes of each row.
-
-`E` is the number of episodes of a result.
-"""
+"""Tables filled with the metrics of the episodes of each row and agent, and with what the paper printed."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from typing import Any
 
-import numpy as np
+import pandas as pd
 
-from mazebench.report.results import METRICS, ReportedResult
-from mazebench.report.rows import Row
-from mazebench.report.table import METRIC_NAMES, SPL_RELATIVE, UNTRAINED_NOTE, Cell, Column, Table
+from mazebench.report.frame import Rows
+from mazebench.report.table import METRIC_NAMES, METRICS, SPL_RELATIVE, UNTRAINED_NOTE, Cell, Column, Table
 from mazebench.results.intervals import mean_interval
+from mazebench.results.paper import printed
 
 
 def make_table(
@@ -21,61 +18,87 @@ def make_table(
     title: str,
     note: str,
     row_name: str,
-    rows: Mapping[str, Row],
-    x: tuple[float, ...],
-    results: Sequence[ReportedResult],
-    labels: Sequence[str],
+    rows: Rows,
+    x: Sequence[float] = (),
     paper: Sequence[Column] = (),
 ) -> Table:
-    """Returns a table with a column for each of `labels` that has a result, and the paper's columns behind them."""
-    by_label = {label: [result for result in results if result.label == label] for label in labels}
-    cells = {label: [_measure_row(row, own) for row in rows.values()] for label, own in by_label.items() if own}
-    if not all(SPL_RELATIVE in row for column in cells.values() for row in column if row):
-        for row in (row for column in cells.values() for row in column):
-            row.pop(SPL_RELATIVE, None)
-    if any(cell.is_untrained_scale for column in cells.values() for row in column for cell in row.values()):
+    """Returns a table with a column for each agent that has episodes in a row, and the paper's columns behind them."""
+    found = {
+        row: {label: measure(own) for label, own in episodes.groupby("label", observed=True)}
+        for row, episodes in rows.items()
+    }
+    cells = [cell for by_label in found.values() for by_metric in by_label.values() for cell in by_metric.values()]
+    if any(cell.is_untrained_scale for cell in cells):
         note = f"{note} {UNTRAINED_NOTE}".strip()
-    measured = [
-        Column(label, False, {metric: tuple(row.get(metric) for row in column) for metric in METRIC_NAMES})
-        for label, column in cells.items()
+    # The oracle's SPL is compared with where it is known of all agents.
+    is_relative = all(SPL_RELATIVE in by_metric for by_label in found.values() for by_metric in by_label.values())
+    metrics = METRIC_NAMES if is_relative else METRICS
+    columns = [
+        Column(label, False, {metric: _of_column(found, label, metric) for metric in metrics})
+        for label in _labels(rows)
     ]
-    return Table(name, title, note, row_name, tuple(rows), x, (*measured, *paper))
+    return Table(name, title, note, row_name, tuple(rows), tuple(x), (*columns, *paper))
 
 
-def measure(result: ReportedResult, chosen: np.ndarray) -> dict[str, Cell]:
-    """Returns the metrics over the `chosen` (`[E]` bool) episodes, with 95 % intervals; nothing if none are chosen."""
-    count = int(chosen.sum())
-    if not count:
-        return {}
-    episodes = result.episodes
+def measure(episodes: pd.DataFrame) -> dict[str, Cell]:
+    """Returns the metrics over episodes of one result, at least one, with 95 % intervals."""
+    marked: dict[str, Any] = {"is_untrained_scale": episodes.result.iloc[0].summary.untrained_scale}
     cells = {}
     for metric in METRICS:
-        estimate = mean_interval(episodes.values(metric)[chosen], episodes.maze[chosen])
-        cells[metric] = Cell(estimate.value, estimate.low, estimate.high, count)
-    relative = _spl_relative(result, chosen)
+        estimate = mean_interval(episodes[metric].to_numpy(), episodes.maze_index.to_numpy())
+        cells[metric] = Cell(estimate.value, estimate.low, estimate.high, len(episodes), **marked)
+    relative = _spl_relative(episodes)
     if relative is not None:
-        cells[SPL_RELATIVE] = Cell(relative, episodes=count)
-    is_marked = result.summary.untrained_scale
-    return {metric: dataclasses.replace(cell, is_untrained_scale=is_marked) for metric, cell in cells.items()}
+        cells[SPL_RELATIVE] = Cell(relative, episodes=len(episodes), **marked)
+    return cells
 
 
-def _measure_row(row: Row, results: Sequence[ReportedResult]) -> dict[str, Cell]:
-    """Returns the metrics of the first result that has episodes in a row; nothing if there is none."""
-    return next((cells for result in results if (cells := measure(result, row(result)))), {})
+def paper_columns(task: str, size: int, rows: Sequence[float], num_rows: int, warped: bool = False) -> list[Column]:
+    """Returns a column for each agent for which the paper prints any of `rows`.
+
+    Args:
+      task: the task.
+      size: cells a side.
+      rows: distances or landmark distances in cells, of the first rows of the table.
+      num_rows: all rows of the table.
+      warped: whether the maps were warped.
+    """
+    columns = []
+    nothing: tuple[Cell | None, ...] = (None,) * num_rows
+    for agent, metrics in printed(task, size, warped).items():
+        cells = dict.fromkeys(METRICS, nothing)
+        for metric, values in metrics.items():
+            there = tuple(Cell(values[int(row)]) if row in values else None for row in rows)
+            cells[metric] = there + nothing[len(there) :]
+        if any(map(any, cells.values())):
+            columns.append(Column(f"{agent} (paper)", True, cells))
+    return columns
 
 
-def _spl_relative(result: ReportedResult, chosen: np.ndarray) -> float | None:
+def _labels(rows: Rows) -> list[str]:
+    """Returns the labels of all agents that have episodes in a row, in the order of the report."""
+    label = pd.concat([episodes.label for episodes in rows.values()])
+    return label.cat.remove_unused_categories().cat.categories.tolist()
+
+
+def _of_column(found: dict[str, dict[str, dict[str, Cell]]], label: str, metric: str) -> tuple[Cell | None, ...]:
+    return tuple(by_label.get(label, {}).get(metric) for by_label in found.values())
+
+
+def _spl_relative(episodes: pd.DataFrame) -> float | None:
     """Returns the SPL divided by the oracle's, by what the summary says of all episodes, each fact and each distance.
 
     None if the summary does not say it of these episodes.
     """
-    if chosen.all():
-        return result.summary.overall.spl_relative
-    for fact, holds in result.episodes.facts.items():
-        if fact in result.summary.by_fact and np.array_equal(chosen, holds):
-            return result.summary.by_fact[fact].spl_relative
-    figures = [result.summary.by_distance[str(d)] for d in np.unique(result.episodes.distance[chosen]).tolist()]
-    if sum(each.n for each in figures) != chosen.sum():
+    result = episodes.result.iloc[0]
+    summary = result.summary
+    if len(episodes) == len(result.episodes):
+        return summary.overall.spl_relative
+    for fact in result.facts:
+        if fact in summary.by_fact and episodes[fact].all() and len(episodes) == result.episodes[fact].sum():
+            return summary.by_fact[fact].spl_relative
+    figures = [summary.by_distance[str(distance)] for distance in sorted(episodes.distance.unique())]
+    if sum(each.n for each in figures) != len(episodes):
         return None
     if len(figures) == 1:
         return figures[0].spl_relative

@@ -6,20 +6,20 @@ import base64
 import json
 import math
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from mazebench.maps.maze import Cell
 from mazebench.report.mazes import shown_ends
 from mazebench.report.results import ReportedResult
 from mazebench.results.trajectories import Trajectories
 
-# explorer.js counts in the same units.
-_POSITION_UNITS = 32  # a cell; one unit is about a pixel on the screen
-_YAW_UNITS = 256  # a turn
-_LARGEST = 2**14 - 1  # units, of a coordinate: a difference of two has 16 bits
+POSITION_UNITS = 32  # a cell; one unit is about a pixel on the screen
+YAW_UNITS = 256  # a turn
+_LARGEST = 2**14 - 1  # units: a difference of two has 16 bits
 
 
 def pack_trials(result: ReportedResult, results: Sequence[ReportedResult]) -> str:
@@ -38,6 +38,8 @@ def pack_drives(result: ReportedResult) -> str:
         "success": episodes.success.astype(int).tolist(),
         "steps": episodes.steps.tolist(),
         "driven": np.round(episodes.path_length, 2).tolist(),
+        "spl": np.round(episodes.spl, 2).tolist(),
+        "splGrid": np.round(episodes.spl_grid, 2).tolist(),
     }
     scale = [result.setting.cell_size] * 2 + [1.0]
     in_cells = [poses / scale for poses in paths if poses is not None]
@@ -60,18 +62,14 @@ def lay_on_first_poses(trajectories: Trajectories) -> np.ndarray | None:
 
 
 def pack_poses(poses: np.ndarray) -> bytes:
-    """Packs poses `[sum(length), 3]` in five planes with one byte of each pose: x low, x high, y low, y high, yaw.
+    """Packs poses `[sum(length), 3]`, x and y in cells and yaw in rad, as 16-bit integers: all x, all y, all yaw.
 
-    x and y come in cells, yaw in rad. All values are differences from the pose before, those of x and y zigzag-encoded.
+    Each is the change from the pose before, in units.
     """
-    units = np.round(poses[:, :2] * _POSITION_UNITS)
-    place = np.clip(units, -_LARGEST, _LARGEST).astype(np.int32)
-    change = np.diff(place, axis=0, prepend=0)
-    zigzag = ((change << 1) ^ (change >> 31)).astype("<u2")
-    turns = np.round(poses[:, 2] * (_YAW_UNITS / (2 * math.pi))).astype(np.int64)
-    yaw = np.diff(turns, prepend=0) % _YAW_UNITS
-    planes = [(zigzag[:, axis] >> shift) & 255 for axis in (0, 1) for shift in (0, 8)]
-    return np.stack([*planes, yaw]).astype(np.uint8).tobytes()
+    units = np.round(poses * (POSITION_UNITS, POSITION_UNITS, YAW_UNITS / (2 * math.pi)))
+    changes = np.diff(np.clip(units, -_LARGEST, _LARGEST), axis=0, prepend=0)
+    changes[:, 2] = (changes[:, 2] + YAW_UNITS / 2) % YAW_UNITS - YAW_UNITS / 2  # the shorter way around
+    return changes.T.astype("<i2").tobytes()
 
 
 def to_base64(content: bytes) -> str:
@@ -82,21 +80,22 @@ def to_base64(content: bytes) -> str:
 def _pack(columns: Mapping[str, Any], content: bytes) -> str:
     """Returns columns and the bytes behind them, deflated, in base64."""
     text = json.dumps(columns, separators=(",", ":")).encode("ascii")
+    text += b" " * (len(text) % 2)  # arrays of 16-bit integers begin at even places
     return to_base64(zlib.compress(len(text).to_bytes(4, "little") + text + content, 9))
 
 
 def _trial_columns(result: ReportedResult, results: Sequence[ReportedResult]) -> dict[str, Any]:
     episodes, trajectories, size = result.episodes, result.trajectories, result.setting.size
     columns: dict[str, Any] = {
-        "maze": episodes.maze.tolist(),
-        "start": (episodes.start @ [size, 1]).tolist(),
-        "goal": (episodes.goal @ [size, 1]).tolist(),
+        "maze": pd.factorize(episodes.maze)[0].tolist(),
+        "start": _indices(episodes.start, size),
+        "goal": _indices(episodes.goal, size),
         "distance": episodes.distance.tolist(),
         "shortest": np.round(episodes.shortest_path, 2).tolist(),
         "seed": episodes.seed.tolist(),
         "landmarks": [],
         "landmarkCounts": [],
-        "groups": {fact: holds.astype(int).tolist() for fact, holds in episodes.facts.items()},
+        "groups": {fact: episodes[fact].astype(int).tolist() for fact in result.facts},
     }
     if trajectories is not None:
         ends = np.cumsum(trajectories.num_landmarks) - 1  # the last one of an episode is its goal
@@ -110,5 +109,5 @@ def _trial_columns(result: ReportedResult, results: Sequence[ReportedResult]) ->
     return columns
 
 
-def _indices(cells: Sequence[Cell], size: int) -> list[float]:
+def _indices(cells: Iterable[Cell], size: int) -> list[float]:
     return [row * size + column for row, column in cells]

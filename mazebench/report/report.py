@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import pathlib
+import warnings
 from collections.abc import Iterator, Sequence
 
-from mazebench.errors import InputError
-from mazebench.report.distributions import build_distributions
-from mazebench.report.document import DOCUMENT, FIGURES, PAGE, build_document
-from mazebench.report.figures import draw_figures
-from mazebench.report.folders import Warn
-from mazebench.report.galleries import build_galleries
+from mazebench.errors import InputError, Remark
+from mazebench.report.document import DOCUMENT, FIGURES, PAGE, Picture, build_document
+from mazebench.report.figures.describe import describe_distributions, describe_several_tables, describe_table
+from mazebench.report.figures.draw import draw_figure
+from mazebench.report.figures.galleries import build_galleries
+from mazebench.report.figures.trajectories import draw_gallery
+from mazebench.report.frame import join_episodes
+from mazebench.report.looks import all_looks
 from mazebench.report.page import build_page
 from mazebench.report.results import ReportedResult, read_results
-from mazebench.report.table_forms import latex_name, to_csv, to_latex, to_markdown
+from mazebench.report.table import latex_name, to_csv, to_latex, to_markdown
 from mazebench.report.tables import build_tables
 from mazebench.storage.files import make_folder, open_whole, writing_to
 from mazebench.storage.locks import FolderLock
@@ -38,40 +41,60 @@ _AGENT_ORDER = (
 
 
 def write_report(
-    paths: Sequence[pathlib.Path], out: pathlib.Path, warn: Warn, names: Sequence[tuple[str, str]] = ()
+    paths: Sequence[pathlib.Path], out: pathlib.Path, names: Sequence[tuple[str, str]] = ()
 ) -> list[ReportedResult]:
     """Writes the report of all results at or below `paths` to the folder `out`, and returns the results.
+
+    It warns with a `Remark` of each thing that is skipped; the report lists these remarks too.
 
     Args:
       paths: evaluation folders, runs of suites, or folders above them.
       out: an empty or new folder, or one with an earlier report, which is replaced.
-      warn: called with one line about each thing that is skipped; the report lists these lines too.
       names: what agents are called, as `read_results` takes it.
 
     Raises:
       InputError: if there is nothing to report, results are of another benchmark, or `out` can't be used.
     """
-    warnings: list[str] = []
-
-    def note(line: str) -> None:
-        warnings.append(line)
-        warn(line)
-
-    results = read_results(paths, note, names)
+    with _noting_remarks() as notes:
+        results = read_results(paths, names)
     labels = sorted({result.label for result in results}, key=_rank)
     results.sort(key=lambda result: (result.setting, labels.index(result.label)))
-    tables, distributions = build_tables(results, labels), build_distributions(results, labels)
-    galleries = build_galleries(results, labels)
+    episodes, looks = join_episodes(results, labels), all_looks(labels)
+    tables = build_tables(episodes)
+    curves = {table.name: describe_table(table, looks) for table in tables if table.x}
+    violins = describe_distributions(episodes, looks)
+    figures = [*curves.values(), *describe_several_tables(tables, looks), *violins]
+    galleries = build_galleries(episodes)
+    pictures = [Picture(each.name, each.title, each.note) for each in figures]
+    pictures += [Picture(each.name, each.title, each.note) for each in galleries]
     with new_report(out):
         for table in tables:
             for suffix, form in _FORMS.items():
                 write_text(out / TABLES / (table.name + suffix), form(table))
             for metric in table.metrics:
                 write_text(out / TABLES / f"{latex_name(table, metric)}.tex", to_latex(table, metric))
-        pictures = list(draw_figures(tables, distributions, galleries, labels, out / FIGURES))
-        write_text(out / DOCUMENT, build_document(results, labels, tables, pictures, warnings))
-        write_text(out / PAGE, build_page(results, labels, tables, distributions, warnings))
+        for figure in figures:
+            draw_figure(figure, out / FIGURES / figure.name)
+        for gallery in galleries:
+            draw_gallery(gallery, looks, out / FIGURES / gallery.name)
+        write_text(out / DOCUMENT, build_document(results, labels, tables, pictures, notes))
+        write_text(out / PAGE, build_page(results, labels, tables, curves, violins, looks, notes))
     return results
+
+
+@contextlib.contextmanager
+def _noting_remarks() -> Iterator[list[str]]:
+    """Yields a list that holds the remarks of the block once it has ended; then all its warnings are shown."""
+    notes: list[str] = []
+    caught: list[warnings.WarningMessage] = []
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", Remark)
+            yield notes
+    finally:
+        notes += [str(warning.message) for warning in caught if issubclass(warning.category, Remark)]
+        for warning in caught:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
 
 
 def _rank(label: str) -> tuple[int, str]:

@@ -1,64 +1,41 @@
-"""Results as the report uses them: the records in columns, the setting, and a label for each agent.
-
-`E` is the number of episodes of a result.
-"""
+"""Finished evaluations as a report reads them: their episodes in a table, the setting, and a label for each agent."""
 
 from __future__ import annotations
 
 import dataclasses
+import os
 import pathlib
+import warnings
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+import pandas as pd
 
-from mazebench.errors import InputError, unknown
+from mazebench.errors import InputError, Remark, unknown
 from mazebench.maps.benchmark import TRACKS_VERSION, VERSION, manifest_hash
-from mazebench.report.folders import Warn, find_folders
 from mazebench.report.settings import Setting, make_setting
 from mazebench.results.metrics import by_fact
-from mazebench.results.reading import load_result
-from mazebench.results.records import Record, Summary, column
+from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, load_result
+from mazebench.results.records import Record, Summary
 from mazebench.results.trajectories import TRAJECTORIES, Trajectories, load_trajectories
 
-# Of each episode.
-METRICS = {"success_rate": "success rate", "spl": "SPL", "spl_grid": "SPL by grid distance"}
+# What `ReportedResult.episodes` says of each episode: fields of its record. Facts of a track are further columns.
+_OF_RECORDS = [
+    *("maze", "start", "goal", "distance", "success", "steps", "path_length", "shortest_path", "spl", "spl_grid"),
+    "seed",
+]
 
 
-@dataclasses.dataclass(frozen=True)
-class Episodes:
-    """The records of a result, in columns."""
-
-    maze: np.ndarray  # [E] int, index among `mazes`
-    mazes: tuple[str, ...]  # names, in the order in which they come up
-    start: np.ndarray  # [E, 2] int, cells
-    goal: np.ndarray  # [E, 2] int
-    distance: np.ndarray  # [E] int, cells
-    success: np.ndarray  # [E] bool
-    steps: np.ndarray  # [E] int
-    path_length: np.ndarray  # [E] m
-    shortest_path: np.ndarray  # [E] m
-    spl: np.ndarray  # [E]
-    spl_grid: np.ndarray  # [E]
-    seed: np.ndarray  # [E] int
-    facts: dict[str, np.ndarray]  # [E] bool by what holds in these episodes of a track, as "blocked" and "not blocked"
-
-    def __len__(self) -> int:
-        return len(self.success)
-
-    def values(self, metric: str) -> np.ndarray:
-        """Returns `[E]` float: the values of which a metric is the mean."""
-        return self.success.astype(np.float64) if metric == "success_rate" else getattr(self, metric)
-
-
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class ReportedResult:
-    """A finished evaluation that a report is made from."""
+    """A finished evaluation that a report is made from. Two are equal if they are the same object."""
 
     folder: pathlib.Path
     summary: Summary
     label: str  # the agent's name in the report, with more where the name alone is ambiguous
     setting: Setting
-    episodes: Episodes
+    episodes: pd.DataFrame  # a row for each episode in protocol order; the metrics are columns
+    facts: tuple[str, ...]  # columns of bools: what a track says of episodes, as "blocked" and "not blocked"
     trajectories: Trajectories | None  # None if none were recorded
 
     @property
@@ -77,58 +54,93 @@ class ReportedResult:
         return self.summary.provenance.options.seed
 
     @property
+    def run(self) -> str:
+        """What tells training runs of one agent apart: the checkpoint, or the seed where there is none."""
+        return self.checkpoint or f"seed {self.seed}"
+
+    @property
     def benchmark(self) -> tuple[str, str]:
         """The benchmark's version and the SHA-256 of its manifest."""
         return self.summary.benchmark, self.summary.provenance.benchmark_manifest_sha256 or ""
 
 
-def read_results(
-    paths: Iterable[pathlib.Path], warn: Warn, names: Sequence[tuple[str, str]] = ()
-) -> list[ReportedResult]:
+def read_results(paths: Iterable[pathlib.Path], names: Sequence[tuple[str, str]] = ()) -> list[ReportedResult]:
     """Returns all results at or below `paths`, one for each agent and setting, with labels; at least one.
+
+    It warns with a `Remark` of each thing that is skipped.
 
     Args:
       paths: evaluation folders, or folders above them.
-      warn: called with one line about each thing that is skipped.
       names: what agents are called in the report: pairs of a name and an agent, or the folder of an agent's results.
 
     Raises:
       InputError: if there is no result, some are not of the installed benchmark, or a name fits no agent.
     """
     results = []
-    for folder in find_folders(paths, warn):
+    for folder in _find_folders(paths):
         try:
-            results.append(_read_result(folder, warn))
+            results.append(_read_result(folder))
         except InputError as error:
-            warn(f"{error}; skipped")
+            warnings.warn(f"{error}; skipped", Remark, stacklevel=2)
     if not results:
         where = ", ".join(map(str, paths))
         raise InputError(f"expected results of `mazebench eval` or `mazebench train` in {where}, found none to report")
     _require_installed_benchmark(results)
-    return _drop_repeats(_label(_rename(results, names)), warn)
+    return _drop_repeats(_label(_rename(results, names)))
 
 
-def _read_result(folder: pathlib.Path, warn: Warn) -> ReportedResult:
+def folders_below(path: pathlib.Path) -> list[pathlib.Path]:
+    """Returns the evaluation folders at or below a path, by name. Hidden folders are left out."""
+    folders = []
+    for folder, subfolders, files in os.walk(path):
+        subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
+        if {SUMMARY, EPISODES, JOURNAL} & set(files):
+            folders.append(pathlib.Path(folder))
+    return folders
+
+
+def _find_folders(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
+    """Returns the evaluation folders at or below `paths`, each once."""
+    found: dict[pathlib.Path, pathlib.Path] = {}
+    for path in paths:
+        folders = folders_below(path)
+        if not folders:
+            warnings.warn(
+                f"{path}: expected results of `mazebench eval`, found {_describe(path)}; skipped", Remark, stacklevel=2
+            )
+        for folder in folders:
+            found.setdefault(folder.resolve(), folder)
+    return list(found.values())
+
+
+def _describe(path: pathlib.Path) -> str:
+    if path.is_dir():
+        return "a folder without any" if any(path.iterdir()) else "an empty folder"
+    return "a file" if path.exists() else "nothing there"
+
+
+def _read_result(folder: pathlib.Path) -> ReportedResult:
     result = load_result(folder)
+    summary = result.summary
     try:
-        setting = make_setting(result.summary, result.records)
+        setting = make_setting(summary, result.records)
     except InputError as error:
         raise InputError(f"{folder}: {error}") from error
-    episodes = _to_columns(result.records)
-    trajectories = _read_trajectories(folder, episodes, setting, warn)
-    return ReportedResult(folder, result.summary, result.summary.agent, setting, episodes, trajectories)
+    episodes, facts = _to_table(result.records)
+    trajectories = _read_trajectories(folder, episodes, setting)
+    return ReportedResult(folder, summary, summary.agent, setting, episodes, facts, trajectories)
 
 
-def _to_columns(records: tuple[Record, ...]) -> Episodes:
-    names = [field.name for field in dataclasses.fields(Episodes) if field.name not in ("maze", "mazes", "facts")]
-    mazes = tuple(dict.fromkeys(record.maze for record in records))
-    index = {name: number for number, name in enumerate(mazes)}
-    columns = {name: column(records, name) for name in names}
-    maze = np.array([index[record.maze] for record in records])
-    return Episodes(maze=maze, mazes=mazes, facts=by_fact(records), **columns)
+def _to_table(records: Sequence[Record]) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """Returns the episodes, and which columns are facts."""
+    episodes = pd.DataFrame(
+        [[getattr(record, name) for name in _OF_RECORDS] for record in records], columns=_OF_RECORDS
+    )
+    facts = by_fact(records)
+    return episodes.assign(success_rate=episodes.success.astype(float), **facts), tuple(facts)
 
 
-def _read_trajectories(folder: pathlib.Path, episodes: Episodes, setting: Setting, warn: Warn) -> Trajectories | None:
+def _read_trajectories(folder: pathlib.Path, episodes: pd.DataFrame, setting: Setting) -> Trajectories | None:
     """Returns the trajectories if the folder has some that fit the records."""
     path = folder / TRAJECTORIES
     if not path.exists():
@@ -136,10 +148,14 @@ def _read_trajectories(folder: pathlib.Path, episodes: Episodes, setting: Settin
     try:
         trajectories = load_trajectories(path, len(episodes))
     except InputError as error:
-        warn(f"{error}; reported without paths")
+        warnings.warn(f"{error}; reported without paths", Remark, stacklevel=2)
         return None
     if trajectories.size != setting.size or not np.array_equal(trajectories.length, episodes.steps + 1):
-        warn(f"{path}: expected a pose for the start and for each step, found others; reported without paths")
+        warnings.warn(
+            f"{path}: expected a pose for the start and for each step, found others; reported without paths",
+            Remark,
+            stacklevel=2,
+        )
         return None
     return trajectories
 
@@ -180,7 +196,7 @@ def _label(results: list[ReportedResult]) -> list[ReportedResult]:
     return labelled
 
 
-def _drop_repeats(results: list[ReportedResult], warn: Warn) -> list[ReportedResult]:
+def _drop_repeats(results: list[ReportedResult]) -> list[ReportedResult]:
     """Returns one result for each agent and setting: the one with the most episodes, the first of equals."""
     kept: dict[tuple[str, Setting], ReportedResult] = {}
     for result in results:
@@ -188,7 +204,9 @@ def _drop_repeats(results: list[ReportedResult], warn: Warn) -> list[ReportedRes
         if other is result:
             continue
         more, less = (result, other) if len(result.episodes) > len(other.episodes) else (other, result)
-        warn(f"{less.folder}: {less.label}, {less.setting} again, as in {more.folder}; skipped")
+        warnings.warn(
+            f"{less.folder}: {less.label}, {less.setting} again, as in {more.folder}; skipped", Remark, stacklevel=2
+        )
         kept[result.label, result.setting] = more
     return list(kept.values())
 

@@ -16,9 +16,9 @@ from collections.abc import Iterable, Sequence
 
 import pydantic
 
-from mazebench.errors import InputError, describe_fault, remark
+from mazebench.errors import InputError, describe_fault
 from mazebench.maps.benchmark import TRACKS_VERSION, load_track_mazes, manifest_hash
-from mazebench.report.table_forms import escape_markdown
+from mazebench.report.table import escape_markdown
 from mazebench.results.intervals import mean_interval
 from mazebench.results.reading import SUITE, Result, find_parts, load_result, read_suite
 from mazebench.results.records import Name, Share, column
@@ -263,7 +263,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             *folders, page = options.paths
             write_scoreboard(read_entries(folders), page)
     except InputError as error:
-        remark(str(error))
+        print(f"mazebench: {error}", file=sys.stderr)
         sys.exit(2)
 
 

@@ -16,14 +16,21 @@ from matplotlib.lines import Line2D
 
 from mazebench.maps import colors
 from mazebench.maps.maze import cell_to_point
-from mazebench.report.figures.style import LINE, STYLE, WIDTH, save, wrap_title
-from mazebench.report.galleries import Drive, Gallery
+from mazebench.report.figures.draw import LINE, STYLE, WIDTH, save, wrap_title
+from mazebench.report.figures.galleries import Drive, Gallery
 from mazebench.report.looks import Look
 
-# Floor, wall, wall that only the map shows, wall that the map does not show, landmark.
-_CELL_COLORS = ListedColormap(["#ffffff", "#4a4e57", "#f6c7a1", "#a99bc4", "#c9dcec"])
+# The page has the same: floor, wall, wall that only the map shows, wall that the map does not show, landmark.
+CELL_COLORS = {
+    "floor": "#ffffff",
+    "wall": "#4a4e57",
+    "false-wall": "#f6c7a1",
+    "lost-wall": "#a99bc4",
+    "landmark": "#c9dcec",
+}
+_CELL_COLORS = ListedColormap(list(CELL_COLORS.values()))
 # Without the palest yellow, which is invisible on white.
-_TIME_COLORS = ListedColormap(mpl.colormaps["plasma"](np.linspace(0, 0.92, 256)))
+TIME_COLORS = ListedColormap(mpl.colormaps["plasma"](np.linspace(0, 0.92, 256)))
 _START, _GOAL = ("o", colors.START, 4.5), ("*", colors.GOAL, 7.5)  # marker, colour, width in points
 # In sides of a maze: the margins left and right, the width of a column, the gap in it, the height of the key.
 _MARGIN, _COLUMN, _GAP, _KEY = 0.05, 1.06, 0.06, 0.4
@@ -78,7 +85,7 @@ def _draw_drive(axes: Axes, drive: Drive, left: float, bottom: float) -> None:
     axes.imshow(cells, cmap=_CELL_COLORS, vmin=0, vmax=4, extent=extent, interpolation="none", aspect="auto")
     points = drive.points / size + (left, bottom)
     segments = np.stack([points[:-1], points[1:]], axis=1)
-    path = LineCollection(list(segments), cmap=_TIME_COLORS, linewidths=1.3, capstyle="round", zorder=3)
+    path = LineCollection(list(segments), cmap=TIME_COLORS, linewidths=1.3, capstyle="round", zorder=3)
     path.set_array(np.linspace(0, 1, len(segments)))
     axes.add_collection(path, autolim=False)
     for cell, marker, color, width in ((drive.start, *_START), (drive.goal, *_GOAL)):
@@ -105,6 +112,6 @@ def _draw_map_key(axes: Axes, columns: int, top: float, gallery: Gallery) -> Non
     middle = columns * _COLUMN / 2
     axes.legend(handles=handles, bbox_to_anchor=(middle, top - 0.1), bbox_transform=axes.transData, **key)
     extent = (middle - 0.6, middle + 0.6, top - 0.06, top - 0.02)
-    axes.imshow(np.linspace(0, 1, 256)[None], cmap=_TIME_COLORS, extent=extent, aspect="auto")
+    axes.imshow(np.linspace(0, 1, 256)[None], cmap=TIME_COLORS, extent=extent, aspect="auto")
     axes.text(middle - 0.64, top - 0.04, "start", fontsize=7, ha="right", va="center")
     axes.text(middle + 0.64, top - 0.04, "end of the episode", fontsize=7, va="center")
