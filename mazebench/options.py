@@ -1,45 +1,62 @@
-"""Options: fields of frozen dataclasses that carry their help text and the values they allow.
+"""Checked options: frozen dataclasses whose fields say in one place what they mean and which values they allow.
 
-Each option is declared once. The command line, Gymnasium's keywords, config files and docs/options.md follow from it.
+    @options
+    class MapOptions:
+        inflate: Annotated[float, Interval(ge=0, le=10), Doc("Metres by which walls are thickened.")] = 0.0
+        unknown: Annotated[str, OneOf("wall", "free"), Doc("What unknown cells become.")] = "wall"
+
+The command line, keyword arguments, config files and docs/options.md follow from the declaration. A field may hold
+options itself: `EvalOptions.task` is `TaskOptions`. `from_names` and `by_name` go between such options and one flat
+table of names, which is what a command line or a JSON file has.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-import math
-import numbers
 import os
+import types
 import typing
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import pydantic
+from annotated_types import Ge, GroupedMetadata, Le
+from pydantic_core import PydanticCustomError, core_schema
+from typing_extensions import Doc as Doc
 
 from mazebench.errors import InputError, unknown
 
+Options = TypeVar("Options")
 
-@dataclasses.dataclass(frozen=True)
-class Option:
-    """The help text of an option and the values it allows; for a tuple, the values that its elements may have."""
+_CONFIG = pydantic.ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, arbitrary_types_allowed=True)
+
+
+class OneOf:
+    """Metadata of a text field that allows some values only."""
+
+    def __init__(self, *choices: str):
+        self.choices = choices
+
+    def __get_pydantic_core_schema__(self, kind: Any, handler: Any) -> core_schema.CoreSchema:
+        return core_schema.no_info_after_validator_function(self._check, handler(kind))
+
+    def _check(self, value: str | None) -> str | None:
+        if value is not None and value not in self.choices:
+            raise PydanticCustomError("one_of", "")
+        return value
+
+
+class Option(NamedTuple):
+    """What is known of one option; for a tuple, `lowest`, `highest` and `choices` are those of its elements."""
 
     help: str
-    lowest: float | None = None
-    highest: float | None = None
-    choices: tuple[str, ...] | None = None
-
-    def check(self, name: str, value: object) -> None:
-        """Checks the value of the option called `name`.
-
-        Raises:
-          InputError: if the value, or an element of a tuple, is not allowed.
-        """
-        for item in value if isinstance(value, tuple) else (value,):
-            if self.choices is not None and item not in self.choices:
-                raise unknown(name, item, self.choices)
-            if self.range_text and not self._is_in_range(item):
-                raise InputError(f"expected {name} {self.range_text}, found {item!r}")
+    default: Any
+    kind: Any  # the declared type
+    lowest: float | None
+    highest: float | None
+    choices: tuple[str, ...] | None
 
     @property
     def range_text(self) -> str:
@@ -48,80 +65,162 @@ class Option:
             return "" if self.highest is None else f"of at most {self.highest}"
         return f"of at least {self.lowest}" if self.highest is None else f"from {self.lowest} to {self.highest}"
 
-    def _is_in_range(self, value: object) -> bool:
-        lowest = -math.inf if self.lowest is None else self.lowest
-        highest = math.inf if self.highest is None else self.highest
-        return isinstance(value, numbers.Real) and lowest <= float(value) <= highest
+    @property
+    def kind_text(self) -> str:
+        """The type in words."""
+        is_plain = isinstance(self.kind, type) and not typing.get_args(self.kind)
+        return self.kind.__name__ if is_plain else str(self.kind)
 
 
-def option(
-    default: Any,
-    help: str,
-    *,
-    lowest: float | None = None,
-    highest: float | None = None,
-    choices: Iterable[str] | None = None,
-) -> Any:
-    """Returns a dataclass field with an `Option` as `metadata["option"]`."""
-    allowed = None if choices is None else tuple(choices)
-    return dataclasses.field(default=default, metadata={"option": Option(help, lowest, highest, allowed)})
+@typing.dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(dataclasses.field,))
+def options(cls: type[Options]) -> type[Options]:
+    """Makes a class a frozen dataclass that checks its fields: a decorator.
 
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Options:
-    """Base class of dataclasses whose fields are made by `option`; it checks them.
-
-    An option whose default is a tuple accepts any iterable, and a single value for a tuple of one. None is allowed
-    where it is the default.
+    NumPy's numbers become Python's, and paths text. A field whose default is a tuple accepts any iterable, and a single
+    value for a tuple of one. None is allowed where the type allows it. `__post_init__` may check how fields go
+    together.
 
     Raises:
-      InputError: if a value is not allowed.
+      InputError: when an object is made with a value that is not allowed.
     """
+    checked: Any = pydantic.dataclasses.dataclass(frozen=True, kw_only=True, config=_CONFIG)(cls)
+    check, fields = checked.__init__, checked.__dataclass_fields__
 
-    def __post_init__(self) -> None:
-        for name, field_option in options_of(type(self)).items():
-            value = getattr(self, name)
-            if isinstance(type(self).__dataclass_fields__[name].default, tuple):
-                value = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else (value,)
-            value = _checked_type(type(self), name, value)
-            object.__setattr__(self, name, value)
-            if value is not None:  # which its type allows
-                field_option.check(name, value)
+    @functools.wraps(check)
+    def __init__(self: Any, *args: Any, **values: Any) -> None:
+        values = {name: _plain(value, fields[name]) if name in fields else value for name, value in values.items()}
+        try:
+            check(self, *args, **values)
+        except pydantic.ValidationError as error:
+            raise _in_words(checked, error, values) from error
+
+    checked.__init__ = __init__
+    return checked
 
 
-def _checked_type(options_class: type[Options], name: str, value: Any) -> Any:
-    """Returns `value` as a plain value of the type that the field is declared with.
+@functools.cache
+def fields_of(options_class: Any) -> Mapping[str, Option]:
+    """Returns what is known of each field of a class that `options` made, but of those that hold options."""
+    kinds, extras = typing.get_type_hints(options_class), typing.get_type_hints(options_class, include_extras=True)
+    described = {}
+    for field in dataclasses.fields(options_class):
+        if _is_options(kinds[field.name]):
+            continue
+        metadata = list(_metadata(extras[field.name]))
+        described[field.name] = Option(
+            help=next((item.documentation for item in metadata if isinstance(item, Doc)), ""),
+            default=field.default,
+            kind=kinds[field.name],
+            lowest=next((item.ge for item in metadata if isinstance(item, Ge)), None),  # type: ignore[arg-type]
+            highest=next((item.le for item in metadata if isinstance(item, Le)), None),  # type: ignore[arg-type]
+            choices=next((item.choices for item in metadata if isinstance(item, OneOf)), None),
+        )
+    return types.MappingProxyType(described)
+
+
+def options_of(options_class: type, defaults: Any = None) -> dict[str, Option]:
+    """Returns the options of a class by name, with those of the options that it holds: the fields that have a `Doc`.
+
+    Args:
+      options_class: made by `options`.
+      defaults: an object of the class whose values are the defaults; None for those that the class declares.
+    """
+    found: dict[str, Option] = {}
+    own = fields_of(options_class)
+    for field in dataclasses.fields(options_class):
+        default = field.default if defaults is None else getattr(defaults, field.name)
+        if field.name not in own:
+            found |= options_of(type(field.default), default)
+        elif own[field.name].help:
+            found[field.name] = own[field.name]._replace(default=default)
+    return found
+
+
+def from_names(options_class: type[Options], values: Mapping[str, Any], **others: Any) -> Options:
+    """Returns options of a class from one table of names, which may be those of options that it holds.
+
+    Args:
+      options_class: made by `options`.
+      values: by name; what is missing has its default.
+      **others: fields that are no options.
 
     Raises:
-      InputError: if it is of another type, such as a text for a number.
+      InputError: if a name is unknown, or a value is not allowed.
     """
-    if isinstance(value, tuple):
-        plain: Any = tuple(map(_plain, value))
-    else:
-        plain = _plain(value)
-    adapter, kind = _validator(options_class, name)  # type: ignore[arg-type]
-    try:
-        return adapter.validate_python(plain)
-    except pydantic.ValidationError as error:
-        raise InputError(f"expected {name} of type {kind}, found {plain!r}"[:200]) from error
+    known = options_of(options_class)
+    for name in values:
+        if name not in known:
+            raise unknown("option", name, known)
+    return _filled(options_class, values, None, others)
 
 
-def _plain(value: Any) -> Any:
-    """Returns NumPy's numbers as Python's, and a path as text."""
+def by_name(options: Any) -> dict[str, Any]:
+    """Returns the fields of options and of the options that they hold as one table."""
+    found: dict[str, Any] = {}
+    for field in dataclasses.fields(options):
+        value = getattr(options, field.name)
+        found |= by_name(value) if _is_options(type(value)) else {field.name: value}
+    return found
+
+
+def _filled(options_class: type[Options], values: Mapping[str, Any], base: Any, others: dict[str, Any]) -> Options:
+    """Returns options with `values`; those that are missing are as in `base`, or the class's defaults if it is None."""
+    given = dict(others)
+    for field in dataclasses.fields(options_class):  # type: ignore[arg-type]
+        default = field.default if base is None else getattr(base, field.name)
+        if _is_options(type(default)):
+            given[field.name] = _filled(type(default), values, default, {})
+        elif field.name in values:
+            given[field.name] = values[field.name]
+        elif base is not None:
+            given[field.name] = default
+    return options_class(**given)
+
+
+def _is_options(kind: Any) -> bool:
+    return isinstance(kind, type) and pydantic.dataclasses.is_pydantic_dataclass(kind)
+
+
+def _metadata(kind: Any) -> Iterable[Any]:
+    """Yields the metadata of a declared type, and of a tuple's elements."""
+    if typing.get_origin(kind) is typing.Annotated:
+        inner, *items = typing.get_args(kind)
+        yield from _metadata(inner)
+        for item in items:
+            yield from item if isinstance(item, GroupedMetadata) else (item,)
+    elif typing.get_origin(kind) is tuple:
+        yield from _metadata(typing.get_args(kind)[0])
+
+
+def _plain(value: Any, field: dataclasses.Field[Any]) -> Any:
+    """Returns NumPy's numbers as Python's, a path as text, and any iterable as a tuple where the field is one."""
+    if isinstance(field.default, tuple):
+        items = value if isinstance(value, Iterable) and not isinstance(value, str) else (value,)
+        return tuple(_plain(item, _NO_FIELD) for item in items)
     if isinstance(value, np.generic):
         return value.item()
     return os.fspath(value) if isinstance(value, os.PathLike) else value
 
 
-@functools.cache
-def _validator(options_class: Any, name: str) -> tuple[pydantic.TypeAdapter[Any], str]:
-    """Returns a strict validator of a field, and the field's type in words."""
-    kind = typing.get_type_hints(options_class)[name]
-    in_words = kind.__name__ if isinstance(kind, type) and not typing.get_args(kind) else str(kind)
-    return pydantic.TypeAdapter(kind, config=pydantic.ConfigDict(strict=True)), in_words
+_NO_FIELD: dataclasses.Field[Any] = dataclasses.field()
 
 
-def options_of(options_class: type[Options]) -> dict[str, Option]:
-    """Returns the options of a dataclass by name."""
-    fields = dataclasses.fields(options_class)
-    return {field.name: field.metadata["option"] for field in fields if "option" in field.metadata}
+def _in_words(options_class: type, error: pydantic.ValidationError, values: Mapping[str, Any]) -> InputError:
+    """Returns the first fault that pydantic found as an error in one line."""
+    fault = error.errors(include_url=False)[0]
+    if "error" in fault.get("ctx", {}):  # which `__post_init__` or a validator raised
+        raised = fault["ctx"]["error"]
+        return raised if isinstance(raised, InputError) else InputError(str(raised))
+    name, found = str(fault["loc"][0]), fault["input"]
+    if fault["type"] == "unexpected_keyword_argument":
+        return unknown("option", name, fields_of(options_class))
+    if fault["type"] == "missing":
+        return InputError(f"expected {name}, found none")
+    option = fields_of(options_class).get(name)
+    if option is None:
+        return InputError(f"expected {name} as options, found {found!r}"[:200])
+    if fault["type"] == "one_of":
+        return unknown(name, found, option.choices or ())
+    if fault["type"] in ("greater_than_equal", "less_than_equal", "finite_number") and option.range_text:
+        return InputError(f"expected {name} {option.range_text}, found {found!r}")
+    return InputError(f"expected {name} of type {option.kind_text}, found {values.get(name, found)!r}"[:200])

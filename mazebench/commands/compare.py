@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import pathlib
+import warnings
 from typing import Annotated
 
 import typer
 
-from mazebench.errors import remark
+from mazebench.errors import Remark
 
 
 def compare(
@@ -32,7 +33,7 @@ def compare(
 
     found = comparison.compare_folders(a, b)
     for line in found.notes:
-        remark(line)
+        warnings.warn(line, Remark, stacklevel=2)
     if as_json:
         print(json.dumps(comparison.to_json(found), indent=1))
         return

@@ -13,12 +13,16 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import has_camera, load_mujoco
-from mazebench.commands.options import NO_CAMERA, refuse_ignored, refuse_ignored_by_task, takes_options
-from mazebench.errors import InputError, RunError, remark
-from mazebench.evaluation.options import NUM_ENVS, TASK_CHOICES, EvalOptions
+from mazebench.commands.options import NO_CAMERA, chosen, refuse_ignored, refuse_ignored_by_task, takes_options
+from mazebench.errors import InputError, RunError
+from mazebench.evaluation.options import EvalOptions, RunOptions
+from mazebench.options import options_of
+
+# A suite has values of its own for them.
+_OF_ONE_EVALUATION = tuple(name for name in options_of(EvalOptions) if name not in ("checkpoint", "seed"))
 
 
-@takes_options(EvalOptions, (*TASK_CHOICES, "checkpoint", "seed"))
+@takes_options(EvalOptions, RunOptions)
 def evaluate(
     context: typer.Context,
     agents: Annotated[
@@ -38,50 +42,35 @@ def evaluate(
     out: Annotated[
         pathlib.Path | None, typer.Option(help="Folder for the results; a new one in results/ if not given.")
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in --out.")] = False,
-    record: Annotated[
-        bool | None,
-        typer.Option("--record/--no-record", help="Write trajectories too; a suite does by default."),
-    ] = None,
     show_traceback: Annotated[
         bool, typer.Option("--traceback", help="If the agent raises, show where; not with --workers or --ray.")
     ] = False,
-    num_envs: Annotated[
-        int, typer.Option(min=1, help="Environments side by side in each process, at most.")
-    ] = NUM_ENVS,
-    workers: Annotated[
-        int, typer.Option(min=0, help="Processes; 0 runs in this one, and with --ray on all its CPUs.")
-    ] = 0,
-    ray: Annotated[
-        bool, typer.Option("--ray", help="Run the workers on Ray; without an address, on this machine.")
-    ] = False,
-    ray_address: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Of a Ray cluster for the workers; auto finds one that runs here."),
-    ] = None,
 ) -> None:
     """Evaluate agents on unseen mazes: success rate and SPL with 95 % intervals."""
     from mazebench.evaluation.checked_agent import AgentError
 
     if suite is None and len(agents) > 1:
         raise InputError(f"expected one --agent without --suite, found {len(agents)}")
+    run = chosen(RunOptions, values)
     refuse_ignored(
         context,
-        (suite is not None, f"the suite {suite!r} has evaluations of its own", TASK_CHOICES),
-        (bool(workers or ray or ray_address), "the agent acts in other processes", ("show_traceback",)),
+        (suite is not None, f"the suite {suite!r} has evaluations of its own", _OF_ONE_EVALUATION),
+        (bool(run.workers or run.cluster), "the agent acts in other processes", ("show_traceback",)),
     )
     refuse_ignored_by_task(context, values)
-    if resume and out is None:
+    if run.resume and out is None:
         raise InputError("--resume needs --out, the folder of the run to go on with")
-    refuse_ignored(context, (not has_camera(values["sensors"]), *NO_CAMERA))
-    load_mujoco(renders=has_camera(values["sensors"]))
-    folder = out or _new_folder(suite or f"{agents[0].replace(':', '-')}-{values['track'] or values['task']}")
-    if resume:
+    options = chosen(EvalOptions, values, agent=agents[0])
+    renders = has_camera(options.task.sensors)
+    refuse_ignored(context, (not renders, *NO_CAMERA))
+    load_mujoco(renders=renders)
+
+    what = options.task.track or options.task.task
+    folder = out or _new_folder(suite or f"{agents[0].replace(':', '-')}-{what}")
+    if run.resume:
         begun = folder.is_dir() and any(folder.iterdir())
         print(f"resuming {folder}" if begun else f"nothing to resume in {folder}; starting a new run")
     kept = progress.Kept()
-    running: dict[str, Any] = {"resume": resume, "num_envs": num_envs, "workers": workers}
-    running["ray_address"] = ray_address or ("local" if ray else None)
 
     def how_to_go_on() -> tuple[str, ...]:
         if kept.of is None and not folder.exists():
@@ -91,9 +80,9 @@ def evaluate(
     try:
         with stopping.stoppable(how_to_go_on):
             if suite is None:
-                _evaluate_one(agents[0], values, folder, bool(record), kept, running)
+                _evaluate_one(options, folder, run, kept)
             else:
-                _evaluate_suite(suite, agents, values, folder, record, kept, running)
+                _evaluate_suite(suite, agents, options, folder, run, kept)
     except AgentError as error:
         if show_traceback and error.__cause__ is not None:
             traceback.print_exception(error.__cause__)
@@ -101,39 +90,28 @@ def evaluate(
     print(f"results in {folder}")
 
 
-def _evaluate_one(
-    agent: str,
-    values: dict[str, Any],
-    folder: pathlib.Path,
-    record: bool,
-    kept: progress.Kept,
-    running: dict[str, Any],
-) -> None:
+def _evaluate_one(options: EvalOptions, folder: pathlib.Path, run: RunOptions, kept: progress.Kept) -> None:
     from mazebench.commands import table
     from mazebench.evaluation import evaluate
 
-    with progress.evaluating(f"{agent}, {values['track'] or values['task']}", kept) as show:
-        summary = evaluate.evaluate(agent, folder, record=record, progress=show, warn=remark, **running, **values)
+    with progress.evaluating(f"{options.agent}, {options.task.track or options.task.task}", kept) as show:
+        summary = evaluate.run_evaluation(options, folder, run, show)
     table.print_summary(summary)
 
 
 def _evaluate_suite(
     suite: str,
     agents: list[str],
-    values: dict[str, Any],
+    options: EvalOptions,
     folder: pathlib.Path,
-    record: bool | None,
+    run: RunOptions,
     kept: progress.Kept,
-    running: dict[str, Any],
 ) -> None:
     from mazebench.commands import table
     from mazebench.evaluation import suites
 
-    chosen = {name: values[name] for name in ("checkpoint", "seed")}
     with progress.evaluating(f"{suite}, {', '.join(agents)}", kept) as show:
-        summaries = suites.run_suite(
-            suite, agents, folder, record=record, progress=show, warn=remark, **chosen, **running
-        )
+        summaries = suites.run_suite(suite, agents, folder, run, show, checkpoint=options.checkpoint, seed=options.seed)
     table.print_suite(summaries)
 
 

@@ -10,10 +10,10 @@ import typer
 
 from mazebench.commands.display import load_mujoco
 from mazebench.commands.options import refuse_ignored, takes_options
-from mazebench.maps.options import MAP_OPTIONS, MapOptions
+from mazebench.maps.options import MapOptions
 
 
-@takes_options(MapOptions, MAP_OPTIONS)
+@takes_options(MapOptions)
 def generate(
     context: typer.Context,
     values: dict[str, Any],
@@ -23,7 +23,7 @@ def generate(
     ] = None,
     count: Annotated[int, typer.Option(min=1, help="How many mazes.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same mazes.")] = 0,
-    style: Annotated[str, typer.Option(help="dfs, rooms or obstacles.")] = "dfs",
+    style: Annotated[str, typer.Option(help="Of the layout: dfs, rooms, obstacles (see `mazebench list`).")] = "dfs",
     out: Annotated[pathlib.Path, typer.Option(help="Folder to fill with NAME.txt, NAME.xml, ...")] = pathlib.Path(
         "mazes"
     ),

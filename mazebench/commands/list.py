@@ -9,9 +9,8 @@ def list_() -> None:
     from mazebench.constants import TASK_VERSION, TRACKS_VERSION
     from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS, VERSION
     from mazebench.maps.generators import STYLES
-    from mazebench.options import options_of
     from mazebench.tasks.options import TASKS
-    from mazebench.tasks.perturbations import Perturbations
+    from mazebench.tasks.perturbations import PERTURBATIONS
     from mazebench.tasks.sensors import SENSORS
     from mazebench.tasks.tracks import TRACKS
 
@@ -22,7 +21,7 @@ def list_() -> None:
         "sizes": f"{', '.join(map(str, SIZES))} "
         f"(benchmark {VERSION}, {MAZES_PER_SPLIT} mazes in each of {', '.join(SPLITS)})",
         "styles": ", ".join(sorted(STYLES)),
-        "perturbed": ", ".join(options_of(Perturbations)),
+        "perturbed": ", ".join(PERTURBATIONS),
         "sensors": ", ".join(SENSORS),
         "Gymnasium": f"{', '.join(ids)} and the other sizes; mazebench/Stale-13-v{TRACKS_VERSION} and the other tracks",
     }

@@ -1,4 +1,4 @@
-"""Options of the command line that follow from the fields of option classes."""
+"""Options of the command line that follow from option classes."""
 
 from __future__ import annotations
 
@@ -7,13 +7,17 @@ import enum
 import functools
 import inspect
 import typing
-from collections.abc import Callable
-from typing import Annotated, Any
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from typing import Annotated, Any, TypeVar
 
 import typer
 
-from mazebench.errors import InputError, held_remarks
-from mazebench.options import Option, Options, options_of
+from mazebench.errors import InputError, Remark
+from mazebench.evaluation.options import EvalOptions
+from mazebench.options import Option, from_names, options_of
+
+Chosen = TypeVar("Chosen")
 
 # Options that another one leaves without effect, and why.
 LOCAL_ONLY = ("distances", "episodes_per_distance")
@@ -29,20 +33,15 @@ _WORTH_WATCHING = 10  # cells from start to goal
 
 
 def takes_options(
-    options_class: type[Options], names: tuple[str, ...], **defaults: Any
+    *options_classes: type, without: Iterable[str] = ()
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Gives a command an option for each field `names` of a class.
+    """Gives a command an option for each option of some classes, with those that they hold, but for `without`.
 
-    The command has a parameter `values`, which receives the values by name.
-
-    Args:
-      options_class: such as `EvalOptions`.
-      names: of the fields.
-      **defaults: of fields whose default differs in this command.
+    The command has a parameter `values`, which receives the values by name. `chosen` makes options of them.
     """
-    options, kinds = options_of(options_class), typing.get_type_hints(options_class)
-    defaults = {field.name: field.default for field in dataclasses.fields(options_class)} | defaults
-    added = [_parameter(name, options[name], kinds[name], defaults[name]) for name in names]
+    found = {name: option for each in options_classes for name, option in options_of(each).items()}
+    options = {name: option for name, option in found.items() if name not in without}
+    added = [_parameter(name, option) for name, option in options.items()]
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         own = inspect.signature(command, eval_str=True)
@@ -50,7 +49,7 @@ def takes_options(
 
         @functools.wraps(command)
         def run(**given: Any) -> None:
-            values = {name: _to_value(name, kinds[name], given.pop(name)) for name in names}
+            values = {name: _to_value(name, option, given.pop(name)) for name, option in options.items()}
             command(**given, values=values)
 
         parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in [*kept, *added]]
@@ -59,6 +58,21 @@ def takes_options(
         return run
 
     return decorate
+
+
+def chosen(options_class: type[Chosen], values: Mapping[str, Any], **others: Any) -> Chosen:
+    """Returns the options of a class from the `values` of a command.
+
+    Args:
+      options_class: one of those that the command takes.
+      values: by name, also of other classes.
+      **others: fields that are no options.
+
+    Raises:
+      InputError: if a value is not allowed.
+    """
+    names = options_of(options_class)
+    return from_names(options_class, {name: value for name, value in values.items() if name in names}, **others)
 
 
 def refuse_ignored(context: typer.Context, *rules: tuple[bool, str, tuple[str, ...]]) -> None:
@@ -93,28 +107,25 @@ def refuse_ignored_by_task(context: typer.Context, values: dict[str, Any]) -> No
     )
 
 
-def watched_distances(values: dict[str, Any]) -> tuple[int, ...] | None:
-    """Returns the given distances, or else that of an episode which is to be looked at.
-
-    It is 10 cells, or as near to that as maps, a start or a goal of one's own allow. None stands for the distances of a
-    track, of given ends, or of corners.
+def watched(options: EvalOptions) -> EvalOptions:
+    """Returns options of an episode that is to be looked at, of 10 cells or near to that if no distance is chosen.
 
     Raises:
-      InputError: if the task is not one.
+      InputError: if the options name no task.
     """
-    has_own = (
-        values["track"] is not None or values["task"] == "hierarchical" or None not in (values["start"], values["goal"])
-    )
-    if values["distances"] or has_own:
-        return values["distances"] or None
-    if values["maps"] is None and values["start"] is None and values["goal"] is None:
-        return (_WORTH_WATCHING,)
-    from mazebench.tasks.registry import make_spec
+    task = options.task
+    if task.distances or task.ends_given == 2 or task.track is not None or task.task == "hierarchical":
+        return options
+    distances: tuple[int, ...] = (_WORTH_WATCHING,)
+    if options.is_own:
+        from mazebench.tasks.build import build_task
+        from mazebench.tasks.options import EVAL_DISTANCES
 
-    of_task = {name: value for name, value in values.items() if name not in ("distances", "checkpoint", "seed")}
-    with held_remarks():  # the command reads the maps again
-        distances = make_spec(**of_task).distances
-    return (min(distances, key=lambda distance: abs(distance - _WORTH_WATCHING)),)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Remark)  # the command reads the maps again
+            distances = build_task(task, options.mazes, default_distances=EVAL_DISTANCES).distances
+    nearest = min(distances, key=lambda distance: abs(distance - _WORTH_WATCHING))
+    return dataclasses.replace(options, task=dataclasses.replace(task, distances=(nearest,)))
 
 
 def parse_numbers(name: str, text: str) -> tuple[int, ...]:
@@ -136,29 +147,27 @@ def parse_numbers(name: str, text: str) -> tuple[int, ...]:
     return tuple(sorted(numbers))
 
 
-def _parameter(name: str, option: Option, kind: Any, default: Any) -> inspect.Parameter:
+def _parameter(name: str, option: Option) -> inspect.Parameter:
     """Returns the parameter from which typer makes the option."""
-    shown, metavar = kind, None
+    kind: Any = option.kind
+    default, metavar = option.default, None
     if kind == tuple[int, ...]:
-        shown, default = str | None, ",".join(map(str, default)) or None
+        kind, default = str | None, ",".join(map(str, default)) or None
     elif kind == tuple[str, ...]:
-        shown, default = list[str], list(default)
+        kind, default = list[str], list(default)
         metavar = f"<{'|'.join(option.choices)}>, repeatable" if option.choices else None
     elif option.choices:
-        choice = _choice(name, option.choices)
-        shown, default = (choice | None, None) if default is None else (choice, choice(default))
-    annotation = Annotated[shown, typer.Option(help=option.help, metavar=metavar)]  # type: ignore[valid-type]
+        choice: Any = enum.StrEnum(name, {each: each for each in option.choices})  # type: ignore[misc]  # as typer wants
+        kind, default = (choice | None, None) if default is None else (choice, choice(default))
+    elif kind is typing.Any:  # in Python also an object, on the command line a text
+        kind = str | None
+    annotation = Annotated[kind, typer.Option(help=option.help, metavar=metavar)]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
-def _choice(name: str, choices: tuple[str, ...]) -> Any:
-    """Returns the enumeration that typer wants for a choice."""
-    return enum.StrEnum(name, {choice: choice for choice in choices})
-
-
-def _to_value(name: str, kind: Any, given: Any) -> Any:
+def _to_value(name: str, option: Option, given: Any) -> Any:
     if isinstance(given, enum.Enum):
         return given.value
-    if kind == tuple[int, ...]:
+    if option.kind == tuple[int, ...]:
         return () if given is None else parse_numbers(name, given)
-    return tuple(given) if kind == tuple[str, ...] else given
+    return tuple(given) if option.kind == tuple[str, ...] else given

@@ -7,15 +7,13 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.options import refuse_ignored_by_task, takes_options, watched_distances
+from mazebench.commands.options import chosen, refuse_ignored_by_task, takes_options, watched
 from mazebench.errors import InputError
-from mazebench.evaluation.options import TASK_CHOICES, EvalOptions
+from mazebench.evaluation.options import EvalOptions
 from mazebench.world.backend import has_display
 
-_CHOICES = tuple(name for name in TASK_CHOICES if name not in ("episodes_per_distance", "camera_size", "textures"))
 
-
-@takes_options(EvalOptions, _CHOICES)
+@takes_options(EvalOptions, without=["episodes_per_distance", "camera_size", "textures", "checkpoint", "seed"])
 def play(
     context: typer.Context,
     values: dict[str, Any],
@@ -26,16 +24,16 @@ def play(
 ) -> None:
     """Drive yourself, with the keyboard: in MuJoCo's viewer, or without a display in the terminal."""
     refuse_ignored_by_task(context, values)
-    values["distances"] = watched_distances(values)
+    options = watched(chosen(EvalOptions, values, agent="you"))
     in_window = has_display() and not terminal
     load_mujoco(renders=in_window)
     from mazebench.play.game import LIDAR, Game
-    from mazebench.tasks.registry import make_spec
+    from mazebench.tasks.build import build_task
 
-    for sensor in values["sensors"]:
+    for sensor in options.task.sensors:
         if sensor != LIDAR:
             raise InputError(f"expected sensors {LIDAR} or none, found {sensor}, which is not shown while you drive")
-    game = Game(make_spec(**values), seed)
+    game = Game(build_task(options.task, options.mazes), seed)
     if in_window:
         from mazebench.play import viewer as screen
     else:

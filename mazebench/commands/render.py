@@ -8,14 +8,13 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.options import refuse_ignored_by_task, takes_options, watched_distances
-from mazebench.evaluation.options import TASK_CHOICES, EvalOptions
+from mazebench.commands.options import chosen, refuse_ignored_by_task, takes_options, watched
+from mazebench.evaluation.options import EvalOptions
 
 _DRAWN = ("map", "lidar")  # views that need no rendering
-_CHOICES = tuple(name for name in TASK_CHOICES if name != "episodes_per_distance")
 
 
-@takes_options(EvalOptions, (*_CHOICES, "checkpoint", "seed"))
+@takes_options(EvalOptions, without=["episodes_per_distance"])
 def render(
     context: typer.Context,
     out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
@@ -32,9 +31,9 @@ def render(
 ) -> None:
     """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
     refuse_ignored_by_task(context, values)
-    values["distances"] = watched_distances(values) or ()
+    options = watched(chosen(EvalOptions, values, agent=agent))
     load_mujoco(renders=view not in _DRAWN)
     from mazebench.play import film
 
-    outcome = film.film_episode(EvalOptions(agent, **values), out, view, pixels)
+    outcome = film.film_episode(options, out, view, pixels)
     print(f"{out}: {outcome}")

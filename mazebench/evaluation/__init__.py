@@ -1,1 +1,1 @@
-"""Evaluations: protocols, runs, metrics, tables and films."""
+"""Evaluations: what is run, how, and the folders that it fills."""

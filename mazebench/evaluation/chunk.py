@@ -117,6 +117,7 @@ def run_trials(
     """
     if not trials:
         return
+
     num_envs = min(num_envs, len(trials))
     # The longest ways first, so that no environment is left alone with one at the end.
     queue = collections.deque(sorted(trials, key=lambda numbered: -numbered[1].shortest_path))
@@ -134,17 +135,29 @@ def run_trials(
     with contextlib.closing(env):
         observation, info = env.reset()
         while active.any():
+            # What the agent is told: each episode has a seed of its own.
             for slot in np.flatnonzero(new_episode):
                 seeds[slot] = agent_seed(seed, _present(slots[slot])[0])
+            truth = true_state(task, env.episodes, info["position"], info["yaw"]) if needs_truth else None
+            inputs = Inputs(
+                observation=observation,
+                new_episode=new_episode,
+                new_context=info["is_first"],
+                seed=seeds,
+                truth=truth,
+                active=active,
+            )
             if recorder:
                 recorder.add(info["position"], info["yaw"], observation["state"], active)
-            truth = true_state(task, env.episodes, info["position"], info["yaw"]) if needs_truth else None
-            actions, state = agent.act(Inputs(observation, new_episode, info["is_first"], seeds, truth, active), state)
+
+            # A step. An environment whose episode ends in it takes the next one; without one, it is no longer active.
+            actions, state = agent.act(inputs, state)
             running = list(slots)
             observation, _, terminated, truncated, info = env.step(actions)
             ended = terminated | truncated
             active = np.array([numbered is not None for numbered in slots])
             new_episode = ended & active
+
             yield [_outcome(*_present(running[slot]), info, slot, recorder) for slot in np.flatnonzero(ended).tolist()]
 
 
@@ -164,8 +177,9 @@ def _outcome(index: int, trial: Trial, info: dict[str, Any], slot: int, recorder
 
 def _to_record(plan: Plan, outcome: Outcome) -> Record:
     episode, trial = outcome.trial.episode, outcome.trial
+    # Of the body as a disc, and from cell to cell; both in metres.
     shortest = np.array([trial.shortest_path, trial.distance * plan.task.cell_size])
-    both = spl(np.array([outcome.success] * 2), shortest, np.array([outcome.path_length] * 2))
+    spl_of_disc, spl_grid = spl(np.array([outcome.success]), shortest, np.array([outcome.path_length])).tolist()
     values = {
         "episode": outcome.index,
         "maze": plan.task.mazes[episode.maze].name,
@@ -176,8 +190,8 @@ def _to_record(plan: Plan, outcome: Outcome) -> Record:
         "steps": outcome.steps,
         "path_length": outcome.path_length,
         "shortest_path": trial.shortest_path,
-        "spl": float(both[0]),
-        "spl_grid": float(both[1]),
+        "spl": spl_of_disc,
+        "spl_grid": spl_grid,
         "seed": episode.seed,
     }
     return Record.model_validate(plan.labels | values | plan.levels | _facts(plan.task, episode))

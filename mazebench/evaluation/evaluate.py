@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import pathlib
 import tempfile
+import warnings
 from collections.abc import Callable
 from typing import Any
 
 from mazebench import stopping
 from mazebench.agent import Agent, SingleAgent
 from mazebench.agent_loading import checked_agent_class, load_agent_class
-from mazebench.errors import InputError, unknown
+from mazebench.errors import InputError, Remark
 from mazebench.evaluation.chunk import Chunk
-from mazebench.evaluation.options import FIXED, NUM_ENVS, EvalOptions, RunOptions
+from mazebench.evaluation.options import NUM_ENVS, EvalOptions, RunOptions
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import Pool, open_pool
 from mazebench.evaluation.store import Store, check_same_run, is_finished, load_finished
@@ -39,10 +39,12 @@ def evaluate(
     workers: int = 0,
     ray_address: str | None = None,
     progress: Progress = lambda ended, of: None,
-    warn: Callable[[str], None] = lambda line: None,
     **options: Any,
 ) -> Summary:
     """Evaluates an agent and returns the summary.
+
+    A `mazebench.errors.Remark` warns of what a user should know, such as maps of a scale on which the agent did not
+    learn.
 
     Args:
       agent: the name of an installed agent, "module:Class", or a class.
@@ -53,41 +55,54 @@ def evaluate(
       workers: processes; 0 runs in this one, on all cores.
       ray_address: of a Ray cluster to run the workers on; 0 of them then are as many as it has CPUs.
       progress: called as episodes end.
-      warn: called with a line on what a user should know, such as maps of a scale on which the agent did not learn.
-      **options: fields of `EvalOptions`: `task`, `size`, `split`, `maps`, `distances`, `map_flip`, `seed` and so on.
+      **options: those of `EvalOptions` by name: `task`, `size`, `split`, `maps`, `distances`, `map_flip`, `seed` and so
+        on.
 
     Raises:
       InputError: if an option can't be met, or `out` can't be written or holds another run.
       RunError: if the agent or a worker failed; what ended until then is kept.
     """
-    RunOptions(resume=resume, record=record, num_envs=num_envs, workers=workers, ray_address=ray_address)
+    run = RunOptions(resume=resume, record=record, num_envs=num_envs, workers=workers, ray_address=ray_address)
     if not isinstance(agent, str | type):
         raise InputError(f"expected the name of an agent or its class, found an object of {type(agent).__name__}")
     name = agent if isinstance(agent, str) else f"{agent.__module__}:{agent.__qualname__}"
     agent_class = load_agent_class(name) if isinstance(agent, str) else checked_agent_class(name, agent)
-    known = {field.name for field in dataclasses.fields(EvalOptions)} - {"agent"}
-    for option in options:
-        if option not in known:
-            raise unknown("option", option, known - set(FIXED))
-    if (workers or ray_address) and (name.startswith("__main__:") or load_agent_class(name) is not agent_class):
+    chosen = EvalOptions.of(name, **options)
+    if (run.workers or run.cluster) and (name.startswith("__main__:") or load_agent_class(name) is not agent_class):
         raise InputError(f"expected a class that other processes can import by its name, found {name}")
-    plan = make_plan(EvalOptions(name, **options), agent_class)
+    return run_evaluation(chosen, out, run, progress, agent_class)
+
+
+def run_evaluation(
+    options: EvalOptions,
+    out: str | pathlib.Path | None,
+    run: RunOptions,
+    progress: Progress = lambda ended, of: None,
+    agent_class: type[Agent] | None = None,
+) -> Summary:
+    """Runs what is left of an evaluation and returns its summary; as `evaluate`, which makes the options.
+
+    Args:
+      options: what is evaluated.
+      out: the folder; None keeps the summary alone.
+      run: how.
+      progress: called as episodes end.
+      agent_class: the class that `options.agent` names, if it is loaded already.
+    """
+    plan = make_plan(options, agent_class)
     if plan.remark:
-        warn(plan.remark)
-    with open_pool(workers, ray_address) as pool, tempfile.TemporaryDirectory() as temporary:
-        folder = pathlib.Path(temporary if out is None else out)
-        return run_plan(plan, folder, pool, resume=resume, record=record, num_envs=num_envs, progress=progress)
+        warnings.warn(plan.remark, Remark, stacklevel=2)
+    with open_pool(run) as pool, tempfile.TemporaryDirectory() as temporary:
+        return run_plan(plan, pathlib.Path(temporary if out is None else out), pool, run, progress)
 
 
 def run_plan(
     plan: Plan,
     folder: pathlib.Path,
     pool: Pool,
-    *,
-    resume: bool = False,
-    record: bool = False,
-    num_envs: int = NUM_ENVS,
+    run: RunOptions,
     progress: Progress = lambda ended, of: None,
+    *,
     suite: str | None = None,
     part: str | None = None,
 ) -> Summary:
@@ -96,15 +111,15 @@ def run_plan(
     Raises:
       InputError, RunError: as `evaluate`.
     """
-    num_trials = len(plan.trials)
-    if resume and is_finished(folder, record):
+    num_trials, record = len(plan.trials), bool(run.record)
+    if run.resume and is_finished(folder, record):
         check_same_run(folder, plan)
         summary = load_finished(folder)
         progress(num_trials, num_trials)
         return summary
-    with Store(folder, plan, resume=resume, record=record) as store:
+    with Store(folder, plan, resume=run.resume, record=record) as store:
         progress(store.num_ended, num_trials)
-        for ended in pool.run(_cut(plan, store, pool, num_envs)):
+        for ended in pool.run(_cut(plan, store, pool, run.num_envs)):
             stopping.check()
             store.append(ended)
             progress(store.num_ended, num_trials)

@@ -6,20 +6,24 @@ import dataclasses
 import functools
 import hashlib
 import pathlib
+import warnings
 from typing import Any
 
 from mazebench.agent import Agent, Interface
 from mazebench.agent_loading import load_agent_class
-from mazebench.errors import InputError, RunError, UnplayableError, held_remarks
+from mazebench.errors import InputError, Remark, RunError, UnplayableError
 from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of, only_context_size
-from mazebench.evaluation.options import FIXED, EvalOptions, make_task
+from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.provenance import provenance
+from mazebench.options import fields_of
 from mazebench.results.oracle import oracle_spl
 from mazebench.results.records import Provenance
+from mazebench.tasks.build import build_task
 from mazebench.tasks.context import default_context_size
+from mazebench.tasks.options import EVAL_DISTANCES, Variants
 from mazebench.tasks.perturbations import perturbation_levels
 from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.trials import Trial, draw_trials, select_track_trials, select_trials
+from mazebench.tasks.trials import Trial, select_trials
 from mazebench.world.mjcf import maze_spec
 
 _FORMAT = 2  # of a folder of results while the run goes on
@@ -29,7 +33,7 @@ _IDENTIFYING = (
     *("agent_package", "agent_code_sha256", "checkpoint_sha256"),
 )
 # Options that the rest of an identity covers, or that have one value in all evaluations.
-_COVERED = ("agent", "task", "track", "level", "size", "split", "maps", "checkpoint", *FIXED)
+_COVERED = ("agent", "task", "track", "level", "size", "split", "maps", "checkpoint", *fields_of(Variants))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -65,7 +69,7 @@ class Plan:
                 f"{agent} learned on maps of {self._learned_scale:g} m a cell and may fail here: its map of {size} "
                 f"cells shows {_square(task.size)} cells of {task.cell_size:g} m, {self._scale:.3g} m a cell{way_out}"
             )
-        if self.options.maps is not None and is_coarse:
+        if self.options.mazes.maps is not None and is_coarse:
             return f"{agent} is shown the {_square(task.size)} cells as a map of {size}{way_out}"
         if task.track is not None:
             try:
@@ -131,22 +135,22 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
       InputError: if an option can't be met.
     """
     agent_class = agent_class or load_agent_class(options.agent)
-    options = _with_checkpoint(options, agent_class)
-    task = make_task(options)
-    if task.track is None:
-        context_size = context_size_of(options.agent, agent_class, task.size)
-        task = dataclasses.replace(task, context_size=context_size)
-    if missing := tuple(name for name in agent_class.needs_sensors if name not in task.sensors):
-        options = dataclasses.replace(options, sensors=(*options.sensors, *missing))
-        task = dataclasses.replace(task, sensors=(*task.sensors, *missing))
-    split = "custom" if options.is_own else options.split
-    labels = {"agent": options.agent, "task": options.task, "size": task.size, "split": split}
+    options = _with_sensors(_with_checkpoint(options, agent_class), agent_class)
+
+    def choose_context_size(size: int) -> int:
+        return context_size_of(options.agent, agent_class, size)
+
+    task = build_task(
+        options.task, options.mazes, default_distances=EVAL_DISTANCES, choose_context_size=choose_context_size
+    )
+    split = "custom" if options.is_own else options.mazes.split
+    labels = {"agent": options.agent, "task": task.task, "size": task.size, "split": split}
     if task.cell_size != 1:
         labels["cell_size"] = task.cell_size
     if task.track is not None:
         labels |= {"track": task.track, "level": task.level[0]}
-    trials = _select_trials(options, task)
-    levels = perturbation_levels(options)
+    trials = select_trials(task, options.is_frozen, options.episodes_per_distance, options.seed)
+    levels = perturbation_levels(task)
     origin = provenance(options, agent_class, task)
     identity = {
         "format": _FORMAT,
@@ -165,17 +169,8 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
         levels=levels,
         identity=identity,
         provenance=origin,
-        oracle_spl=oracle_spl(options.benchmark, options.task, task.size, trials) if options.is_frozen else None,
+        oracle_spl=oracle_spl(options.benchmark, task.task, task.size, trials) if options.is_frozen else None,
     )
-
-
-def _select_trials(options: EvalOptions, task: TaskSpec) -> list[Trial]:
-    if options.is_own:
-        return draw_trials(task, options.episodes_per_distance, options.seed)
-    what = (options.is_frozen, options.distances, options.episodes_per_distance, options.seed)
-    if task.track is not None:
-        return select_track_trials(task.mazes, *what)
-    return select_trials(options.task, task.mazes, *what)
 
 
 def _square(side: int) -> str:
@@ -185,8 +180,17 @@ def _square(side: int) -> str:
 @functools.lru_cache(maxsize=1)
 def _make_plan_once(options: EvalOptions) -> Plan:
     """Returns the plan of `options`, the same one for all chunks of an evaluation that a process runs."""
-    with held_remarks():  # which the process printed that made the plan first
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Remark)  # the process that made the plan first has shown them
         return make_plan(options)
+
+
+def _with_sensors(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:
+    """Returns `options` with the sensors that the agent needs."""
+    observed = options.task.observed_sensors
+    missing = tuple(name for name in agent_class.needs_sensors if name not in observed)
+    sensors = (*options.task.sensors, *missing)
+    return dataclasses.replace(options, task=dataclasses.replace(options.task, sensors=sensors))
 
 
 def _with_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:

@@ -14,8 +14,9 @@ from collections.abc import Iterator, Sequence
 from typing import Protocol
 
 from mazebench import stopping
-from mazebench.errors import InputError, RunError
+from mazebench.errors import RunError
 from mazebench.evaluation.chunk import Chunk, Ended, run_chunk, run_whole_chunk
+from mazebench.evaluation.options import RunOptions
 
 
 class Pool(Protocol):
@@ -34,25 +35,19 @@ class Pool(Protocol):
 
 
 @contextlib.contextmanager
-def open_pool(workers: int = 0, ray_address: str | None = None) -> Iterator[Pool]:
+def open_pool(run: RunOptions) -> Iterator[Pool]:
     """Yields the pool that is asked for and ends it.
 
-    Args:
-      workers: processes; 0 for this one.
-      ray_address: of a Ray cluster to run on, with as many workers as it has CPUs if `workers` is 0.
-
     Raises:
-      InputError: if `workers` is negative, or there is no such cluster.
+      InputError: if there is no such cluster.
     """
-    if workers < 0:
-        raise InputError(f"expected workers of at least 0, found {workers}")
-    if ray_address is not None:
+    if run.cluster is not None:
         from mazebench.evaluation.cluster import Cluster  # Ray is an extra
 
-        with Cluster(ray_address, workers) as cluster:
+        with Cluster(run.cluster, run.workers) as cluster:
             yield cluster
-    elif workers:
-        with _Processes(workers) as processes:
+    elif run.workers:
+        with _Processes(run.workers) as processes:
             yield processes
     else:
         yield _ThisProcess()

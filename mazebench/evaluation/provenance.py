@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import hashlib
 import inspect
@@ -21,9 +20,11 @@ from mazebench.agent_loading import package_of
 from mazebench.errors import InputError
 from mazebench.evaluation.options import EvalOptions
 from mazebench.maps.benchmark import manifest_hash
+from mazebench.options import by_name
 from mazebench.results.records import Provenance
 from mazebench.storage.files import open_file
 from mazebench.storage.json_files import parse_json
+from mazebench.tasks.options import Variants
 from mazebench.tasks.spec import TaskSpec
 
 _PACKAGES = (
@@ -48,7 +49,12 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
         "agent_code_sha256": code_hash(options, agent_class),
         "seed": options.seed,
         # With the distances and the time limit that are played, of which the options may only say to choose them.
-        "options": dataclasses.asdict(options) | {name: getattr(task, name) for name in ("distances", "time_limit")},
+        "options": {
+            **by_name(options),
+            **by_name(Variants()),
+            "distances": task.distances,
+            "time_limit": task.time_limit,
+        },
         "command": [pathlib.Path(sys.argv[0]).name, *sys.argv[1:]],
         "python": platform.python_version(),
         "packages": {name: _version(name) for name in _PACKAGES},

@@ -8,13 +8,14 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import pathlib
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Sequence
 from typing import Any
 
 from mazebench.agent import Interface
-from mazebench.errors import InputError, RunError, UnplayableError, unknown
+from mazebench.errors import InputError, Remark, RunError, UnplayableError, unknown
 from mazebench.evaluation.evaluate import Progress, run_plan
-from mazebench.evaluation.options import NUM_ENVS, EvalOptions, RunOptions
+from mazebench.evaluation.options import EvalOptions, RunOptions
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import open_pool
 from mazebench.evaluation.store import check_same_run, is_finished
@@ -27,6 +28,7 @@ from mazebench.storage.locks import FolderLock
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 
+_DEFAULT_RUN = RunOptions()
 _TABLE_DISTANCES = (2, 4, 6, 8, 10)  # those that the paper prints
 
 
@@ -35,7 +37,7 @@ class Part:
     """One evaluation of a suite."""
 
     name: str
-    changes: dict[str, Any]  # of `EvalOptions`, by field
+    changes: dict[str, Any]  # of `EvalOptions`, by name
 
 
 def _hierarchical(name: str, **changes: Any) -> Part:
@@ -72,30 +74,24 @@ def run_suite(
     suite: str,
     agents: Sequence[str],
     out: pathlib.Path,
+    run: RunOptions = _DEFAULT_RUN,
+    progress: Progress = lambda ended, of: None,
     *,
     checkpoint: str | None = None,
     seed: int = 0,
-    record: bool | None = None,
-    resume: bool = False,
-    num_envs: int = NUM_ENVS,
-    workers: int = 0,
-    ray_address: str | None = None,
-    progress: Progress = lambda ended, of: None,
-    warn: Callable[[str], None] = lambda line: None,
 ) -> list[Summary]:
     """Runs what is left of a suite for some agents; returns the summaries by agent and then in the suite's order.
 
-    Parts that an agent can't play are left out.
+    Parts that an agent can't play are left out; a `mazebench.errors.Remark` warns of it.
 
     Args:
       suite: a name in `SUITES`.
       agents: whom to evaluate.
-      out: the suite's folder; with `resume`, agents that it does not have yet are added.
+      out: the suite's folder; with `run.resume`, agents that it does not have yet are added.
+      run: how. `run.record` None writes trajectories, but does not run finished parts again that have none.
+      progress: called as episodes end, with their number and that of all parts together.
       checkpoint: of a single agent.
       seed: of what the agents draw.
-      record: write trajectories; None writes them, but does not run finished parts again that have none.
-      resume, num_envs, workers, ray_address, progress: as for `evaluate`.
-      warn: called with a line on the parts that an agent can't play.
 
     Raises:
       InputError: if a name is unknown, an agent named twice, a checkpoint given to several agents, or the folder holds
@@ -103,34 +99,31 @@ def run_suite(
       UnplayableError: if an agent can play no part.
       RunError: if an agent or a worker failed; what ended until then is kept.
     """
-    writes = False if record is None else record
-    RunOptions(resume=resume, record=writes, num_envs=num_envs, workers=workers, ray_address=ray_address)
     if suite not in SUITES:
         raise unknown("suite", suite, SUITES)
     if checkpoint is not None and len(agents) > 1:
         raise InputError(f"expected one agent with --checkpoint, found {len(agents)}")
     plans = {
-        (folder, part.name): make_plan(EvalOptions(agent, checkpoint=checkpoint, seed=seed, **part.changes))
+        (folder, part.name): make_plan(EvalOptions.of(agent, checkpoint=checkpoint, seed=seed, **part.changes))
         for agent, folder in _folders(agents).items()
         for part in SUITES[suite]
     }
-    plans = _playable(plans, out, suite, warn)
+    plans = _playable(plans, out, suite)
     with contextlib.ExitStack() as stack:
-        pool = stack.enter_context(open_pool(workers, ray_address))  # first: if it is refused, no folder is made
+        pool = stack.enter_context(open_pool(run))  # first: if it is refused, no folder is made
         make_folder(out)
         stack.enter_context(FolderLock(out))
-        _prepare(out, suite, agents, seed, plans, resume)
+        _prepare(out, suite, agents, seed, plans, run.resume)
         total = sum(len(plan.trials) for plan in plans.values())
         summaries, before = [], 0
         for (folder, part), plan in plans.items():
+            record = not is_finished(out / folder / part) if run.record is None else run.record
             summary = run_plan(
                 plan,
                 out / folder / part,
                 pool,
-                resume=True,
-                record=not is_finished(out / folder / part) if record is None else record,
-                num_envs=num_envs,
-                progress=lambda ended, of, before=before: progress(before + ended, total),  # type: ignore[misc]
+                dataclasses.replace(run, resume=True, record=record),
+                lambda ended, of, before=before: progress(before + ended, total),  # type: ignore[misc]
                 suite=suite,
                 part=part,
             )
@@ -139,9 +132,7 @@ def run_suite(
     return summaries
 
 
-def _playable(
-    plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str, warn: Callable[[str], None]
-) -> dict[tuple[str, str], Plan]:
+def _playable(plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str) -> dict[tuple[str, str], Plan]:
     """Returns the plans that their agents can play, and warns of the others in a line an agent.
 
     Raises:
@@ -161,7 +152,7 @@ def _playable(
         reason = next(iter(reasons.values()))
         if len(reasons) == sum(each == folder for each, _ in plans):
             raise UnplayableError(f"{reason}; it can play no part of the suite {suite!r}")
-        warn(f"{reason}; left out: {', '.join(reasons)}")
+        warnings.warn(f"{reason}; left out: {', '.join(reasons)}", Remark, stacklevel=3)
     return {(folder, part): plan for (folder, part), plan in plans.items() if part not in left_out.get(folder, {})}
 
 

@@ -11,7 +11,7 @@ from mazebench.errors import InputError
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.files import read_all
 from mazebench.maps.maze import Maze, resized
-from mazebench.maps.options import MAP_OPTIONS, NO_OPTIONS, OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions
+from mazebench.maps.options import MAP_OPTIONS, OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions, MazeOptions
 from mazebench.maps.readers.arrays import read_array
 
 _DEFAULT_SIZE = 13
@@ -20,26 +20,23 @@ _DEFAULT_SIZE = 13
 Maps = str | pathlib.Path | Maze | np.ndarray | Iterable[Maze | np.ndarray]
 
 
-def load_mazes_of(
-    size: int | None = None, split: str = "train", maps: Maps | None = None, options: MapOptions = NO_OPTIONS
-) -> tuple[Maze, ...]:
-    """Returns the mazes of a task.
+def load_mazes_of(options: MazeOptions) -> tuple[Maze, ...]:
+    """Returns the mazes of a task that is no track.
 
     Args:
-      size: N, the cells on a side of benchmark v1's mazes: 13 (the default), 15, 17, 19 or 21; with `maps`, a size that
-        they must have.
-      split: "train" or "eval" mazes of benchmark v1; without effect with `maps`.
-      maps: mazes of your own instead: a `Maze`, an array as `maze_from_array` takes it, several of these of one size,
-        or the path of a file or of a folder of files.
-      options: how `maps` are read.
+      options: `size` is N, the cells on a side of benchmark v1's mazes: 13 (the default), 15, 17, 19 or 21; with
+        `maps`, a size that they must have. `split` names mazes of benchmark v1. `maps` are mazes of your own instead: a
+        `Maze`, an array as `maze_from_array` takes it, several of these of one size, or the path of a file or of a
+        folder of files.
 
     Raises:
       InputError: if there are no such mazes, a map can't be read, or a map option is given without `maps`.
     """
-    if maps is None:
+    size = options.size
+    if options.maps is None:
         options.require_defaults(MAP_OPTIONS, "maps of your own", "the benchmark's mazes")
-        return load_mazes(_DEFAULT_SIZE if size is None else size, split)
-    mazes = _own_mazes(maps, options)
+        return load_mazes(_DEFAULT_SIZE if size is None else size, options.split)
+    mazes = _own_mazes(options.maps, options)
     for maze in mazes:
         if size not in (None, maze.size):
             raise InputError(f"expected mazes of size {size}, found size {maze.size}")

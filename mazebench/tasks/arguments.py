@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
-import dataclasses
+from typing import Annotated
+
+from annotated_types import Ge
 
 from mazebench.errors import InputError
-from mazebench.options import Options, option
+from mazebench.options import OneOf, options
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.rendering import CAMERAS
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Arguments(Options):
+@options
+class Arguments:
     """The arguments of an environment; each constructor gives those that it has.
 
     Raises:
       InputError: if a value is not allowed.
     """
 
-    seed: int | None = option(None, "Seed of the first reset.", lowest=0)
-    render_mode: str | None = option(None, "What `render` returns.", choices=("rgb_array",))
-    camera: str = option("top", "Whose pictures `render` returns.", choices=CAMERAS)
-    num_envs: int = option(1, "Environments side by side.", lowest=1)
-    num_threads: int = option(0, "Threads of the simulation; 0 uses all cores.", lowest=0)
+    seed: Annotated[int | None, Ge(0)] = None  # of the first reset
+    render_mode: Annotated[str | None, OneOf("rgb_array", "human")] = None  # what `render` returns
+    camera: Annotated[str, OneOf(*CAMERAS)] = "top"  # whose pictures `render` returns
+    num_envs: Annotated[int, Ge(1)] = 1  # environments side by side
+    num_threads: Annotated[int, Ge(0)] = 0  # of the simulation; 0 uses all cores
 
     def __post_init__(self) -> None:
         if self.render_mode == "human":
             raise InputError("expected render_mode 'rgb_array', found 'human'; `mazebench play` opens a window")
-        super().__post_init__()
 
 
 def require_task_spec(task_spec: TaskSpec) -> None:

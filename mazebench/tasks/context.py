@@ -24,14 +24,17 @@ def build_context(walls: np.ndarray, start: Cell, goal: Cell, context_size: int)
     start at (M // 2, M // 2); outside of the map is wall. Plane 2 marks the goal, plane 3 the start: a cell (r, c) of
     N x N is marked at (r M // N, c M // N).
     """
-    size, half = len(walls), context_size // 2
+    size = len(walls)
     context = np.zeros((NUM_PLANES, context_size, context_size), dtype=np.float32)
     context[GLOBAL_MAP] = resized_map(walls, context_size)
-    top, bottom = max(0, start[0] - half), min(size, start[0] - half + context_size)
-    left, right = max(0, start[1] - half), min(size, start[1] - half + context_size)
+
+    # The part of the map around the start, whose cell (r, c) is cell (r - row, c - column) of the local map.
+    row, column = start[0] - context_size // 2, start[1] - context_size // 2
+    top, bottom = max(0, row), min(size, row + context_size)
+    left, right = max(0, column), min(size, column + context_size)
     context[LOCAL_MAP] = 1
-    row, column = half - start[0], half - start[1]  # add these to a cell of the map to get its cell in the crop
-    context[LOCAL_MAP, top + row : bottom + row, left + column : right + column] = walls[top:bottom, left:right]
+    context[LOCAL_MAP, top - row : bottom - row, left - column : right - column] = walls[top:bottom, left:right]
+
     context[GOAL, goal[0] * context_size // size, goal[1] * context_size // size] = 1
     context[START, start[0] * context_size // size, start[1] * context_size // size] = 1
     return context

@@ -14,39 +14,39 @@ _METRES = r"([-+]?\d*\.?\d+)\s*m"
 _POINT = re.compile(rf"{_METRES}\s*,\s*{_METRES}")
 
 
-def place_text(name: str, place: Any) -> str | None:
-    """Returns a place as text; a cell may be given as two ints. None stays None.
+def end_text(name: str, end: Any) -> str | None:
+    """Returns a start or a goal as text; a cell may be given as two ints. None stays None.
 
     Raises:
-      InputError: if it is no place; `name` is that of the option.
+      InputError: if it is neither a cell nor a point; `name` is that of the option.
     """
-    if place is None:
+    if end is None:
         return None
-    text = ",".join(map(str, place)) if isinstance(place, Iterable) and not isinstance(place, str) else str(place)
+    text = ",".join(map(str, end)) if isinstance(end, Iterable) and not isinstance(end, str) else str(end)
     if not (_CELL.fullmatch(text.strip()) or _POINT.fullmatch(text.strip())):
-        raise InputError(f"expected {name} as a cell 'row,column' or a point '1.5m,2.5m' (x, y), found {place!r}"[:200])
+        raise InputError(f"expected {name} as a cell 'row,column' or a point '1.5m,2.5m' (x, y), found {end!r}"[:200])
     return text.strip()
 
 
-def cell_of_place(name: str, place: str, maze: Maze) -> Cell:
-    """Returns the cell of a place that `place_text` made.
+def cell_of_end(name: str, end: str, maze: Maze) -> Cell:
+    """Returns the cell of a start or a goal that `end_text` made.
 
     Raises:
       InputError: if it is not free in `maze`; `name` is that of the option.
     """
-    if cell := _CELL.fullmatch(place):
+    if cell := _CELL.fullmatch(end):
         row, column = map(int, cell.groups())
         try:
             return maze.require_free((row, column))
         except MazeError as error:
-            raise InputError(f"{name} {place!r}: {error}") from error
-    point = _POINT.fullmatch(place)
-    assert point is not None, place
+            raise InputError(f"{name} {end!r}: {error}") from error
+    point = _POINT.fullmatch(end)
+    assert point is not None, end
     x, y = map(float, point.groups())
     is_inside = 0 <= x < maze.side and 0 <= y < maze.side
     if not is_inside or not maze.is_free(maze.cell_at(x, y)):
         found = "a wall" if is_inside else "one outside"
-        raise InputError(f"{name} {place!r}: {maze.name}: expected a point {_describe_extent(maze)}, found {found}")
+        raise InputError(f"{name} {end!r}: {maze.name}: expected a point {_describe_extent(maze)}, found {found}")
     return maze.cell_at(x, y)
 
 

@@ -39,7 +39,13 @@ def sample_episode(spec: TaskSpec, rng: np.random.Generator) -> Episode:
         pair_rng = np.random.default_rng([_FIXED_PAIR_SEED, index]) if spec.pairs == "fixed" else rng
         distance = spec.distances[pair_rng.integers(len(spec.distances))]
         start, goal = sample_pair(maze, distance, pair_rng, start, goal)
-    return Episode(index, start, goal, float(rng.uniform(-np.pi, np.pi)), int(rng.integers(_SEEDS)))
+    return make_episode(index, start, goal, rng)
+
+
+def make_episode(maze: int, start: Cell, goal: Cell, rng: np.random.Generator) -> Episode:
+    """Returns the episode from `start` to `goal` in maze number `maze`; draws the first heading and the seed."""
+    yaw = float(rng.uniform(-np.pi, np.pi))
+    return Episode(maze=maze, start=start, goal=goal, yaw=yaw, seed=int(rng.integers(_SEEDS)))
 
 
 def sample_pair(
@@ -55,18 +61,22 @@ def sample_pair(
     """
     if start is not None and goal is not None:
         return start, goal
+
+    # One is given: draw the other.
     if (given := start or goal) is not None:
         others = maze.cells_at(given, distance)
         if not len(others):
             raise InputError(f"{maze.name}: found no cell {distance} cells from {given}; choose others (--distances)")
         row, column = others[rng.integers(len(others))].tolist()
         return (given, (row, column)) if given is start else ((row, column), given)
+
+    # Draw starts until one has goals.
     for _ in range(_MAX_TRIES):
-        start = maze.free_cells[rng.integers(len(maze.free_cells))]
-        goals = maze.cells_at((int(start[0]), int(start[1])), distance)
+        row, column = maze.free_cells[rng.integers(len(maze.free_cells))].tolist()
+        goals = maze.cells_at((row, column), distance)
         if len(goals):
-            goal = goals[rng.integers(len(goals))]
-            return (int(start[0]), int(start[1])), (int(goal[0]), int(goal[1]))
+            goal_row, goal_column = goals[rng.integers(len(goals))].tolist()
+            return (row, column), (goal_row, goal_column)
     raise InputError(f"{maze.name}: found no two cells {distance} cells apart; the farthest are {maze.diameter}")
 
 

@@ -17,7 +17,8 @@ from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_action, controls_
 from mazebench.tasks.arguments import Arguments, require_task_spec
 from mazebench.tasks.episode import Episode, check_episode, sample_episode
 from mazebench.tasks.observation import OpenSensors, observation_specs, state_errors
-from mazebench.tasks.route import Event, plan_route
+from mazebench.tasks.perturbations.base import ShownMap, StateError
+from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.sensors.base import Worlds
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
@@ -25,10 +26,11 @@ from mazebench.world.models import models_of
 from mazebench.world.simulation import Simulation
 
 _DISCOUNTS = {Event.REACHED: 0.0, Event.TIMEOUT: 1.0}
-# Attributes of a `Navigation` that are not part of its state, and others that are replaced but never changed. Copying
-# the generator takes as long as copying all the rest, so its state is kept instead.
+# Attributes of a `Navigation` that are not part of its state. Copying the generator takes as long as copying all the
+# rest, so a state has the generator's state instead.
 _NO_STATE = ("spec", "rng", "_models", "_sensors")
-_REPLACED = ("episode", "shown_map", "_context")
+# Attributes whose values are never changed in place, so that copies share them.
+_SHARED = ("episode", "shown_map", "_context")
 
 
 class Navigation:
@@ -57,6 +59,15 @@ class Navigation:
     truncated (discount 1) after `time_limit` steps, in the hierarchical task of the last leg. A goal that is
     entered on the last step is reached.
     """
+
+    # Of the running episode, from the first `initialize_episode` on.
+    episode: Episode
+    shown_map: ShownMap
+    route: Route
+    _state_errors: list[StateError]
+    _position: tuple[float, float]  # x, y (m) of the body after the last step
+    _context: np.ndarray  # of the current leg
+    _is_first: bool
 
     def __init__(self, spec: TaskSpec, seed: int | None = None):
         """`seed` is that of the stream from which episodes are drawn.
@@ -103,17 +114,25 @@ class Navigation:
 
     def initialize_episode(self, simulation: Simulation) -> None:
         """Draws an episode, or takes the chosen one, and places body and goal; call it within `reset_context()`."""
-        self.episode = self._next_episode or sample_episode(self.spec, self.rng)
+        episode = self._next_episode or sample_episode(self.spec, self.rng)
         self._next_episode = None
-        episode = self.episode
+        self.episode = episode
+
+        # The body in its maze.
         self._load_maze(simulation, episode.maze)
         start = self.spec.mazes[episode.maze].point(episode.start)
-        self._position: tuple[float, float] = (float(start[0]), float(start[1]))
         simulation.place_agent(start, episode.yaw)
+
+        # What the agent is shown, and where it is sent.
         self.shown_map = show_map(self.spec, episode)
         self.route = plan_route(self.spec, episode, self.shown_map)
         self._state_errors = state_errors(self.spec, episode)
-        self.path_length, self.steps, self._event = 0.0, 0, Event.NONE
+
+        # What steps add to.
+        self._position = (float(start[0]), float(start[1]))
+        self.path_length = 0.0
+        self.steps = 0
+        self._event = Event.NONE
         self._begin_leg(simulation)
 
     def _load_maze(self, simulation: Simulation, index: int) -> None:
@@ -134,10 +153,12 @@ class Navigation:
     def after_step(self, simulation: Simulation) -> None:
         """Takes note of what the action led to."""
         x, y = simulation.position().tolist()
-        moved_x, moved_y = x - self._position[0], y - self._position[1]
+        last_x, last_y = self._position
+        moved_x, moved_y = x - last_x, y - last_y
         self.path_length += math.sqrt(moved_x * moved_x + moved_y * moved_y)
         self._position = (x, y)
         self.steps += 1
+
         self._event = self.route.advance(self.spec.mazes[self._maze].cell_at(x, y), self.steps)
         self._is_first = False
         if self._event is Event.LANDMARK:
@@ -157,7 +178,9 @@ class Navigation:
         if self.spec.has_legs:
             observation["is_first"] = np.array(self._is_first)
         if self.spec.sensors:
-            world = Worlds(np.array([self.episode.maze]), simulation.data.qpos[None], simulation.data.mocap_pos)
+            world = Worlds(
+                maze=np.array([self.episode.maze]), pose=simulation.data.qpos[None], marker=simulation.data.mocap_pos
+            )
             observation |= {name: values[0] for name, values in self._sensors.read(world).items()}
         return observation
 
@@ -185,8 +208,12 @@ class Navigation:
     def get_state(self, simulation: Simulation) -> EnvironmentState:
         """Returns all that the future of the task and its simulation depends on."""
         changing = {name: value for name, value in vars(self).items() if name not in _NO_STATE}
-        maze, rng_state = self.spec.mazes[self._maze], self.rng.bit_generator.state
-        return EnvironmentState(maze, simulation.full_state(), rng_state, _copied(changing))
+        return EnvironmentState(
+            maze=self.spec.mazes[self._maze],
+            simulation=simulation.full_state(),
+            rng=self.rng.bit_generator.state,
+            task=_copied(changing),
+        )
 
     def set_state(self, state: EnvironmentState, simulation: Simulation) -> None:
         """Goes back to a state.
@@ -218,6 +245,6 @@ class EnvironmentState(NamedTuple):
 
 
 def _copied(attributes: dict[str, Any]) -> dict[str, Any]:
-    """Returns a copy of attributes of a `Navigation` that shares what is never changed."""
-    shared = {id(attributes[name]): attributes[name] for name in _REPLACED if name in attributes}
+    """Returns a copy of attributes of a `Navigation`, in which the values of `_SHARED` are the same objects."""
+    shared = {id(attributes[name]): attributes[name] for name in _SHARED if name in attributes}
     return copy.deepcopy(attributes, shared)

@@ -1,72 +1,57 @@
-"""A navigation task: its options and its mazes."""
+"""A navigation task: what is played and in which mazes."""
 
 from __future__ import annotations
 
-import dataclasses
+from pydantic import InstanceOf
 
 from mazebench.constants import TASK_VERSION, TRACKS_VERSION
 from mazebench.errors import InputError
-from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, Cell, Maze, corner_cells, require_one_size
+from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, Maze, require_one_size
 from mazebench.maps.options import THIN_WALLS
-from mazebench.tasks.context import default_context_size
-from mazebench.tasks.options import ENDS, TIME_LIMIT, TaskOptions
-from mazebench.tasks.places import cell_of_place
+from mazebench.options import options
+from mazebench.tasks.options import TaskOptions, Variants
 from mazebench.tasks.tracks import TRACKS
 
 MIN_CONTEXT_SIZE = 3
-_LIDAR = "lidar"  # the sensor that every track offers
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class TaskSpec(TaskOptions):
+@options
+class TaskSpec(TaskOptions, Variants):
     """A navigation task on mazes of one size and scale, which the dm_env, Gymnasium and vector environments all play.
 
-    It holds plain values: no models, no simulation.
+    `mazebench.tasks.build` computes it from options. It is complete: its distances, time limit, context size and
+    sensors are those that are played. It holds plain values: no models, no simulation.
 
     Raises:
-      InputError: if an option is not allowed, or the mazes do not fit it.
+      InputError: if a value is not allowed, or the mazes do not fit it.
     """
 
-    mazes: tuple[Maze, ...]
+    mazes: tuple[InstanceOf[Maze], ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_one_size(self.mazes)
-        if self.cell_size < MIN_CELL_SIZE:
+        check_mazes(self, self.mazes)
+        if self.num_goals > 1 and (self.task != "local" or self.pairs != "random"):
             raise InputError(
-                f"{self.mazes[0].name}: expected cells of at least {MIN_CELL_SIZE} m, through which the body passes, "
-                f"found {self.cell_size} m; {THIN_WALLS}"
+                f"expected num_goals 1 unless the task is local and pairs are random, found {self.num_goals}"
             )
-        if self.time_limit == 0:
-            object.__setattr__(self, "time_limit", TIME_LIMIT)
-        if self.track is not None:
-            self._apply_track(self.track)
-        elif self.context_size == 0:
-            object.__setattr__(self, "context_size", default_context_size(self.size))
-        if self.context_size < MIN_CONTEXT_SIZE:
+        if self.ends_given and self.pairs == "fixed":
+            raise InputError("expected pairs 'random' beside a start or a goal, found 'fixed', pairs of their own")
+        if self.goal is not None and self.num_goals > 1:
+            raise InputError(f"expected num_goals 1 beside a goal, found {self.num_goals}")
+        if not self.context_size >= MIN_CONTEXT_SIZE:
             raise InputError(f"expected context_size from {MIN_CONTEXT_SIZE} to {MAX_SIZE}, found {self.context_size}")
-        for maze in self.mazes:
-            if len(maze.free_cells) < 2:
-                raise InputError(f"{maze.name}: expected two free cells for a start and a goal, found one")
-            start, goal = self.ends(maze)
-            if start is not None and start == goal:
-                raise InputError(f"{maze.name}: expected start and goal in different cells, found both in {start}")
+        if self.time_limit < 1:
+            raise InputError(f"expected time_limit of at least 1, found {self.time_limit}")
         if self.task == "local":
             self._check_distances()
 
-    def _apply_track(self, name: str) -> None:
-        """Takes over what the track called `name` fixes."""
-        track = TRACKS[name]
-        if self.cell_size != 1:
-            raise InputError(f"track {name!r}: expected cells of 1 m, found {self.cell_size} m")
-        for maze in self.mazes:
-            track.check(maze, self.level)
-        context_size = track.context_size(self.level, self.size)
-        if self.context_size not in (0, context_size):
-            raise InputError(f"track {name!r}: expected context_size {context_size}, found {self.context_size}")
-        object.__setattr__(self, "context_size", context_size)
-        if _LIDAR not in self.sensors:
-            object.__setattr__(self, "sensors", (_LIDAR, *self.sensors))
+    def _check_track(self, name: str) -> None:
+        super()._check_track(name)
+        for option_name, value in {"pairs": "random", "num_goals": 1}.items():
+            found = getattr(self, option_name)
+            if found != value:
+                raise InputError(f"track {name!r}: expected {option_name} {value!r}, found {found!r}")
 
     def _check_distances(self) -> None:
         if not self.distances:
@@ -77,26 +62,6 @@ class TaskSpec(TaskOptions):
                     f"{maze.name}: expected distances of at most {farthest} cells, as far as the maze reaches, "
                     f"found {max(self.distances)}; choose others (--distances)"
                 )
-
-    def ends(self, maze: Maze) -> tuple[Cell | None, Cell | None]:
-        """Returns the start and the goal of all episodes in a maze; None for one that each episode draws.
-
-        Raises:
-          InputError: if one is not free.
-        """
-        places = {name: place for name in ENDS if (place := getattr(self, name)) is not None}
-        cells = {name: cell_of_place(name, place, maze) for name, place in places.items()}
-        corners = dict(zip(ENDS, corner_cells(maze), strict=True)) if self.task == "hierarchical" else {}
-        start, goal = ((corners | cells).get(name) for name in ENDS)
-        return start, goal
-
-    def farthest(self, maze: Maze) -> int:
-        """Returns the largest distance in cells that start and goal can have in a maze."""
-        start, goal = self.ends(maze)
-        if start is not None and goal is not None:
-            return maze.distance(start, goal)
-        given = start or goal
-        return maze.diameter if given is None else int(maze.distances(given).max())
 
     @property
     def size(self) -> int:
@@ -117,3 +82,29 @@ class TaskSpec(TaskOptions):
     def has_legs(self) -> bool:
         """Whether the context may change within an episode: at landmarks, or where one goal follows another."""
         return self.task == "hierarchical" or self.num_goals > 1
+
+
+def check_mazes(task: TaskOptions, mazes: tuple[Maze, ...]) -> None:
+    """Checks that a task can be played in some mazes.
+
+    Raises:
+      InputError: if they are not of one size and scale, a cell is too narrow for the body, a maze has no two free cells
+        for a start and a goal, or the task's track does not take them.
+    """
+    require_one_size(mazes)
+    name, cell_size = mazes[0].name, mazes[0].cell_size
+    if cell_size < MIN_CELL_SIZE:
+        raise InputError(
+            f"{name}: expected cells of at least {MIN_CELL_SIZE} m, through which the body passes, "
+            f"found {cell_size} m; {THIN_WALLS}"
+        )
+    if task.track is not None and cell_size != 1:
+        raise InputError(f"track {task.track!r}: expected cells of 1 m, found {cell_size} m")
+    for maze in mazes:
+        if task.track is not None:
+            TRACKS[task.track].check(maze, task.level)
+        if len(maze.free_cells) < 2:
+            raise InputError(f"{maze.name}: expected two free cells for a start and a goal, found one")
+        start, goal = task.ends(maze)
+        if start is not None and start == goal:
+            raise InputError(f"{maze.name}: expected start and goal in different cells, found both in {start}")

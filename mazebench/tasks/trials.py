@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, TRACKS_VERSION, VERSION, read_asset
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.maze import Cell, Maze
-from mazebench.tasks.episode import Episode, sample_pair
+from mazebench.tasks.episode import Episode, make_episode, sample_pair
 from mazebench.tasks.options import EVAL_DISTANCES
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.mjcf import BODY_RADIUS
@@ -21,7 +21,6 @@ from mazebench.world.mjcf import BODY_RADIUS
 COLUMNS = ("maze", "start_row", "start_column", "goal_row", "goal_column", "distance", "yaw", "seed", "shortest_path")
 
 _MAX_DRAWS = 100  # for a pair not drawn before
-_SEEDS = 2**31
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,55 +43,47 @@ def frozen_trials(task: str, size: int, version: str = VERSION) -> tuple[Trial, 
     v1 has 1,500 of the local task and 20 of the hierarchical one; v2 has 200, which tracks share.
     """
     rows = csv.DictReader(read_asset(episodes_file(task, size), version).splitlines())
-    return tuple(
-        Trial(
-            Episode(
-                int(row["maze"]),
-                (int(row["start_row"]), int(row["start_column"])),
-                (int(row["goal_row"]), int(row["goal_column"])),
-                float(row["yaw"]),
-                int(row["seed"]),
-            ),
-            int(row["distance"]),
-            float(row["shortest_path"]),
-        )
-        for row in rows
+    return tuple(_trial_of_row(row) for row in rows)
+
+
+def _trial_of_row(row: dict[str, str]) -> Trial:
+    episode = Episode(
+        maze=int(row["maze"]),
+        start=(int(row["start_row"]), int(row["start_column"])),
+        goal=(int(row["goal_row"]), int(row["goal_column"])),
+        yaw=float(row["yaw"]),
+        seed=int(row["seed"]),
     )
+    return Trial(episode, distance=int(row["distance"]), shortest_path=float(row["shortest_path"]))
 
 
 def select_trials(
-    task: str,
-    mazes: Sequence[Maze],
-    frozen: bool,
-    distances: Iterable[int] = EVAL_DISTANCES,
-    episodes_per_distance: int = EPISODES_PER_DISTANCE,
-    seed: int = 0,
+    spec: TaskSpec, is_frozen: bool, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0
 ) -> list[Trial]:
     """Returns the episodes to evaluate, by maze and then by distance.
 
     Args:
-      task: "local" or "hierarchical".
-      mazes: all the task's mazes.
-      frozen: whether `mazes` are benchmark v1's eval mazes, whose frozen episodes are then taken as far as they go.
-      distances: of the local task's pairs, cells.
+      spec: the task; its distances are those of the pairs.
+      is_frozen: whether its mazes are the benchmark's eval mazes, whose frozen episodes are then taken as far as they
+        go: of a track all of those distances, of v1 at most five for each maze and distance.
       episodes_per_distance: for each maze and distance.
       seed: of what is drawn.
 
     Raises:
       InputError: if no two cells of a maze are a wanted distance apart.
     """
-    distances = sorted(set(distances))
-    if frozen and task == "hierarchical":
-        return list(frozen_trials(task, mazes[0].size))
-    if frozen and set(distances) <= set(EVAL_DISTANCES) and episodes_per_distance <= EPISODES_PER_DISTANCE:
-        kept = np.arange(EPISODES_PER_DISTANCE) < episodes_per_distance
-        trials = frozen_trials(task, mazes[0].size)
+    if is_frozen and spec.track is not None:
+        trials = frozen_trials("local", spec.size, TRACKS_VERSION)
+        return [trial for trial in trials if trial.distance in spec.distances]
+    if is_frozen and spec.task == "hierarchical":
+        return list(frozen_trials(spec.task, spec.size))
+    if is_frozen and set(spec.distances) <= set(EVAL_DISTANCES) and episodes_per_distance <= EPISODES_PER_DISTANCE:
+        # The frozen episodes of a maze and a distance follow each other, EPISODES_PER_DISTANCE of them.
         return [
             trial
-            for trial, keep in zip(trials, np.resize(kept, len(trials)), strict=True)
-            if keep and trial.distance in distances
+            for index, trial in enumerate(frozen_trials(spec.task, spec.size))
+            if index % EPISODES_PER_DISTANCE < episodes_per_distance and trial.distance in spec.distances
         ]
-    spec = TaskSpec(task=task, mazes=tuple(mazes), distances=tuple(distances))
     return draw_trials(spec, episodes_per_distance, seed)
 
 
@@ -115,17 +106,17 @@ def draw_trials(spec: TaskSpec, episodes_per_distance: int = EPISODES_PER_DISTAN
         if start is not None and goal is not None:
             distances = [maze.distance(start, goal)]
         for distance in distances:
-            trials += _local_trials(maze, index, distance, episodes_per_distance, seed, start, goal)
+            rng = np.random.default_rng([seed, maze.size, index, distance])
+            for pair in _draw_pairs(maze, distance, episodes_per_distance, rng, start, goal):
+                trials.append(make_trial(maze, index, pair, rng))
     return trials
 
 
-def _local_trials(
-    maze: Maze, index: int, distance: int, count: int, seed: int, start: Cell | None, goal: Cell | None
-) -> list[Trial]:
-    """Returns `count` episodes, of different pairs if there are so many; the first ones do not depend on `count`."""
-    rng = np.random.default_rng([seed, maze.size, index, distance])
+def _draw_pairs(
+    maze: Maze, distance: int, count: int, rng: np.random.Generator, start: Cell | None, goal: Cell | None
+) -> Iterator[tuple[Cell, Cell]]:
+    """Yields `count` starts and goals, different ones if there are so many; the first ones do not depend on `count`."""
     seen: set[tuple[Cell, Cell]] = set()
-    trials = []
     for _ in range(count):
         pair = sample_pair(maze, distance, rng, start, goal)
         for _ in range(_MAX_DRAWS):
@@ -133,24 +124,13 @@ def _local_trials(
                 break
             pair = sample_pair(maze, distance, rng, start, goal)
         seen.add(pair)
-        trials.append(make_trial(maze, index, pair, rng))
-    return trials
-
-
-def select_track_trials(
-    mazes: Sequence[Maze], frozen: bool, distances: Iterable[int], episodes_per_distance: int, seed: int = 0
-) -> list[Trial]:
-    """Returns the episodes of a track to evaluate, as `select_trials` does; of frozen ones, all at these distances."""
-    if not frozen:
-        return select_trials("local", mazes, False, distances, episodes_per_distance, seed)
-    wanted = set(distances)
-    return [trial for trial in frozen_trials("local", mazes[0].size, TRACKS_VERSION) if trial.distance in wanted]
+        yield pair
 
 
 def make_trial(maze: Maze, index: int, pair: tuple[Cell, Cell], rng: np.random.Generator) -> Trial:
     """Returns the trial of a start and a goal in maze number `index`; draws the first heading and the seed."""
     start, goal = pair
-    episode = Episode(index, start, goal, float(rng.uniform(-np.pi, np.pi)), int(rng.integers(_SEEDS)))
+    episode = make_episode(index, start, goal, rng)
     shortest = _disc_paths(maze).length(maze.point(start), goal)
     return Trial(episode, maze.distance(start, goal), shortest)
 
@@ -162,7 +142,5 @@ def _disc_paths(maze: Maze) -> DiscPaths:
 
 def benchmark_task_sizes() -> list[tuple[str, int, int]]:
     """Returns (task, size, number of frozen episodes) for all of benchmark v1."""
-    local = MAZES_PER_SPLIT * len(EVAL_DISTANCES) * EPISODES_PER_DISTANCE
-    return [
-        (task, size, count) for size in SIZES for task, count in (("local", local), ("hierarchical", MAZES_PER_SPLIT))
-    ]
+    counts = {"local": MAZES_PER_SPLIT * len(EVAL_DISTANCES) * EPISODES_PER_DISTANCE, "hierarchical": MAZES_PER_SPLIT}
+    return [(task, size, count) for size in SIZES for task, count in counts.items()]

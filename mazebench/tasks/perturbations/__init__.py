@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
-import dataclasses
+import typing
+from typing import Annotated
 
-from mazebench.options import Options
-from mazebench.tasks.perturbations.base import Perturbation, level
+from mazebench.options import options
+from mazebench.tasks.perturbations.base import Perturbation
 from mazebench.tasks.perturbations.flip import MapFlip
 from mazebench.tasks.perturbations.noise import PositionNoise
 from mazebench.tasks.perturbations.warp import MapWarp
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Perturbations(Options):
+@options
+class Perturbations:
     """The table of perturbations, as options of a task; they are applied in this order. Level 0 switches one off.
 
     Each draws from a random stream of its own. Streams 0 to 2 are taken by these, stream 3 by the goals after the first
     one (`mazebench.tasks.route`), streams 4 to 8 by the tracks; a new perturbation takes 9, 10, ...
     """
 
-    map_flip: float = level(MapFlip())
-    map_warp: float = level(MapWarp())
-    position_noise: float = level(PositionNoise())
+    map_flip: Annotated[float, MapFlip()] = 0.0
+    map_warp: Annotated[float, MapWarp()] = 0.0
+    position_noise: Annotated[float, PositionNoise()] = 0.0
 
 
 PERTURBATIONS: dict[str, Perturbation] = {
-    field.name: field.metadata["perturbation"] for field in dataclasses.fields(Perturbations)
+    name: kind.__metadata__[0] for name, kind in typing.get_type_hints(Perturbations, include_extras=True).items()
 }
 
 

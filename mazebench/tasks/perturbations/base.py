@@ -5,13 +5,14 @@ from __future__ import annotations
 import abc
 import dataclasses
 import functools
-from collections.abc import Callable
-from typing import Any, ClassVar
+from collections.abc import Callable, Iterator
+from typing import ClassVar
 
 import numpy as np
+from annotated_types import Ge, GroupedMetadata, Le
 
 from mazebench.maps.maze import Cell
-from mazebench.options import option
+from mazebench.options import Doc
 
 # Changes an observed state `[12]` float64 in place. It is called once for each observation of one episode. It is an
 # object that can be copied and pickled in the middle of an episode, so a function inside of another one will not do.
@@ -62,10 +63,11 @@ class ShownMap:
         return points if self.drawing is None else self.drawing.points(points, len(self.walls))
 
 
-class Perturbation:
+class Perturbation(GroupedMetadata):
     """One thing that may be wrong with what the agent is shown; the world stays true.
 
-    A level says how wrong it is; at level 0 nothing is. A subclass overrides `show`, or `state_error`, or both.
+    A level says how wrong it is; at level 0 nothing is. A subclass overrides `show`, or `state_error`, or both. As
+    metadata of an option, it is the range of the level and what it means.
     """
 
     help: ClassVar[str]  # what the level means, in one line
@@ -81,8 +83,7 @@ class Perturbation:
         """Returns what is wrong with the observed states of an episode that begins; None if nothing is."""
         return None
 
-
-def level(perturbation: Perturbation) -> Any:
-    """Returns the dataclass field of the level of `perturbation`, which is kept as `metadata["perturbation"]`."""
-    field = option(0.0, perturbation.help, lowest=perturbation.lowest, highest=perturbation.highest)
-    return dataclasses.field(default=0.0, metadata={**field.metadata, "perturbation": perturbation})
+    def __iter__(self) -> Iterator[object]:
+        yield Ge(self.lowest)
+        yield Le(self.highest)
+        yield Doc(self.help)

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import abc
-import dataclasses
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from annotated_types import Interval
 from dm_env import specs
 
 from mazebench.constants import MAX_PIXELS
 from mazebench.maps.maze import Maze
-from mazebench.options import Options, option
+from mazebench.options import Doc, options
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class SensorOptions(Options):
+@options
+class SensorOptions:
     """The options that sensors read."""
 
-    camera_size: int = option(64, "Pixels on a side of a camera's picture.", lowest=1, highest=MAX_PIXELS)
-    textures: bool = option(False, "Walls in pictures have patterns and colours that tell places apart.")
+    camera_size: Annotated[int, Interval(ge=1, le=MAX_PIXELS), Doc("Pixels on a side of a camera's picture.")] = 64
+    textures: Annotated[bool, Doc("Walls in pictures have patterns and colours that tell places apart.")] = False
 
 
 class Worlds(NamedTuple):

@@ -16,6 +16,7 @@ from mazebench.world.angles import wrap_angle
 
 _SCALES = (0.9, 1.1)  # lowest and highest of an episode's scale
 _HEADING_WALK = math.radians(2.0)  # rad per root second
+_X, _Y, _YAW, _VELOCITY, _YAW_RATE = 0, 1, 5, slice(6, 9), 11  # indices in a state
 
 
 class Lost(Track):
@@ -61,21 +62,22 @@ class Odometry:
 
     def __call__(self, state: np.ndarray) -> None:
         """Changes a true state `[12]` in place; each call is the observation after the next agent step."""
-        x, y, _, _, _, yaw = state[:6].tolist()
+        x, y, yaw = state.item(_X), state.item(_Y), state.item(_YAW)
         drift = 0.0
         if self._true is not None:
             drift = self.rng.normal(0.0, self.heading_walk * math.sqrt(STEP_TIME))
             self._advance(x, y, yaw, drift)
         self._true = (x, y, yaw)
-        state[0], state[1], state[5] = self._observed
-        state[6:9] *= self.scale
-        state[11] += drift / STEP_TIME
+        state[_X], state[_Y], state[_YAW] = self._observed
+        state[_VELOCITY] *= self.scale
+        state[_YAW_RATE] += drift / STEP_TIME
 
     def _advance(self, x: float, y: float, yaw: float, drift: float) -> None:
         """Moves the observed pose as the true one moved to (x, y, yaw), and turns it by `drift` (rad) more."""
         assert self._true is not None
         true_x, true_y, true_yaw = self._true
         odometry_x, odometry_y, heading = self._observed
+
         # The true motion in the body's frame, turned into the frame of odometry: one rotation by the difference.
         cosine, sine = math.cos(heading - true_yaw), math.sin(heading - true_yaw)
         moved_x, moved_y = self.scale * (x - true_x), self.scale * (y - true_y)

@@ -80,10 +80,10 @@ class Displacement:
         """Returns whether the displaced sheet lies over itself somewhere, or one of its axes runs backwards."""
         nodes, count = _nodes(size), self.noise.shape[-1]
         smooth, slope = _gaussians(nodes, count), _gaussian_slopes(nodes, count)
-        (row_row, column_row), (row_column, column_column) = (
-            _weighted(slope, self.noise, smooth),
-            _weighted(smooth, self.noise, slope),
-        )
+
+        # By how much each component changes along rows and along columns.
+        row_row, column_row = _weighted(slope, self.noise, smooth)
+        row_column, column_column = _weighted(smooth, self.noise, slope)
         jacobian = (1 + row_row) * (1 + column_column) - row_column * column_row
         return bool(min(jacobian.min(), 1 + row_row.min(), 1 + column_column.min()) <= 0)
 
@@ -117,11 +117,13 @@ class HandDrawing(Drawing):
     def picture(self, walls: np.ndarray) -> np.ndarray:
         """Returns `[P, P]` float32: the share of wall in each pixel, a multiple of 1 / 255; bare paper is wall."""
         size, pixels = len(walls), PIXELS * len(walls)
+        # How many samples of the maze, and how many of its walls, fall into each pixel.
         samples = (np.arange(_SAMPLES * size) + 0.5) / _SAMPLES
         row, column = np.clip(self._drawn_grid(samples), 0, pixels - 1).astype(np.intp)
         pixel = row * pixels + column
         drawn = np.bincount(pixel.ravel(), minlength=pixels**2)
         wall = np.bincount(pixel[self._thick_walls(walls, samples)], minlength=pixels**2)
+
         # In whole numbers, so that every machine draws the same picture. Paper is `_WHITE` of `_WHITE`.
         grey = np.where(drawn > 0, (2 * _WHITE * wall + drawn) // np.maximum(2 * drawn, 1), _WHITE)
         return (grey / np.float32(_WHITE)).astype(np.float32).reshape(pixels, pixels)
@@ -173,23 +175,24 @@ def draw_by_hand(size: int, level: float, rng: np.random.Generator) -> HandDrawi
     """
     displacement = draw_displacement(size, rng).scaled(level)
     stretch = rng.uniform(1 - LARGEST_STRETCH, 1 + LARGEST_STRETCH, size=2)
-    place = rng.uniform(size=2)  # share of the paper that is left over which lies above, and on the left
+    margin = rng.uniform(size=2)
     thickening = float(rng.uniform(-LARGEST_THICKENING, LARGEST_THICKENING))
-    return fitted_drawing(size, displacement, stretch / (1 + LARGEST_STRETCH), place, thickening)
+    return fitted_drawing(size, displacement, stretch / (1 + LARGEST_STRETCH), margin, thickening)
 
 
 def fitted_drawing(
-    size: int, displacement: Displacement, share: np.ndarray, place: np.ndarray, thickening: float
+    size: int, displacement: Displacement, share: np.ndarray, margin: np.ndarray, thickening: float
 ) -> HandDrawing:
     """Returns a drawing that takes `share` `[2]` of the sheet along rows and columns.
 
-    `place` `[2]` is the share of what is left that lies above the drawing, and on its left.
+    Of the paper that it leaves bare, the share `margin` `[2]` lies above the drawing, and on its left.
     """
     nodes, pixels = _nodes(size), PIXELS * size
     points = np.stack(np.meshgrid(nodes, nodes, indexing="ij")) + displacement.on_grid(nodes)
     first, last = points.min(axis=(1, 2)), points.max(axis=(1, 2))
     scale = share * pixels / (last - first)
-    return HandDrawing(displacement, scale, place * (1 - share) * pixels - scale * first, thickening)
+    origin = margin * (1 - share) * pixels - scale * first
+    return HandDrawing(displacement=displacement, scale=scale, origin=origin, thickening=thickening)
 
 
 def _nodes(size: int) -> np.ndarray:

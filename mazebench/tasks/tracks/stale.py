@@ -89,6 +89,8 @@ def move_doors(walls: np.ndarray, num_swaps: int, keep: Iterable[Cell], rng: np.
     weight = math.exp(intercept - slope * num_swaps / len(doors.ways))
     for _ in range(_MAX_TRIES):
         earlier = _search(doors, is_open, weight, rng)
+
+        # How many doors are still to be opened: of those that are closed in the maze, and of those that are open.
         num_new = num_swaps - int((earlier & ~is_open).sum())
         num_old = int(is_open.sum()) - int(earlier.sum()) - num_new
         new, old = np.flatnonzero(~is_open & ~earlier), np.flatnonzero(is_open & ~earlier)
@@ -99,7 +101,12 @@ def move_doors(walls: np.ndarray, num_swaps: int, keep: Iterable[Cell], rng: np.
                 moved = walls.copy()
                 moved[tuple(doors.cells.T)] = ~earlier
                 return moved
-        weight *= _ADAPTATION if num_new < 0 else 1 / _ADAPTATION if num_old < 0 else 1
+
+        # The search had too many swaps, or too few.
+        if num_new < 0:
+            weight *= _ADAPTATION
+        elif num_old < 0:
+            weight *= 1 / _ADAPTATION
     raise InputError(f"found no maze with {num_swaps} doors moved; give a larger maze")
 
 

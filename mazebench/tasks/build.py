@@ -1,0 +1,187 @@
+"""From options to a task: `build_task` is the one place where a `TaskSpec` is made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from mazebench.errors import InputError, unknown
+from mazebench.maps.maze import Maze
+from mazebench.maps.options import MAP_OPTIONS, MazeOptions
+from mazebench.maps.selection import Maps, load_mazes_of
+from mazebench.options import by_name, from_names, options_of
+from mazebench.tasks.context import default_context_size
+from mazebench.tasks.options import (
+    EVAL_DISTANCES,
+    TASKS,
+    TIME_LIMIT,
+    TRAIN_DISTANCES,
+    EnvironmentOptions,
+    TaskOptions,
+    Variants,
+)
+from mazebench.tasks.spec import TaskSpec, check_mazes
+from mazebench.tasks.tracks import TRACKS
+
+# Of the diameter of a large maze. Few pairs of cells are farther apart, so that they would be long to find.
+_FARTHEST_SHARE = 0.9
+# Agent steps. A metre takes 2 at the top speed, and a quarter turn in each cell 4; the track `far` has as many.
+_STEPS_A_METRE, _STEPS_A_CELL, _SPARE_STEPS = 2, 4, 50
+
+
+def make_spec(
+    task: str = "local", size: int | None = None, split: str = "train", *, maps: Maps | None = None, **options: Any
+) -> TaskSpec:
+    """Returns a navigation task.
+
+    Args:
+      task: "local", "hierarchical" or the name of a track.
+      size: N, the cells on a side of benchmark v1's mazes: 13 (the default), 15, 17, 19 or 21; with `maps`, a size that
+        they must have. A track has its own.
+      split: "train" or "eval" mazes of the benchmark.
+      maps: mazes of your own instead: a `Maze`, an array as `maze_from_array` takes it, several of these of one size,
+        or the path of a file or of a folder of files.
+      **options: those of `mazebench.tasks.options.TaskOptions` and `Variants` and, with `maps`, of
+        `mazebench.maps.options.MapOptions`, which docs/options.md lists; None stands for the default.
+
+    Raises:
+      InputError: if an option is unknown or not allowed, or a map can't be read.
+    """
+    check_names(options)
+    values = {name: value for name, value in options.items() if value is not None}
+    if task not in (*TASKS, *TRACKS):
+        raise unknown("task", task, (*TASKS, *TRACKS))
+    if task in TRACKS:
+        if values.setdefault("track", task) != task:
+            raise InputError(f"expected one track, found {task!r} and {values['track']!r}")
+        task = "local"
+    values |= {"task": task, "size": size, "split": split, "maps": maps}
+    chosen = from_names(EnvironmentOptions, values)
+    return build_task(chosen.task, chosen.mazes, chosen.variants)
+
+
+def check_names(options: Iterable[str], arguments: Iterable[str] = ()) -> None:
+    """Checks the names of options for `make_spec`, in a call that takes `arguments` too.
+
+    Raises:
+      InputError: if there is no such option; it lists all that the call takes.
+    """
+    known = (*options_of(EnvironmentOptions), *arguments)
+    for name in options:
+        if name not in known:
+            raise unknown("option", name, known)
+
+
+def build_task(
+    task: TaskOptions,
+    mazes: MazeOptions,
+    variants: Variants | None = None,
+    *,
+    default_distances: tuple[int, ...] | None = None,
+    choose_context_size: Callable[[int], int] = default_context_size,
+) -> TaskSpec:
+    """Returns the task that options name, with all that they leave open.
+
+    Args:
+      task: what is played.
+      mazes: where it is played.
+      variants: what evaluations don't have; None for none.
+      default_distances: those in the benchmark's mazes, if the task names none and is no track; None for 1 to 5 in
+        train mazes and 1 to 15 in eval mazes.
+      choose_context_size: gives M for mazes of N cells on a side, if no context size is given and the task is no track.
+
+    Raises:
+      InputError: if options contradict each other or the mazes, or a map can't be read.
+    """
+    variants = variants or Variants()
+    chosen = load_task_mazes(task, mazes)
+    is_own = mazes.maps is not None or task.ends_given > 0
+    if is_own:
+        check_mazes(task, chosen)
+
+    # Distances: the given ones, else those that fit the mazes.
+    if task.ends_given == 2 and task.distances:
+        raise InputError(f"start and goal are given; found distances {task.distances}, which would be ignored")
+    default_distances = default_distances or (EVAL_DISTANCES if mazes.split == "eval" else TRAIN_DISTANCES)
+    distances = task.distances or _distances(task, chosen, is_own, default_distances)
+
+    # The time limit: the given one, else one in which goals of one's own are reached.
+    time_limit = task.time_limit or TIME_LIMIT
+    if is_own and task.track is None and not task.time_limit:
+        cells = task.landmark_distance if task.task == "hierarchical" else max(distances)
+        time_limit = fitting_time_limit(cells, chosen[0].cell_size)
+
+    # The context: the track's, else the given one, else the one that is chosen for mazes of this size.
+    if task.track is not None:
+        context_size = _context_size_of_track(task, chosen[0].size, variants.context_size)
+    else:
+        context_size = variants.context_size or choose_context_size(chosen[0].size)
+
+    computed = {
+        "mazes": chosen,
+        "distances": distances,
+        "time_limit": time_limit,
+        "context_size": context_size,
+        "sensors": task.observed_sensors,
+    }
+    return TaskSpec(**{**by_name(task), **by_name(variants), **computed})
+
+
+def load_task_mazes(task: TaskOptions, mazes: MazeOptions) -> tuple[Maze, ...]:
+    """Returns the mazes in which a task is played.
+
+    Raises:
+      InputError: if there are no such mazes, the task's track has another size, or a map can't be read.
+    """
+    if task.track is None or mazes.maps is not None:
+        return load_mazes_of(mazes)
+    mazes.require_defaults(MAP_OPTIONS, "maps of your own", f"the track {task.track!r}")
+    track = TRACKS[task.track]
+    chosen = track.mazes(task.level, mazes.split)
+    if mazes.size not in (None, chosen[0].size):
+        raise InputError(
+            f"track {task.track!r}, level {task.level[0]}: expected size {chosen[0].size}, found {mazes.size}; "
+            f"levels 1 to 3 have sizes {', '.join(map(str, track.sizes))}"
+        )
+    return chosen
+
+
+def fitting_time_limit(num_cells: int, cell_size: float) -> int:
+    """Returns the agent steps in which a goal `num_cells` away is reached with some to spare, at least 100."""
+    return max(TIME_LIMIT, math.ceil((_STEPS_A_METRE * cell_size + _STEPS_A_CELL) * num_cells) + _SPARE_STEPS)
+
+
+def _distances(task: TaskOptions, mazes: tuple[Maze, ...], is_own: bool, default: tuple[int, ...]) -> tuple[int, ...]:
+    """Returns the distances in cells of a task that names none."""
+    of_track = TRACKS[task.track].distances(min(task.level)) if task.track is not None else ()
+    if not is_own:
+        return of_track or default
+
+    # Of given ends, that between them.
+    if task.task == "hierarchical" or task.ends_given == 2:
+        return tuple(sorted({task.farthest(maze) for maze in mazes}))
+
+    # Of a track, those that all mazes have; all of its own, if none has any.
+    farthest, count = min(map(task.farthest, mazes)), len(EVAL_DISTANCES)
+    if of_track:
+        return tuple(distance for distance in of_track if distance <= farthest) or of_track
+
+    # Else at most 15, evenly spaced up to what all mazes have.
+    if farthest > count:
+        farthest = max(count, int(_FARTHEST_SHARE * farthest))
+    count = min(count, farthest)
+    return tuple(round(farthest * number / count) for number in range(1, count + 1))
+
+
+def _context_size_of_track(task: TaskOptions, size: int, given: int) -> int:
+    """Returns M of the task's track.
+
+    Raises:
+      InputError: if another one is `given`; 0 is none.
+    """
+    assert task.track is not None
+    context_size = TRACKS[task.track].context_size(task.level, size)
+    if given not in (0, context_size):
+        raise InputError(f"track {task.track!r}: expected context_size {context_size}, found {given}")
+    return context_size
