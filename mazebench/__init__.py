@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from mazebench.maps.generators import generate
     from mazebench.maps.maze import Maze, MazeError
     from mazebench.maps.readers.arrays import maze_from_array
+    from mazebench.tasks.build import make_spec
     from mazebench.tasks.episode import Episode
-    from mazebench.tasks.registry import make_spec
     from mazebench.tasks.spec import TaskSpec
 
 __version__ = "0.1.0"
@@ -43,7 +43,7 @@ _HOMES = {
     "evaluate": "mazebench.evaluation.evaluate",
     "generate": "mazebench.maps.generators",
     "load": "mazebench.envs.registration",
-    "make_spec": "mazebench.tasks.registry",
+    "make_spec": "mazebench.tasks.build",
     "maze_from_array": "mazebench.maps.readers.arrays",
     "make_vec": "mazebench.envs.registration",
     "read_maze": "mazebench.maps.files",

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import importlib
 import io
 import itertools
 import re
 import sys
-from collections.abc import Sequence
-from typing import Annotated, NoReturn
+import warnings
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -21,12 +24,12 @@ from mazebench.commands.play import play
 from mazebench.commands.render import render
 from mazebench.commands.report import report
 from mazebench.commands.train import train
-from mazebench.errors import InputError, RunError, remark, shortened
+from mazebench.errors import InputError, Remark, RunError, one_line, shortened
 
 _LONGEST = 2000  # characters of a message; an agent's InputError may be of any length
 
-# The parser's own error, which typer exports by its children only.
-_UsageError: type[Exception] = typer.BadParameter.__mro__[2]
+# What click raises where it can't parse a command line. Typer uses click or, in later versions, a copy of its own.
+_ClickException = importlib.import_module(typer.BadParameter.__module__).ClickException
 
 app = typer.Typer(
     help="Zero-shot navigation in unseen 3-D mazes from abstract top-down maps, on MuJoCo.",
@@ -56,7 +59,7 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names of files need not be legal Unicode
     try:
-        with stopping.listening(), stopping.stoppable(lambda: ("run it again",)):
+        with _remarks_as_lines(), stopping.listening(), stopping.stoppable(lambda: ("run it again",)):
             try:
                 _refuse_empty_values(sys.argv)
                 status = app(sys.argv[1:] or ["--help"], prog_name="mazebench", standalone_mode=False) or 0
@@ -65,9 +68,8 @@ def main() -> None:
             if status == 130:  # typer's, of an interrupt
                 raise KeyboardInterrupt
             sys.exit(status)
-    except _UsageError as error:
-        message = error.format_message()  # type: ignore[attr-defined]
-        _fail(message.replace("Value error, ", ""), 2)  # with which pydantic begins, through typer
+    except _ClickException as error:
+        _fail(error.format_message().replace("Value error, ", ""), 2)  # with which pydantic begins, through typer
     except InputError as error:
         _fail(str(error), 2)
     except OSError as error:
@@ -85,9 +87,32 @@ def _refuse_empty_values(words: Sequence[str]) -> None:
             raise InputError(f"expected a value of {word.rstrip('=') or before}, found an empty one")
 
 
+@contextlib.contextmanager
+def _remarks_as_lines() -> Iterator[None]:
+    """Prints each `Remark` that the block warns with as one line, and only once."""
+    printed: set[str] = set()
+    show = warnings.showwarning
+
+    def show_remark(message: Warning | str, category: type[Warning], *where: Any, **source: Any) -> None:
+        if not issubclass(category, Remark):
+            show(message, category, *where, **source)
+        elif str(message) not in printed:
+            printed.add(str(message))
+            _print_line(str(message))
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", Remark)
+        warnings.showwarning = show_remark
+        yield
+
+
 def _fail(message: str, status: int) -> NoReturn:
-    remark(shortened(message, _LONGEST))
+    _print_line(shortened(message, _LONGEST))
     sys.exit(status)
+
+
+def _print_line(line: str) -> None:
+    print(f"mazebench: {one_line(line)}", file=sys.stderr)
 
 
 def _print_version(asked: bool) -> None:

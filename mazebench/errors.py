@@ -1,18 +1,12 @@
-"""The errors that the command line prints as one line: of bad input (exit status 2) and of failed runs (1)."""
+"""What the command line prints as one line: errors of bad input (exit status 2) and of failed runs (1), and remarks."""
 
 from __future__ import annotations
 
-import contextlib
-import contextvars
-import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import pydantic
-
-# The list in which remarks are held back; None where they are printed.
-_held: contextvars.ContextVar[list[str] | None] = contextvars.ContextVar("held", default=None)
 
 
 class InputError(ValueError):
@@ -31,6 +25,14 @@ class RunError(RuntimeError):
     """A failure of a run whose input was good; the message says what happened and what is kept."""
 
 
+class Remark(UserWarning):
+    """A warning that tells a user in one line what was done with good input, such as a map that was padded."""
+
+    def __init__(self, message: str):
+        """Escapes what does not print in `message`, such as line ends in names of files."""
+        super().__init__(one_line(message))
+
+
 def one_line(text: str) -> str:
     """Returns `text` with characters escaped that do not print, such as line ends and commands to a terminal."""
     return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)
@@ -46,26 +48,6 @@ def unknown(kind: str, name: object, available: Iterable[object]) -> InputError:
     """Returns the error of an unknown name, which lists the known ones."""
     names = ", ".join(sorted(str(item) for item in available)) or "none"
     return InputError(f"unknown {kind} {repr(name)[:80]}; available: {names}")
-
-
-def remark(line: str) -> None:
-    """Prints a line for the user beside the output, on stderr."""
-    held = _held.get()
-    if held is None:
-        print(f"mazebench: {one_line(line)}", file=sys.stderr)
-    else:
-        held.append(line)
-
-
-@contextlib.contextmanager
-def held_remarks() -> Iterator[list[str]]:
-    """Gathers the remarks of the block in a list, and prints none of them."""
-    lines: list[str] = []
-    token = _held.set(lines)
-    try:
-        yield lines
-    finally:
-        _held.reset(token)
 
 
 def describe_fault(error: pydantic.ValidationError) -> str:

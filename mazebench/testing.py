@@ -18,8 +18,8 @@ from mazebench.errors import InputError
 from mazebench.evaluation.agent_inputs import agent_seed, true_state
 from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling, context_size_of
 from mazebench.maps.generators import generate
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import Episode, sample_episode
-from mazebench.tasks.spec import TaskSpec
 
 _SIZE = 7
 _NUM_MAZES = 3  # of different paths between their corners, so that episodes side by side end at different steps
@@ -97,15 +97,20 @@ class _Trial:
         self.name = agent_class.__name__
         self._agent_class, self._checkpoint = agent_class, checkpoint
         if interface is None:
-            context_size = context_size_of(self.name, agent_class, _SIZE)
-            interface = Interface("hierarchical", _SIZE, context_size, sensors=agent_class.needs_sensors)
+            interface = Interface(
+                task="hierarchical",
+                size=_SIZE,
+                context_size=context_size_of(self.name, agent_class, _SIZE),
+                sensors=agent_class.needs_sensors,
+            )
         self._interface = interface
+
         rng = np.random.default_rng(0)
         drawn = (generate("dfs", interface.size, rng, f"maze-{index}") for index in range(_NUM_MAZES))
         mazes = tuple(dataclasses.replace(maze, cell_size=interface.cell_size) for maze in drawn)
-        self._task_spec = TaskSpec(
-            task="hierarchical",
-            mazes=mazes,
+        self._task_spec = make_spec(
+            "hierarchical",
+            maps=mazes,
             time_limit=_TIME_LIMIT,
             landmark_distance=3,
             context_size=interface.context_size,
@@ -153,11 +158,18 @@ class _Trial:
             new_episode = np.ones(num_slots, dtype=bool)
             state = agent.initial_state(num_slots)
             while any(number is not None for number in running):
-                seed = np.array([agent_seed(0, number or 0) for number in running])
-                inputs = Inputs(observation, new_episode, info["is_first"], seed)
+                truth = None
                 if self._agent_class.needs_truth:
                     truth = true_state(self._task_spec, env.episodes, info["position"], info["yaw"])
-                    inputs = inputs._replace(truth=truth)
+                inputs = Inputs(
+                    observation=observation,
+                    new_episode=new_episode,
+                    new_context=info["is_first"],
+                    seed=np.array([agent_seed(0, number or 0) for number in running]),
+                    truth=truth,
+                )
+
+                # Let the agent act, and check that it changed none of its inputs.
                 before = _arrays(inputs)
                 taken, state = agent.act(inputs, state)
                 for name, array in _arrays(inputs).items():
@@ -165,6 +177,7 @@ class _Trial:
                         np.array_equal(array, before[name]),
                         f"agent {self.name!r}: expected act() to leave inputs.{name} as it was; change a copy",
                     )
+
                 for number, action in zip(running, taken.tolist(), strict=True):
                     if number is not None:
                         actions.setdefault(number, []).append(action)

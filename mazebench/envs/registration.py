@@ -141,7 +141,7 @@ def _task_spec(task: str, options: dict[str, Any], arguments: Iterable[str]) -> 
       InputError: as `mazebench.make_spec`.
     """
     from mazebench.envs.env_spec import with_mazes
-    from mazebench.tasks.registry import check_names, make_spec
+    from mazebench.tasks.build import check_names, make_spec
 
     id_size = options.pop(_ID_SIZE, None)
     if options.get("maps") is None and options.get("size") is None:

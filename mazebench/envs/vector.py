@@ -19,6 +19,7 @@ from mazebench.constants import STEP_TIME, STEPS_PER_ACTION
 from mazebench.envs import spaces
 from mazebench.envs.env_spec import JsonSpec
 from mazebench.errors import InputError, unknown
+from mazebench.maps.maze import Cell
 from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_actions, controls_of_velocities
 from mazebench.tasks.arguments import Arguments, require_task_spec
 from mazebench.tasks.context import NUM_PLANES
@@ -35,8 +36,7 @@ from mazebench.world.models import models_of
 from mazebench.world.rendering import Cameras
 from mazebench.world.simulation import STATE_SIZE, states_from_sensors
 
-# Returns the next episode of environment i, or None: then the environment rests, which means that it is not stepped any
-# more.
+# Returns the next episode of environment i; None ends the environment, which is not stepped any more.
 EpisodeSource = Callable[[int], Episode | None]
 Seeds = int | Sequence[int | None] | None
 
@@ -93,6 +93,8 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         arguments = Arguments(num_envs=num_envs, num_threads=num_threads, render_mode=render_mode)
         self.task_spec = task_spec
         self.num_envs = num_envs = arguments.num_envs
+
+        # What Gymnasium expects of a vector environment.
         self.render_mode = render_mode
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = self.metadata | {"autoreset_mode": self.autoreset_mode}
@@ -100,10 +102,14 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self.single_action_space = spaces.action_space(task_spec)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
+
+        # The episodes, and where each of them is.
         self._episode_source = episode_source
         self._rngs = [np.random.default_rng(value) for value in _seeds(seed, num_envs)]
         self._was_reset = False
         self._allocate()
+
+        # The simulation, with views of its arrays, and the sensors.
         self._maze_models = models_of(task_spec.mazes)
         self._models = [self._maze_models[0]] * num_envs
         self._process = os.getpid()
@@ -138,7 +144,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._deadline = np.zeros(num_envs, dtype=np.int64)
         self._landmark = np.zeros(num_envs, dtype=np.int64)
         self._maze = np.zeros(num_envs, dtype=np.int64)
-        self._active = np.zeros(num_envs, dtype=bool)
+        self._active = np.zeros(num_envs, dtype=bool)  # whether the environment has an episode
         self._ended = np.zeros(num_envs, dtype=bool)  # whether the episode is over and the next one has yet to begin
         self._states = np.zeros((num_envs, STATE_SIZE), dtype=np.float32)  # as observed last
 
@@ -166,9 +172,11 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
             if value is not None and mask[i]:
                 self._rngs[i] = np.random.default_rng(value)
         self._was_reset = True
-        self._begin_episodes(np.flatnonzero(mask))
-        self._observe(np.flatnonzero(mask))
-        return self._observations(), self._infos(mask.copy(), np.zeros(self.num_envs, dtype=bool), mask)
+        indices = np.flatnonzero(mask)
+        self._begin_episodes(indices)
+        self._observe(indices)
+        infos = self._infos(is_first=mask.copy(), success=np.zeros(self.num_envs, dtype=bool), mask=mask)
+        return self._observations(), infos
 
     def _reset_mask(self, options: dict[str, Any] | None) -> np.ndarray:
         """Returns `[B]` bool: which environments `options` say to reset."""
@@ -197,21 +205,30 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._require_open()
         self._require_reset()
         self._ctrl[:] = self._controls(actions)
+
+        # Simulate the environments whose episode is under way.
         running = self._active & ~self._ended
         all_run = running.all()
         self._batch.step(None if all_run else np.flatnonzero(running), nstep=STEPS_PER_ACTION, stage=_VELOCITY_STAGE)
+
+        # Take over how far the bodies moved.
         moved = self._qpos[:, :2] - self._positions
         self._positions += moved
         self._path_length += np.sqrt(moved[:, 0] * moved[:, 0] + moved[:, 1] * moved[:, 1])
         self._steps += running
+
+        # Apply the rules of the task.
         is_first, terminated, truncated = self._advance(running)
         rewards = np.where(terminated, 0.0, -1.0)
-        if not all_run:
-            rewards[~running] = 0.0
+        rewards[~running] = 0.0
+
+        # With NEXT_STEP, begin the episodes that follow those that ended in the step before.
         if self._ended.any():
             is_first[self._begin_episodes(np.flatnonzero(self._ended))] = True
         self._observe(slice(None))
-        infos = self._infos(is_first, terminated)
+        infos = self._infos(is_first, success=terminated)
+
+        # With SAME_STEP, begin those that follow the ones that ended in this step.
         ended = terminated | truncated
         if self.autoreset_mode is not AutoresetMode.SAME_STEP:
             self._ended = ended
@@ -238,6 +255,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
             )
 
     def _controls(self, actions: np.ndarray) -> np.ndarray:
+        """Returns `[B, 5]` float: the controls of `actions`, which are checked."""
         if self.task_spec.continuous:
             return controls_of_velocities(actions, (self.num_envs, VELOCITY_SIZE))
         return controls_of_actions(actions, self.num_envs)
@@ -247,6 +265,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         size = self.task_spec.size
         is_first, terminated, truncated = np.zeros((3, self.num_envs), dtype=bool)
         cells = self.cells()
+
         # Nothing happens to a route unless one of these holds; then the route's own rules decide.
         due = (cells == self._target) | (cells == self._goal) | (self._steps >= self._deadline)
         for i in np.flatnonzero(due & running).tolist():
@@ -260,30 +279,38 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
     def _autoreset(self, ended: np.ndarray, infos: dict[str, Any]) -> dict[str, Any]:
         """Begins the next episodes where one `ended`, and returns the infos with the ended ones' last observations."""
-        final_obs = np.full(self.num_envs, None, dtype=object)
+        # What was observed last, and the infos of then: those of the ended environments only.
         indices = np.flatnonzero(ended)
+        final_obs = np.full(self.num_envs, None, dtype=object)
         sensed = self._sense(indices)
         for index, i in enumerate(indices):
             final_obs[i] = {"state": self._states[i].copy(), "context": self._context[i].copy()}
             final_obs[i] |= {name: values[index] for name, values in sensed.items()}
         final_info = {key: value if key.startswith("_") else value.copy() for key, value in infos.items()}
         final_info.update({key: ended for key in infos if key.startswith("_")})
+
+        # The next episodes, and the infos of now.
         began = self._begin_episodes(indices)
         self._observe(began)
         is_first = infos["is_first"]
         is_first[began] = True
-        infos = self._infos(is_first, infos["success"] & ~ended)
+        infos = self._infos(is_first, success=infos["success"] & ~ended)
         return infos | {"final_obs": final_obs, "_final_obs": ended, "final_info": final_info, "_final_info": ended}
 
     def _begin_episodes(self, indices: np.ndarray) -> np.ndarray:
-        """Begins the next episodes of the environments `indices`; returns those that have one, the others rest."""
+        """Begins the next episodes of the environments `indices`; returns those of them that have one."""
         for i in indices.tolist():
-            self.episodes[i] = self._episode_source(i) if self._episode_source else self._draw_episode(i)
+            if self._episode_source:
+                self.episodes[i] = self._episode_source(i)
+            else:
+                self.episodes[i] = sample_episode(self.task_spec, self._rngs[i])
             self._active[i] = self.episodes[i] is not None
         self._ended[indices] = False
         began = indices[self._active[indices]]
         if not len(began):
             return began
+
+        # Change the mazes, reset the simulations, place the bodies, and compute what follows from that.
         for i in began:
             self._models[i] = self._maze_models[self._episode(i).maze]
         self._batch.set_models(self._models)
@@ -299,20 +326,26 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._shown[i] = shown
         self._routes[i] = plan_route(spec, episode, shown)
         self._state_errors[i] = state_errors(spec, episode)
+        self._maze[i] = episode.maze
         self._positions[i] = spec.mazes[episode.maze].point(episode.start)
         self._qpos[i] = (*self._positions[i], episode.yaw)
-        self._path_length[i], self._steps[i], self._maze[i] = 0.0, 0, episode.maze
+        self._path_length[i] = 0.0
+        self._steps[i] = 0
         self._begin_leg(i)
 
     def _begin_leg(self, i: int) -> None:
         route, shown = self._route(i), self._shown[i]
         assert shown is not None
         self._context[i] = leg_context(self.task_spec, shown, route.start, route.target)
-        self._start[i], self._target[i], self._goal[i] = (
-            row * self.task_spec.size + column for row, column in (route.start, route.target, route.goal)
-        )
+        self._start[i] = self._cell_index(route.start)
+        self._target[i] = self._cell_index(route.target)
+        self._goal[i] = self._cell_index(route.goal)
+        self._deadline[i] = route.deadline
+        self._landmark[i] = route.leg
         self._marker[i, 0] = (*self.task_spec.mazes[self._maze[i]].point(route.goal), 0.0)
-        self._deadline[i], self._landmark[i] = route.deadline, route.leg
+
+    def _cell_index(self, cell: Cell) -> int:
+        return cell[0] * self.task_spec.size + cell[1]
 
     def _observe(self, indices: np.ndarray | slice) -> None:
         """Takes over into `_states` the states of the environments `indices`, as their agents observe them."""
@@ -328,10 +361,11 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
     def _sense(self, indices: np.ndarray | slice) -> dict[str, np.ndarray]:
         """Returns `[K, ...]` by sensor: what the environments `indices` observe with it."""
-        return self._sensors.read(Worlds(self._maze[indices], self._qpos[indices], self._marker[indices, 0]))
+        worlds = Worlds(maze=self._maze[indices], pose=self._qpos[indices], marker=self._marker[indices, 0])
+        return self._sensors.read(worlds)
 
-    def _infos(self, is_first: np.ndarray, success: np.ndarray, told: np.ndarray | None = None) -> dict[str, Any]:
-        """Returns the infos of the environments `told`, `[B]` bool; of all by default."""
+    def _infos(self, is_first: np.ndarray, success: np.ndarray, mask: np.ndarray | None = None) -> dict[str, Any]:
+        """Returns the infos; `mask` (`[B]` bool) says of which environments they are, of all by default."""
         infos = {
             "is_first": is_first,
             "success": success.copy(),
@@ -342,11 +376,8 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
             "maze": self._maze.copy(),
             "landmark": self._landmark.copy(),
         }
-        told = np.ones(self.num_envs, dtype=bool) if told is None else told.copy()
-        return infos | {f"_{key}": told for key in infos}
-
-    def _draw_episode(self, i: int) -> Episode:
-        return sample_episode(self.task_spec, self._rngs[i])
+        mask = np.ones(self.num_envs, dtype=bool) if mask is None else mask.copy()
+        return infos | {f"_{key}": mask for key in infos}
 
     def _episode(self, i: int) -> Episode:
         episode = self.episodes[i]
@@ -360,7 +391,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
     def cells(self) -> np.ndarray:
         """Returns `[B]` int: the true cells of the bodies, as row * N + column; agents must not use them."""
-        # All mazes have one size and one cell size, so that any of them tells the cells.
+        # All mazes have one size and one cell size, so the first one converts the points of all.
         return self.task_spec.mazes[0].cell(self._positions) @ (self.task_spec.size, 1)
 
     def legs(self) -> tuple[np.ndarray, np.ndarray]:

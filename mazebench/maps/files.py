@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import pathlib
+import warnings
 from typing import Any
 
 import numpy as np
 
-from mazebench.errors import InputError, held_remarks, remark
+from mazebench.errors import InputError, Remark
 from mazebench.maps.maze import Maze, resized
 from mazebench.maps.options import OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions
 from mazebench.maps.readers.arrays import read_array_maze
 from mazebench.maps.readers.image import read_image_maze
-from mazebench.maps.readers.occupancy import PlacedMaze
-from mazebench.maps.readers.ros import ROS_SUFFIXES, map_of_picture, picture_of, place_floor_plan, place_ros_maze
+from mazebench.maps.readers.occupancy import LocatedMaze
+from mazebench.maps.readers.ros import ROS_SUFFIXES, locate_floor_plan, locate_ros_maze, map_of_picture, picture_of
 from mazebench.maps.text import read_text_maze
 
 IMAGE_SUFFIXES = (
@@ -40,7 +41,7 @@ def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any)
     Raises:
       InputError: if the file can't be read or holds no legal maze, or an option does not belong to such files.
     """
-    return read_placed(pathlib.Path(path), size, MapOptions(**options)).maze
+    return read_located(pathlib.Path(path), size, MapOptions(**options)).maze
 
 
 def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
@@ -62,21 +63,24 @@ def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
 def read_all(path: pathlib.Path, options: MapOptions) -> tuple[Maze, ...]:
     """Reads the maze in a file, or those in a folder, as `read_mazes` does."""
     if not path.is_dir():
-        return (read_placed(path, None, options).maze,)
+        return (read_located(path, None, options).maze,)
     files = _map_files(path)
     if len(files) == 1:
-        return (read_placed(files[0], None, options).maze,)
+        return (read_located(files[0], None, options).maze,)
     mazes, remarks = [], []
     for file in files:
-        with held_remarks() as lines:
-            mazes.append(read_placed(file, None, options).maze)
-        remarks.extend(lines[:1])
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", Remark)
+            mazes.append(read_located(file, None, options).maze)
+        of_file = [str(warning.message) for warning in caught if issubclass(warning.category, Remark)]
+        remarks.extend(of_file[:1])
     if remarks:
-        remark(f"{len(remarks)} of {len(mazes)} maps have remarks, such as {remarks[0]}")
+        line = f"{len(remarks)} of {len(mazes)} maps have remarks, such as {remarks[0]}"
+        warnings.warn(line, Remark, stacklevel=2)
     return tuple(mazes)
 
 
-def read_placed(path: pathlib.Path, size: int | None, options: MapOptions) -> PlacedMaze:
+def read_located(path: pathlib.Path, size: int | None, options: MapOptions) -> LocatedMaze:
     """Reads the maze in one file, as `read_maze` does, and its place in the frame of a ROS map."""
     suffix = path.suffix.lower()
     if suffix not in IMAGE_SUFFIXES:
@@ -84,23 +88,23 @@ def read_placed(path: pathlib.Path, size: int | None, options: MapOptions) -> Pl
     elif (ros_map := map_of_picture(path)) is not None:
         raise InputError(f"{path}: expected a maze, found the picture of a ROS map; give {ros_map}")
     if suffix in ROS_SUFFIXES:
-        placed = place_ros_maze(path, options)
+        located = locate_ros_maze(path, options)
     elif suffix in ARRAY_SUFFIXES:
-        placed = PlacedMaze(read_array_maze(path, options))
+        located = LocatedMaze(read_array_maze(path, options))
     elif options.pixel_size is not None:
-        placed = place_floor_plan(path, options.pixel_size, options)
+        located = locate_floor_plan(path, options.pixel_size, options)
     elif suffix in IMAGE_SUFFIXES:
         options.require_defaults(OCCUPANCY_OPTIONS, "ROS maps, arrays and pictures with a pixel_size", f"{path}")
         maze = read_image_maze(path, size, options.walls)
         if options.cell_size is None:
             _remark_on_thin_walls(maze)
-        placed = PlacedMaze(resized(maze, options.cell_size))
+        located = LocatedMaze(resized(maze, options.cell_size))
     else:
         options.require_defaults(OCCUPANCY_OPTIONS, "ROS maps and arrays", f"{path}")
-        placed = PlacedMaze(resized(read_text_maze(path), options.cell_size))
-    if size not in (None, placed.maze.size):
-        raise InputError(f"{path}: expected a maze of size {size}, found size {placed.maze.size}")
-    return placed
+        located = LocatedMaze(resized(read_text_maze(path), options.cell_size))
+    if size not in (None, located.maze.size):
+        raise InputError(f"{path}: expected a maze of size {size}, found size {located.maze.size}")
+    return located
 
 
 def _remark_on_thin_walls(maze: Maze) -> None:
@@ -109,10 +113,11 @@ def _remark_on_thin_walls(maze: Maze) -> None:
     inside = free[np.ix_(free.any(axis=1), free.any(axis=0))]
     rows, columns = np.add(inside.shape, 2)  # with the outer walls
     if max(rows, columns) > _MANY_CELLS and inside.mean() > _MOSTLY_FREE:
-        remark(
+        line = (
             f"{maze.name}: read as {columns} m wide and {rows} m high, with a cell of 1 m for the width of a wall; "
             "if it is a floor plan, --pixel-size sets its scale"
         )
+        warnings.warn(line, Remark, stacklevel=2)
 
 
 def _map_files(folder: pathlib.Path) -> list[pathlib.Path]:

@@ -107,9 +107,9 @@ def _open_doors(walls: np.ndarray, rng: np.random.Generator) -> None:
     regions, num_regions = ndimage.label(~walls)
     joined = np.arange(num_regions + 1)  # the number of the group of regions to which each region belongs
     for row, column in rng.permutation(np.argwhere(_between_lattice_cells(walls))):
-        down = row % 2 == 0  # whether the door leads up and down
-        first = joined[regions[row - down, column - (not down)]]
-        second = joined[regions[row + down, column + (not down)]]
+        down, right = (1, 0) if row % 2 == 0 else (0, 1)  # to one of the regions that the door joins
+        first = joined[regions[row - down, column - right]]
+        second = joined[regions[row + down, column + right]]
         if first != second or rng.random() < _EXTRA_DOORS:
             walls[row, column] = False
             joined[joined == second] = first

@@ -48,6 +48,23 @@ class _Pieces(NamedTuple):
 _Table = TypeVar("_Table", _Circles, _Pieces)
 
 
+class _Side(NamedTuple):
+    """The free part of a side of a cell: x is `level` and y from `low` to `high`, or the other way round."""
+
+    axis: int  # 0 if x is constant along the side, 1 if y is
+    level: float
+    low: float
+    high: float
+
+
+class _Route(NamedTuple):
+    """A shortest path through pieces."""
+
+    pieces: _Pieces  # those of the maze and those of the query
+    length: float
+    ends: np.ndarray  # [L] int, the ends that the path passes, as indices into the 2 P ends of all pieces
+
+
 class DiscPaths:
     """Shortest paths of a disc of one radius in one maze.
 
@@ -70,6 +87,8 @@ class DiscPaths:
         self._radius = float(radius) / maze.cell_size
         self._space = _FreeSpace(maze.walls, self._radius)
         self._corners = _exposed_corners(self._space.walls, self._radius)
+
+        # The tangents of all pairs of circles that no wall cuts.
         batches = (
             self._clear(_tangents(self._corners, first, second, side))
             for side in (1, -1)
@@ -84,7 +103,9 @@ class DiscPaths:
           InputError: if `start` is not at least the radius away from every wall, or `goal` is not a free cell.
         """
         start, corner = self._check(start, goal)
-        return 0.0 if _is_in_cell(start, corner) else self._maze.cell_size * self._search(start, corner)[1]
+        if _is_in_cell(start, corner):
+            return 0.0
+        return self._maze.cell_size * self._search(start, corner).length
 
     def path(self, start: np.ndarray, goal: Cell, arc_step: float = 0.05) -> np.ndarray:
         """Returns points (x, y) along a shortest path from `start`, on arcs at most `arc_step` metres apart: `[L, 2]`.
@@ -97,12 +118,13 @@ class DiscPaths:
         start, corner = self._check(start, goal)
         if _is_in_cell(start, corner):
             return self._maze.cell_size * start[None]
-        pieces, _, nodes = self._search(start, corner)
-        circle, offset = pieces.circle.ravel()[nodes], pieces.offset.ravel()[nodes]
+        pieces, _, ends = self._search(start, corner)
+        circle, offset = pieces.circle.ravel()[ends], pieces.offset.ravel()[ends]
+        end = pieces.end.reshape(-1, 2)[ends]
         points = [start[None]]
-        for i in range(1, len(nodes)):
+        for i in range(1, len(ends)):
             if circle[i] != circle[i - 1]:
-                points.append(pieces.end.reshape(-1, 2)[nodes[i]][None])
+                points.append(end[i, None])
             elif offset[i] != offset[i - 1]:
                 points.append(self._arc(circle[i], offset[i - 1], offset[i], arc_step / self._maze.cell_size))
         return self._maze.cell_size * np.concatenate(points)
@@ -123,19 +145,21 @@ class DiscPaths:
         keep = self._space.is_clear(pieces.end[:, 0], pieces.end[:, 1])
         return _Pieces(*(array[keep] for array in pieces))
 
-    def _search(self, start: np.ndarray, corner: np.ndarray) -> tuple[_Pieces, float, np.ndarray]:
-        """Returns all pieces of the query, the shortest length, and the ends on a shortest path as indices into `2 P`.
-
-        The corners' circles come first, then the start; all beyond are points where a path may end.
-        """
+    def _search(self, start: np.ndarray, corner: np.ndarray) -> _Route:
+        """Returns a shortest path from the start to the goal cell with this lower left corner."""
         pieces = _concatenate([self._pieces, self._clear(self._query_pieces(start, corner))])
+
+        # The corners' circles come first, then the start; all beyond are points where a path may end.
         circle, source = pieces.circle.ravel(), len(self._corners.radius)
         first = int(np.argmax(circle == source))
         distances, previous = csgraph.dijkstra(_graph(pieces), indices=first, return_predecessors=True)
-        nodes = [int(np.argmin(np.where(circle > source, distances, np.inf)))]
-        while previous[nodes[-1]] >= 0:
-            nodes.append(int(previous[nodes[-1]]))
-        return pieces, float(distances[nodes[0]]), np.array(nodes[::-1])
+        last = int(np.argmin(np.where(circle > source, distances, np.inf)))
+
+        # Follow the path back from its last end.
+        ends = [last]
+        while previous[ends[-1]] >= 0:
+            ends.append(int(previous[ends[-1]]))
+        return _Route(pieces, float(distances[last]), np.array(ends[::-1]))
 
     def _query_pieces(self, start: np.ndarray, corner: np.ndarray) -> _Pieces:
         """Returns straight pieces from the start to the circles and from both to the goal, not tested for walls.
@@ -145,11 +169,16 @@ class DiscPaths:
         """
         source = len(self._corners.radius)
         circles = _concatenate([self._corners, _points(start[None]), _points(self._space.open_corners(corner))])
-        to_side = _concatenate([_perpendiculars(circles, source + 1, *side) for side in self._space.sides(corner)])
-        # Each ends at a point of its own.
+
+        # From the circles and the start to a side of the goal cell, where each piece ends at a point of its own.
+        to_side = _concatenate([_perpendiculars(circles, source + 1, side) for side in self._space.sides(corner)])
         to_side.circle[:, 1] += np.arange(len(to_side.circle))
+
+        # From the start to the circles.
         corners = np.arange(source)
         from_start = _tangents(circles, np.full_like(corners, source), corners, side=1)
+
+        # From the circles and the start to the corners of the goal cell.
         first, last = np.meshgrid(np.arange(source + 1), np.arange(source + 1, len(circles.radius)))
         to_corner = _tangents(circles, first.ravel(), last.ravel(), side=1)
         return _concatenate([from_start, to_corner, to_side])
@@ -173,12 +202,12 @@ class _FreeSpace:
         self._side = len(walls) + 1
         padded = np.pad(self.walls, 1, constant_values=True)
         left_or_right = padded[:-1] | padded[1:]
-        # [x, y]: whether a cell at the lattice point is a wall.
-        self._corner = left_or_right[:, :-1] | left_or_right[:, 1:]
-        # Flattened [2, x, y], for flat and, with the axes exchanged, for steep segments: the corners, and whether a
-        # wall is left or right of the line from lattice point (x, y) to (x, y + 1).
+        # [x, y]: whether one of the four cells at a lattice point is a wall.
+        self._is_near_wall = left_or_right[:, :-1] | left_or_right[:, 1:]
+        # Flattened [2, x, y], for flat and, with the axes exchanged, for steep segments: whether a wall is at the
+        # lattice point (x, y), and whether one is left or right of the line from there to (x, y + 1).
         upper_or_lower = padded[:, :-1] | padded[:, 1:]
-        self._corner_table = np.stack([self._corner, self._corner.T]).ravel()
+        self._corner_table = np.stack([self._is_near_wall, self._is_near_wall.T]).ravel()
         self._edge_table = np.stack([left_or_right[:, 1:], upper_or_lower[1:].T]).ravel()
 
     def holds(self, point: np.ndarray) -> bool:
@@ -195,20 +224,18 @@ class _FreeSpace:
     def open_corners(self, corner: np.ndarray) -> np.ndarray:
         """Returns the 0 to 4 corners that a cell (lower left corner `[2]`) shares with no wall: `[0 to 4, 2]`."""
         corners = corner + np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
-        return corners[~self._corner[tuple(corners.T)]]
+        return corners[~self._is_near_wall[tuple(corners.T)]]
 
-    def sides(self, corner: np.ndarray) -> Iterator[tuple[int, float, float, float]]:
-        """Yields the free parts of a cell's sides as (axis, level, low, high).
-
-        Such a part has x = `level` and y from `low` to `high` if `axis` is 0, or the other way round if it is 1.
-        """
+    def sides(self, corner: np.ndarray) -> Iterator[_Side]:
+        """Yields the sides that a cell (lower left corner `[2]`) shares with a free cell, without what is too near."""
         for axis, step in np.ndindex(2, 2):
             across, along = np.eye(2, dtype=np.int64)[[axis, 1 - axis]]
             first = corner + step * across
             if self.walls[tuple(corner + (2 * step - 1) * across)]:
                 continue
-            margins = [self._radius * self._corner[tuple(point)] for point in (first, first + along)]
-            yield axis, first[axis], first[1 - axis] + margins[0], first[1 - axis] + 1 - margins[1]
+            before, after = (self._radius * self._is_near_wall[tuple(point)] for point in (first, first + along))
+            low, high = first[1 - axis] + before, first[1 - axis] + 1 - after
+            yield _Side(axis, level=first[axis], low=low, high=high)
 
     def is_clear(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         """Returns whether the segments between free points (`[S, 2]` each) are free: `[S]` bool.
@@ -217,19 +244,22 @@ class _FreeSpace:
         segment's longer axis: the two lattice points about a crossing are the only ones on that line within half a
         cell, and between two lines the segment changes cells at most once.
         """
+        # Exchange ends and axes such that all segments lead to the right, with a slope of at most 1 either way.
         steep = np.abs(end - start)[:, 1] > np.abs(end - start)[:, 0]
         forward = np.where(steep, end[:, 1] > start[:, 1], end[:, 0] > start[:, 0])[:, None]
         start, end = np.where(forward, start, end), np.where(forward, end, start)
         start, end = (np.where(steep[:, None], point[:, ::-1], point) for point in (start, end))
         extent, rise = (end - start).T
         slope = rise / np.where(extent == 0, 1.0, extent)
+
+        # The lines that may show a wall. Most segments of a maze meet one soon, so the lines are tested in batches of
+        # growing size.
         first = np.ceil(start[:, 0] - self._radius).astype(np.int64)
         last = np.floor(end[:, 0] + self._radius).astype(np.int64)
         table = steep * self._side**2
         clear = np.ones(len(start), dtype=bool)
         active = np.arange(len(start))
         done, batch = 0, 1
-        # Most segments of a maze meet a wall soon, so the lines are walked in batches of growing size.
         while len(active):
             line = np.minimum(first[active, None] + np.arange(done, done + batch), last[active, None])
             blocked = self._is_blocked(line, start[active], extent[active], slope[active], table[active])
@@ -242,14 +272,19 @@ class _FreeSpace:
         self, line: np.ndarray, start: np.ndarray, extent: np.ndarray, slope: np.ndarray, table: np.ndarray
     ) -> np.ndarray:
         """Returns whether a wall shows on any line at x = `line` (`[S, L]` int) of flat segments: `[S]` bool."""
-        squared_cosine = 1 / (1 + slope * slope)
+        # Where each line is crossed.
         along = line - start[:, :1]
         height = start[:, 1:] + slope[:, None] * along
         below = np.floor(height).astype(np.int64)
         gap = height - below
         index = table[:, None] + line * self._side + below
         extent = extent[:, None]
+
+        # Walls that the segment enters there.
         blocked = self._edge_table[index] & (along >= 0) & (along <= extent)
+
+        # Corners below and above the crossing that are too near.
+        squared_cosine = 1 / (1 + slope * slope)
         reach = (self._clearance / np.sqrt(squared_cosine))[:, None]
         shift = (slope * squared_cosine)[:, None]
         for rise in (0, 1):
@@ -262,9 +297,11 @@ class _FreeSpace:
 
 def _exposed_corners(walls: np.ndarray, radius: float) -> _Circles:
     """Returns the circles about all lattice points that touch exactly one wall (`walls` is `[x, y]`)."""
-    below, above = walls[:, :-1].astype(np.int64), walls[:, 1:].astype(np.int64)
-    left, right = below[:-1] + above[:-1], below[1:] + above[1:]
-    below, above = below[:-1] + below[1:], above[:-1] + above[1:]
+    count = walls.astype(np.int64)
+    lower_left, lower_right = count[:-1, :-1], count[1:, :-1]  # of each lattice point
+    upper_left, upper_right = count[:-1, 1:], count[1:, 1:]
+    left, right = lower_left + upper_left, lower_right + upper_right
+    below, above = lower_left + lower_right, upper_left + upper_right
     exposed = left + right == 1
     away_from_wall = np.stack([left - right, below - above], axis=-1)
     centre = np.argwhere(exposed) + 1.0
@@ -302,12 +339,17 @@ def _tangents(circles: _Circles, first: np.ndarray, second: np.ndarray, side: in
     `side` is 1 for tangents that have both circles on one side, -1 for those that pass between them. With normal n at
     the first circle and side * n at the second, D . n = r1 - side * r2, where D joins the centres.
     """
+    # The unit vectors along the line of centres, and to its left.
     joint = circles.centre[second] - circles.centre[first]
     distance = np.hypot(joint[:, 0], joint[:, 1])
     unit = joint / distance[:, None]
+    left = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+
+    # The normals' components along the two.
     along = ((circles.radius[first] - side * circles.radius[second]) / distance)[:, None]
     across = np.sqrt(np.maximum(1 - along * along, 0))
-    left = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+
+    # Of the two tangents of a pair, those with normals in the exposed quadrants.
     found = []
     for turn in (1, -1):
         normal = along * unit + turn * across * left
@@ -316,23 +358,27 @@ def _tangents(circles: _Circles, first: np.ndarray, second: np.ndarray, side: in
         circle = np.stack([first[fits], second[fits]], axis=1)
         normals = np.stack([normal[fits], side * normal[fits]], axis=1)
         end = circles.centre[circle] + circles.radius[circle][..., None] * normals
-        found.append(_Pieces(circle, _offset(circles, circle, normals), end))
+        found.append(_Pieces(circle=circle, offset=_offset(circles, circle, normals), end=end))
     return _concatenate(found)
 
 
-def _perpendiculars(circles: _Circles, num_sources: int, axis: int, level: float, low: float, high: float) -> _Pieces:
-    """Returns tangents of the first `num_sources` circles that meet a part of a side (see `sides`) at a right angle.
+def _perpendiculars(circles: _Circles, num_sources: int, side: _Side) -> _Pieces:
+    """Returns tangents of the first `num_sources` circles that meet a side at a right angle.
 
     Where an arc itself ends on the side, its piece has length 0.
     """
-    normal = (circles.quadrant * np.eye(2)[1 - axis])[:num_sources]
+    # Where the tangents touch the circles.
+    normal = (circles.quadrant * np.eye(2)[1 - side.axis])[:num_sources]
     contact = circles.centre[:num_sources] + circles.radius[:num_sources, None] * normal
-    height = contact[:, 1 - axis]
-    source = np.flatnonzero((height >= low - _TOLERANCE) & (height <= high + _TOLERANCE))
+
+    # Those that meet the side, and where they do.
+    height = contact[:, 1 - side.axis]
+    source = np.flatnonzero((height >= side.low - _TOLERANCE) & (height <= side.high + _TOLERANCE))
     end = contact[source, None].repeat(2, axis=1)
-    end[:, 1, axis] = level
+    end[:, 1, side.axis] = side.level
     offset = np.stack([_offset(circles, source, normal[source]), np.zeros(len(source))], axis=1)
-    return _Pieces(np.stack([source, np.full_like(source, len(circles.radius))], axis=1), offset, end)
+    circle = np.stack([source, np.full_like(source, len(circles.radius))], axis=1)
+    return _Pieces(circle=circle, offset=offset, end=end)
 
 
 def _offset(circles: _Circles, index: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -349,16 +395,20 @@ def _graph(pieces: _Pieces) -> sparse.csr_array:
     """
     circle, offset = pieces.circle.ravel(), pieces.offset.ravel()
     num_nodes = len(circle)
-    # An offset is at most pi / 4 * 0.5 cells, so the sum sorts by circle first.
+
+    # Neighbours on a circle. An offset is at most pi / 4 * 0.5 cells, so the sum sorts by circle first.
     order = np.argsort(circle + offset)
     joined = circle[order[1:]] == circle[order[:-1]]
     before, after = order[:-1][joined], order[1:][joined]
     arc = np.abs(offset[after] - offset[before])
+
+    # The two ends of each piece, whose indices differ in the last bit.
     nodes = np.arange(num_nodes)
     straight = np.hypot(*(pieces.end[:, 1] - pieces.end[:, 0]).T).repeat(2)
     row = np.concatenate([nodes, before, after])
     column = np.concatenate([nodes ^ 1, after, before])
-    return sparse.csr_array((np.concatenate([straight, arc, arc]), (row, column)), shape=(num_nodes, num_nodes))
+    length = np.concatenate([straight, arc, arc])
+    return sparse.csr_array((length, (row, column)), shape=(num_nodes, num_nodes))
 
 
 def _concatenate(parts: list[_Table]) -> _Table:

@@ -5,17 +5,19 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 from scipy import ndimage
 
-from mazebench.errors import remark
+from mazebench.errors import Remark
 from mazebench.maps.maze import Maze, require_closed_border
 
 
 def square_maze(walls: np.ndarray, name: str, cell_size: float = 1.0) -> Maze:
     """Returns the maze with `walls` (`[R, C]` bool), padded to a square with wall on the right or at the bottom.
 
-    A cell keeps its row and column. A remark says what was padded.
+    A cell keeps its row and column. A `Remark` says what was padded.
 
     Raises:
       MazeError: if it is not a legal maze.
@@ -26,7 +28,8 @@ def square_maze(walls: np.ndarray, name: str, cell_size: float = 1.0) -> Maze:
     maze = Maze(pad_to_square(walls), name, cell_size)
     rows, columns = walls.shape
     where = "on the right" if rows > columns else "at the bottom"
-    remark(f"{name}: {rows} x {columns} cells, padded with wall {where} to {maze.size} x {maze.size}")
+    line = f"{name}: {rows} x {columns} cells, padded with wall {where} to {maze.size} x {maze.size}"
+    warnings.warn(line, Remark, stacklevel=2)
     return maze
 
 

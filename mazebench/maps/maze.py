@@ -201,14 +201,17 @@ def resized(maze: Maze, cell_size: float | None) -> Maze:
 
 def grid_graph(index: np.ndarray) -> sparse.csr_array:
     """Returns the 4-connected graph of the cells whose `index` (`[N, N]` int, consecutive from 0) is not negative."""
-    right = (index[:, :-1].ravel(), index[:, 1:].ravel())
-    down = (index[:-1].ravel(), index[1:].ravel())
-    a, b = np.concatenate([right, down], axis=1)
-    linked = (a >= 0) & (b >= 0)
-    a, b = a[linked], b[linked]
+    # The pairs of neighbours: side by side, then one above the other.
+    first = np.concatenate([index[:, :-1].ravel(), index[:-1].ravel()])
+    second = np.concatenate([index[:, 1:].ravel(), index[1:].ravel()])
+    linked = (first >= 0) & (second >= 0)
+    first, second = first[linked], second[linked]
+
+    # Both ways.
     num_nodes = int(index.max()) + 1
-    ones = np.ones(2 * len(a), dtype=np.int32)
-    return sparse.csr_array((ones, (np.r_[a, b], np.r_[b, a])), shape=(num_nodes, num_nodes))
+    ones = np.ones(2 * len(first), dtype=np.int32)
+    row, column = np.concatenate([first, second]), np.concatenate([second, first])
+    return sparse.csr_array((ones, (row, column)), shape=(num_nodes, num_nodes))
 
 
 def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]:
@@ -217,20 +220,23 @@ def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]
     It is a shortest free path if there is one; else each wall on the path costs 1000 cells. The landmark oracle plans
     so on maps with flipped cells (the paper's appendix on perturbed planning).
     """
+    # Over free cells.
     index = np.where(walls, -1, np.cumsum(~walls).reshape(walls.shape) - 1)
     distances = np.full(walls.shape, np.inf)
     if not walls[goal]:
         distances[~walls] = csgraph.dijkstra(grid_graph(index), unweighted=True, indices=index[goal])
-    if not np.isfinite(distances[start]):
-        every_cell = np.arange(walls.size).reshape(walls.shape)
-        graph = grid_graph(every_cell).astype(np.float64).tocoo()
-        # The search goes backwards from the goal: edge u -> v is the step from v to u, and costs what entering u costs.
-        cost = np.where(walls.ravel()[graph.row], _WALL_COST, 1.0)
-        weighted = sparse.csr_array((cost, (graph.row, graph.col)), shape=graph.shape)
-        distances = csgraph.dijkstra(weighted, indices=every_cell[goal]).reshape(walls.shape)
-        return _descend(distances, start, np.where(walls, _WALL_COST, 1.0))
-    distances[walls] = UNREACHABLE
-    return _descend(distances, start)
+    if np.isfinite(distances[start]):
+        distances[walls] = UNREACHABLE
+        return _descend(distances, start)
+
+    # Through walls. The search goes backwards from the goal: edge u -> v is the step from v to u, and costs what
+    # entering u costs.
+    every_cell = np.arange(walls.size).reshape(walls.shape)
+    graph = grid_graph(every_cell).astype(np.float64).tocoo()
+    cost = np.where(walls.ravel()[graph.row], _WALL_COST, 1.0)
+    weighted = sparse.csr_array((cost, (graph.row, graph.col)), shape=graph.shape)
+    distances = csgraph.dijkstra(weighted, indices=every_cell[goal]).reshape(walls.shape)
+    return _descend(distances, start, np.where(walls, _WALL_COST, 1.0))
 
 
 def _descend(distances: np.ndarray, start: Cell, step_cost: np.ndarray | None = None) -> list[Cell]:

@@ -87,9 +87,14 @@ def draw_rays(image: np.ndarray, cell_pixels: int, centre: np.ndarray, ends: np.
     """
     points = np.concatenate([[centre], ends]) * [cell_pixels, -cell_pixels] + [0, len(image)]
     begin, *corners = _to_subpixels(points).tolist()
-    area, unit = image.copy(), _unit(image, cell_pixels)
+
+    # The area that the rays reach, translucent.
+    area = image.copy()
     cv2.fillPoly(area, [np.array(corners)], _RAY_SHADE, cv2.LINE_AA, _SUBPIXEL_BITS)
     cv2.addWeighted(area, 0.25, image, 0.75, 0, dst=image)
+
+    # The rays, with a dot at the end of each.
+    unit = _unit(image, cell_pixels)
     for number, corner in enumerate(corners):
         thickness = max(1, round(unit / (10 if number == 0 else 30)))
         cv2.line(image, begin, corner, _RAY_SHADE, thickness, cv2.LINE_AA, _SUBPIXEL_BITS)
@@ -120,13 +125,16 @@ def _draw_path(image: np.ndarray, path: np.ndarray, cell_pixels: int) -> None:
     points = np.asarray(path, dtype=np.float64)
     if points.shape != (len(points), 2) or len(points) == 0 or not np.isfinite(points).all():
         raise InputError(f"expected a path of finite points, shape [T, 2], found shape {points.shape}")
+    # In pixels, y down, and how far along the path each point is.
     side = len(image)
     pixels = np.clip(points * [cell_pixels, -cell_pixels] + [0, side], -side, 2 * side)
     travelled = np.r_[0, np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))]
+
     # Segments of two pixels: shorter ones are blended into the image so often that the line's soft edge is lost.
     kept = np.unique(np.r_[np.searchsorted(travelled, np.arange(0, travelled[-1], 2)), len(points) - 1])
     times = np.linspace(0, 1, len(points))[kept]
     shades = np.stack([np.interp(times, [0, 0.5, 1], shade) for shade in _PATH_SHADES.T], axis=1)
+
     corners = _to_subpixels(pixels[kept]).tolist()
     thickness = max(1, round(_unit(image, cell_pixels) / 6))
     for before, after, shade in zip(corners[:-1], corners[1:], shades[1:], strict=True):

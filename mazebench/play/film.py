@@ -66,8 +66,10 @@ def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[l
     plan = make_plan(options)
     views = _views(view, plan.task)
     number = options.seed % len(plan.trials)
-    trial, episode = plan.trials[number], plan.trials[number].episode
+    trial = plan.trials[number]
+    episode = trial.episode
     maze = plan.task.mazes[episode.maze]
+
     agent = plan.build_agent()
     state = agent.initial_state(1)
     seed = np.array([agent_seed(options.seed, number)])
@@ -84,11 +86,17 @@ def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[l
             truth = None
             if plan.agent_class.needs_truth:
                 truth = true_state(plan.task, [episode], info["position"][None], np.array([info["yaw"]]))
-            batch = {name: value[None] for name, value in observation.items()}
-            new_episode, new_context = np.array([info["steps"] == 0]), np.array([info["is_first"]])
-            actions, state = agent.act(Inputs(batch, new_episode, new_context, seed, truth), state)
+            inputs = Inputs(
+                observation={name: value[None] for name, value in observation.items()},
+                new_episode=np.array([info["steps"] == 0]),
+                new_context=np.array([info["is_first"]]),
+                seed=seed,
+                truth=truth,
+            )
+            actions, state = agent.act(inputs, state)
             observation, _, terminated, truncated, info = env.step(int(actions[0]))
             ended = terminated or truncated
+
     ending = "reached the goal" if info["success"] else "ran out of time"
     return frames, (
         f"{options.agent} {ending} after {info['steps']} steps and {info['path_length']:.2f} m "
@@ -152,7 +160,8 @@ class _Scene:
         """Returns a picture of the map that the agent is shown, some two times as large as a view."""
         task, side = self.env.task, self.env.task_spec.context_size
         seen = task.shown_map.seen_walls()
-        walls, size = resized_map(seen, side), len(seen)
+        size = len(seen)
+        walls = resized_map(seen, side)
         pixels = (task.shown_map.seen_cell(cell) for cell in (task.episode.start, task.episode.goal))
         start, goal = ((row * side // size, column * side // size) for row, column in pixels)
         path = task.shown_map.seen_points(self._to_cells(self._path)) * (side / size)

@@ -13,7 +13,7 @@ from mazebench.tasks.episode import Episode
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.lidar import ray_ends
 
-# The actions of letters and of arrow keys.
+# The actions of letters and of arrow keys, as indices in `ACTIONS`.
 LETTERS = {"w": 0, "s": 1, "a": 2, "d": 3, "q": 4, "e": 5}
 ARROWS = {"up": 0, "down": 1, "left": 4, "right": 5}
 LIDAR = "lidar"  # the only sensor whose readings are shown

@@ -58,18 +58,21 @@ def draw(game: Game, width: int, height: int, plain: bool = False) -> Characters
     if width < _MIN_WIDTH or height < _MIN_HEIGHT:
         _write(screen, 0, 0, "enlarge the terminal")
         return screen
+
+    # The world on the left and the map on the right; of large ones, the part around the body.
     rows, columns = _scale(game, width, height)
     half = (width - _GAP) // 2
-    place = game.to_cells(game.path[-1]) / game.task_spec.size
-    world = _focus(draw_world(game, rows, columns, plain), height - _LINES, half, place)
-    shown = _focus(draw_map(game, rows, columns), height - _LINES, half, place)
+    centre = game.to_cells(game.path[-1]) / game.task_spec.size
+    world = _focus(draw_world(game, rows, columns, plain), height - _LINES, half, centre)
+    shown = _focus(draw_map(game, rows, columns), height - _LINES, half, centre)
     right = world.glyphs.shape[1] + _GAP
-    _write(screen, 0, 0, game.title())
-    _write(screen, 1, 0, "the world")
-    _write(screen, 1, right, "the map as an agent is given it")
     for panel, left in ((world, 0), (shown, right)):
         area = slice(2, 2 + panel.glyphs.shape[0]), slice(left, left + panel.glyphs.shape[1])
         screen.glyphs[area], screen.styles[area] = panel.glyphs, panel.styles
+
+    _write(screen, 0, 0, game.title())
+    _write(screen, 1, 0, "the world")
+    _write(screen, 1, right, "the map as an agent is given it")
     _write(screen, height - 2, 0, game.status())
     _write(screen, height - 1, 0, HELP)
     return screen
@@ -77,6 +80,7 @@ def draw(game: Game, width: int, height: int, plain: bool = False) -> Characters
 
 def draw_world(game: Game, rows: int, columns: int, plain: bool = False) -> Characters:
     """Returns the true maze with the path and the rays of the range sensor, `rows` x `columns` characters a cell."""
+    # What is drawn later lies over what was drawn before.
     task, size = game.env.task, game.task_spec.size
     styles = np.where(game.walls, Style.WALL, Style.FLOOR).repeat(rows, axis=0).repeat(columns, axis=1)
     path = game.to_cells(game.path) * [columns, -rows] + [0, size * rows]
@@ -88,6 +92,8 @@ def draw_world(game: Game, rows: int, columns: int, plain: bool = False) -> Char
     for cells, style in ((game.landmarks, Style.LANDMARK), ([task.route.goal], Style.GOAL)):
         for cell in cells:
             _mark(styles, cell, style, rows, columns)
+
+    # The body as an arrow.
     panel = _characters(styles)
     x, y = path[-1].astype(int)
     octant = round(game.env.simulation.yaw() / (math.pi / 4)) % 8

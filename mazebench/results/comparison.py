@@ -17,10 +17,13 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.results.intervals import Estimate, difference_interval
 from mazebench.results.metrics import METRICS, by_distance
-from mazebench.results.records import Record, Summary, column
 from mazebench.results.reading import Result, find_parts, load_result
+from mazebench.results.records import Record, Summary, column
 
-_SAME_EPISODE = ("maze", "start", "goal", "seed", "distance")  # fields of records that must be equal
+# Fields of summaries, of their provenance and of records that must be equal.
+_SAME_TASK = ("benchmark", "task", "size", "cell_size", "split")
+_SAME_PROVENANCE = ("benchmark_manifest_sha256", "mazes_sha256")
+_SAME_EPISODE = ("maze", "start", "goal", "seed", "distance")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,7 +84,10 @@ def compare_folders(a: pathlib.Path, b: pathlib.Path) -> Comparison:
     title = f"A is {_who(ours, common)} in {a}, B is {_who(theirs, common)} in {b}"
     title += f"; {ours.task}, {ours.split} mazes {ours.size} x {ours.size}" if common == [""] else ""
     return Comparison(
-        title, {name: compare_results(*pair) for name, pair in pairs.items()}, ours.task == "local", notes
+        title=title,
+        parts={name: compare_results(*pair) for name, pair in pairs.items()},
+        has_distances=ours.task == "local",
+        notes=notes,
     )
 
 
@@ -157,16 +163,10 @@ def _who(summary: Summary, parts: list[str]) -> str:
 
 
 def _check_pairs(a: Result, b: Result) -> None:
-    for key, ours, theirs in (
-        *(
-            (key, getattr(a.summary, key), getattr(b.summary, key))
-            for key in ("benchmark", "task", "size", "cell_size", "split")
-        ),
-        *(
-            (key, getattr(a.summary.provenance, key), getattr(b.summary.provenance, key))
-            for key in ("benchmark_manifest_sha256", "mazes_sha256")
-        ),
-    ):
+    for key in (*_SAME_TASK, *_SAME_PROVENANCE):
+        ours, theirs = (
+            getattr(result.summary.provenance if key in _SAME_PROVENANCE else result.summary, key) for result in (a, b)
+        )
         if ours != theirs:
             raise InputError(
                 f"expected results of one {key} to compare, found {str(ours)[:80]} in {a.folder} "

@@ -7,8 +7,8 @@ import json
 from collections.abc import Sequence
 from importlib import resources
 
-from mazebench.tasks.trials import Trial, frozen_trials
 from mazebench.maps.benchmark import VERSION
+from mazebench.tasks.trials import Trial, frozen_trials
 
 
 def oracle_spl(benchmark: str, task: str, size: int, trials: Sequence[Trial]) -> dict[int, float] | None:

@@ -10,9 +10,9 @@ import numpy as np
 import pydantic
 
 from mazebench.errors import InputError, describe_fault
+from mazebench.renamed import describe_unfinished, name_of_class
 from mazebench.results.metrics import METRICS, spl
 from mazebench.results.records import Record, Summary, column
-from mazebench.renamed import describe_unfinished, name_of_class
 from mazebench.storage.files import read_at_most
 from mazebench.storage.json_files import read_json, read_lines
 

@@ -72,15 +72,15 @@ class Trajectories:
         return len(self.length)
 
     def __getitem__(self, episode: int) -> Trajectory:
-        landmarks = self._landmark_bounds
         steps = slice(*self._pose_bounds[episode : episode + 2])
+        landmarks = slice(*self._landmark_bounds[episode : episode + 2])
         return Trajectory(
-            self.pose[steps],
-            _unpack(self.shown[episode], self.size),
-            self.landmark[landmarks[episode] : landmarks[episode + 1]],
-            None if self.marks is None else self.marks[episode],
-            None if self.picture is None else self.picture[episode],
-            None if self.observed is None else self.observed[steps],
+            pose=self.pose[steps],
+            shown=_unpack(self.shown[episode], self.size),
+            landmarks=self.landmark[landmarks],
+            marks=None if self.marks is None else self.marks[episode],
+            picture=None if self.picture is None else self.picture[episode],
+            observed=None if self.observed is None else self.observed[steps],
         )
 
     @property
@@ -163,11 +163,12 @@ def from_json(content: dict[str, Any], size: int) -> Trajectory:
       ValueError: if it is none.
     """
     try:
-        found = {name: _from_base64(content[name], _DTYPES[name]) for name in ("pose", "shown")}
+        pose = _from_base64(content["pose"], _DTYPES["pose"]).reshape(-1, 3)
+        shown = _unpack(_from_base64(content["shown"], _DTYPES["shown"]), size)
+        landmarks = np.array(content["landmarks"], dtype=_DTYPES["landmark"])
         optional = {
             name: _from_base64(content[name], dtype) for name, dtype in _OPTIONAL_DTYPES.items() if name in content
         }
-        landmarks = np.array(content["landmarks"], dtype=_DTYPES["landmark"])
     except (KeyError, TypeError, OverflowError) as error:
         raise ValueError(f"no trajectory: {error}") from error
     if "picture" in optional:
@@ -175,7 +176,7 @@ def from_json(content: dict[str, Any], size: int) -> Trajectory:
         optional["picture"] = optional["picture"].reshape(side, side)
     if "observed" in optional:
         optional["observed"] = optional["observed"].reshape(-1, 3)
-    trajectory = Trajectory(found["pose"].reshape(-1, 3), _unpack(found["shown"], size), landmarks, **optional)
+    trajectory = Trajectory(pose=pose, shown=shown, landmarks=landmarks, **optional)
     fault = _fault(pack_trajectories([trajectory]), 1)
     if fault:
         raise ValueError(fault)

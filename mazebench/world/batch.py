@@ -1,4 +1,7 @@
-"""Batches of simulations on native threads, which a forked process must neither use nor wait for."""
+"""Batches of simulations on native threads.
+
+A fork copies a batch without its threads, so a forked process must neither use the batch nor destroy it.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +26,11 @@ def open_batch(model: mujoco.MjModel, num_sims: int, num_threads: int) -> mujoco
 
 
 def _keep_batches() -> None:
-    """Keeps this process, a forked one, from destroying the batches of its parent.
+    """Keeps a forked process from destroying the batches of its parent.
 
-    A batch waits for its threads when it is destroyed, and a fork copies the batch without the threads. Only a
-    reference that nobody gives up outlasts the end of the interpreter, too.
+    When a batch is destroyed it waits for its threads, which a forked process does not have: it would wait forever.
+    The interpreter destroys all objects at its end, also those in global variables, unless a reference to them is
+    counted that nobody holds.
     """
     for batch in list(_batches):
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(batch))

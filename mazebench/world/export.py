@@ -19,9 +19,8 @@ _WALL_COLOUR = (92, 120, 153, 255)
 # Metres; the side of the pillars that join walls which touch only at a corner. Without pillars an edge would have four
 # faces, and readers that merge vertices (OBJ, STL) would not find the mesh watertight.
 _PILLAR = 0.02
-_PROUD = (
-    0.001  # metres by which pillars stand out above and below; flush ones would leave the walls' corners in the mesh
-)
+# Metres by which pillars stand out above and below. Flush ones would leave the walls' corners in the mesh.
+_PILLAR_OVERHANG = 0.001
 # glTF has y up, we have z up.
 _TO_GLTF = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
@@ -46,19 +45,21 @@ def wall_mesh(maze: Maze) -> trimesh.Trimesh:
 
     A pillar of 2 cm joins walls that touch only at a corner, where no body can pass anyway.
     """
-    boxes = [
-        _box(*(maze.cell_size * edge for edge in (left, maze.size - bottom, right, maze.size - top)))
-        for top, left, bottom, right in cover(maze.walls)
-    ]
+    scale = maze.cell_size
+    boxes = []
+    for top, left, bottom, right in cover(maze.walls):
+        low, high = maze.size - bottom, maze.size - top
+        boxes.append(_box(scale * left, scale * low, scale * right, scale * high, overhang=0.0))
     half = _PILLAR / 2
-    boxes += [_box(x - half, y - half, x + half, y + half, _PROUD) for x, y in _diagonal_corners(maze)]
+    for x, y in _diagonal_corners(maze):
+        boxes.append(_box(x - half, y - half, x + half, y + half, overhang=_PILLAR_OVERHANG))
     mesh = trimesh.boolean.union(boxes, engine="manifold", check_volume=False)
     mesh.visual.face_colors = _WALL_COLOUR
     return mesh
 
 
-def _box(left: float, low: float, right: float, high: float, proud: float = 0.0) -> trimesh.Trimesh:
-    return trimesh.creation.box(bounds=[[left, low, -proud], [right, high, WALL_HEIGHT + proud]])
+def _box(left: float, low: float, right: float, high: float, overhang: float) -> trimesh.Trimesh:
+    return trimesh.creation.box(bounds=[[left, low, -overhang], [right, high, WALL_HEIGHT + overhang]])
 
 
 def _diagonal_corners(maze: Maze) -> np.ndarray:
@@ -80,9 +81,5 @@ def write_mesh(maze: Maze, path: pathlib.Path) -> None:
     if path.suffix == ".glb":
         mesh.apply_transform(_TO_GLTF)
     with open_whole(path) as file:
-        file.write(_encoded(mesh, path.suffix[1:]))
-
-
-def _encoded(mesh: trimesh.Trimesh, file_type: str) -> bytes:
-    content = mesh.export(file_type=file_type)
-    return content.encode("utf-8") if isinstance(content, str) else bytes(content)
+        content = mesh.export(file_type=path.suffix[1:])  # text of OBJ, bytes of the others
+        file.write(content.encode("utf-8") if isinstance(content, str) else bytes(content))

@@ -5,16 +5,17 @@ from __future__ import annotations
 import functools
 import pathlib
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
 from mazebench.errors import InputError, unknown
-from mazebench.maps.files import read_placed
+from mazebench.maps.files import read_located
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze, resized
 from mazebench.maps.options import OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions
 from mazebench.maps.pictures import draw_maze, write_image
-from mazebench.maps.readers.occupancy import PlacedMaze
+from mazebench.maps.readers.occupancy import LocatedMaze
 from mazebench.maps.readers.ros import write_ros_map
 from mazebench.maps.text import write_text_maze
 from mazebench.world.export import MESH_FORMATS, write_mesh, write_mjcf
@@ -23,23 +24,28 @@ _DEFAULT_SIZE = 13
 _PICTURE_PIXELS = 1024  # about the side of a maze's picture
 
 
+class _Format(NamedTuple):
+    suffixes: tuple[str, ...]  # of the files that a maze is written to
+    write: Callable[[LocatedMaze, pathlib.Path], None]  # writes them all, given the path of the first
+
+
 def make_mazes(
     size: int | None, count: int, seed: int, style: str, source: pathlib.Path | None, options: MapOptions
-) -> Iterator[PlacedMaze]:
+) -> Iterator[LocatedMaze]:
     """Yields `count` mazes of a style, named after style, size, seed and index; or the one maze in the map `source`.
 
     Raises:
       InputError: if the style can't make mazes of that size, or the map holds no maze.
     """
     if source is not None:
-        yield read_placed(source, size, options)
+        yield read_located(source, size, options)
         return
     options.require_defaults((*OCCUPANCY_OPTIONS, *PICTURE_OPTIONS), "maps", "a generated maze")
     size = _DEFAULT_SIZE if size is None else size
     for index in range(count):
         name = f"{style}-{size}-{seed}-{index:03d}"
         maze = generate(style, size, np.random.default_rng([seed, index]), name)
-        yield PlacedMaze(resized(maze, options.cell_size))
+        yield LocatedMaze(resized(maze, options.cell_size))
 
 
 def parse_formats(text: str) -> list[str]:
@@ -50,21 +56,23 @@ def parse_formats(text: str) -> list[str]:
     """
     formats = [name.strip() for name in text.split(",")]
     for name in formats:
-        if name not in _WRITERS:
-            raise unknown("format", name, _WRITERS)
+        if name not in _FORMATS:
+            raise unknown("format", name, _FORMATS)
     return formats
 
 
 def write_maze(
-    placed: PlacedMaze, folder: pathlib.Path, formats: list[str], source: pathlib.Path | None = None
+    located: LocatedMaze, folder: pathlib.Path, formats: list[str], source: pathlib.Path | None = None
 ) -> list[pathlib.Path]:
     """Writes a maze into `folder` in each format and returns the files; a ROS map overlays the one it was read from.
 
     Raises:
       InputError: if the folder can't be written, or a file is `source`, the map that the maze was read from.
     """
-    written = {name: [folder / f"{placed.maze.name}.{suffix}" for suffix in _WRITERS[name][0]] for name in formats}
-    paths = [path for several in written.values() for path in several]
+    paths_of = {
+        name: [folder / f"{located.maze.name}.{suffix}" for suffix in _FORMATS[name].suffixes] for name in formats
+    }
+    paths = [path for several in paths_of.values() for path in several]
     for path in paths:
         if source is not None and path.exists() and path.samefile(source):
             raise InputError(
@@ -72,8 +80,8 @@ def write_maze(
             )
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, (first, *_) in written.items():
-            _WRITERS[name][1](placed, first)
+        for name in formats:
+            _FORMATS[name].write(located, paths_of[name][0])
     except OSError as error:
         raise InputError(f"{folder}: can't write there: {error.strerror}") from error
     return paths
@@ -83,21 +91,20 @@ def _write_picture(maze: Maze, path: pathlib.Path) -> None:
     write_image(draw_maze(maze, max(1, _PICTURE_PIXELS // maze.size)), path)
 
 
-def _in_own_frame(write: Callable[[Maze, pathlib.Path], None]) -> Callable[[PlacedMaze, pathlib.Path], None]:
+def _in_own_frame(write: Callable[[Maze, pathlib.Path], None]) -> Callable[[LocatedMaze, pathlib.Path], None]:
     """Returns a writer of a format whose frame is the maze's."""
-    return lambda placed, path: write(placed.maze, path)
+    return lambda located, path: write(located.maze, path)
 
 
-def _write_ros_map(placed: PlacedMaze, path: pathlib.Path) -> None:
-    write_ros_map(placed.maze, path, placed.origin)
+def _write_ros_map(located: LocatedMaze, path: pathlib.Path) -> None:
+    write_ros_map(located.maze, path, located.origin)
 
 
-# By format: the suffixes of its files, and what writes them all, given the path of the first.
-_WRITERS: dict[str, tuple[tuple[str, ...], Callable[[PlacedMaze, pathlib.Path], None]]] = {
-    "txt": (("txt",), _in_own_frame(write_text_maze)),
-    "mjcf": (("xml",), _in_own_frame(write_mjcf)),
-    "mjcf-textured": (("textured.xml",), _in_own_frame(functools.partial(write_mjcf, textures=True))),
-    "png": (("png",), _in_own_frame(_write_picture)),
-    "ros": (("yaml", "pgm"), _write_ros_map),
-    **{name: ((name,), _in_own_frame(write_mesh)) for name in MESH_FORMATS},
+_FORMATS: dict[str, _Format] = {
+    "txt": _Format(("txt",), _in_own_frame(write_text_maze)),
+    "mjcf": _Format(("xml",), _in_own_frame(write_mjcf)),
+    "mjcf-textured": _Format(("textured.xml",), _in_own_frame(functools.partial(write_mjcf, textures=True))),
+    "png": _Format(("png",), _in_own_frame(_write_picture)),
+    "ros": _Format(("yaml", "pgm"), _write_ros_map),
+    **{name: _Format((name,), _in_own_frame(write_mesh)) for name in MESH_FORMATS},
 }

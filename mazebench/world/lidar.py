@@ -58,19 +58,24 @@ class Lidar:
           pose: `[K, 3]` float64, the bodies' x, y (m) and yaw (rad, not wrapped).
         """
         num_bodies = len(pose)
-        heading = np.floor(pose[:, 2] / _STEP)  # in steps, rounded down
-        spacing = _line_spacing(pose[:, 2] - heading * _STEP)
-        cell, gap = self._turned_places(maze, pose[:, :2].T / self._cell_size)
+        point, yaw = pose[:, :2].T / self._cell_size, pose[:, 2]
+        heading = np.floor(yaw / _STEP)  # in steps, rounded down
+        spacing = _line_spacing(yaw - heading * _STEP)
+
+        # Where the rays begin, and their first lines.
+        cell, gap = self._cells_in_turned_mazes(maze, point)
         crossing = gap[:, :, None] * spacing[:, None]  # [2, 4, 8, K]
         cells = cell.repeat(_PER_TURN, axis=0).ravel()
+
         distances = self._traverse(cells, crossing.reshape(2, -1), spacing.reshape(2, -1))
         ranges = np.minimum(distances * self._cell_size, MAX_RANGE).astype(np.float32)
+
         # The first of `ranges` is less than a step from +x, the first that is returned is straight ahead. With "wrap",
         # ray 0 follows ray 31.
         ray = (heading % NUM_RAYS).astype(np.int64)[:, None] + np.arange(NUM_RAYS)  # [K, 32]
         return ranges.take(ray * num_bodies + np.arange(num_bodies)[:, None], mode="wrap")
 
-    def _turned_places(self, maze: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _cells_in_turned_mazes(self, maze: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Returns where the points (`[2, K]`, in cells) lie in the mazes turned by 0, 1, 2 and 3 quarters.
 
         That is the number of the cell in `_free` (`[4, K]` int), and the distances to the next lines on the right and
@@ -79,8 +84,8 @@ class Lidar:
         corner = np.floor(point)
         offset = point - corner
         gap = np.concatenate([1.0 - offset, offset]).take(_TURNED_AXES, axis=0)
-        place = np.concatenate([corner, self._size - 1 - corner]).astype(np.int64)
-        column, row = place.take(_TURNED_AXES, axis=0)
+        index = np.concatenate([corner, self._size - 1 - corner]).astype(np.int64)
+        column, row = index.take(_TURNED_AXES, axis=0)
         return ((self._first_maze + maze) * self._size + row) * self._size + column, gap
 
     def _traverse(self, cell: np.ndarray, crossing: np.ndarray, spacing: np.ndarray) -> np.ndarray:
@@ -97,13 +102,18 @@ class Lidar:
         distances = np.empty(len(cell))
         ray = np.arange(len(cell))  # those that have met no wall
         while len(ray):
+            # Enter the cell behind the nearer line.
             is_x = crossing[0] < crossing[1]
             distance = np.minimum(crossing[0], crossing[1])
             distances[ray] = distance
             cell += np.where(is_x, 1, self._size)
+
+            # Go on with the rays that are in a free cell and in reach.
             # With "clip", a body that was never placed and stands outside the free cells does no harm.
             going_on = (self._free.take(cell, mode="clip") & (distance < self._reach)).nonzero()[0]
             ray, cell, is_x = ray.take(going_on), cell.take(going_on), is_x.take(going_on)
+
+            # Move the line that was crossed on to the next one.
             step = spacing.take(ray, axis=1, mode="wrap")
             step[0] *= is_x
             step[1] *= ~is_x

@@ -34,8 +34,15 @@ _CONTACT_SOLREF = [2 * PHYSICS_TIMESTEP, 3.0]
 _EYE_HEIGHT = 0.45
 _PARKED_DEPTH = 10.0  # metres below the floor
 
-# The sensors, in this order in `sensordata`: position (3), yaw (1), linear velocity (3), angular velocity (3).
-NUM_SENSORS = 10
+# The columns of `sensordata`, in the order in which `_add_sensors` adds them.
+SENSED_POSITION = slice(0, 3)
+SENSED_YAW = 3
+SENSED_VELOCITY = slice(4, 7)
+SENSED_ANGULAR_VELOCITY = slice(7, 10)
+
+# The columns of controls, in the order in which `_add_actuators` adds them: four drives and the turn.
+NUM_CONTROLS = 5
+_FORWARD, _BACKWARD, _LEFT, _RIGHT, _TURN = range(NUM_CONTROLS)
 
 
 def maze_spec(maze: Maze) -> mujoco.MjSpec:
@@ -51,17 +58,20 @@ def build_spec(maze: Maze, boxes: list[Rectangle], num_boxes: int, name: str = "
     spec.option.timestep = PHYSICS_TIMESTEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0, 0, 0]
+
     # Set, not computed by MuJoCo, so that models of one size share camera and shadow ranges.
     spec.stat.center = [maze.side / 2, maze.side / 2, WALL_HEIGHT / 2]
     spec.stat.extent = maze.side
     spec.stat.meansize = 0.5
+
     spec.visual.map.znear = 0.02 / maze.side
-    # `global` is a keyword of Python.
-    getattr(spec.visual, "global").offwidth = MAX_PIXELS
-    getattr(spec.visual, "global").offheight = MAX_PIXELS
+    offscreen = getattr(spec.visual, "global")  # a keyword of Python
+    offscreen.offwidth = MAX_PIXELS
+    offscreen.offheight = MAX_PIXELS
     spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
     spec.visual.headlight.diffuse = [0.25, 0.25, 0.25]
     spec.visual.headlight.specular = [0, 0, 0]
+
     _add_materials(spec, maze)
     _add_room(spec, maze.side)
     _add_walls(spec, maze, boxes, num_boxes)
@@ -173,7 +183,11 @@ def _add_body(spec: mujoco.MjSpec, maze: Maze) -> None:
     body.add_joint(name="x", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0], damping=[_DAMPING, 0, 0])
     body.add_joint(name="y", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 1, 0], damping=[_DAMPING, 0, 0])
     body.add_joint(name="yaw", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
-    body.mass, body.inertia, body.ipos, body.explicitinertial = 1.0, [_YAW_INERTIA] * 3, [0, 0, 0], True
+    body.mass = 1.0
+    body.inertia = [_YAW_INERTIA] * 3
+    body.ipos = [0, 0, 0]
+    body.explicitinertial = True
+
     body.add_geom(
         name="agent",
         type=mujoco.mjtGeom.mjGEOM_CAPSULE,
@@ -186,12 +200,14 @@ def _add_body(spec: mujoco.MjSpec, maze: Maze) -> None:
         name="nose", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0.11, 0, 0.02], size=[0.06, 0.09, 0.05], material="nose"
     )
     body.add_site(name="agent", pos=[0, 0, 0], size=[0.01, 0.01, 0.01], group=4)
+
     eye = _EYE_HEIGHT - BODY_HEIGHT / 2
     # The camera looks along the body's x axis: its right is -y, its up is z. The nose is below its view.
     body.add_camera(name="egocentric", pos=[0.12, 0, eye], xyaxes=[0, -1, 0, 0, 0, 1], fovy=75)
     # Between narrow walls, it is nearer and looks down more steeply.
     behind = min(1.0, maze.cell_size)
     body.add_camera(name="chase", pos=[-1.6 * behind, 0, 2.2], xyaxes=[0, -1, 0, 0.75, 0, 0.66 * behind], fovy=60)
+
     _add_actuators(spec)
     _add_sensors(spec)
     spec.add_key(name="start", qpos=[x, y, 0], mpos=[0, 0, -_PARKED_DEPTH], mquat=[1, 0, 0, 0])
@@ -233,9 +249,11 @@ def _add_sensors(spec: mujoco.MjSpec) -> None:
 
 def action_controls() -> np.ndarray:
     """Returns the controls of the four drives and the turn for each of `ACTIONS`: `[6, 5]` float."""
-    controls = np.zeros((len(ACTIONS), 5))
-    controls[np.arange(4), np.arange(4)] = 1.0
-    controls[4, 4], controls[5, 4] = TURN_RATE, -TURN_RATE
+    controls = np.zeros((len(ACTIONS), NUM_CONTROLS))
+    for drive in (_FORWARD, _BACKWARD, _LEFT, _RIGHT):
+        controls[drive, drive] = 1.0
+    controls[ACTIONS.index("look_left"), _TURN] = TURN_RATE
+    controls[ACTIONS.index("look_right"), _TURN] = -TURN_RATE
     return controls
 
 
@@ -247,12 +265,13 @@ def velocity_controls(velocities: np.ndarray) -> np.ndarray:
     shortened to it. With one of the three at 1 or -1 and the others at 0, the controls are those of an action. With
     all at 0 the body coasts.
     """
-    drive = velocities[..., :2] / np.maximum(1.0, np.hypot(velocities[..., 0], velocities[..., 1]))[..., None]
-    controls = np.zeros((*velocities.shape[:-1], 5))
-    for forwards, backwards, share in ((0, 1, drive[..., 0]), (2, 3, drive[..., 1])):
+    forward, left, turn = np.moveaxis(velocities, -1, 0)
+    excess = np.maximum(1.0, np.hypot(forward, left))
+    controls = np.zeros((*velocities.shape[:-1], NUM_CONTROLS))
+    for ahead, back, share in ((_FORWARD, _BACKWARD, forward / excess), (_LEFT, _RIGHT, left / excess)):
         # The control under which drive and damping balance at `share * TOP_SPEED`.
         control = _DAMPING * np.abs(share) / (_DRIVE_GAIN * (1 - np.abs(share)) + _DAMPING)
-        controls[..., forwards] = np.where(share > 0, control, 0.0)
-        controls[..., backwards] = np.where(share < 0, control, 0.0)
-    controls[..., 4] = TURN_RATE * velocities[..., 2]
+        controls[..., ahead] = np.where(share > 0, control, 0.0)
+        controls[..., back] = np.where(share < 0, control, 0.0)
+    controls[..., _TURN] = TURN_RATE * turn
     return controls

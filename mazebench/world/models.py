@@ -64,7 +64,7 @@ class MazeModels:
 
 def models_of(mazes: tuple[Maze, ...], textures: bool = False) -> MazeModels:
     """Returns the models of `mazes`, which all environments with these mazes share."""
-    return _models_of(mazes, textures)
+    return _models_of(mazes, textures)  # the cache tells `textures=False` from the default
 
 
 @functools.lru_cache(maxsize=8)

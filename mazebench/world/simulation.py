@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from mazebench.world.angles import wrap_angle
-from mazebench.world.mjcf import NUM_SENSORS
+from mazebench.world.mjcf import SENSED_ANGULAR_VELOCITY, SENSED_POSITION, SENSED_VELOCITY, SENSED_YAW
 from mazebench.world.models import copy_maze
 
 STATE_SIZE = 12
@@ -116,13 +116,14 @@ def _resumed(model: mujoco.MjModel, state: np.ndarray) -> MujocoSimulation:
 
 
 def states_from_sensors(sensors: np.ndarray) -> np.ndarray:
-    """Returns `[..., 12]` float64 states from `[..., 10]` sensor values.
+    """Returns `[..., 12]` float64 states from `[..., 10]` values of the sensors that `mjcf` names.
 
     A state is, in this order: position x, y, z (m); orientation roll, pitch, yaw (rad, yaw in [-pi, pi)); linear
     velocity forward, left, up in the body's frame (m/s); angular velocity about the body's x, y, z (rad/s).
     """
     states = np.zeros((*sensors.shape[:-1], STATE_SIZE))
-    states[..., :3] = sensors[..., :3]
-    states[..., 5] = wrap_angle(sensors[..., 3])
-    states[..., 6:] = sensors[..., 4:NUM_SENSORS]
+    states[..., 0:3] = sensors[..., SENSED_POSITION]
+    states[..., 5] = wrap_angle(sensors[..., SENSED_YAW])
+    states[..., 6:9] = sensors[..., SENSED_VELOCITY]
+    states[..., 9:12] = sensors[..., SENSED_ANGULAR_VELOCITY]
     return states

@@ -92,11 +92,18 @@ def wall_faces(maze: Maze) -> list[Face]:
             for begin, end in itertools.pairwise([0, *ends, len(line)]):
                 if line[begin] < 0:
                     continue
+                # The middle of the face, from the middle of the maze; turned back, clockwise.
                 x, y = scale * ((begin + end) / 2 - middle), scale * (middle - row - 1) + _OFFSET
-                for _ in range(turns):  # back, clockwise
+                for _ in range(turns):
                     x, y = y, -x
-                half_length, surface = scale * (end - begin) / 2, int(line[begin])
-                faces.append(Face(x + scale * middle, y + scale * middle, -turns * np.pi / 2, half_length, surface))
+                face = Face(
+                    x=x + scale * middle,
+                    y=y + scale * middle,
+                    yaw=-turns * np.pi / 2,
+                    half_length=scale * (end - begin) / 2,
+                    surface=int(line[begin]),
+                )
+                faces.append(face)
     return faces
 
 
@@ -106,6 +113,8 @@ def _surfaces(maze: Maze) -> np.ndarray:
     Regions next to each other have different surfaces if that can be, and all surfaces are used about equally often.
     """
     rng = np.random.default_rng(list(hashlib.sha256(np.packbits(maze.walls).tobytes()).digest()))
+
+    # Regions: the cells nearest to each of some sites.
     num_cells = len(maze.free_cells)
     cells = np.full(maze.walls.shape, -1)
     cells[~maze.walls] = np.arange(num_cells)
@@ -113,6 +122,8 @@ def _surfaces(maze: Maze) -> np.ndarray:
     sites = np.sort(rng.choice(num_cells, max(1, num_cells // _CELLS_PER_REGION), replace=False))
     _, _, nearest = csgraph.dijkstra(graph, unweighted=True, indices=sites, min_only=True, return_predecessors=True)
     region = np.searchsorted(sites, nearest)  # of each free cell
+
+    # A surface for each region: of those that no neighbour has, one that was used least.
     borders = region[np.stack(graph.nonzero())]  # [2, E]
     surface = np.full(len(sites), -1)  # of each region
     uses = np.zeros(len(_SURFACES))
@@ -122,6 +133,7 @@ def _surfaces(maze: Maze) -> np.ndarray:
         rank = np.where(is_around, np.inf, uses)
         surface[site] = rng.choice(np.flatnonzero(rank == rank.min()))
         uses[surface[site]] += 1
+
     result = np.full(maze.walls.shape, -1)
     result[~maze.walls] = surface[region]
     return result
@@ -138,7 +150,7 @@ def add_textures(spec: mujoco.MjSpec, maze: Maze, faces: list[Face], num_faces: 
     """
     _add_materials(spec)
     middle = maze.cell_size * maze.size / 2
-    parked = [Face(middle, middle, 0.0, 0.1, 0)] * (num_faces - len(faces))
+    parked = [Face(x=middle, y=middle, yaw=0.0, half_length=0.1, surface=0)] * (num_faces - len(faces))
     for index, face in enumerate([*faces, *parked]):
         depth = 0.0 if index < len(faces) else _PARKED_DEPTH
         # A plane faces its own z axis. This one is turned so that its y axis points up, then about the vertical.
@@ -156,9 +168,12 @@ def add_textures(spec: mujoco.MjSpec, maze: Maze, faces: list[Face], num_faces: 
 
 
 def _add_materials(spec: mujoco.MjSpec) -> None:
-    sky, floor = spec.texture("sky"), spec.texture("cells")
+    sky = spec.texture("sky")
     sky.rgb1, sky.rgb2 = _SKY
-    floor.builtin, (floor.rgb1, floor.rgb2) = mujoco.mjtBuiltin.mjBUILTIN_CHECKER, _FLOOR
+    floor = spec.texture("cells")
+    floor.builtin = mujoco.mjtBuiltin.mjBUILTIN_CHECKER
+    floor.rgb1, floor.rgb2 = _FLOOR
+
     textures = [""] * mujoco.mjtTextureRole.mjNTEXROLE
     for index, surface in enumerate(_SURFACES):
         name = f"face_{index}"

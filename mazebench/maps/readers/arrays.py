@@ -14,7 +14,7 @@ from mazebench.maps.file_kinds import kind_of
 from mazebench.maps.grids import square_maze
 from mazebench.maps.maze import MIN_CELL_SIZE, Maze, MazeError
 from mazebench.maps.options import OCCUPANCY_OPTIONS, MapOptions
-from mazebench.maps.readers.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, place_maze
+from mazebench.maps.readers.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, locate_maze
 from mazebench.storage.files import read_at_most
 
 _MAX_BYTES = 2**27  # of a .npy file
@@ -26,7 +26,7 @@ def maze_from_array(array: np.ndarray, name: str = "maze", **options: Any) -> Ma
 
     Args:
       array: `[R, C]`, either walls as bool or as 0 (free) and 1 (wall), which are padded to a square by `square_maze`;
-        or occupancy as integers from 0 (free) to 100 (occupied) per cent, -1 where unknown, see `place_maze`.
+        or occupancy as integers from 0 (free) to 100 (occupied) per cent, -1 where unknown, see `locate_maze`.
       name: of the maze.
       **options: those of `MapOptions`.
 
@@ -58,7 +58,7 @@ def read_array(array: np.ndarray, name: str, options: MapOptions) -> Maze:
     states = np.full(array.shape, UNKNOWN, dtype=np.int8)
     states[(array >= 0) & (array <= _MAX_FREE)] = FREE
     states[array >= _MIN_OCCUPIED] = OCCUPIED
-    return place_maze(OccupancyGrid(states, cell_size), dataclasses.replace(options, cell_size=cell_size), name).maze
+    return locate_maze(OccupancyGrid(states, cell_size), dataclasses.replace(options, cell_size=cell_size), name).maze
 
 
 def read_array_maze(path: str | pathlib.Path, options: MapOptions) -> Maze:

@@ -18,6 +18,7 @@ CORE = 0.5  # share of a cell's side: the middle of a cell, which decides whethe
 def fit_grid(
     across: np.ndarray,
     down: np.ndarray,
+    *,
     pixels: tuple[int, ...],
     shortest: int,
     longest: tuple[int, int],
@@ -35,10 +36,13 @@ def fit_grid(
       size: the number of cells along the longer axis; estimated if None.
       nearly_best: share of the best fit with which smaller numbers are preferred.
     """
+    # The fit of each pair of numbers: the two axes' fits, weighted.
     row_fits, row_weight = _axis_fits(across)
     column_fits, column_weight = _axis_fits(down)
     weight = max(1e-9, row_weight + column_weight)
     fits = (row_weight * row_fits[:, None] + column_weight * column_fits[None, :]) / weight  # [R, C]
+
+    # The pairs that are allowed.
     counts = np.arange(len(row_fits))
     stretch = np.log(np.maximum(counts, 1)[:, None] / np.maximum(counts, 1)[None, :] * pixels[1] / pixels[0])
     longer = np.maximum(counts[:, None], counts[None, :])
@@ -48,14 +52,16 @@ def fit_grid(
         allowed &= longer == size
     fits[~allowed] = -1.0
     best = fits.max()
+    if best <= 0:
+        return (longest[0], longest[0]), -1.0
+
+    # The smallest of the pairs that fit nearly best, better than their neighbours, and stretch cells as the best does.
     near = cv2.dilate(fits, np.ones((3, 3), np.uint8))
     as_stretched = np.abs(stretch - stretch.ravel()[fits.argmax()]) <= _SAME_STRETCH
     rows, columns = np.nonzero((fits >= near) & (fits >= nearly_best * best) & as_stretched & allowed)
-    if best <= 0:
-        return (longest[0], longest[0]), -1.0
     first = int(np.argmin(rows * columns))
-    row, column = int(rows[first]), int(columns[first])
-    return (row, column), float(min(row_fits[row], column_fits[column]))
+    num_rows, num_columns = int(rows[first]), int(columns[first])
+    return (num_rows, num_columns), float(min(row_fits[num_rows], column_fits[num_columns]))
 
 
 def core_bounds(count: int, length: int) -> tuple[np.ndarray, np.ndarray]:

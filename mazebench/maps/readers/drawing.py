@@ -25,12 +25,14 @@ def flatten(gray: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Both are `[H', W']` uint8 with a margin around the picture; 255 is paper.
     """
+    # The light on the paper, from a small copy: a closing half as wide as the picture replaces ink by the paper around.
     gray = _shrink(gray, WORKING_SIDE)
     small = _shrink(gray, _LIGHT_SIDE)
-    # A closing half as wide as the picture replaces ink by the paper around it.
     closed = cv2.morphologyEx(small, cv2.MORPH_CLOSE, np.ones((max(small.shape) // 2,) * 2, np.uint8))
     light = np.maximum(closed, _MIN_LIGHT * np.percentile(closed, 95)).astype(np.float32)
     light = cv2.resize(cv2.GaussianBlur(light, (0, 0), 3), gray.shape[::-1], interpolation=cv2.INTER_LINEAR)
+
+    # The picture in even light, with a margin of paper.
     fine = np.clip(255.0 * gray / np.maximum(light, 1), 0, 255).astype(np.uint8)
     fine = cv2.copyMakeBorder(fine, *(_MARGIN,) * 4, cv2.BORDER_CONSTANT, value=255)
     return cv2.medianBlur(fine, 3), fine
@@ -94,20 +96,27 @@ def _shrink(gray: np.ndarray, side: int) -> np.ndarray:
 
 def _fit_corners(outline: np.ndarray) -> np.ndarray | None:
     """Returns the corners (x, y) of an outline with four straight sides, `[4, 2]` float32 from top left, or None."""
+    # Four rough corners.
     hull = cv2.convexHull(outline, clockwise=False)  # clockwise if y points down
     tolerances = cv2.arcLength(hull, True) * np.arange(0.01, 0.1, 0.005)
     polygons = (cv2.approxPolyDP(hull, tolerance, True)[:, 0] for tolerance in tolerances)
     rough = next((polygon for polygon in polygons if len(polygon) == 4), None)
     if rough is None:
         return None
+
+    # In order from the top left one: the upper side leads most to the right, the lower one most to the left.
     rightwards = np.roll(rough, -1, axis=0)[:, 0] - rough[:, 0]  # of the side that starts at each corner
     rough = np.roll(rough, -int(np.argmax(rightwards - np.roll(rightwards, 2))), axis=0).astype(np.float64)
+
+    # The lines through the sides meet in the corners, in homogeneous coordinates.
     points = outline[:, 0].astype(np.float64)
     sides = [_fit_side(points, rough[i], rough[(i + 1) % 4]) for i in range(4)]
-    meetings = np.array([np.cross(sides[i - 1], sides[i]) for i in range(4)])  # homogeneous
+    meetings = np.array([np.cross(sides[i - 1], sides[i]) for i in range(4)])
     if (np.abs(meetings[:, 2]) < 1e-9).any():
         return None
     corners = (meetings[:, :2] / meetings[:, 2:]).astype(np.float32)
+
+    # The outline must fill the shape between them.
     smaller, larger = sorted((cv2.contourArea(outline), cv2.contourArea(corners)))
     return corners if smaller >= _MIN_FRAME_FILL * larger else None
 

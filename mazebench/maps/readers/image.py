@@ -6,11 +6,12 @@
 from __future__ import annotations
 
 import pathlib
+import warnings
 
 import cv2
 import numpy as np
 
-from mazebench.errors import InputError, held_remarks
+from mazebench.errors import InputError, Remark
 from mazebench.maps.file_kinds import kind_of
 from mazebench.maps.grids import square_maze
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, Maze, MazeError
@@ -22,8 +23,6 @@ from mazebench.storage.files import read_at_most
 _MAX_BYTES = 2**27  # of a picture's file; _MAX_PIXELS gray pixels take half of it
 _MAX_PIXELS = MAX_SIDE**2  # of a picture that is read: every drawing, and more than the 50 megapixels of a telephone
 _PNG_START = b"\x89PNG\r\n\x1a\n"
-
-
 _MIN_DARK = 0.3  # share of the pixels of a picture of light walls on a dark ground
 _MARK_SATURATION = 90  # of 255, between the strongest and the weakest channel of a mark
 _MAX_MARK_SHARE = 0.15  # of the picture, and of its dark pixels; if more are coloured, the paper or the walls are
@@ -131,19 +130,18 @@ def to_gray(image: np.ndarray, name: str) -> np.ndarray:
         return image
     colours = np.ascontiguousarray(image[..., :3])
     gray = cv2.cvtColor(colours, cv2.COLOR_RGB2GRAY)
-    _clear_marks(gray, colours)
-    if shape[2] == 3:
-        return gray
-    opacity = image[..., 3].astype(np.uint16)
-    return ((gray * opacity + 255 * (255 - opacity)) // 255).astype(np.uint8)
 
-
-def _clear_marks(gray: np.ndarray, colours: np.ndarray) -> None:
-    """Makes pixels in strong colours white in `gray`, in place, unless they may be paper or walls."""
+    # Make pixels in strong colours white, which are marks, unless they may be paper or walls.
     is_mark = colours.max(axis=2) - colours.min(axis=2) >= _MARK_SATURATION
     dark = gray < 128
     if is_mark.mean() < _MAX_MARK_SHARE and is_mark[dark].mean() < _MAX_MARK_SHARE:
         gray[is_mark] = 255
+
+    # Lay the picture on white paper.
+    if shape[2] == 3:
+        return gray
+    opacity = image[..., 3].astype(np.uint16)
+    return ((gray * opacity + 255 * (255 - opacity)) // 255).astype(np.uint8)
 
 
 def _read_walls(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
@@ -154,7 +152,8 @@ def _read_walls(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
 
 def _is_maze(gray: np.ndarray, size: int | None, name: str) -> bool:
     try:
-        with held_remarks():
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Remark)  # of a reading that is only tried
             square_maze(_read_walls(gray, size, name), name)
     except MazeError:
         return False
@@ -167,11 +166,15 @@ def _pixel_map(gray: np.ndarray, size: int | None) -> np.ndarray | None:
     if len(shades) < 2:
         return None
     dark = gray < shades[[0, -1]].mean()
+
+    # The side of a block. If the border does not alternate as in a drawing of ours, only dark and light count: JPEG may
+    # have made several shades of two.
     block = _block(gray)
     border = gray[0, ::block]
     if not (border[1:] != border[:-1]).all():
-        # The border does not alternate as in a drawing of ours, so shades tell nothing: JPEG may have made them of two.
         block = _block(dark)
+
+    # The side of a cell, of which a block has one or more.
     longer, shorter = max(gray.shape), min(gray.shape)
     num_cells = size or longer // block
     cell = longer // num_cells
@@ -179,6 +182,7 @@ def _pixel_map(gray: np.ndarray, size: int | None) -> np.ndarray | None:
         return None
     if block == 1 and len(shades) > _MAX_MAP_SHADES:
         return None
+
     walls = dark[::cell, ::cell]
     has_margin = not (walls[0].any() or walls[-1].any() or walls[:, 0].any() or walls[:, -1].any())
     return None if has_margin else walls

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -14,10 +15,12 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from mazebench.errors import InputError, remark
+from mazebench.errors import InputError, Remark
 from mazebench.maps.grids import largest_area, pad_to_square
 from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, MIN_SIZE, Maze, MazeError
 from mazebench.maps.options import MapOptions
+
+Pose = tuple[float, float, float]  # x, y (m), yaw (rad)
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 _TOLERANCE = 1e-3  # pixels by which a cell may miss a whole number of them
@@ -31,30 +34,33 @@ class OccupancyGrid:
 
     states: np.ndarray  # [H, W] int8: FREE, OCCUPIED or UNKNOWN
     resolution: float  # m, the side of a pixel
-    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # x, y (m), yaw (rad) of the lower left corner
+    origin: Pose = (0.0, 0.0, 0.0)  # of the lower left corner
     changes: tuple[str, ...] = ()  # how the states differ from the file's, in words
 
 
-class PlacedMaze(NamedTuple):
+class LocatedMaze(NamedTuple):
     """A maze, and where it lies in the map that it was made of."""
 
     maze: Maze
-    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # x, y (m), yaw (rad) of its lower left corner there
+    origin: Pose = (0.0, 0.0, 0.0)  # of the maze's lower left corner in the map's frame
 
 
-def place_maze(grid: OccupancyGrid, options: MapOptions, name: str) -> PlacedMaze:
+def locate_maze(grid: OccupancyGrid, options: MapOptions, name: str) -> LocatedMaze:
     """Returns the largest connected free area of `grid` as a maze.
 
     Rows and columns around the grid of which nothing is known are cut off. A cell is wall if one of its pixels is. Free
     cells that can't be reached are closed. Wall is added where the border is open, then on the right or at the bottom
-    until the maze is square. A remark says what was changed.
+    until the maze is square. A `Remark` says what was changed.
 
     Raises:
       InputError: if the size of the cells is no multiple of the grid's resolution.
       MazeError: if nothing is free, or the maze would be too large or too small.
     """
+    # Which pixels can't be driven on.
     top, left, states = _without_unknown_margin(grid.states)
     blocked = _inflate(_walls(states, options.unknown), options.inflate / grid.resolution)
+
+    # Cells of several pixels.
     if options.cell_size is None:
         pixels = _smallest_cell_pixels(blocked, grid.resolution)
     else:
@@ -65,14 +71,19 @@ def place_maze(grid: OccupancyGrid, options: MapOptions, name: str) -> PlacedMaz
         raise MazeError(
             f"{name}: expected a free cell, found none of {cell_size:g} m; unknown cells: {options.unknown}"
         )
+
+    # The largest area of free cells, closed all around.
     walls = largest_area(cells)
     num_free, num_closed = int((~cells).sum()), int(walls.sum() - cells.sum())
     row, column, walls = _close_border(walls)
     maze = Maze(_checked_size(pad_to_square(walls), cell_size, name), name, cell_size)
 
-    below = len(grid.states) - top - (row + maze.size) * pixels  # pixels from the map's lower edge up to the maze's
-    x, y = ((left + column * pixels) * grid.resolution, below * grid.resolution)
-    origin = _moved(grid.origin, x, y)
+    # Where the maze lies, in pixels from the left and from the lower edge of the map.
+    from_left = left + column * pixels
+    from_below = len(grid.states) - top - (row + maze.size) * pixels
+    origin = _moved(grid.origin, from_left * grid.resolution, from_below * grid.resolution)
+
+    # What a user should know.
     changes, hints = list(grid.changes), []
     if pixels > 1:
         height, width = grid.states.shape
@@ -93,10 +104,10 @@ def place_maze(grid: OccupancyGrid, options: MapOptions, name: str) -> PlacedMaz
         changes.append(f"{walls.shape[0]} x {walls.shape[1]} cells padded with wall to {maze.size} x {maze.size}")
     if changes:
         changes.append(_describe_corner(origin))
-        remark(f"{name}: {'; '.join(changes)}")
+        warnings.warn(f"{name}: {'; '.join(changes)}", Remark, stacklevel=2)
     if hints:
-        remark(f"{name}: {'; '.join(hints)}")
-    return PlacedMaze(maze, origin)
+        warnings.warn(f"{name}: {'; '.join(hints)}", Remark, stacklevel=2)
+    return LocatedMaze(maze, origin)
 
 
 def _without_unknown_margin(states: np.ndarray) -> tuple[int, int, np.ndarray]:
@@ -152,7 +163,7 @@ def _reasons_to_close(states: np.ndarray, pixels: int, resolution: float, option
         yield "walls are inflated, try a smaller --inflate"
 
 
-def _describe_corner(origin: tuple[float, float, float]) -> str:
+def _describe_corner(origin: Pose) -> str:
     """Returns where the maze lies on a map and, if it is not turned, where a point of the map lies in the maze."""
     x, y, yaw = (round(number, 6) + 0.0 for number in origin)  # + 0.0: no -0
     corner = f"the maze's lower left corner is ({x:g}, {y:g}) m on the map"
@@ -215,7 +226,7 @@ def _checked_size(walls: np.ndarray, cell_size: float, name: str) -> np.ndarray:
     return np.pad(walls, ((0, missing), (0, missing)), constant_values=True)
 
 
-def _moved(origin: tuple[float, float, float], x: float, y: float) -> tuple[float, float, float]:
+def _moved(origin: Pose, x: float, y: float) -> Pose:
     """Returns the pose of the point (x, y) of a frame that lies at `origin`."""
     x0, y0, yaw = origin
     cosine, sine = math.cos(yaw), math.sin(yaw)

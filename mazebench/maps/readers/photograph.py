@@ -58,11 +58,14 @@ def _read_rectangle(drawing: np.ndarray, fine: np.ndarray, size: int | None, nam
 
     The outermost cells are walls.
     """
+    # The grid of cells.
     ink = ink_of(drawing)
     advice = _advice(ink, size)
     shape, fit = _count_cells(ink, size)
     if fit < _MIN_FIT:
         raise MazeError(f"{name}: expected walls along the lines of a grid of cells, found edges off it ({advice})")
+
+    # The shade of each cell's middle, which must be clearly dark or light.
     cores = _cores(drawing, shape)
     dark, light = dark_and_light(np.round(cores).astype(np.uint8))
     in_words = f"{shape[0]} x {shape[1]} cells"
@@ -77,6 +80,8 @@ def _read_rectangle(drawing: np.ndarray, fine: np.ndarray, size: int | None, nam
         raise MazeError(f"{name}: expected {in_words} of wall or floor, found cell {cell} between the two ({advice})")
     walls = cores < (dark + light) / 2
     walls[[0, -1], :] = walls[:, [0, -1]] = True
+
+    # What else speaks against filled walls as thick as a cell.
     lines = _lines_in_floor(fine, walls, _MIN_LINE * (light - dark))
     if lines.any():
         cell = tuple(map(int, np.argwhere(lines)[0]))
@@ -101,15 +106,18 @@ def _advice(ink: np.ndarray, size: int | None) -> str:
 
 def _lines_in_floor(fine: np.ndarray, walls: np.ndarray, contrast: float) -> np.ndarray:
     """Returns the floor cells in which a thin dark line, about a cell long or longer, is found: `[R, C]` bool."""
+    # Dark pixels in thin shapes, then those of them that are part of a line along an axis.
     cell = min(length // count for length, count in zip(fine.shape, walls.shape, strict=True))
     thick, long = max(3, round(_LINE_WIDTH * cell)), max(3, round(_LINE_LENGTH * cell))
     dark = cv2.morphologyEx(fine, cv2.MORPH_BLACKHAT, np.ones((thick, thick), np.uint8)) > contrast
     lines = np.zeros(fine.shape, dtype=bool)
     for kernel in (np.ones((1, long), np.uint8), np.ones((long, 1), np.uint8)):
         lines |= cv2.morphologyEx(dark.astype(np.uint8), cv2.MORPH_OPEN, kernel) > 0
+
+    # The floor, but not next to walls, where it is dark if the picture is blurred or the drawing a little off its grid.
     floor = cv2.resize((~walls).astype(np.uint8), fine.shape[::-1], interpolation=cv2.INTER_NEAREST)
-    # Without the floor next to walls, which is dark if the picture is blurred or the drawing a little off its grid.
     floor = cv2.erode(floor, np.ones((2 * (cell // 4) + 1,) * 2, np.uint8))
+
     rows, columns = np.nonzero(lines & (floor > 0))
     found = np.zeros_like(walls)
     found[rows * walls.shape[0] // fine.shape[0], columns * walls.shape[1] // fine.shape[1]] = True
@@ -126,7 +134,15 @@ def _count_cells(ink: np.ndarray, size: int | None) -> tuple[tuple[int, int], fl
     """
     across = cv2.reduce(cv2.absdiff(ink[1:], ink[:-1]), 1, cv2.REDUCE_SUM, dtype=cv2.CV_64F).ravel()
     down = cv2.reduce(cv2.absdiff(ink[:, 1:], ink[:, :-1]), 0, cv2.REDUCE_SUM, dtype=cv2.CV_64F).ravel()
-    return fit_grid(across, down, ink.shape, MIN_SIDE, (MIN_SIZE, MAX_SIZE), size, _NEARLY_BEST)
+    return fit_grid(
+        across,
+        down,
+        pixels=ink.shape,
+        shortest=MIN_SIDE,
+        longest=(MIN_SIZE, MAX_SIZE),
+        size=size,
+        nearly_best=_NEARLY_BEST,
+    )
 
 
 def _cores(drawing: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

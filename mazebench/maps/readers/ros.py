@@ -19,7 +19,7 @@ from mazebench.errors import InputError
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.options import MapOptions
 from mazebench.maps.readers.image import read_picture, to_gray
-from mazebench.maps.readers.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, PlacedMaze, place_maze
+from mazebench.maps.readers.occupancy import FREE, OCCUPIED, UNKNOWN, LocatedMaze, OccupancyGrid, Pose, locate_maze
 from mazebench.storage.files import open_whole, read_at_most
 
 ROS_SUFFIXES = (".yaml", ".yml")
@@ -36,7 +36,7 @@ class _Metadata(pydantic.BaseModel):
     image: str = pydantic.Field(min_length=1, description="the name of a picture")  # absolute, or beside the YAML file
     resolution: float = pydantic.Field(gt=0, allow_inf_nan=False, description="the side of a pixel, above 0 m")
     # x, y (m) and yaw (rad) of the lower left corner of the picture
-    origin: tuple[float, float, float] = pydantic.Field(description="three numbers, [x, y, yaw]")
+    origin: Pose = pydantic.Field(description="three numbers, [x, y, yaw]")
     negate: bool = pydantic.Field(description="0 or 1")  # whether light is occupied
     # A pixel whose probability of being occupied is above the first is wall, below the second free.
     occupied_thresh: float = pydantic.Field(description="a number from 0 to 1")
@@ -44,7 +44,7 @@ class _Metadata(pydantic.BaseModel):
     mode: Literal["trinary", "scale", "raw"] = pydantic.Field("trinary", description="trinary, scale or raw")
 
 
-def read_ros_maze(path: str | pathlib.Path, **options: Any) -> PlacedMaze:
+def read_ros_maze(path: str | pathlib.Path, **options: Any) -> LocatedMaze:
     """Reads the maze in a map of ROS, named after the YAML file at `path`, and its place in the map's frame.
 
     A point (x, y) of the maze lies at `(x0 + x cos(yaw) - y sin(yaw), y0 + x sin(yaw) + y cos(yaw))` in the map's frame
@@ -58,15 +58,15 @@ def read_ros_maze(path: str | pathlib.Path, **options: Any) -> PlacedMaze:
       InputError: if a file can't be read or an option is not allowed.
       MazeError: if there is no legal maze in the map.
     """
-    return place_ros_maze(path, MapOptions(**options))
+    return locate_ros_maze(path, MapOptions(**options))
 
 
-def place_ros_maze(path: str | pathlib.Path, options: MapOptions) -> PlacedMaze:
+def locate_ros_maze(path: str | pathlib.Path, options: MapOptions) -> LocatedMaze:
     """Reads a map of ROS as `read_ros_maze` does."""
-    return place_maze(read_occupancy(path), options, pathlib.Path(path).stem)
+    return locate_maze(read_occupancy(path), options, pathlib.Path(path).stem)
 
 
-def place_floor_plan(path: pathlib.Path, pixel_size: float, options: MapOptions) -> PlacedMaze:
+def locate_floor_plan(path: pathlib.Path, pixel_size: float, options: MapOptions) -> LocatedMaze:
     """Reads a picture of a floor plan as a map of ROS with pixels of `pixel_size` m and the usual thresholds.
 
     Marks in colour are floor. What lies outside of closed outer walls is unknown, and is cut off around the plan. The
@@ -92,10 +92,13 @@ def place_floor_plan(path: pathlib.Path, pixel_size: float, options: MapOptions)
         raise MazeError(
             f"{path.stem}: expected dark walls on light paper, found more dark than light; invert the picture"
         )
+
+    # The part of the picture that the walls span, with the lower left corner of the picture as origin.
     states = _without_surroundings(states)
-    box = _box_of_walls(states)
-    corner = np.array([box[1].start, len(states) - box[0].stop]) * pixel_size
-    return place_maze(OccupancyGrid(states[box], pixel_size, (*corner.tolist(), 0.0)), options, path.stem)
+    rows, columns = _box_of_walls(states)
+    x, y = columns.start * pixel_size, (len(states) - rows.stop) * pixel_size
+    grid = OccupancyGrid(states[rows, columns], pixel_size, origin=(x, y, 0.0))
+    return locate_maze(grid, options, path.stem)
 
 
 def _box_of_walls(states: np.ndarray) -> tuple[slice, slice]:
@@ -134,6 +137,8 @@ def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     states = _states(picture, metadata)
+
+    # The departure from map_server.
     is_unknown = _saved_as_unknown(picture)
     changes = []
     if metadata.mode == "trinary" and (states[is_unknown] == FREE).any():
@@ -164,7 +169,7 @@ def map_of_picture(path: pathlib.Path) -> pathlib.Path | None:
     return None
 
 
-def write_ros_map(maze: Maze, path: str | pathlib.Path, origin: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
+def write_ros_map(maze: Maze, path: str | pathlib.Path, origin: Pose = (0.0, 0.0, 0.0)) -> None:
     """Writes `maze` as a map of ROS, with a picture of a pixel for each cell beside the YAML file at `path`.
 
     A pixel's side is the size of a cell. `origin` is x, y (m) and yaw (rad) of the maze's lower left corner in the
@@ -211,10 +216,14 @@ def _states(picture: np.ndarray, metadata: _Metadata) -> np.ndarray:
     """Returns `[H, W]` int8 of a picture: `[H, W]`, or `[H, W, 3]` or `[H, W, 4]` with opacity, uint8 or uint16."""
     if picture.dtype == np.uint16:
         picture = (picture >> 8).astype(np.uint8)
+
+    # [H, W, C], and where the picture is opaque.
     channels = picture if picture.ndim == 3 else picture[..., None]
     opaque = channels[..., 3] == 255 if channels.shape[2] == 4 else None
     if opaque is not None and metadata.mode != "trinary":  # where the opacity counts as a fourth shade
         channels = channels[..., :3]
+
+    # The shade of a pixel is the mean of its channels; states are looked up by their sum.
     num_channels = channels.shape[2]
     sums = channels.sum(axis=2, dtype=np.uint16)
     shades = np.arange(255 * num_channels + 1) / (255 * num_channels)
