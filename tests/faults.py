@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 import os
 import pathlib
+import select
 import shutil
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 import pytest
@@ -72,20 +72,22 @@ def said(errors: str) -> list[str]:
     return [line for line in errors.splitlines() if not line.endswith(" episodes")]
 
 
-def wait_until(condition: Callable[[], object], process: subprocess.Popen | None = None) -> None:
-    """Waits until `condition` holds, or `process` ends."""
-    for _ in waiting():
-        if condition() or (process is not None and process.poll() is not None):
+def wait_until(condition: Callable[[], object], process: subprocess.Popen) -> None:
+    """Waits until `condition` holds or `process` ends, at most for `PATIENCE`; looks a hundred times a second."""
+    for _ in range(100 * PATIENCE):
+        if condition():
             return
-
-
-def waiting() -> Iterator[None]:
-    """Yields a hundred times a second, for `PATIENCE` seconds."""
-    end = time.monotonic() + PATIENCE
-    while time.monotonic() < end:
-        yield
-        time.sleep(0.01)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=0.01)
+            return
     raise TimeoutError(f"waited for {PATIENCE} s")
+
+
+def wait_for_ends(pids: Iterable[int]) -> None:
+    """Waits until processes, of whatever parent, have ended."""
+    for pid in pids:
+        with contextlib.suppress(ProcessLookupError), open(os.pidfd_open(pid)) as process:
+            assert select.select([process], [], [], PATIENCE)[0], f"waited for {PATIENCE} s"
 
 
 def num_bytes(folder: pathlib.Path) -> int:
@@ -108,14 +110,14 @@ def run_through_kills(
     words: list[str],
     num_kills: int,
     most_bytes: int,
-    victim: Callable[[subprocess.Popen, np.random.Generator], int] = lambda process, rng: process.pid,
+    kills_worker: bool = False,
 ) -> list[str]:
     """Runs a command that writes to `folder`, killed and resumed `num_kills` times, and then to its end.
 
     Args:
-      rng: draws the moments of the kills: after so many more bytes of results, and up to 50 ms later.
+      rng: draws the moments of the kills, each after so many more bytes of results.
       most_bytes: of results between two kills.
-      victim: returns the process to kill, by default the command's own.
+      kills_worker: whether one of its worker processes is killed instead of the command's own.
 
     Returns:
       The standard error of each sitting that was killed.
@@ -125,9 +127,8 @@ def run_through_kills(
         process = start(*words, "--out", folder, *(["--resume"] if sitting else []))
         wanted = num_bytes(folder) + int(rng.integers(1, most_bytes + 1))
         wait_until(lambda wanted=wanted: num_bytes(folder) >= wanted, process)
-        time.sleep(rng.uniform(0, 0.05))
         if process.poll() is None:
-            os.kill(victim(process, rng), signal.SIGKILL)
+            os.kill(int(rng.choice(workers_of(process))) if kills_worker else process.pid, signal.SIGKILL)
         errors.append(process.communicate(timeout=PATIENCE)[1])
         assert process.returncode != 0, f"it ended before kill {sitting}: give it more to do"
         assert "Traceback" not in errors[-1]
@@ -160,14 +161,6 @@ def command_line(pid: int) -> str:
         return pathlib.Path(f"/proc/{pid}/cmdline").read_text().replace("\0", " ")
     except OSError:
         return ""
-
-
-def is_running(pid: int) -> bool:
-    """Whether a process exists and is not a zombie."""
-    try:
-        return pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 class Disk:

@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 
 from mazebench.evaluation.recorder import Recorder
-from mazebench.maps.benchmark import TRACKS_VERSION, VERSION, load_mazes, manifest_hash
+from mazebench.maps.benchmark import TRACKS_VERSION, VERSION, manifest_hash
 from mazebench.maps.maze import cell_to_point, path_through_walls
 from mazebench.results.metrics import spl, summarize, summarize_facts
 from mazebench.results.reading import EPISODES, SUMMARY
 from mazebench.results.records import Record
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, pack_trajectories, save_trajectories
 from mazebench.storage.json_files import write_json
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.observation import state_errors
 from mazebench.tasks.perturbations import perturbation_levels
-from mazebench.tasks.registry import make_spec
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.trials import Trial, select_track_trials, select_trials
+from mazebench.tasks.trials import Trial, select_trials
 
 _STEP = 0.3  # m
 
@@ -70,11 +70,11 @@ def make_result(
     if track is not None:
         spec = make_spec(track, split=split, level=level)
         size, version, labels = spec.size, TRACKS_VERSION, {"track": track, "level": level}
-        trials = select_track_trials(spec.mazes, split == "eval", spec.distances, episodes_per_distance)
+        trials = select_trials(spec, split == "eval", episodes_per_distance)
     else:
-        mazes, version, labels = load_mazes(size, split), VERSION, {}
-        spec = TaskSpec(task=task, mazes=mazes, distances=distances, landmark_distance=landmark_distance, **levels)
-        trials = select_trials(task, mazes, split == "eval", distances, episodes_per_distance)
+        version, labels = VERSION, {}
+        spec = make_spec(task, size, split, distances=distances, landmark_distance=landmark_distance, **levels)
+        trials = select_trials(spec, split == "eval", episodes_per_distance)
     rng = np.random.default_rng([len(agent), size, landmark_distance, seed])
     labels = {"agent": agent, "task": task, "size": size, "split": split} | labels
     records, drives = [], []

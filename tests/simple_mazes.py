@@ -1,10 +1,10 @@
-"""Mazes in which one can say by hand where a body gets to."""
+"""Mazes in which one can say by hand where a body gets to, and how far a point is from the walls of any maze."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from mazebench.maps.maze import Maze
+from mazebench.maps.maze import Maze, point_to_cell
 
 
 def field(size: int) -> Maze:
@@ -17,3 +17,16 @@ def corridor() -> Maze:
     walls = np.ones((9, 9), dtype=bool)
     walls[1, 1:8] = False
     return Maze(walls, "corridor")
+
+
+def clearance(walls: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Returns `[K]` cells: how far `[K, 2]` points are from the nearest wall, infinite where none is near."""
+    cells = point_to_cell(points, len(walls))
+    nearest = np.full(len(points), np.inf)
+    for down in (-1, 0, 1):
+        for right in (-1, 0, 1):
+            row, column = np.clip(cells + np.array([down, right]), 0, len(walls) - 1).T
+            centre = np.stack([column + 0.5, len(walls) - row - 0.5], axis=-1)
+            distance = np.hypot(*np.maximum(np.abs(points - centre) - 0.5, 0).T)
+            nearest = np.where(walls[row, column], np.minimum(nearest, distance), nearest)
+    return nearest

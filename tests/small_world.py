@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from simple_mazes import field
 
-from mazebench.agent import Interface
 from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.maze import Maze
-from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.trials import select_trials
+from mazebench.tasks.build import make_spec
+from mazebench.tasks.trials import draw_trials
 from mazebench.training.experience import Collector
+from mazebench.training.loop import num_updates_due
 
 TIME_LIMIT = 25
 
@@ -22,9 +22,9 @@ def learn(
 ) -> tuple[float, float]:
     """Success rates before and after so many updates, in a field of `side` x `side` cells with walls around."""
     maze = field(side + 2)
-    spec = TaskSpec(mazes=(maze,), distances=distances, time_limit=TIME_LIMIT, num_goals=4)
+    spec = make_spec(maps=maze, distances=distances, time_limit=TIME_LIMIT, num_goals=4)
     overrides = {key: str(value) for key, value in values.items()}
-    learner = agent_class.build_learner(Interface("local", maze.size, maze.size), spec.mazes, overrides=overrides)
+    learner = agent_class.build_learner(spec, overrides=overrides)
     before = _success_rate(learner.actor, maze, distances)
     collector = Collector(spec, learner.num_envs, seed=0)
     learner.actor.explore_from(0, learner.num_envs, seed=0)
@@ -34,7 +34,7 @@ def learn(
         experience, state = collector.play(learner.actor, state)
         learner.observe(experience)
         steps += learner.num_envs
-        while updates < learner.num_updates_due(steps):
+        while updates < num_updates_due(learner, steps):
             learner.update()
             updates += 1
     return before, _success_rate(learner.actor, maze, distances)
@@ -42,6 +42,6 @@ def learn(
 
 def _success_rate(actor: Any, maze: Maze, distances: tuple[int, ...]) -> float:
     """Of acting greedily, over 32 episodes a distance."""
-    spec = TaskSpec(mazes=(maze,), distances=distances, time_limit=TIME_LIMIT)
-    trials = list(enumerate(select_trials("local", spec.mazes, False, distances, 32, seed=7)))
+    spec = make_spec(maps=maze, distances=distances, time_limit=TIME_LIMIT)
+    trials = list(enumerate(draw_trials(spec, 32, seed=7)))
     return np.mean([outcome.success for outcomes in run_trials(actor, spec, trials, 64) for outcome in outcomes])

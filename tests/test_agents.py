@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 from acting import inputs_of
-from mazebench_agents.planner.observation import start_cell
+from mazebench_agents.robot.cells import start_cell
 from run_folders import IMPORTS
 
 from mazebench.agent import Agent, Inputs, Interface, SingleAgent, Truth, as_agent_class
@@ -22,9 +22,9 @@ from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import generate
-from mazebench.tasks.registry import make_spec
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.trials import select_trials
+from mazebench.tasks.trials import draw_trials
 from mazebench.testing import ConformanceError, check_agent
 from mazebench.training.protocol import LearningAgent
 
@@ -66,94 +66,40 @@ class Drawing(Agent):
         return np.array([rng.integers(6) for rng in state]), state
 
 
-class OneTooMany(Counting):
-    def act(self, inputs, state, explore=False):
-        return np.zeros(len(inputs.seed) + 1, dtype=int), state
+class Sensing(SingleAgent):
+    """Drives forward unless a wall is near, which the lidar says."""
+
+    needs_sensors = ("lidar",)
+
+    def act(self, observation):
+        return 0 if observation["lidar"][0] > 0.5 else 4
 
 
-class OnlyOne(Counting):
-    def act(self, inputs, state, explore=False):
-        return 0, state
+def acting(act) -> type[Agent]:
+    """`Counting` with another act(), which is called without `self` and `explore`."""
+    return type("Broken", (Counting,), {"act": lambda self, inputs, state, explore=False: act(inputs, state)})
 
 
-class OnlyThree(Counting):
-    def act(self, inputs, state, explore=False):
-        return np.zeros(3, dtype=int), state
+def count_on(inputs, state, new):
+    """Acts as `Counting` does, where episodes are taken to begin in the slots of `new`."""
+    state = np.where(new, 0, state)
+    return state % 6, state + 1
 
 
-class Columns(Counting):
-    def act(self, inputs, state, explore=False):
-        return np.zeros((len(inputs.seed), 1), dtype=int), state
+def halve_the_map(inputs, state):
+    inputs.observation["context"] *= 0.5
+    return count_on(inputs, state, inputs.new_episode)
 
 
-class Floats(Counting):
-    def act(self, inputs, state, explore=False):
-        return np.zeros(len(inputs.seed)), state
+def clear_the_marks(inputs, state):
+    inputs.new_context[:] = False
+    return count_on(inputs, state, inputs.new_episode)
 
 
-class Booleans(Counting):
-    def act(self, inputs, state, explore=False):
-        return inputs.new_episode, state
-
-
-class Words(Counting):
-    def act(self, inputs, state, explore=False):
-        return ["forward"] * len(inputs.seed), state
-
-
-class Ragged(Counting):
-    def act(self, inputs, state, explore=False):
-        return [[0], [0, 1], 0], state
-
-
-class TooHigh(Counting):
-    def act(self, inputs, state, explore=False):
-        return np.full(len(inputs.seed), 6), state
-
-
-class Negative(Counting):
-    def act(self, inputs, state, explore=False):
-        return np.full(len(inputs.seed), -1), state
-
-
-class NoState(Counting):
-    def act(self, inputs, state, explore=False):
-        return np.zeros(len(inputs.seed), dtype=int)
-
-
-class HalvesTheMap(Counting):
-    def act(self, inputs, state, explore=False):
-        inputs.observation["context"] *= 0.5
-        return super().act(inputs, state)
-
-
-class ClearsTheMarks(Counting):
-    def act(self, inputs, state, explore=False):
-        inputs.new_context[:] = False
-        return super().act(inputs, state)
-
-
-class Unseeded(Counting):
-    def act(self, inputs, state, explore=False):
-        return np.random.default_rng().integers(6, size=len(inputs.seed)), state
-
-
-class GlobalDraws(Counting):
-    def act(self, inputs, state, explore=False):
-        return np.random.randint(6, size=len(inputs.seed)), state  # noqa: NPY002
-
-
-class NeverResets(Counting):
-    def act(self, inputs, state, explore=False):
-        return state % 6, state + 1
-
-
-class ResetsAll(Counting):
-    """Begins anew in all slots where an episode begins in one."""
-
-    def act(self, inputs, state, explore=False):
-        state = state * 0 if inputs.new_episode.any() else state
-        return state % 6, state + 1
+def crash_at_landmarks(inputs, state):
+    if (inputs.new_context & ~inputs.new_episode).any():
+        raise ValueError("another start")
+    return count_on(inputs, state, inputs.new_episode)
 
 
 class SharesAList(Counting):
@@ -166,16 +112,6 @@ class SharesAList(Counting):
         for slot in range(len(state)):
             state[slot][0] = 0 if inputs.new_episode[slot] else state[slot][0] + slot
         return np.array([count[0] % 6 for count in state]), state
-
-
-class KnowsItsSlot(Counting):
-    def act(self, inputs, state, explore=False):
-        return np.arange(len(inputs.seed)) % 6, state
-
-
-class KnowsTheBatch(Counting):
-    def act(self, inputs, state, explore=False):
-        return np.full(len(inputs.seed), len(inputs.seed)), state
 
 
 class RemembersOnSelf(Counting):
@@ -195,18 +131,6 @@ class DrawsOnSelf(Counting):
 
     def act(self, inputs, state, explore=False):
         return self.rng.integers(6, size=len(inputs.seed)), state
-
-
-class CrashesAtLandmarks(Counting):
-    def act(self, inputs, state, explore=False):
-        if (inputs.new_context & ~inputs.new_episode).any():
-            raise ValueError("another start")
-        return super().act(inputs, state)
-
-
-class Raising(Counting):
-    def act(self, inputs, state, explore=False):
-        return inputs.observation["map"], state
 
 
 class Unbuilt(Counting):
@@ -251,31 +175,16 @@ class Motionless(Agent):
     pass
 
 
-class AloneReturnsNothing(SingleAgent):
-    def act(self, observation):
-        self.action = 0
+def acting_alone(act) -> type[SingleAgent]:
+    return type("Broken", (SingleAgent,), {"act": lambda self, observation: act()})
 
 
-class AloneReturnsAnArray(SingleAgent):
-    def act(self, observation):
-        return np.array([0])
+CALLS: list[int] = []
 
 
-class AloneWithAGlobal(SingleAgent):
-    counts: list[int] = []  # noqa: RUF012
-
-    def act(self, observation):
-        self.counts.append(0)
-        return len(self.counts) % 6
-
-
-class Sensing(SingleAgent):
-    """Drives forward unless a wall is near, which the lidar says."""
-
-    needs_sensors = ("lidar",)
-
-    def act(self, observation):
-        return 0 if observation["lidar"][0] > 0.5 else 4
+def number_of_calls() -> int:
+    CALLS.append(0)
+    return len(CALLS) % 6
 
 
 SAME = r"expected the same actions in an episode "
@@ -289,7 +198,8 @@ class TestConformance:
         if issubclass(agent_class, LearningAgent):
             # Untrained: the contract does not depend on what it learned.
             mazes = (generate("dfs", 7, np.random.default_rng(0), "m"),)
-            agent_class.build_learner(interface, mazes).save(tmp_path, {})
+            task = make_spec(maps=mazes, distances=(1, 2, 3), context_size=interface.context_size)
+            agent_class.build_learner(task).save(tmp_path, {})
             checkpoint = tmp_path / "agent.safetensors"
         check_agent(agent_class, interface, checkpoint)
 
@@ -299,41 +209,64 @@ class TestConformance:
         check_agent(agent_class, Interface("local", 9, 5, sensors=agent_class.needs_sensors))
 
     @pytest.mark.parametrize("needed", ["lidar", ("sonar",)])
-    def test_needed_sensors_are_those_there_are(self, needed, monkeypatch):
-        monkeypatch.setattr(Sensing, "needs_sensors", needed)
+    def test_needed_sensors_are_those_there_are(self, needed):
+        wrong = type("Wrong", (Sensing,), {"needs_sensors": needed})
         with pytest.raises(ConformanceError, match=r"expected needs_sensors as a tuple of .*lidar, found"):
-            check_agent(Sensing)
+            check_agent(wrong)
+
+    @pytest.mark.parametrize(
+        ("actions", "message"),
+        [
+            (lambda size: np.zeros(size + 1, dtype=int), "3 actions, one an environment, found shape (4,)"),
+            (lambda size: 0, "3 actions, one an environment, found shape ()"),
+            (lambda size: np.zeros(3, dtype=int), "1 actions, one an environment, found shape (3,)"),
+            (lambda size: np.zeros((size, 1), dtype=int), "3 actions, one an environment, found shape (3, 1)"),
+            (lambda size: np.zeros(size), "integer actions, found float64"),
+            (lambda size: np.zeros(size, dtype=bool), "integer actions, found bool"),
+            (lambda size: ["forward"] * size, "integer actions, found <U7"),
+            (lambda size: np.full(size, 6), "actions from 0 to 5, found 6"),
+            (lambda size: np.full(size, -1), "actions from 0 to 5, found -1"),
+        ],
+    )
+    def test_actions_that_cannot_be_taken_are_named_in_one_line(self, actions, message):
+        broken = acting(lambda inputs, state: (actions(len(inputs.seed)), state))
+        with pytest.raises(ConformanceError) as caught:
+            check_agent(broken)
+        assert str(caught.value) == f"agent 'Broken': expected act() to return {message}"
 
     @pytest.mark.parametrize(
         ("broken", "message"),
         [
-            (OneTooMany, r"expected act\(\) to return 3 actions, one an environment, found shape \(4,\)$"),
-            (OnlyOne, r"expected act\(\) to return 3 actions, one an environment, found shape \(\)$"),
-            (OnlyThree, r"expected act\(\) to return 1 actions, one an environment, found shape \(3,\)$"),
-            (Columns, r"expected act\(\) to return 3 actions, one an environment, found shape \(3, 1\)$"),
-            (Floats, r"expected act\(\) to return integer actions, found float64$"),
-            (Booleans, r"expected act\(\) to return integer actions, found bool$"),
-            (Words, r"expected act\(\) to return integer actions, found <U7$"),
-            (Ragged, r"act\(\) raised ValueError: .*inhomogeneous"),
-            (TooHigh, r"expected act\(\) to return actions from 0 to 5, found 6$"),
-            (Negative, r"expected act\(\) to return actions from 0 to 5, found -1$"),
-            (NoState, r"expected act\(\) to return \(actions, state\), found "),
-            (HalvesTheMap, r"expected act\(\) to leave inputs\.observation\['context'\] as it was; change a copy$"),
-            (ClearsTheMarks, r"expected act\(\) to leave inputs\.new_context as it was; change a copy$"),
+            (acting(lambda inputs, state: ([[0], [0, 1], 0], state)), r"act\(\) raised ValueError: .*inhomogeneous"),
+            (acting(lambda inputs, state: [0, 0, 0]), r"expected act\(\) to return \(actions, state\), found "),
             (
-                Unseeded,
+                acting(halve_the_map),
+                r"expected act\(\) to leave inputs\.observation\['context'\] as it was; change a copy$",
+            ),
+            (acting(clear_the_marks), r"expected act\(\) to leave inputs\.new_context as it was; change a copy$"),
+            (
+                acting(lambda inputs, state: (np.random.default_rng().integers(6, size=len(inputs.seed)), state)),
                 SAME + r"when built anew from the same seed, found others; make weights in build\(\) from its seed, ",
             ),
-            (GlobalDraws, SAME + r"when built anew from the same seed, found others; "),
-            (NeverResets, SAME + r"after another episode, found others; begin anew where inputs\.new_episode is set$"),
-            (ResetsAll, SAME),
+            (
+                acting(lambda inputs, state: (np.random.randint(6, size=len(inputs.seed)), state)),  # noqa: NPY002
+                SAME + r"when built anew from the same seed, found others; ",
+            ),
+            (
+                acting(lambda inputs, state: count_on(inputs, state, False)),
+                SAME + r"after another episode, found others; begin anew where inputs\.new_episode is set$",
+            ),
+            (acting(lambda inputs, state: count_on(inputs, state, inputs.new_episode.any())), SAME),
             (SharesAList, SAME),
-            (KnowsItsSlot, SAME),
-            (KnowsTheBatch, SAME),
+            (acting(lambda inputs, state: (np.arange(len(inputs.seed)) % 6, state)), SAME),
+            (acting(lambda inputs, state: (np.full(len(inputs.seed), len(inputs.seed)), state)), SAME),
             (RemembersOnSelf, SAME + r"when another batch .* by turns, found others; keep all memory, .* on self$"),
             (DrawsOnSelf, SAME + r"when another batch .* by turns, found others; keep all memory, generators too, "),
-            (CrashesAtLandmarks, r"act\(\) raised ValueError: another start \(test_agents\.py:\d+\)$"),
-            (Raising, r"act\(\) raised KeyError: 'map' \(test_agents\.py:\d+\)$"),
+            (acting(crash_at_landmarks), r"act\(\) raised ValueError: another start \(test_agents\.py:\d+\)$"),
+            (
+                acting(lambda inputs, state: (inputs.observation["map"], state)),
+                r"act\(\) raised KeyError: 'map' \(test_agents\.py:\d+\)$",
+            ),
             (Unbuilt, r"expected build\(\) to return an agent, found NoneType$"),
             (Unbuildable, r"build\(\) raised TypeError: .* unexpected keyword argument 'seed'$"),
             (OldSignature, r"act\(\) raised TypeError: "),
@@ -342,9 +275,8 @@ class TestConformance:
             (NamedMethod, r"expected context_size\(\) to be a classmethod, found a method of its objects$"),
             (Stranger, r"expected a subclass of mazebench\.Agent or mazebench\.SingleAgent, found one of object$"),
             (Motionless, r"expected a class with act\(\), found none$"),
-            (AloneReturnsNothing, r"expected act\(\) to return integer actions, found None$"),
-            (AloneReturnsAnArray, r"expected act\(\) to return 3 actions, one an environment, found shape \(3, 1\)$"),
-            (AloneWithAGlobal, SAME),
+            (acting_alone(lambda: None), r"expected act\(\) to return integer actions, found None$"),
+            (acting_alone(number_of_calls), SAME),
         ],
     )
     def test_fault_is_named_in_one_line(self, broken, message):
@@ -529,37 +461,37 @@ class Small(Counting):
 
 class TestTracks:
     def test_an_agent_that_asks_for_one_size_is_refused_where_a_track_shows_another(self):
-        assert make_plan(EvalOptions("mine:Small", track="stale"), Small).build_agent().name == "mine:Small"
-        plan = make_plan(EvalOptions("mine:Small", track="sketch"), Small)
+        assert make_plan(EvalOptions.of("mine:Small", track="stale"), Small).build_agent().name == "mine:Small"
+        plan = make_plan(EvalOptions.of("mine:Small", track="sketch"), Small)
         message = r"context_size\(\) asks for maps of 13 x 13 only; the track 'sketch' shows 26 x 26$"
         with pytest.raises(UnplayableError, match=message):
             plan.build_agent()
 
     def test_a_track_that_shows_another_map_than_asked_for_is_remarked(self):
         remark = "navigator asks for a map of 51 x 51; the track 'far' shows 21 x 21 to all agents"
-        assert make_plan(EvalOptions("navigator", track="far", level=3)).remark == remark
-        assert make_plan(EvalOptions("navigator", track="far")).remark is None
-        assert make_plan(EvalOptions("random", track="far", level=3)).remark is None
+        assert make_plan(EvalOptions.of("navigator", track="far", level=3)).remark == remark
+        assert make_plan(EvalOptions.of("navigator", track="far")).remark is None
+        assert make_plan(EvalOptions.of("random", track="far", level=3)).remark is None
 
     @pytest.mark.parametrize("name", agent_names())
-    @pytest.mark.parametrize("level", [1, 2, 3])
-    @pytest.mark.parametrize("track", ["lost", "far"])
-    def test_every_agent_acts_or_says_that_it_serves_one_size(self, name, track, level):
-        self.act(name, make_spec(track, level=level))
-
-    @pytest.mark.parametrize("name", agent_names())
-    def test_every_agent_acts_on_a_map_of_twice_the_resolution_or_says_why_not(self, name):
-        self.act(name, make_spec(size=13, context_size=26, sensors=load_agent_class(name).needs_sensors))
-
-    def act(self, name: str, spec: TaskSpec) -> None:
+    @pytest.mark.parametrize(
+        "options",
+        [{"task": "lost", "level": 3}, {"task": "far", "level": 3}, {"size": 13, "context_size": 26}],
+        ids=["lost", "far", "finer map"],
+    )
+    def test_every_agent_acts_or_says_that_it_serves_one_size(self, name, options):
+        agent_class = load_agent_class(name)
+        options = {"sensors": agent_class.needs_sensors} | options if "size" in options else options
+        spec = make_spec(**options)
         if name in OF_ONE_SIZE and spec.context_size != 13:
             with pytest.raises(UnplayableError, match=r"reads maps of 13 x 13 only, found .* belief-planner reads"):
                 act_for_three_steps(name, spec)
         else:
-            act_for_three_steps(name, spec)
+            assert act_for_three_steps(name, spec) == 3
 
 
-def act_for_three_steps(name: str, spec: TaskSpec) -> None:
+def act_for_three_steps(name: str, spec: TaskSpec) -> int:
+    """Returns how many steps were taken, of a run of which all actions are checked."""
     agent_class = load_agent_class(name)
     interface = Interface(spec.task, spec.size, spec.context_size, sensors=spec.sensors)
     agent = CheckedAgent(name, agent_class.build(interface), interface.num_actions)
@@ -571,6 +503,7 @@ def act_for_three_steps(name: str, spec: TaskSpec) -> None:
         actions, state = agent.act(Inputs(observation, new, info["is_first"], seed, truth), state)
         observation, _, _, _, info = env.step(actions)
         new = np.zeros(2, dtype=bool)
+    return int(info["steps"][0])
 
 
 def success_rate(
@@ -579,7 +512,7 @@ def success_rate(
     agent_class = load_agent_class(name)
     spec = make_spec("local", maps=load_mazes(13, "train")[:num_mazes], distances=distances, **perturbation)
     spec = dataclasses.replace(spec, context_size=context_size)
-    trials = list(enumerate(select_trials("local", spec.mazes, False, distances, episodes_per_distance)))
+    trials = list(enumerate(draw_trials(spec, episodes_per_distance)))
     agent = agent_class.build(Interface("local", 13, spec.context_size))
     played = run_trials(agent, spec, trials, 64, needs_truth=agent_class.needs_truth)
     ended = [outcome for outcomes in played for outcome in outcomes]

@@ -55,12 +55,6 @@ def test_a_command_that_renders_says_in_one_line_what_is_wrong(backend, argument
 
 
 @pytest.mark.parametrize("backend", WRONG)
-def test_mazebench_is_imported_and_specs_are_made(backend, tmp_path):
-    program = "import mazebench; print(mazebench.make_spec('local', size=13).size)"
-    assert run(backend, "-c", program, folder=tmp_path).stdout == "13\n"
-
-
-@pytest.mark.parametrize("backend", WRONG)
 def test_every_environment_is_refused_with_the_same_line(backend, tmp_path):
     program = """
 import gymnasium, mazebench

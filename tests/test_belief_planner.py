@@ -5,21 +5,24 @@ import pytest
 import torch
 from acting import inputs_of
 from mazebench_agents.belief_planner import BeliefPlanner
-from mazebench_agents.belief_planner import agent as agent_module
+from mazebench_agents.belief_planner.agent import PATIENCE
 from mazebench_agents.belief_planner.belief import GOAL, WALL, Belief, belief_losses, probabilities
-from mazebench_agents.belief_planner.displacement import Displacement
-from mazebench_agents.belief_planner.evidence import FAILED, NUM_EVIDENCE, PASSED, SENSED, Readings, place
+from mazebench_agents.belief_planner.evidence import FAILED, NUM_EVIDENCE, PASSED, SENSED, Readings, add_readings
 from mazebench_agents.belief_planner.framing import framed
+from mazebench_agents.belief_planner.learner import NUM_PAST
 from mazebench_agents.belief_planner.network import BeliefPlannerNetwork, Propagation, brought_nearer
+from mazebench_agents.belief_planner.pictures import past_evidence
 from mazebench_agents.belief_planner.scan_match import find_pose, is_odometry
 from mazebench_agents.belief_planner.shortest_paths import cheapest_paths
 from mazebench_agents.belief_planner.wrong_maps import wrong_map
 from mazebench_agents.muzero.network import rotate
+from mazebench_agents.robot.odometry import Displacement
 from test_muzero import CONFIGS, a_context, an_observation, code_of, make_learner, small_config
 
 from mazebench.agent import Interface
 from mazebench.errors import InputError
 from mazebench.maps.generators import generate
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.context import build_context
 from mazebench.tasks.tracks.sketch import draw_by_hand
 from mazebench.tasks.tracks.stale import num_movable
@@ -45,15 +48,15 @@ def a_reading(position, velocity=(0, 0), wished=(0, 0), yaw=0.0, ranges=(), on_l
 
 def test_cell_of_the_body_is_free_and_passed():
     evidence = planes()
-    place(evidence, a_reading((2.2, 3.3)), METRE)
+    add_readings(evidence, a_reading((2.2, 3.3)), METRE)
     assert evidence[0, SENSED, 2, 3] < -0.3
     assert evidence[0, PASSED, 2, 3] == 1
     assert np.count_nonzero(evidence) == 2
-    place(evidence, a_reading((4.0, 1.0), on_leg=False), METRE)
+    add_readings(evidence, a_reading((4.0, 1.0), on_leg=False), METRE)
     assert evidence[0, PASSED].sum() == 1
     before = evidence.copy()
-    place(evidence, a_reading((2.45, 5.0)), METRE)  # too near to the edge to tell the cell
-    place(evidence, a_reading((-3.0, 9.0)), METRE)  # outside
+    add_readings(evidence, a_reading((2.45, 5.0)), METRE)  # too near to the edge to tell the cell
+    add_readings(evidence, a_reading((-3.0, 9.0)), METRE)  # outside
     np.testing.assert_array_equal(evidence, before)
 
 
@@ -68,7 +71,7 @@ def test_cell_of_the_body_is_free_and_passed():
 )
 def test_body_that_is_slower_than_it_wished_was_stopped_by_a_wall(position, velocity, is_wall):
     evidence = planes()
-    place(evidence, a_reading(position, velocity, wished=(0.0, 0.9)), METRE)
+    add_readings(evidence, a_reading(position, velocity, wished=(0.0, 0.9)), METRE)
     assert (evidence[0, SENSED, 2, 4] > 0) == is_wall
     assert evidence[0, FAILED].sum() == is_wall
 
@@ -80,7 +83,7 @@ def test_rays_pass_through_free_cells_and_end_at_walls(mazes):
         for row, column in np.argwhere(~maze.walls)[::3]:
             x, y, yaw = column + 0.6, size - row - 0.45, 0.3 * row
             ranges = lidar.ranges(np.array([index]), np.array([[x, y, yaw]]))[0]
-            place(evidence, a_reading((size - y - 0.5, x - 0.5), yaw=yaw, ranges=ranges), METRE)
+            add_readings(evidence, a_reading((size - y - 0.5, x - 0.5), yaw=yaw, ranges=ranges), METRE)
         sensed = evidence[0, SENSED]
         told = np.abs(sensed) > 0.3
         assert told.sum() > 0.8 * size**2
@@ -89,7 +92,7 @@ def test_rays_pass_through_free_cells_and_end_at_walls(mazes):
 
 def test_ray_that_meets_nothing_tells_of_no_wall():
     evidence = planes(13)
-    place(evidence, a_reading((6.0, 6.0), ranges=[MAX_RANGE] * 32), METRE)
+    add_readings(evidence, a_reading((6.0, 6.0), ranges=[MAX_RANGE] * 32), METRE)
     assert evidence.max(initial=0) == 1  # the body's own cell, passed
     assert (evidence[0, SENSED] <= 0).all()
 
@@ -138,38 +141,23 @@ def test_losses_of_a_belief_by_hand():
 def test_evidence_at_replay_comes_from_the_past_alone(mazes):
     """What is written into the replay after a sample's earliest step changes nothing of its evidence."""
     learner = make_learner(mazes)
-    learner.actor.network.scale.data.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))
-    sample = learner.sample()
+    network = learner.actor.network
+    network.scale.data.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))
+    sample = learner.replay.sample_sequences(
+        4, 3, 8, hindsight=learner.hindsight, rng=np.random.default_rng(0), num_past=NUM_PAST
+    )
     past = sample.past
     assert past.exists[:, -1].all()
     first = sample.state[:, :, 0]
     steps_of = (past.state[:, -1:] == first).all(axis=-1)
     assert steps_of.any(axis=1).all()  # the last row of the past is the earliest step of the group
 
-    replay, rng = learner._replay, np.random.default_rng(0)
-    state = learner._rng.bit_generator.state
-    before = learner._evidence(sample)
-    sequences = {name: rng.normal(size=getattr(sample, name).shape) for name in ("state",)}
-    learner._rng.bit_generator.state = state
-    np.testing.assert_array_equal(learner._evidence(sample._replace(**sequences)), before)
-    assert replay.num_rows
-    assert np.count_nonzero(before)
+    def evidence(sample):
+        return past_evidence(sample, network, size=7, lidar=learner.lidar, rng=np.random.default_rng(0))
 
-
-def test_past_of_a_sample_ends_at_its_earliest_step_and_stays_in_its_trajectory(mazes):
-    learner = make_learner(mazes, steps=60)
-    replay = learner._replay
-    for _ in range(20):
-        sample = learner.sample()
-        env, index = np.divmod(sample.row, replay._length)
-        for g in range(len(env)):
-            kept = sample.past.state[g][sample.past.exists[g]]
-            rows = np.flatnonzero(replay._trajectory[env[g]] == replay._trajectory[env[g], index[g]])
-            stored = replay._state[env[g], rows]
-            np.testing.assert_array_equal(kept, stored[: len(kept)][-len(kept) :])  # from the trajectory's first row on
-            steps = sample.state[g, :, 0]
-            positions = [int(np.flatnonzero((stored == step).all(axis=1))[0]) for step in steps]
-            assert len(kept) == min(positions) + 1
+    later = np.random.default_rng(0).normal(size=sample.state.shape)
+    np.testing.assert_array_equal(evidence(sample._replace(state=later)), evidence(sample))
+    assert np.count_nonzero(evidence(sample))
 
 
 def test_positions_are_believed_where_they_are_exact_and_filtered_where_they_are_noisy():
@@ -233,7 +221,7 @@ def test_maze_without_movable_doors_is_drawn_wrong_all_the_same():
 
 def test_learner_wants_contexts_of_the_mazes_size(mazes):
     with pytest.raises(InputError, match="contexts of the mazes' size, found mazes of 7 and a context of 5"):
-        BeliefPlanner.build_learner(Interface("local", 7, 5), mazes)
+        BeliefPlanner.build_learner(make_spec(maps=mazes, distances=(1, 2, 3), context_size=5))
 
 
 def an_agent(size=7):
@@ -250,7 +238,7 @@ def move(state, x, y):
     state[:, 6:8] = 2 * x / 0.16, 2 * y / 0.16
 
 
-def test_belief_is_revised_where_evidence_contradicts_it_and_only_there(monkeypatch):
+def test_belief_is_revised_where_evidence_contradicts_it_and_only_there():
     agent = an_agent()
     context = np.zeros((2, 4, 7, 7), dtype=np.float32)
     context[:, 2, 1, 5] = context[:, 3, 5, 1] = 1
@@ -259,11 +247,10 @@ def test_belief_is_revised_where_evidence_contradicts_it_and_only_there(monkeypa
     memory = agent.initial_state(2)
     _, memory = agent.act(inputs_of({"state": state, "context": context}, np.ones(2, dtype=bool)), memory)
     revised = []
-    revise = agent._revise
-    monkeypatch.setattr(agent, "_revise", lambda rows, *rest: (revised.append(rows.tolist()), revise(rows, *rest)))
     move(state, 1.0, 0.0)  # both bodies are a cell further right now
-    for _ in range(agent_module._PATIENCE + 2):
+    for _ in range(PATIENCE + 2):
         _, memory = agent.act(inputs_of({"state": state, "context": context}, np.zeros(2, dtype=bool)), memory)
+        revised.append(np.flatnonzero(memory.waited == 0).tolist())
     assert [rows for rows in revised if rows] == [[0]]  # once, when it has waited long enough
     assert memory.evidence[0, SENSED, 5, 2] < 0
     assert np.abs(memory.belief[0] - memory.belief[1]).max() > 0
@@ -309,7 +296,7 @@ def test_episode_begins_where_the_position_says_or_else_where_the_start_is_marke
     np.testing.assert_array_equal(memory.anchor[0], expected)
 
 
-def test_goal_is_believed_elsewhere_where_the_body_has_passed_it(monkeypatch):
+def test_goal_is_believed_elsewhere_where_the_body_has_passed_it():
     agent = an_agent()
     with torch.no_grad():  # a belief that has learned that the goal is not where the body was
         agent.network.belief.forward = lambda shown, evidence: torch.stack(
@@ -322,7 +309,7 @@ def test_goal_is_believed_elsewhere_where_the_body_has_passed_it(monkeypatch):
     _, memory = agent.act(inputs_of({"state": state, "context": context}, np.ones(1, dtype=bool)), memory)
     assert memory.belief[0, GOAL].argmax() == 5 * 7 + 2
     move(state, 1.0, 0.0)
-    for _ in range(agent_module._PATIENCE):
+    for _ in range(PATIENCE):
         _, memory = agent.act(inputs_of({"state": state, "context": context}, np.zeros(1, dtype=bool)), memory)
     assert memory.belief[0, GOAL, 5, 2] < 0.05
 

@@ -21,7 +21,8 @@ from mazebench.maps.benchmark import (
     read_asset,
 )
 from mazebench.maps.maze import canonical_bytes
-from mazebench.tasks.mazes import load_task_mazes
+from mazebench.maps.options import MazeOptions
+from mazebench.tasks.build import load_task_mazes
 from mazebench.tasks.options import TaskOptions
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.tracks import TRACKS
@@ -60,7 +61,7 @@ def test_no_shown_map_is_like_a_maze_or_like_one_that_is_shown_of_another_maze()
     known |= {canonical_bytes(maze.walls) for maze in load_track_mazes(13, "eval")}
     shown = collections.defaultdict(set)
     for level in LEVELS:
-        plan = make_plan(EvalOptions("random", track="stale", level=level))
+        plan = make_plan(EvalOptions.of("random", track="stale", level=level))
         for trial in plan.trials:
             shown[canonical_bytes(show_map(plan.task, trial.episode).walls)].add(trial.episode.maze)
     assert not known & set(shown)
@@ -83,10 +84,10 @@ def test_each_maze_has_ten_episodes_and_distances_come_up_equally_often(size):
 def test_levels_in_mazes_of_one_size_have_the_same_episodes(track):
     by_size = collections.defaultdict(set)
     for level in LEVELS:
-        plan = make_plan(EvalOptions("random", track=track, level=level))
+        plan = make_plan(EvalOptions.of("random", track=track, level=level))
         by_size[plan.task.size].add(plan.trials)
     assert all(len(trials) == 1 for trials in by_size.values())
 
 
 def test_train_mazes_of_size_13_are_those_of_v1():
-    assert load_task_mazes(TaskOptions(track="stale"), None, "train") == load_mazes(13, "train")
+    assert load_task_mazes(TaskOptions(track="stale"), MazeOptions()) == load_mazes(13, "train")

@@ -12,7 +12,7 @@ from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.tasks.registry import make_spec
+from mazebench.tasks.build import make_spec
 
 
 class TestOptions:

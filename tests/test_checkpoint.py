@@ -5,7 +5,8 @@ import pytest
 import torch
 from acting import inputs_of
 from mazebench_agents.common.checkpoint import load_checkpoint, save_checkpoint
-from mazebench_agents.dqn import DQN, MAH
+from mazebench_agents.dqn import DQN
+from mazebench_agents.mah import MAH
 
 from mazebench.agent import Interface
 from mazebench.errors import InputError

@@ -16,8 +16,8 @@ from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.maze import Maze, cell_to_point
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.registry import make_spec
 from mazebench.testing import check_environment
 from mazebench.world.mjcf import BODY_RADIUS, TURN_RATE, action_controls, velocity_controls
 

@@ -19,7 +19,7 @@ from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.maps.generators import generate
-from mazebench.tasks.registry import make_spec
+from mazebench.tasks.build import make_spec
 
 TASKS: dict[str, dict[str, Any]] = {
     "local": {"time_limit": 60},
@@ -130,7 +130,7 @@ class TestCopies:
         run_with_egl("""
 import copy, pickle
 from mazebench.envs.gym import MazeEnv
-from mazebench.tasks.registry import make_spec
+from mazebench.tasks.build import make_spec
 env = MazeEnv(make_spec(size=13, sensors=("egocentric",)), seed=0, render_mode="rgb_array")
 env.reset(seed=0)
 picture = env.render()

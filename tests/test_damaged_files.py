@@ -18,6 +18,7 @@ from mazebench import cli
 
 EVAL = ["eval", "--agent", "random", "--distances", "1", "--episodes-per-distance", "1"]
 LEARN = [*TRAIN, "--env-steps", "800"]
+SUITE = b'{"parts":["near"],"folders":{"random":"random"}}'
 PLAN = b"#####\n#...#\n#.#.#\n#...#\n#####\n"
 MARK = "code_has_run"  # a folder that code in a file would make in the working directory
 
@@ -60,80 +61,55 @@ def refusal(*words: str | pathlib.Path) -> str:
     return lines[0]
 
 
-def copied(folder: pathlib.Path, to: pathlib.Path) -> pathlib.Path:
-    shutil.copytree(folder, to)
-    return to
-
-
 @pytest.fixture(autouse=True)
 def empty_working_directory(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture(scope="module")
-def result(tmp_path_factory) -> pathlib.Path:
-    """An evaluation of 20 episodes."""
-    folder = tmp_path_factory.mktemp("results") / "run"
-    assert run(*EVAL, "--record", "--out", folder)[0] == 0
-    return folder
+def folders(tmp_path_factory) -> dict[str, pathlib.Path]:
+    """A folder with each kind of file."""
+    top = tmp_path_factory.mktemp("whole")
+    assert run(*EVAL, "--record", "--out", top / "result")[0] == 0
+    shutil.copytree(top / "result", top / "unfinished")
+    (top / "unfinished" / "summary.json").unlink()
+    assert run(*LEARN, "--out", top / "training") == (0, [])
+    for name, file, content in (("map", "plan.txt", PLAN), ("suite", "suite.json", SUITE)):
+        (top / name).mkdir()
+        (top / name / file).write_bytes(content)
+    return {folder.name: folder for folder in top.iterdir()}
 
 
-@pytest.fixture(scope="module")
-def training(tmp_path_factory) -> pathlib.Path:
-    """A training run of 800 steps."""
-    folder = tmp_path_factory.mktemp("training") / "run"
-    assert run(*LEARN, "--out", folder) == (0, [])
-    return folder
-
-
-def last_checkpoint(run: pathlib.Path) -> pathlib.Path:
-    return max((run / "checkpoints").iterdir())
-
-
-@damaged
-def test_a_damaged_map_is_named_in_one_line(damage):
-    path = pathlib.Path("plan.txt")
-    path.write_bytes(damage(PLAN))
-    assert "plan" in refusal(*EVAL, "--maps", path)
+CHECKPOINT = "checkpoints/000000000800"
+IN_CHECKPOINT = ("agent.safetensors", "training.safetensors", "replay.npz", "random.json", "counters.json")
+RESUME = ["--out", "run", "--resume"]
 
 
 @damaged
-def test_a_damaged_checkpoint_is_named_in_one_line(training, damage):
-    path = pathlib.Path("agent.safetensors")
-    path.write_bytes(damage((last_checkpoint(training) / path).read_bytes()))
-    assert f"{path}: expected a checkpoint" in refusal("eval", "--agent", "mah", "--checkpoint", path)
-
-
-@damaged
-@pytest.mark.parametrize("name", ["summary.json", "episodes.jsonl"])
-def test_a_damaged_result_is_named_in_one_line(result, tmp_path, name, damage):
-    folder = copied(result, tmp_path / "run")
-    (folder / name).write_bytes(damage((result / name).read_bytes()))
-    line = refusal("compare", folder, folder)
-    assert str(folder) in line
-    assert name in line
-    assert "expected" in line
-
-
-@damaged
-def test_a_damaged_suite_is_named_in_one_line(tmp_path, damage):
-    path = tmp_path / "suite.json"
-    path.write_bytes(damage(b'{"parts":["near"],"folders":{"random":"random"}}'))
-    assert f"{path}: expected" in refusal("compare", tmp_path, tmp_path)
-
-
-@damaged
-def test_resuming_a_run_with_a_damaged_config_is_refused(result, tmp_path, damage):
-    folder = copied(result, tmp_path / "run")
-    (folder / "summary.json").unlink()
-    (folder / "config.json").write_bytes(damage((result / "config.json").read_bytes()))
-    assert f"{folder / 'config.json'}: " in refusal(*EVAL, "--out", folder, "--resume")
+@pytest.mark.parametrize(
+    ("kind", "file", "words"),
+    [
+        ("map", "plan.txt", [*EVAL, "--maps", "run/plan.txt"]),
+        ("result", "summary.json", ["compare", "run", "run"]),
+        ("result", "episodes.jsonl", ["compare", "run", "run"]),
+        ("suite", "suite.json", ["compare", "run", "run"]),
+        ("unfinished", "config.json", [*EVAL, *RESUME]),
+        ("training", f"{CHECKPOINT}/agent.safetensors", ["eval", "--agent", "mah", "--checkpoint", "run"]),
+        ("training", "config.json", [*LEARN, *RESUME]),
+        *(("training", f"{CHECKPOINT}/{name}", [*LEARN, *RESUME]) for name in IN_CHECKPOINT),
+    ],
+)
+def test_a_damaged_file_is_named_in_one_line(folders, kind, file, words, damage):
+    path = shutil.copytree(folders[kind], "run") / pathlib.Path(file)
+    path.write_bytes(damage(path.read_bytes()))
+    assert (path.stem if kind == "map" else path.name) in refusal(*words)
 
 
 @damaged
 @pytest.mark.parametrize("name", ["summary.json", "episodes.jsonl", "trajectories.npz"])
-def test_a_finished_run_with_a_damaged_file_is_mended_by_deleting_that(result, tmp_path, name, damage):
-    folder = copied(result, tmp_path / "run")
+def test_a_finished_run_with_a_damaged_file_is_mended_by_deleting_that(folders, tmp_path, name, damage):
+    result = folders["result"]
+    folder = shutil.copytree(result, tmp_path / "run")
     path = folder / name
     path.write_bytes(damage(path.read_bytes()))
     for record in ([], ["--record"]):
@@ -145,15 +121,3 @@ def test_a_finished_run_with_a_damaged_file_is_mended_by_deleting_that(result, t
     assert {file.name for file in folder.iterdir()} == RECORDED
     assert (folder / "trajectories.npz").read_bytes() == (result / "trajectories.npz").read_bytes()
     assert (folder / "episodes.jsonl").read_bytes() == (result / "episodes.jsonl").read_bytes()
-
-
-@damaged
-@pytest.mark.parametrize(
-    "name",
-    ["config.json", "agent.safetensors", "training.safetensors", "replay.npz", "random.json", "counters.json"],
-)
-def test_resuming_a_training_with_a_damaged_file_is_refused(training, tmp_path, name, damage):
-    folder = copied(training, tmp_path / "run")
-    path = (folder if name == "config.json" else last_checkpoint(folder)) / name
-    path.write_bytes(damage(path.read_bytes()))
-    assert f"{path}: " in refusal(*LEARN, "--out", folder, "--resume")

@@ -29,11 +29,6 @@ COMMANDS = typer.main.get_command(cli.app).commands
 PLAIN_AGENTS = {"random", "planner", "planner-closed-loop"}
 
 
-@EVERY_PAGE
-def test_no_line_waits_to_be_filled_in(page):
-    assert re.findall(r"^[A-Z_]{4,}$", read(page), re.MULTILINE) == []
-
-
 class TestLinks:
     @EVERY_PAGE
     def test_links_lead_to_files(self, page):
@@ -118,13 +113,6 @@ def check_command(command: list[str]) -> None:
         assert importlib.util.find_spec(arguments[1]), command
     elif program == "python":
         assert (ROOT / arguments[0]).exists(), command
-
-
-def test_block_when_a_comment_says_that_it_is_not_run(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("<!-- not run: opens a window -->\n```sh\nmazebench play\n```\n\n```text\nhm\n```\n")
-    shown, printed = blocks(page)
-    assert (shown.is_run, shown.commands(), printed.is_output) == (False, [["mazebench", "play"]], True)
 
 
 class TestRun:

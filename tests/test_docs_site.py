@@ -92,18 +92,6 @@ def test_field_when_explained_by_its_comment(site):
     assert text.count("that draws the goals after the first one") == 1  # of LATER_GOALS_STREAM
 
 
-def test_docstrings_when_read_as_sections(site):
-    # What looks like a section of another name comes out as a box with its lines run together.
-    boxes = [
-        path.name for path in (site / "reference").glob("*.html") if "<details" in path.read_text(encoding="utf-8")
-    ]
-    assert boxes == []
-
-
-def test_interval_when_a_line_ends(site):
-    assert "1.00\u00a0[0.95,\u00a01.00]" in (site / "results.html").read_text(encoding="utf-8")
-
-
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     with Browser(tmp_path_factory.mktemp("profile")) as browser:

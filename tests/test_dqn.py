@@ -1,12 +1,17 @@
 """The DQN agents: targets, network, config, and that they learn."""
 
 import numpy as np
+import pytest
 import torch
 from acting import inputs_of
-from mazebench_agents.dqn import DQN, MAH, MAHPaper
+from mazebench_agents.dqn import DQN
+from mazebench_agents.dqn.config import DQNConfig
 from mazebench_agents.dqn.learner import double_q_target
-from mazebench_agents.dqn.network import ReadingQNetwork
+from mazebench_agents.mah import MAH, MAHPaper
+from mazebench_agents.mah.network import ReadingQNetwork
 from small_world import learn
+
+from mazebench.errors import InputError
 
 
 def test_double_q_target_by_hand():
@@ -43,8 +48,16 @@ def test_network_takes_the_middle_of_the_map_for_a_start_that_is_not_marked():
 
 def test_network_without_context_does_not_depend_on_it():
     agent = DQN(DQN.default_config, 13)
-    assert agent.initial_state(2).code is None
-    assert not any("encoder" in name for name, _ in agent.network.named_parameters())
+    rng = np.random.default_rng(0)
+    state, contexts = rng.normal(size=(8, 12)).astype(np.float32), rng.random((2, 8, 4, 13, 13)).astype(np.float32)
+    first = np.ones(8, dtype=bool)
+    one, other = (
+        agent.act(inputs_of({"state": state, "context": context}, first), agent.initial_state(8))[0]
+        for context in contexts
+    )
+    np.testing.assert_array_equal(one, other)
+    with pytest.raises(InputError, match="expected use_context False, found True; agent 'mah' gets the context"):
+        DQN(DQNConfig(use_context=True), 13)
 
 
 def test_mah_paper_reads_one_code_of_the_context_and_codes_of_the_estimated_position():

@@ -11,8 +11,8 @@ from simple_mazes import corridor
 from mazebench.envs.goal import GoalMazeEnv
 from mazebench.envs.gym import MazeEnv
 from mazebench.errors import InputError
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.registry import make_spec
 
 FORWARD, LOOK_LEFT = 0, 4
 

@@ -194,9 +194,9 @@ class TestAgents:
         assert results_of(tmp_path / "declared") == results_of(tmp_path / "given")
 
     def test_a_sensor_that_a_track_offers_is_not_added(self):
-        assert make_plan(EvalOptions("navigator", track="stale")).options.sensors == ()
-        assert make_plan(EvalOptions("navigator")).options.sensors == ("lidar",)
-        assert make_plan(EvalOptions("navigator", sensors=("top",))).task.sensors == ("top", "lidar")
+        assert make_plan(EvalOptions.of("navigator", track="stale")).options.task.sensors == ()
+        assert make_plan(EvalOptions.of("navigator")).options.task.sensors == ("lidar",)
+        assert make_plan(EvalOptions.of("navigator", sensors=("top",))).task.sensors == ("top", "lidar")
 
 
 class TestSeeds:
@@ -207,7 +207,7 @@ class TestSeeds:
         assert [record["path_length"] for record in again] != [record["path_length"] for record in before]
 
     def test_agents_seeds_do_not_depend_on_the_episodes_seeds(self, monkeypatch):
-        plan = make_plan(EvalOptions(f"{__name__}:Witness", **FEW))
+        plan = make_plan(EvalOptions.of(f"{__name__}:Witness", **FEW))
         others = tuple(
             dataclasses.replace(trial, episode=dataclasses.replace(trial.episode, seed=1000 + index))
             for index, trial in enumerate(plan.trials)
@@ -327,11 +327,11 @@ class TestRefused:
     @pytest.mark.parametrize(
         ("options", "message"),
         [
-            ({"pairs": "fixed"}, "expected pairs 'random' in an evaluation, found 'fixed'"),
+            ({"pairs": "fixed"}, "unknown option 'pairs'; available: camera_size, "),
             ({"speed": 2}, "unknown option 'speed'; available: .*distances.*map_flip"),
             ({"num_envs": 0}, "expected num_envs of at least 1, found 0"),
             ({"num_envs": "3"}, "expected num_envs of type int, found '3'"),
-            ({"record": "yes"}, "expected record of type bool, found 'yes'"),
+            ({"record": "yes"}, r"expected record of type bool \| None, found 'yes'"),
             ({"workers": -1}, "expected workers of at least 0, found -1"),
         ],
     )

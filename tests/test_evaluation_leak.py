@@ -45,7 +45,7 @@ def test_a_planner_that_undoes_flips_with_its_seed_does_no_better(monkeypatch, t
     more = successes(Undoing, tmp_path / "undoing") - honest
     assert more.mean() <= 2 * more.std(ddof=1) / len(more) ** 0.5
     # If it were told the episodes' seeds, it would do better, and this test would see that.
-    trials = make_plan(EvalOptions("random", **options)).trials
+    trials = make_plan(EvalOptions.of("random", **options)).trials
     told = {agent_seed(0, index): trial.episode.seed for index, trial in enumerate(trials)}
     monkeypatch.setattr(Undoing, "episode_seeds", told)
     assert successes(Undoing, tmp_path / "told").mean() >= honest.mean() + 0.2

@@ -12,9 +12,10 @@ from run_folders import FEW, IMPORTS, summary_of
 from mazebench import __version__
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.evaluation.options import EvalOptions, make_task
+from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.provenance import checkpoint_metadata, code_hash, provenance
 from mazebench.maps.benchmark import manifest_hash
+from mazebench.tasks.build import build_task
 
 
 def write_checkpoint(path, metadata: object) -> str:
@@ -48,8 +49,8 @@ def test_versions_options_and_machine_are_in_the_summary(tmp_path):
 
 def test_a_checkpoint_is_named_by_its_hash_and_tells_its_config(tmp_path):
     checkpoint = write_checkpoint(tmp_path / "x.safetensors", {"mine": json.dumps({"config": {"width": 8}})})
-    options = EvalOptions("mah", checkpoint=checkpoint)
-    found = provenance(options, load_agent_class("mah"), make_task(options)).model_dump()
+    options = EvalOptions.of("mah", checkpoint=checkpoint)
+    found = provenance(options, load_agent_class("mah"), build_task(options.task, options.mazes)).model_dump()
     assert found["checkpoint_sha256"] == hashlib.sha256((tmp_path / "x.safetensors").read_bytes()).hexdigest()
     assert found["checkpoint_metadata"] == {"mine": {"config": {"width": 8}}}
 
@@ -59,8 +60,8 @@ def test_an_agent_at_hand_is_named_by_the_hash_of_its_file(tmp_path, monkeypatch
     (tmp_path / "provenance_at_hand.py").write_text(code)
     monkeypatch.syspath_prepend(tmp_path)
     name = "provenance_at_hand:Mine"
-    options = EvalOptions(name)
-    found = provenance(options, load_agent_class(name), make_task(options)).model_dump()
+    options = EvalOptions.of(name)
+    found = provenance(options, load_agent_class(name), build_task(options.task, options.mazes)).model_dump()
     assert found["agent_code_sha256"] == hashlib.sha256(code.encode()).hexdigest()
     assert (found["agent_class"], found["agent_package"]) == (name, None)
 
@@ -74,7 +75,7 @@ def test_an_installed_agent_is_named_by_the_hash_of_all_python_files_of_its_pack
     (package / "deep.py").write_text("def act(self, observation):\n    return 0\n")
     monkeypatch.syspath_prepend(tmp_path)
     agent_class = load_agent_class("packaged_at_hand:Mine")
-    found = code_hash(EvalOptions("mine"), agent_class)
+    found = code_hash(EvalOptions.of("mine"), agent_class)
     expected = hashlib.sha256()
     for name in ("__init__.py", "deep.py"):
         content = (package / name).read_bytes()

@@ -30,7 +30,7 @@ RING = "#####\n#...#\n#.#.#\n#...#\n#####\n"
 
 @pytest.fixture(scope="module")
 def plan() -> Plan:
-    return make_plan(EvalOptions("random", **FEW))
+    return make_plan(EvalOptions.of("random", **FEW))
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,8 @@ import shutil
 import pytest
 from run_folders import IMPORTS, RECORDED, Killed, files_of, kill_after, results_of, summary_of
 
-from mazebench.errors import InputError, RunError, UnplayableError
-from mazebench.evaluation.options import EvalOptions
+from mazebench.errors import InputError, Remark, RunError, UnplayableError
+from mazebench.evaluation.options import EvalOptions, RunOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.evaluation.suites import SUITES, Part, run_suite
 from mazebench.maps.benchmark import SIZES
@@ -44,25 +44,26 @@ class TestParts:
     def test_no_part_is_run_twice(self, suite):
         parts = SUITES[suite]
         assert len({part.name for part in parts}) == len(parts)
-        assert len({EvalOptions("random", **part.changes) for part in parts}) == len(parts)
+        assert len({EvalOptions.of("random", **part.changes) for part in parts}) == len(parts)
 
     def test_the_suite_paper_is_the_papers_protocol(self):
-        paper = {part.name: EvalOptions("random", **part.changes) for part in SUITES["paper"]}
+        paper = {part.name: EvalOptions.of("random", **part.changes) for part in SUITES["paper"]}
         assert list(paper) == [
             *(f"local-{size}" for size in SIZES),
             *(f"hierarchical-13-k{cells}" for cells in range(1, 6)),
             *("flip-0.05", "flip-0.1", "flip-0.2", "flip-0.3", "warp-0.05", "warp-0.1", "warp-0.2"),
             *(f"noise-{level}" for level in ("0.1", "0.2", "0.3", "0.4", "0.5", "0.6", "0.7", "0.8", "0.9", "1.0")),
         ]
-        assert paper["local-13"].distances == tuple(range(1, 16))
-        assert paper["local-21"].size == 21
-        assert (paper["hierarchical-13-k2"].task, paper["hierarchical-13-k2"].landmark_distance) == ("hierarchical", 2)
-        assert (paper["flip-0.3"].task, paper["flip-0.3"].map_flip) == ("hierarchical", 0.3)
-        assert (paper["warp-0.1"].distances, paper["warp-0.1"].map_warp) == ((2, 4, 6, 8, 10), 0.1)
-        assert (paper["noise-1.0"].distances, paper["noise-1.0"].position_noise) == ((2, 4, 6, 8, 10), 1.0)
+        assert paper["local-13"].task.distances == ()  # 1 to 15
+        assert paper["local-21"].mazes.size == 21
+        corners, flipped = paper["hierarchical-13-k2"].task, paper["flip-0.3"].task
+        assert (corners.task, corners.landmark_distance) == ("hierarchical", 2)
+        assert (flipped.task, flipped.map_flip) == ("hierarchical", 0.3)
+        assert (paper["warp-0.1"].task.distances, paper["warp-0.1"].task.map_warp) == ((2, 4, 6, 8, 10), 0.1)
+        assert (paper["noise-1.0"].task.distances, paper["noise-1.0"].task.position_noise) == ((2, 4, 6, 8, 10), 1.0)
 
     def test_the_suite_quick_has_420_episodes(self):
-        plans = [make_plan(EvalOptions("random", **part.changes)) for part in SUITES["quick"]]
+        plans = [make_plan(EvalOptions.of("random", **part.changes)) for part in SUITES["quick"]]
         assert sum(len(plan.trials) for plan in plans) == 420
 
 
@@ -81,7 +82,7 @@ class TestRun:
     @pytest.mark.parametrize("running", [{"num_envs": 7}, {"workers": 2, "num_envs": 16}], ids=["envs", "workers"])
     def test_the_bytes_do_not_depend_on_how_it_is_run(self, tiny_run, tmp_path, running):
         calls = []
-        summaries = run_suite("tiny", BOTH, tmp_path, progress=lambda *call: calls.append(call), **running)
+        summaries = run_suite("tiny", BOTH, tmp_path, RunOptions(**running), lambda *call: calls.append(call))
         assert results_of(tmp_path) == results_of(tiny_run)
         assert (calls[0], calls[-1]) == ((0, 160), (160, 160))
         assert calls == sorted(calls)
@@ -90,7 +91,7 @@ class TestRun:
         ]
 
     def test_trajectories_are_left_out_if_asked_for(self, tiny_run, tmp_path):
-        run_suite("tiny", ["random"], tmp_path, record=False)
+        run_suite("tiny", ["random"], tmp_path, RunOptions(record=False))
         assert not list(tmp_path.rglob("trajectories.npz"))
         records = "random/near/episodes.jsonl"
         assert (tmp_path / records).read_bytes() == (tiny_run / records).read_bytes()
@@ -100,22 +101,22 @@ class TestResume:
     @pytest.mark.parametrize("num_episodes", [10, 70, 160])
     def test_a_suite_goes_on_wherever_it_was_killed(self, tiny_run, tmp_path, num_episodes):
         with pytest.raises(Killed):
-            run_suite("tiny", BOTH, tmp_path, num_envs=16, progress=kill_after(num_episodes))
+            run_suite("tiny", BOTH, tmp_path, RunOptions(num_envs=16), kill_after(num_episodes))
         finished = {path: path.read_bytes() for path in tmp_path.rglob("summary.json")}
-        run_suite("tiny", BOTH, tmp_path, resume=True)
+        run_suite("tiny", BOTH, tmp_path, RunOptions(resume=True))
         assert results_of(tmp_path) == results_of(tiny_run)
         assert {path: path.read_bytes() for path in finished} == finished
 
     def test_an_agent_can_be_added(self, tiny_run, tmp_path):
         run_suite("tiny", ["planner"], tmp_path)
         before = files_of(tmp_path / "planner")
-        run_suite("tiny", ["random"], tmp_path, resume=True)
+        run_suite("tiny", ["random"], tmp_path, RunOptions(resume=True))
         assert results_of(tmp_path) == results_of(tiny_run)
         assert files_of(tmp_path / "planner") == before
 
     def test_a_finished_suite_is_not_run_again(self, tiny_run):
         before = files_of(tiny_run)
-        run_suite("tiny", BOTH, tiny_run, resume=True)
+        run_suite("tiny", BOTH, tiny_run, RunOptions(resume=True))
         assert files_of(tiny_run) == before
 
     def test_an_agent_that_fails_costs_the_others_nothing(self, tiny_run, tmp_path, monkeypatch):
@@ -125,7 +126,7 @@ class TestResume:
         out = tmp_path / "out"
         with pytest.raises(RunError, match=r"agent 'failing_at_hand:Failing': act\(\) raised RuntimeError: no"):
             run_suite("tiny", ["random", "failing_at_hand:Failing"], out)
-        run_suite("tiny", ["planner"], out, resume=True)
+        run_suite("tiny", ["planner"], out, RunOptions(resume=True))
         for agent in BOTH:
             assert results_of(out / agent) == results_of(tiny_run / agent)
 
@@ -161,10 +162,12 @@ class TestPartsThatCannotBePlayed:
 
     @pytest.mark.parametrize("workers", [0, 1])
     def test_they_are_left_out_and_named(self, mixed, tmp_path, monkeypatch, workers):
-        said = []
         agent = self.write_agent(tmp_path, monkeypatch, 13)
-        summaries = run_suite("mixed", [agent, "random"], tmp_path / "out", workers=workers, warn=said.append)
-        assert said == ["agent 'Partial': plays local goals only, found hierarchical; left out: corners, flips"]
+        with pytest.warns(Remark) as warned:
+            summaries = run_suite("mixed", [agent, "random"], tmp_path / "out", RunOptions(workers=workers))
+        assert [str(each.message) for each in warned] == [
+            "agent 'Partial': plays local goals only, found hierarchical; left out: corners, flips"
+        ]
         played = [(summary.agent, summary.part) for summary in summaries]
         assert played[:2] == [(agent, "near"), (agent, "noise-0.5")]
         assert len(played) == 6
@@ -196,9 +199,9 @@ class TestRefused:
     def test_a_folder_that_holds_another_run_is_refused(self, tiny_run):
         before = files_of(tiny_run)
         for suite, options, said in [
-            ("tiny", {}, "holds a run already; go on with --resume or name another folder"),
-            ("tiny", {"resume": True, "seed": 1}, "holds another run: its seed is 0, this one's 1"),
-            ("quick", {"resume": True}, "holds another run: its suite is tiny, this one's quick"),
+            ("tiny", {"run": RunOptions()}, "holds a run already; go on with --resume or name another folder"),
+            ("tiny", {"run": RunOptions(resume=True), "seed": 1}, "holds another run: its seed is 0, this one's 1"),
+            ("quick", {"run": RunOptions(resume=True)}, "holds another run: its suite is tiny, this one's quick"),
         ]:
             with pytest.raises(InputError, match=said):
                 run_suite(suite, ["random"], tiny_run, **options)
@@ -219,7 +222,7 @@ class TestRefused:
         (tmp_path / ("thesis.tex" if content is None else "suite.json")).write_text(content or "")
         before = files_of(tmp_path)
         with pytest.raises(InputError, match=said) as refused:
-            run_suite("tiny", ["random"], tmp_path, resume=True)
+            run_suite("tiny", ["random"], tmp_path, RunOptions(resume=True))
         assert "\n" not in str(refused.value)
         assert files_of(tmp_path) == before
 

@@ -23,8 +23,8 @@ from mazebench.results.trajectories import (
     save_trajectories,
     to_json,
 )
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
-from mazebench.tasks.registry import make_spec
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.trials import frozen_trials
 

@@ -19,7 +19,7 @@ from mazebench.envs.vector import MazeVectorEnv
 from mazebench.maps.generators import STYLES, generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
-from mazebench.tasks.registry import make_spec
+from mazebench.tasks.build import make_spec
 from mazebench.world.lidar import MAX_RANGE, NUM_RAYS, Lidar, ray_ends
 from mazebench.world.mjcf import BODY_HEIGHT, maze_spec
 

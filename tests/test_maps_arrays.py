@@ -9,8 +9,7 @@ import mazebench
 from mazebench.errors import InputError
 from mazebench.maps.generators import generate
 from mazebench.maps.maze import Maze, MazeError
-from mazebench.maps.options import NO_OPTIONS
-from mazebench.maps.readers.arrays import maze_from_array, read_array_maze
+from mazebench.maps.readers.arrays import maze_from_array
 
 WALLS = generate("dfs", 7, np.random.default_rng(0)).walls
 
@@ -20,13 +19,13 @@ class TestWalls:
     def test_walls_are_true_or_one(self, dtype):
         assert maze_from_array(WALLS.astype(dtype)) == Maze(WALLS)
 
-    def test_a_rectangle_is_padded_with_wall_and_one_line_says_so(self, capsys):
+    def test_a_rectangle_is_padded_with_wall_and_one_line_says_so(self, remarks):
         walls = np.ones((9, 15), dtype=bool)
         walls[1:-1, 1:-1] = False
         maze = maze_from_array(walls, "hall")
         assert (maze.walls[:9] == walls).all()
         assert maze.walls[9:].all()
-        assert capsys.readouterr().err == "mazebench: hall: 9 x 15 cells, padded with wall at the bottom to 15 x 15\n"
+        assert remarks() == ["hall: 9 x 15 cells, padded with wall at the bottom to 15 x 15"]
 
     def test_a_cell_has_the_size_asked_for(self):
         assert maze_from_array(WALLS, cell_size=0.5) == Maze(WALLS, cell_size=0.5)
@@ -52,25 +51,19 @@ class TestWalls:
 
 
 class TestOccupancy:
-    def test_per_cent_are_thresholded_and_what_cannot_be_reached_is_closed(self, capsys):
+    def test_per_cent_are_thresholded_and_what_cannot_be_reached_is_closed(self, remarks):
         occupancy = np.full((5, 6), 100, dtype=np.int8)
         occupancy[1, 1:5] = [0, 25, -1, 0]  # the last is cut off by the unknown cell
         occupancy[2, 1:3] = [64, 65]  # unknown, occupied
         walls = np.ones((6, 6), dtype=bool)
         walls[1, 1:3] = False
         assert maze_from_array(occupancy, "map") == Maze(walls)
-        assert "1 of 3 free cells (33 %) closed that can't be reached from the others" in capsys.readouterr().err
+        assert "1 of 3 free cells (33 %) closed that can't be reached from the others" in remarks()[0]
         walls[1, 1:5] = walls[2, 1] = False
         assert maze_from_array(occupancy, unknown="free") == Maze(walls)
 
 
 class TestFile:
-    def test_an_array_is_read_from_its_file(self, tmp_path):
-        np.save(tmp_path / "plan.npy", WALLS)
-        maze = read_array_maze(tmp_path / "plan.npy", NO_OPTIONS)
-        assert (maze, maze.name) == (Maze(WALLS), "plan")
-        assert mazebench.read_maze(tmp_path / "plan.npy", cell_size=2.0) == Maze(WALLS, cell_size=2.0)
-
     def test_a_pickle_is_refused(self, tmp_path):
         np.save(tmp_path / "plan.npy", np.array([{}]), allow_pickle=True)
         with pytest.raises(InputError, match=r"plan\.npy: expected a \.npy file of numbers, found .*Object arrays"):

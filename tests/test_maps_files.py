@@ -1,14 +1,22 @@
-"""Mazes read from files and folders."""
+"""Mazes read from files and folders: as they were written, in every format."""
 
 from __future__ import annotations
 
+import dataclasses
+import pathlib
+import tempfile
+import warnings
+
+import hypothesis
 import numpy as np
 import pytest
+from hypothesis import strategies
 
 from mazebench.errors import InputError
 from mazebench.maps.files import read_maze, read_mazes
-from mazebench.maps.generators import generate
+from mazebench.maps.generators import STYLES, generate
 from mazebench.maps.pictures import draw_maze, write_image
+from mazebench.maps.readers.ros import write_ros_map
 from mazebench.maps.text import write_text_maze
 
 
@@ -20,6 +28,34 @@ def mazes():
 
 def write_picture(maze, path):
     write_image(draw_maze(maze, 8), path)
+
+
+WRITERS = {
+    "txt": write_text_maze,
+    "png": write_picture,
+    "npy": lambda maze, path: np.save(path, maze.walls),
+    "yaml": write_ros_map,  # with a picture beside it, and the size of a cell
+}
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+@hypothesis.given(
+    strategies.integers(0, 2**32 - 1),
+    strategies.sampled_from(sorted(STYLES)),
+    strategies.integers(2, 20).map(lambda half: 2 * half + 1),
+    strategies.sampled_from([1.0, 0.5, 0.7]),
+)
+@hypothesis.example(0, "obstacles", 255, 1.0)
+@hypothesis.example(0, "obstacles", 40, 0.5)
+@hypothesis.settings(max_examples=25, deadline=None)
+def test_a_maze_is_read_as_it_was_written_without_remarks(suffix, seed, style, size, cell_size):
+    maze = dataclasses.replace(generate(style, size, np.random.default_rng(seed), "other"), cell_size=cell_size)
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        path = pathlib.Path(folder) / f"plan.{suffix}"
+        WRITERS[suffix](maze, path)
+        read = read_maze(path) if suffix == "yaml" else read_maze(path, cell_size=cell_size)
+    assert (read, read.name) == (maze, "plan")
 
 
 def test_a_suffix_may_be_in_capitals(mazes, tmp_path):

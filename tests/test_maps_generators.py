@@ -10,8 +10,8 @@ from mazebench.errors import InputError
 from mazebench.maps.generators import STYLES, dfs_walls, generate
 from mazebench.maps.maze import Maze, corner_cells
 from mazebench.maps.text import format_maze, parse_maze
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.registry import make_spec
 from mazebench.tasks.route import plan_route
 from mazebench.tasks.shown_map import show_map
 

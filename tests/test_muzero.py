@@ -12,13 +12,16 @@ from mazebench_agents.belief_planner.network import BeliefPlannerNetwork
 from mazebench_agents.common.layers import marked_position
 from mazebench_agents.mmn import MMN
 from mazebench_agents.mmn.config import MMNConfig
+from mazebench_agents.muzero.batches import make_batch
 from mazebench_agents.muzero.lookahead import lookahead
+from mazebench_agents.muzero.losses import unrolled_losses
+from mazebench_agents.muzero.targets import Targets
 from small_world import learn
 
 from mazebench.agent import Interface
 from mazebench.maps.generators import generate
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
-from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Collector
 
 SMALL = {"hidden": 16, "head_hidden": 16, "latent": 8, "groups": 4, "num_envs": 8, "min_rows": 100}
@@ -59,9 +62,8 @@ def code_of(network, context):
 def make_learner(mazes, config=CONFIGS["belief-planner"], seed=0, steps=100):
     """A small learner that has seen some steps of random driving."""
     overrides = {name: str(value) for name, value in dataclasses.asdict(config).items()}
-    size = mazes[0].size
-    learner = agent_class(config).build_learner(Interface("local", size, size), mazes, seed=seed, overrides=overrides)
-    spec = TaskSpec(mazes=mazes, distances=(1, 2, 3), **learner.task_options())
+    spec = make_spec(maps=mazes, distances=(1, 2, 3), num_goals=config.num_goals)
+    learner = agent_class(config).build_learner(spec, seed=seed, overrides=overrides)
     collector = Collector(spec, learner.num_envs, seed=seed)
     rng = np.random.default_rng(seed)
     for _ in range(steps):
@@ -97,7 +99,16 @@ def test_task_and_model_losses_reach_the_hypermodels_weights(config, mazes):
     network = learner.actor.network
     with torch.no_grad():  # heads that are zero pass nothing on
         network.heads.weight.normal_(std=0.1)
-    losses, _ = learner._losses(learner.sample())
+    sample = learner.replay.sample_sequences(
+        8, 3, config.sequence_steps, hindsight=learner.hindsight, rng=np.random.default_rng(0)
+    )
+    contexts = learner.maps.contexts(sample, turned=0)
+    if isinstance(config, BeliefPlannerConfig):
+        contexts = contexts[:, [GLOBAL_MAP, GOAL]]
+    device = network.support.device
+    batch = make_batch(sample, maps=learner.maps, turned=0, context=contexts, device=device)
+    wanted = Targets(-torch.rand(batch.exists.shape), torch.softmax(torch.randn(*batch.exists.shape, 6), dim=-1))
+    losses, _ = unrolled_losses(network, config, batch, Targets(*(each.to(device) for each in wanted)))
     psi = (network.hypermodel.rows if isinstance(config, BeliefPlannerConfig) else network.hypermodel.hyper).weight
     for loss in ("value_loss", "policy_loss", "goal_loss", "model_loss"):
         (gradient,) = torch.autograd.grad(losses[loss], psi, retain_graph=True)

@@ -2,11 +2,12 @@
 
 import json
 import pathlib
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 import torch
-from mazebench_agents.mmn import measure
 from mazebench_agents.muzero import search
 
 torch.set_num_threads(1)  # two that share a core with other tests wait for each other
@@ -25,7 +26,8 @@ def table_model(tables):
     def recurrent_fn(embedding, action):
         state = embedding[:, 0].numpy()
         following = roots(tables["next_state"][state, action])
-        return search.Evaluation(tables["reward"][state, action], tables["discount"][state, action], *following)
+        reward, discount = tables["reward"][state, action], tables["discount"][state, action]
+        return search.Evaluation(reward, discount, following.prior_logits, following.value), following.embedding
 
     return roots, recurrent_fn
 
@@ -219,7 +221,11 @@ def test_considered_visits_by_hand():
     assert search.considered_visits(6, 4) == [0] * 4
 
 
-def test_speed_of_the_search_beside_mctx_is_measured():
-    pytest.importorskip("mctx")
-    (rows,) = measure.search_table(0.1).values()
-    assert all(row["mctx sims/s"] > 0 for row in rows)
+@pytest.mark.slow
+def test_speed_of_the_search_is_measured_beside_that_of_mctx():
+    script = pathlib.Path(__file__).parent.parent / "benchmarks" / "search.py"
+    command = [sys.executable, script, "--seconds", "0.01"]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    rows = [line.split(" | ") for line in said.splitlines() if "," in line and line.startswith("| ")][1:]
+    assert [row[0] for row in rows] == ["| gumbel, 1", "| gumbel, 64", "| gumbel, 256", "| puct, 64"]
+    assert all(float(row[1].replace(",", "")) > 0 for row in rows)

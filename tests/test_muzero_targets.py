@@ -6,8 +6,10 @@ import pytest
 import torch
 from mazebench_agents.belief_planner.config import BeliefPlannerConfig
 from mazebench_agents.belief_planner.network import BeliefPlannerNetwork
-from mazebench_agents.muzero.losses import Batch, Targets, unrolled_losses
+from mazebench_agents.muzero.batches import Batch
+from mazebench_agents.muzero.losses import unrolled_losses
 from mazebench_agents.muzero.targets import (
+    Targets,
     cross_entropy,
     n_step_returns,
     tree_backup_returns,

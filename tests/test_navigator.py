@@ -16,9 +16,10 @@ from mazebench.evaluation.chunk import Outcome, run_trials
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.generators import dfs_walls, obstacles_walls
 from mazebench.maps.maze import Maze
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.trials import make_trial, select_track_trials, select_trials
+from mazebench.tasks.trials import draw_trials, make_trial
 from mazebench.world.lidar import Lidar
 
 FREE, WALL = -1, 1
@@ -166,11 +167,9 @@ def success_rate(outcomes: list[Outcome]) -> float:
 
 
 def track_success_rate(track: str, level: int, distances: tuple[int, ...], num_mazes: int = 10) -> float:
-    size = TRACKS[track].sizes[level - 1]
     mazes = TRACKS[track].mazes((level,), "train")[:num_mazes]
-    context_size = TRACKS[track].context_size((level,), size)
-    spec = TaskSpec(mazes=mazes, track=track, level=(level,), distances=distances, context_size=context_size)
-    return success_rate(play(spec, select_track_trials(mazes, False, distances, 2)))
+    spec = make_spec(track, maps=mazes, level=level, distances=distances)
+    return success_rate(play(spec, draw_trials(spec, 2)))
 
 
 class TestNavigator:
@@ -181,8 +180,8 @@ class TestNavigator:
     def test_goals_are_reached_where_the_map_is_true(self):
         mazes = load_mazes(13, "train")[:4]
         distances = tuple(range(1, 16))
-        spec = TaskSpec(mazes=mazes, distances=distances, sensors=("lidar",))
-        assert success_rate(play(spec, select_trials("local", mazes, False, distances, 2))) == 1.0
+        spec = make_spec(maps=mazes, distances=distances, sensors=("lidar",), time_limit=100)
+        assert success_rate(play(spec, draw_trials(spec, 2))) == 1.0
 
     @pytest.mark.parametrize("level", [1, 2, 3])
     def test_goals_are_reached_where_doors_have_moved(self, level):
@@ -198,19 +197,19 @@ class TestNavigator:
     def test_a_landmark_in_a_wall_is_given_up(self):
         # Landmarks are planned on the shown map, and some of them lie in walls. The legs to them time out.
         mazes = load_mazes(13, "train")[:20]
-        spec = TaskSpec(task="hierarchical", mazes=mazes, map_flip=0.1, sensors=("lidar",))
-        assert success_rate(play(spec, select_trials("hierarchical", mazes, False))) >= 0.9
+        spec = make_spec("hierarchical", maps=mazes, map_flip=0.1, sensors=("lidar",), time_limit=100)
+        assert success_rate(play(spec, draw_trials(spec))) >= 0.9
 
     @pytest.mark.parametrize("perturbation", [{"position_noise": 0.5}, {"map_warp": 0.1}], ids=["noise", "warp"])
     def test_goals_are_reached_where_positions_or_marks_are_off(self, perturbation):
         mazes = load_mazes(13, "train")[:5]
-        spec = TaskSpec(mazes=mazes, distances=(5, 10), sensors=("lidar",), **perturbation)
-        assert success_rate(play(spec, select_trials("local", mazes, False, (5, 10), 2))) >= 0.9
+        spec = make_spec(maps=mazes, distances=(5, 10), sensors=("lidar",), time_limit=100, **perturbation)
+        assert success_rate(play(spec, draw_trials(spec, 2))) >= 0.9
 
     def test_the_cells_of_a_mark_on_a_small_map_are_searched(self):
         # 5 x 5 pixels of a field of 15 x 15 cells: nine cells have the goal's pixel.
         maze = field(15)
-        spec = TaskSpec(mazes=(maze,), distances=(12,), context_size=5, sensors=("lidar",))
+        spec = make_spec(maps=maze, distances=(12,), context_size=5, sensors=("lidar",), time_limit=100)
         rng = np.random.default_rng(0)
         trials = [make_trial(maze, 0, ((2, 2), goal), rng) for goal in ((9, 6), (11, 8), (10, 7))]
         assert success_rate(play(spec, trials)) == 1.0

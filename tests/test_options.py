@@ -1,28 +1,39 @@
-"""Options declared as fields of a dataclass: what they accept, what they refuse, and what can be read of them."""
+"""Checked options: what they accept, what they refuse, and what can be read of them."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+import json
+from typing import Annotated, Any
 
 import numpy as np
 import pytest
+from annotated_types import Ge, Interval
+from hypothesis import given
+from hypothesis import strategies as st
 
 from mazebench.errors import InputError
-from mazebench.options import Option, Options, option, options_of
+from mazebench.options import Doc, OneOf, by_name, from_names, options, options_of
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Base(Options):
-    share: float = option(0.5, "A share.", lowest=0, highest=1)
+@options
+class Base:
+    share: Annotated[float, Interval(ge=0, le=1), Doc("A share.")] = 0.5
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@options
 class Given(Base):
-    count: int | None = option(None, "How many.", lowest=1)
-    colour: str = option("red", "Which one.", choices=("red", "blue"))
-    sizes: tuple[int, ...] = option((3, 4), "All sizes.", lowest=3)
+    count: Annotated[int | None, Ge(1), Doc("How many.")] = None
+    colour: Annotated[str, OneOf("red", "blue"), Doc("Which one.")] = "red"
+    sizes: Annotated[tuple[Annotated[int, Ge(3)], ...], Doc("All sizes.")] = (3, 4)
     name: str = "no option"
+
+
+@options
+class Whole:
+    agent: str = dataclasses.field(kw_only=False)
+    given: Given = Given(colour="blue")
+    seed: Annotated[int, Ge(0), Doc("A seed.")] = 0
 
 
 @pytest.mark.parametrize(
@@ -32,10 +43,12 @@ class Given(Base):
         ({"share": float("nan")}, "expected share from 0 to 1, found nan"),
         ({"share": None}, "expected share of type float, found None"),
         ({"count": 0}, "expected count of at least 1, found 0"),
+        ({"count": True}, "expected count of type int | None, found True"),
         ({"count": "many"}, "expected count of type int | None, found 'many'"),
         ({"colour": "green"}, "unknown colour 'green'; available: blue, red"),
         ({"sizes": (3, 4.5)}, "expected sizes of type tuple[int, ...], found (3, 4.5)"),
         ({"sizes": (3, 2)}, "expected sizes of at least 3, found 2"),
+        ({"hue": 1}, "unknown option 'hue'; available: colour, count, name, share, sizes"),
     ],
 )
 def test_a_value_that_is_not_allowed_is_refused(values: dict[str, Any], message: str):
@@ -44,9 +57,9 @@ def test_a_value_that_is_not_allowed_is_refused(values: dict[str, Any], message:
     assert str(caught.value) == message
 
 
-def test_bounds_numpy_numbers_and_a_default_of_none_are_allowed():
-    given = Given(share=np.float32(1.0), count=np.int64(1))
-    assert (given.share, given.count, Given().count) == (1.0, 1, None)
+def test_numpy_numbers_and_a_default_of_none_are_allowed():
+    made = Given(share=np.float32(1.0), count=np.int64(1))
+    assert (made.share, made.count, Given().count) == (1.0, 1, None)
 
 
 @pytest.mark.parametrize("sizes", [[5], iter([5]), np.array([5]), 5])
@@ -54,6 +67,38 @@ def test_any_iterable_and_a_single_value_become_a_tuple(sizes: Any):
     assert Given(sizes=sizes).sizes == (5,)
 
 
-def test_options_are_listed_with_those_of_base_classes():
-    assert list(options_of(Given)) == ["share", "count", "colour", "sizes"]
-    assert options_of(Given)["share"] == Option("A share.", lowest=0, highest=1)
+def test_options_are_listed_with_those_that_they_hold_and_their_defaults():
+    found = options_of(Whole)
+    assert list(found) == ["share", "count", "colour", "sizes", "seed"]
+    assert found["share"][:2] == ("A share.", 0.5)
+    assert (found["share"].lowest, found["share"].highest) == (0, 1)
+    assert (found["sizes"].lowest, found["colour"].choices) == (3, ("red", "blue"))
+    assert found["colour"].default == "blue"
+
+
+def test_a_name_that_no_option_has_is_refused():
+    with pytest.raises(InputError, match="unknown option 'hue'; available: colour, count, seed, share, sizes"):
+        from_names(Whole, {"hue": 1}, agent="mmn")
+
+
+@given(
+    st.fixed_dictionaries(
+        {},
+        optional={
+            "share": st.floats(0, 1),
+            "count": st.none() | st.integers(1),
+            "colour": st.sampled_from(["red", "blue"]),
+            "sizes": st.lists(st.integers(3)),
+            "seed": st.integers(0),
+        },
+    )
+)
+def test_options_survive_the_way_through_json(values: dict[str, Any]):
+    made = from_names(Whole, values, agent="mmn")
+    table = by_name(made)
+    assert table.pop("agent") == "mmn"
+    assert table.pop("name") == "no option"
+    assert table == {"share": 0.5, "count": None, "colour": "blue", "sizes": (3, 4), "seed": 0} | {
+        name: tuple(value) if name == "sizes" else value for name, value in values.items()
+    }
+    assert from_names(Whole, json.loads(json.dumps(table)), agent="mmn") == made

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import dataclasses
 import inspect
 import pathlib
 import re
@@ -12,9 +11,9 @@ import pytest
 
 from mazebench.envs import registration
 from mazebench.maps.options import MapOptions
-from mazebench.options import Option, Options
-from mazebench.tasks import registry
-from mazebench.tasks.options import TaskOptions
+from mazebench.options import Option, options_of
+from mazebench.tasks import build
+from mazebench.tasks.options import TaskOptions, Variants
 
 PAGE = pathlib.Path(__file__).parent.parent / "docs" / "options.md"
 DERIVED_TABLE = re.compile(r"\| option \| default \| values \| what \|\n(?:\|.*\n)+")
@@ -23,16 +22,15 @@ TABLE = re.compile(r"^\| option.*\n\|[-|]+\n((?:\|.*\n)+)", re.MULTILINE)
 
 def derived_tables() -> list[str]:
     """Returns the tables of the options of maps and of tasks, in the order of the page."""
-    return [derived_table(MapOptions), derived_table(TaskOptions)]
+    return [derived_table(MapOptions), derived_table(TaskOptions, Variants)]
 
 
-def derived_table(options: type[Options]) -> str:
-    """Returns the table of the fields of a class: its own first, then those of base classes."""
-    fields = sorted(dataclasses.fields(options), key=lambda field: field.name not in options.__annotations__)
+def derived_table(*classes: type) -> str:
+    """Returns the table of the fields of some classes: of each its own first, then those of base classes."""
     lines = ["| option | default | values | what |\n", "|---|---|---|---|\n"]
-    for field in fields:
-        option = field.metadata["option"]
-        lines.append(f"| `{field.name}` | `{field.default!r}` | {values(option)} | {option.help} |\n")
+    for each in classes:
+        for name, option in sorted(options_of(each).items(), key=lambda item: item[0] not in each.__annotations__):
+            lines.append(f"| `{name}` | `{option.default!r}` | {values(option)} | {option.help} |\n")
     return "".join(lines)
 
 
@@ -60,8 +58,8 @@ def test_the_tables_of_options_follow_from_the_code():
 @pytest.mark.parametrize(
     ("index", "function", "others"),
     [
-        (0, registry.make_spec, None),
-        (3, registration.load, registry.make_spec),
+        (0, build.make_spec, None),
+        (3, registration.load, build.make_spec),
         (4, registration.make_env, None),
         (4, registration.make_goal_env, None),
         (5, registration.make_vec, None),

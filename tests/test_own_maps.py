@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import warnings
 
 import cv2
 import gymnasium
@@ -16,10 +17,10 @@ from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.constants import STEPS_PER_ACTION
 from mazebench.envs.goal import GoalMazeEnv
-from mazebench.errors import InputError
+from mazebench.errors import InputError, Remark
 from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.evaluate import run_plan
-from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.options import EvalOptions, RunOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.evaluation.pool import open_pool
 from mazebench.maps.generators import generate
@@ -34,10 +35,9 @@ from mazebench.report.report import write_report
 from mazebench.report.results import read_results
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.context import resized_map
 from mazebench.tasks.episode import sample_episode
-from mazebench.tasks.registry import make_spec
-from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.trials import draw_trials
 from mazebench.world.export import wall_mesh
 from mazebench.world.lidar import Lidar
@@ -63,12 +63,12 @@ def scaled(tmp_path_factory):
     """Results of an evaluation in cells of half a metre."""
     folder = tmp_path_factory.mktemp("scaled")
     (folder / "maze.txt").write_text(format_maze(dfs(13)))
-    plan = make_plan(EvalOptions("oracle", maps=str(folder / "maze.txt"), sensors=("lidar",)))
+    plan = make_plan(EvalOptions.of("oracle", maps=str(folder / "maze.txt"), sensors=("lidar",)))
     task = make_spec(maps=dfs(13, 0.5), context_size=13, sensors=("lidar",))
     labels = plan.labels | {"cell_size": 0.5}
     plan = dataclasses.replace(plan, task=task, trials=tuple(draw_trials(task, 1)), labels=labels)
-    with open_pool(0, None) as pool:
-        run_plan(plan, folder / "oracle", pool, record=True)
+    with open_pool(RunOptions()) as pool:
+        run_plan(plan, folder / "oracle", pool, RunOptions(record=True))
     return folder / "oracle"
 
 
@@ -209,37 +209,37 @@ class TestAgents:
 
     def test_a_scale_on_which_an_agent_did_not_learn_is_remarked(self, tmp_path):
         (tmp_path / "fine.txt").write_text(format_maze(generate("dfs", 13, np.random.default_rng(0))))
-        told: list[str] = []
         options = {"maps": str(tmp_path / "fine.txt"), "cell_size": 2.0, "distances": (1,), "episodes_per_distance": 1}
-        summary = mazebench.evaluate("mah", warn=told.append, **options)
-        assert summary.untrained_scale
-        assert told == [
+        with pytest.warns(Remark) as warned:
+            assert mazebench.evaluate("mah", **options).untrained_scale
+        assert [str(each.message) for each in warned] == [
             "mah learned on maps of 1 m a cell and may fail here: its map of 13 x 13 cells shows 13 x 13 cells of 2 m, "
             "2 m a cell"
         ]
-        mazebench.evaluate("planner", warn=told.append, **options)
-        assert len(told) == 1
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Remark)
+            mazebench.evaluate("planner", **options)
 
     @pytest.mark.parametrize("name", ["belief-planner", "mah", "dqn"])
     def test_learned_agents_that_read_any_map_get_one_of_the_mazes_own_cells(self, tmp_path, name):
         (tmp_path / "large.txt").write_text(format_maze(generate("dfs", 31, np.random.default_rng(0))))
-        plan = make_plan(EvalOptions(name, maps=str(tmp_path / "large.txt")))
+        plan = make_plan(EvalOptions.of(name, maps=str(tmp_path / "large.txt")))
         assert (plan.task.context_size, plan.untrained_scale, plan.remark) == (31, False, None)
 
     def test_a_map_that_is_coarser_than_the_mazes_is_remarked(self, tmp_path):
         (tmp_path / "large.txt").write_text(format_maze(generate("dfs", 31, np.random.default_rng(0))))
-        assert make_plan(EvalOptions("random", maps=str(tmp_path / "large.txt"))).remark == (
+        assert make_plan(EvalOptions.of("random", maps=str(tmp_path / "large.txt"))).remark == (
             "random is shown the 31 x 31 cells as a map of 21 x 21; context_size() of its class chooses another one "
             "(docs/agents.md)"
         )
-        assert make_plan(EvalOptions("planner", maps=str(tmp_path / "large.txt"))).remark is None
-        assert make_plan(EvalOptions("random", track="far")).remark is None
+        assert make_plan(EvalOptions.of("planner", maps=str(tmp_path / "large.txt"))).remark is None
+        assert make_plan(EvalOptions.of("random", track="far")).remark is None
 
     def test_a_film_has_the_map_as_it_is_shown(self, tmp_path):
         maze = generate("dfs", 31, np.random.default_rng(0))
         (tmp_path / "large.txt").write_text(format_maze(maze))
         for agent, side in (("random", 21), ("planner", 31)):
-            options = EvalOptions(agent, maps=str(tmp_path / "large.txt"), distances=(1,))
+            options = EvalOptions.of(agent, maps=str(tmp_path / "large.txt"), distances=(1,))
             film_episode(options, tmp_path / "x.png", "map", 10 * side)
             picture = cv2.imread(str(tmp_path / "x.png"), cv2.IMREAD_GRAYSCALE)
             centres = picture[5::10, 5::10]
@@ -342,7 +342,7 @@ class TestDefaults:
 
     def test_the_benchmark_keeps_its_own(self):
         assert make_spec(split="eval").distances == tuple(range(1, 16))
-        assert make_spec(split="eval").time_limit == TaskSpec(mazes=(dfs(),)).time_limit == 100
+        assert make_spec(split="eval").time_limit == 100
 
 
 class TestEvaluation:
@@ -375,8 +375,8 @@ class TestEvaluation:
         np.testing.assert_allclose(poses[0, :2], dfs(13, 0.5).point(records[0].start), atol=0.01)
 
     def test_a_report_says_the_scale(self, scaled, tmp_path):
-        (result,) = read_results([scaled], pytest.fail)
+        (result,) = read_results([scaled])
         assert str(result.setting) == "local, 13 × 13, custom mazes, cells of 0.5 m"
-        write_report([scaled], tmp_path / "report", warn=pytest.fail)
+        write_report([scaled], tmp_path / "report")
         page = (tmp_path / "report" / "report.html").read_text()
         assert '"cellSize":0.5' in page

@@ -13,7 +13,6 @@ import struct
 import subprocess
 import sys
 import termios
-import time
 from collections.abc import Iterator
 
 import mujoco
@@ -29,8 +28,8 @@ from mazebench.maps.text import write_text_maze
 from mazebench.play import viewer
 from mazebench.play.game import LETTERS, Game
 from mazebench.play.picture import Style, draw, draw_map, draw_world
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.registry import make_spec
 
 SECONDS = 60  # to wait for what must come
 SIZE = (30, 100)  # rows and columns of the terminal
@@ -172,11 +171,14 @@ class Terminal:
 
     def end(self) -> int:
         """Waits for the end and checks that the terminal is as it was; returns the exit status."""
-        last = time.monotonic() + SECONDS
-        while self.process.poll() is None or select.select([self.master], [], [], 0.05)[0]:
-            assert time.monotonic() < last, f"waited for the end, found {self.output!r}"
-            if select.select([self.master], [], [], 0.05)[0]:
+        with open(os.pidfd_open(self.process.pid)) as ended:
+            while True:
+                ready = select.select([self.master, ended], [], [], SECONDS)[0]
+                assert ready, f"waited for the end, found {self.output!r}"
+                if self.master not in ready:
+                    break
                 self.output += os.read(self.master, 65536).decode(errors="replace")
+        self.process.wait()
         assert termios.tcgetattr(self.slave) == self.settings
         if "\x1b[?1049h" in self.output:  # the screen that programs draw on, and the cursor
             assert self.output.rindex("\x1b[?1049l") > self.output.rindex("\x1b[?1049h")

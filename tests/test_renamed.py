@@ -52,7 +52,7 @@ def test_a_finished_result_appears_under_the_present_name(agent, planner_run, tm
     before, now = files_of(folder), FORMER[agent][0]
     result = load_result(folder)
     assert {result.summary.agent, *(record.agent for record in result.records)} == {now}
-    assert [each.label for each in read_results([folder], print)] == [now]
+    assert [each.label for each in read_results([folder])] == [now]
     assert compare_folders(folder, planner_run).title.startswith(f"A is {now} in ")
     assert files_of(folder) == before
 

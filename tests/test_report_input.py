@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+import warnings
 
 import pytest
 from made_results import edit_records, edit_summary, make_result, of_own_mazes, read_summary
 
 from mazebench import cli
-from mazebench.errors import InputError
+from mazebench.errors import InputError, Remark
 from mazebench.report.report import write_report
 from mazebench.report.results import read_results
 from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY
@@ -26,9 +27,10 @@ def run(tmp_path):
 
 def read(*paths):
     """(labels, warnings) of the results at `paths`."""
-    warnings: list[str] = []
-    results = read_results(paths, warnings.append)
-    return [result.label for result in results], warnings
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", Remark)
+        results = read_results(paths)
+    return [result.label for result in results], [str(warning.message) for warning in caught]
 
 
 def cut_records(folder):
@@ -97,7 +99,7 @@ class TestSkipped:
 
     def test_a_result_with_damaged_trajectories_is_reported_without_paths(self, run):
         (run / "good" / TRAJECTORIES).write_bytes(b"PK\x03\x04 no archive")
-        [result] = read_results([run], lambda line: None)
+        [result] = read_results([run])
         assert result.trajectories is None
         assert read(run)[1][0].endswith("reported without paths")
 
@@ -118,7 +120,7 @@ class TestLabels:
 
     def test_names_replace_those_of_agents_everywhere(self, run, tmp_path):
         make_result(run / "other", "lab.agents:Bold", num_mazes=2)
-        write_report([run], tmp_path / "out", lambda line: None, [("ours", "lab.agents:Bold")])
+        write_report([run], tmp_path / "out", [("ours", "lab.agents:Bold")])
         files = [path for path in (tmp_path / "out").rglob("*") if path.suffix in (".md", ".csv", ".tex", ".html")]
         assert len(files) > 5
         for path in files:
@@ -130,21 +132,21 @@ class TestLabels:
         for name, checkpoint in (("a", "aa11bb22"), ("b", "cc33dd44")):
             make_result(tmp_path / name / "local-13", "mah", num_mazes=1, checkpoint=checkpoint)
         names = [("first", str(tmp_path / "a")), ("second", str(tmp_path / "b" / "local-13"))]
-        results = read_results([tmp_path], pytest.fail, names)
+        results = read_results([tmp_path], names)
         assert [result.label for result in results] == ["first", "second"]
 
     def test_a_name_of_nothing_and_one_of_two_agents_are_refused(self, run):
         make_result(run / "other", "dqn", num_mazes=2)
         with pytest.raises(InputError, match="unknown agent or folder 'mmn'; available: dqn, mah"):
-            read_results([run], pytest.fail, [("ours", "mmn")])
+            read_results([run], [("ours", "mmn")])
         for names in ([("ours", "dqn"), ("ours", "mah")], [("dqn", "mah")], [("ours", str(run))]):
             with pytest.raises(InputError, match=rf"expected one agent called '{names[0][0]}', found dqn, mah"):
-                read_results([run], pytest.fail, names)
+                read_results([run], names)
 
     def test_privileged_agents_are_marked_in_tables_and_on_the_page(self, run, tmp_path):
         make_result(run / "oracle", "oracle", num_mazes=2, privileged=True)
         assert read(run) == (["mah", "oracle (privileged)"], [])
-        write_report([run], tmp_path / "out", lambda line: None)
+        write_report([run], tmp_path / "out")
         assert "| oracle (privileged) | mah |" in (tmp_path / "out" / "tables" / "local-13.md").read_text()
         assert '"label":"oracle (privileged)"' in (tmp_path / "out" / "report.html").read_text()
 
@@ -189,7 +191,7 @@ class TestRefused:
 
 def test_results_on_mazes_of_ones_own_are_reported_with_their_walls(tmp_path):
     folder = of_own_mazes(make_result(tmp_path / "own", "mah", num_mazes=2), "office")
-    [result] = write_report([folder], tmp_path / "out", lambda line: None)
+    [result] = write_report([folder], tmp_path / "out")
     assert result.setting.mazes == ("office-00", "office-01")
     assert (tmp_path / "out" / "tables" / "custom-1-local-13.md").exists()
     data = (tmp_path / "out" / "report.html").read_text().split('id="data">')[1].split("</script>")[0]

@@ -3,15 +3,16 @@
 import numpy as np
 import pytest
 import torch
+from hypothesis import given, strategies
 from mazebench_agents.common import symmetry
 from mazebench_agents.common.layers import state_features
 from simple_mazes import field
 
 from mazebench.envs.dm_control import Environment
 from mazebench.maps.generators import generate
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.context import build_context
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.spec import TaskSpec
 
 
 def test_turn_planes_by_symmetry_one_turns_to_the_left():
@@ -20,41 +21,57 @@ def test_turn_planes_by_symmetry_one_turns_to_the_left():
     assert symmetry.turn_planes(plane, 4).tolist() == [[[1.0, 0.0], [3.0, 2.0]]]
 
 
-@pytest.mark.parametrize("turned", range(symmetry.NUM_SYMMETRIES))
-def test_turned_cells_are_where_the_turned_plane_has_the_mark(turned):
-    plane = torch.zeros(1, 5, 5)
-    plane[0, 1, 3] = 1
-    row, column = symmetry.turn_cells(torch.tensor([1, 3]), 5, turned).tolist()
-    assert symmetry.turn_planes(plane, turned)[0, row, column] == 1
+SYMMETRY = strategies.integers(0, symmetry.NUM_SYMMETRIES - 1)
+SEED = strategies.integers(0, 2**32)
+
+
+def turned_cell(cell, size, turned):
+    return tuple(symmetry.turn_cells(torch.tensor(cell), size, turned).tolist())
+
+
+@given(SYMMETRY, strategies.integers(2, 6), SEED)
+def test_turned_context_is_the_context_of_the_turned_maze(turned, half, seed):
+    rng = np.random.default_rng(seed)
+    size = 2 * half + 1
+    walls = generate("dfs", size, rng).walls
+    start, goal = rng.permutation(np.argwhere(~walls))[:2].tolist()
+    context = build_context(walls, tuple(start), tuple(goal), size)
+    turned_walls = symmetry.turn_planes(torch.from_numpy(walls.copy()), turned).numpy()
+    expected = build_context(turned_walls, turned_cell(start, size, turned), turned_cell(goal, size, turned), size)
+    np.testing.assert_array_equal(symmetry.turn_planes(torch.from_numpy(context), turned), expected)
+
+
+@given(SYMMETRY, strategies.integers(1, 9), SEED)
+def test_the_inverse_of_a_symmetry_turns_everything_back(turned, size, seed):
+    inverse = turned if turned >= 4 else -turned % 4  # mirrored twice, or turned on to a whole turn
+    rng = np.random.default_rng(seed)
+    planes, features = torch.from_numpy(rng.normal(size=(2, size, size))), torch.from_numpy(rng.normal(size=(5, 9)))
+    cells, actions = torch.from_numpy(rng.integers(size, size=(5, 2))), rng.integers(6, size=5)
+    assert torch.equal(symmetry.turn_planes(symmetry.turn_planes(planes, turned), inverse), planes)
+    assert torch.equal(symmetry.turn_features(symmetry.turn_features(features, turned), inverse), features)
+    assert torch.equal(symmetry.turn_cells(symmetry.turn_cells(cells, size, turned), size, inverse), cells)
+    np.testing.assert_array_equal(symmetry.turn_actions(symmetry.turn_actions(actions, turned), inverse), actions)
 
 
 @pytest.mark.parametrize("turned", range(symmetry.NUM_SYMMETRIES))
 def test_turned_experience_is_what_the_simulation_does_in_the_turned_maze(turned):
     """Drives the same way in a field and in the turned one, and compares what would be learned from."""
     start, goal, yaw = (8, 5), (3, 4), 0.7
-    turn = lambda cell: tuple(symmetry.turn_cells(torch.tensor(cell), 13, turned).tolist())  # noqa: E731
     turned_yaw = (np.pi - yaw if turned >= 4 else yaw) + (turned % 4) * np.pi / 2
     # Short enough to touch no wall: the boxes that walls are made of do not turn along.
     actions = np.random.default_rng(0).integers(6, size=12)
     plain = drive(Episode(0, start, goal, yaw, 0), actions)
-    other = drive(Episode(0, turn(start), turn(goal), turned_yaw, 0), symmetry.turn_actions(actions, turned))
+    other = drive(
+        Episode(0, turned_cell(start, 13, turned), turned_cell(goal, 13, turned), turned_yaw, 0),
+        symmetry.turn_actions(actions, turned),
+    )
     assert np.ptp(plain[:, :2], axis=0).max() > 0.5
     features = [state_features(torch.from_numpy(states), torch.from_numpy(states[0, :2])) for states in (plain, other)]
     np.testing.assert_allclose(symmetry.turn_features(features[0], turned), features[1], atol=1e-4)
 
 
-@pytest.mark.parametrize("turned", range(symmetry.NUM_SYMMETRIES))
-def test_turned_context_is_the_context_of_the_turned_maze(turned):
-    walls = generate("dfs", 7, np.random.default_rng(2)).walls
-    turn = lambda cell: tuple(symmetry.turn_cells(torch.tensor(cell), 7, turned).tolist())  # noqa: E731
-    turned_walls = symmetry.turn_planes(torch.from_numpy(walls.copy()), turned).numpy()
-    context = torch.from_numpy(build_context(walls, (1, 1), (5, 3), 7))
-    expected = build_context(turned_walls, turn((1, 1)), turn((5, 3)), 7)
-    np.testing.assert_array_equal(symmetry.turn_planes(context, turned), expected)
-
-
 def drive(episode, actions):
-    env = Environment(TaskSpec(mazes=(field(13),), distances=(1,), time_limit=1000))
+    env = Environment(make_spec(maps=field(13), distances=(1,), time_limit=1000))
     states = [env.reset(episode=episode).observation["state"]]
     for action in actions:
         states.append(env.step(int(action)).observation["state"])

@@ -17,8 +17,9 @@ from mazebench_agents.random_agent import RandomAgent
 import mazebench
 from mazebench.constants import TASK_VERSION, TRACKS_VERSION
 from mazebench.envs.dm_control import Environment
-from mazebench.evaluation.options import EvalOptions, make_task
+from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.provenance import provenance
+from mazebench.tasks.build import build_task
 
 GOLDEN = pathlib.Path(__file__).parent / "golden" / "episodes-v1.json"
 TASKS: dict[str, dict[str, Any]] = {
@@ -88,8 +89,8 @@ def test_version_when_environments_are_asked():
 
 @pytest.mark.parametrize(("track", "version"), [(None, TASK_VERSION), ("far", TRACKS_VERSION)])
 def test_version_when_a_result_says_what_it_came_from(track, version):
-    options = EvalOptions("random", track=track)
-    assert provenance(options, RandomAgent, make_task(options)).task_version == version
+    options = EvalOptions.of("random", track=track)
+    assert provenance(options, RandomAgent, build_task(options.task, options.mazes)).task_version == version
 
 
 if __name__ == "__main__":

@@ -53,8 +53,11 @@ class TestArguments:
         assert str(error.value) == message
 
     @pytest.mark.parametrize("maker", MAKERS.values(), ids=MAKERS)
-    def test_numbers_of_numpy_are_accepted(self, maker):
-        maker(seed=np.int64(3), time_limit=np.int32(50), distances=np.arange(1, 4), map_flip=np.float32(0.5))
+    def test_numbers_of_numpy_count_as_those_of_python(self, maker):
+        numbers = {"time_limit": np.int32(50), "distances": np.arange(1, 4), "map_flip": np.float32(0.5)}
+        env = maker(seed=np.int64(3), **numbers)
+        spec = env.task.spec if maker is mazebench.load else env.unwrapped.task_spec
+        assert spec == mazebench.make_spec(time_limit=50, distances=(1, 2, 3), map_flip=0.5)
 
     @pytest.mark.parametrize("make", [Environment, MazeEnv, lambda spec: MazeVectorEnv(spec, 2)])
     @pytest.mark.parametrize(("spec", "found"), [(None, "NoneType"), ("local", "str")])
@@ -88,13 +91,14 @@ class TestReset:
 class TestActions:
     @pytest.mark.parametrize("action", [6, -1, 1.5, "forward", None, np.nan, np.inf, [0, 0], np.zeros((3, 3))])
     @pytest.mark.parametrize("make", [MazeEnv, Environment, lambda spec: MazeVectorEnv(spec, 3)])
-    def test_a_wrong_action_is_refused_in_one_line(self, make, action):
+    def test_a_wrong_action_is_refused_in_one_line_and_the_episode_goes_on(self, make, action):
         env = make(SPEC)
         env.reset(seed=0)
         with pytest.raises(
             InputError, match=r"^expected (an action|3 actions) from 0 to 5[^\n]*, (found|values)[^\n]*$"
         ):
             env.step(action)
+        env.step(np.zeros(3, dtype=int) if isinstance(env, MazeVectorEnv) else 0)
 
     @pytest.mark.parametrize("action", [1, "forward", None, [0, 0], [np.nan, 0, 0], np.zeros((3, 2))])
     @pytest.mark.parametrize("make", [MazeEnv, Environment, lambda spec: MazeVectorEnv(spec, 3)])

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from simple_mazes import corridor
 
+from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations.base import ShownMap
 from mazebench.tasks.perturbations.warp import Perspective
 from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.shown_map import show_map
-from mazebench.tasks.spec import TaskSpec
 
 START, FIRST, SECOND, GOAL, ELSEWHERE = (1, 1), (1, 3), (1, 5), (1, 7), (2, 2)
 
@@ -118,7 +118,7 @@ class TestLandmarks:
         assert self.cells(1, (1, 1), (1, 7), task="local") == [(1, 1), (1, 7)]
 
     def cells(self, every: int, start, goal, task: str = "hierarchical") -> list[tuple[int, int]]:
-        spec = TaskSpec(task=task, mazes=(corridor(),), landmark_distance=every)
+        spec = make_spec(task, maps=corridor(), landmark_distance=every)
         episode = Episode(0, start, goal, 0.0, 0)
         return plan_route(spec, episode, show_map(spec, episode)).cells
 

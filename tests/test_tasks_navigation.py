@@ -327,17 +327,6 @@ class TestSeeds:
         assert len({episode.seed for episode in episodes}) == 3
 
 
-class TestActions:
-    @pytest.mark.parametrize("action", [-1, 6, 2.5])
-    def test_an_action_out_of_range_is_refused_and_the_episode_goes_on(self, action):
-        env = mazebench.load(maps=corridor())
-        expected = play(env, [FORWARD] * 3, episode=eastwards())
-        env.reset(episode=eastwards())
-        with pytest.raises(ValueError, match=r"expected an action from 0 to 5 \(forward, .*, look_right\), found"):
-            env.step(action)
-        assert_equal(expected[1:], [env.step(FORWARD) for _ in range(3)])
-
-
 class TestPhysics:
     def test_the_goals_marker_stands_in_the_goal(self):
         env = mazebench.load(maps=corridor())

@@ -3,6 +3,7 @@
 import contextlib
 import itertools
 import json
+import logging
 import math
 import signal
 import time
@@ -15,13 +16,13 @@ from simple_mazes import field
 
 from mazebench import stopping
 from mazebench.agent import Agent
+from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.build import make_spec
 from mazebench.training import loop
 from mazebench.training.experience import Collector
 from mazebench.training.loop import TrainingError, train
 from mazebench.training.options import TrainOptions
-from mazebench.training.sitting import Status
 from mazebench.training.sources import InProcessSource
 
 
@@ -81,13 +82,13 @@ def test_resume_reports_no_step_twice(tmp_path):
     assert [line["env_steps"] for line in metrics(tmp_path)] == [800, 1600]
 
 
-def test_resume_says_whether_the_run_goes_on_or_is_finished(unbroken, tmp_path):
-    lines: list[Status | str] = []
-    train(tiny_options(env_steps=2400), unbroken, resume=True, report=lines.append)
-    assert lines == [f"{unbroken}: the run is finished, at 2,400 steps"]
+def test_resume_says_whether_the_run_goes_on_or_is_finished(unbroken, tmp_path, caplog):
+    caplog.set_level(logging.INFO, "mazebench.training")
+    train(tiny_options(env_steps=2400), unbroken, resume=True)
+    assert caplog.messages == [f"{unbroken}: the run is finished, at 2,400 steps"]
     train(tiny_options(env_steps=800), tmp_path)
-    train(tiny_options(env_steps=1600), tmp_path, resume=True, report=lines.append)
-    assert f"resuming {tmp_path} at 800 steps" in lines
+    train(tiny_options(env_steps=1600), tmp_path, resume=True)
+    assert f"resuming {tmp_path} at 800 steps" in caplog.messages
 
 
 def test_folder_of_a_run_is_refused_without_resume_and_for_another_config(unbroken):
@@ -123,40 +124,32 @@ def test_options_that_contradict_each_other_are_refused(changes, message):
         tiny_options(**changes)
 
 
-class Stop:
-    """A report that stops a run with SIGTERM at its first status for which `wanted` holds; keeps all it is given."""
+def stopped(options, folder, wanted, resume=False):
+    """Runs a training that is stopped with SIGTERM at its first status for which `wanted` holds."""
+    is_stopped = False
 
-    def __init__(self, wanted):
-        self._wanted = wanted
-        self.given: list[Status | str] = []
-
-    def __call__(self, status):
-        self.given.append(status)
-        if isinstance(status, Status) and self._wanted(status):
-            self._wanted = lambda status: False
+    def stop(status):
+        nonlocal is_stopped
+        if wanted(status) and not is_stopped:
+            is_stopped = True
             with contextlib.suppress(stopping.Terminated):  # as a library may
                 signal.raise_signal(signal.SIGTERM)
 
-
-def stopped(options, folder, wanted, resume=False):
-    """Runs a training to where it is stopped; returns what it reported."""
-    report = Stop(wanted)
     with stopping.listening(), pytest.raises(stopping.Terminated):
-        train(options, folder, resume, report)
-    return report.given
+        train(options, folder, resume, stop)
 
 
 def checkpoints(folder):
     return sorted(int(path.name) for path in (folder / "checkpoints").iterdir())
 
 
-def test_stopped_run_leaves_a_savepoint_and_goes_on_from_it_to_its_next_milestone(unbroken, tmp_path):
+def test_stopped_run_leaves_a_savepoint_and_goes_on_from_it_to_its_next_milestone(unbroken, tmp_path, caplog):
+    caplog.set_level(logging.INFO, "mazebench.training")
     stopped(tiny_options(env_steps=2400), tmp_path, lambda status: status.env_steps == 1208)
     assert checkpoints(tmp_path) == [800, 1208]
     assert metrics(tmp_path) == metrics(unbroken)[:1]
-    lines: list[Status | str] = []
-    train(tiny_options(env_steps=2400), tmp_path, resume=True, report=lines.append)
-    assert f"resuming {tmp_path} at 1,208 steps" in lines
+    train(tiny_options(env_steps=2400), tmp_path, resume=True)
+    assert f"resuming {tmp_path} at 1,208 steps" in caplog.messages
     assert checkpoints(tmp_path) == [1600, 2400]
     assert [line["env_steps"] for line in metrics(tmp_path)] == [800, 1600, 2400]
     assert metrics(tmp_path)[-1]["updates"] == (2400 - 400) // 32
@@ -196,7 +189,7 @@ def test_without_savepoints_a_stopped_run_goes_on_from_its_last_milestone_to_the
 
 
 def test_metrics_have_a_line_every_so_many_steps_with_the_losses_since_the_line_before(unbroken, tmp_path, monkeypatch):
-    monkeypatch.setattr(loop, "_STEPS_BETWEEN_LINES", 400)
+    monkeypatch.setattr(loop, "STEPS_BETWEEN_LINES", 400)
     options = tiny_options(env_steps=2400)
     train(options, tmp_path / "whole")
     lines = metrics(tmp_path / "whole")
@@ -228,19 +221,19 @@ class Faltering(InProcessSource):
 
 def test_a_step_is_saved_once_if_no_experience_came_since(tmp_path, monkeypatch):
     open_source = lambda options, task, learner: Faltering(task, learner.actor, learner.num_envs)  # noqa: E731
-    monkeypatch.setattr(loop, "_open_source", open_source)
+    monkeypatch.setattr(loop, "open_source", open_source)
     train(tiny_options(env_steps=40, checkpoint_minutes=1e-9), tmp_path)
     assert checkpoints(tmp_path) == [0, 40]
 
 
 def test_second_signal_ends_the_run_without_a_savepoint(tmp_path):
-    def report(status):
-        if isinstance(status, Status) and status.env_steps == 1208:
+    def stop_twice(status):
+        if status.env_steps == 1208:
             signal.raise_signal(signal.SIGTERM)
             signal.raise_signal(signal.SIGTERM)
 
     with stopping.listening(), pytest.raises(stopping.Terminated):
-        train(tiny_options(env_steps=2400), tmp_path, report=report)
+        train(tiny_options(env_steps=2400), tmp_path, progress=stop_twice)
     assert checkpoints(tmp_path) == [0, 800]
 
 
@@ -273,7 +266,7 @@ def test_minutes_limit_a_sitting(tmp_path):
 
 def test_collector_gives_trajectories_that_hang_together():
     """Each next state follows the one before it, and cells, legs and ends are those of the environments."""
-    spec = TaskSpec(mazes=(field(7),), distances=(1, 2), time_limit=10, num_goals=3)
+    spec = make_spec(maps=field(7), distances=(1, 2), time_limit=10, num_goals=3)
     collector = Collector(spec, 4, seed=1)
     rng = np.random.default_rng(0)
     steps = [collector.step(rng.integers(6, size=4)) for _ in range(80)]
@@ -304,9 +297,12 @@ class Rolling(Agent):
 
 def roll(seed):
     """The inputs of 40 steps in four environments, the steps, and the seeds of the environments' first episodes."""
-    spec = TaskSpec(mazes=(field(7),), distances=(1, 2), time_limit=6, num_goals=3)
+    spec = make_spec(maps=field(7), distances=(1, 2), time_limit=6, num_goals=3)
     collector, state, steps = Collector(spec, 4, seed=seed), [], []
-    first = [episode.seed for episode in collector._env.episodes]
+    env = MazeVectorEnv(spec, 4)  # the same environments, to look at their episodes
+    observation, _ = env.reset(seed=np.random.SeedSequence(seed).generate_state(4).tolist())
+    np.testing.assert_array_equal(observation["state"], collector.inputs.observation["state"])
+    first = [episode.seed for episode in env.episodes]
     for _ in range(40):
         step, state = collector.play(Rolling(), state)
         steps.append(step)

@@ -123,7 +123,7 @@ def test_a_line_of_a_milestone_is_printed_at_once_and_puts_off_the_next_status(c
     clock = Clock()
     lines = StatusLines(clock)
     clock.now += 19
-    lines("200,000 steps")
+    lines.say("200,000 steps")
     clock.now += 19
     lines(Status(**STATUS))
     assert capsys.readouterr().out == "200,000 steps\n"

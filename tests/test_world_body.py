@@ -6,6 +6,7 @@ import mujoco
 import mujoco.batch
 import numpy as np
 import pytest
+from simple_mazes import clearance
 
 from mazebench.constants import ACTIONS, STEPS_PER_ACTION
 from mazebench.maps.generators import generate
@@ -61,19 +62,6 @@ def trajectory(simulation: MujocoSimulation, action: str | None, num_steps: int,
         simulation.step(nstep)
         rows.append(np.r_[simulation.data.qpos, simulation.data.qvel])
     return np.array(rows)
-
-
-def depth(walls: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """`[K]` m: how far discs at `[K, 2]` points reach into the nearest wall; negative where they are clear of it."""
-    cells = point_to_cell(points, len(walls))
-    nearest = np.full(len(points), np.inf)
-    for down in (-1, 0, 1):
-        for right in (-1, 0, 1):
-            row, column = np.clip(cells + np.array([down, right]), 0, len(walls) - 1).T
-            centre = np.stack([column + 0.5, len(walls) - row - 0.5], axis=-1)
-            distance = np.hypot(*np.maximum(np.abs(points - centre) - 0.5, 0).T)
-            nearest = np.where(walls[row, column], np.minimum(nearest, distance), nearest)
-    return BODY_RADIUS - nearest
 
 
 class TestDriving:
@@ -195,7 +183,7 @@ class TestWalls:
             ctrl[:] = action_controls()[ACTIONS.index(action)]
             for _ in range(150):
                 batch.step(None, nstep=1)
-                assert depth(maze.walls, qpos[:, :2]).max() <= 0.01
+                assert clearance(maze.walls, qpos[:, :2]).min() >= BODY_RADIUS - 0.01
 
     @pytest.mark.parametrize(("style", "size"), [("dfs", 13), ("rooms", 15), ("obstacles", 11)])
     def test_body_when_acting_at_random_for_thousands_of_steps(self, style, size):
@@ -228,9 +216,8 @@ class TestWalls:
             assert points.max() < size
             row, column = point_to_cell(points, size).T
             assert not maze.walls[row, column].any()
-            depths = depth(maze.walls, points)
-            assert depths.max() <= 0.01
-            assert (depths > -0.1).any()  # walls were met
+            nearest = clearance(maze.walls, points).min()
+            assert BODY_RADIUS - 0.01 <= nearest < BODY_RADIUS + 0.1  # walls were met
 
 
 class TestFixedFreedoms:

@@ -1,0 +1,22 @@
+"""The diffs of docs/extend.md: each one fits the code as it is."""
+
+from __future__ import annotations
+
+import pathlib
+import re
+import subprocess
+
+import pytest
+
+ROOT = pathlib.Path(__file__).parent.parent
+DIFFS = re.findall(r"```diff\n(.*?)```", (ROOT / "docs" / "extend.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+def test_the_page_shows_a_kind_of_mazes_a_sensor_a_track_and_an_agent():
+    assert len(DIFFS) == 4
+
+
+@pytest.mark.parametrize("diff", DIFFS, ids=["mazes", "sensor", "track", "agent"])
+def test_a_diff_applies(diff):
+    run = subprocess.run(["git", "apply", "--check"], input=diff, text=True, cwd=ROOT, capture_output=True)
+    assert run.returncode == 0, run.stderr
