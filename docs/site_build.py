@@ -1,8 +1,10 @@
-"""What the site needs beside mkdocs.yml: fields explained by their comments, and intervals that stay on one line."""
+"""What the site needs beside mkdocs.yml: fields explained by comments or `Doc`, intervals that stay on one line."""
 
 from __future__ import annotations
 
+import ast
 import re
+import textwrap
 
 import griffe
 
@@ -17,20 +19,20 @@ def on_page_content(html: str, **kwargs) -> str:
 
 
 class FieldComments(griffe.Extension):
-    """Lists the comments behind fields and constants in the docstring of their class or module, as "Attributes"."""
+    """Lists what is said of fields and constants in the docstring of their class or module, as "Attributes"."""
 
     def on_class_members(self, *, cls: griffe.Class, **kwargs) -> None:
         """Called when a class has been read."""
-        _list_comments(cls)
+        _list_attributes(cls)
 
     def on_module_members(self, *, mod: griffe.Module, **kwargs) -> None:
         """Called when a module has been read."""
-        _list_comments(mod)
+        _list_attributes(mod)
 
 
-def _list_comments(owner: griffe.Class | griffe.Module) -> None:
+def _list_attributes(owner: griffe.Class | griffe.Module) -> None:
     own = [each for each in owner.attributes.values() if not each.is_alias and not each.name.startswith("_")]
-    lines = [f"  {each.name}: {comment}" for each in own if (comment := _comment(each))]
+    lines = [f"  {each.name}: {text}" for each in own if (text := _comment(each) or _documentation(each))]
     if lines and owner.docstring:
         owner.docstring.value += "\n\nAttributes:\n" + "\n".join(lines)
 
@@ -41,3 +43,14 @@ def _comment(attribute: griffe.Attribute) -> str | None:
     found = _COMMENT.search(attribute.lines_collection[attribute.filepath][attribute.endlineno - 1])
     # A shape in brackets would read as the text of a link.
     return _SHAPE.sub(lambda shape: f"`{shape[0]}`", found[1]) if found else None
+
+
+def _documentation(attribute: griffe.Attribute) -> str | None:
+    """Returns the text of the `Doc` in the annotation of an option."""
+    if "Doc(" not in str(attribute.annotation):
+        return None
+    for node in ast.walk(ast.parse(textwrap.dedent("\n".join(attribute.lines)))):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Doc":
+            parts = getattr(node.args[0], "values", [node.args[0]])  # of an f-string
+            return "".join(part.value if isinstance(part, ast.Constant) else "..." for part in parts)
+    return None
