@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+import contextlib
+import sys
+import warnings
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import pydantic
@@ -31,6 +34,32 @@ class Remark(UserWarning):
     def __init__(self, message: str):
         """Escapes what does not print in `message`, such as line ends in names of files."""
         super().__init__(one_line(message))
+
+
+def remark(line: str) -> None:
+    """Warns of something with a `Remark`, at the line of the user's code that led here."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in ("mazebench", "mazebench_agents"):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(line, Remark, stacklevel=level)
+
+
+@contextlib.contextmanager
+def held_remarks() -> Iterator[list[str]]:
+    """Gathers the remarks of the block in a list, and shows none of them; other warnings are shown as ever."""
+    lines: list[str] = []
+    with warnings.catch_warnings():
+        show = warnings.showwarning
+
+        def hold(message: Warning | str, category: type[Warning], *where: Any, **source: Any) -> None:
+            if issubclass(category, Remark):
+                lines.append(str(message))
+            else:
+                show(message, category, *where, **source)
+
+        warnings.simplefilter("always", Remark)
+        warnings.showwarning = hold
+        yield lines
 
 
 def one_line(text: str) -> str:

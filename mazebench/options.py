@@ -88,7 +88,9 @@ def options(cls: type[Options]) -> type[Options]:
 
     @functools.wraps(check)
     def __init__(self: Any, *args: Any, **values: Any) -> None:
-        values = {name: _plain(value, fields[name]) if name in fields else value for name, value in values.items()}
+        for name in values:
+            is_tuple = name in fields and isinstance(fields[name].default, tuple)
+            values[name] = _plain_tuple(values[name]) if is_tuple else _plain(values[name])
         try:
             check(self, *args, **values)
         except pydantic.ValidationError as error:
@@ -192,17 +194,17 @@ def _metadata(kind: Any) -> Iterable[Any]:
         yield from _metadata(typing.get_args(kind)[0])
 
 
-def _plain(value: Any, field: dataclasses.Field[Any]) -> Any:
-    """Returns NumPy's numbers as Python's, a path as text, and any iterable as a tuple where the field is one."""
-    if isinstance(field.default, tuple):
-        items = value if isinstance(value, Iterable) and not isinstance(value, str) else (value,)
-        return tuple(_plain(item, _NO_FIELD) for item in items)
+def _plain(value: Any) -> Any:
+    """Returns NumPy's numbers as Python's, and a path as text."""
     if isinstance(value, np.generic):
         return value.item()
     return os.fspath(value) if isinstance(value, os.PathLike) else value
 
 
-_NO_FIELD: dataclasses.Field[Any] = dataclasses.field()
+def _plain_tuple(value: Any) -> tuple[Any, ...]:
+    """Returns any iterable as a tuple, and a single value as a tuple of one."""
+    is_single = isinstance(value, str) or not isinstance(value, Iterable)
+    return tuple(map(_plain, (value,) if is_single else value))
 
 
 def _in_words(options_class: type, error: pydantic.ValidationError, values: Mapping[str, Any]) -> InputError:
@@ -221,6 +223,8 @@ def _in_words(options_class: type, error: pydantic.ValidationError, values: Mapp
         return InputError(f"expected {name} as options, found {found!r}"[:200])
     if fault["type"] == "one_of":
         return unknown(name, found, option.choices or ())
-    if fault["type"] in ("greater_than_equal", "less_than_equal", "finite_number") and option.range_text:
+    if fault["type"] == "finite_number" and not (option.lowest is not None and option.highest is not None):
+        return InputError(f"expected {name} as a finite number, found {found!r}")
+    if fault["type"] in ("greater_than_equal", "less_than_equal", "finite_number"):
         return InputError(f"expected {name} {option.range_text}, found {found!r}")
     return InputError(f"expected {name} of type {option.kind_text}, found {values.get(name, found)!r}"[:200])

@@ -36,7 +36,7 @@ def test_every_number_of_a_config_has_a_range(config):
         (DQNConfig, {"hidden": "many"}, "config key 'hidden': expected int, found 'many'"),
         (DQNConfig, {"symmetries": "perhaps"}, "config key 'symmetries': expected bool"),
         (DQNConfig, {"num_envs": "0"}, "config: expected num_envs from 1 to 65536, found 0"),
-        (DQNConfig, {"learning_rate": "nan"}, "config: expected learning_rate of at least 0, found nan"),
+        (DQNConfig, {"learning_rate": "nan"}, "config: expected learning_rate as a finite number, found nan"),
         (DQNConfig, {"replay_capacity": "1000"}, "expected a replay_capacity of at least min_rows 20000"),
         (MMNConfig, {"search": "alpha"}, "config: unknown search 'alpha'; available: gumbel, puct"),
         (MMNConfig, {"num_distances": "2"}, "unknown config key 'num_distances'"),

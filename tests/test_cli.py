@@ -181,6 +181,10 @@ BAD_INPUT = [
     (("render", "--out", "x.png", "--pixels", "10"), "Invalid value for '--pixels'"),
     (("render", "--out", "{bad}/file/x.png", "--view", "map"), "file/x.png: can't write"),
     (("play", "--terminal"), "expected a terminal to play on, found a file or a pipe"),
+    (
+        ("play", "--terminal", "--track", "lost", "--level", "1-3"),
+        "expected a terminal to play on, found a file or a pipe",
+    ),
     (("bench", "--fast"), "No such option: --fast"),
     # options that another one leaves without effect
     *(

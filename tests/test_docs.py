@@ -23,7 +23,7 @@ from mazebench.maps.readers.ros import write_ros_map
 from mazebench.maps.text import write_text_maze
 
 EVERY_PAGE = pytest.mark.parametrize("page", PAGES, ids=name_of)
-LANGUAGES = {"python", "sh", "text", "toml", "json", "yaml", "bibtex"}
+LANGUAGES = {"python", "sh", "text", "toml", "json", "yaml", "bibtex", "diff"}
 COMMANDS = typer.main.get_command(cli.app).commands
 # Quick, and without a checkpoint.
 PLAIN_AGENTS = {"random", "planner", "planner-closed-loop"}

@@ -327,7 +327,7 @@ class TestRefused:
     @pytest.mark.parametrize(
         ("options", "message"),
         [
-            ({"pairs": "fixed"}, "unknown option 'pairs'; available: camera_size, "),
+            ({"pairs": "fixed"}, "expected pairs 'random' in an evaluation, found 'fixed'"),
             ({"speed": 2}, "unknown option 'speed'; available: .*distances.*map_flip"),
             ({"num_envs": 0}, "expected num_envs of at least 1, found 0"),
             ({"num_envs": "3"}, "expected num_envs of type int, found '3'"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from faults import descendants, is_running, num_bytes, start, wait_until, workers_of
+from faults import descendants, num_bytes, start, wait_for_ends, wait_until, workers_of
 from faults import nothing_left as nothing_left  # a fixture
 from run_folders import IMPORTS, records_of, results_of
 
@@ -92,5 +92,5 @@ def test_workers_end_when_their_parent_is_killed(tmp_path):
     children = descendants(process.pid)
     assert len(workers_of(process)) == 2
     process.kill()
-    wait_until(lambda: not any(map(is_running, children)))
+    wait_for_ends(children)
     assert "Traceback" not in process.communicate()[1]

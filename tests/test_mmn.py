@@ -114,6 +114,9 @@ def test_weights_are_copied_for_kernels_only_after_training_has_changed_them():
         before = weights_of(network)
         parameter.add_(0.5)
         assert weights_of(network) is not before
+        before = weights_of(network)
+        parameter.data.mul_(2.0)  # which PyTorch does not count as a new version
+        assert weights_of(network) is not before
     network.load_state_dict(other.state_dict())
     for found, expected in zip(weights_of(network).heads, first.heads, strict=True):
         np.testing.assert_array_equal(found, expected)

@@ -119,3 +119,12 @@ def test_a_body_comes_to_rest_ahead_of_where_it_drives():
 @pytest.mark.parametrize(("point", "cell"), [((0.5, 0.5), (4, 0)), ((4.9, 4.1), (0, 4)), ((-3.0, 9.0), (0, 0))])
 def test_nearest_cell(point, cell):
     assert nearest_cell(*point, size=5) == cell
+
+
+def test_costs_that_are_no_numbers_write_nowhere_else():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        end = rng.random((5, 5))
+        end[rng.random((5, 5)) < 0.3] = np.nan
+        ways = cheapest_ways.py_func(rng.random((5, 5)), rng.random((5, 5)), end)
+        assert ways.order.shape == (25,)

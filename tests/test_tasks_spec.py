@@ -102,6 +102,7 @@ class TestOptions:
             ({"size": 13}, r"expected mazes of size 13, found size 9"),
             ({"maps": ()}, r"expected at least one maze, found none"),
             ({"maps": (CORRIDOR, CUT_CORNERS)}, r"expected mazes of one size, found 7, 9"),
+            ({"distances": ()}, r"expected at least one distance, found none"),
             ({"distances": (0, 1)}, r"expected distances of at least 1, found 0"),
             ({"time_limit": -1}, r"expected time_limit of at least 0, found -1"),
             ({"time_limit": "5"}, r"expected time_limit of type int, found '5'"),
@@ -270,3 +271,16 @@ class TestSeveralGoals:
         route.advance((1, 4), 5)
         assert route.start == (1, 4)
         assert route.target in {(1, 1), (1, 7)}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"context_size": 7}, "track 'stale': expected context_size 13, found 7"),
+        ({"sensors": ()}, "track 'stale': expected the sensor lidar, found none"),
+        ({"pairs": "fixed"}, "track 'stale': expected pairs 'random', found 'fixed'"),
+    ],
+)
+def test_a_task_of_a_track_holds_what_the_track_fixes(changes, message):
+    with pytest.raises(InputError, match=message):
+        dataclasses.replace(make_spec("stale"), **changes)

@@ -77,6 +77,20 @@ def test_the_user_chooses_before_the_learner_does(tmp_path):
     assert (task["distances"], task["num_goals"], task["time_limit"]) == ([3, 4], 2, 50)
 
 
+class Misspelled(MAH):
+    """Wants what no task has."""
+
+    @classmethod
+    def task_options(cls, overrides=None):
+        return {"num_goal": 4}
+
+
+def test_a_learner_that_wants_an_unknown_option_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"unknown option of the learner's task 'num_goal'; available: .*num_goals"):
+        train(tiny_options(agent=f"{__name__}:Misspelled"), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -15,15 +15,12 @@ import multiprocessing
 import os
 import pathlib
 import sys
-import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import numba
 import numpy as np
 from numba.core.event import Listener, register
-
-from mazebench.errors import Remark
 
 
 class _Announcement(Listener):
@@ -33,10 +30,9 @@ class _Announcement(Listener):
 
     def on_start(self, event):
         if self.is_due:
-            warnings.warn(
-                "compiling the agent's kernels, which numba's cache lacks; this takes some seconds",
-                Remark,
-                stacklevel=2,
+            print(
+                "mazebench: compiling the agent's kernels, which numba's cache lacks; this takes some seconds",
+                file=sys.stderr,
             )
         self.is_due = False
 

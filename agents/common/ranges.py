@@ -6,7 +6,7 @@ from typing import Annotated
 
 from annotated_types import Ge, Interval
 
-Size = Annotated[int, Interval(ge=1, le=8192)]  # numbers of a layer or of a code
+Size = Annotated[int, Interval(ge=1, le=4096)]  # numbers of a layer or of a code
 Count = Annotated[int, Interval(ge=1, le=65_536)]  # of what is computed or played side by side
 Steps = Annotated[int, Interval(ge=1, le=1_000_000)]  # of the environment
 Length = Annotated[int, Interval(ge=1, le=1000)]  # steps of a sequence, or of a return

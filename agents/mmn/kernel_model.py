@@ -85,8 +85,8 @@ class Model(NamedTuple):
     num_roots: int  # of each context
 
 
-# The weights of each network, and the versions of the parameters that they were copied from.
-_copied: WeakKeyDictionary[MMNNetwork, tuple[list[tuple[int, int]], Weights]] = WeakKeyDictionary()
+# The weights of each network, and copies of the parameters that they were made of.
+_copied: WeakKeyDictionary[MMNNetwork, tuple[list[np.ndarray], Weights]] = WeakKeyDictionary()
 
 
 def kernel_model(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple[Root, KernelModel]:
@@ -105,12 +105,12 @@ def kernel_model(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple
 
 
 def weights_of(network: MMNNetwork) -> Weights:
-    """Returns the weights of a network as they are now; they are copied only after training has changed them."""
+    """Returns the weights of a network as they are now; they are transposed only where a parameter has changed."""
     sharpness = network.hypermodel.sharpness
     parameters = (network.scale, sharpness, *network.body.parameters(), *network.heads.parameters())
-    versions = [(parameter.data_ptr(), parameter._version) for parameter in parameters]
+    values = [parameter.detach().numpy() for parameter in parameters]
     copied = _copied.get(network)
-    if copied is None or copied[0] != versions:
+    if copied is None or not all(map(np.array_equal, copied[0], values)):
         body = linear_of(network.body[0]), linear_of(network.body[2])
         weights = Weights(
             scale=network.scale.detach().numpy().copy(),
@@ -119,7 +119,7 @@ def weights_of(network: MMNNetwork) -> Weights:
             body=body,
             heads=linear_of(network.heads),
         )
-        _copied[network] = copied = versions, weights
+        _copied[network] = copied = [value.copy() for value in values], weights
     return copied[1]
 
 

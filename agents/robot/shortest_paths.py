@@ -42,7 +42,7 @@ def cheapest_ways(entering: np.ndarray, leaving: np.ndarray, end: np.ndarray) ->
     # The search begins at the ends. What is popped is settled, so that cells come from near to far.
     queue = [(least[cell // size, cell % size], cell) for cell in range(size * size)]
     heapq.heapify(queue)
-    while queue:
+    while queue and num_done < size * size:  # costs that are no numbers would be popped again and again
         near, cell = heapq.heappop(queue)
         row, column = cell // size, cell % size
         if near > least[row, column]:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import sys
-import warnings
 from typing import Annotated
 
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.errors import Remark
+from mazebench.errors import remark
 from mazebench.world.backend import RenderingError
 
 
@@ -22,7 +21,7 @@ def bench(
     try:
         load_mujoco(renders=True)
     except RenderingError as error:
-        warnings.warn(f"{error}; pictures are not measured", Remark, stacklevel=2)
+        remark(f"{error}; pictures are not measured")
         load_mujoco(renders=False)
     from mazebench.bench import measure
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import pathlib
-import warnings
 from typing import Annotated
 
 import typer
 
-from mazebench.errors import Remark
+from mazebench.errors import remark
 
 
 def compare(
@@ -33,7 +32,7 @@ def compare(
 
     found = comparison.compare_folders(a, b)
     for line in found.notes:
-        warnings.warn(line, Remark, stacklevel=2)
+        remark(line)
     if as_json:
         print(json.dumps(comparison.to_json(found), indent=1))
         return

@@ -22,7 +22,7 @@ from mazebench.options import options_of
 _OF_ONE_EVALUATION = tuple(name for name in options_of(EvalOptions) if name not in ("checkpoint", "seed"))
 
 
-@takes_options(EvalOptions, RunOptions)
+@takes_options(RunOptions, EvalOptions)
 def evaluate(
     context: typer.Context,
     agents: Annotated[

@@ -7,15 +7,15 @@ import enum
 import functools
 import inspect
 import typing
-import warnings
 from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any, TypeVar
 
 import typer
 
-from mazebench.errors import InputError, Remark
-from mazebench.evaluation.options import EvalOptions
+from mazebench.errors import InputError, held_remarks
+from mazebench.maps.options import MazeOptions
 from mazebench.options import Option, from_names, options_of
+from mazebench.tasks.options import TaskOptions
 
 Chosen = TypeVar("Chosen")
 
@@ -107,25 +107,23 @@ def refuse_ignored_by_task(context: typer.Context, values: dict[str, Any]) -> No
     )
 
 
-def watched(options: EvalOptions) -> EvalOptions:
-    """Returns options of an episode that is to be looked at, of 10 cells or near to that if no distance is chosen.
+def watched(task: TaskOptions, mazes: MazeOptions) -> TaskOptions:
+    """Returns the task of an episode that is to be looked at, of 10 cells or near to that if no distance is chosen.
 
     Raises:
       InputError: if the options name no task.
     """
-    task = options.task
     if task.distances or task.ends_given == 2 or task.track is not None or task.task == "hierarchical":
-        return options
+        return task
     distances: tuple[int, ...] = (_WORTH_WATCHING,)
-    if options.is_own:
+    if mazes.maps is not None or task.ends_given:
         from mazebench.tasks.build import build_task
         from mazebench.tasks.options import EVAL_DISTANCES
 
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Remark)  # the command reads the maps again
-            distances = build_task(task, options.mazes, default_distances=EVAL_DISTANCES).distances
+        with held_remarks():  # the command reads the maps again
+            distances = build_task(task, mazes, default_distances=EVAL_DISTANCES).distances
     nearest = min(distances, key=lambda distance: abs(distance - _WORTH_WATCHING))
-    return dataclasses.replace(options, task=dataclasses.replace(task, distances=(nearest,)))
+    return dataclasses.replace(task, distances=(nearest,))
 
 
 def parse_numbers(name: str, text: str) -> tuple[int, ...]:

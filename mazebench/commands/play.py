@@ -10,6 +10,8 @@ from mazebench.commands.display import load_mujoco
 from mazebench.commands.options import chosen, refuse_ignored_by_task, takes_options, watched
 from mazebench.errors import InputError
 from mazebench.evaluation.options import EvalOptions
+from mazebench.maps.options import MazeOptions
+from mazebench.tasks.options import TaskOptions
 from mazebench.world.backend import has_display
 
 
@@ -24,16 +26,17 @@ def play(
 ) -> None:
     """Drive yourself, with the keyboard: in MuJoCo's viewer, or without a display in the terminal."""
     refuse_ignored_by_task(context, values)
-    options = watched(chosen(EvalOptions, values, agent="you"))
+    mazes = chosen(MazeOptions, values)
+    task = watched(chosen(TaskOptions, values), mazes)
     in_window = has_display() and not terminal
     load_mujoco(renders=in_window)
     from mazebench.play.game import LIDAR, Game
     from mazebench.tasks.build import build_task
 
-    for sensor in options.task.sensors:
+    for sensor in task.sensors:
         if sensor != LIDAR:
             raise InputError(f"expected sensors {LIDAR} or none, found {sensor}, which is not shown while you drive")
-    game = Game(build_task(options.task, options.mazes), seed)
+    game = Game(build_task(task, mazes), seed)
     if in_window:
         from mazebench.play import viewer as screen
     else:

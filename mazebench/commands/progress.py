@@ -112,13 +112,15 @@ def training() -> Iterator[Progress]:
 def _logged(name: str, say: Callable[[str], None]) -> Iterator[None]:
     """Gives `say` what the logger called `name` logs in the block; warnings go to standard error."""
     logger, handler = logging.getLogger(name), _Lines(say)
-    level = logger.level
+    level, propagates = logger.level, logger.propagate
     logger.setLevel(logging.INFO)
+    logger.propagate = False  # an agent's module may have configured the root logger
     logger.addHandler(handler)
     try:
         yield
     finally:
         logger.removeHandler(handler)
+        logger.propagate = propagates
         logger.setLevel(level)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pathlib
 from typing import Annotated, Any
 
@@ -31,7 +32,8 @@ def render(
 ) -> None:
     """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
     refuse_ignored_by_task(context, values)
-    options = watched(chosen(EvalOptions, values, agent=agent))
+    options = chosen(EvalOptions, values, agent=agent)
+    options = dataclasses.replace(options, task=watched(options.task, options.mazes))
     load_mujoco(renders=view not in _DRAWN)
     from mazebench.play import film
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import pathlib
-import warnings
 from typing import Annotated
 
 import typer
 
 from mazebench import stopping
-from mazebench.errors import InputError, Remark
+from mazebench.errors import InputError, remark
 
 
 def report(
@@ -46,11 +45,7 @@ def report(
             print(f"{counted(len(drawn), 'training run')}: {out / DOCUMENT}")
             return
         if runs:
-            warnings.warn(
-                f"{counted(len(runs), 'training run')} left out beside results; report them by themselves",
-                Remark,
-                stacklevel=2,
-            )
+            remark(f"{counted(len(runs), 'training run')} left out beside results; report them by themselves")
         reported = write_report(results, out, names)
     agents = sorted({result.label for result in reported})
     print(f"{counted(len(reported), 'result')} of {', '.join(agents)}: {out / PAGE}, {out / DOCUMENT}")

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 import pathlib
 import tempfile
-import warnings
 from collections.abc import Callable
 from typing import Any
 
 from mazebench import stopping
 from mazebench.agent import Agent, SingleAgent
 from mazebench.agent_loading import checked_agent_class, load_agent_class
-from mazebench.errors import InputError, Remark
+from mazebench.errors import InputError, remark
 from mazebench.evaluation.chunk import Chunk
 from mazebench.evaluation.options import NUM_ENVS, EvalOptions, RunOptions
 from mazebench.evaluation.plan import Plan, make_plan
@@ -91,7 +90,7 @@ def run_evaluation(
     """
     plan = make_plan(options, agent_class)
     if plan.remark:
-        warnings.warn(plan.remark, Remark, stacklevel=2)
+        remark(plan.remark)
     with open_pool(run) as pool, tempfile.TemporaryDirectory() as temporary:
         return run_plan(plan, pathlib.Path(temporary if out is None else out), pool, run, progress)
 

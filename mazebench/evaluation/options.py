@@ -11,8 +11,8 @@ from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import TRACKS_VERSION, VERSION
 from mazebench.maps.options import MazeOptions
-from mazebench.options import Doc, from_names, options
-from mazebench.tasks.options import TaskOptions
+from mazebench.options import Doc, fields_of, from_names, options
+from mazebench.tasks.options import TaskOptions, Variants
 from mazebench.tasks.tracks import TRACKS
 
 NUM_ENVS = 256  # environments side by side in a process, unless another number is asked for
@@ -41,9 +41,14 @@ class EvalOptions:
     def of(cls, agent: str, **values: Any) -> EvalOptions:
         """Returns the options of an agent's evaluation; `values` are those of the task, the mazes and these, by name.
 
+        They may include what evaluations don't vary, as the provenance of a summary does.
+
         Raises:
           InputError: if a name is unknown or a value is not allowed.
         """
+        for name, option in fields_of(Variants).items():
+            if (found := values.pop(name, option.default)) != option.default:
+                raise InputError(f"expected {name} {option.default!r} in an evaluation, found {found!r}")
         return from_names(cls, values, agent=agent)
 
     def __post_init__(self) -> None:

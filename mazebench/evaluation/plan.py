@@ -6,12 +6,11 @@ import dataclasses
 import functools
 import hashlib
 import pathlib
-import warnings
 from typing import Any
 
 from mazebench.agent import Agent, Interface
 from mazebench.agent_loading import load_agent_class
-from mazebench.errors import InputError, Remark, RunError, UnplayableError
+from mazebench.errors import InputError, RunError, UnplayableError, held_remarks
 from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of, only_context_size
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.provenance import provenance
@@ -180,8 +179,7 @@ def _square(side: int) -> str:
 @functools.lru_cache(maxsize=1)
 def _make_plan_once(options: EvalOptions) -> Plan:
     """Returns the plan of `options`, the same one for all chunks of an evaluation that a process runs."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Remark)  # the process that made the plan first has shown them
+    with held_remarks():  # the process that made the plan first has shown them
         return make_plan(options)
 
 

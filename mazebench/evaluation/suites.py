@@ -8,12 +8,11 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import pathlib
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
 from mazebench.agent import Interface
-from mazebench.errors import InputError, Remark, RunError, UnplayableError, unknown
+from mazebench.errors import InputError, RunError, UnplayableError, remark, unknown
 from mazebench.evaluation.evaluate import Progress, run_plan
 from mazebench.evaluation.options import EvalOptions, RunOptions
 from mazebench.evaluation.plan import Plan, make_plan
@@ -152,7 +151,7 @@ def _playable(plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str)
         reason = next(iter(reasons.values()))
         if len(reasons) == sum(each == folder for each, _ in plans):
             raise UnplayableError(f"{reason}; it can play no part of the suite {suite!r}")
-        warnings.warn(f"{reason}; left out: {', '.join(reasons)}", Remark, stacklevel=3)
+        remark(f"{reason}; left out: {', '.join(reasons)}")
     return {(folder, part): plan for (folder, part), plan in plans.items() if part not in left_out.get(folder, {})}
 
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import pathlib
-import warnings
 from typing import Any
 
 import numpy as np
 
-from mazebench.errors import InputError, Remark
+from mazebench.errors import InputError, held_remarks, remark
 from mazebench.maps.maze import Maze, resized
 from mazebench.maps.options import OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions
 from mazebench.maps.readers.arrays import read_array_maze
@@ -69,14 +68,12 @@ def read_all(path: pathlib.Path, options: MapOptions) -> tuple[Maze, ...]:
         return (read_located(files[0], None, options).maze,)
     mazes, remarks = [], []
     for file in files:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", Remark)
+        with held_remarks() as lines:
             mazes.append(read_located(file, None, options).maze)
-        of_file = [str(warning.message) for warning in caught if issubclass(warning.category, Remark)]
-        remarks.extend(of_file[:1])
+        remarks.extend(lines[:1])
     if remarks:
         line = f"{len(remarks)} of {len(mazes)} maps have remarks, such as {remarks[0]}"
-        warnings.warn(line, Remark, stacklevel=2)
+        remark(line)
     return tuple(mazes)
 
 
@@ -117,7 +114,7 @@ def _remark_on_thin_walls(maze: Maze) -> None:
             f"{maze.name}: read as {columns} m wide and {rows} m high, with a cell of 1 m for the width of a wall; "
             "if it is a floor plan, --pixel-size sets its scale"
         )
-        warnings.warn(line, Remark, stacklevel=2)
+        remark(line)
 
 
 def _map_files(folder: pathlib.Path) -> list[pathlib.Path]:

@@ -5,12 +5,10 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 from scipy import ndimage
 
-from mazebench.errors import Remark
+from mazebench.errors import remark
 from mazebench.maps.maze import Maze, require_closed_border
 
 
@@ -29,7 +27,7 @@ def square_maze(walls: np.ndarray, name: str, cell_size: float = 1.0) -> Maze:
     rows, columns = walls.shape
     where = "on the right" if rows > columns else "at the bottom"
     line = f"{name}: {rows} x {columns} cells, padded with wall {where} to {maze.size} x {maze.size}"
-    warnings.warn(line, Remark, stacklevel=2)
+    remark(line)
     return maze
 
 

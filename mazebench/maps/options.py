@@ -79,7 +79,6 @@ class MapOptions:
 OCCUPANCY_OPTIONS = ("unknown", "inflate")
 PICTURE_OPTIONS = ("walls", "pixel_size")
 MAP_OPTIONS = tuple(fields_of(MapOptions))
-NO_OPTIONS = MapOptions()
 THIN_WALLS = "a floor plan with thin walls needs --pixel-size, its metres a pixel"  # of plans that can't be read
 
 Size = Annotated[

@@ -5,11 +5,10 @@ from __future__ import annotations
 import dataclasses
 import os
 import pathlib
-import warnings
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from mazebench.errors import InputError, Remark
+from mazebench.errors import InputError, remark
 from mazebench.report.document import DOCUMENT, FIGURES, Picture, show_picture
 from mazebench.report.figures.draw import draw_figure
 from mazebench.report.figures.figure import Figure, Panel, Point, Series
@@ -96,10 +95,10 @@ def _read(folder: pathlib.Path, name: str) -> Run | None:
         config = read_json(folder / CONFIG)
         lines = tuple(filter(None, map(_parse, read_lines(folder / METRICS))))
     except InputError as error:
-        warnings.warn(f"{error}; skipped", Remark, stacklevel=2)
+        remark(f"{error}; skipped")
         return None
     if not lines or not isinstance(config, dict):
-        warnings.warn(f"{folder}: expected a training run with metrics, found none yet; skipped", Remark, stacklevel=2)
+        remark(f"{folder}: expected a training run with metrics, found none yet; skipped")
         return None
     return Run(name, config, lines)
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import pathlib
-import warnings
 from collections.abc import Iterator, Sequence
 
-from mazebench.errors import InputError, Remark
+from mazebench.errors import InputError, held_remarks, remark
 from mazebench.report.document import DOCUMENT, FIGURES, PAGE, Picture, build_document
 from mazebench.report.figures.describe import describe_distributions, describe_several_tables, describe_table
 from mazebench.report.figures.draw import draw_figure
@@ -84,17 +83,14 @@ def write_report(
 
 @contextlib.contextmanager
 def _noting_remarks() -> Iterator[list[str]]:
-    """Yields a list that holds the remarks of the block once it has ended; then all its warnings are shown."""
+    """Gathers the remarks of the block in a list, and shows them when it has ended."""
     notes: list[str] = []
-    caught: list[warnings.WarningMessage] = []
     try:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", Remark)
+        with held_remarks() as notes:
             yield notes
     finally:
-        notes += [str(warning.message) for warning in caught if issubclass(warning.category, Remark)]
-        for warning in caught:
-            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+        for note in notes:
+            remark(note)
 
 
 def _rank(label: str) -> tuple[int, str]:

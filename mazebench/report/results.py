@@ -5,13 +5,12 @@ from __future__ import annotations
 import dataclasses
 import os
 import pathlib
-import warnings
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
 
-from mazebench.errors import InputError, Remark, unknown
+from mazebench.errors import InputError, remark, unknown
 from mazebench.maps.benchmark import TRACKS_VERSION, VERSION, manifest_hash
 from mazebench.report.settings import Setting, make_setting
 from mazebench.results.metrics import by_fact
@@ -81,7 +80,7 @@ def read_results(paths: Iterable[pathlib.Path], names: Sequence[tuple[str, str]]
         try:
             results.append(_read_result(folder))
         except InputError as error:
-            warnings.warn(f"{error}; skipped", Remark, stacklevel=2)
+            remark(f"{error}; skipped")
     if not results:
         where = ", ".join(map(str, paths))
         raise InputError(f"expected results of `mazebench eval` or `mazebench train` in {where}, found none to report")
@@ -105,9 +104,7 @@ def _find_folders(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
     for path in paths:
         folders = folders_below(path)
         if not folders:
-            warnings.warn(
-                f"{path}: expected results of `mazebench eval`, found {_describe(path)}; skipped", Remark, stacklevel=2
-            )
+            remark(f"{path}: expected results of `mazebench eval`, found {_describe(path)}; skipped")
         for folder in folders:
             found.setdefault(folder.resolve(), folder)
     return list(found.values())
@@ -148,14 +145,10 @@ def _read_trajectories(folder: pathlib.Path, episodes: pd.DataFrame, setting: Se
     try:
         trajectories = load_trajectories(path, len(episodes))
     except InputError as error:
-        warnings.warn(f"{error}; reported without paths", Remark, stacklevel=2)
+        remark(f"{error}; reported without paths")
         return None
     if trajectories.size != setting.size or not np.array_equal(trajectories.length, episodes.steps + 1):
-        warnings.warn(
-            f"{path}: expected a pose for the start and for each step, found others; reported without paths",
-            Remark,
-            stacklevel=2,
-        )
+        remark(f"{path}: expected a pose for the start and for each step, found others; reported without paths")
         return None
     return trajectories
 
@@ -204,9 +197,7 @@ def _drop_repeats(results: list[ReportedResult]) -> list[ReportedResult]:
         if other is result:
             continue
         more, less = (result, other) if len(result.episodes) > len(other.episodes) else (other, result)
-        warnings.warn(
-            f"{less.folder}: {less.label}, {less.setting} again, as in {more.folder}; skipped", Remark, stacklevel=2
-        )
+        remark(f"{less.folder}: {less.label}, {less.setting} again, as in {more.folder}; skipped")
         kept[result.label, result.setting] = more
     return list(kept.values())
 

@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import numpy as np
+
 from mazebench.errors import InputError, unknown
 from mazebench.maps.maze import Maze
 from mazebench.maps.options import MAP_OPTIONS, MazeOptions
@@ -50,6 +52,8 @@ def make_spec(
     """
     check_names(options)
     values = {name: value for name, value in options.items() if value is not None}
+    if "distances" in values and not np.size(values["distances"]):
+        raise InputError("expected at least one distance, found none")
     if task not in (*TASKS, *TRACKS):
         raise unknown("task", task, (*TASKS, *TRACKS))
     if task in TRACKS:
@@ -112,11 +116,11 @@ def build_task(
         cells = task.landmark_distance if task.task == "hierarchical" else max(distances)
         time_limit = fitting_time_limit(cells, chosen[0].cell_size)
 
-    # The context: the track's, else the given one, else the one that is chosen for mazes of this size.
-    if task.track is not None:
-        context_size = _context_size_of_track(task, chosen[0].size, variants.context_size)
-    else:
-        context_size = variants.context_size or choose_context_size(chosen[0].size)
+    # The context: the given one, else the track's, else the one that is chosen for mazes of this size.
+    size, track = chosen[0].size, None if task.track is None else TRACKS[task.track]
+    context_size = variants.context_size
+    if context_size == 0:
+        context_size = choose_context_size(size) if track is None else track.context_size(task.level, size)
 
     computed = {
         "mazes": chosen,
@@ -172,16 +176,3 @@ def _distances(task: TaskOptions, mazes: tuple[Maze, ...], is_own: bool, default
         farthest = max(count, int(_FARTHEST_SHARE * farthest))
     count = min(count, farthest)
     return tuple(round(farthest * number / count) for number in range(1, count + 1))
-
-
-def _context_size_of_track(task: TaskOptions, size: int, given: int) -> int:
-    """Returns M of the task's track.
-
-    Raises:
-      InputError: if another one is `given`; 0 is none.
-    """
-    assert task.track is not None
-    context_size = TRACKS[task.track].context_size(task.level, size)
-    if given not in (0, context_size):
-        raise InputError(f"track {task.track!r}: expected context_size {context_size}, found {given}")
-    return context_size

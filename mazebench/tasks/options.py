@@ -12,10 +12,10 @@ from mazebench.errors import InputError
 from mazebench.maps.maze import MAX_SIZE, Cell, Maze, corner_cells
 from mazebench.maps.options import MazeOptions
 from mazebench.options import Doc, OneOf, options
-from mazebench.tasks.ends import cell_of_end, end_text
 from mazebench.tasks.perturbations import Perturbations, perturbation_levels
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.base import SensorOptions
+from mazebench.tasks.start_goal import cell_of_end, end_text
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 

@@ -29,8 +29,8 @@ class TaskSpec(TaskOptions, Variants):
     mazes: tuple[InstanceOf[Maze], ...] = ()
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         check_mazes(self, self.mazes)
+        super().__post_init__()
         if self.num_goals > 1 and (self.task != "local" or self.pairs != "random"):
             raise InputError(
                 f"expected num_goals 1 unless the task is local and pairs are random, found {self.num_goals}"
@@ -52,6 +52,11 @@ class TaskSpec(TaskOptions, Variants):
             found = getattr(self, option_name)
             if found != value:
                 raise InputError(f"track {name!r}: expected {option_name} {value!r}, found {found!r}")
+        context_size = TRACKS[name].context_size(self.level, self.size)
+        if self.context_size != context_size:
+            raise InputError(f"track {name!r}: expected context_size {context_size}, found {self.context_size}")
+        if self.sensors != self.observed_sensors:
+            raise InputError(f"track {name!r}: expected the sensor lidar, found {', '.join(self.sensors) or 'none'}")
 
     def _check_distances(self) -> None:
         if not self.distances:

@@ -19,7 +19,7 @@ import numpy as np
 
 from mazebench import stopping
 from mazebench.agent_loading import learning_agents, load_agent_class
-from mazebench.errors import InputError, RunError
+from mazebench.errors import InputError, RunError, unknown
 from mazebench.evaluation.checked_agent import context_size_of
 from mazebench.maps.options import MazeOptions
 from mazebench.options import fields_of, from_names
@@ -190,12 +190,23 @@ def num_updates_due(learner: Learner, env_steps: int) -> int:
 
 
 def _training_task(options: TrainOptions, agent_class: type[LearningAgent], defaults: dict[str, Any]) -> TaskSpec:
-    """Returns the task of `options`; `defaults` are the learner's, by name, for what the user left as it was."""
-    fields = fields_of(TaskOptions)
-    left = {name for name in fields if getattr(options.task, name) == fields[name].default}
+    """Returns the task of `options`; `defaults` are the learner's, by name, for what the user left as it was.
+
+    Raises:
+      InputError: if there is no such task, or one of `defaults` is no option of a task.
+    """
+    of_task, of_variants = fields_of(TaskOptions), fields_of(Variants)
+    for name in defaults:
+        if name not in of_task and name not in of_variants:
+            raise unknown("option of the learner's task", name, (*of_task, *of_variants))
+
+    left = {name for name in of_task if getattr(options.task, name) == of_task[name].default}
     task = dataclasses.replace(options.task, **{name: defaults[name] for name in defaults if name in left})
-    variants = {name: defaults[name] for name in defaults if name in fields_of(Variants)} | {"pairs": options.pairs}
-    if task.track is not None or options.pairs == "fixed":
+
+    variants = {name: value for name, value in defaults.items() if name in of_variants}
+    if options.pairs != of_variants["pairs"].default:
+        variants["pairs"] = options.pairs
+    if task.track is not None or variants.get("pairs") == "fixed":
         variants["num_goals"] = 1  # a track has one goal, and so has a maze with a fixed pair
 
     def choose_context_size(size: int) -> int:

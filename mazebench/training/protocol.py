@@ -29,7 +29,8 @@ class LearningAgent(Agent):
     def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:
         """Returns the options of the task that a learner is to collect in, unless the user asks for others; here none.
 
-        They are fields of `TaskOptions`, but not those that choose mazes or context size: `track` and `level`.
+        They are fields of `TaskOptions` and `Variants`, but not those that choose mazes or context size: `track`,
+        `level` and `context_size`.
 
         Args:
           overrides: values of the agent's config as text, by name.

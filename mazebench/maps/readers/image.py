@@ -6,12 +6,11 @@
 from __future__ import annotations
 
 import pathlib
-import warnings
 
 import cv2
 import numpy as np
 
-from mazebench.errors import InputError, Remark
+from mazebench.errors import InputError, held_remarks
 from mazebench.maps.file_kinds import kind_of
 from mazebench.maps.grids import square_maze
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, Maze, MazeError
@@ -152,8 +151,7 @@ def _read_walls(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
 
 def _is_maze(gray: np.ndarray, size: int | None, name: str) -> bool:
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Remark)  # of a reading that is only tried
+        with held_remarks():  # of a reading that is only tried
             square_maze(_read_walls(gray, size, name), name)
     except MazeError:
         return False

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import warnings
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -15,7 +14,7 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from mazebench.errors import InputError, Remark
+from mazebench.errors import InputError, remark
 from mazebench.maps.grids import largest_area, pad_to_square
 from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, MIN_SIZE, Maze, MazeError
 from mazebench.maps.options import MapOptions
@@ -104,9 +103,9 @@ def locate_maze(grid: OccupancyGrid, options: MapOptions, name: str) -> LocatedM
         changes.append(f"{walls.shape[0]} x {walls.shape[1]} cells padded with wall to {maze.size} x {maze.size}")
     if changes:
         changes.append(_describe_corner(origin))
-        warnings.warn(f"{name}: {'; '.join(changes)}", Remark, stacklevel=2)
+        remark(f"{name}: {'; '.join(changes)}")
     if hints:
-        warnings.warn(f"{name}: {'; '.join(hints)}", Remark, stacklevel=2)
+        remark(f"{name}: {'; '.join(hints)}")
     return LocatedMaze(maze, origin)
 
 

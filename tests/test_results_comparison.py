@@ -1,4 +1,4 @@
-"""Comparisons of results, with numbers done by hand; test_evaluation_intervals.py has the intervals."""
+"""Comparisons of results, with numbers done by hand; test_results_intervals.py has the intervals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""SPL and summaries by hand; test_evaluation_intervals.py has the intervals."""
+"""SPL and summaries by hand; test_results_intervals.py has the intervals."""
 
 from __future__ import annotations
 
