@@ -1,0 +1,1 @@
+"""Results of evaluations: records on disk, metrics, intervals, comparisons."""
