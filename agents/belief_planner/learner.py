@@ -15,9 +15,10 @@ from mazebench.world.lidar import Lidar
 
 from ..common import symmetry
 from ..common.actor import one_torch_thread
-from ..common.descent import Descent, in_numbers
+from ..common.descent import in_numbers
 from ..common.learner import HindsightLearner
 from ..muzero.batches import make_batch
+from ..muzero.descent import make_descent
 from ..muzero.lookahead import lookahead_targets
 from ..muzero.losses import unrolled_losses
 from .belief import belief_losses
@@ -34,15 +35,7 @@ class BeliefPlannerLearner(HindsightLearner):
         if task.context_size != task.size:
             found = f"mazes of {task.size} and a context of {task.context_size} cells a side"
             raise InputError(f"agent {actor.name!r}: learns from contexts of the mazes' size, found {found}")
-        config = actor.config
-        groups = actor.network.parameter_groups()
-        descent = Descent(
-            actor.network,
-            torch.optim.AdamW(groups, lr=config.learning_rate, weight_decay=config.weight_decay),
-            max_gradient_norm=config.max_gradient_norm,
-            target_rate=config.target_rate,
-            constant_steps=config.constant_updates,
-        )
+        descent = make_descent(actor.network, actor.config)
         super().__init__(actor, task, seed, descent, keep_anchor=True)
         self.lidar = Lidar(task.mazes)
 

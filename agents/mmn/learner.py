@@ -14,9 +14,10 @@ from mazebench.tasks.spec import TaskSpec
 
 from ..common import symmetry
 from ..common.actor import one_torch_thread
-from ..common.descent import Descent, in_numbers
+from ..common.descent import in_numbers
 from ..common.learner import HindsightLearner
 from ..muzero.batches import Batch, make_batch
+from ..muzero.descent import make_descent
 from ..muzero.lookahead import lookahead_targets
 from ..muzero.losses import unrolled_losses
 from ..muzero.network import Code, Predictions, rows_of
@@ -30,16 +31,8 @@ class MMNLearner(HindsightLearner):
     """Updates the network of its actor."""
 
     def __init__(self, actor: Any, task: TaskSpec, seed: int):
-        config = actor.config
-        groups = actor.network.parameter_groups()
-        descent = Descent(
-            actor.network,
-            torch.optim.AdamW(groups, lr=config.learning_rate, weight_decay=config.weight_decay),
-            max_gradient_norm=config.max_gradient_norm,
-            target_rate=config.target_rate,
-            constant_steps=config.constant_updates,
-        )
-        super().__init__(actor, task, seed, descent, keep_anchor=config.keep_anchor)
+        descent = make_descent(actor.network, actor.config)
+        super().__init__(actor, task, seed, descent, keep_anchor=actor.config.keep_anchor)
 
     @one_torch_thread()
     def update(self) -> dict[str, float]:

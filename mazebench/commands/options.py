@@ -15,7 +15,7 @@ import typer
 from mazebench.errors import InputError, held_remarks
 from mazebench.maps.options import MazeOptions
 from mazebench.options import Option, from_names, options_of
-from mazebench.tasks.options import TaskOptions
+from mazebench.tasks.options import EVAL_DISTANCES, TaskOptions, is_own
 
 Chosen = TypeVar("Chosen")
 
@@ -116,9 +116,8 @@ def watched(task: TaskOptions, mazes: MazeOptions) -> TaskOptions:
     if task.distances or task.ends_given == 2 or task.track is not None or task.task == "hierarchical":
         return task
     distances: tuple[int, ...] = (_WORTH_WATCHING,)
-    if mazes.maps is not None or task.ends_given:
+    if is_own(task, mazes):
         from mazebench.tasks.build import build_task
-        from mazebench.tasks.options import EVAL_DISTANCES
 
         with held_remarks():  # the command reads the maps again
             distances = build_task(task, mazes, default_distances=EVAL_DISTANCES).distances

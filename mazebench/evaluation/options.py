@@ -12,7 +12,7 @@ from mazebench.errors import InputError
 from mazebench.maps.benchmark import TRACKS_VERSION, VERSION
 from mazebench.maps.options import MazeOptions
 from mazebench.options import Doc, fields_of, from_names, options
-from mazebench.tasks.options import TaskOptions, Variants
+from mazebench.tasks.options import TaskOptions, Variants, is_own
 from mazebench.tasks.tracks import TRACKS
 
 NUM_ENVS = 256  # environments side by side in a process, unless another number is asked for
@@ -69,7 +69,7 @@ class EvalOptions:
     @property
     def is_own(self) -> bool:
         """Whether mazes, start or goal are not the benchmark's."""
-        return self.mazes.maps is not None or self.task.ends_given > 0
+        return is_own(self.task, self.mazes)
 
     @property
     def is_frozen(self) -> bool:

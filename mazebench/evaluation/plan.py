@@ -135,10 +135,7 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
     """
     agent_class = agent_class or load_agent_class(options.agent)
     options = _with_sensors(_with_checkpoint(options, agent_class), agent_class)
-
-    def choose_context_size(size: int) -> int:
-        return context_size_of(options.agent, agent_class, size)
-
+    choose_context_size = functools.partial(context_size_of, options.agent, agent_class)
     task = build_task(
         options.task, options.mazes, default_distances=EVAL_DISTANCES, choose_context_size=choose_context_size
     )

@@ -22,6 +22,7 @@ from mazebench.tasks.options import (
     EnvironmentOptions,
     TaskOptions,
     Variants,
+    is_own,
 )
 from mazebench.tasks.spec import TaskSpec, check_mazes
 from mazebench.tasks.tracks import TRACKS
@@ -100,19 +101,19 @@ def build_task(
     """
     variants = variants or Variants()
     chosen = load_task_mazes(task, mazes)
-    is_own = mazes.maps is not None or task.ends_given > 0
-    if is_own:
+    fits_mazes = is_own(task, mazes)
+    if fits_mazes:
         check_mazes(task, chosen)
 
     # Distances: the given ones, else those that fit the mazes.
     if task.ends_given == 2 and task.distances:
         raise InputError(f"start and goal are given; found distances {task.distances}, which would be ignored")
     default_distances = default_distances or (EVAL_DISTANCES if mazes.split == "eval" else TRAIN_DISTANCES)
-    distances = task.distances or _distances(task, chosen, is_own, default_distances)
+    distances = task.distances or _distances(task, chosen, fits_mazes, default_distances)
 
     # The time limit: the given one, else one in which goals of one's own are reached.
     time_limit = task.time_limit or TIME_LIMIT
-    if is_own and task.track is None and not task.time_limit:
+    if fits_mazes and task.track is None and not task.time_limit:
         cells = task.landmark_distance if task.task == "hierarchical" else max(distances)
         time_limit = fitting_time_limit(cells, chosen[0].cell_size)
 
@@ -156,10 +157,12 @@ def fitting_time_limit(num_cells: int, cell_size: float) -> int:
     return max(TIME_LIMIT, math.ceil((_STEPS_A_METRE * cell_size + _STEPS_A_CELL) * num_cells) + _SPARE_STEPS)
 
 
-def _distances(task: TaskOptions, mazes: tuple[Maze, ...], is_own: bool, default: tuple[int, ...]) -> tuple[int, ...]:
+def _distances(
+    task: TaskOptions, mazes: tuple[Maze, ...], fits_mazes: bool, default: tuple[int, ...]
+) -> tuple[int, ...]:
     """Returns the distances in cells of a task that names none."""
     of_track = TRACKS[task.track].distances(min(task.level)) if task.track is not None else ()
-    if not is_own:
+    if not fits_mazes:
         return of_track or default
 
     # Of given ends, that between them.

@@ -156,6 +156,11 @@ class TaskOptions(Perturbations, SensorOptions):
                 raise InputError(f"track {name!r}: expected sensors without {sensor!r}, which shows where the body is")
 
 
+def is_own(task: TaskOptions, mazes: MazeOptions) -> bool:
+    """Returns whether mazes, start or goal are not the benchmark's."""
+    return mazes.maps is not None or task.ends_given > 0
+
+
 @options
 class Variants:
     """What environments offer beyond the protocol of evaluations."""

@@ -8,6 +8,7 @@ goes on unchanged; a run that is resumed from it begins new trajectories there, 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import logging
 import math
 import pathlib
@@ -209,9 +210,7 @@ def _training_task(options: TrainOptions, agent_class: type[LearningAgent], defa
     if task.track is not None or variants.get("pairs") == "fixed":
         variants["num_goals"] = 1  # a track has one goal, and so has a maze with a fixed pair
 
-    def choose_context_size(size: int) -> int:
-        return context_size_of(options.agent, agent_class, size)
-
+    choose_context_size = functools.partial(context_size_of, options.agent, agent_class)
     mazes = MazeOptions(size=options.size)
     return build_task(task, mazes, from_names(Variants, variants), choose_context_size=choose_context_size)
 
