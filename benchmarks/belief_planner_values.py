@@ -16,7 +16,7 @@ from mazebench_agents.belief_planner.learner import BeliefPlannerLearner
 from mazebench_agents.belief_planner.network import BeliefPlannerNetwork
 from mazebench_agents.belief_planner.wrong_maps import planes_of
 
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.build import make_spec
 from mazebench.training.run_folder import RunFolder

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mazebench.maps.benchmark import MANIFEST, MAZES_PER_SPLIT, SIZES, SPLITS, VERSION, mazes_file
-from mazebench.maps.generators import DFS_OPENINGS, dfs_walls
+from mazebench.maps.kinds.dfs import DFS_OPENINGS, dfs_walls
 from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
 from mazebench.tasks.build import make_spec

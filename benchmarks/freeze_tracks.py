@@ -24,13 +24,13 @@ from mazebench.maps.benchmark import (
     load_mazes,
     mazes_file,
 )
-from mazebench.maps.generators import DFS_OPENINGS, dfs_walls
+from mazebench.maps.kinds.dfs import DFS_OPENINGS, dfs_walls
 from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.shown_map import leg_context, show_map
-from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks import TRACKS, tracks_of
 from mazebench.tasks.tracks.base import LEVELS
 from mazebench.tasks.trials import Trial, episodes_file, make_trial
 
@@ -49,9 +49,9 @@ def freeze_tracks(folder: pathlib.Path) -> None:
         eval_mazes[size], trials[size] = tuple(mazes["eval"]), draw_track_trials(mazes["eval"])
         files[episodes_file("local", size)] = format_trials(trials[size])
     shown = {
-        f"{name}-{level}": shown_hash(name, level, eval_mazes[track.sizes[level - 1]], trials[track.sizes[level - 1]])
-        for name, track in TRACKS.items()
-        for level in LEVELS
+        f"{name}-{level}": shown_hash(name, level, eval_mazes[size], trials[size])
+        for name in tracks_of(TRACKS_VERSION)
+        for level, size in zip(LEVELS, TRACKS[name].sizes, strict=True)
     }
     generator = {"style": "dfs", "openings": DFS_OPENINGS, "seed": _SEED, "contexts_sha256": shown}
     files[MANIFEST] = format_manifest(TRACKS_VERSION, generator, files)
@@ -112,9 +112,9 @@ def _shuffled_rounds(values: tuple[int, ...], rng: np.random.Generator) -> Itera
 def _distances(size: int) -> tuple[int, ...]:
     """Returns the distances of the tracks that are played in mazes of `size` cells a side."""
     return next(
-        track.distances(level)
-        for track in TRACKS.values()
-        for level, track_size in enumerate(track.sizes, 1)
+        TRACKS[name].distances(level)
+        for name in tracks_of(TRACKS_VERSION)
+        for level, track_size in enumerate(TRACKS[name].sizes, 1)
         if track_size == size
     )
 

@@ -4,7 +4,7 @@
 "naive" map makes random swaps of an open and a closed door that leave the maze connected; a "searched" one is made by
 `mazebench.tasks.tracks.stale.move_doors`. Both are drawn from mazes of our own, never from those of an evaluation. The
 second table says how often the shortest path on a searched map leads through a wall of the world.
-docs/tracks.md shows what this prints.
+docs/tracks_v2.md shows what this prints.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from scipy import ndimage, stats
 from torch import nn
 from torch.nn import functional
 
-from mazebench.maps.generators import dfs_walls
+from mazebench.maps.kinds.dfs import dfs_walls
 from mazebench.maps.maze import Maze, corner_cells
 from mazebench.tasks.perturbations.base import ShownMap
 from mazebench.tasks.tracks.stale import SWAPS, Stale, move_doors

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mazebench.maps.benchmark import load_mazes
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, cell_to_point
 from mazebench.maps.pictures import write_image
 from mazebench.world.models import MazeModels

@@ -1,4 +1,4 @@
-"""What can be reached on the tracks at most: `python benchmarks/track_ceilings.py [--split eval]`.
+"""What can be reached on the tracks of v2 at most: `python benchmarks/track_ceilings.py [--split eval]`.
 
 An ideal agent drives on the grid. It knows its cell, sees every cell within 5 m that no wall hides, and knows where
 each cell is drawn on the shown map. It believes the map where it has seen nothing, and follows a shortest path on what
@@ -15,6 +15,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.sparse import csgraph, csr_array
 
+from mazebench.constants import TRACKS_VERSION
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.maze import Cell, Maze, cell_to_point
@@ -23,7 +24,7 @@ from mazebench.tasks.context import resized_map
 from mazebench.tasks.imperfections import time_limit
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks import tracks_of
 from mazebench.tasks.tracks.base import LEVELS
 from mazebench.tasks.trials import Trial
 
@@ -40,7 +41,7 @@ def main() -> None:
     parser.add_argument("--split", default="train", choices=("train", "eval"))
     split = parser.parse_args().split
     print("| track | level | episodes | success rate | cells entered / shortest path |\n|---|---|---|---|---|")
-    for track in TRACKS:
+    for track in tracks_of(f"v{TRACKS_VERSION}"):
         for level in LEVELS:
             print(f"| `{track}` | {level} | {_row(track, level, split)} |", flush=True)
 

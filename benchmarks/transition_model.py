@@ -17,7 +17,7 @@ from mazebench_agents.mmn.config import MMNConfig
 from mazebench_agents.mmn.network import Code, MMNNetwork
 
 from mazebench.maps.benchmark import load_mazes
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.context import build_context

@@ -17,7 +17,7 @@ import numpy as np
 from mazebench.agent import Agent, Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.chunk import run_trials
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.results.intervals import mean_interval
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.spec import TaskSpec

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from mazebench.errors import InputError, UnplayableError
     from mazebench.evaluation.evaluate import evaluate
     from mazebench.maps.files import read_maze, read_mazes
-    from mazebench.maps.generators import generate
+    from mazebench.maps.kinds import generate
     from mazebench.maps.maze import Maze, MazeError
     from mazebench.maps.readers.arrays import maze_from_array
     from mazebench.tasks.build import make_spec
@@ -41,7 +41,7 @@ _HOMES = {
     "TaskSpec": "mazebench.tasks.spec",
     "UnplayableError": "mazebench.errors",
     "evaluate": "mazebench.evaluation.evaluate",
-    "generate": "mazebench.maps.generators",
+    "generate": "mazebench.maps.kinds",
     "load": "mazebench.envs.registration",
     "make_spec": "mazebench.tasks.build",
     "maze_from_array": "mazebench.maps.readers.arrays",

@@ -15,6 +15,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from mazebench.tasks.context import default_context_size
+from mazebench.world.lidar import LidarModel
 
 Observation = dict[str, np.ndarray]  # "state" [B, 12] float32, "context" [B, 4, M, M] float32, sensors by name
 
@@ -29,6 +30,9 @@ class Interface:
     num_actions: int = 6
     sensors: tuple[str, ...] = ()  # whose readings are observed beside the state and the context
     cell_size: float = 1.0  # m, the side of a cell of the mazes
+    hidden: tuple[str, ...] = ()  # of "map" and "goal": what the context does not show
+    lidar: LidarModel | None = None  # what the sensor lidar measures; None without it
+    odometry_noise: float = 0.0  # alpha of the noise on the observed motion (`mazebench.tasks.odometry.NoisyMotion`)
 
 
 class Truth(NamedTuple):
@@ -56,6 +60,7 @@ class _Declarations:
 
     needs_truth: ClassVar[bool] = False  # results of an agent that does are labelled as privileged
     needs_sensors: ClassVar[tuple[str, ...]] = ()  # an evaluation adds them to the sensors that it is given
+    needs_shown: ClassVar[tuple[str, ...]] = ()  # of "map" and "goal": what it can't play without
     learns: ClassVar[bool] = False  # an agent that does can be given a checkpoint, even if it ships with none
 
     @classmethod
@@ -184,6 +189,6 @@ def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
 def _running(declared: type[SingleAgent]) -> type[Agent]:
     """Returns an `Agent` that runs a `SingleAgent`."""
     # Named as the class that it wraps, for messages and provenance.
-    names = ("__module__", "__qualname__", "__doc__", "needs_truth", "needs_sensors")
+    names = ("__module__", "__qualname__", "__doc__", "needs_truth", "needs_sensors", "needs_shown")
     attributes = {name: getattr(declared, name) for name in names}
     return type(declared.__name__, (_SingleAgents,), attributes | {"single_class": declared})

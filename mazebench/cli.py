@@ -46,7 +46,7 @@ app.command(short_help="Make tables, figures and a page of results.")(report)
 app.command(short_help="Film or picture an episode.")(render)
 app.command(short_help="Drive yourself, with the keyboard.")(play)
 app.command(short_help="Measure speed on this machine.")(bench)
-app.command("list", short_help="List tasks, agents, sizes and styles.")(list_)
+app.command("list", short_help="List tasks, agents, sizes and kinds of mazes.")(list_)
 
 
 def main() -> None:

@@ -202,9 +202,12 @@ def _plain(value: Any) -> Any:
 
 
 def _plain_tuple(value: Any) -> tuple[Any, ...]:
-    """Returns any iterable as a tuple, and a single value as a tuple of one."""
+    """Returns any iterable as a tuple, and a single value as a tuple of one; texts are split at their commas."""
     is_single = isinstance(value, str) or not isinstance(value, Iterable)
-    return tuple(map(_plain, (value,) if is_single else value))
+    parts: list[Any] = []
+    for item in (value,) if is_single else value:
+        parts += [part.strip() for part in item.split(",")] if isinstance(item, str) else [_plain(item)]
+    return tuple(parts)
 
 
 def _in_words(options_class: type, error: pydantic.ValidationError, values: Mapping[str, Any]) -> InputError:

@@ -17,7 +17,7 @@ from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.evaluation.agent_inputs import agent_seed, true_state
 from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling, context_size_of
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import Episode, sample_episode
 

@@ -70,11 +70,11 @@ def make_result(
     if track is not None:
         spec = make_spec(track, split=split, level=level)
         size, version, labels = spec.size, TRACKS_VERSION, {"track": track, "level": level}
-        trials = select_trials(spec, split == "eval", episodes_per_distance)
+        trials = select_trials(spec, split if split == "eval" else None, episodes_per_distance)
     else:
         version, labels = VERSION, {}
         spec = make_spec(task, size, split, distances=distances, landmark_distance=landmark_distance, **levels)
-        trials = select_trials(spec, split == "eval", episodes_per_distance)
+        trials = select_trials(spec, split if split == "eval" else None, episodes_per_distance)
     rng = np.random.default_rng([len(agent), size, landmark_distance, seed])
     labels = {"agent": agent, "task": task, "size": size, "split": split} | labels
     records, drives = [], []

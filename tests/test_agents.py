@@ -21,7 +21,7 @@ from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import load_mazes
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.trials import draw_trials

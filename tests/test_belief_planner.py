@@ -21,7 +21,7 @@ from test_muzero import CONFIGS, a_context, an_observation, code_of, make_learne
 
 from mazebench.agent import Interface
 from mazebench.errors import InputError
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.context import build_context
 from mazebench.tasks.tracks.sketch import draw_by_hand

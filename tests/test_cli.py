@@ -78,7 +78,10 @@ def one_line(run: tuple[int, str, str], status: int = 2) -> str:
 BAD_INPUT = [
     (("--frobnicate",), "No such option"),
     # generate
-    (("generate", "--size", "14"), "style 'dfs' makes mazes of odd sizes only, found size 14"),
+    (("generate", "--size", "14"), "kind 'dfs' makes mazes of odd sizes only, found size 14"),
+    (("generate", "--kind", "pub"), "unknown kind 'pub'; available: cave, dfs, hospital, house, museum, obstacles, "),
+    (("generate", "--kind", "cave", "--size", "9"), "kind 'cave' makes mazes of 13 cells and more, found size 9"),
+    (("generate", "--style", "rooms"), "No such option: --style"),
     (("generate", "--format", "txt,gif"), "unknown format 'gif'; available: glb, mjcf, mjcf-textured, obj, png, ros"),
     (("generate", "--from-image", "x.png", "--seed", "1"), "the map shows one maze; found --seed, which would"),
     (
@@ -109,7 +112,7 @@ BAD_INPUT = [
     ((*QUICK, "--task", "local"), "the suite 'quick' has evaluations of its own; found --task, which would be ignored"),
     ((*QUICK, "--agent", "random"), "expected agents with folders of their own, found two for 'random'"),
     # eval: tracks
-    ((*RANDOM, "--track", "stail"), "'--track': 'stail' is not one of 'stale', 'lost', 'sketch', 'far'"),
+    ((*RANDOM, "--track", "stail"), "'--track': 'stail' is not one of 'building', 'rebuilt', 'adrift'"),
     ((*RANDOM, "--track", "far", "--level", "4"), "expected level from 1 to 3, found 4"),
     ((*RANDOM, "--track", "far", "--level", "two"), "expected level like 1-3 or 2,3, found 'two'"),
     (
@@ -315,12 +318,12 @@ class TestGenerate:
         assert format_maze(mazes[0]) in output  # the first is shown
         assert [read_maze(tmp_path / "mine" / f"dfs-9-3-{i:03d}.png") for i in range(2)] == mazes
 
-    def test_mazes_depend_on_seed_and_style_and_not_on_their_number(self, command, tmp_path):
+    def test_mazes_depend_on_seed_and_kind_and_not_on_their_number(self, command, tmp_path):
         for out, *arguments in [
             ("first",),
             ("again", "--count", "3"),
             ("seed", "--seed", "1"),
-            ("style", "--style", "rooms"),
+            ("kind", "--kind", "rooms"),
         ]:
             assert command("generate", "--size", "11", "--format", "txt", "--out", out, *arguments)[0] == 0
         texts = {path.parent.name + path.name: path.read_text() for path in tmp_path.rglob("*.txt")}
@@ -329,7 +332,7 @@ class TestGenerate:
         assert len(set(texts.values())) == 5
 
     def test_a_maze_is_read_off_its_picture(self, command, tmp_path):
-        assert command("generate", "--style", "rooms", "--format", "txt,png", "--out", "drawn")[0] == 0
+        assert command("generate", "--kind", "rooms", "--format", "txt,png", "--out", "drawn")[0] == 0
         picture = "drawn/rooms-13-0-000.png"
         assert command("generate", "--from-image", picture, "--format", "txt", "--out", "read")[0] == 0
         drawn, read = (tmp_path / out / "rooms-13-0-000.txt" for out in ("drawn", "read"))

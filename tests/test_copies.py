@@ -18,7 +18,7 @@ from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.tasks.build import make_spec
 
 TASKS: dict[str, dict[str, Any]] = {
@@ -28,6 +28,7 @@ TASKS: dict[str, dict[str, Any]] = {
     "perturbed": {"map_flip": 0.2, "map_warp": 0.1, "position_noise": 0.3, "time_limit": 40},
     "continuous": {"continuous": True, "time_limit": 40},
     "lidar": {"sensors": "lidar", "time_limit": 40},
+    "fresh": {"kinds": ("dfs", "house"), "fresh": True, "sensors": "lidar", "num_goals": 2, "time_limit": 20},
     "stale": {"task": "stale", "level": (1, 2, 3)},
     "lost": {"task": "lost", "level": 3},
     "lost, any level": {"task": "lost", "level": (1, 2, 3)},

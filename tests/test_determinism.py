@@ -38,7 +38,7 @@ COMMANDS = (
     "eval --agent planner --distances 4 --episodes-per-distance 1 --map-warp 0.2 --seed 5 --split train",
     "eval --agent mah --distances 1,2 --episodes-per-distance 1 --map-flip 0.1 --num-envs 16",
     "generate --size 9 --count 2 --seed 3 --format txt,mjcf,png,glb,obj,stl",
-    "generate --size 9 --style rooms",
+    "generate --size 9 --kind rooms",
     f"{TRAIN} --set replay_capacity=4000",
 )
 # Runs each command in this process, and prints the SHA-256 of every file that is promised to be the same.

@@ -17,7 +17,7 @@ import typer
 from pages import PAGES, ROOT, Block, blocks, name_of, read
 
 from mazebench import cli
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.pictures import draw_maze, write_image
 from mazebench.maps.readers.ros import write_ros_map
 from mazebench.maps.text import write_text_maze
@@ -187,7 +187,8 @@ def shortened(command: list[str]) -> list[str] | None:
         folders = [option for option in options if not option.startswith("--")]
         return arguments if pathlib.Path(folders[0]).exists() else None
     if kind == "render":
-        near = () if {"--start", "--goal"} <= set(options) else ("--distances", "3")
+        is_short = {"--start", "--goal"} <= set(options) or "--split" in options
+        near = () if is_short else ("--distances", "3")
         return [*arguments, "--pixels", "64", *near]
     if kind == "eval" and "--suite" not in options:
         agent = options[options.index("--agent") + 1]

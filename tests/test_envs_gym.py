@@ -21,7 +21,7 @@ from mazebench.envs.gym import MazeEnv
 from mazebench.envs.registration import register_environments
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import write_text_maze
 from mazebench.tasks.build import make_spec
@@ -31,7 +31,9 @@ from mazebench.tasks.tracks import TRACKS
 TITLES = ("Local", "Hierarchical", "LocalGoal")
 IDS = [f"mazebench/{title}-{size}-v1" for title in TITLES for size in (13, 15, 17, 19, 21)]
 TRACK_IDS = [
-    f"mazebench/{name.title()}-{size}-v2" for name, track in TRACKS.items() for size in sorted(set(track.sizes))
+    f"mazebench/{name.title()}-{size}-{track.benchmark}"
+    for name, track in TRACKS.items()
+    for size in sorted(set(track.sizes))
 ]
 FORWARD, LOOK_LEFT = 0, 4
 

@@ -17,7 +17,7 @@ from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import Episode
@@ -49,6 +49,7 @@ SPECS = {
     "position_noise": make_spec(maps=dfs_mazes(), distances=[1, 2], time_limit=25, position_noise=0.4),
     "context_size": make_spec(maps=dfs_mazes(), distances=[1, 2], time_limit=25, context_size=6),
     "num_goals": make_spec(maps=dfs_mazes(), distances=[1, 2], time_limit=15, num_goals=3),
+    "fresh": make_spec(kinds=("dfs", "obstacles"), size=13, fresh=True, distances=[1, 2], time_limit=25),
 }
 every_spec = pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
 

@@ -66,6 +66,7 @@ def files_of_at_most(num_bytes: int) -> Iterator[None]:
 def test_episodes_that_end_in_any_order_are_written_in_the_protocols(plan, episodes, summary, unbroken, tmp_path):
     order = np.random.default_rng(0).permutation(40).tolist()
     with Store(tmp_path / "run", plan, resume=False, record=True) as store:
+        store.keep_oracle_steps(plan.oracle_steps)
         for index in order:
             store.append([episodes[index]])
         assert store.missing == []
@@ -137,7 +138,7 @@ def test_what_was_written_before_the_disk_is_full_is_kept(plan, episodes, summar
         # No file that a reader would take for a whole one.
         assert set(files_of(tmp_path)) == {"config.json", "journal.jsonl"}
     evaluate("random", tmp_path, resume=True, **FEW)
-    names = ["config.json", "episodes.jsonl"] + ["trajectories.npz"] * record
+    names = ["config.json", "oracle.json", "episodes.jsonl"] + ["trajectories.npz"] * record
     assert results_of(tmp_path) == {name: (unbroken / name).read_bytes() for name in names}
 
 

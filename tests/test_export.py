@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from mazebench.maps.covering import cover
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, point_to_cell
 from mazebench.maps.text import parse_maze
 from mazebench.world.export import wall_mesh, write_mesh, write_mjcf
@@ -18,8 +18,8 @@ DIAGONAL = parse_maze("#######\n#....##\n#.#...#\n#..#..#\n#...#.#\n#.#...#\n###
 MAZES = [
     DIAGONAL,
     *(
-        generate(style, size, np.random.default_rng(size))
-        for style in ("dfs", "rooms", "obstacles")
+        generate(kind, size, np.random.default_rng(size))
+        for kind in ("dfs", "rooms", "obstacles")
         for size in (5, 13, 21)
     ),
 ]

@@ -14,10 +14,10 @@ from mazebench_agents.common import kernels
 
 CODE = """
 import numpy as np
-from mazebench_agents.navigator.driving import is_clear
+from mazebench_agents.robot.occupancy import posterior
 
 for _ in range(2):
-    is_clear(np.zeros((5, 5), dtype=bool), 1.5, 1.5, 3.5, 3.5, 0.3)
+    posterior(np.zeros((5, 5)), np.zeros((5, 5)), np.array([0.5]), 3.0)
 """
 
 
@@ -35,23 +35,22 @@ def test_a_compilation_is_announced_once_and_cached(tmp_path):
     assert [each.count(announcement) for each in said] == [1, 0]
 
 
-WITH_RAYS = """
+WITH_TURN = """
 import sys
-import numpy as np
-from mazebench.world import lidar
+from mazebench_agents.robot import body
 
-lidar.NUM_RAYS = int(sys.argv[1])
-from mazebench_agents.navigator import scans
+body.TURN_STEP = float(sys.argv[1])
+from mazebench_agents.robot.motion import turned
 
-print(scans.predict(np.zeros((5, 5), dtype=bool), np.full((1, 3), 2.5)).shape[1])
+print(turned(0.0, 1))
 """
 
 
 def test_a_constant_of_another_module_that_changes_is_compiled_anew(tmp_path):
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    for num_rays in ("32", "8", "32"):
-        command = [sys.executable, "-c", WITH_RAYS, num_rays]
-        assert subprocess.run(command, env=environment, capture_output=True, text=True).stdout.split() == [num_rays]
+    for turn in ("0.5", "0.25", "0.5"):
+        command = [sys.executable, "-c", WITH_TURN, turn]
+        assert subprocess.run(command, env=environment, capture_output=True, text=True).stdout.split() == [turn]
 
 
 @pytest.mark.parametrize(("given", "expected"), [("3", 3), ("2,4", 2), ("", None), ("0", None), ("many", None)])

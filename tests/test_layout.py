@@ -9,12 +9,15 @@ import importlib
 import json
 import operator
 import pathlib
+import re
 import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
 
 import pytest
+
+from mazebench.maps.kinds import NOVEL
 
 ROOT = pathlib.Path(__file__).parent.parent
 # A module imports only from those of lines above it and its own.
@@ -184,6 +187,13 @@ class TestImports:
         )
         result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
         assert result.returncode == 0, result.stderr
+
+
+@pytest.mark.parametrize("path", sources("agents", "mazebench/training"), ids=name_of)
+def test_no_module_that_learns_names_a_novel_kind(path):
+    """Learned agents meet these kinds first in their one play on eval."""
+    names = {*NOVEL, "NOVEL"}
+    assert not names & set(re.findall(r"\w+", path.read_text(encoding="utf-8")))
 
 
 def dotted_name(path: pathlib.Path) -> str:

@@ -16,7 +16,7 @@ import mazebench
 from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.maps.generators import STYLES, generate
+from mazebench.maps.kinds import KINDS, generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 from mazebench.tasks.build import make_spec
@@ -64,11 +64,11 @@ def near_corners(maze: Maze, pose: np.ndarray) -> np.ndarray:
 
 @strategies.composite
 def mazes_and_poses(draw: strategies.DrawFn) -> tuple[Maze, np.ndarray]:
-    """A maze of any style and size, and 20 poses in its free cells, some of them close to a wall."""
-    style = draw(strategies.sampled_from(sorted(STYLES)))
-    size = draw(strategies.integers(5, 51).filter(lambda size: style == "obstacles" or size % 2))
+    """A maze of any kind and size, and 20 poses in its free cells, some of them close to a wall."""
+    kind = draw(strategies.sampled_from(sorted(KINDS)))
+    size = draw(strategies.integers(KINDS[kind].smallest, 51).filter(lambda size: size % 2 or not KINDS[kind].odd))
     rng = np.random.default_rng(draw(strategies.integers(0, 2**32)))
-    maze = generate(style, size, rng)
+    maze = generate(kind, size, rng)
     cells = maze.free_cells[rng.integers(len(maze.free_cells), size=20)]
     margin = draw(strategies.sampled_from([0.15, 0.01, 1e-4]))
     within = np.where(rng.random((20, 2)) < 0.5, rng.uniform(margin, 1 - margin, (20, 2)), margin)

@@ -7,7 +7,7 @@ import pytest
 
 import mazebench
 from mazebench.errors import InputError
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.readers.arrays import maze_from_array
 

@@ -14,7 +14,7 @@ from hypothesis import strategies
 
 from mazebench.errors import InputError
 from mazebench.maps.files import read_maze, read_mazes
-from mazebench.maps.generators import STYLES, generate
+from mazebench.maps.kinds import KINDS, generate
 from mazebench.maps.pictures import draw_maze, write_image
 from mazebench.maps.readers.ros import write_ros_map
 from mazebench.maps.text import write_text_maze
@@ -41,15 +41,16 @@ WRITERS = {
 @pytest.mark.parametrize("suffix", WRITERS)
 @hypothesis.given(
     strategies.integers(0, 2**32 - 1),
-    strategies.sampled_from(sorted(STYLES)),
+    strategies.sampled_from(sorted(KINDS)),
     strategies.integers(2, 20).map(lambda half: 2 * half + 1),
     strategies.sampled_from([1.0, 0.5, 0.7]),
 )
 @hypothesis.example(0, "obstacles", 255, 1.0)
 @hypothesis.example(0, "obstacles", 40, 0.5)
 @hypothesis.settings(max_examples=25, deadline=None)
-def test_a_maze_is_read_as_it_was_written_without_remarks(suffix, seed, style, size, cell_size):
-    maze = dataclasses.replace(generate(style, size, np.random.default_rng(seed), "other"), cell_size=cell_size)
+def test_a_maze_is_read_as_it_was_written_without_remarks(suffix, seed, kind, size, cell_size):
+    size = max(size, KINDS[kind].smallest)
+    maze = dataclasses.replace(generate(kind, size, np.random.default_rng(seed), "other"), cell_size=cell_size)
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")
         path = pathlib.Path(folder) / f"plan.{suffix}"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mazebench.maps.generators import generate
 from mazebench.maps.homography import warp_cell, warp_points, warp_walls
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import cell_to_point, point_to_cell
 from mazebench.tasks.perturbations.warp import random_homography
 

@@ -14,8 +14,8 @@ from scipy import ndimage
 from mazebench.errors import InputError
 from mazebench.maps import colors
 from mazebench.maps.files import read_maze
-from mazebench.maps.generators import generate
 from mazebench.maps.grids import largest_area
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.pictures import draw_maze, write_image
 from mazebench.maps.readers.image import maze_from_image, read_image_maze
@@ -247,13 +247,13 @@ def test_a_drawing_with_marks_is_read(maze):
 @pytest.mark.parametrize(
     ("rows", "columns"), [(9, 15), (13, 27), (21, 13), (15, 11), (11, 25), (19, 9), (13, 13), (21, 21)]
 )
-@pytest.mark.parametrize("style", ["dfs", "obstacles"])
-def test_photograph_of_a_maze_is_read_with_and_without_the_size(rows, columns, style):
+@pytest.mark.parametrize("kind", ["dfs", "obstacles"])
+def test_photograph_of_a_maze_is_read_with_and_without_the_size(rows, columns, kind):
     rng = np.random.default_rng(rows)
-    walls = generate(style, max(rows, columns), rng).walls[:rows, :columns].copy()
+    walls = generate(kind, max(rows, columns), rng).walls[:rows, :columns].copy()
     walls[[0, -1]] = walls[:, [0, -1]] = True
     walls = largest_area(walls)
-    image = photograph(walls, rng, table=style == "dfs")
+    image = photograph(walls, rng, table=kind == "dfs")
     assert maze_from_image(image) == padded(walls)
     assert maze_from_image(image, max(rows, columns)) == padded(walls)
 

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 import mazebench
 from mazebench.errors import InputError
 from mazebench.maps.files import read_located, read_maze, read_mazes
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, MazeError, cell_to_point
 from mazebench.maps.options import MapOptions
 from mazebench.maps.pictures import draw_maze, write_image

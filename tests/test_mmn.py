@@ -20,7 +20,7 @@ from test_muzero import CONFIGS, a_context, an_observation, make_learner
 
 from mazebench.agent import Interface
 from mazebench.errors import UnplayableError
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from mazebench_agents.muzero.targets import Targets
 from small_world import learn
 
 from mazebench.agent import Interface
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.training.experience import Collector

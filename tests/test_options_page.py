@@ -10,7 +10,7 @@ import re
 import pytest
 
 from mazebench.envs import registration
-from mazebench.maps.options import MapOptions
+from mazebench.maps.options import DrawnOptions, MapOptions
 from mazebench.options import Option, options_of
 from mazebench.tasks import build
 from mazebench.tasks.options import TaskOptions, Variants
@@ -21,8 +21,8 @@ TABLE = re.compile(r"^\| option.*\n\|[-|]+\n((?:\|.*\n)+)", re.MULTILINE)
 
 
 def derived_tables() -> list[str]:
-    """Returns the tables of the options of maps and of tasks, in the order of the page."""
-    return [derived_table(MapOptions), derived_table(TaskOptions, Variants)]
+    """Returns the tables of the options of mazes and of tasks, in the order of the page."""
+    return [derived_table(DrawnOptions), derived_table(MapOptions), derived_table(TaskOptions, Variants)]
 
 
 def derived_table(*classes: type) -> str:
@@ -59,16 +59,16 @@ def test_the_tables_of_options_follow_from_the_code():
     ("index", "function", "others"),
     [
         (0, build.make_spec, None),
-        (3, registration.load, build.make_spec),
-        (4, registration.make_env, None),
-        (4, registration.make_goal_env, None),
-        (5, registration.make_vec, None),
+        (4, registration.load, build.make_spec),
+        (5, registration.make_env, None),
+        (5, registration.make_goal_env, None),
+        (6, registration.make_vec, None),
     ],
     ids=["mazes", "load", "gymnasium.make", "goal", "make_vec"],
 )
 def test_the_other_tables_name_the_parameters_of_their_function(index, function, others):
     tables = TABLE.findall(PAGE.read_text(encoding="utf-8"))
-    assert len(tables) == 6
+    assert len(tables) == 7
     found = parameters(function)
     for name in parameters(others) if others else ():
         found.pop(name, None)

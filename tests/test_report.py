@@ -28,6 +28,7 @@ from mazebench.report.report import write_report
 from mazebench.report.results import read_results
 from mazebench.report.table import Cell, Column, Table, escape_latex, escape_markdown, to_csv, to_latex, to_markdown
 from mazebench.report.tables import build_tables, maze_sets
+from mazebench.storage.json_files import write_json
 from mazebench.storage.locks import FolderLock
 
 AGENTS = ("mah", "random")
@@ -101,20 +102,19 @@ class TestValues:
         assert [cell.value for cell in cells["spl_grid"]] == [0.5, 0.5, 0.5]
         assert all(cell.low < cell.value <= cell.high for cell in cells["success_rate"])
 
-    def test_spl_relative_to_the_oracles_needs_every_result_to_have_it(self, tmp_path):
+    def test_results_with_the_oracles_steps_tell_what_is_on_time(self, tmp_path):
         folder = make_result(tmp_path / "a", "mah", num_mazes=4, record=False)
         set_outcomes(folder, (1, 1, 1, 0, 1, 1, 1, 0))
-        summary = read_summary(folder)
-        by_distance = {  # the oracle's SPL is 0.5 at 2 cells, 0.25 at 4
-            "2": summary["by_distance"]["2"] | {"spl_relative": 0.5},
-            "4": summary["by_distance"]["4"] | {"spl_relative": 0.5},
-        }
-        edit_summary(folder, by_distance=by_distance, overall=summary["overall"] | {"spl_relative": 0.5})
-        table = tables_of(folder)["local-13"]
-        assert [cell.value for cell in table.columns[0].cells["spl_relative"]] == [0.5, 0.5, 0.5]
-        assert "| SPL / oracle's, by distance | mah |" in to_markdown(table)
-        make_result(tmp_path / "b", "random", num_mazes=4, record=False)
-        assert "spl_relative" not in tables_of(tmp_path)["local-13"].metrics
+        edit_records(folder, lambda record: record | {"steps": 10})
+        write_json(folder / "oracle.json", {"steps": [8, 8, 5, 8, 4, 8, None, 8]})
+        make_result(tmp_path / "b", "random", num_mazes=4, record=False)  # as earlier versions wrote it
+        table = tables_of(tmp_path)["local-13"]
+        ours, others, *_ = table.columns
+        assert [cell.value for cell in ours.cells["on_time_1.25"]] == [0.5, 0.5, 0.5]
+        assert [cell.value for cell in ours.cells["on_time_2"]] == [0.75, 0.5, 0.625]
+        assert others.cells["on_time_2"] == (None, None, None)
+        assert "| on time (1.25), by distance | mah |" in to_markdown(table)
+        assert "| success rate, by distance | mah | random |" in to_markdown(table)
 
     def test_the_papers_values_stand_in_columns_of_their_own(self):
         [mmn] = paper_columns("local", 13, [1, 2, 10], 4)
@@ -247,15 +247,10 @@ class TestTracks:
         folder = make_result(tmp_path / "a", "mah", track="stale", level=2, num_mazes=2, record=False)
         edit_records(folder, lambda record: record | {"blocked": record["episode"] % 4 == 0})
         set_outcomes(folder, [index % 4 > 0 for index in range(20)])
-        summary = read_summary(folder)
-        for figures, relative in ((summary["overall"], 0.25), *zip(summary["by_fact"].values(), (0, 0.5), strict=True)):
-            figures["spl_relative"] = relative
-        edit_summary(folder, by_fact=summary["by_fact"], overall=summary["overall"])
         table = tables_of(folder)["track-stale"]
         assert table.rows == ("2", "2, blocked", "2, not blocked")
         cells = table.columns[0].cells
         assert [(cell.value, cell.episodes) for cell in cells["success_rate"]] == [(0.75, 20), (0.0, 5), (1.0, 15)]
-        assert [cell.value for cell in cells["spl_relative"]] == [0.25, 0.0, 0.5]
 
     def test_a_map_scale_that_an_agent_was_never_trained_on_is_marked(self, tmp_path):
         folder = make_result(tmp_path / "a", "mah", track="lost", num_mazes=2, record=False)

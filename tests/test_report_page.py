@@ -177,7 +177,7 @@ class TestTracks:
         with_rays = on_tracks.run(PIXELS)
         maze, x, y, yaw, *ranges = on_tracks.run(
             "[view.current.maze, ...['x', 'y', 'yaw'].map(name => view.current.path[name][view.time]),"
-            "...rangesOf(view.current.real, view.current.size, view.current.path, view.time, data.lidar)]"
+            "...rangesOf(view.current.real, view.current.size, view.current.path, view.time, view.current.sensor)]"
         )
         mazes = load_track_mazes(13, "eval")
         index = [known.name for known in mazes].index(maze)

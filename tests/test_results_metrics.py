@@ -7,7 +7,7 @@ import pytest
 from made_results import make_record
 
 from mazebench.results.intervals import mean_interval
-from mazebench.results.metrics import spl, summarize
+from mazebench.results.metrics import is_on_time, spl, summarize
 
 
 def record(index=0, distance=1, maze="m", success=True, spl=1.0, spl_grid=1.0):
@@ -53,8 +53,24 @@ def test_figures_worked_by_hand():
     assert by_distance["10"].success_rate_ci95 == (one.low, one.high)
 
 
-def test_spl_relative_to_the_oracle_worked_by_hand():
-    overall, by_distance = summarize(RECORDS, {0: 0.5, 1: 1.0, 2: 0.8, 3: 0.7})
-    assert overall.spl_relative == pytest.approx(1.9 / 3.0)
-    assert by_distance["10"].spl_relative == pytest.approx(1.0)
-    assert summarize(RECORDS)[0].spl_relative is None
+class TestOnTime:
+    def test_on_time_worked_by_hand(self):
+        # The worked example of docs/metrics.md: five successes in 10 steps, then a failure.
+        records = [make_record(index, steps=10, success=index < 5) for index in range(6)]
+        oracle_steps = (8, 7, 5, 4, None, 10)  # 10 is 1.25 x 8 and 2 x 5; the oracle missed the fifth goal
+        assert is_on_time(records, oracle_steps, 1.25).tolist() == [True, False, False, False, True, False]
+        assert is_on_time(records, oracle_steps, 2).tolist() == [True, True, True, False, True, False]
+        assert is_on_time(records[3:5], oracle_steps, 2).tolist() == [False, True]  # records keep their numbers
+
+    def test_figures_tell_it_by_factor(self):
+        overall, by_distance = summarize(RECORDS, (4, 4, 4, 2))  # records of 5 steps, the third a failure
+        assert overall.on_time == {"1.25": 0.5, "2": 0.5}
+        assert by_distance["10"].on_time == {"1.25": 1.0, "2": 1.0}
+        assert by_distance["2"].on_time == {"1.25": pytest.approx(1 / 3), "2": pytest.approx(1 / 3)}
+        both = mean_interval(np.array([1.0, 1.0, 0.0, 0.0]), np.array(["a", "a", "b", "b"]))
+        assert overall.on_time_ci95["2"] == (both.low, both.high)
+
+    def test_figures_without_the_oracles_steps_tell_nothing(self):
+        figures = summarize(RECORDS)[0]
+        assert (figures.on_time, figures.on_time_ci95) == (None, None)
+        assert list(figures.means) == ["success_rate", "spl", "spl_grid"]

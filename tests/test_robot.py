@@ -9,17 +9,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mazebench_agents.belief_planner.evidence import NUM_EVIDENCE, SENSED, Readings, add_readings
-from mazebench_agents.navigator.occupancy import Occupancy
 from mazebench_agents.robot import rays
+from mazebench_agents.robot.beams import beams_of
 from mazebench_agents.robot.body import COASTING_TIME, Body
 from mazebench_agents.robot.cells import nearest_cell
+from mazebench_agents.robot.occupancy import Occupancy
 from mazebench_agents.robot.odometry import DeadReckoning
 from mazebench_agents.robot.shortest_paths import cheapest_ways
 
 from mazebench.constants import STEP_TIME
-from mazebench.maps.generators import dfs_walls, obstacles_walls
+from mazebench.maps.kinds.dfs import dfs_walls
+from mazebench.maps.kinds.obstacles import obstacles_walls
 from mazebench.maps.maze import Maze
-from mazebench.world.lidar import Lidar
+from mazebench.world.lidar import Lidar, LidarModel
 
 METRE = np.array([[0, -1], [1, 0]], dtype=np.float32)  # a cell a metre, y up
 BODY_RADIUS = 0.15
@@ -59,8 +61,9 @@ def scans(draw):
 @given(scans())
 def test_evidence_and_occupancy_agree_on_the_cells_that_both_decide(scan):
     maze, pose, ranges = scan
-    occupancy = Occupancy.of_map(np.full(maze.walls.shape, 0.5))
-    occupancy.see(*pose, ranges)
+    occupancy = Occupancy.unseen(maze.size)
+    for _ in range(2):
+        occupancy.see(pose, ranges, beams_of(LidarModel(), 1.0), 0.01)
     evidence = sensed(maze.size, pose, ranges)
     decided = occupancy.is_seen() & (np.abs(evidence) > TOLD_TWICE)
     assert decided.sum() >= 1

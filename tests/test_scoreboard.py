@@ -10,13 +10,14 @@ import pytest
 from made_results import edit_records, edit_summary, make_result, read_summary
 
 from mazebench.errors import InputError
+from mazebench.maps.benchmark import TRACKS_VERSION
 from mazebench.report.scoreboard import BEGIN, END, check, kept_entries, read_entries, to_markdown, write_scoreboard
 from mazebench.results.reading import SUITE
 from mazebench.storage.json_files import write_json
-from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks import tracks_of
 
-PAGE = pathlib.Path(__file__).parent.parent / "docs" / "scoreboard.md"
-PARTS = [(track, level) for track in TRACKS for level in (1, 2, 3)]
+PAGE = pathlib.Path(__file__).parent.parent / "docs" / "scoreboard_v2.md"
+PARTS = [(track, level) for track in tracks_of(TRACKS_VERSION) for level in (1, 2, 3)]
 
 
 def make_part(folder, agent, track, level, successes=200, code="c" * 64, **options):
@@ -27,7 +28,7 @@ def make_part(folder, agent, track, level, successes=200, code="c" * 64, **optio
 
     def edit(record):
         success = record["episode"] < successes
-        lengths = {"path_length": 1.0, "shortest_path": 1.0}
+        lengths = {"path_length": 1.0, "shortest_path": 1.0, "steps": 1}
         return record | lengths | {"success": success, "spl": float(success), "spl_grid": float(success)}
 
     return edit_records(part, edit)
@@ -63,12 +64,13 @@ def suite(tmp_path_factory):
 class TestTable:
     def test_a_row_is_an_agent_and_a_column_a_track_and_level(self, suite):
         head, _, part, whole = rows(read_entries([suite]))
-        assert head == ["agent", "mean", *(f"{track} {level}" for track, level in PARTS), "configurations", "from"]
+        parts = [f"{track} {level}" for track, level in PARTS]
+        assert head == ["agent", "mean", "on time", *parts, "configurations", "from"]
         # In 8 of 12 parts all goals are reached, in 4 half of them.
         assert whole[1].startswith("0.83 [0.")
         assert whole[0] == "whole (privileged)"
-        assert whole[2:] == [*["1.00", "1.00", "0.50"] * 4, "1", "made-up 1.0 cccccccc"]
-        assert part == ["part", *[""] * 4, "0.25", "0.25\\*", *[""] * 7, "2", "made-up 1.0 cccccccc"]
+        assert whole[2:] == ["0.83, 0.83", *["1.00", "1.00", "0.50"] * 4, "1", "made-up 1.0 cccccccc"]
+        assert part == ["part", *[""] * 5, "0.25", "0.25\\*", *[""] * 7, "2", "made-up 1.0 cccccccc"]
 
     def test_a_folder_of_one_agent_gives_one_row(self, suite):
         assert read_entries([suite / "part"]) == read_entries([suite])[:1]

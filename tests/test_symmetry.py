@@ -9,7 +9,7 @@ from mazebench_agents.common.layers import state_features
 from simple_mazes import field
 
 from mazebench.envs.dm_control import Environment
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.context import build_context
 from mazebench.tasks.episode import Episode

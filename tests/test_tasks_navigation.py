@@ -15,7 +15,7 @@ from simple_mazes import field
 
 import mazebench
 from mazebench.envs.dm_control import Environment
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.episode import Episode
 from mazebench.testing import ConformanceError, check_environment

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies
 
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import corner_cells
 from mazebench.options import options_of
 from mazebench.tasks.options import TaskOptions

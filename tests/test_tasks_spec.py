@@ -14,7 +14,7 @@ import pytest
 from simple_mazes import corridor, field
 
 from mazebench.errors import InputError
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import format_maze, parse_maze
 from mazebench.tasks.build import make_spec
@@ -95,8 +95,8 @@ class TestOptions:
     @pytest.mark.parametrize(
         ("options", "message"),
         [
-            ({"task": "locl"}, r"unknown task 'locl'; available: far, hierarchical, local, lost, sketch, stale"),
-            ({"split": "test", "maps": None}, r"unknown split 'test'; available: eval, train"),
+            ({"task": "locl"}, r"unknown task 'locl'; available: adrift, building, far, hierarchical, local, lost"),
+            ({"split": "test", "maps": None}, r"unknown split 'test'; available: dev, eval, train"),
             ({"size": 13.0, "maps": None}, r"expected size of type int \| None, found 13\.0"),
             ({"size": 14, "maps": None}, r"unknown size 14; available: 13, 15, 17, 19, 21"),
             ({"size": 13}, r"expected mazes of size 13, found size 9"),
@@ -128,9 +128,9 @@ class TestOptions:
             (
                 "local",
                 {"level": 2},
-                "level 2: expected a track beside it, found none; tracks: stale, lost, sketch, far",
+                "level 2: expected a track beside it, found none; tracks: building, rebuilt, adrift, rough",
             ),
-            ("local", {"track": "stail"}, "unknown track 'stail'; available: far, lost, sketch, stale"),
+            ("local", {"track": "stail"}, "unknown track 'stail'; available: adrift, building, far"),
             ("lost", {"track": "far"}, "expected one track, found 'lost' and 'far'"),
             ("hierarchical", {"track": "far"}, "track 'far': expected task 'local', found 'hierarchical'"),
             ("far", {"level": 0}, "expected level from 1 to 3, found 0"),

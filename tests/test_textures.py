@@ -8,13 +8,13 @@ import pytest
 from rendering import run_with_egl
 
 from mazebench.maps.benchmark import load_mazes
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, point_to_cell
 from mazebench.world.export import write_mjcf
 from mazebench.world.textures import Face, wall_faces
 
 MAZES = [
-    generate(style, size, np.random.default_rng(size)) for style in ("dfs", "rooms", "obstacles") for size in (5, 15)
+    generate(kind, size, np.random.default_rng(size)) for kind in ("dfs", "rooms", "obstacles") for size in (5, 15)
 ]
 
 

@@ -14,7 +14,7 @@ from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.tasks.build import make_spec
-from mazebench.tasks.tracks.lost import Odometry, corrupted_odometry
+from mazebench.tasks.odometry import Odometry, corrupted_odometry
 
 X, Y, YAW, FORWARD, LEFT, YAW_RATE = 0, 1, 5, 6, 7, 11  # indices in the state
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies
 
-from mazebench.maps.generators import dfs_walls
+from mazebench.maps.kinds.dfs import dfs_walls
 from mazebench.maps.maze import cell_to_point
 from mazebench.tasks.perturbations.base import ShownMap
 from mazebench.tasks.tracks.sketch import (

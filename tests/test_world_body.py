@@ -9,7 +9,7 @@ import pytest
 from simple_mazes import clearance
 
 from mazebench.constants import ACTIONS, STEPS_PER_ACTION
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, point_to_cell
 from mazebench.world.mjcf import BODY_HEIGHT, BODY_RADIUS, action_controls
 from mazebench.world.models import MazeModels
@@ -185,11 +185,11 @@ class TestWalls:
                 batch.step(None, nstep=1)
                 assert clearance(maze.walls, qpos[:, :2]).min() >= BODY_RADIUS - 0.01
 
-    @pytest.mark.parametrize(("style", "size"), [("dfs", 13), ("rooms", 15), ("obstacles", 11)])
-    def test_body_when_acting_at_random_for_thousands_of_steps(self, style, size):
+    @pytest.mark.parametrize(("kind", "size"), [("dfs", 13), ("rooms", 15), ("obstacles", 11)])
+    def test_body_when_acting_at_random_for_thousands_of_steps(self, kind, size):
         num_mazes, num_actions = 8, 105
         rng = np.random.default_rng(size)
-        mazes = [generate(style, size, rng) for _ in range(num_mazes)]
+        mazes = [generate(kind, size, rng) for _ in range(num_mazes)]
         models = MazeModels(mazes)
         num_bodies = 8 * num_mazes
         maze_of_body = np.arange(num_bodies) % num_mazes

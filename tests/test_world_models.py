@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mazebench.constants import ACTIONS, STEPS_PER_ACTION
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 from mazebench.world.export import write_mjcf
@@ -29,9 +29,9 @@ def golden_maze() -> Maze:
 
 
 def mazes(seed: int, count: int = 4) -> list[Maze]:
-    """Of different styles, so that the numbers of their wall boxes differ."""
+    """Of different kinds, so that the numbers of their wall boxes differ."""
     rng = np.random.default_rng(seed)
-    return [generate(style, 13, rng) for style in ("dfs", "rooms", "obstacles", "dfs")[:count]]
+    return [generate(kind, 13, rng) for kind in ("dfs", "rooms", "obstacles", "dfs")[:count]]
 
 
 def fields(struct: object, prefix: str = "") -> Iterator[tuple[str, object]]:
@@ -96,7 +96,7 @@ class TestCopyMaze:
         models = MazeModels(mazes(5, count=2))
         simulation = MujocoSimulation(models[0])
         with simulation.reset_context():
-            simulation.load_maze(models[1])
+            simulation.load_maze(models, 1)
             simulation.data.qpos[:] = models[1].key_qpos[0]
         fresh = MujocoSimulation(models[1])
         for swapped in (simulation, fresh):

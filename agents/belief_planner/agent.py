@@ -13,6 +13,7 @@ import torch
 
 from mazebench.agent import Inputs, Interface, Observation
 from mazebench.maps.maze import cell_to_point, point_to_cell
+from mazebench.world.lidar import LidarModel
 
 from ..common.actor import NetworkAgent, acting
 from ..common.layers import in_batches, state_features
@@ -55,6 +56,7 @@ class BeliefPlanner(NetworkAgent):
     """Drives by a learned policy along shortest paths over a belief of the maze, which evidence revises."""
 
     name: ClassVar[str] = "belief-planner"
+    needs_shown: ClassVar[tuple[str, ...]] = ("map", "goal")
     default_config: ClassVar[BeliefPlannerConfig] = BeliefPlannerConfig()
     learner_class: ClassVar[type[BeliefPlannerLearner]] = BeliefPlannerLearner
     learns_on_gpu = True
@@ -75,6 +77,7 @@ class BeliefPlanner(NetworkAgent):
         self._size = min(self.interface.size, self.interface.context_size)
         # Whether a cell of that map is a metre, so that the position tells the cell.
         self._points_tell = self._size == self.interface.size and self.interface.cell_size == 1.0
+        self._reach = (self.interface.lidar or LidarModel()).max_range  # m
 
     @classmethod
     def make_network(cls, config: BeliefPlannerConfig, context_size: int) -> BeliefPlannerNetwork:
@@ -133,6 +136,7 @@ class BeliefPlanner(NetworkAgent):
             wished=state.wished,
             yaw=observed[:, YAW],
             ranges=inputs.observation.get("lidar", np.zeros((batch_size, 0), dtype=np.float32)),
+            reach=self._reach,
         )
         add_readings(state.evidence, readings, self.network.metre())
 
@@ -196,7 +200,7 @@ class BeliefPlanner(NetworkAgent):
             return cell, 0.0
         if "lidar" in observation and is_odometry(observed):
             cells = starts if len(starts) else np.argwhere(walls <= max(0.5, walls.min()))
-            return find_pose(walls, observation["lidar"][row], cells, self.network.metre())
+            return find_pose(walls, observation["lidar"][row], cells, self.network.metre(), self._reach)
         return starts[0] if len(starts) else np.full(2, (self._size - 1) / 2), 0.0
 
     def _revise(self, rows: np.ndarray, position: np.ndarray, state: ActorState) -> None:

@@ -39,6 +39,7 @@ class Readings(NamedTuple):
     wished: np.ndarray  # [K, 2] float32, the velocity without obstacles; 0 if unknown
     yaw: np.ndarray  # [K] float32, rad
     ranges: np.ndarray  # [K, R] float32, m; R = 0 without lidar
+    reach: float = MAX_RANGE  # m, what a ray reads that meets no wall
 
 
 @compiled
@@ -55,7 +56,7 @@ def add_readings(planes: np.ndarray, readings: Readings, to_map: np.ndarray) -> 
         if _is_on(evidence[SENSED], round(position[0]), round(position[1])):
             _add_body(evidence, position, readings.on_leg[k])
             _add_contacts(evidence, position, readings.velocity[k], readings.wished[k])
-            _add_scan(evidence[SENSED], position, readings.yaw[k], readings.ranges[k], to_map)
+            _add_scan(evidence[SENSED], position, readings.yaw[k], readings.ranges[k], readings.reach, to_map)
 
 
 @inlined
@@ -87,7 +88,9 @@ def _add_contacts(evidence: np.ndarray, position: np.ndarray, velocity: np.ndarr
 
 
 @inlined
-def _add_scan(sensed: np.ndarray, position: np.ndarray, yaw: float, ranges: np.ndarray, to_map: np.ndarray) -> None:
+def _add_scan(
+    sensed: np.ndarray, position: np.ndarray, yaw: float, ranges: np.ndarray, reach: float, to_map: np.ndarray
+) -> None:
     """Adds that the rays of a scan `[R]` pass through free cells and end at walls."""
     for j in range(len(ranges)):
         # The direction on the map, in cells for a metre, then as a unit vector.
@@ -109,7 +112,7 @@ def _add_scan(sensed: np.ndarray, position: np.ndarray, yaw: float, ranges: np.n
                 _move(sensed, row, column, -1.0)
 
         # The cell behind its end is a wall, unless the last point lies in it as well.
-        if ranges[j] < MAX_RANGE:
+        if ranges[j] < reach:
             end = length + _BEHIND
             end_row, end_column = round(position[0] + end * down), round(position[1] + end * right)
             if (end_row != row or end_column != column) and _is_on(sensed, end_row, end_column):

@@ -49,7 +49,7 @@ def make_pictures(
     """
     shown, truth = [], []
     for index, maze in enumerate(sample.maze.tolist()):
-        walls = maps.mazes[maze].walls
+        walls = maps.walls(maze)
         start, goal = (divmod(int(cell[index]), maps.size) for cell in (sample.anchor, sample.goal))
         truth.append(planes_of(walls, goal))
         if sample.shown is not None:

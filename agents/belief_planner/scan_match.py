@@ -22,7 +22,9 @@ def is_odometry(state: np.ndarray) -> bool:
     return not state[[X, Y, YAW]].any()
 
 
-def find_pose(walls: np.ndarray, ranges: np.ndarray, cells: np.ndarray, to_map: np.ndarray) -> tuple[np.ndarray, float]:
+def find_pose(
+    walls: np.ndarray, ranges: np.ndarray, cells: np.ndarray, to_map: np.ndarray, reach: float = MAX_RANGE
+) -> tuple[np.ndarray, float]:
     """Returns the cell `[2]` and the heading (rad) at which a reading of the lidar fits the map best.
 
     Args:
@@ -30,30 +32,33 @@ def find_pose(walls: np.ndarray, ranges: np.ndarray, cells: np.ndarray, to_map: 
       ranges: `[R]` float32, m.
       cells: `[C, 2]` int, in the middle of which the body may be.
       to_map: `[2, 2]` float32, rows and columns (first axis) of a metre in x and in y (second axis).
+      reach: m, what a ray reads that meets no wall.
     """
     step = 2 * math.pi / _HEADINGS
-    index, heading = _best(walls, ranges, cells, to_map, np.arange(_HEADINGS) * step)
+    index, heading = _best(walls, ranges, cells, to_map, np.arange(_HEADINGS) * step, reach)
     finer = heading + np.linspace(-step, step, 2 * _FINER + 1)
-    _, heading = _best(walls, ranges, cells[index : index + 1], to_map, finer)
+    _, heading = _best(walls, ranges, cells[index : index + 1], to_map, finer, reach)
     return cells[index], float(heading)
 
 
 @compiled
 def _best(
-    walls: np.ndarray, ranges: np.ndarray, cells: np.ndarray, to_map: np.ndarray, headings: np.ndarray
+    walls: np.ndarray, ranges: np.ndarray, cells: np.ndarray, to_map: np.ndarray, headings: np.ndarray, reach: float
 ) -> tuple[int, float]:
     """Returns the index of the cell, and the heading, whose rays pass through the least wall and end at the most."""
     best, best_cell, best_heading = -math.inf, 0, 0.0
     for i in range(len(cells)):
         for heading in headings:
-            fit = _fit(walls, ranges, cells[i], to_map, heading)
+            fit = _fit(walls, ranges, cells[i], to_map, heading, reach)
             if fit > best:
                 best, best_cell, best_heading = fit, i, heading
     return best_cell, best_heading
 
 
 @inlined
-def _fit(walls: np.ndarray, ranges: np.ndarray, cell: np.ndarray, to_map: np.ndarray, heading: float) -> float:
+def _fit(
+    walls: np.ndarray, ranges: np.ndarray, cell: np.ndarray, to_map: np.ndarray, heading: float, reach: float
+) -> float:
     """Returns the wall behind the ends of rays, less that on the way to them, in cells; beyond the map is wall."""
     fit = 0.0
     for j in range(len(ranges)):
@@ -64,7 +69,7 @@ def _fit(walls: np.ndarray, ranges: np.ndarray, cell: np.ndarray, to_map: np.nda
         while along < ranges[j]:
             fit -= _SAMPLE * _wall_at(walls, cell[0] + along * down, cell[1] + along * right, 0.0)
             along += _SAMPLE
-        if ranges[j] < MAX_RANGE:
+        if ranges[j] < reach:
             end = ranges[j] + _BEHIND
             fit += _wall_at(walls, cell[0] + end * down, cell[1] + end * right, 1.0)
     return fit

@@ -138,7 +138,7 @@ class Replay:
         self._start = np.zeros(shape, dtype=np.uint16)
         self._anchor = np.zeros(shape, dtype=np.uint16)
         self._goal = np.zeros(shape, dtype=np.uint16)
-        self._maze = np.zeros(shape, dtype=np.uint16)
+        self._maze = np.zeros(shape, dtype=np.uint32)
         self._trajectory = np.full(shape, -1, dtype=np.int64)  # numbers that no two trajectories of a ring share
         self._leg = np.full(shape, -1, dtype=np.int64)  # likewise, of the leg to one goal
         # The row that each environment writes next, counted without wrapping.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 import torch
@@ -17,18 +18,26 @@ from mazebench.tasks.spec import TaskSpec
 from . import symmetry
 from .replay import Sample, SequenceSample
 
+_NUM_KEPT = 2**16  # mazes whose walls are kept, in bits; a million rows of experience have about half as many
+
 
 class TrainingMaps:
     """The maps of a task's mazes; a symmetry of 0 leaves them as they are. `G` is the number of a sample's groups."""
 
     def __init__(self, task: TaskSpec):
         self.mazes = task.mazes
+        self._bits = functools.lru_cache(_NUM_KEPT)(lambda maze: np.packbits(task.mazes[maze].walls))
         self.size = task.size  # N
         self._context_size = task.context_size  # M
 
+    def walls(self, maze: int) -> np.ndarray:
+        """Returns `[N, N]` bool: the walls of the maze with a number."""
+        bits = np.unpackbits(self._bits(maze), count=self.size**2)
+        return bits.astype(bool).reshape(self.size, self.size)
+
     def contexts(self, sample: Sample | SequenceSample, turned: int) -> torch.Tensor:
         """Returns the contexts `[G, 4, M, M]` of a sample's groups, turned by the symmetry `turned`."""
-        shown = [self.mazes[maze].walls for maze in sample.maze] if sample.shown is None else sample.shown
+        shown = map(self.walls, sample.maze.tolist()) if sample.shown is None else sample.shown
         contexts = [
             build_context(walls, divmod(start, self.size), divmod(goal, self.size), self._context_size)
             for walls, start, goal in zip(shown, sample.start.tolist(), sample.goal.tolist(), strict=True)

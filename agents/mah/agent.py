@@ -35,6 +35,7 @@ class ActorState:
 class _MapAgent(NetworkAgent):
     """Acts greedily by a Q-network that gets the context."""
 
+    needs_shown: ClassVar[tuple[str, ...]] = ("map", "goal")
     learner_class: ClassVar[type[DQNLearner]] = DQNLearner
     config: DQNConfig
     network: QNetwork

@@ -38,6 +38,7 @@ class MMN(NetworkAgent):
     """Acts by tree search in a latent model, whose weights a hypermodel generates from the context, once a leg."""
 
     name: ClassVar[str] = "mmn"
+    needs_shown: ClassVar[tuple[str, ...]] = ("map", "goal")
     default_config: ClassVar[MMNConfig] = MMNConfig()
     learner_class: ClassVar[type[MMNLearner]] = MMNLearner
     learns_on_gpu = True

@@ -5,8 +5,7 @@ The point of the maze at a pixel is affine in the pixel plus a Gaussian random f
 
 - `compare` finds how grey pixels should be, blurred by the uncertainty of their points. So far from what is known
   nothing is compared, and the registration grows from the start and the outline inwards.
-- The probability of each cell to be a wall is updated by mean field, from a prior that knows mazes of corridors: cells
-  with odd row and column are rooms, those with even row and column are pillars.
+- The probability of each cell to be a wall is updated by mean field.
 - A Gauss-Newton step moves the points and changes the thickness (Lucas and Kanade 1981; Amit et al. 1991 for the prior
   of modes).
 
@@ -38,7 +37,7 @@ _LARGEST_THICKENING = 0.6  # cells
 _MARKED_POINT = 0.2  # cells, deviation of a cell's centre from the centre of the pixel that marks it
 _MARK_OFF = 0.5  # cells, from which a mark counts less, because it was moved out of a wall
 
-_ROOM, _PILLAR, _DOOR = 0.01, 0.99, 0.4  # prior probabilities of a wall
+_WALL = 0.4  # prior probability of a wall
 _LARGEST_LOG_ODDS = 30.0
 _DAMPING = 0.5  # share of the new log odds in an update; all at once, neighbours would go back and forth
 
@@ -139,13 +138,9 @@ def register(picture: np.ndarray, size: int, anchor: tuple[Cell, np.ndarray] | N
       anchor: a pixel and the point `[2]` in it, if one is known.
     """
     picture = picture.astype(np.float64)
-    corridors, any_style = (
-        [(_corridor_prior(size), schedule) for schedule in _SCHEDULES],
-        (_flat_prior(size), _SCHEDULES[0]),
-    )
     found: list[Registration] = []
-    for prior, schedule in [*(corridors if size % 2 else []), any_style]:
-        found.append(_Fit.begin(picture, prior, anchor).run(schedule))
+    for schedule in _SCHEDULES:
+        found.append(_Fit.begin(picture, size, anchor).run(schedule))
         if found[-1].residual < _SHARP:
             break
     return min(found, key=lambda registration: registration.residual)
@@ -183,12 +178,9 @@ class _Fit:
     anchor: _Anchor | None
 
     @classmethod
-    def begin(cls, picture: np.ndarray, prior: np.ndarray, anchor: tuple[Cell, np.ndarray] | None) -> _Fit:
-        """Returns the fit that lays the maze's inner cells on the box around what is free in the picture.
-
-        `prior` is `[N, N]` float, the log odds of walls.
-        """
-        size = len(prior)
+    def begin(cls, picture: np.ndarray, size: int, anchor: tuple[Cell, np.ndarray] | None) -> _Fit:
+        """Returns the fit that lays the maze's inner cells on the box around what is free in the picture."""
+        prior = np.minimum(special.logit(with_border(np.full((size, size), _WALL))), _LARGEST_LOG_ODDS)
 
         # The box around what is free, and two pixels more.
         free = picture < max(0.5, picture.min() + 0.1)
@@ -207,7 +199,8 @@ class _Fit:
         precision[-1] = 1 / _THICKENING**2
         covariance, own_anchor = np.diag(1 / precision), None
         if anchor is not None:
-            (row, column), point = anchor
+            pixel, point = anchor
+            row, column = np.minimum(np.maximum(pixel, corner), [crop[-1] for crop in crops]).tolist()
             own_anchor = _Anchor((row - corner[0]) * len(crops[1]) + column - corner[1], np.asarray(point))
             hessian = np.diag(precision)
             own_anchor.add_to(hessian, np.zeros(len(precision)), nominal, basis)
@@ -233,9 +226,8 @@ class _Fit:
         residual = float(np.sqrt((differences**2).mean()))
         error = min(_ERROR + _ERROR_SLOPE * max(residual - _SHARP, 0.0), _LARGEST_ERROR)
         walls = (1 - error) * special.expit(self.log_odds) + error * special.expit(self.prior)
-        walls[[0, -1]] = walls[:, [0, -1]] = 1.0
         return Registration(
-            walls=walls,
+            walls=with_border(walls),
             picture=self.picture,
             points=self.points(),
             deviations=np.sqrt(self._variances()),
@@ -288,22 +280,10 @@ class _Fit:
         return differences
 
 
-def _corridor_prior(size: int) -> np.ndarray:
-    """Returns `[N, N]` float: the log odds of walls in mazes of corridors."""
-    walls = np.full((size, size), _DOOR)
-    walls[1::2, 1::2] = _ROOM
-    walls[::2, ::2] = _PILLAR
-    return _with_border(walls)
-
-
-def _flat_prior(size: int) -> np.ndarray:
-    """Returns `[N, N]` float: the log odds of walls in mazes of any style."""
-    return _with_border(np.full((size, size), _DOOR))
-
-
-def _with_border(walls: np.ndarray) -> np.ndarray:
+def with_border(walls: np.ndarray) -> np.ndarray:
+    """Returns `walls` `[N, N]` with 1 at the border, in place."""
     walls[[0, -1]] = walls[:, [0, -1]] = 1.0
-    return np.minimum(special.logit(walls), _LARGEST_LOG_ODDS)
+    return walls
 
 
 def _basis(rows: np.ndarray, columns: np.ndarray, size: int) -> np.ndarray:

@@ -1,86 +1,83 @@
-"""How to get there: aims at the farthest point of the path that the body can reach in a straight line."""
+"""How to get there: the quickest drive through the free cells around the next part of a path.
+
+It is planned a few steps ahead with a model of the body's motion (a dynamic window: Fox, Burgard & Thrun 1997), by the
+same search as the oracle's, with a narrower beam.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
 
-from ..common.kernels import compiled, inlined
+from mazebench.constants import TOP_SPEED
+from mazebench.maps.maze import Cell
 
-# Metres.
-_CLEARANCE = 0.19  # of the body's centre from walls: its radius of 0.15, a contact's margin of 0.03, and a little
-_SPACING = 0.25  # of the points of the path that are tried
-_FARTHEST = 4.0  # along the path
-_NEAREST = 0.75  # along the path, or cells if they are larger; aimed at if no farther point can be reached straight
+from ..robot.body import Body, Point
+from ..robot.quickest import make_course, quickest_drive
 
-
-@compiled
-def aim(
-    blocked: np.ndarray, points: np.ndarray, x: float, y: float, cells_per_metre: float = 1.0
-) -> tuple[float, float]:
-    """Returns the point (x, y) to drive at from (x, y); points are in cells.
-
-    Args:
-      blocked: `[N, N]` bool, the cells to keep clear of.
-      points: `[P, 2]`, the centres of the path's cells; the body is in the first one.
-      x: where the body would come to rest.
-      y: likewise.
-      cells_per_metre: of the map.
-    """
-    if len(points) == 1:
-        return points[0, 0], points[0, 1]
-    length = float(len(points) - 1)
-    nearest = min(_NEAREST * max(cells_per_metre, 1.0), length)
-    along = min(_FARTHEST * cells_per_metre, length)
-    while along > nearest:
-        aim_x, aim_y = _point_along(points, along)
-        if is_clear(blocked, x, y, aim_x, aim_y, _CLEARANCE * cells_per_metre):
-            return aim_x, aim_y
-        along -= _SPACING * cells_per_metre
-    return _point_along(points, nearest)
+_CELLS_AHEAD = 7  # of the path
+_STEPS_AHEAD = 7  # that are planned
+_STEPS_USED = 4  # of them
+_WIDTH = 4  # of the beam, for each heading
+_INSIDE = 0.05  # cells, from the edges of the cell that the body is in
+_FASTEST = 1.1 * TOP_SPEED  # m/s; more is an error of the observation
+_MOST_OFF = 0.08  # m from where the body should be, before the drive is planned anew
 
 
-@inlined
-def _point_along(points: np.ndarray, along: float) -> tuple[float, float]:
-    segment = min(int(along), len(points) - 2)
-    share = along - segment
-    return (
-        points[segment, 0] + share * (points[segment + 1, 0] - points[segment, 0]),
-        points[segment, 1] + share * (points[segment + 1, 1] - points[segment, 1]),
-    )
+@dataclasses.dataclass
+class Drive:
+    """What is left of a drive that was planned."""
+
+    actions: list[int] = dataclasses.field(default_factory=list)
+    points: list[Point] = dataclasses.field(default_factory=list)  # where each action begins, m
+    path: list[Cell] = dataclasses.field(default_factory=list)  # the cells ahead when it was planned
+
+    def next(self, blocked: np.ndarray, path: list[Cell], body: Body, cell_size: float) -> tuple[int, Point]:
+        """Returns the next action, and the point (x, y) that it should bring the body to, in cells.
+
+        Args:
+          blocked: `[L, L]` bool, the cells to keep clear of.
+          path: to follow.
+          body: in cells.
+          cell_size: m.
+        """
+        ahead = path[: _CELLS_AHEAD + 1]
+        x, y = body.x * cell_size, body.y * cell_size
+        if not self.actions or math.dist(self.points[0], (x, y)) > _MOST_OFF or not _continues(self.path, ahead):
+            self._plan(blocked, ahead, body, cell_size)
+        before, after = self.points.pop(0), self.points[0]
+        point = body.x + (after[0] - before[0]) / cell_size, body.y + (after[1] - before[1]) / cell_size
+        return self.actions.pop(0), point
+
+    def _plan(self, blocked: np.ndarray, ahead: list[Cell], body: Body, cell_size: float) -> None:
+        """Plans the drive to the last cell of `ahead` through the free cells around."""
+        # The part of the grid around the path, with walls around it.
+        cells, size = np.array(ahead), len(blocked)
+        top, left = cells.min(axis=0) - 2
+        side = int(np.ptp(cells, axis=0).max()) + 5
+        walls = np.ones((side, side), dtype=bool)
+        rows, columns = (np.arange(max(first + 1, 0), min(first + side - 1, size)) for first in (top, left))
+        walls[np.ix_(rows - top, columns - left)] = blocked[np.ix_(rows, columns)]
+
+        # In metres from its lower left corner. The body is in the first cell, whatever is observed.
+        corner = np.array([left, size - top - side])
+        row, column = ahead[0]
+        first = np.array([column, size - 1 - row])
+        point = np.clip((body.x, body.y), first + _INSIDE, first + 1 - _INSIDE)
+        x, y = ((point - corner) * cell_size).tolist()
+        velocity = np.clip(np.array(body.velocity()) * cell_size, -_FASTEST, _FASTEST).tolist()
+        course = make_course(walls, cell_size, (int(ahead[-1][0] - top), int(ahead[-1][1] - left)))
+        actions, points = quickest_drive(course, (x, y), velocity, body.yaw, _STEPS_AHEAD, _WIDTH)
+        self.actions, self.path = actions[:_STEPS_USED], ahead
+        shift = corner * cell_size
+        self.points = [(body.x * cell_size, body.y * cell_size), *(tuple(shift + each) for each in points)]
 
 
-@compiled
-def is_clear(blocked: np.ndarray, x0: float, y0: float, x1: float, y1: float, clearance: float) -> bool:
-    """Returns whether a disc of radius `clearance` gets from (x0, y0) straight to (x1, y1) past the blocked cells."""
-    size = len(blocked)
-    left, right = math.floor(min(x0, x1) - clearance), math.floor(max(x0, x1) + clearance)
-    bottom, top = math.floor(min(y0, y1) - clearance), math.floor(max(y0, y1) + clearance)
-    for level in range(max(bottom, 0), min(top, size - 1) + 1):
-        for column in range(max(left, 0), min(right, size - 1) + 1):
-            if blocked[size - 1 - level, column] and _meets(x0, y0, x1, y1, column, level, clearance):
-                return False
-    return True
-
-
-@compiled
-def _meets(x0: float, y0: float, x1: float, y1: float, column: int, level: int, clearance: float) -> bool:
-    """Returns whether a segment comes nearer than `clearance` to a cell; `level` is the row counted from below."""
-    # The distance from a convex cell is convex along the segment, so that a search by thirds finds the least one.
-    low, high = 0.0, 1.0
-    for _ in range(12):
-        third = (high - low) / 3
-        if _distance(x0, y0, x1, y1, low + third, column, level) < _distance(
-            x0, y0, x1, y1, high - third, column, level
-        ):
-            high -= third
-        else:
-            low += third
-    return _distance(x0, y0, x1, y1, (low + high) / 2, column, level) < clearance
-
-
-@compiled
-def _distance(x0: float, y0: float, x1: float, y1: float, share: float, column: int, level: int) -> float:
-    x, y = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
-    return math.hypot(max(column - x, 0.0, x - column - 1), max(level - y, 0.0, y - level - 1))
+def _continues(before: list[Cell], ahead: list[Cell]) -> bool:
+    """Returns whether a path goes on as it did before, when the body was in one of its first cells."""
+    if ahead[0] not in before:
+        return False
+    rest = before[before.index(ahead[0]) :]
+    return ahead[: len(rest)] == rest[: len(ahead)]

@@ -1,7 +1,7 @@
 """What a context tells of the maze before the body moves: where walls, start and goal probably are.
 
-A map with a pixel for each cell shows the cells (`cell_map`). One with fewer pixels is explained by doors that are open
-or closed (`coarse_map`). One with more pixels is registered with the maze as a drawing (`drawn_map`).
+A map with a pixel for each cell shows the cells. One with fewer pixels shows shares of wall. One with more pixels is
+registered with the maze as a drawing (`drawn_map`). Planes that are zero tell nothing.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, START
 
 from ..robot.body import Point
 from ..robot.cells import marked_cell, nearest_cell
-from .cell_map import wall_probability
-from .coarse_map import read_coarse_map
-from .drawn_map import register
+from .drawn_map import register, with_border
+
+_ERROR = 0.1  # probability that a cell is shown wrong, before anything was seen
+_UNKNOWN = 0.2  # probability of a wall where no map is shown; less than walls' share, so that unseen ways are tried
 
 
 class MapReading(NamedTuple):
@@ -34,32 +35,44 @@ def read_map(context: np.ndarray, size: int, start_point: Point | None = None) -
     `start_point` is a point (x, y) in the start cell, in cells, if one is known.
     """
     start = None if start_point is None else nearest_cell(*start_point, size)
-    if context.shape[-1] > size:
+    if context.shape[-1] > size and context[GLOBAL_MAP].any():
         return _read_drawing(context, size, start)
-    if context.shape[-1] < size:
-        return _read_coarse(context, size, start)
-    walls = wall_probability(context[GLOBAL_MAP] > 0.5)
-    # Marks are right even where the map shows a wall.
-    inner = (walls < 1).astype(np.float64)
-    return _reading(walls, start, *(_marks(context[plane]) * inner for plane in (START, GOAL)))
 
+    # The shares of wall in pixels, as the probabilities of walls in cells.
+    walls = np.full((size, size), _UNKNOWN)
+    if context[GLOBAL_MAP].any():
+        shares = _overlaps(size, context.shape[-1])
+        shares /= shares.sum(axis=0)
+        walls = _believed(shares.T @ context[GLOBAL_MAP].astype(np.float64) @ shares)
+    if start is not None and context.shape[-1] < size and context[LOCAL_MAP].any():
+        walls = _with_cells_around(walls, context[LOCAL_MAP], start)
+    walls = with_border(walls)
 
-def _read_coarse(context: np.ndarray, size: int, start: Cell | None) -> MapReading:
-    """Reads a map with fewer pixels than cells, on which cell (r, c) is marked at (r M // N, c M // N)."""
-    picture = context[GLOBAL_MAP].astype(np.float64)
-    known = np.full((size, size), np.nan) if start is None else _cells_around(context[LOCAL_MAP], size, start)
-    walls = read_coarse_map(picture, size, known)
+    # Cell (r, c) is marked at (r M // N, c M // N). Marks are right even where the map shows a wall.
     pixels = np.ix_(*[np.arange(size) * context.shape[-1] // size] * 2)
-    return _reading(walls, start, *(_marks(context[plane])[pixels] * (1 - walls) for plane in (START, GOAL)))
+    inner = (walls < 1).astype(np.float64)
+    return _reading(walls, start, *(_marks(context[plane])[pixels] * inner for plane in (START, GOAL)))
 
 
-def _cells_around(crop: np.ndarray, size: int, start: Cell) -> np.ndarray:
-    """Returns `[N, N]` float: the cells of the local map `[M, M]`, whose middle is the start; NaN where it has none."""
-    known = np.full((size, size), np.nan)
-    first = [index - len(crop) // 2 for index in start]
+def _overlaps(size: int, num_pixels: int) -> np.ndarray:
+    """Returns `[M, N]` float: the share of each cell in each pixel along one axis; rows sum to 1."""
+    edges, cells = np.arange(num_pixels + 1) * size / num_pixels, np.arange(size)
+    overlaps = np.minimum(edges[1:, None], cells + 1) - np.maximum(edges[:-1, None], cells)
+    return np.maximum(overlaps, 0.0) * num_pixels / size
+
+
+def _with_cells_around(walls: np.ndarray, crop: np.ndarray, start: Cell) -> np.ndarray:
+    """Returns `walls` with the cells of the local map `crop` `[M, M]`, whose middle is the start."""
+    size, first = len(walls), [index - len(crop) // 2 for index in start]
     (top, bottom), (left, right) = ((max(0, index), min(size, index + len(crop))) for index in first)
-    known[top:bottom, left:right] = crop[top - first[0] : bottom - first[0], left - first[1] : right - first[1]]
-    return known
+    cells = crop[top - first[0] : bottom - first[0], left - first[1] : right - first[1]]
+    walls[top:bottom, left:right] = _believed(cells)
+    return walls
+
+
+def _believed(shown: np.ndarray) -> np.ndarray:
+    """Returns the probabilities of walls where shares of wall in [0, 1] are shown, of which some are wrong."""
+    return _ERROR + (1 - 2 * _ERROR) * np.clip(shown, 0, 1)
 
 
 def _read_drawing(context: np.ndarray, size: int, start: Cell | None) -> MapReading:

@@ -15,7 +15,7 @@ from ..robot.shortest_paths import cheapest_ways
 # Cells: what a try of a cell costs if it turns out to be a wall (Canadian traveller's problem, Papadimitriou &
 # Yannakakis 1991). A try pays if what it saves, times the chance that the cell is free, is more than this times the
 # chance that it is not. So a cell costs 1, and this times the odds of a wall.
-_DETOUR = 2.0
+_DETOUR = 1.0
 _GOAL_DETOUR = 3.0  # cells by which a goal that is half as likely as another must be nearer to be searched before it
 _LARGEST_COST = 1e4  # cells; of a certain wall
 _UNLIKELY = 1e-9  # of the likeliest goal's probability, up to which a goal is too far to be searched on any map
@@ -29,6 +29,14 @@ def plan(walls: np.ndarray, goal: np.ndarray, start: Cell) -> list[Cell]:
       goal: `[N, N]` float, how likely a cell is the goal, not zero everywhere.
       start: the cell of the body.
     """
+    # Outside of the box around what may be free, there is no way.
+    is_open = walls < 1
+    is_open[start] = True
+    rows, columns = (np.flatnonzero(is_open.any(axis=1 - axis)) for axis in (0, 1))
+    top, left = int(rows[0]), int(columns[0])
+    walls, goal = (each[top : rows[-1] + 1, left : columns[-1] + 1] for each in (walls, goal))
+    start = (start[0] - top, start[1] - left)
+
     # Entering a cell costs more the likelier it is a wall.
     odds = walls / np.maximum(1 - walls, 1e-9)
     entering = np.minimum(1 + _DETOUR * odds, _LARGEST_COST)
@@ -39,9 +47,10 @@ def plan(walls: np.ndarray, goal: np.ndarray, start: Cell) -> list[Cell]:
     end[possible] = _GOAL_DETOUR * (goal.max() / goal[possible] - 1)
 
     following = cheapest_ways(entering, np.zeros(walls.shape), end).following
-    size, path = len(walls), [start]
-    index = start[0] * size + start[1]
+    width = walls.shape[1]
+    index = start[0] * width + start[1]
+    path = [index]
     while following[index] != index:
         index = int(following[index])
-        path.append((index // size, index % size))
-    return path
+        path.append(index)
+    return [(top + index // width, left + index % width) for index in path]

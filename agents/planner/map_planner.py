@@ -17,6 +17,8 @@ from ..robot.cells import marked_cell
 class MapPlanner(Agent):
     """The base of agents that plan on the cells of the shown map."""
 
+    needs_shown = ("map", "goal")
+
     def __init__(self, cells_per_metre: float = 1.0):
         self._cells_per_metre = cells_per_metre  # of the map that the context shows
 

@@ -1,51 +1,70 @@
-"""The oracle: what a controller reaches that knows the true maze and its true pose."""
+"""The oracle: what a driver reaches that knows the true maze, its true pose and how the body moves."""
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import pathlib
 from typing import Self
 
 import numpy as np
 
 from mazebench.agent import Agent, Inputs, Interface
-from mazebench.maps.maze import path_through_walls
 
-from ..robot.body import observed_body
-from ..robot.cells import nearest_cell
-from ..robot.pilot import Pilot
+from ..robot.body import Point
+from ..robot.motion import moved
+from ..robot.quickest import Course, make_course, quickest_drive
+
+_MAX_OFF = 0.1  # m from where the drive should be, before it is planned anew
+
+
+@dataclasses.dataclass
+class _Drive:
+    """What is left of a drive in one environment."""
+
+    course: Course
+    actions: list[int] = dataclasses.field(default_factory=list)
+    velocity: Point = (0.0, 0.0)  # x, y (m/s); an episode begins at rest
+    points: list[Point] = dataclasses.field(default_factory=list)  # where each action begins
 
 
 class Oracle(Agent):
-    """Pure pursuit of the shortest path on the true walls, from the true pose to the goal; it ignores landmarks."""
+    """The quickest drive on the true walls, from the true pose to the goal; it ignores landmarks."""
 
     needs_truth = True
 
-    def __init__(self, cells_per_metre: float = 1.0):
-        self._cells_per_metre = cells_per_metre
+    def __init__(self, cell_size: float = 1.0):
+        self._cell_size = cell_size
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
-        """Returns an oracle for the scale of the mazes."""
-        return cls(1 / interface.cell_size)
+        """Returns an oracle for the width of the mazes' cells."""
+        return cls(interface.cell_size)
 
-    def initial_state(self, batch_size: int) -> list[Pilot]:
-        """Returns pilots that `act` replaces where an episode begins."""
-        return [Pilot([]) for _ in range(batch_size)]
+    def initial_state(self, batch_size: int) -> list[_Drive | None]:
+        """Returns nothing yet: a drive begins with an episode."""
+        return [None] * batch_size
 
-    def act(self, inputs: Inputs, state: list[Pilot], explore: bool = False) -> tuple[np.ndarray, list[Pilot]]:
-        """Returns actions `[B]`, planned for one environment after the other."""
+    def act(
+        self, inputs: Inputs, state: list[_Drive | None], explore: bool = False
+    ) -> tuple[np.ndarray, list[_Drive | None]]:
+        """Returns actions `[B]`, planned for one environment after the other where an episode begins."""
         truth = inputs.truth
         assert truth is not None, "an evaluation gives the truth to a class that declares needs_truth"
-        size = truth.walls.shape[-1]
-        poses = (truth.pose * [self._cells_per_metre, self._cells_per_metre, 1.0]).tolist()
-        for slot in np.flatnonzero(inputs.new_context).tolist():
-            x, y, _ = poses[slot]
-            row, column = truth.goal[slot].tolist()
-            path = path_through_walls(truth.walls[slot], nearest_cell(x, y, size), (row, column))
-            state[slot] = Pilot.along(path, size, self._cells_per_metre)
         actions = np.zeros(len(state), dtype=np.int64)
-        for slot, values in enumerate(inputs.observation["state"].tolist()):
-            x, y, yaw = poses[slot]
-            body = observed_body(values, self._cells_per_metre)
-            actions[slot] = state[slot].action(body._replace(x=x, y=y, yaw=yaw))
+        running = np.ones(len(state), dtype=bool) if inputs.active is None else inputs.active
+        for slot in np.flatnonzero(running).tolist():
+            x, y, yaw = truth.pose[slot].tolist()
+            drive = state[slot]
+            if drive is None or inputs.new_episode[slot]:
+                row, column = truth.goal[slot].tolist()
+                drive = state[slot] = _Drive(make_course(truth.walls[slot], self._cell_size, (row, column)))
+            if not drive.actions or math.dist(drive.points[0], (x, y)) > _MAX_OFF:
+                drive.actions, points = quickest_drive(drive.course, (x, y), drive.velocity, yaw)
+                drive.points = [(x, y), *points]
+            actions[slot] = action = drive.actions.pop(0)
+            drive.points.pop(0)
+            # Computed, and not observed: what is observed may be wrong.
+            *_, vx, vy = moved(drive.course.walls, self._cell_size, x, y, *drive.velocity, yaw, action)
+            drive.velocity = vx, vy
         return actions, state

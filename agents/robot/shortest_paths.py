@@ -1,6 +1,6 @@
 """Cheapest paths on a grid, by Dijkstra's algorithm.
 
-`N` is the number of cells on a side; cell (row, column) has the index row * N + column.
+A grid has `N` x `N` cells, or `N` x `W`; cell (row, column) has the index row * W + column.
 """
 
 from __future__ import annotations
@@ -33,27 +33,27 @@ def cheapest_ways(entering: np.ndarray, leaving: np.ndarray, end: np.ndarray) ->
       leaving: `[N, N]` float, the costs of leaving it; one of both is more than 0.
       end: `[N, N]` float, what it costs if the way ends in a cell; infinite where none does.
     """
-    size = len(end)
+    height, width = end.shape
     least = end.copy()
-    following = np.arange(size * size).astype(np.int32)
-    order = np.empty(size * size, np.int32)
+    following = np.arange(end.size).astype(np.int32)
+    order = np.empty(end.size, np.int32)
     num_done = 0
 
     # The search begins at the ends. What is popped is settled, so that cells come from near to far.
-    queue = [(least[cell // size, cell % size], cell) for cell in range(size * size)]
+    queue = [(least[cell // width, cell % width], cell) for cell in range(end.size)]
     heapq.heapify(queue)
-    while queue and num_done < size * size:  # costs that are no numbers would be popped again and again
+    while queue and num_done < end.size:  # costs that are no numbers would be popped again and again
         near, cell = heapq.heappop(queue)
-        row, column = cell // size, cell % size
+        row, column = cell // width, cell % width
         if near > least[row, column]:
             continue  # a cheaper way was found after this one
         order[num_done] = cell
         num_done += 1
         for down, right in ((-1, 0), (0, -1), (1, 0), (0, 1)):
             r, c = row + down, column + right
-            if 0 <= r < size and 0 <= c < size:
+            if 0 <= r < height and 0 <= c < width:
                 through = near + entering[row, column] + leaving[r, c]
                 if through < least[r, c]:
-                    least[r, c], following[r * size + c] = through, cell
-                    heapq.heappush(queue, (through, r * size + c))
+                    least[r, c], following[r * width + c] = through, cell
+                    heapq.heappush(queue, (through, r * width + c))
     return Ways(least, following, order)

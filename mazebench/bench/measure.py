@@ -26,7 +26,7 @@ from mazebench.constants import ACTIONS, STEPS_PER_ACTION
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.options import TRAIN_DISTANCES
 from mazebench.tasks.spec import TaskSpec
@@ -39,6 +39,7 @@ from mazebench.world.models import models_of
 _SIZES = (13, 21, 51, 101)
 _NUM_ENVS = (1, 16, 256, 1024, 4096)
 _LIDAR_NUM_ENVS = (1, 16, 256)
+_NOISE = "turtlebot3"
 _MAZES_PER_SIZE = 8
 _PICTURE_ENVS = 16
 _TITLES = {
@@ -86,7 +87,10 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
     say("pictures")
     results["pictures"] = _picture_rows(spec, seconds * rounds)
     say("the range sensor")
-    results["lidar"] = [_lidar_row(spec, num_envs, seconds, rounds) for num_envs in _LIDAR_NUM_ENVS]
+    results["lidar"] = [
+        _lidar_row(spec, num_envs, noise, seconds, rounds)
+        for num_envs, noise in [*((num_envs, None) for num_envs in _LIDAR_NUM_ENVS), (_LIDAR_NUM_ENVS[-1], _NOISE)]
+    ]
     say("cost against size")
     results["sizes"] = [_size_row(size, seconds, rounds) for size in _SIZES]
     say("cost against the number of environments")
@@ -285,7 +289,7 @@ def _resets(spec: TaskSpec, count: int) -> list[dict[str, Any]]:
     """Milliseconds a reset; models are compiled before, as after the first episodes of a run."""
     _compile(spec)
     env = MazeEnv(spec, 0)
-    one_maze = MazeEnv(dataclasses.replace(spec, mazes=spec.mazes[:1]), 0)
+    one_maze = MazeEnv(dataclasses.replace(spec, mazes=spec.fixed_mazes[:1]), 0)
     envs = MazeVectorEnv(spec, 256, seed=0)
     rows = [
         ("Gymnasium, another maze", _milliseconds(lambda: env.reset(), count)),
@@ -325,10 +329,11 @@ def _picture_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
     return rows
 
 
-def _lidar_row(spec: TaskSpec, num_envs: int, seconds: float, rounds: int) -> dict[str, Any]:
+def _lidar_row(spec: TaskSpec, num_envs: int, noise: str | None, seconds: float, rounds: int) -> dict[str, Any]:
     """Returns the speed of the vector environment with the range sensor, beside a simulation that observes nothing."""
-    sensing = dataclasses.replace(spec, sensors=("lidar",))
-    return _ratio(f"{num_envs} environments", num_envs, *_vector_pair(sensing, num_envs, 0), seconds, rounds)
+    sensing = dataclasses.replace(spec, sensors=("lidar",), lidar_noise=noise)
+    what = f"{num_envs} environments" + ("" if noise is None else f", noise of {noise}")
+    return _ratio(what, num_envs, *_vector_pair(sensing, num_envs, 0), seconds, rounds)
 
 
 def _milliseconds(call: Callable[[], Any], count: int) -> float:

@@ -35,8 +35,9 @@ def evaluate(
     suite: Annotated[
         str | None,
         typer.Option(
-            help="Evaluations by name instead: paper, the whole protocol; quick, minutes of it; or tracks, every track "
-            "at all levels."
+            help="Evaluations by name instead: paper, the whole protocol; quick, minutes of it; tracks, every track of "
+            "v2 at all levels; v3, those of v3; or what these are measured against: v3-no-map, hiding the map, "
+            "v3-no-goal, the goal too, v3-true-pose, with the true pose where it is lost."
         ),
     ] = None,
     out: Annotated[

@@ -23,7 +23,7 @@ def generate(
     ] = None,
     count: Annotated[int, typer.Option(min=1, help="How many mazes.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same mazes.")] = 0,
-    style: Annotated[str, typer.Option(help="Of the layout: dfs, rooms, obstacles (see `mazebench list`).")] = "dfs",
+    kind: Annotated[str, typer.Option(help="Of the layout: dfs, house, rooms ... (see `mazebench list`).")] = "dfs",
     out: Annotated[pathlib.Path, typer.Option(help="Folder to fill with NAME.txt, NAME.xml, ...")] = pathlib.Path(
         "mazes"
     ),
@@ -45,8 +45,8 @@ def generate(
     from mazebench.storage.locks import FolderLock
     from mazebench.world.formats import make_mazes, parse_formats, write_maze
 
-    refuse_ignored(context, (from_image is not None, "the map shows one maze", ("count", "seed", "style")))
-    mazes = make_mazes(size, count, seed, style, from_image, MapOptions(**values))
+    refuse_ignored(context, (from_image is not None, "the map shows one maze", ("count", "seed", "kind")))
+    mazes = make_mazes(size, count, seed, kind, from_image, MapOptions(**values))
     chosen = parse_formats(formats)
     with ExitStack() as opened:
         for index, placed in enumerate(mazes):

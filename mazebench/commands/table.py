@@ -2,33 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from rich import box
 from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
+from mazebench.constants import ON_TIME
 from mazebench.results.comparison import Row
+from mazebench.results.metrics import ON_TIME_METRICS
 from mazebench.results.paper import printed_mmn
 from mazebench.results.records import Figures, Summary
 
 _NAME_CHARACTERS = 12  # in a line, at least, before a name is wrapped
 _ANY_WIDTH = 10_000
+_HEAD = ("n", "success rate", "on time", "SPL", "SPL by grid")
+_NOTE = f"on time: within {' and '.join(f'{k:g}' for k in ON_TIME)} times the oracle's steps"
+_ON_TIME, _NAME_OF_ON_TIME = next((metric, f"on time {k:g}") for metric, k in ON_TIME_METRICS.items())
 
 
 def print_summary(summary: Summary) -> None:
-    """Prints success rate, SPL and SPL by grid distance with their 95 % intervals, by distance for local episodes.
+    """Prints success rate and SPL with their 95 % intervals, on time and SPL by grid, by distance for local episodes.
 
     What the paper's MMN reached stands beside it where it can be compared.
     """
-    agent = f"{summary.agent} (privileged)" if summary.privileged else summary.agent
     task = f"{summary.track} {summary.level}" if summary.track else summary.task
     scale = "" if summary.cell_size is None else f" cells of {summary.cell_size:g} m"
-    title = f"{agent}: {task}, {summary.split} mazes {summary.size} x {summary.size}{scale}"
-    perturbed = ", ".join(f"{name} {value}" for name, value in summary.perturbation.items() if value)
+    title = f"{summary.who}: {task}, {summary.split} mazes {summary.size} x {summary.size}{scale}"
+    perturbations = [f"{name} {value}" for name, value in summary.perturbation.items() if value]
+    perturbed = ", ".join([*perturbations, *summary.senses])
     paper = printed_mmn(summary)
-    head = ["n", "success rate", *["paper"] * bool(paper), "SPL", "SPL by grid"]
+    head = ["n", "success rate", *["paper"] * bool(paper), *_HEAD[2:]]
     totals = []
     if summary.task == "local":
         head = ["distance", *head]
@@ -38,31 +43,26 @@ def print_summary(summary: Summary) -> None:
         ]
     else:
         rows = [_with_paper(summary.overall, paper, summary.provenance.options.landmark_distance)]
-    print_table(f"{title}{', ' + perturbed if perturbed else ''}", head, rows, totals)
-    if summary.overall.spl_relative is not None:
-        print(f"SPL relative to the oracle's: {summary.overall.spl_relative:.2f}")
+    print_table(f"{title}{', ' + perturbed if perturbed else ''}", head, rows, totals, narrow=True)
+    print(_NOTE)
     if paper:
         print("paper: success rate of the paper's MMN, in DeepMind Lab")
 
 
 def print_suite(summaries: Sequence[Summary]) -> None:
     """Prints the overall figures of a suite's parts, one table an agent."""
-    for agent in dict.fromkeys(summary.agent for summary in summaries):
-        rows = []
-        for summary in summaries:
-            if summary.agent == agent:
-                overall = summary.overall
-                relative = "" if overall.spl_relative is None else f"{overall.spl_relative:.2f}"
-                rows.append([str(summary.part), *_cells(overall)[:-1], f"{overall.spl_grid:.2f}", relative])
-        head = ("part", "n", "success rate", "SPL", "SPL by grid", "relative")
-        print_table(f"{agent}: suite {summaries[0].suite}", head, rows, narrow=True)
-    print("relative: SPL divided by the oracle's on the same episodes")
+    for agent in dict.fromkeys(summary.who for summary in summaries):
+        rows = [[str(summary.part), *_cells(summary.overall)] for summary in summaries if summary.who == agent]
+        print_table(f"{agent}: suite {summaries[0].suite}", ("part", *_HEAD), rows, narrow=True)
+    print(_NOTE)
 
 
 def print_comparison(title: str, name: str, rows: Mapping[str, Row]) -> None:
     """Prints what A has more than B, with 95 % intervals; the keys of `rows` go in the column `name`."""
-    head = (name, "A", "B", "A - B, success rate", "A - B, SPL", "A wins")
-    cells = [[key, *_comparison_cells(row)] for key, row in rows.items()]
+    has_on_time = all(_ON_TIME in row.metrics for row in rows.values())
+    metrics = {"success_rate": "success rate", **({_ON_TIME: _NAME_OF_ON_TIME} if has_on_time else {}), "spl": "SPL"}
+    head = (name, "A", "B", *(f"A - B, {metric}" for metric in metrics.values()), "A wins")
+    cells = [[key, *_comparison_cells(row, metrics)] for key, row in rows.items()]
     print_table(title, head, cells, narrow=True)
 
 
@@ -106,9 +106,9 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]], num_totals: int, 
     return table
 
 
-def _comparison_cells(row: Row) -> list[str]:
+def _comparison_cells(row: Row, metrics: Iterable[str]) -> list[str]:
     cells = [f"{row.metrics['success_rate'].a:.2f}", f"{row.metrics['success_rate'].b:.2f}"]
-    for metric in ("success_rate", "spl"):
+    for metric in metrics:
         difference = row.metrics[metric].difference
         cells.append(f"{difference.value:+.2f} [{difference.low:+.2f}, {difference.high:+.2f}]")
     return [*cells, f"{row.win_share.value:.2f}"]
@@ -122,8 +122,10 @@ def _with_paper(row: Figures, paper: Mapping[int, float], distance: int = 0) -> 
 
 
 def _cells(row: Figures) -> list[str]:
-    cells = [str(row.n)]
-    for key in ("success_rate", "spl", "spl_grid"):
-        low, high = getattr(row, f"{key}_ci95")
-        cells.append(f"{getattr(row, key):.2f} [{low:.2f}, {high:.2f}]")
-    return cells
+    """Cells of a row below `_HEAD`."""
+    success_rate, spl = (
+        f"{value:.2f} [{low:.2f}, {high:.2f}]"
+        for value, (low, high) in ((row.success_rate, row.success_rate_ci95), (row.spl, row.spl_ci95))
+    )
+    on_time = "-" if row.on_time is None else ", ".join(f"{share:.2f}" for share in row.on_time.values())
+    return [str(row.n), success_rate, on_time, spl, f"{row.spl_grid:.2f}"]

@@ -28,7 +28,7 @@ def train(
     values: dict[str, Any],
     out: Annotated[
         pathlib.Path | None,
-        typer.Option(help="The run folder; runs/AGENT-SIZE-SEED or runs/AGENT-TRACK-LEVEL-SEED if not given."),
+        typer.Option(help="The run folder; runs/AGENT-[KINDS-]SIZE-SEED or runs/AGENT-TRACK-LEVEL-SEED if not given."),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint in --out.")] = False,
     overrides: Annotated[
@@ -36,7 +36,7 @@ def train(
         typer.Option("--set", metavar="KEY=VALUE", help="A value of the agent's config; repeatable."),
     ] = None,
 ) -> None:
-    """Train an agent on the benchmark's training mazes; evaluated now and then on held-out mazes of the same kind."""
+    """Train an agent, on the benchmark's training mazes or others; evaluated on held-out mazes of the same kinds."""
     load_mujoco(renders=has_camera(values["sensors"]))
     from mazebench.training import loop, run_folder
 
@@ -64,8 +64,12 @@ def train(
 
 def _folder_name(options: TrainOptions) -> str:
     track, level = options.task.track, options.task.level
-    where = options.size or SIZES[0] if track is None else "-".join(map(str, (track, *level)))
-    return f"{options.agent.replace(':', '-')}-{where}-{options.seed}"
+    mazes = options.mazes
+    parts = [options.agent.replace(":", "-"), *mazes.kinds, *(["fresh"] if mazes.fresh else [])]
+    if mazes.maps is not None:
+        parts.append(pathlib.Path(mazes.maps).stem)
+    parts += [str(mazes.size or SIZES[0])] if track is None else [track, *map(str, level)]
+    return "-".join([*parts, str(options.seed)])
 
 
 def _parse_override(text: str) -> tuple[str, str]:

@@ -34,7 +34,7 @@ class JsonSpec:
         if spec is not None:
             kwargs = {name: _plain(value) for name, value in spec.kwargs.items()}
             if not isinstance(kwargs.get("maps"), str | None):  # else a path, or none
-                kwargs["maps"] = [_describe(maze) for maze in self.task_spec.mazes]
+                kwargs["maps"] = [_describe(maze) for maze in self.task_spec.fixed_mazes]
             spec = dataclasses.replace(spec, kwargs=kwargs)
         self._spec = spec
 

@@ -43,6 +43,8 @@ class GoalMazeEnv(MazeEnv):
             raise InputError("expected the local task with one goal for a goal-conditioned environment, found several")
         if task_spec.track is not None:  # which may hide where the body is, and has time limits of its own
             raise InputError(f"expected no track for a goal-conditioned environment, found {task_spec.track!r}")
+        if task_spec.hide:  # the goals would tell what is hidden
+            raise InputError(f"expected nothing hidden for a goal-conditioned environment, found {task_spec.hide}")
         super().__init__(task_spec, seed, render_mode, camera)
         side, num_values = task_spec.mazes[0].side, STATE_SIZE + len(_SHOWN_PLANES) * task_spec.context_size**2
         sensed = {name: spaces.observation_space(task_spec)[name] for name in task_spec.sensors}

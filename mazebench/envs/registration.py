@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
-from mazebench.constants import BENCHMARK_SIZES, TASK_VERSION, TRACKS_VERSION
+from mazebench.constants import BENCHMARK_SIZES, KINDS_VERSION, TASK_VERSION, TRACKS_VERSION
 from mazebench.errors import InputError
 from mazebench.world.backend import load_mujoco, loading_backend
 
@@ -25,14 +25,18 @@ if TYPE_CHECKING:
     from mazebench.tasks.spec import TaskSpec
 
 _TASKS = {"Local": "local", "Hierarchical": "hierarchical"}
-# Tracks by title and size, with the level that is played if none is given. `TRACKS` has the same ones; it is not read
-# here because `import mazebench` should load little.
+# Tracks by title, size and version, with the level that is played if none is given. `TRACKS` has the same ones; it is
+# not read here because `import mazebench` should load little.
 _TRACKS = {
-    ("Stale", 13): 1,
-    ("Lost", 13): 1,
-    ("Sketch", 13): 1,
-    ("Far", 31): 1,
-    ("Far", 51): 2,
+    ("Building", 31, KINDS_VERSION): 1,
+    ("Rebuilt", 31, KINDS_VERSION): 1,
+    ("Adrift", 31, KINDS_VERSION): 1,
+    ("Rough", 31, KINDS_VERSION): 1,
+    ("Stale", 13, TRACKS_VERSION): 1,
+    ("Lost", 13, TRACKS_VERSION): 1,
+    ("Sketch", 13, TRACKS_VERSION): 1,
+    ("Far", 31, TRACKS_VERSION): 1,
+    ("Far", 51, TRACKS_VERSION): 2,
 }
 _ID_SIZE = "id_size"  # the keyword of an id's size, apart from the `size` that a user gives
 _SINGLE = ("seed", "render_mode", "camera")  # what a single environment takes besides its task's options
@@ -49,8 +53,8 @@ def register_environments() -> None:
         for size in BENCHMARK_SIZES:
             env_id = f"mazebench/{title}-{size}-v{TASK_VERSION}"
             _register(env_id, {"task": task, _ID_SIZE: size})
-    for (title, size), level in _TRACKS.items():
-        env_id = f"mazebench/{title}-{size}-v{TRACKS_VERSION}"
+    for (title, size, version), level in _TRACKS.items():
+        env_id = f"mazebench/{title}-{size}-v{version}"
         _register(env_id, {"task": title.lower(), _ID_SIZE: size, "level": level})
     for size in BENCHMARK_SIZES:
         env_id = f"mazebench/LocalGoal-{size}-v{TASK_VERSION}"

@@ -24,7 +24,7 @@ from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_actions, controls
 from mazebench.tasks.arguments import Arguments, require_task_spec
 from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode, sample_episode
-from mazebench.tasks.observation import OpenSensors, state_errors
+from mazebench.tasks.observation import OpenSensors, lidar_noise, observation_specs, state_errors
 from mazebench.tasks.perturbations.base import ShownMap, StateError
 from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.sensors.base import Worlds
@@ -111,7 +111,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
         # The simulation, with views of its arrays, and the sensors.
         self._maze_models = models_of(task_spec.mazes)
-        self._models = [self._maze_models[0]] * num_envs
+        self._models = self._maze_models.first_models(num_envs)
         self._process = os.getpid()
         self._batch = open_batch(self._maze_models[0], num_envs, arguments.num_threads)
         self._sensordata = self._batch.bind("sensordata")
@@ -133,6 +133,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._routes: list[Route | None] = [None] * num_envs
         self._shown: list[ShownMap | None] = [None] * num_envs
         self._state_errors: list[list[StateError]] = [[] for _ in range(num_envs)]
+        self._lidar_noise: list[np.random.Generator | None] = [None] * num_envs
         self._context = np.zeros((num_envs, NUM_PLANES, size, size), dtype=np.float32)
         self._positions = np.zeros((num_envs, 2))
         self._path_length = np.zeros(num_envs)
@@ -146,7 +147,12 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._maze = np.zeros(num_envs, dtype=np.int64)
         self._active = np.zeros(num_envs, dtype=bool)  # whether the environment has an episode
         self._ended = np.zeros(num_envs, dtype=bool)  # whether the episode is over and the next one has yet to begin
-        self._states = np.zeros((num_envs, STATE_SIZE), dtype=np.float32)  # as observed last
+        # As observed last: the states, and [B, ...] by sensor.
+        self._states = np.zeros((num_envs, STATE_SIZE), dtype=np.float32)
+        specs = observation_specs(self.task_spec)
+        self._sensed = {
+            name: np.zeros((num_envs, *specs[name].shape), specs[name].dtype) for name in self.task_spec.sensors
+        }
 
     def reset(
         self, *, seed: Seeds = None, options: dict[str, Any] | None = None
@@ -282,16 +288,15 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         # What was observed last, and the infos of then: those of the ended environments only.
         indices = np.flatnonzero(ended)
         final_obs = np.full(self.num_envs, None, dtype=object)
-        sensed = self._sense(indices)
-        for index, i in enumerate(indices):
-            final_obs[i] = {"state": self._states[i].copy(), "context": self._context[i].copy()}
-            final_obs[i] |= {name: values[index] for name, values in sensed.items()}
+        for i in indices:
+            final_obs[i] = {name: values[i].copy() for name, values in self._observed().items()}
         final_info = {key: value if key.startswith("_") else value.copy() for key, value in infos.items()}
         final_info.update({key: ended for key in infos if key.startswith("_")})
 
         # The next episodes, and the infos of now.
         began = self._begin_episodes(indices)
-        self._observe(began)
+        if len(began):
+            self._observe(began)
         is_first = infos["is_first"]
         is_first[began] = True
         infos = self._infos(is_first, success=infos["success"] & ~ended)
@@ -312,7 +317,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
         # Change the mazes, reset the simulations, place the bodies, and compute what follows from that.
         for i in began:
-            self._models[i] = self._maze_models[self._episode(i).maze]
+            self._models[i] = self._maze_models.replaced(self._models[i], self._episode(i).maze)
         self._batch.set_models(self._models)
         self._batch.reset(began, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
         for i in began:
@@ -326,6 +331,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._shown[i] = shown
         self._routes[i] = plan_route(spec, episode, shown)
         self._state_errors[i] = state_errors(spec, episode)
+        self._lidar_noise[i] = lidar_noise(spec, episode)
         self._maze[i] = episode.maze
         self._positions[i] = spec.mazes[episode.maze].point(episode.start)
         self._qpos[i] = (*self._positions[i], episode.yaw)
@@ -348,7 +354,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         return cell[0] * self.task_spec.size + cell[1]
 
     def _observe(self, indices: np.ndarray | slice) -> None:
-        """Takes over into `_states` the states of the environments `indices`, as their agents observe them."""
+        """Takes over what the agents of the environments `indices` observe; noise is drawn anew with each call."""
         states = states_from_sensors(self._sensordata[indices])
         if any(self._state_errors):
             for state, i in zip(states, np.arange(self.num_envs)[indices], strict=True):
@@ -356,13 +362,23 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
                     add_error(state)
         self._states[indices] = states
 
-    def _observations(self) -> dict[str, np.ndarray]:
-        return {"state": self._states.copy(), "context": self._context.copy(), **self._sense(slice(None))}
+        # What the sensors read.
+        slots = np.arange(self.num_envs)[indices].tolist()
+        worlds = Worlds(
+            maze=self._maze[indices],
+            pose=self._qpos[indices],
+            marker=self._marker[indices, 0],
+            noise=[self._lidar_noise[i] if self._active[i] else None for i in slots],
+        )
+        for name, values in self._sensors.read(worlds).items():
+            self._sensed[name][indices] = values
 
-    def _sense(self, indices: np.ndarray | slice) -> dict[str, np.ndarray]:
-        """Returns `[K, ...]` by sensor: what the environments `indices` observe with it."""
-        worlds = Worlds(maze=self._maze[indices], pose=self._qpos[indices], marker=self._marker[indices, 0])
-        return self._sensors.read(worlds)
+    def _observed(self) -> dict[str, np.ndarray]:
+        """Returns `[B, ...]` by name: what was observed last, not copied."""
+        return {"state": self._states, "context": self._context, **self._sensed}
+
+    def _observations(self) -> dict[str, np.ndarray]:
+        return {name: values.copy() for name, values in self._observed().items()}
 
     def _infos(self, is_first: np.ndarray, success: np.ndarray, mask: np.ndarray | None = None) -> dict[str, Any]:
         """Returns the infos; `mask` (`[B]` bool) says of which environments they are, of all by default."""

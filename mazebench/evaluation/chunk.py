@@ -197,9 +197,9 @@ def _to_record(plan: Plan, outcome: Outcome) -> Record:
     return Record.model_validate(plan.labels | values | plan.levels | _facts(plan.task, episode))
 
 
-def _facts(task: TaskSpec, episode: Episode) -> dict[str, bool]:
+def _facts(task: TaskSpec, episode: Episode) -> dict[str, bool | str]:
     """Returns what the task's track says of an episode."""
     if task.track is None:
         return {}
-    walls, shown = task.mazes[episode.maze].walls, show_map(task, episode)
-    return TRACKS[task.track].facts(walls, shown, (episode.start, episode.goal))
+    shown = show_map(task, episode)
+    return TRACKS[task.track].facts(task.mazes[episode.maze], shown, (episode.start, episode.goal))

@@ -14,6 +14,7 @@ from mazebench.agent_loading import checked_agent_class, load_agent_class
 from mazebench.errors import InputError, remark
 from mazebench.evaluation.chunk import Chunk
 from mazebench.evaluation.options import NUM_ENVS, EvalOptions, RunOptions
+from mazebench.evaluation.oracle import ORACLE, measure_oracle_steps
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import Pool, open_pool
 from mazebench.evaluation.store import Store, check_same_run, is_finished, load_finished
@@ -118,13 +119,19 @@ def run_plan(
         return summary
     with Store(folder, plan, resume=run.resume, record=record) as store:
         progress(store.num_ended, num_trials)
+        is_oracle = plan.options.agent == ORACLE
+        if store.oracle_steps is None and (plan.oracle_steps or not is_oracle):
+            _keep_oracle_steps(plan, store, run.num_envs)
         for ended in pool.run(_cut(plan, store, pool, run.num_envs)):
             stopping.check()
             store.append(ended)
             progress(store.num_ended, num_trials)
-        overall, by_distance = metrics.summarize(store.records, plan.oracle_spl)
+        if store.oracle_steps is None and is_oracle:
+            store.keep_oracle_steps([each.steps if each.success else None for each in store.records])
+        overall, by_distance = metrics.summarize(store.records, store.oracle_steps)
         summary = Summary(
             **plan.labels,
+            **plan.conditions,
             privileged=plan.agent_class.needs_truth,
             untrained_scale=plan.untrained_scale,
             suite=suite,
@@ -135,10 +142,22 @@ def run_plan(
             provenance=plan.provenance,
             overall=overall,
             by_distance=by_distance,
-            by_fact=metrics.summarize_facts(store.records, plan.oracle_spl),
+            by_fact=metrics.summarize_facts(store.records, store.oracle_steps),
         )
         store.finish(summary)
     return summary
+
+
+def _keep_oracle_steps(plan: Plan, store: Store, num_envs: int) -> None:
+    """Puts the oracle's steps into the store: the frozen ones, else those of a run of its own."""
+    steps = plan.oracle_steps
+    if steps is None:
+        try:
+            steps = measure_oracle_steps(plan.task, plan.trials, num_envs)
+        except InputError as error:  # the oracle is not installed
+            remark(f"no episode is on time, since the oracle can't play: {error}")
+            return
+    store.keep_oracle_steps(steps)
 
 
 def _cut(plan: Plan, store: Store, pool: Pool, num_envs: int) -> list[Chunk]:

@@ -9,7 +9,7 @@ from annotated_types import Ge
 
 from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.errors import InputError
-from mazebench.maps.benchmark import TRACKS_VERSION, VERSION
+from mazebench.maps.benchmark import FROZEN_SPLITS, VERSION
 from mazebench.maps.options import MazeOptions
 from mazebench.options import Doc, fields_of, from_names, options
 from mazebench.tasks.options import TaskOptions, Variants, is_own
@@ -55,6 +55,8 @@ class EvalOptions:
         track, level = self.task.track, self.task.level
         if not isinstance(self.mazes.maps, str | None):
             raise InputError(f"expected maps as a path in an evaluation, found {type(self.mazes.maps).__name__}")
+        if self.mazes.fresh:
+            raise InputError("expected no fresh mazes in an evaluation; num_mazes says how many of each kind are drawn")
         if len(level) > 1:
             found = ", ".join(map(str, level))
             raise InputError(f"expected one level in an evaluation, found {found}; the suite 'tracks' plays all levels")
@@ -69,17 +71,17 @@ class EvalOptions:
     @property
     def is_own(self) -> bool:
         """Whether mazes, start or goal are not the benchmark's."""
-        return is_own(self.task, self.mazes)
+        return is_own(self.task, self.mazes) or self.mazes.is_drawn
 
     @property
     def is_frozen(self) -> bool:
-        """Whether the benchmark's eval mazes are asked for, which have frozen episodes."""
-        return not self.is_own and self.mazes.split == "eval"
+        """Whether mazes of the benchmark are asked for whose episodes are frozen."""
+        return not self.is_own and self.mazes.split in FROZEN_SPLITS
 
     @property
     def benchmark(self) -> str:
         """The version of the benchmark that the evaluation belongs to."""
-        return VERSION if self.task.track is None else TRACKS_VERSION
+        return VERSION if self.task.track is None else TRACKS[self.task.track].benchmark
 
 
 @options

@@ -14,12 +14,14 @@ from mazebench.errors import InputError, RunError, UnplayableError, held_remarks
 from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of, only_context_size
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.provenance import provenance
+from mazebench.maps.options import DrawnOptions
 from mazebench.options import fields_of
-from mazebench.results.oracle import oracle_spl
+from mazebench.results.metrics import Steps
+from mazebench.results.oracle import frozen_oracle_steps
 from mazebench.results.records import Provenance
 from mazebench.tasks.build import build_task
 from mazebench.tasks.context import default_context_size
-from mazebench.tasks.options import EVAL_DISTANCES, Variants
+from mazebench.tasks.options import EVAL_DISTANCES, HIDEABLE, Variants
 from mazebench.tasks.perturbations import perturbation_levels
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.trials import Trial, select_trials
@@ -31,8 +33,14 @@ _IDENTIFYING = (
     *("task_version", "benchmark_manifest_sha256", "mazes_sha256"),
     *("agent_package", "agent_code_sha256", "checkpoint_sha256"),
 )
+# Options of which records and summaries tell where a user sets them.
+_SENSES = ("lidar_noise", "odometry_noise")
 # Options that the rest of an identity covers, or that have one value in all evaluations.
-_COVERED = ("agent", "task", "track", "level", "size", "split", "maps", "checkpoint", *fields_of(Variants))
+_COVERED = (
+    *("agent", "task", "track", "level", "size", "split", "maps", "checkpoint"),
+    *fields_of(DrawnOptions),
+    *fields_of(Variants),
+)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -44,10 +52,11 @@ class Plan:
     task: TaskSpec
     trials: tuple[Trial, ...]  # in the protocol's order, by which they are numbered
     labels: dict[str, Any]  # agent, task, size and split: what every record begins with
+    conditions: dict[str, Any]  # what the agent is told less or more than others, as the summary says
     levels: dict[str, float]  # of the perturbations: what every record ends with
     identity: dict[str, Any]  # the content of config.json; only runs of equal identity are resumed
     provenance: Provenance  # where the result will come from
-    oracle_spl: dict[int, float] | None  # the oracle's SPL by the trial's index; None if it is not known
+    oracle_steps: Steps | None  # the oracle's steps in each trial, if those are frozen
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _make_plan_once, (self.options,)
@@ -101,7 +110,16 @@ class Plan:
     def interface(self) -> Interface:
         """The environments that the agent is built for."""
         task = self.task
-        return Interface(task.task, task.size, task.context_size, sensors=task.sensors, cell_size=task.cell_size)
+        return Interface(
+            task.task,
+            task.size,
+            task.context_size,
+            sensors=task.sensors,
+            cell_size=task.cell_size,
+            hidden=task.hide,
+            lidar=task.lidar if "lidar" in task.sensors else None,
+            odometry_noise=max(map(task.odometry_noise_at, task.level)),
+        )
 
     def build_agent(self) -> CheckedAgent:
         """Returns a new agent for the task, held to its contract.
@@ -118,6 +136,8 @@ class Plan:
                 f"agent {options.agent!r}: its context_size() asks for maps of {_square(only)} only; the track "
                 f"{self.task.track!r} shows {_square(interface.context_size)}"
             )
+        if needed := [name for name in self.agent_class.needs_shown if name in interface.hidden]:
+            raise UnplayableError(f"agent {options.agent!r}: needs the {needed[0]}, found it hidden")
         with calling(options.agent, "build"):
             agent = self.agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)
         return CheckedAgent(options.agent, agent, interface.num_actions)
@@ -145,7 +165,17 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
         labels["cell_size"] = task.cell_size
     if task.track is not None:
         labels |= {"track": task.track, "level": task.level[0]}
-    trials = select_trials(task, options.is_frozen, options.episodes_per_distance, options.seed)
+    labels |= {name: value for name in _SENSES if (value := getattr(task, name)) is not None}
+    conditions: dict[str, Any] = {}
+    if task.hide:
+        conditions["hide"] = ",".join(name for name in HIDEABLE if name in task.hide)
+    if task.exact_pose:
+        conditions["exact_pose"] = True
+    frozen_split = options.mazes.split if options.is_frozen else None
+    trials = select_trials(task, frozen_split, options.episodes_per_distance, options.seed)
+    oracle_steps = None
+    if frozen_split is not None:
+        oracle_steps = frozen_oracle_steps(options.benchmark, task.task, task.size, frozen_split, trials)
     levels = perturbation_levels(task)
     origin = provenance(options, agent_class, task)
     identity = {
@@ -162,10 +192,11 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
         task=task,
         trials=tuple(trials),
         labels=labels,
+        conditions=conditions,
         levels=levels,
         identity=identity,
         provenance=origin,
-        oracle_spl=oracle_spl(options.benchmark, task.task, task.size, trials) if options.is_frozen else None,
+        oracle_steps=oracle_steps,
     )
 
 

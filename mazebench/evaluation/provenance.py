@@ -64,15 +64,16 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
             "processor": platform.machine(),
             "cores": os.cpu_count(),
         },
-        "mazes_sha256": _mazes_hash(task),
+        "mazes_sha256": mazes_hash(task),
     }
     return Provenance.model_validate_json(json.dumps(content))  # as a reader will find it
 
 
-def _mazes_hash(task: TaskSpec) -> str:
+def mazes_hash(task: TaskSpec) -> str:
     """Returns a SHA-256 of the mazes; 1 m, the width of the benchmark's cells, does not change it."""
     scale = "" if task.cell_size == 1 else repr(task.cell_size)
-    return hashlib.sha256(b"".join(maze.walls.tobytes() for maze in task.mazes) + scale.encode("ascii")).hexdigest()
+    walls = b"".join(maze.walls.tobytes() for maze in task.fixed_mazes)
+    return hashlib.sha256(walls + scale.encode("ascii")).hexdigest()
 
 
 def code_hash(options: EvalOptions, agent_class: type[Agent]) -> str | None:

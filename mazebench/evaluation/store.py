@@ -1,7 +1,8 @@
 """The folder of an evaluation while it runs. What has ended survives a kill at any moment.
 
-`config.json` identifies the run. An episode that ends becomes a line of `journal.jsonl`, in any order. When all have
-ended, `episodes.jsonl`, `trajectories.npz` and last `summary.json` are written, each whole, and the journal is removed.
+`config.json` identifies the run, and `oracle.json` holds the oracle's steps, as soon as they are known. An episode that
+ends becomes a line of `journal.jsonl`, in any order. When all have ended, `episodes.jsonl`, `trajectories.npz` and last
+`summary.json` are written, each whole, and the journal is removed.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from mazebench.errors import InputError, RunError, describe_fault
 from mazebench.evaluation.chunk import Ended
 from mazebench.evaluation.plan import Plan
 from mazebench.renamed import describe_unfinished
-from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, SUMMARY, load_result
+from mazebench.results.metrics import Steps
+from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, ORACLE, SUMMARY, load_result, read_oracle_steps
 from mazebench.results.records import Record, Summary
 from mazebench.results.trajectories import (
     TRAJECTORIES,
@@ -88,6 +90,7 @@ class Store:
         with contextlib.ExitStack() as opened, writing_to(folder):
             opened.enter_context(FolderLock(folder))
             _prepare(folder, plan, resume)
+            self.oracle_steps = read_oracle_steps(folder, len(plan.trials))  # None if they are not known yet
             ended = _read_journal(folder / JOURNAL, plan)
             self.record = record or any(trajectory is not None for _, trajectory in ended)
             self._ended = {each.record.episode: each for each in ended if each.trajectory or not self.record}
@@ -108,6 +111,16 @@ class Store:
     def records(self) -> list[Record]:
         """The records of the episodes that have ended, in protocol order."""
         return [self._ended[index].record for index in sorted(self._ended)]
+
+    def keep_oracle_steps(self, steps: Steps) -> None:
+        """Writes the oracle's steps in all episodes.
+
+        Raises:
+          RunError: as for `append`.
+        """
+        with self._keeping_what_is_written():
+            write_json(self.folder / ORACLE, {"steps": steps}, indent=None)
+        self.oracle_steps = steps
 
     def append(self, ended: Sequence[Ended]) -> None:
         """Adds episodes that ended.
@@ -158,6 +171,7 @@ class Store:
         """Removes what a run left that was refused before an episode ended, such as one that its agent can't play."""
         with contextlib.suppress(OSError):  # the refusal matters more
             (self.folder / JOURNAL).unlink()
+            (self.folder / ORACLE).unlink(missing_ok=True)
             (self.folder / CONFIG).unlink()
             self.folder.rmdir()
 
@@ -166,7 +180,8 @@ def _prepare(folder: pathlib.Path, plan: Plan, resume: bool) -> None:
     """Makes `folder` ready to hold the run of `plan`, or refuses."""
     found = {path.name for path in folder.iterdir() if path.suffix != ".tmp"}
     journal = folder / JOURNAL
-    if found <= {CONFIG, JOURNAL} and not (journal.exists() and journal.stat().st_size):  # no episode has ended
+    if found <= {CONFIG, ORACLE, JOURNAL} and not (journal.exists() and journal.stat().st_size):  # no episode has ended
+        (folder / ORACLE).unlink(missing_ok=True)  # it may be of another run
         write_json(folder / CONFIG, plan.identity)
         return
     if CONFIG not in found:

@@ -1,11 +1,13 @@
 """The frozen mazes of the benchmark: read from the package's assets and checked against their manifests.
 
-Version v1 is the paper's protocol. Version v2 holds the mazes of the tracks: eval mazes of size 13, whose train mazes
-are v1's, and train and eval mazes of sizes 31 and 51.
+Version v1 is the paper's protocol. Version v2 holds the mazes of the first tracks: eval mazes of size 13, whose train
+mazes are v1's, and train and eval mazes of sizes 31 and 51. Version v3 holds mazes of 31 x 31 cells of several kinds,
+in the splits train, dev and, once its agents are done, eval.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import hashlib
 import json
@@ -19,9 +21,14 @@ from mazebench.maps.text import parse_maze
 
 VERSION = "v1"
 TRACKS_VERSION = "v2"
+KINDS_VERSION = "v3"
 SIZES = BENCHMARK_SIZES
 TRACK_SIZES = (13, 31, 51)
+KINDS_SIZE = 31
 SPLITS = ("train", "eval")
+DEV = "dev"  # v3's split for choosing agents
+ALL_SPLITS = ("train", DEV, "eval")
+FROZEN_SPLITS = (DEV, "eval")  # those whose episodes are frozen
 MAZES_PER_SPLIT = 20
 MANIFEST = "manifest.json"
 
@@ -52,6 +59,35 @@ def load_track_mazes(size: int, split: str) -> tuple[Maze, ...]:
     return _load_mazes(size, split, TRACKS_VERSION if has_train_mazes else VERSION)
 
 
+def load_kind_mazes(split: str) -> tuple[Maze, ...]:
+    """Returns the mazes of one split of v3, kind by kind.
+
+    Raises:
+      InputError: if there is no such split.
+    """
+    if split not in ALL_SPLITS:
+        raise unknown("split", split, ALL_SPLITS)
+    return _load_kind_mazes(split)
+
+
+@functools.cache
+def _load_kind_mazes(split: str) -> tuple[Maze, ...]:
+    kinds = manifest(KINDS_VERSION)["generator"]["kinds"].get(split)
+    if kinds is None:
+        raise InputError(f"benchmark {KINDS_VERSION}: its split {split!r} is not frozen yet; play the split {DEV!r}")
+    mazes: list[Maze] = []
+    for kind in kinds:
+        blocks = read_asset(kind_mazes_file(kind, split), KINDS_VERSION).split("\n\n")
+        names = (f"{KINDS_VERSION}-{kind}-{split}-{index:02d}" for index in range(len(blocks)))
+        mazes += [dataclasses.replace(parse_maze(*each), kind=kind) for each in zip(blocks, names, strict=True)]
+    return tuple(mazes)
+
+
+def kind_mazes_file(kind: str, split: str) -> str:
+    """Returns the name of the file with v3's mazes of one kind and split."""
+    return f"mazes-{kind}-{split}.txt"
+
+
 def _check_names(size: int, sizes: tuple[int, ...], split: str) -> None:
     """Raises `InputError` if there is no such size or split."""
     if isinstance(size, str | float):
@@ -66,7 +102,8 @@ def _check_names(size: int, sizes: tuple[int, ...], split: str) -> None:
 def _load_mazes(size: int, split: str, version: str) -> tuple[Maze, ...]:
     blocks = read_asset(mazes_file(size, split), version).split("\n\n")
     prefix = "" if version == VERSION else f"{version}-"
-    return tuple(parse_maze(block, f"{prefix}{size}-{split}-{index:02d}") for index, block in enumerate(blocks))
+    mazes = (parse_maze(block, f"{prefix}{size}-{split}-{index:02d}") for index, block in enumerate(blocks))
+    return tuple(dataclasses.replace(maze, kind="dfs") for maze in mazes)
 
 
 def read_asset(name: str, version: str = VERSION) -> str:

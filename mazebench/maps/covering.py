@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,18 +21,16 @@ def cover(walls: np.ndarray) -> list[Rectangle]:
 
     Each starts at the first cell left in reading order, and grows first to the right, then down.
     """
-    left_over = walls.copy()
+    # As bytes, in which Python finds cells faster than NumPy does in rows this short.
+    rows = [bytearray(row) for row in walls.astype(np.uint8)]
     rectangles = []
-    for top, left in np.argwhere(walls):
-        if not left_over[top, left]:
-            continue
-        right = left + _leading(left_over[top, left:])
-        bottom = top + _leading(left_over[top:, left:right].all(axis=1))
-        left_over[top:bottom, left:right] = False
-        rectangles.append(Rectangle(int(top), int(left), int(bottom), int(right)))
+    for top, row in enumerate(rows):
+        while (left := row.find(1)) >= 0:
+            end = row.find(0, left)
+            right = len(row) if end < 0 else end
+            filled, bottom = row[left:right], top
+            while bottom < len(rows) and rows[bottom].startswith(filled, left):
+                rows[bottom][left:right] = bytes(right - left)
+                bottom += 1
+            rectangles.append(Rectangle(top, left, bottom, right))
     return rectangles
-
-
-def _leading(flags: Any) -> int:
-    """Returns how many of `flags` are True before the first False."""
-    return len(flags) if flags.all() else int(np.argmin(flags))

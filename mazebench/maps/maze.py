@@ -19,6 +19,7 @@ from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 
 from mazebench.errors import InputError
+from mazebench.maps.covering import Rectangle, cover
 
 Cell = tuple[int, int]
 
@@ -30,8 +31,8 @@ UNREACHABLE = -1
 
 # (rows, columns) to each neighbour, in the order in which a shortest path prefers them.
 _NEIGHBOURS = ((-1, 0), (0, -1), (1, 0), (0, 1))
-# All-pairs distances (F * F int16) are cached up to this F; every maze of up to 45 x 45 cells is below.
-_MAX_ALL_PAIRS = 2048
+# Rows of distances are kept up to this F; every maze of up to 45 x 45 cells is below.
+_MAX_KEPT_ROWS = 2048
 _WALL_COST = 1000  # the cost, in cells, of each wall on a path through walls
 
 
@@ -50,6 +51,7 @@ class Maze:
     walls: np.ndarray  # [N, N] bool, True is wall; copied and made read-only
     name: str = "maze"
     cell_size: float = 1.0  # m, the side of a cell; 1 in the benchmark
+    kind: str = ""  # of its layout, see `mazebench.maps.kinds`; empty for a maze that no kind has made
 
     def __post_init__(self) -> None:
         walls = np.array(self.walls)
@@ -72,7 +74,7 @@ class Maze:
         return self  # it never changes
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Maze, (self.walls, self.name, self.cell_size)  # without what is cached
+        return Maze, (self.walls, self.name, self.cell_size, self.kind)  # without what is cached
 
     @property
     def size(self) -> int:
@@ -144,9 +146,14 @@ class Maze:
     @functools.cached_property
     def diameter(self) -> int:
         """The largest distance of two free cells; with over 2,048 free cells, a lower bound by a double sweep."""
-        if len(self.free_cells) <= _MAX_ALL_PAIRS:
-            return int(self._all_pairs.max())
+        if len(self.free_cells) <= _MAX_KEPT_ROWS:
+            return int(csgraph.dijkstra(self._graph, unweighted=True).max())
         return int(self._distance_row(int(np.argmax(self._distance_row(0)))).max())
+
+    @functools.cached_property
+    def boxes(self) -> list[Rectangle]:
+        """The walls as few rectangles of cells."""
+        return cover(self.walls)
 
     @functools.cached_property
     def _index(self) -> np.ndarray:  # [N, N] int: the index of a free cell among `free_cells`, -1 at walls
@@ -159,13 +166,16 @@ class Maze:
         return grid_graph(self._index)
 
     @functools.cached_property
-    def _all_pairs(self) -> np.ndarray:  # [F, F] int16
-        return csgraph.dijkstra(self._graph, unweighted=True).astype(np.int16)
+    def _rows(self) -> dict[int, np.ndarray]:  # what `_distance_row` returned, by source
+        return {}
 
     def _distance_row(self, source: int) -> np.ndarray:  # [F] int: from free cell `source` to each free cell
-        if len(self.free_cells) <= _MAX_ALL_PAIRS:
-            return self._all_pairs[source]
-        return csgraph.dijkstra(self._graph, unweighted=True, indices=source).astype(np.int32)
+        row = self._rows.get(source)
+        if row is None:
+            row = csgraph.dijkstra(self._graph, unweighted=True, indices=source).astype(np.int32)
+            if len(self.free_cells) <= _MAX_KEPT_ROWS:
+                self._rows[source] = row
+        return row
 
 
 def corner_cells(maze: Maze) -> tuple[Cell, Cell]:
@@ -209,7 +219,7 @@ def grid_graph(index: np.ndarray) -> sparse.csr_array:
 
     # Both ways.
     num_nodes = int(index.max()) + 1
-    ones = np.ones(2 * len(first), dtype=np.int32)
+    ones = np.ones(2 * len(first))  # of the type that SciPy's searches take without a copy
     row, column = np.concatenate([first, second]), np.concatenate([second, first])
     return sparse.csr_array((ones, (row, column)), shape=(num_nodes, num_nodes))
 
@@ -232,7 +242,7 @@ def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]
     # Through walls. The search goes backwards from the goal: edge u -> v is the step from v to u, and costs what
     # entering u costs.
     every_cell = np.arange(walls.size).reshape(walls.shape)
-    graph = grid_graph(every_cell).astype(np.float64).tocoo()
+    graph = grid_graph(every_cell).tocoo()
     cost = np.where(walls.ravel()[graph.row], _WALL_COST, 1.0)
     weighted = sparse.csr_array((cost, (graph.row, graph.col)), shape=graph.shape)
     distances = csgraph.dijkstra(weighted, indices=every_cell[goal]).reshape(walls.shape)

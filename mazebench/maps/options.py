@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Annotated, Any
 
-from annotated_types import Interval
+from annotated_types import Ge, Interval
+from pydantic import BeforeValidator
 
 from mazebench.errors import InputError
-from mazebench.maps.benchmark import SPLITS
+from mazebench.maps.benchmark import ALL_SPLITS
+from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.options import Doc, OneOf, fields_of, options
 
 
@@ -82,15 +84,70 @@ MAP_OPTIONS = tuple(fields_of(MapOptions))
 THIN_WALLS = "a floor plan with thin walls needs --pixel-size, its metres a pixel"  # of plans that can't be read
 
 Size = Annotated[
-    int | None, Doc("Cells a side of the benchmark's mazes: 13 (if not given), 15, 17, 19 or 21; a track has its own.")
+    int | None,
+    Doc(
+        "Cells a side of the benchmark's mazes: 13 (if not given), 15, 17, 19 or 21; of drawn mazes, any that their "
+        "kinds can make; a track has its own."
+    ),
 ]
+DRAWN_KINDS = (*KNOWN, *CHECK)
+
+
+def _refuse_novel(kinds: tuple[Any, ...]) -> tuple[Any, ...]:
+    for kind in kinds:
+        if kind in NOVEL:
+            raise InputError(f"kind {kind!r}: only the eval split has it; kinds: {', '.join(DRAWN_KINDS)}")
+    return kinds
 
 
 @options
-class MazeOptions(MapOptions):
+class DrawnOptions:
+    """Which mazes are drawn, instead of the benchmark's.
+
+    Raises:
+      InputError: if an option is not allowed.
+    """
+
+    kinds: Annotated[
+        tuple[Annotated[str, OneOf(*DRAWN_KINDS)], ...],
+        BeforeValidator(_refuse_novel),
+        Doc(f"Mazes that are drawn, of these kinds, as dfs,house; {DRAWN_KINDS[0]} beside the other two options."),
+    ] = ()
+    num_mazes: Annotated[int, Ge(0), Doc("Drawn mazes of each kind; 0 stands for 20.")] = 0
+    fresh: Annotated[bool, Doc("Every episode has a new maze, of one of the kinds (not in an evaluation).")] = False
+
+    def __post_init__(self) -> None:
+        if len(set(self.kinds)) < len(self.kinds):
+            raise InputError(f"expected each kind once, found {', '.join(self.kinds)}")
+        if self.fresh and self.num_mazes:
+            raise InputError(f"expected no num_mazes beside fresh, found {self.num_mazes}")
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether mazes are drawn."""
+        return bool(self.kinds or self.num_mazes or self.fresh)
+
+    @property
+    def drawn_kinds(self) -> tuple[str, ...]:
+        """The kinds of mazes that are drawn."""
+        return self.kinds or DRAWN_KINDS[:1]
+
+
+@options
+class MazeOptions(MapOptions, DrawnOptions):
     """In which mazes a task is played."""
 
     size: Size = None
-    split: Annotated[str, OneOf(*SPLITS), Doc("The benchmark's unseen mazes, or its training mazes.")] = "train"
+    split: Annotated[
+        str,
+        OneOf(*ALL_SPLITS),
+        Doc("The benchmark's training mazes, unseen ones to choose agents on (tracks of v3), or those for results."),
+    ] = "train"
     # A path, or in Python also mazes and arrays (`mazebench.maps.selection.Maps`).
     maps: Annotated[Any, Doc("Mazes of your own: a text, picture, array or ROS map, or a folder of them.")] = None
+
+    def __post_init__(self) -> None:
+        MapOptions.__post_init__(self)
+        DrawnOptions.__post_init__(self)
+        if self.is_drawn and self.maps is not None:
+            raise InputError("expected maps of your own or mazes that are drawn, found both")

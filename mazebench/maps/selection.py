@@ -9,25 +9,28 @@ import numpy as np
 
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import load_mazes
+from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
 from mazebench.maps.files import read_all
 from mazebench.maps.maze import Maze, resized
 from mazebench.maps.options import MAP_OPTIONS, OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions, MazeOptions
 from mazebench.maps.readers.arrays import read_array
 
-_DEFAULT_SIZE = 13
+_NUM_MAZES = 20  # of a kind, unless another number is asked for
 
 # Mazes of one's own: one or several, as values or arrays, or the path of a file or of a folder.
 Maps = str | pathlib.Path | Maze | np.ndarray | Iterable[Maze | np.ndarray]
 
 
-def load_mazes_of(options: MazeOptions) -> tuple[Maze, ...]:
-    """Returns the mazes of a task that is no track.
+def load_mazes_of(options: MazeOptions, default_size: int = 13) -> Mazes:
+    """Returns the mazes that options name, but for those of tracks.
 
     Args:
       options: `size` is N, the cells on a side of benchmark v1's mazes: 13 (the default), 15, 17, 19 or 21; with
         `maps`, a size that they must have. `split` names mazes of benchmark v1. `maps` are mazes of your own instead: a
         `Maze`, an array as `maze_from_array` takes it, several of these of one size, or the path of a file or of a
-        folder of files.
+        folder of files. With `kinds`, `num_mazes` or `fresh`, mazes are drawn, of any N that the kinds can make: those
+        of the split "train", or others, "dev".
+      default_size: N, unless options name it.
 
     Raises:
       InputError: if there are no such mazes, a map can't be read, or a map option is given without `maps`.
@@ -35,7 +38,13 @@ def load_mazes_of(options: MazeOptions) -> tuple[Maze, ...]:
     size = options.size
     if options.maps is None:
         options.require_defaults(MAP_OPTIONS, "maps of your own", "the benchmark's mazes")
-        return load_mazes(_DEFAULT_SIZE if size is None else size, options.split)
+        size = default_size if size is None else size
+        if options.fresh:
+            return FreshMazes(options.drawn_kinds, size)
+        if options.is_drawn:
+            split = "train" if options.split == "train" else "dev"
+            return draw_mazes(options.drawn_kinds, size, split, options.num_mazes or _NUM_MAZES)
+        return load_mazes(size, options.split)
     mazes = _own_mazes(options.maps, options)
     for maze in mazes:
         if size not in (None, maze.size):

@@ -78,7 +78,7 @@ function episodeOf(packed, number, index) {
   return {
     size: result.size,
     cellSize: result.cellSize,
-    sensor: { rays: data.lidar.rays, range: data.lidar.range / result.cellSize }, // in cells
+    sensor: { rays: data.rays, range: result.lidar / result.cellSize }, // in cells
     maze: maze.name,
     real,
     ...shownMap(packed, result, index, real),
@@ -87,7 +87,7 @@ function episodeOf(packed, number, index) {
     landmarks: columns.landmarks.slice(firstLandmark, firstLandmark + (columns.landmarkCounts[index] || 0)),
     path: partOf(packed.path, first, poses),
     observed: packed.observed && partOf(packed.observed, first, poses),
-    lidar: result.lidar && real !== null,
+    lidar: result.lidar > 0 && real !== null,
     groups: result.groups.filter((group) => columns.groups[group][index]),
     distance: columns.distance[index],
     success: Boolean(columns.success[index]),

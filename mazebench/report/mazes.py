@@ -6,13 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mazebench.maps.benchmark import load_mazes, load_track_mazes
+from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.maze import Cell, Maze
 from mazebench.report.results import ReportedResult
 from mazebench.report.settings import known_levels
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.shown_map import show_map
+from mazebench.tasks.tracks import TRACKS
 
 
 def real_walls(result: ReportedResult, maze: str, results: Sequence[ReportedResult]) -> np.ndarray | None:
@@ -23,7 +24,10 @@ def real_walls(result: ReportedResult, maze: str, results: Sequence[ReportedResu
     """
     setting = result.setting
     if setting.split != "custom":
-        mazes = (load_track_mazes if setting.track else load_mazes)(setting.size, setting.split)
+        if setting.track:
+            mazes = TRACKS[setting.track].mazes((setting.level,), setting.split)
+        else:
+            mazes = load_mazes(setting.size, setting.split)
         return next((known.walls for known in mazes if known.name == maze), None)
     for other in results:
         is_same = (other.setting.mazes, other.setting.size) == (setting.mazes, setting.size)

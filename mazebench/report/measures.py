@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from mazebench.report.frame import Rows
-from mazebench.report.table import METRIC_NAMES, METRICS, SPL_RELATIVE, UNTRAINED_NOTE, Cell, Column, Table
+from mazebench.report.table import METRICS, UNTRAINED_NOTE, Cell, Column, Table
 from mazebench.results.intervals import mean_interval
 from mazebench.results.paper import printed
 
@@ -30,26 +30,22 @@ def make_table(
     cells = [cell for by_label in found.values() for by_metric in by_label.values() for cell in by_metric.values()]
     if any(cell.is_untrained_scale for cell in cells):
         note = f"{note} {UNTRAINED_NOTE}".strip()
-    # The oracle's SPL is compared with where it is known of all agents.
-    is_relative = all(SPL_RELATIVE in by_metric for by_label in found.values() for by_metric in by_label.values())
-    metrics = METRIC_NAMES if is_relative else METRICS
     columns = [
-        Column(label, False, {metric: _of_column(found, label, metric) for metric in metrics})
+        Column(label, False, {metric: _of_column(found, label, metric) for metric in METRICS})
         for label in _labels(rows)
     ]
     return Table(name, title, note, row_name, tuple(rows), tuple(x), (*columns, *paper))
 
 
 def measure(episodes: pd.DataFrame) -> dict[str, Cell]:
-    """Returns the metrics over episodes of one result, at least one, with 95 % intervals."""
+    """Returns the metrics that are known of episodes of one result, at least one, with 95 % intervals."""
     marked: dict[str, Any] = {"is_untrained_scale": episodes.result.iloc[0].summary.untrained_scale}
     cells = {}
     for metric in METRICS:
+        if episodes[metric].isna().any():  # the oracle's steps are not known
+            continue
         estimate = mean_interval(episodes[metric].to_numpy(), episodes.maze_index.to_numpy())
         cells[metric] = Cell(estimate.value, estimate.low, estimate.high, len(episodes), **marked)
-    relative = _spl_relative(episodes)
-    if relative is not None:
-        cells[SPL_RELATIVE] = Cell(relative, episodes=len(episodes), **marked)
     return cells
 
 
@@ -83,29 +79,3 @@ def _labels(rows: Rows) -> list[str]:
 
 def _of_column(found: dict[str, dict[str, dict[str, Cell]]], label: str, metric: str) -> tuple[Cell | None, ...]:
     return tuple(by_label.get(label, {}).get(metric) for by_label in found.values())
-
-
-def _spl_relative(episodes: pd.DataFrame) -> float | None:
-    """Returns the SPL divided by the oracle's, by what the summary says of all episodes, each fact and each distance.
-
-    None if the summary does not say it of these episodes.
-    """
-    result = episodes.result.iloc[0]
-    summary = result.summary
-    if len(episodes) == len(result.episodes):
-        return summary.overall.spl_relative
-    for fact in result.facts:
-        if fact in summary.by_fact and episodes[fact].all() and len(episodes) == result.episodes[fact].sum():
-            return summary.by_fact[fact].spl_relative
-    figures = [summary.by_distance[str(distance)] for distance in sorted(episodes.distance.unique())]
-    if sum(each.n for each in figures) != len(episodes):
-        return None
-    if len(figures) == 1:
-        return figures[0].spl_relative
-    ours = oracles = 0.0
-    for each in figures:
-        if not each.spl_relative:  # unknown, or 0, from which the oracle's SPL does not follow
-            return None
-        ours += each.n * each.spl
-        oracles += each.n * each.spl / each.spl_relative
-    return ours / oracles

@@ -29,10 +29,11 @@ from mazebench.report.mazes import real_walls
 from mazebench.report.packed_episodes import POSITION_UNITS, YAW_UNITS, pack_drives, pack_trials, to_base64
 from mazebench.report.results import ReportedResult
 from mazebench.report.settings import Setting
-from mazebench.report.table import METRIC_NAMES, Table
+from mazebench.report.table import METRICS, Table
 from mazebench.results.paper import citation, reference
 from mazebench.tasks.context import default_context_size
-from mazebench.world.lidar import MAX_RANGE, NUM_RAYS
+from mazebench.tasks.options import TaskOptions
+from mazebench.world.lidar import NUM_RAYS
 from mazebench.world.mjcf import BODY_RADIUS
 
 _SVG_LETTERS = {Path.MOVETO: "M", Path.LINETO: "L", Path.CURVE3: "Q", Path.CURVE4: "C", Path.CLOSEPOLY: "Z"}
@@ -80,14 +81,12 @@ def build_page(
         "labels": labels,
         "printed": list(printed),
         "looks": {label: _look(look) for label, look in looks.items()},
-        "metrics": {
-            name: text for name, text in METRIC_NAMES.items() if any(name in table.metrics for table in tables)
-        },
+        "metrics": {name: text for name, text in METRICS.items() if any(name in table.metrics for table in tables)},
         "warnings": warnings,
         "charts": [_chart(table, curves) for table in sorted(tables, key=lambda table: not table.x)],
         "violins": [_figure(figure) for figure in violins],
         "settings": [_names(setting) for setting in settings],
-        "lidar": {"rays": NUM_RAYS, "range": MAX_RANGE},
+        "rays": NUM_RAYS,
         "units": {"position": POSITION_UNITS, "yaw": YAW_UNITS, "step": STEP_TIME, "body": BODY_RADIUS},
         "timeColors": [mpl.colors.to_hex(TIME_COLORS(n / (_NUM_TIME_COLORS - 1))) for n in range(_NUM_TIME_COLORS)],
         "mazes": mazes,
@@ -197,6 +196,7 @@ def _describe(result: ReportedResult) -> dict[str, Any]:
     picture = None if trajectories is None else trajectories.picture
     provenance = result.summary.provenance
     sensors = (provenance.options.model_extra or {}).get("sensors", ())
+    lidar = TaskOptions(track=setting.track or None, lidar_noise=result.summary.lidar_noise).lidar
     # Cells a side of the agent's map: those of the shown map, unless it is large and the agent asks for fewer.
     side = setting.size if picture is None else picture.shape[-1]
     context_size = (provenance.model_extra or {}).get("context_size")  # results of earlier versions do not say it
@@ -212,7 +212,7 @@ def _describe(result: ReportedResult) -> dict[str, Any]:
         "context": min(context_size, side) if isinstance(context_size, int) else 0,  # 0 if it is not known
         "picture": 0 if picture is None else picture.shape[-1],
         "odometry": trajectories is not None and trajectories.observed is not None,
-        "lidar": bool(setting.track) or "lidar" in sensors,
+        "lidar": lidar.max_range if setting.track or "lidar" in sensors else 0,  # m
         "groups": result.facts,
     }
 

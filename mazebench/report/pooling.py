@@ -113,6 +113,8 @@ def _cell(sides: Sequence[Runs | None], metric: str, estimate: Callable[..., Est
     runs = [side for side in sides if side is not None]
     if len(runs) < len(sides) or not all(side.episodes.equals(runs[0].episodes) for side in runs):
         return None
+    if any(np.isnan(side.scores[metric]).any() for side in runs):  # the oracle's steps are not known
+        return None
     found = estimate(*(side.scores[metric] for side in runs))
     num_runs = sum(len(side.scores[metric]) for side in runs)
     return Cell(found.value, found.low, found.high, num_runs * len(runs[0].episodes), num_runs)

@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 
 from mazebench.errors import InputError, remark, unknown
-from mazebench.maps.benchmark import TRACKS_VERSION, VERSION, manifest_hash
+from mazebench.maps.benchmark import KINDS_VERSION, TRACKS_VERSION, VERSION, manifest_hash
 from mazebench.report.settings import Setting, make_setting
-from mazebench.results.metrics import by_fact
-from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, load_result
-from mazebench.results.records import Record, Summary
+from mazebench.results.metrics import ON_TIME_METRICS, by_fact, scores
+from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, Result, load_result
+from mazebench.results.records import Summary
 from mazebench.results.trajectories import TRAJECTORIES, Trajectories, load_trajectories
 
 # What `ReportedResult.episodes` says of each episode: fields of its record. Facts of a track are further columns.
@@ -39,8 +39,8 @@ class ReportedResult:
 
     @property
     def name(self) -> str:
-        """The agent's name, marked if the agent is privileged."""
-        return self.summary.agent + (" (privileged)" if self.summary.privileged else "")
+        """The agent's name, with what sets the result apart from the agent's others."""
+        return self.summary.who
 
     @property
     def checkpoint(self) -> str | None:
@@ -123,18 +123,19 @@ def _read_result(folder: pathlib.Path) -> ReportedResult:
         setting = make_setting(summary, result.records)
     except InputError as error:
         raise InputError(f"{folder}: {error}") from error
-    episodes, facts = _to_table(result.records)
+    episodes, facts = _to_table(result)
     trajectories = _read_trajectories(folder, episodes, setting)
     return ReportedResult(folder, summary, summary.agent, setting, episodes, facts, trajectories)
 
 
-def _to_table(records: Sequence[Record]) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """Returns the episodes, and which columns are facts."""
+def _to_table(result: Result) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """Returns the episodes, and which columns are facts; metrics that are not known have no values."""
     episodes = pd.DataFrame(
-        [[getattr(record, name) for name in _OF_RECORDS] for record in records], columns=_OF_RECORDS
+        [[getattr(record, name) for name in _OF_RECORDS] for record in result.records], columns=_OF_RECORDS
     )
-    facts = by_fact(records)
-    return episodes.assign(success_rate=episodes.success.astype(float), **facts), tuple(facts)
+    facts = by_fact(result.records)
+    metrics = dict.fromkeys(ON_TIME_METRICS, np.nan) | scores(result.records, result.oracle_steps)
+    return episodes.assign(**metrics, **facts), tuple(facts)
 
 
 def _read_trajectories(folder: pathlib.Path, episodes: pd.DataFrame, setting: Setting) -> Trajectories | None:
@@ -203,7 +204,7 @@ def _drop_repeats(results: list[ReportedResult]) -> list[ReportedResult]:
 
 
 def _require_installed_benchmark(results: list[ReportedResult]) -> None:
-    installed = [(version, manifest_hash(version)) for version in (VERSION, TRACKS_VERSION)]
+    installed = [(version, manifest_hash(version)) for version in (VERSION, TRACKS_VERSION, KINDS_VERSION)]
     folders: dict[tuple[str, str], list[str]] = {}
     for result in results:
         folders.setdefault(result.benchmark, []).append(str(result.folder))

@@ -1,8 +1,8 @@
-"""The scoreboard of the tracks: one table of agents, made from the entries that the repository keeps.
+"""The scoreboards of the tracks, one for v3 and one for v2: tables of agents, made from entries that are kept.
 
 `python -m mazebench.report.scoreboard RESULTS... docs/scoreboard.md` keeps an entry of each agent in RESULTS in the
-folder docs/scoreboard, one file each, and writes the table of all entries into the page, between two comments. With
-`--check`, it says whether RESULTS are complete entries, and writes nothing.
+folder docs/scoreboard, one file each, and writes the table of all entries into the page, between two comments. The
+entries of a page are of one benchmark. With `--check`, it says whether RESULTS are complete entries.
 """
 
 from __future__ import annotations
@@ -16,22 +16,26 @@ from collections.abc import Iterable, Sequence
 
 import pydantic
 
+from mazebench.constants import ON_TIME
 from mazebench.errors import InputError, describe_fault
-from mazebench.maps.benchmark import TRACKS_VERSION, load_track_mazes, manifest_hash
+from mazebench.maps.benchmark import DEV, KINDS_VERSION, TRACKS_VERSION, manifest_hash
 from mazebench.report.table import escape_markdown
 from mazebench.results.intervals import mean_interval
+from mazebench.results.metrics import is_on_time
+from mazebench.results.oracle import frozen_oracle_steps
 from mazebench.results.reading import SUITE, Result, find_parts, load_result, read_suite
 from mazebench.results.records import Name, Share, column
 from mazebench.storage.files import make_folder, open_whole, read_at_most
 from mazebench.storage.json_files import write_json
-from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks import TRACKS, tracks_of
 from mazebench.tasks.tracks.base import LEVELS
 from mazebench.tasks.trials import frozen_trials
 
 BEGIN, END = "<!-- scoreboard begins -->\n", "<!-- scoreboard ends -->\n"
 UNTRAINED = "\\*"  # behind the success rates of an agent that learned on maps of another scale
 
-_PARTS = tuple(f"{track} {level}" for track in TRACKS for level in LEVELS)
+# The split that counts, by benchmark. The eval mazes of v3 are not frozen yet.
+_SPLITS = {KINDS_VERSION: DEV, TRACKS_VERSION: "eval"}
 _MAX_ENTRY_BYTES = 2**16
 
 
@@ -42,9 +46,10 @@ class _Kept(pydantic.BaseModel):
 
 
 class Part(_Kept):
-    """The success rate in the frozen episodes of one track and level."""
+    """The success rate in the frozen episodes of one track and level, and the share that are on time by each factor."""
 
     success_rate: Share
+    on_time: dict[str, Share] = {}  # empty in entries of earlier versions
     untrained_scale: bool = False
 
 
@@ -61,6 +66,7 @@ class Entry(_Kept):
 
     agent: Name
     privileged: bool
+    benchmark: Name = TRACKS_VERSION
     parts: dict[str, Part]  # by track and level, as "stale 1"
     mean: tuple[Share, Share, Share] | None  # of all episodes, with its 95 % interval; None if parts are missing
     configurations: tuple[Configuration, ...]
@@ -75,14 +81,14 @@ class Entry(_Kept):
     @property
     def missing(self) -> list[str]:
         """The parts that were not played."""
-        return [part for part in _PARTS if part not in self.parts]
+        return [part for part in _parts(self.benchmark) if part not in self.parts]
 
 
 def read_entries(paths: Iterable[pathlib.Path]) -> list[Entry]:
     """Returns the entries that folders of results make.
 
     Args:
-      paths: runs of the suite `tracks`, agents' folders in them, or folders with evaluations of one agent.
+      paths: runs of the suites `v3` or `tracks`, agents' folders in them, or folders with evaluations of one agent.
 
     Raises:
       InputError: if a folder holds anything else than one agent's results of whole tracks, each once.
@@ -107,12 +113,13 @@ def kept_entries(page: pathlib.Path) -> list[Entry]:
 
 def to_markdown(entries: Sequence[Entry]) -> str:
     """Returns the scoreboard as a table in Markdown."""
-    lines = [["agent", "mean", *_PARTS, "configurations", "from"]]
+    parts = _parts(entries[0].benchmark) if entries else []
+    lines = [["agent", "mean", "on time", *parts, "configurations", "from"]]
     lines.append(["---"] * len(lines[0]))
     for entry in entries:
         name = escape_markdown(entry.agent) + (" (privileged)" if entry.privileged else "")
-        rates = (_rate(entry.parts.get(part)) for part in _PARTS)
-        lines.append([name, _mean(entry), *rates, str(len(entry.configurations)), _origin(entry)])
+        rates = (_rate(entry, part) for part in parts)
+        lines.append([name, _mean(entry), _on_time(entry), *rates, str(len(entry.configurations)), _origin(entry)])
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
@@ -122,8 +129,8 @@ def write_scoreboard(entries: Iterable[Entry], page: pathlib.Path) -> None:
     An entry replaces one of the same agent, code and checkpoints.
 
     Raises:
-      InputError: if the page can't be read, or has no place for a scoreboard, or an entry lacks parts of the one that
-        it would replace; no entry is kept then.
+      InputError: if the page can't be read, or has no place for a scoreboard, an entry lacks parts of the one that it
+        would replace, or the page would have entries of two benchmarks; no entry is kept then.
     """
     try:
         text = page.read_text(encoding="utf-8")
@@ -138,6 +145,8 @@ def write_scoreboard(entries: Iterable[Entry], page: pathlib.Path) -> None:
         if lost := [part for part in kept.get(entry.file_name, entry).parts if part not in entry.parts]:
             raise InputError(f"{entry.agent}: expected all parts of its entry in one folder, found none of {lost[0]}")
         kept[entry.file_name] = entry
+    if len(benchmarks := {entry.benchmark for entry in kept.values()}) > 1:
+        raise InputError(f"{page}: expected entries of one benchmark, found {' and '.join(sorted(benchmarks))}")
     make_folder(page.with_suffix(""))
     for entry in entries:
         write_json(page.with_suffix("") / entry.file_name, entry.model_dump(exclude_defaults=True))
@@ -156,9 +165,11 @@ def check(path: pathlib.Path) -> tuple[list[str], bool]:
         entries.append(entry := _make_entry(folder))
         if entry.missing:
             found, missing = len(entry.parts), ", ".join(entry.missing)
-            lines.append(f"{folder}: {found} of {len(_PARTS)} parts of {entry.agent}, no mean; missing: {missing}")
+            of = found + len(entry.missing)
+            lines.append(f"{folder}: {found} of {of} parts of {entry.agent}, no mean; missing: {missing}")
         else:
-            lines.append(f"{folder}: a complete entry of {entry.agent}, all {len(_PARTS)} parts, mean {_mean(entry)}")
+            num_parts = len(entry.parts)
+            lines.append(f"{folder}: a complete entry of {entry.agent}, all {num_parts} parts, mean {_mean(entry)}")
     return lines, not any(entry.missing for entry in entries)
 
 
@@ -174,23 +185,29 @@ def _make_entry(folder: pathlib.Path) -> Entry:
             raise InputError(f"{folder}: expected one result of {part}, found two")
         results[part] = result
     summaries = [result.summary for result in results.values()]
-    agents = sorted({summary.agent for summary in summaries})
+    agents = sorted({summary.row for summary in summaries})
     if len(agents) > 1:
         raise InputError(f"{folder}: expected results of one agent, found those of {', '.join(agents)}")
+    benchmarks = sorted({summary.benchmark for summary in summaries})
+    if len(benchmarks) > 1:
+        raise InputError(f"{folder}: expected results of one benchmark, found {' and '.join(benchmarks)}")
+    parts = _parts(benchmarks[0])
     mean = None
-    if len(results) == len(_PARTS):  # each has as many episodes
+    if len(results) == len(parts):  # each has as many episodes
         records = [record for result in results.values() for record in result.records]
         estimate = mean_interval(column(records, "success"), column(records, "maze"))
         mean = estimate.value, estimate.low, estimate.high
     return Entry(
         agent=agents[0],
         privileged=any(summary.privileged for summary in summaries),
+        benchmark=benchmarks[0],
         parts={
             part: Part(
                 success_rate=results[part].summary.overall.success_rate,
+                on_time=_shares_on_time(results[part]),
                 untrained_scale=results[part].summary.untrained_scale,
             )
-            for part in _PARTS
+            for part in parts
             if part in results
         },
         mean=mean,
@@ -198,18 +215,30 @@ def _make_entry(folder: pathlib.Path) -> Entry:
     )
 
 
+def _shares_on_time(result: Result) -> dict[str, float]:
+    """Returns the share of the frozen episodes that are on time, by factor; whatever the folder tells of the oracle."""
+    size, benchmark, split = result.summary.size, result.summary.benchmark, result.summary.split
+    trials = frozen_trials("local", size, benchmark, split)
+    steps = frozen_oracle_steps(benchmark, "local", size, split, trials)
+    assert steps is not None, "the oracle's steps are frozen with the episodes"
+    return {f"{factor:g}": float(is_on_time(result.records, steps, factor).mean()) for factor in ON_TIME}
+
+
 def _part(result: Result) -> str:
     """Returns track and level of a result; raises `InputError` if it is not of all their frozen episodes."""
     summary = result.summary
     part = f"{summary.track or summary.task} {summary.level or ''}".strip()
-    if part not in _PARTS or summary.split != "eval":
-        raise InputError(f"{result.folder}: expected eval episodes of a track, found {summary.split} {part}")
-    if summary.provenance.benchmark_manifest_sha256 != manifest_hash(TRACKS_VERSION):
+    benchmark, split = summary.benchmark, _SPLITS.get(summary.benchmark, "eval")
+    if summary.track not in TRACKS or part not in _parts(benchmark) or summary.split != split:
+        raise InputError(f"{result.folder}: expected {split} episodes of a track, found {summary.split} {part}")
+    if summary.senses:
+        raise InputError(f"{result.folder}: expected the senses of the track, found {', '.join(summary.senses)}")
+    if summary.provenance.benchmark_manifest_sha256 != manifest_hash(benchmark):
         raise InputError(f"{result.folder}: expected results of the installed benchmark, found those of another one")
-    trials = frozen_trials("local", summary.size, TRACKS_VERSION)
+    trials = frozen_trials("local", summary.size, benchmark, split)
     if summary.episodes != len(trials):
         raise InputError(f"{result.folder}: expected {len(trials)} episodes, found {summary.episodes}")
-    mazes = load_track_mazes(summary.size, "eval")
+    mazes = TRACKS[summary.track].mazes((summary.level or 0,), split)
     for record, trial in zip(result.records, trials, strict=True):
         episode = trial.episode
         frozen = mazes[episode.maze].name, episode.start, episode.goal, episode.seed
@@ -227,8 +256,17 @@ def _configuration(result: Result) -> Configuration:
     )
 
 
-def _rate(part: Part | None) -> str:
-    return "" if part is None else f"{part.success_rate:.2f}{UNTRAINED if part.untrained_scale else ''}"
+def _parts(benchmark: str) -> list[str]:
+    return [f"{track} {level}" for track in tracks_of(benchmark) for level in LEVELS]
+
+
+def _rate(entry: Entry, name: str) -> str:
+    """Returns the success rate of a part and, on v3, the share on time; nothing for a part that was not played."""
+    part = entry.parts.get(name)
+    if part is None:
+        return ""
+    on_time = f", {part.on_time[f'{ON_TIME[0]:g}']:.2f}" if entry.benchmark == KINDS_VERSION else ""
+    return f"{part.success_rate:.2f}{on_time}{UNTRAINED if part.untrained_scale else ''}"
 
 
 def _mean(entry: Entry) -> str:
@@ -236,6 +274,15 @@ def _mean(entry: Entry) -> str:
         return ""
     value, low, high = entry.mean
     return f"{value:.2f} [{low:.2f}, {high:.2f}]"
+
+
+def _on_time(entry: Entry) -> str:
+    """Returns the shares of all episodes that are on time; nothing if parts are missing or don't tell."""
+    parts = entry.parts.values()
+    if entry.mean is None or not all(part.on_time for part in parts):
+        return ""
+    factors = next(iter(parts)).on_time
+    return ", ".join(f"{sum(part.on_time[factor] for part in parts) / len(parts):.2f}" for factor in factors)
 
 
 def _origin(entry: Entry) -> str:
@@ -252,7 +299,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         usage="%(prog)s [RESULTS...] PAGE.md\n       %(prog)s --check RESULTS...",
     )
     parser.add_argument("--check", action="store_true", help="say whether RESULTS are complete entries; write nothing")
-    parser.add_argument("paths", nargs="+", type=pathlib.Path, metavar="RESULTS", help="runs of the suite `tracks`")
+    about = "runs of the suites `v3` or `tracks`"
+    parser.add_argument("paths", nargs="+", type=pathlib.Path, metavar="RESULTS", help=about)
     options = parser.parse_args(arguments)
     try:
         if options.check:

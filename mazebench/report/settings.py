@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mazebench.errors import unknown
-from mazebench.maps.benchmark import SIZES, SPLITS
+from mazebench.maps.benchmark import ALL_SPLITS, SIZES
 from mazebench.options import options_of
 from mazebench.results.records import Record, Summary
 from mazebench.tasks.options import ENDS, TaskOptions
@@ -24,7 +24,7 @@ class Setting:
 
     task: str
     size: int  # N
-    split: str  # "train", "eval" or "custom"
+    split: str  # "train", "dev", "eval" or "custom"
     landmark_distance: int  # cells; 0 in the local task
     perturbations: tuple[tuple[str, float], ...] = ()  # those that are switched on, with their levels
     mazes: tuple[str, ...] = ()  # names, of the split "custom"
@@ -32,6 +32,7 @@ class Setting:
     level: int = 0  # of the track
     cell_size: float = 1.0  # m
     ends: tuple[str, str] = ("", "")  # the start and the goal of all episodes, "" for one that was drawn
+    senses: tuple[str, ...] = ()  # the noise on the senses that a user set, in words
 
     @property
     def is_exact(self) -> bool:
@@ -52,9 +53,10 @@ class Setting:
 
     @property
     def own(self) -> tuple[str, ...]:
-        """What is not the benchmark's beside the mazes, in words: the size of a cell, the start and the goal."""
+        """What is not the benchmark's beside the mazes, in words: the size of a cell, start and goal, the senses."""
         scale = () if self.cell_size == 1 else (f"cells of {self.cell_size:g} m",)
-        return *scale, *(f"{name} {place}" for name, place in zip(ENDS, self.ends, strict=True) if place)
+        ends = (f"{name} {place}" for name, place in zip(ENDS, self.ends, strict=True) if place)
+        return *scale, *ends, *self.senses
 
     def level_of(self, perturbation: str) -> float:
         """Returns the level of a perturbation; 0 if it is switched off."""
@@ -86,9 +88,9 @@ def make_setting(summary: Summary, records: tuple[Record, ...]) -> Setting:
     track: dict[str, Any] = {"track": name, "level": (level,)} if name else {}
     TaskOptions(task=summary.task, **track, **known_levels(summary.perturbation))  # raises if one is not allowed
     sizes = (TRACKS[name].sizes[level - 1],) if name else SIZES
-    if summary.split not in (*SPLITS, _CUSTOM):
-        raise unknown("split", summary.split, (*SPLITS, _CUSTOM))
-    if summary.split in SPLITS and summary.size not in sizes:
+    if summary.split not in (*ALL_SPLITS, _CUSTOM):
+        raise unknown("split", summary.split, (*ALL_SPLITS, _CUSTOM))
+    if summary.split in ALL_SPLITS and summary.size not in sizes:
         raise unknown("size", summary.size, sizes)
     return Setting(
         task=summary.task,
@@ -101,6 +103,7 @@ def make_setting(summary: Summary, records: tuple[Record, ...]) -> Setting:
         level=level,
         cell_size=summary.cell_size or 1.0,
         ends=(summary.provenance.options.start or "", summary.provenance.options.goal or ""),
+        senses=summary.senses,
     )
 
 

@@ -10,10 +10,14 @@ from collections.abc import Callable, Sequence
 
 from mazebench.errors import one_line
 from mazebench.report.looks import wrap
+from mazebench.results.metrics import ON_TIME_METRICS
 
-METRICS = {"success_rate": "success rate", "spl": "SPL", "spl_grid": "SPL by grid distance"}  # of each episode
-SPL_RELATIVE = "spl_relative"
-METRIC_NAMES = METRICS | {SPL_RELATIVE: "SPL / oracle's"}
+METRICS = {  # of each episode, with their names
+    "success_rate": "success rate",
+    **{metric: f"on time ({factor:g})" for metric, factor in ON_TIME_METRICS.items()},
+    "spl": "SPL",
+    "spl_grid": "SPL by grid distance",
+}
 UNTRAINED_MARK = "*"
 UNTRAINED_NOTE = f"{UNTRAINED_MARK} The agent was never trained on maps of this scale."
 
@@ -76,7 +80,7 @@ class Table:
     @property
     def metrics(self) -> dict[str, str]:
         """The metrics that the table has values of, with their names."""
-        return {metric: name for metric, name in METRIC_NAMES.items() if self.columns_of(metric)}
+        return {metric: name for metric, name in METRICS.items() if self.columns_of(metric)}
 
     @property
     def is_turned(self) -> bool:
@@ -91,7 +95,7 @@ class Table:
     def lines(self, metric: str, escape: Callable[[str], str] = str) -> list[list[str]]:
         """Returns the texts of the table of a metric line by line, the head first; labels are escaped."""
         columns = self.columns_of(metric)
-        lines = [[f"{METRIC_NAMES[metric]}, by {self.row_name}", *(escape(column.label) for column in columns)]]
+        lines = [[f"{METRICS[metric]}, by {self.row_name}", *(escape(column.label) for column in columns)]]
         for index, row in enumerate(self.rows):
             lines.append([row, *(_text(column.cells[metric][index]) for column in columns)])
         return [list(line) for line in zip(*lines, strict=True)] if self.is_turned else lines
@@ -112,7 +116,7 @@ def to_csv(table: Table) -> str:
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(_CSV_COLUMNS)
-    for metric in METRIC_NAMES:
+    for metric in METRICS:
         for index, row in enumerate(table.rows):
             for column in table.columns_of(metric):
                 cell = column.cells[metric][index]
@@ -134,7 +138,7 @@ def to_latex(table: Table, metric: str) -> str:
     columns = table.columns_of(metric)
     num_blocks = -(-len(columns) // _LATEX_COLUMNS)
     blocks = (columns[len(columns) * n // num_blocks : len(columns) * (n + 1) // num_blocks] for n in range(num_blocks))
-    caption = f"{table.title}: {METRIC_NAMES[metric]}. {table.note}".strip()
+    caption = f"{table.title}: {METRICS[metric]}. {table.note}".strip()
     if any(cell and cell.low is not None for column in columns for cell in column.cells[metric]):
         caption += " The brackets are 95 % intervals."
     return (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Iterator
 
 import pandas as pd
@@ -44,13 +45,18 @@ def maze_sets(episodes: pd.DataFrame) -> Iterator[tuple[pd.DataFrame, str, str]]
     for setting in settings_of(episodes):
         sets.setdefault((setting.split, setting.mazes, setting.own), []).append(setting)
     num_custom = 0
-    for split, mazes, own in sorted(sets, key=lambda key: (("eval", "train", "custom").index(key[0]), *key[1:])):
-        prefix, suffix = {"train": ("train-", ", on the training mazes")}.get(split, ("", ""))
+    for split, mazes, own in sorted(sets, key=lambda key: (("eval", "dev", "train", "custom").index(key[0]), *key[1:])):
+        prefix, suffix = "", ""
+        if split in ("dev", "train"):
+            prefix, suffix = f"{split}-", f", on the {split} mazes"
         if split == "custom":
             num_custom += 1
             more = f" and {len(mazes) - 3} more" if len(mazes) > 3 else ""
             suffix = ", ".join(("", f"on mazes {', '.join(mazes[:3])}{more}", *own))
             prefix = f"custom-{num_custom}-"
+        elif own:
+            suffix = ", ".join((suffix, *own))
+            prefix += re.sub(r"[^a-z0-9.]+", "-", "-".join(own)) + "-"
         yield episodes[episodes.setting.isin(sets[split, mazes, own])], prefix, suffix
 
 
@@ -105,15 +111,17 @@ def _by_distance(name: str, title: str, episodes: pd.DataFrame, is_warped: bool 
     rows = rows_by_distance(episodes)
     distances = sorted(episodes.distance.unique())
     setting = episodes.setting.iloc[0]
-    paper = paper_columns("local", setting.size, distances, len(rows), is_warped) if setting.split == "eval" else []
+    is_comparable = setting.split == "eval" and not setting.senses
+    paper = paper_columns("local", setting.size, distances, len(rows), is_warped) if is_comparable else []
     note = "Distance from start to goal in cells."
     return make_table(name, title, note, "distance", rows, list(map(float, distances)), paper)
 
 
 def _by_landmark_distance(size: int, episodes: pd.DataFrame) -> Table:
     rows = rows_by(episodes, "landmark_distance")
-    is_eval = episodes.split.iloc[0] == "eval"
-    paper = paper_columns("hierarchical", size, _positions(rows), len(rows)) if is_eval else []
+    setting = episodes.setting.iloc[0]
+    is_comparable = setting.split == "eval" and not setting.senses
+    paper = paper_columns("hierarchical", size, _positions(rows), len(rows)) if is_comparable else []
     title, note = f"Hierarchical navigation, {size} × {size}", "Cells from landmark to landmark."
     return make_table(f"hierarchical-{size}", title, note, "landmark distance", rows, _positions(rows), paper)
 
@@ -139,7 +147,7 @@ def _split_tables(episodes: pd.DataFrame) -> Iterator[Table]:
     """Yields a table of training against eval mazes for each unperturbed setting in which an agent has both."""
     pairs: dict[Setting, list[Setting]] = {}
     for setting in settings_of(episodes):
-        if setting.split in ("train", "eval") and not setting.perturbations:
+        if setting.split in ("train", "eval") and not (setting.perturbations or setting.senses):
             pairs.setdefault(dataclasses.replace(setting, split="eval"), []).append(setting)
     for base in sorted(pairs):
         group = episodes[episodes.setting.isin(pairs[base])]

@@ -16,7 +16,7 @@ import numpy as np
 
 from mazebench.errors import InputError
 from mazebench.results.intervals import Estimate, difference_interval
-from mazebench.results.metrics import METRICS, by_distance
+from mazebench.results.metrics import by_distance, scores
 from mazebench.results.reading import Result, find_parts, load_result
 from mazebench.results.records import Record, Summary, column
 
@@ -40,7 +40,7 @@ class Row:
     """Two evaluations on the same episodes."""
 
     num_episodes: int
-    metrics: dict[str, Paired]  # by the names of `METRICS`
+    metrics: dict[str, Paired]  # by the names of `metrics.scores`
     win_share: Estimate  # of episodes in which A's SPL is higher than B's; a tie counts half
 
 
@@ -100,8 +100,8 @@ def compare_results(a: Result, b: Result) -> PairedResults:
     _check_pairs(a, b)
     ours, theirs = by_distance(a.records), by_distance(b.records)
     return PairedResults(
-        overall=_compare(a.records, b.records),
-        by_distance={distance: _compare(ours[distance], theirs[distance]) for distance in ours},
+        overall=_compare(a, b, a.records, b.records),
+        by_distance={distance: _compare(a, b, ours[distance], theirs[distance]) for distance in ours},
     )
 
 
@@ -110,7 +110,8 @@ def to_json(comparison: Comparison) -> dict[str, Any]:
 
     Returns:
       dict: {"overall": {"n", "win_share", "win_share_ci95", and of each metric M of success_rate, spl and spl_grid
-       "M_a", "M_b", "M_difference" and "M_difference_ci95"}, "by_distance": {"1": {the same}, ...}}
+       "M_a", "M_b", "M_difference" and "M_difference_ci95"}, "by_distance": {"1": {the same}, ...}}; further metrics
+       are on_time_1.25 and on_time_2 if both folders tell the oracle's steps
     """
     parts = {
         name: {
@@ -122,21 +123,23 @@ def to_json(comparison: Comparison) -> dict[str, Any]:
     return parts.get("", parts)
 
 
-def _compare(a: Sequence[Record], b: Sequence[Record]) -> Row:
-    mazes = column(a, "maze")
-    ours, theirs = ({metric: column(r, name).astype(float) for metric, name in METRICS.items()} for r in (a, b))
+def _compare(a: Result, b: Result, a_records: Sequence[Record], b_records: Sequence[Record]) -> Row:
+    """Returns the row of some records of two evaluations."""
+    mazes = column(a_records, "maze")
+    ours, theirs = scores(a_records, a.oracle_steps), scores(b_records, b.oracle_steps)
     metrics = {
         metric: Paired(
             a=float(ours[metric].mean()),
             b=float(theirs[metric].mean()),
             difference=difference_interval(ours[metric] - theirs[metric], mazes),
         )
-        for metric in METRICS
+        for metric in ours
+        if metric in theirs
     }
     # Won is 1, lost is -1 and a tie 0: the share of wins is half of their mean, and a half.
     outcome = difference_interval(np.sign(ours["spl"] - theirs["spl"]), mazes)
     win_share = Estimate(*(0.5 + share / 2 for share in (outcome.value, outcome.low, outcome.high)))
-    return Row(len(a), metrics, win_share)
+    return Row(len(a_records), metrics, win_share)
 
 
 def _row_to_json(row: Row) -> dict[str, Any]:
@@ -156,7 +159,7 @@ def _named(parts: dict[str, pathlib.Path]) -> str:
 
 def _who(summary: Summary, parts: list[str]) -> str:
     """Returns the agent and, for a single evaluation, its track and level or its perturbations."""
-    wrong = [f"{key} {value}" for key, value in summary.perturbation.items() if value]
+    wrong = [*(f"{key} {value}" for key, value in summary.perturbation.items() if value), *summary.senses]
     if summary.track is not None:
         wrong.insert(0, f"track {summary.track}, level {summary.level}")
     return summary.agent + (f" ({', '.join(wrong)})" if wrong and parts == [""] else "")

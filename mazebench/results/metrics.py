@@ -5,16 +5,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from mazebench.constants import ON_TIME
 from mazebench.results.intervals import mean_interval
 from mazebench.results.records import Figures, Record, column
 
 # What a summary calls a metric, and the field of a record that it is the mean of.
 METRICS = {"success_rate": "success", "spl": "spl", "spl_grid": "spl_grid"}
+ON_TIME_METRICS = {f"on_time_{k:g}": k for k in ON_TIME}  # by the name in comparisons and reports
+
+Steps = Sequence[int | None]  # of each episode, in its order; None where the oracle did not reach the goal
+_KIND = "kind"  # the field of a record that names the kind of its maze
 
 
 def spl(success: np.ndarray, shortest: np.ndarray, driven: np.ndarray) -> np.ndarray:
@@ -40,46 +46,75 @@ def by_distance(records: Sequence[Record]) -> dict[int, list[Record]]:
     }
 
 
-def summarize(
-    records: Sequence[Record], oracle_spl: Mapping[int, float] | None = None
-) -> tuple[Figures, dict[str, Figures]]:
+def is_on_time(records: Sequence[Record], oracle_steps: Steps, factor: float) -> np.ndarray:
+    """Returns `[E]` bool: whether the goal is reached within `factor` times the oracle's steps in the episode.
+
+    Where the oracle did not reach the goal itself, any success is on time.
+
+    Args:
+      records: of an evaluation or some of its episodes.
+      oracle_steps: of the episodes of the evaluation, by which the records are numbered.
+      factor: of the oracle's steps.
+    """
+    limits = [oracle_steps[record.episode] for record in records]
+    limit = np.array([math.inf if steps is None else factor * steps for steps in limits])
+    return column(records, "success") & (column(records, "steps") <= limit)
+
+
+def scores(records: Sequence[Record], oracle_steps: Steps | None) -> dict[str, np.ndarray]:
+    """Returns `[E]` float by metric: of `METRICS`, and of `ON_TIME_METRICS` if the oracle's steps are known."""
+    found = {metric: column(records, name).astype(float) for metric, name in METRICS.items()}
+    if oracle_steps is not None:
+        found |= {name: is_on_time(records, oracle_steps, k).astype(float) for name, k in ON_TIME_METRICS.items()}
+    return found
+
+
+def summarize(records: Sequence[Record], oracle_steps: Steps | None = None) -> tuple[Figures, dict[str, Figures]]:
     """Returns the figures of all records, and those of each distance from start to goal.
 
     Args:
       records: of an evaluation, at least one.
-      oracle_spl: the oracle's SPL in each of these episodes, by index; None if it is not known.
+      oracle_steps: the oracle's steps in the evaluation's episodes; None if they are not known.
     """
-    groups = {str(distance): _figures(group, oracle_spl) for distance, group in by_distance(records).items()}
-    return _figures(records, oracle_spl), groups
+    groups = {str(distance): _figures(group, oracle_steps) for distance, group in by_distance(records).items()}
+    return _figures(records, oracle_steps), groups
 
 
-def summarize_facts(records: Sequence[Record], oracle_spl: Mapping[int, float] | None = None) -> dict[str, Figures]:
+def summarize_facts(records: Sequence[Record], oracle_steps: Steps | None = None) -> dict[str, Figures]:
     """Returns the figures of the records in which a fact holds, such as "blocked", and where it does not.
 
     Args:
-      records, oracle_spl: as for `summarize`; on some tracks, records tell facts.
+      records, oracle_steps: as for `summarize`; on some tracks, records tell facts.
     """
     return {
-        name: _figures([records[index] for index in np.flatnonzero(holds).tolist()], oracle_spl)
+        name: _figures([records[index] for index in np.flatnonzero(holds).tolist()], oracle_steps)
         for name, holds in by_fact(records).items()
         if holds.any()
     }
 
 
 def by_fact(records: Sequence[Record]) -> dict[str, np.ndarray]:
-    """Returns `[E]` bool for each fact of the records ("blocked") and its contrary ("not blocked"): where it holds."""
-    facts = [name for name, value in (records[0].model_extra or {}).items() if isinstance(value, bool)]
-    return {
+    """Returns `[E]` bool for each group of records that a track tells apart: who is in it.
+
+    The groups of a fact ("blocked") are named after it and its contrary ("not blocked"), those of mazes after the kind.
+    """
+    told = records[0].model_extra or {}
+    facts = [name for name, value in told.items() if isinstance(value, bool)]
+    groups = {
         f"{'' if holds else 'not '}{fact}": column(records, fact) == holds for fact in facts for holds in (True, False)
     }
+    kinds = column(records, _KIND) if _KIND in told else np.empty(0)
+    return groups | {kind: kinds == kind for kind in dict.fromkeys(kinds.tolist())}
 
 
-def _figures(records: Sequence[Record], oracle_spl: Mapping[int, float] | None) -> Figures:
+def _figures(records: Sequence[Record], oracle_steps: Steps | None) -> Figures:
     mazes = column(records, "maze")
-    values: dict[str, Any] = {"n": len(records), "spl_relative": None}
-    for metric, name in METRICS.items():
-        estimate = mean_interval(column(records, name), mazes)
-        values |= {metric: estimate.value, f"{metric}_ci95": (estimate.low, estimate.high)}
-    if oracle_spl is not None:
-        values["spl_relative"] = values["spl"] / float(np.mean([oracle_spl[record.episode] for record in records]))
+    means = {metric: mean_interval(values, mazes) for metric, values in scores(records, oracle_steps).items()}
+    values: dict[str, Any] = {"n": len(records)}
+    for metric in METRICS:
+        values |= {metric: means[metric].value, f"{metric}_ci95": (means[metric].low, means[metric].high)}
+    if oracle_steps is not None:
+        on_time = {f"{k:g}": means[metric] for metric, k in ON_TIME_METRICS.items()}
+        values["on_time"] = {k: mean.value for k, mean in on_time.items()}
+        values["on_time_ci95"] = {k: (mean.low, mean.high) for k, mean in on_time.items()}
     return Figures.model_validate(values)

@@ -1,33 +1,59 @@
-"""The SPL of the agent `oracle` in the frozen episodes, against which SPL is normalised."""
+"""The steps of the agent `oracle` in the frozen episodes, by which an episode is on time."""
 
 from __future__ import annotations
 
 import functools
+import hashlib
 import json
 from collections.abc import Sequence
 from importlib import resources
 
-from mazebench.maps.benchmark import VERSION
+from mazebench.errors import InputError
+from mazebench.maps.benchmark import manifest, read_asset
+from mazebench.results.metrics import Steps
 from mazebench.tasks.trials import Trial, frozen_trials
 
-
-def oracle_spl(benchmark: str, task: str, size: int, trials: Sequence[Trial]) -> dict[int, float] | None:
-    """Returns the oracle's SPL in each of some frozen trials, by index; None if one of them is not frozen."""
-    table = _by_seed(benchmark, task, size)
-    if not all(trial.episode.seed in table for trial in trials):
-        return None
-    return {index: table[trial.episode.seed] for index, trial in enumerate(trials)}
+# Of steps.json. The manifests of v1 and v2 are older than it; those of later versions name files of their own.
+_SHA256 = "1ddd525d0266e046bafaf30b30bbb6a435991e2b3f9f8a643dd64cb2233b9706"
 
 
-@functools.cache
-def _by_seed(benchmark: str, task: str, size: int) -> dict[int, float]:
-    """Returns the oracle's SPL by the seed of the episode, which no two frozen episodes of a task and size share."""
-    text = resources.files("mazebench_assets").joinpath("oracle", "spl.json").read_text("utf-8")
-    values = json.loads(text).get(oracle_key(benchmark, task, size), [])
-    seeds = [trial.episode.seed for trial in frozen_trials(task, size, benchmark)] if values else []
-    return dict(zip(seeds, values, strict=True))
+def frozen_oracle_steps(benchmark: str, task: str, size: int, split: str, trials: Sequence[Trial]) -> Steps | None:
+    """Returns the oracle's steps in some trials; None unless all of them are frozen, and the oracle's steps, too."""
+    steps = _steps_by_seed(benchmark, task, size, split)
+    seeds = [trial.episode.seed for trial in trials]
+    return tuple(steps[seed] for seed in seeds) if all(seed in steps for seed in seeds) else None
+
+
+def oracle_file(task: str, size: int, split: str) -> str:
+    """Returns the name of the file with the oracle's steps in the frozen episodes of one task, size and split."""
+    return f"oracle-{task}-{size}-{split}.json"
 
 
 def oracle_key(benchmark: str, task: str, size: int) -> str:
-    """Returns the name of the list of the oracle's SPL in the frozen episodes of a benchmark, a task and a size."""
-    return f"{task}-{size}" if benchmark == VERSION else f"{benchmark}-{task}-{size}"
+    """Returns the name of the oracle's steps in the eval episodes of v1 or v2, in `assets/oracle/steps.json`."""
+    return f"{benchmark}-{task}-{size}"
+
+
+@functools.cache
+def _steps_by_seed(benchmark: str, task: str, size: int, split: str) -> dict[int, int | None]:
+    """Returns the steps by the seed of the episode, which no two episodes of a task, size and split share."""
+    name = oracle_file(task, size, split)
+    if name in manifest(benchmark)["files"]:
+        steps = json.loads(read_asset(name, benchmark))["steps"]
+    else:
+        steps = _first_steps().get(oracle_key(benchmark, task, size), []) if split == "eval" else []
+    seeds = [trial.episode.seed for trial in frozen_trials(task, size, benchmark, split)] if steps else []
+    return dict(zip(seeds, steps, strict=True))
+
+
+@functools.cache
+def _first_steps() -> dict[str, list[int | None]]:
+    """Returns the steps in the eval episodes of v1 and v2.
+
+    Raises:
+      InputError: if the file was changed.
+    """
+    content = resources.files("mazebench_assets").joinpath("oracle", "steps.json").read_bytes()
+    if (found := hashlib.sha256(content).hexdigest()) != _SHA256:
+        raise InputError(f"oracle/steps.json was changed: expected SHA-256 {_SHA256}, found {found}")
+    return json.loads(content)

@@ -11,7 +11,7 @@ import pydantic
 
 from mazebench.errors import InputError, describe_fault
 from mazebench.renamed import describe_unfinished, name_of_class
-from mazebench.results.metrics import METRICS, spl
+from mazebench.results.metrics import Steps, scores, spl
 from mazebench.results.records import Record, Summary, column
 from mazebench.storage.files import read_at_most
 from mazebench.storage.json_files import read_json, read_lines
@@ -20,6 +20,7 @@ CONFIG = "config.json"
 JOURNAL = "journal.jsonl"
 EPISODES = "episodes.jsonl"
 SUMMARY = "summary.json"
+ORACLE = "oracle.json"
 SUITE = "suite.json"
 
 _Model = TypeVar("_Model", bound=pydantic.BaseModel)
@@ -35,6 +36,15 @@ class Result:
     folder: pathlib.Path
     summary: Summary
     records: tuple[Record, ...]  # in protocol order
+    oracle_steps: Steps | None = None  # the oracle's steps in these episodes; None in folders of earlier versions
+
+
+class _OracleSteps(pydantic.BaseModel):
+    """The content of `oracle.json`."""
+
+    model_config = pydantic.ConfigDict(strict=True)
+
+    steps: tuple[Annotated[int, pydantic.Field(ge=1)] | None, ...]  # of each episode; None where it missed the goal
 
 
 FolderName = Annotated[str, pydantic.Field(pattern=r"^[\w-][\w.-]*$")]
@@ -64,13 +74,29 @@ def load_result(folder: pathlib.Path) -> Result:
         raise InputError(f"{folder}: expected a finished evaluation, found {_describe_content(folder)}")
     summary = _read_model(folder / SUMMARY, Summary, "an evaluation's summary")
     records = _read_records(folder / EPISODES)
-    fault = _contradiction(summary, records)
+    oracle_steps = read_oracle_steps(folder, summary.episodes)
+    fault = _contradiction(summary, records, oracle_steps)
     if fault:
         raise InputError(f"{folder}: {SUMMARY} contradicts {EPISODES}: {fault}")
     if now := name_of_class(summary.provenance.agent_class):
         summary = summary.model_copy(update={"agent": now})
         records = tuple(record.model_copy(update={"agent": now}) for record in records)
-    return Result(folder, summary, records)
+    return Result(folder, summary, records, oracle_steps)
+
+
+def read_oracle_steps(folder: pathlib.Path, num_episodes: int) -> Steps | None:
+    """Returns the oracle's steps in the episodes of an evaluation; None if its folder does not tell them.
+
+    Raises:
+      InputError: if the file is damaged or of another number of episodes.
+    """
+    path = folder / ORACLE
+    if not path.exists():
+        return None
+    steps = _read_model(path, _OracleSteps, "the oracle's steps").steps
+    if len(steps) != num_episodes:
+        raise InputError(f"{path}: expected the oracle's steps in {num_episodes} episodes, found {len(steps)}")
+    return steps
 
 
 def read_suite(folder: pathlib.Path) -> Suite:
@@ -132,11 +158,11 @@ def _read_records(path: pathlib.Path) -> tuple[Record, ...]:
     return tuple(records)
 
 
-def _contradiction(summary: Summary, records: tuple[Record, ...]) -> str | None:
+def _contradiction(summary: Summary, records: tuple[Record, ...], oracle_steps: Steps | None) -> str | None:
     """Returns the first way in which records are not those that a summary was made from, in words."""
     if len(records) != summary.episodes:
         return f"expected {summary.episodes} records, found {len(records)}"
-    same = ("agent", "task", "size", "split", "cell_size", "track", "level")
+    same = ("agent", "task", "size", "split", "cell_size", "track", "level", "lidar_noise", "odometry_noise")
     expected = {key: getattr(summary, key) for key in same} | summary.perturbation
     for record in records:
         for key, value in expected.items():
@@ -148,21 +174,22 @@ def _contradiction(summary: Summary, records: tuple[Record, ...]) -> str | None:
         wrong = np.flatnonzero(np.abs(scores - column(records, name)) > _TOLERANCE)
         if len(wrong):
             return f"expected {name} {scores[wrong[0]]:.6f} by the lengths of episode {wrong[0]}, found another"
-    return _wrong_mean(summary, records)
+    return _wrong_mean(summary, records, oracle_steps)
 
 
-def _wrong_mean(summary: Summary, records: tuple[Record, ...]) -> str | None:
+def _wrong_mean(summary: Summary, records: tuple[Record, ...], oracle_steps: Steps | None) -> str | None:
     distance = column(records, "distance")
     groups = {"overall": (summary.overall, np.ones(len(records), dtype=bool))}
     for key in np.unique(distance).tolist():
         if str(key) not in summary.by_distance:
             return f"expected figures of distance {key}, found none"
         groups[f"distance {key}"] = summary.by_distance[str(key)], distance == key
+    found = scores(records, oracle_steps)
     for name, (figures, chosen) in groups.items():
-        for metric, field in METRICS.items():
-            mean = float(column(records, field)[chosen].mean())
-            if abs(getattr(figures, metric) - mean) > _TOLERANCE:
-                return f"{metric} of {name} is {getattr(figures, metric):.6f}, by the records {mean:.6f}"
+        for metric, value in figures.means.items():
+            mean = float(found[metric][chosen].mean()) if metric in found else value
+            if abs(value - mean) > _TOLERANCE:
+                return f"{metric} of {name} is {value:.6f}, by the records {mean:.6f}"
     return None
 
 

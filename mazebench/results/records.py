@@ -31,7 +31,8 @@ class Record(_Stored):
     """What came of one episode.
 
     The levels of the perturbations follow as further keys; on a track also `track`, `level` and its facts, such as
-    `blocked`; in mazes whose cells are not 1 m wide also `cell_size`, in metres.
+    `blocked`; in mazes whose cells are not 1 m wide also `cell_size`, in metres; where a user set them, `lidar_noise`
+    and `odometry_noise`.
     """
 
     agent: Name
@@ -66,7 +67,15 @@ class Figures(_Stored):
     spl_ci95: tuple[Share, Share]
     spl_grid: Share
     spl_grid_ci95: tuple[Share, Share]
-    spl_relative: Length | None = None  # SPL divided by the oracle's on the same episodes; None if that is not known
+    # Episodes that are on time, by the factor as text ("1.25", "2"); None if the oracle's steps are not known.
+    on_time: dict[str, Share] | None = None
+    on_time_ci95: dict[str, tuple[Share, Share]] | None = None
+
+    @property
+    def means(self) -> dict[str, float]:
+        """The means by the names of their metrics, such as "spl" and "on_time_1.25"."""
+        on_time = {f"on_time_{factor}": share for factor, share in (self.on_time or {}).items()}
+        return {"success_rate": self.success_rate, "spl": self.spl, "spl_grid": self.spl_grid} | on_time
 
 
 class TaskProvenance(_Stored):
@@ -104,6 +113,10 @@ class Summary(_Stored):
     cell_size: Annotated[float, pydantic.Field(gt=0, lt=_LARGEST)] | None = None  # m, where it is not 1
     track: str | None = None
     level: int | None = None  # of the track
+    lidar_noise: Name | None = None  # the option, where it was given: "turtlebot3", or as "0.1,0.05"
+    odometry_noise: Share | None = None  # the option, where it was given
+    hide: Name | None = None  # what the context did not show: "map", "goal" or "map,goal"
+    exact_pose: bool = False  # whether the observed pose was the true one on a track whose pose is odometry
     suite: str | None = None  # of a part of a suite, with the part's name
     part: str | None = None
     benchmark: Name
@@ -112,12 +125,31 @@ class Summary(_Stored):
     provenance: Provenance
     overall: Figures
     by_distance: dict[str, Figures]
-    by_fact: dict[str, Figures] = {}  # of what the track says of each episode, as "blocked" and "not blocked"
+    by_fact: dict[str, Figures] = {}  # of the groups that a track tells apart: "blocked", "not blocked", kinds of mazes
+
+    @property
+    def who(self) -> str:
+        """The agent, with what sets its result apart: "navigator without map", "oracle (privileged)"."""
+        return self.row + (" (privileged)" if self.privileged else "")
+
+    @property
+    def row(self) -> str:
+        """The agent, and what it was told less or more than others: "navigator without map"."""
+        without = "" if self.hide is None else f" without {self.hide.replace(',', ' and ')}"
+        return self.agent + without + (" with the true pose" if self.exact_pose else "")
+
+    @property
+    def senses(self) -> tuple[str, ...]:
+        """The noise on the senses that a user set, in words."""
+        noise = {"lidar noise": self.lidar_noise, "odometry noise": self.odometry_noise}
+        return tuple(f"{name} {value}" for name, value in noise.items() if value is not None)
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the content of `summary.json`."""
-        optional = ("untrained_scale", "cell_size", "suite", "part", "track", "level", "by_fact")
-        return {key: value for key, value in self.model_dump().items() if not (key in optional and not value)}
+        optional = {"untrained_scale", "cell_size", "hide", "exact_pose", "lidar_noise", "odometry_noise"}
+        optional |= {"suite", "part", "track", "level", "by_fact"}
+        defaults = {name: field.default for name, field in Summary.model_fields.items() if name in optional}
+        return {key: value for key, value in self.model_dump().items() if key not in optional or value != defaults[key]}
 
 
 def column(records: Sequence[Record], name: str) -> np.ndarray:

@@ -39,14 +39,14 @@ def _finite(text: str) -> float:
     return value
 
 
-def write_json(path: pathlib.Path, content: Any) -> None:
-    """Writes `content` all or nothing: a reader finds the old file or the new one.
+def write_json(path: pathlib.Path, content: Any, indent: int | None = 1) -> None:
+    """Writes `content` all or nothing: a reader finds the old file or the new one. Without `indent`, it is one line.
 
     Raises:
       OSError: if it can't be written.
     """
     with open_whole(path) as file:
-        file.write((json.dumps(content, indent=1, allow_nan=False) + "\n").encode("utf-8"))
+        file.write((json.dumps(content, indent=indent, allow_nan=False) + "\n").encode("utf-8"))
 
 
 def read_json(path: pathlib.Path) -> Any:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mazebench.errors import InputError, unknown
-from mazebench.maps.maze import Maze
+from mazebench.maps.drawn import FreshMazes, Mazes
 from mazebench.maps.options import MAP_OPTIONS, MazeOptions
 from mazebench.maps.selection import Maps, load_mazes_of
 from mazebench.options import by_name, from_names, options_of
@@ -45,8 +45,8 @@ def make_spec(
       split: "train" or "eval" mazes of the benchmark.
       maps: mazes of your own instead: a `Maze`, an array as `maze_from_array` takes it, several of these of one size,
         or the path of a file or of a folder of files.
-      **options: those of `mazebench.tasks.options.TaskOptions` and `Variants` and, with `maps`, of
-        `mazebench.maps.options.MapOptions`, which docs/options.md lists; None stands for the default.
+      **options: those of `mazebench.tasks.options.TaskOptions` and `Variants`, of `mazebench.maps.options.MazeOptions`
+        and, with `maps`, of `MapOptions`, which docs/options.md lists; None stands for the default.
 
     Raises:
       InputError: if an option is unknown or not allowed, or a map can't be read.
@@ -113,7 +113,7 @@ def build_task(
 
     # The time limit: the given one, else one in which goals of one's own are reached.
     time_limit = task.time_limit or TIME_LIMIT
-    if fits_mazes and task.track is None and not task.time_limit:
+    if (fits_mazes or mazes.is_drawn) and task.track is None and not task.time_limit:
         cells = task.landmark_distance if task.task == "hierarchical" else max(distances)
         time_limit = fitting_time_limit(cells, chosen[0].cell_size)
 
@@ -133,16 +133,18 @@ def build_task(
     return TaskSpec(**{**by_name(task), **by_name(variants), **computed})
 
 
-def load_task_mazes(task: TaskOptions, mazes: MazeOptions) -> tuple[Maze, ...]:
+def load_task_mazes(task: TaskOptions, mazes: MazeOptions) -> Mazes:
     """Returns the mazes in which a task is played.
 
     Raises:
       InputError: if there are no such mazes, the task's track has another size, or a map can't be read.
     """
-    if task.track is None or mazes.maps is not None:
+    if task.track is None:
         return load_mazes_of(mazes)
-    mazes.require_defaults(MAP_OPTIONS, "maps of your own", f"the track {task.track!r}")
     track = TRACKS[task.track]
+    if mazes.maps is not None or mazes.is_drawn:
+        return load_mazes_of(mazes, default_size=track.sizes[task.level[0] - 1])
+    mazes.require_defaults(MAP_OPTIONS, "maps of your own", f"the track {task.track!r}")
     chosen = track.mazes(task.level, mazes.split)
     if mazes.size not in (None, chosen[0].size):
         raise InputError(
@@ -157,12 +159,10 @@ def fitting_time_limit(num_cells: int, cell_size: float) -> int:
     return max(TIME_LIMIT, math.ceil((_STEPS_A_METRE * cell_size + _STEPS_A_CELL) * num_cells) + _SPARE_STEPS)
 
 
-def _distances(
-    task: TaskOptions, mazes: tuple[Maze, ...], fits_mazes: bool, default: tuple[int, ...]
-) -> tuple[int, ...]:
+def _distances(task: TaskOptions, mazes: Mazes, fits_mazes: bool, default: tuple[int, ...]) -> tuple[int, ...]:
     """Returns the distances in cells of a task that names none."""
     of_track = TRACKS[task.track].distances(min(task.level)) if task.track is not None else ()
-    if not fits_mazes:
+    if not fits_mazes or isinstance(mazes, FreshMazes):
         return of_track or default
 
     # Of given ends, that between them.

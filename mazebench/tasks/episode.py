@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 
 import numpy as np
 
 from mazebench.errors import InputError
+from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.tracks import TRACKS
 
 _SEEDS = 2**31
 _MAX_TRIES = 1000
+_MAX_REDRAWS = 100  # of a fresh maze, for an episode
 _FIXED_PAIR_SEED = 20210  # of the pairs of the extremely-low-data regime; any number, chosen once
 
 
@@ -31,9 +35,22 @@ class Episode:
 
 
 def sample_episode(spec: TaskSpec, rng: np.random.Generator) -> Episode:
-    """Draws an episode of a task."""
+    """Draws an episode of a task; of fresh mazes, in one in which the task can be played.
+
+    Raises:
+      InputError: if no such maze is found.
+    """
+    for _ in range(_MAX_REDRAWS if isinstance(spec.mazes, FreshMazes) else 0):
+        with contextlib.suppress(InputError):
+            return _sample_episode(spec, rng)
+    return _sample_episode(spec, rng)
+
+
+def _sample_episode(spec: TaskSpec, rng: np.random.Generator) -> Episode:
     index = int(rng.integers(len(spec.mazes)))
     maze = spec.mazes[index]
+    if spec.track is not None and isinstance(spec.mazes, FreshMazes):
+        TRACKS[spec.track].check(maze, spec.level)
     start, goal = spec.ends(maze)
     if start is None or goal is None:
         pair_rng = np.random.default_rng([_FIXED_PAIR_SEED, index]) if spec.pairs == "fixed" else rng

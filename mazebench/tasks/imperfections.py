@@ -17,7 +17,7 @@ def imperfections(spec: TaskSpec, episode: Episode) -> list[tuple[Perturbation, 
     """Returns what is wrong in `episode`, in the order in which it applies, each with its level and random stream."""
     active = active_perturbations(spec)
     if spec.track is not None:
-        active = [*active, (TRACKS[spec.track], episode_level(spec, episode))]
+        active = [*active, *TRACKS[spec.track].parts(episode_level(spec, episode))]
     return [(perturbation, level, episode.stream(perturbation.stream)) for perturbation, level in active]
 
 

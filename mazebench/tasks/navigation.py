@@ -16,7 +16,7 @@ from mazebench.maps.maze import Maze
 from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_action, controls_of_velocities
 from mazebench.tasks.arguments import Arguments, require_task_spec
 from mazebench.tasks.episode import Episode, check_episode, sample_episode
-from mazebench.tasks.observation import OpenSensors, observation_specs, state_errors
+from mazebench.tasks.observation import OpenSensors, lidar_noise, observation_specs, state_errors
 from mazebench.tasks.perturbations.base import ShownMap, StateError
 from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.sensors.base import Worlds
@@ -45,13 +45,15 @@ class Navigation:
     Observations:
 
     - state: `[12]` float32: x, y, z (m); roll, pitch, yaw (rad, yaw in [-pi, pi)); velocity forward, left, up (m/s);
-      angular velocity about the body's x, y, z (rad/s). With `position_noise`, x and y are noisy.
+      angular velocity about the body's x, y, z (rad/s). With `position_noise`, x and y are noisy; with
+      `odometry_noise`, the pose and the velocities are.
     - context: `[4, M, M]` float32, constant until the next landmark: the map, the map around the start, goal, start.
     - is_first: bool, only if episodes may have several legs: whether this context is new.
     - egocentric, top, chase: `[H, H, 3]` uint8, if `sensors` names them: pictures of the true world, with a marker at
       the goal.
     - lidar: `[32]` float32, if `sensors` names it: metres from the body's centre to the nearest wall of the true maze,
-      at most 5, along horizontal rays; the first straight ahead, then counter-clockwise every 360 / 32 degrees.
+      at most 5, along horizontal rays; the first straight ahead, then counter-clockwise every 360 / 32 degrees. With
+      `lidar_noise`, they are noisy, and may reach less far.
 
     Reward: -1 for each step, 0 for the step that reaches the goal cell; there is no discount on the way.
 
@@ -65,6 +67,7 @@ class Navigation:
     shown_map: ShownMap
     route: Route
     _state_errors: list[StateError]
+    _lidar_noise: np.random.Generator | None
     _position: tuple[float, float]  # x, y (m) of the body after the last step
     _context: np.ndarray  # of the current leg
     _is_first: bool
@@ -127,6 +130,7 @@ class Navigation:
         self.shown_map = show_map(self.spec, episode)
         self.route = plan_route(self.spec, episode, self.shown_map)
         self._state_errors = state_errors(self.spec, episode)
+        self._lidar_noise = lidar_noise(self.spec, episode)
 
         # What steps add to.
         self._position = (float(start[0]), float(start[1]))
@@ -136,7 +140,7 @@ class Navigation:
         self._begin_leg(simulation)
 
     def _load_maze(self, simulation: Simulation, index: int) -> None:
-        simulation.load_maze(self._models[index])
+        simulation.load_maze(self._models, index)
         self._maze = index
 
     def before_step(self, action: int | np.ndarray, simulation: Simulation) -> None:
@@ -179,7 +183,10 @@ class Navigation:
             observation["is_first"] = np.array(self._is_first)
         if self.spec.sensors:
             world = Worlds(
-                maze=np.array([self.episode.maze]), pose=simulation.data.qpos[None], marker=simulation.data.mocap_pos
+                maze=np.array([self.episode.maze]),
+                pose=simulation.data.qpos[None],
+                marker=simulation.data.mocap_pos,
+                noise=[self._lidar_noise],
             )
             observation |= {name: values[0] for name, values in self._sensors.read(world).items()}
         return observation
@@ -222,7 +229,7 @@ class Navigation:
           InputError: if it is of an environment with other mazes.
         """
         index = state.task["_maze"]
-        if self.spec.mazes[index : index + 1] != (state.maze,):
+        if index >= len(self.spec.mazes) or self.spec.mazes[index] != state.maze:
             raise InputError(f"expected a state of an environment with the same mazes, found one of {state.maze.name}")
         self._load_maze(simulation, index)
         simulation.set_full_state(state.simulation)

@@ -9,10 +9,12 @@ from dm_env import specs
 
 from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.imperfections import imperfections
+from mazebench.tasks.imperfections import episode_level, imperfections
+from mazebench.tasks.odometry import NOISE_STREAM, NoisyMotion
 from mazebench.tasks.perturbations.base import StateError
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.base import Sensor, Worlds
+from mazebench.tasks.sensors.lidar_noise import STREAM
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.simulation import STATE_SIZE
 
@@ -29,8 +31,17 @@ def observation_specs(spec: TaskSpec) -> dict[str, specs.Array]:
 
 def state_errors(spec: TaskSpec, episode: Episode) -> list[StateError]:
     """Returns what is wrong with the states observed in `episode`; each has a random stream of its own."""
+    if spec.exact_pose:
+        return []
     errors = [perturbation.state_error(level, rng) for perturbation, level, rng in imperfections(spec, episode)]
-    return [error for error in errors if error is not None]
+    alpha = spec.odometry_noise_at(episode_level(spec, episode))
+    noise = NoisyMotion(alpha, episode.stream(NOISE_STREAM)) if alpha else None
+    return [error for error in (noise, *errors) if error is not None]
+
+
+def lidar_noise(spec: TaskSpec, episode: Episode) -> np.random.Generator | None:
+    """Returns what draws the noise on the lidar's readings in `episode`; None if nothing is drawn."""
+    return episode.stream(STREAM) if "lidar" in spec.sensors and spec.lidar.is_random else None
 
 
 class OpenSensors:

@@ -18,11 +18,13 @@ from mazebench.tasks.sensors.base import SensorOptions
 from mazebench.tasks.start_goal import cell_of_end, end_text
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
+from mazebench.world.lidar import LidarModel
 
 TASKS = ("local", "hierarchical")
 TRAIN_DISTANCES = tuple(range(1, 6))
 EVAL_DISTANCES = tuple(range(1, 16))
 ENDS = ("start", "goal")
+HIDEABLE = ("map", "goal")
 TIME_LIMIT = 100  # agent steps
 _FIRST_LEVEL = LEVELS[:1]
 _LIDAR = "lidar"  # the sensor that every track offers
@@ -94,6 +96,24 @@ class TaskOptions(Perturbations, SensorOptions):
         tuple[Annotated[str, OneOf(*SENSORS)], ...],
         Doc("Sensors that are observed besides the state and the context."),
     ] = ()
+    hide: Annotated[
+        tuple[Annotated[str, OneOf(*HIDEABLE)], ...],
+        Doc(
+            "What the context does not show: map makes planes 0 and 1 zero, goal plane 2 (local task, one goal). "
+            "Results without the map say what the map is worth."
+        ),
+    ] = ()
+    odometry_noise: Annotated[
+        float | None,
+        Interval(ge=0, le=1),
+        Doc(
+            "alpha of the noise on the observed motion, AMCL's omnidirectional model (.2 is its default): the observed "
+            "pose drifts away from the true one; that of the track, or 0, if not given."
+        ),
+    ] = None
+    exact_pose: Annotated[
+        bool, Doc("The observed pose is the true one on a track whose pose is odometry, as a reference.")
+    ] = False
 
     def __post_init__(self) -> None:
         if len(set(self.sensors)) < len(self.sensors):
@@ -102,8 +122,15 @@ class TaskOptions(Perturbations, SensorOptions):
             raise InputError(f"expected each level once, found {', '.join(map(str, self.level))}")
         if not self.level:
             raise InputError("expected at least one level, found none")
+        if self.hide:
+            self._check_hidden()
+        if self.odometry_noise and (self.position_noise or self.exact_pose):
+            beside = "exact_pose" if self.exact_pose else "position_noise"
+            raise InputError(f"odometry_noise {self.odometry_noise:g}: expected no {beside} beside it, found it")
         if self.track is not None:
             self._check_track(self.track)
+        elif self.exact_pose:
+            raise InputError("exact_pose: expected a track whose pose is odometry beside it, found none")
         elif self.level != _FIRST_LEVEL:
             levels = ", ".join(map(str, self.level))
             raise InputError(f"level {levels}: expected a track beside it, found none; tracks: {', '.join(TRACKS)}")
@@ -119,6 +146,17 @@ class TaskOptions(Perturbations, SensorOptions):
         if self.track is None or _LIDAR in self.sensors:
             return self.sensors
         return (_LIDAR, *self.sensors)
+
+    @property
+    def lidar(self) -> LidarModel:
+        """What the sensor `lidar` measures: as the option says, or the track."""
+        return TRACKS[self.track].lidar if self.lidar_noise is None and self.track is not None else super().lidar
+
+    def odometry_noise_at(self, level: int) -> float:
+        """Returns alpha of the noise on the observed motion at a level: as the option says, or the track."""
+        if self.odometry_noise is not None or self.track is None or self.exact_pose:
+            return self.odometry_noise or 0.0
+        return TRACKS[self.track].odometry_noise(level)
 
     def ends(self, maze: Maze) -> tuple[Cell | None, Cell | None]:
         """Returns the start and the goal of all episodes in a maze; None for one that each episode draws.
@@ -140,6 +178,19 @@ class TaskOptions(Perturbations, SensorOptions):
         given = start or goal
         return maze.diameter if given is None else int(maze.distances(given).max())
 
+    def _check_hidden(self) -> None:
+        """Raises `InputError` if something is hidden twice, or another option would tell it."""
+        hidden = ",".join(self.hide)
+        if len(set(self.hide)) < len(self.hide):
+            raise InputError(f"expected each of {', '.join(HIDEABLE)} once to hide, found {hidden}")
+        if self.task != "local":
+            raise InputError(f"hide {hidden}: expected the task 'local', found {self.task!r}")
+        cameras = [name for name in self.sensors if name != _LIDAR]
+        telling = cameras if "goal" in self.hide else [name for name in cameras if name != "egocentric"]
+        if telling:
+            what = "where the goal is" if "goal" in self.hide else "the maze from above"
+            raise InputError(f"hide {hidden}: expected sensors without {telling[0]!r}, which shows {what}")
+
     def _check_track(self, name: str) -> None:
         """Raises `InputError` if an option contradicts the track called `name`."""
         if self.time_limit not in (0, TIME_LIMIT):
@@ -151,6 +202,8 @@ class TaskOptions(Perturbations, SensorOptions):
         for perturbation, strength in perturbation_levels(self).items():
             if strength:
                 raise InputError(f"track {name!r}: expected no perturbation, found {perturbation} {strength}")
+        if self.exact_pose and not any(map(TRACKS[name].hides_pose, self.level)):
+            raise InputError(f"track {name!r}: expected no exact_pose, for the pose is exact; it belongs to lost poses")
         for sensor in TRACKS[name].refused_sensors:
             if sensor in self.sensors:
                 raise InputError(f"track {name!r}: expected sensors without {sensor!r}, which shows where the body is")
@@ -191,3 +244,7 @@ class EnvironmentOptions:
     task: TaskOptions = TaskOptions()
     mazes: MazeOptions = MazeOptions()
     variants: Variants = Variants()
+
+    def __post_init__(self) -> None:
+        if self.mazes.is_drawn and self.mazes.split == "eval":
+            raise InputError("mazes that are drawn: expected split 'train' or 'dev', found 'eval'")

@@ -5,18 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from mazebench.maps.maze import Cell
-from mazebench.tasks.context import GLOBAL_MAP, LOCAL_MAP, build_context
+from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, build_context
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.imperfections import imperfections
 from mazebench.tasks.perturbations.base import ShownMap
 from mazebench.tasks.spec import TaskSpec
 
 _GREY_LEVELS = np.float32(255)
+_PLANES = {"map": (GLOBAL_MAP, LOCAL_MAP), "goal": (GOAL,)}  # of the context, by what `hide` names
 
 
 def show_map(spec: TaskSpec, episode: Episode) -> ShownMap:
     """Returns the map that the agent is shown in `episode`."""
-    shown = ShownMap(spec.mazes[episode.maze].walls)
+    maze = spec.mazes[episode.maze]
+    shown = ShownMap(maze.walls, kind=maze.kind)
     for perturbation, level, rng in imperfections(spec, episode):
         shown = perturbation.show(shown, level, (episode.start, episode.goal), rng)
     return shown
@@ -31,6 +33,6 @@ def leg_context(spec: TaskSpec, shown: ShownMap, start: Cell, goal: Cell) -> np.
     if spec.track is not None:
         maps = context[[GLOBAL_MAP, LOCAL_MAP]]
         context[[GLOBAL_MAP, LOCAL_MAP]] = np.rint(maps * _GREY_LEVELS) / _GREY_LEVELS
-    for plane in shown.hidden:
+    for plane in (*shown.hidden, *(plane for name in spec.hide for plane in _PLANES[name])):
         context[plane] = 0
     return context

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from pydantic import InstanceOf
 
-from mazebench.constants import TASK_VERSION, TRACKS_VERSION
+from mazebench.constants import TASK_VERSION
 from mazebench.errors import InputError
+from mazebench.maps.drawn import FreshMazes, Mazes
 from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, Maze, require_one_size
 from mazebench.maps.options import THIN_WALLS
 from mazebench.options import options
-from mazebench.tasks.options import TaskOptions, Variants
+from mazebench.tasks.options import ENDS, TaskOptions, Variants
 from mazebench.tasks.tracks import TRACKS
 
 MIN_CONTEXT_SIZE = 3
+_NUM_CHECKED = 10  # of fresh mazes, one of which must have the distances
 
 
 @options
@@ -26,7 +28,7 @@ class TaskSpec(TaskOptions, Variants):
       InputError: if a value is not allowed, or the mazes do not fit it.
     """
 
-    mazes: tuple[InstanceOf[Maze], ...] = ()
+    mazes: tuple[InstanceOf[Maze], ...] | InstanceOf[FreshMazes]
 
     def __post_init__(self) -> None:
         check_mazes(self, self.mazes)
@@ -37,6 +39,11 @@ class TaskSpec(TaskOptions, Variants):
             )
         if self.ends_given and self.pairs == "fixed":
             raise InputError("expected pairs 'random' beside a start or a goal, found 'fixed', pairs of their own")
+        if self.hide and self.num_goals > 1:
+            raise InputError(f"hide {','.join(self.hide)}: expected num_goals 1, found {self.num_goals}")
+        if self.lidar_noise is not None and "lidar" not in self.sensors:
+            found = ", ".join(self.sensors) or "none"
+            raise InputError(f"lidar_noise {self.lidar_noise}: expected the sensor lidar, found {found}")
         if self.goal is not None and self.num_goals > 1:
             raise InputError(f"expected num_goals 1 beside a goal, found {self.num_goals}")
         if not self.context_size >= MIN_CONTEXT_SIZE:
@@ -61,12 +68,26 @@ class TaskSpec(TaskOptions, Variants):
     def _check_distances(self) -> None:
         if not self.distances:
             raise InputError("expected at least one distance, found none")
-        for maze in self.mazes if self.ends_given < 2 else ():
+        mazes = self.mazes
+        if isinstance(mazes, FreshMazes):  # an episode whose maze is too small takes another one
+            mazes = (max((mazes[number] for number in range(_NUM_CHECKED)), key=self.farthest),)
+        for maze in mazes if self.ends_given < 2 else ():
             if max(self.distances) > (farthest := self.farthest(maze)):
                 raise InputError(
                     f"{maze.name}: expected distances of at most {farthest} cells, as far as the maze reaches, "
                     f"found {max(self.distances)}; choose others (--distances)"
                 )
+
+    @property
+    def fixed_mazes(self) -> tuple[Maze, ...]:
+        """The mazes.
+
+        Raises:
+          InputError: if every episode has a new one.
+        """
+        if isinstance(self.mazes, FreshMazes):
+            raise InputError("expected a task with a number of mazes, found fresh ones")
+        return self.mazes
 
     @property
     def size(self) -> int:
@@ -81,7 +102,7 @@ class TaskSpec(TaskOptions, Variants):
     @property
     def version(self) -> int:
         """The version of what an episode is."""
-        return TASK_VERSION if self.track is None else TRACKS_VERSION
+        return TASK_VERSION if self.track is None else TRACKS[self.track].version
 
     @property
     def has_legs(self) -> bool:
@@ -89,13 +110,16 @@ class TaskSpec(TaskOptions, Variants):
         return self.task == "hierarchical" or self.num_goals > 1
 
 
-def check_mazes(task: TaskOptions, mazes: tuple[Maze, ...]) -> None:
+def check_mazes(task: TaskOptions, mazes: Mazes) -> None:
     """Checks that a task can be played in some mazes.
 
     Raises:
       InputError: if they are not of one size and scale, a cell is too narrow for the body, a maze has no two free cells
         for a start and a goal, or the task's track does not take them.
     """
+    if isinstance(mazes, FreshMazes):
+        _check_fresh(task, mazes)
+        return
     require_one_size(mazes)
     name, cell_size = mazes[0].name, mazes[0].cell_size
     if cell_size < MIN_CELL_SIZE:
@@ -113,3 +137,12 @@ def check_mazes(task: TaskOptions, mazes: tuple[Maze, ...]) -> None:
         start, goal = task.ends(maze)
         if start is not None and start == goal:
             raise InputError(f"{maze.name}: expected start and goal in different cells, found both in {start}")
+
+
+def _check_fresh(task: TaskOptions, mazes: FreshMazes) -> None:
+    if task.textures:
+        raise InputError("fresh mazes: expected no textures, which take long to make, found textures")
+    for name in ENDS:
+        if (end := getattr(task, name)) is not None:
+            raise InputError(f"fresh mazes: expected no {name}, which may be a wall in one of them, found {end!r}")
+    mazes.max_boxes  # noqa: B018 - raises if a kind can't make mazes of this size

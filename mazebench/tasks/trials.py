@@ -10,12 +10,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from mazebench.constants import EPISODES_PER_DISTANCE
-from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, TRACKS_VERSION, VERSION, read_asset
+from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, VERSION, read_asset
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.episode import Episode, make_episode, sample_pair
 from mazebench.tasks.options import EVAL_DISTANCES
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.tracks import TRACKS
 from mazebench.world.mjcf import BODY_RADIUS
 
 COLUMNS = ("maze", "start_row", "start_column", "goal_row", "goal_column", "distance", "yaw", "seed", "shortest_path")
@@ -32,17 +33,17 @@ class Trial:
     shortest_path: float  # m, of the body as a disc from the start point to the goal cell
 
 
-def episodes_file(task: str, size: int) -> str:
-    """Returns the name of the file with the frozen eval episodes of one task and size."""
-    return f"episodes-{task}-{size}-eval.csv"
+def episodes_file(task: str, size: int, split: str = "eval") -> str:
+    """Returns the name of the file with the frozen episodes of one task, size and split."""
+    return f"episodes-{task}-{size}-{split}.csv"
 
 
-def frozen_trials(task: str, size: int, version: str = VERSION) -> tuple[Trial, ...]:
-    """Returns the eval episodes of one task and size.
+def frozen_trials(task: str, size: int, version: str = VERSION, split: str = "eval") -> tuple[Trial, ...]:
+    """Returns the frozen episodes of one task, size and split.
 
-    v1 has 1,500 of the local task and 20 of the hierarchical one; v2 has 200, which tracks share.
+    v1 has 1,500 of the local task and 20 of the hierarchical one; v2 has 200 and v3 240, which tracks share.
     """
-    rows = csv.DictReader(read_asset(episodes_file(task, size), version).splitlines())
+    rows = csv.DictReader(read_asset(episodes_file(task, size, split), version).splitlines())
     return tuple(_trial_of_row(row) for row in rows)
 
 
@@ -58,26 +59,27 @@ def _trial_of_row(row: dict[str, str]) -> Trial:
 
 
 def select_trials(
-    spec: TaskSpec, is_frozen: bool, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0
+    spec: TaskSpec, frozen_split: str | None, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0
 ) -> list[Trial]:
     """Returns the episodes to evaluate, by maze and then by distance.
 
     Args:
       spec: the task; its distances are those of the pairs.
-      is_frozen: whether its mazes are the benchmark's eval mazes, whose frozen episodes are then taken as far as they
-        go: of a track all of those distances, of v1 at most five for each maze and distance.
+      frozen_split: the split of the benchmark that its mazes are, whose frozen episodes are then taken as far as they
+        go: of a track all of those distances, of v1 at most five for each maze and distance. None for other mazes.
       episodes_per_distance: for each maze and distance.
       seed: of what is drawn.
 
     Raises:
       InputError: if no two cells of a maze are a wanted distance apart.
     """
-    if is_frozen and spec.track is not None:
-        trials = frozen_trials("local", spec.size, TRACKS_VERSION)
+    if frozen_split is not None and spec.track is not None:
+        trials = frozen_trials("local", spec.size, TRACKS[spec.track].benchmark, frozen_split)
         return [trial for trial in trials if trial.distance in spec.distances]
-    if is_frozen and spec.task == "hierarchical":
+    if frozen_split is not None and spec.task == "hierarchical":
         return list(frozen_trials(spec.task, spec.size))
-    if is_frozen and set(spec.distances) <= set(EVAL_DISTANCES) and episodes_per_distance <= EPISODES_PER_DISTANCE:
+    has_all = set(spec.distances) <= set(EVAL_DISTANCES) and episodes_per_distance <= EPISODES_PER_DISTANCE
+    if frozen_split is not None and has_all:
         # The frozen episodes of a maze and a distance follow each other, EPISODES_PER_DISTANCE of them.
         return [
             trial
@@ -96,7 +98,7 @@ def draw_trials(spec: TaskSpec, episodes_per_distance: int = EPISODES_PER_DISTAN
       InputError: if no two cells of a maze are a wanted distance apart.
     """
     trials = []
-    for index, maze in enumerate(spec.mazes):
+    for index, maze in enumerate(spec.fixed_mazes):
         start, goal = spec.ends(maze)
         if spec.task == "hierarchical":
             rng = np.random.default_rng([seed, maze.size, index])

@@ -1,4 +1,4 @@
-"""The evaluation that accompanies a training run, in mazes that it doesn't train in."""
+"""The evaluation that accompanies a training run, in mazes that it doesn't train in unless they are one's own."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from mazebench.agent import Agent
 from mazebench.errors import InputError
 from mazebench.evaluation.chunk import run_trials
-from mazebench.maps.generators import generate
+from mazebench.maps.drawn import FreshMazes, Mazes
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.trials import draw_trials
@@ -22,7 +23,10 @@ _MAX_DRAWS = 100  # of a maze in which the task can be played
 
 
 class HeldOutEvaluation:
-    """Episodes in `num_mazes` new mazes of the size of `task`'s, with its track, perturbations and sensors."""
+    """Episodes in `num_mazes` new mazes of the size and kinds of `task`'s, with its track, perturbations and sensors.
+
+    Mazes of one's own have no kind, and no others are like them: there, they are new episodes in the same mazes.
+    """
 
     def __init__(self, task: TaskSpec, num_mazes: int, distances: Sequence[int] = ()):
         """Draws the mazes; the goals are at five of the `distances`, or of those of the task's track.
@@ -30,14 +34,18 @@ class HeldOutEvaluation:
         Raises:
           InputError: if no such mazes are found.
         """
+        kinds = _kinds(task.mazes)
         if not distances:
-            distances = _DISTANCES if task.track is None else task.distances
+            distances = _DISTANCES if task.track is None and kinds else task.distances
         spread = np.linspace(min(distances), max(distances), len(_DISTANCES)).round().astype(int).tolist()
         self._distances = tuple(sorted({min(distances, key=lambda each: abs(each - wanted)) for wanted in spread}))
         plain = dataclasses.replace(task, distances=self._distances, num_goals=1, pairs="random")
         streams = np.random.SeedSequence([_SEED, task.size]).spawn(num_mazes)
-        mazes = [_draw_maze(plain, f"held-out-{index}", stream) for index, stream in enumerate(streams)]
-        self.task = dataclasses.replace(plain, mazes=tuple(mazes))
+        drawn = [
+            _draw_maze(plain, kinds[index % len(kinds)], f"held-out-{index}", stream)
+            for index, stream in enumerate(streams if kinds else ())
+        ]
+        self.task = dataclasses.replace(plain, mazes=tuple(drawn) or plain.mazes)
         self.trials = list(enumerate(draw_trials(self.task, _EPISODES)))
 
     def success_rates(self, agent: Agent, progress: Callable[[int, int], None]) -> dict[int, float]:
@@ -57,11 +65,17 @@ class HeldOutEvaluation:
         return {distance: float(np.mean(successes)) for distance, successes in reached.items()}
 
 
-def _draw_maze(task: TaskSpec, name: str, stream: np.random.SeedSequence) -> Maze:
+def _kinds(mazes: Mazes) -> tuple[str, ...]:
+    """Returns the kinds of mazes, each once; none of mazes of one's own."""
+    kinds = mazes.kinds if isinstance(mazes, FreshMazes) else (maze.kind for maze in mazes if maze.kind)
+    return tuple(dict.fromkeys(kinds))
+
+
+def _draw_maze(task: TaskSpec, kind: str, name: str, stream: np.random.SeedSequence) -> Maze:
     """Returns the first maze of `stream` in which `task` can be played."""
     rng = np.random.default_rng(stream)
     for draw in range(_MAX_DRAWS):
-        maze = generate("dfs", task.size, rng, name)
+        maze = generate(kind, task.size, rng, name)
         try:
             dataclasses.replace(task, mazes=(maze,))
         except InputError:

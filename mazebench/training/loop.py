@@ -22,7 +22,8 @@ from mazebench import stopping
 from mazebench.agent_loading import learning_agents, load_agent_class
 from mazebench.errors import InputError, RunError, unknown
 from mazebench.evaluation.checked_agent import context_size_of
-from mazebench.maps.options import MazeOptions
+from mazebench.evaluation.provenance import mazes_hash
+from mazebench.maps.options import DrawnOptions
 from mazebench.options import fields_of, from_names
 from mazebench.tasks.build import build_task
 from mazebench.tasks.options import TaskOptions, Variants
@@ -196,6 +197,8 @@ def _training_task(options: TrainOptions, agent_class: type[LearningAgent], defa
     Raises:
       InputError: if there is no such task, or one of `defaults` is no option of a task.
     """
+    if needed := [name for name in agent_class.needs_shown if name in options.task.hide]:
+        raise InputError(f"agent {options.agent!r}: needs the {needed[0]}, found it hidden")
     of_task, of_variants = fields_of(TaskOptions), fields_of(Variants)
     for name in defaults:
         if name not in of_task and name not in of_variants:
@@ -211,8 +214,11 @@ def _training_task(options: TrainOptions, agent_class: type[LearningAgent], defa
         variants["num_goals"] = 1  # a track has one goal, and so has a maze with a fixed pair
 
     choose_context_size = functools.partial(context_size_of, options.agent, agent_class)
-    mazes = MazeOptions(size=options.size)
-    return build_task(task, mazes, from_names(Variants, variants), choose_context_size=choose_context_size)
+    chosen = from_names(Variants, variants)
+    spec = build_task(task, options.mazes, chosen, choose_context_size=choose_context_size)
+    if spec.cell_size != 1:
+        raise InputError(f"expected maps with cells of 1 m in a training, found {spec.cell_size:g} m (--cell-size)")
+    return spec
 
 
 def open_source(options: TrainOptions, task: TaskSpec, learner: Learner) -> Source:
@@ -257,7 +263,12 @@ def _save(options: TrainOptions, folder: RunFolder, learner: Learner, task: Task
 def _origin(options: TrainOptions, task: TaskSpec) -> dict[str, Any]:
     """Returns what is trained, and in which task."""
     values = {name: getattr(task, name) for name in (*fields_of(TaskOptions), *fields_of(Variants))}
-    return {"agent": options.agent, "size": task.size, "task": values, "seed": options.seed}
+    origin = {"agent": options.agent, "size": task.size, "task": values, "seed": options.seed}
+    if options.mazes.is_drawn:
+        origin["mazes"] = {name: getattr(options.mazes, name) for name in fields_of(DrawnOptions)}
+    elif options.mazes.maps is not None:
+        origin["mazes"] = {"sha256": mazes_hash(task)}
+    return origin
 
 
 def _mix(*numbers: int) -> int:

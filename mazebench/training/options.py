@@ -8,12 +8,12 @@ from typing import Annotated
 from annotated_types import Ge, Interval
 
 from mazebench.errors import InputError
-from mazebench.maps.options import Size
-from mazebench.options import Doc, fields_of, options
+from mazebench.maps.options import MazeOptions
+from mazebench.options import Doc, by_name, options, options_of
 from mazebench.tasks.options import Pairs, TaskOptions
 
-# Options of `TaskOptions` for which trainings have one value only.
-FIXED = ("task", "start", "goal", "landmark_distance")
+# Options of `TaskOptions` and `MazeOptions` for which trainings have one value only.
+FIXED = ("task", "start", "goal", "landmark_distance", "split")
 _LONGEST_MINUTES = 366 * 24 * 60  # a year
 
 
@@ -27,7 +27,6 @@ class TrainOptions:
 
     agent: str = dataclasses.field(kw_only=False)
     overrides: tuple[tuple[str, str], ...] = ()  # values of the agent's config, by name
-    size: Size = None
     minutes: Annotated[float | None, Interval(ge=0.01, le=_LONGEST_MINUTES), Doc("How long this sitting lasts.")] = None
     env_steps: Annotated[int | None, Ge(1), Doc("Agent steps of the run, all sittings together.")] = None
     seed: Annotated[int, Interval(ge=0, le=2**63 - 1), Doc("Seed of everything that is drawn.")] = 0
@@ -45,13 +44,17 @@ class TrainOptions:
     workers: Annotated[int, Ge(0), Doc("Ray actors that collect; 0 collects in this process.")] = 0
     ray_address: Annotated[str | None, Doc("Address of a Ray cluster for the workers; local if not given.")] = None
     task: TaskOptions = TaskOptions()
+    mazes: MazeOptions = MazeOptions()
     pairs: Pairs = "random"
 
     def __post_init__(self) -> None:
+        values, declared = by_name(self.task) | by_name(self.mazes), options_of(TrainOptions)
         for name in FIXED:
-            value, default = getattr(self.task, name), fields_of(TaskOptions)[name].default
+            value, default = values[name], declared[name].default
             if value != default:
                 raise InputError(f"expected {name} {default!r} in a training, found {value!r}")
+        if not isinstance(self.mazes.maps, str | None):
+            raise InputError(f"expected maps as a path in a training, found {type(self.mazes.maps).__name__}")
         if self.minutes is None and self.env_steps is None:
             raise InputError("expected --minutes or --env-steps, found neither")
         if self.ray_address is not None and not self.workers:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mazebench.errors import InputError, unknown
 from mazebench.maps.files import read_located
-from mazebench.maps.generators import generate
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, resized
 from mazebench.maps.options import OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions
 from mazebench.maps.pictures import draw_maze, write_image
@@ -30,12 +30,12 @@ class _Format(NamedTuple):
 
 
 def make_mazes(
-    size: int | None, count: int, seed: int, style: str, source: pathlib.Path | None, options: MapOptions
+    size: int | None, count: int, seed: int, kind: str, source: pathlib.Path | None, options: MapOptions
 ) -> Iterator[LocatedMaze]:
-    """Yields `count` mazes of a style, named after style, size, seed and index; or the one maze in the map `source`.
+    """Yields `count` mazes of a kind, named after kind, size, seed and index; or the one maze in the map `source`.
 
     Raises:
-      InputError: if the style can't make mazes of that size, or the map holds no maze.
+      InputError: if the kind has no mazes of that size, or the map holds no maze.
     """
     if source is not None:
         yield read_located(source, size, options)
@@ -43,8 +43,8 @@ def make_mazes(
     options.require_defaults((*OCCUPANCY_OPTIONS, *PICTURE_OPTIONS), "maps", "a generated maze")
     size = _DEFAULT_SIZE if size is None else size
     for index in range(count):
-        name = f"{style}-{size}-{seed}-{index:03d}"
-        maze = generate(style, size, np.random.default_rng([seed, index]), name)
+        name = f"{kind}-{size}-{seed}-{index:03d}"
+        maze = generate(kind, size, np.random.default_rng([seed, index]), name)
         yield LocatedMaze(resized(maze, options.cell_size))
 
 

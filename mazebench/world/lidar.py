@@ -8,10 +8,11 @@ and upwards. Eight rays of a body share a copy. Arrays of rays are `[4, 8, K]`: 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from mazebench.maps.drawn import FreshMazes, Mazes
 from mazebench.maps.maze import Maze
 
 NUM_RAYS = 32
@@ -23,8 +24,30 @@ _COS, _SIN = np.cos(np.arange(_PER_TURN) * _STEP), np.sin(np.arange(_PER_TURN) *
 _RAYS = np.stack([_COS, _SIN])[..., None]  # [2, 8, 1]: x and y of the rays that point to the right and upwards
 _RAYS_TURNED = np.stack([-_SIN, _COS])[..., None]  # the same rays, turned by a quarter counter-clockwise
 _PARALLEL = 1e-300  # the least component of a ray, so that the lines it is parallel to are far away but not at infinity
+_NUM_FRESH = 512  # fresh mazes that are kept turned
 # Which of (right, up, left, down) are x and y in the maze that is turned by 0, 1, 2 and 3 quarters.
 _TURNED_AXES = np.array([[0, 1, 2, 3], [1, 2, 3, 0]])
+
+
+class LidarModel(NamedTuple):
+    """What a range sensor measures. The default is exact and sees as far as 5 m."""
+
+    min_range: float = 0.0  # m
+    max_range: float = MAX_RANGE  # m; what a ray reads that meets no wall this near
+    sigma: float = 0.0  # m, the standard deviation of the noise on a distance
+    step: float = 0.0  # m, between two distances that can be read; 0 for any
+    lost: float = 0.0  # the share of rays that get no return
+
+    @property
+    def is_random(self) -> bool:
+        """Whether readings of the same scene differ."""
+        return self.sigma > 0 or self.lost > 0
+
+
+# The LDS-01 of a TurtleBot3: all but `lost` is as in ROBOTIS' own simulation of it (turtlebot3_simulations,
+# turtlebot3_gazebo/models/turtlebot3_burger/model.sdf). That has no rays without return; a real sensor does, on dark or
+# shiny walls and at grazing angles, and 2 % is our choice.
+TURTLEBOT3 = LidarModel(min_range=0.12, max_range=3.5, sigma=0.01, step=0.015, lost=0.02)
 
 
 def ray_ends(pose: np.ndarray, ranges: np.ndarray) -> np.ndarray:
@@ -40,16 +63,45 @@ def ray_ends(pose: np.ndarray, ranges: np.ndarray) -> np.ndarray:
 class Lidar:
     """The range sensor in some mazes of one size, whose cells have one size."""
 
-    def __init__(self, mazes: Sequence[Maze]):
+    def __init__(self, mazes: Mazes, max_range: float = MAX_RANGE):
+        """Sees as far as `max_range` (m)."""
         self._size, self._cell_size = mazes[0].size, mazes[0].cell_size
-        self._reach = MAX_RANGE / self._cell_size  # cells
+        self._max_range = max_range
+        self._reach = max_range / self._cell_size  # cells
+        self._mazes = mazes
+        # Of fresh mazes, those that bodies are in.
+        self._index_of: dict[int, int] | None = {} if isinstance(mazes, FreshMazes) else None
+        self._allocate(_NUM_FRESH if isinstance(mazes, FreshMazes) else len(mazes))
+        if not isinstance(mazes, FreshMazes):
+            for index, maze in enumerate(mazes):
+                self._put(index, maze)
+
+    def _allocate(self, num_mazes: int) -> None:
+        """Makes room for mazes: `[4, num_mazes, N, N]` bool, the free cells of each in four turns."""
+        self._free = np.zeros((4, num_mazes, self._size, self._size), dtype=bool)
+        self._first_maze = np.arange(4)[:, None] * num_mazes  # [4, 1], among the turned ones
+
+    def _put(self, index: int, maze: Maze) -> None:
         # Rows from the bottom to the top, so that row and column are the integer parts of y and x.
-        free = np.stack([~maze.walls[::-1] for maze in mazes])
-        self._free = np.stack([np.rot90(free, turns, axes=(1, 2)) for turns in range(4)]).ravel()
-        self._first_maze = np.arange(4)[:, None] * len(mazes)  # [4, 1], among the turned ones
+        free = ~maze.walls[::-1]
+        self._free[:, index] = [np.rot90(free, turns) for turns in range(4)]
+
+    def _indices(self, maze: np.ndarray) -> np.ndarray:
+        """Returns where some mazes are in `_free`, `[K]` int, and puts those that are not there into it."""
+        if self._index_of is None:
+            return maze
+        numbers = maze.tolist()
+        new = set(numbers) - self._index_of.keys()
+        if len(self._index_of) + len(new) > self._free.shape[1]:  # begin anew, with those that are needed now
+            self._index_of, new = {}, set(numbers)
+            self._allocate(max(self._free.shape[1], 2 * len(new)))
+        for number in new:
+            self._put(len(self._index_of), self._mazes[number])
+            self._index_of[number] = len(self._index_of)
+        return np.array([self._index_of[number] for number in numbers])
 
     def ranges(self, maze: np.ndarray, pose: np.ndarray) -> np.ndarray:
-        """Returns the distances to the nearest walls along the rays of K bodies: `[K, 32]` float32, m, at most 5.
+        """Returns the distances to the nearest walls along the rays of K bodies: `[K, 32]` float32, m.
 
         `ray_ends` says where the rays point. The other bodies change no bit of a body's ranges.
 
@@ -63,12 +115,12 @@ class Lidar:
         spacing = _line_spacing(yaw - heading * _STEP)
 
         # Where the rays begin, and their first lines.
-        cell, gap = self._cells_in_turned_mazes(maze, point)
+        cell, gap = self._cells_in_turned_mazes(self._indices(maze), point)
         crossing = gap[:, :, None] * spacing[:, None]  # [2, 4, 8, K]
         cells = cell.repeat(_PER_TURN, axis=0).ravel()
 
         distances = self._traverse(cells, crossing.reshape(2, -1), spacing.reshape(2, -1))
-        ranges = np.minimum(distances * self._cell_size, MAX_RANGE).astype(np.float32)
+        ranges = np.minimum(distances * self._cell_size, self._max_range).astype(np.float32)
 
         # The first of `ranges` is less than a step from +x, the first that is returned is straight ahead. With "wrap",
         # ray 0 follows ray 31.

@@ -12,7 +12,6 @@ import numpy as np
 
 from mazebench.constants import ACTIONS, MAX_PIXELS, PHYSICS_TIMESTEP, TOP_SPEED
 from mazebench.maps import colors
-from mazebench.maps.covering import Rectangle, cover
 from mazebench.maps.maze import WALL_HEIGHT, Maze
 
 BODY_RADIUS = 0.15  # DeepMind Lab's box is 30 x 30 x 56 units
@@ -47,12 +46,11 @@ _FORWARD, _BACKWARD, _LEFT, _RIGHT, _TURN = range(NUM_CONTROLS)
 
 def maze_spec(maze: Maze) -> mujoco.MjSpec:
     """Returns the standalone model of one maze, which `mazebench generate` writes."""
-    boxes = cover(maze.walls)
-    return build_spec(maze, boxes, len(boxes), maze.name)
+    return build_spec(maze, len(maze.boxes), maze.name)
 
 
-def build_spec(maze: Maze, boxes: list[Rectangle], num_boxes: int, name: str = "maze") -> mujoco.MjSpec:
-    """Returns the model of `maze` with `boxes` as walls, and boxes below the floor to make up `num_boxes`."""
+def build_spec(maze: Maze, num_boxes: int, name: str = "maze") -> mujoco.MjSpec:
+    """Returns the model of `maze`, with boxes below the floor to make up `num_boxes`."""
     spec = mujoco.MjSpec()
     spec.modelname = name
     spec.option.timestep = PHYSICS_TIMESTEP
@@ -74,7 +72,7 @@ def build_spec(maze: Maze, boxes: list[Rectangle], num_boxes: int, name: str = "
 
     _add_materials(spec, maze)
     _add_room(spec, maze.side)
-    _add_walls(spec, maze, boxes, num_boxes)
+    _add_walls(spec, maze, num_boxes)
     _add_goal(spec, maze.cell_size)
     _add_body(spec, maze)
     return spec
@@ -142,16 +140,28 @@ def _add_room(spec: mujoco.MjSpec, side: float) -> None:
     world.add_camera(name="top", pos=[middle, middle, height], quat=[1, 0, 0, 0], fovy=fovy)
 
 
-def _add_walls(spec: mujoco.MjSpec, maze: Maze, boxes: list[Rectangle], num_boxes: int) -> None:
-    scale = maze.cell_size
-    for index in range(num_boxes):
-        if index < len(boxes):
-            top, left, bottom, right = boxes[index]
-            pos = [scale * (left + right) / 2, scale * (maze.size - (top + bottom) / 2), WALL_HEIGHT / 2]
-            half = [scale * (right - left) / 2, scale * (bottom - top) / 2, WALL_HEIGHT / 2]
-        else:
-            # Collidable and apart from each other: geoms without contacts would change the layout of MjData.
-            pos, half = [scale * (index + 0.5), scale * 0.5, -_PARKED_DEPTH], [0.1, 0.1, 0.1]
+def wall_boxes(maze: Maze, num_boxes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the middles and half sides of the boxes that are a maze's walls: `[num_boxes, 3]` m, twice.
+
+    Those that the maze does not need are below the floor.
+    """
+    # Collidable and apart from each other: geoms without contacts would change the layout of MjData.
+    scale, num_walls = maze.cell_size, len(maze.boxes)
+    middle, half = np.full((num_boxes, 3), scale * 0.5), np.full((num_boxes, 3), 0.1)
+    middle[:, 0] = scale * (np.arange(num_boxes) + 0.5)
+    middle[:, 2] = -_PARKED_DEPTH
+
+    top, left, bottom, right = np.transpose(maze.boxes)
+    middle[:num_walls, 0] = scale * (left + right) / 2
+    middle[:num_walls, 1] = scale * (maze.size - (top + bottom) / 2)
+    half[:num_walls, 0] = scale * (right - left) / 2
+    half[:num_walls, 1] = scale * (bottom - top) / 2
+    middle[:num_walls, 2] = half[:num_walls, 2] = WALL_HEIGHT / 2
+    return middle, half
+
+
+def _add_walls(spec: mujoco.MjSpec, maze: Maze, num_boxes: int) -> None:
+    for index, (pos, half) in enumerate(zip(*wall_boxes(maze, num_boxes), strict=True)):
         spec.worldbody.add_geom(
             name=f"wall_{index}",
             type=mujoco.mjtGeom.mjGEOM_BOX,

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from mazebench.world.backend import rendering_error
-from mazebench.world.models import MazeModels, copy_maze
+from mazebench.world.models import MazeModels
 
 CAMERAS = ("top", "chase", "egocentric")
 _PICTURE_SIZE = 480  # pixels a side
@@ -47,7 +47,7 @@ class Cameras:
         if self._renderer is None:
             self._renderer = self._open()
         if maze != self._shown:
-            copy_maze(self._models[maze], self._model)
+            self._models.load(maze, self._model)
             self._shown = maze
         self._data.qpos[:], self._data.mocap_pos[0] = qpos, marker
         mujoco.mj_kinematics(self._model, self._data)

@@ -13,7 +13,7 @@ import numpy as np
 
 from mazebench.world.angles import wrap_angle
 from mazebench.world.mjcf import SENSED_ANGULAR_VELOCITY, SENSED_POSITION, SENSED_VELOCITY, SENSED_YAW
-from mazebench.world.models import copy_maze
+from mazebench.world.models import MazeModels
 
 STATE_SIZE = 12
 FULL_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)  # all that MuJoCo's next step depends on
@@ -28,9 +28,9 @@ class Simulation(abc.ABC):
     model: Any
     data: Any
 
-    def load_maze(self, model: mujoco.MjModel) -> None:
-        """Changes to the maze of `model`, which must come from the same `MazeModels`."""
-        copy_maze(model, self.model)
+    def load_maze(self, models: MazeModels, index: int) -> None:
+        """Changes to maze number `index` of the `models` that the simulation's own comes from."""
+        models.load(index, self.model)
 
     def place_agent(self, position: np.ndarray, yaw: float) -> None:
         """Moves the body to `position` (`[2]`, m) and `yaw` (rad); call it within `reset_context()`."""

@@ -13,8 +13,9 @@ from mazebench.report.frame import at_common_distances, note_on_distances
 from mazebench.report.looks import MEAN, Look
 from mazebench.report.measures import measure
 from mazebench.report.settings import Setting, level_help, level_name, short_name
-from mazebench.report.table import METRIC_NAMES, UNTRAINED_NOTE, Cell, Column, Table
+from mazebench.report.table import METRICS, UNTRAINED_NOTE, Cell, Column, Table
 from mazebench.report.tables import perturbed_groups
+from mazebench.results.metrics import ON_TIME_METRICS
 
 _DODGE, _DODGES = 0.12, 0.72  # of the smallest step between levels: two agents are so far apart, all of them at most
 _MIN_CURVE = 4  # points of a curve with bands; fewer have bars, since bands over one point are not seen
@@ -38,10 +39,11 @@ _SCORE_RANGE = (-0.05, 1.05)
 def describe_table(table: Table, looks: Mapping[str, Look]) -> Figure:
     """Returns curves by row, in a panel for each metric.
 
-    Files have success rate and SPL; they have SPL by grid distance where the paper's SPL stands beside it.
+    Files have success rate, on time by the first factor, and SPL; they have SPL by grid distance where the paper's SPL
+    stands beside it.
     """
     with_paper = any(column.is_paper and any(column.cells["spl_grid"]) for column in table.columns)
-    in_file = ("success_rate", "spl_grid" if with_paper else "spl")
+    in_file = ("success_rate", next(iter(ON_TIME_METRICS)), "spl_grid" if with_paper else "spl")
     panels = tuple(_curves(table, metric, metric in in_file) for metric in table.metrics)
     return Figure(table.name, table.title, table.note, panels, looks, panel_height=2.45)
 
@@ -97,7 +99,7 @@ def _curves(table: Table, metric: str, is_in_file: bool = True) -> Panel:
         areas = () if column.is_paper or not is_curve else (_band(points),)
         has_bars = not column.is_paper and not is_curve
         series.append(Series(column.label, points, has_bars=has_bars, areas=areas, opacity=band))
-    name = METRIC_NAMES[metric]
+    name = METRICS[metric]
     return Panel(
         title=name[0].upper() + name[1:],
         x_name=f"{table.row_name}{' (cells)' if 'distance' in table.row_name else ''}",
@@ -121,7 +123,7 @@ def _point(x: float, cell: Cell, tick: int) -> Point:
 
 
 def _band(points: Sequence[Point]) -> tuple[tuple[float, float], ...]:
-    """Returns the corners of the area between the ends of the points' intervals; those of SPL / oracle's have none."""
+    """Returns the corners of the area between the ends of the points' intervals."""
     upper = [(point.x, point.high) for point in points if point.high is not None]
     lower = [(point.x, point.low) for point in points if point.low is not None]
     return (*upper, *reversed(lower))

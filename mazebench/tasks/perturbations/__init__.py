@@ -17,7 +17,8 @@ class Perturbations:
     """The table of perturbations, as options of a task; they are applied in this order. Level 0 switches one off.
 
     Each draws from a random stream of its own. Streams 0 to 2 are taken by these, stream 3 by the goals after the first
-    one (`mazebench.tasks.route`), streams 4 to 8 by the tracks; a new perturbation takes 9, 10, ...
+    one (`mazebench.tasks.route`), streams 4 to 12 by the tracks, streams 13 and 14 by the noise of the lidar and of the
+    observed motion; a new perturbation takes 15, 16, ...
     """
 
     map_flip: Annotated[float, MapFlip()] = 0.0

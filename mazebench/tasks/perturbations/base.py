@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 from annotated_types import Ge, GroupedMetadata, Le
 
-from mazebench.maps.maze import Cell
+from mazebench.maps.maze import Cell, Maze
 from mazebench.options import Doc
 
 # Changes an observed state `[12]` float64 in place. It is called once for each observation of one episode. It is an
@@ -45,6 +45,7 @@ class ShownMap:
     walls: np.ndarray  # [N, N] bool, the cells that are shown
     drawing: Drawing | None = None  # None: a pixel for each cell
     hidden: tuple[int, ...] = ()  # planes of the context that the agent is not given: they are zero
+    kind: str = ""  # of the true maze, `Maze.kind`
 
     def seen_walls(self) -> np.ndarray:
         """Returns `[P, P]` bool or float32: the walls as the agent sees them; P is N where the map is not drawn."""
@@ -78,6 +79,9 @@ class Perturbation(GroupedMetadata):
     def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
         """Returns the map that the agent is shown instead of `shown`; `ends` are the episode's start and goal."""
         return shown
+
+    def require(self, maze: Maze, level: float) -> None:
+        """Raises `InputError` if the level can't be played in `maze`."""
 
     def state_error(self, level: float, rng: np.random.Generator) -> StateError | None:
         """Returns what is wrong with the observed states of an episode that begins; None if nothing is."""

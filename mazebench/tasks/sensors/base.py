@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import abc
+from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
 import numpy as np
 from annotated_types import Interval
 from dm_env import specs
+from pydantic import BeforeValidator
 
 from mazebench.constants import MAX_PIXELS
-from mazebench.maps.maze import Maze
+from mazebench.maps.drawn import Mazes
 from mazebench.options import Doc, options
+from mazebench.tasks.sensors.lidar_noise import model_of, noise_text
+from mazebench.world.lidar import LidarModel
 
 
 @options
@@ -20,6 +24,19 @@ class SensorOptions:
 
     camera_size: Annotated[int, Interval(ge=1, le=MAX_PIXELS), Doc("Pixels on a side of a camera's picture.")] = 64
     textures: Annotated[bool, Doc("Walls in pictures have patterns and colours that tell places apart.")] = False
+    lidar_noise: Annotated[
+        str | None,
+        BeforeValidator(noise_text),
+        Doc(
+            "turtlebot3 (.12 to 3.5 m, noise of .01 m, steps of .015 m, 2 % of rays lost), or SIGMA,LOST: the noise in "
+            "metres and the share of rays that are lost, at 5 m reach; that of the track, or exact, if not given."
+        ),
+    ] = None
+
+    @property
+    def lidar(self) -> LidarModel:
+        """What the sensor `lidar` measures."""
+        return model_of(self.lidar_noise)
 
 
 class Worlds(NamedTuple):
@@ -28,6 +45,7 @@ class Worlds(NamedTuple):
     maze: np.ndarray  # [K] int, index among the task's mazes
     pose: np.ndarray  # [K, 3] float64, of the body: x, y (m), yaw (rad, not wrapped)
     marker: np.ndarray  # [K, 3] float64, m: where the goal's marker stands
+    noise: Sequence[np.random.Generator | None]  # [K], draws the lidar's noise in an episode; None: there is none
 
 
 class Sensor(abc.ABC):
@@ -39,7 +57,7 @@ class Sensor(abc.ABC):
         """Returns shape, type and range of what the sensor called `name` observes of one environment."""
 
     @abc.abstractmethod
-    def __init__(self, names: tuple[str, ...], options: SensorOptions, mazes: tuple[Maze, ...]):
+    def __init__(self, names: tuple[str, ...], options: SensorOptions, mazes: Mazes):
         """Opens the sensors called `names`."""
 
     @abc.abstractmethod

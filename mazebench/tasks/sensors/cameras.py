@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from dm_env import specs
 
-from mazebench.maps.maze import Maze
+from mazebench.maps.drawn import Mazes
 from mazebench.tasks.sensors.base import Sensor, SensorOptions, Worlds
 
 
@@ -16,7 +16,7 @@ class CameraSensor(Sensor):
     def observation_spec(cls, name: str, options: SensorOptions) -> specs.BoundedArray:
         return specs.BoundedArray((options.camera_size, options.camera_size, 3), np.uint8, 0, 255, name)
 
-    def __init__(self, names: tuple[str, ...], options: SensorOptions, mazes: tuple[Maze, ...]):
+    def __init__(self, names: tuple[str, ...], options: SensorOptions, mazes: Mazes):
         # Imported here: who only reads a task's options, such as the command line, shall not load MuJoCo.
         from mazebench.world.models import models_of
         from mazebench.world.rendering import Cameras
@@ -30,7 +30,7 @@ class CameraSensor(Sensor):
         Raises:
           RenderingError: if no rendering context can be opened.
         """
-        pictures = [self._cameras.take(*world) for world in zip(*worlds, strict=True)]
+        pictures = [self._cameras.take(*world) for world in zip(worlds.maze, worlds.pose, worlds.marker, strict=True)]
         return {name: np.stack([taken[name] for taken in pictures]) for name in self._names}
 
     def close(self) -> None:

@@ -1,13 +1,14 @@
-"""Distances to the walls of the true maze, from the true pose, as observations."""
+"""Distances to the walls of the true maze, from the true pose, as observations; noise may be on them."""
 
 from __future__ import annotations
 
 import numpy as np
 from dm_env import specs
 
-from mazebench.maps.maze import Maze
+from mazebench.maps.drawn import Mazes
 from mazebench.tasks.sensors.base import Sensor, SensorOptions, Worlds
-from mazebench.world.lidar import MAX_RANGE, NUM_RAYS, Lidar
+from mazebench.tasks.sensors.lidar_noise import read
+from mazebench.world.lidar import NUM_RAYS, Lidar, LidarModel
 
 
 class LidarSensor(Sensor):
@@ -15,12 +16,15 @@ class LidarSensor(Sensor):
 
     @classmethod
     def observation_spec(cls, name: str, options: SensorOptions) -> specs.BoundedArray:
-        return specs.BoundedArray((NUM_RAYS,), np.float32, 0.0, MAX_RANGE, name)
+        return specs.BoundedArray((NUM_RAYS,), np.float32, options.lidar.min_range, options.lidar.max_range, name)
 
-    def __init__(self, names: tuple[str, ...], options: SensorOptions, mazes: tuple[Maze, ...]):
+    def __init__(self, names: tuple[str, ...], options: SensorOptions, mazes: Mazes):
         (self._name,) = names
-        self._lidar = Lidar(mazes)
+        self._model = options.lidar
+        self._is_exact = self._model == LidarModel(max_range=self._model.max_range)
+        self._lidar = Lidar(mazes, self._model.max_range)
 
     def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
-        """Returns `[K, 32]` float32 by name, as `Lidar.ranges` does."""
-        return {self._name: self._lidar.ranges(worlds.maze, worlds.pose)}
+        """Returns `[K, 32]` float32 by name, m: the rays of `Lidar.ranges`, as the model measures them."""
+        ranges = self._lidar.ranges(worlds.maze, worlds.pose)
+        return {self._name: ranges if self._is_exact else read(ranges, self._model, worlds.noise)}

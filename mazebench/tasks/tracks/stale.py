@@ -51,10 +51,13 @@ class Stale(Track):
         if movable < swaps:
             raise InputError(f"{maze.name}: track 'stale' needs {swaps} doors that can move, found {movable}")
 
-    def facts(self, walls: np.ndarray, shown: ShownMap, ends: tuple[Cell, Cell]) -> dict[str, bool]:
-        """Returns as `blocked` whether a shortest path on the map leads through a wall of the world."""
-        path = path_through_walls(shown.walls, *ends)
-        return {"blocked": bool(walls[tuple(np.transpose(path))].any())}
+    def facts(self, maze: Maze, shown: ShownMap, ends: tuple[Cell, Cell]) -> dict[str, bool | str]:
+        return {"blocked": is_blocked(maze.walls, shown.walls, ends)}
+
+
+def is_blocked(walls: np.ndarray, shown: np.ndarray, ends: tuple[Cell, Cell]) -> bool:
+    """Returns whether a shortest path on the shown map leads through a wall of the world; both `[N, N]` bool."""
+    return bool(walls[tuple(np.transpose(path_through_walls(shown, *ends)))].any())
 
 
 def num_movable(walls: np.ndarray) -> int:

@@ -1,13 +1,17 @@
-"""Generators: legal, seeded, and as hard as the paper's mazes."""
+"""Kinds of mazes: legal, seeded, and those of depth-first search as hard as the paper's."""
 
 from __future__ import annotations
+
+import hashlib
 
 import numpy as np
 import pytest
 from scipy import ndimage
 
 from mazebench.errors import InputError
-from mazebench.maps.generators import STYLES, dfs_walls, generate
+from mazebench.maps.benchmark import load_mazes, load_track_mazes
+from mazebench.maps.kinds import CHECK, KINDS, KNOWN, NOVEL, generate
+from mazebench.maps.kinds.dfs import dfs_walls
 from mazebench.maps.maze import Maze, corner_cells
 from mazebench.maps.text import format_maze, parse_maze
 from mazebench.tasks.build import make_spec
@@ -26,34 +30,82 @@ DFS_7_OF_SEED_0 = """\
 """
 
 
-@pytest.mark.parametrize("style", sorted(STYLES))
-class TestEveryStyle:
-    @pytest.mark.parametrize("size", [5, 7, 9, 13, 21, 63, 255])
-    def test_mazes_of_all_odd_sizes_are_legal(self, style, size):
-        for seed in range(20 if size <= 21 else 1):
-            # The constructor of Maze refuses what is not legal.
-            assert generate(style, size, np.random.default_rng(seed)).size == size
+# SHA-256 of the text of a maze of 31 x 31 cells of seed 0: frozen mazes are drawn again from seeds.
+GOLDEN = {
+    "dfs": "1b5bb57d11b3f25e840a4a7b6c169b96a358d8a017f335cec4f494d090de0ba6",
+    "house": "13e331fdde6f148a801da49c2970df7100524a9ba7196fb8bad0c9ba674b9925",
+    "rooms": "8005af538f29fc3f09c4a6c9b46083918d53dba19d6f86a894caf470c97b0419",
+    "office": "2d7e57284e9167bdb4d07b78bd2f60943ab8ac3cbc4761ceee2d3690176b6a03",
+    "hospital": "88a7af12fca05dcc628e7101133e9d824a7586668c02160047dd517ddefa661a",
+    "museum": "46583547102e9a9d2447fa969a57105a387dfc7f45d6a2bfb474fc9cb8581d0e",
+    "obstacles": "9d139b1094d443cde14ecae3e6ba482979a8f0556052fb47226e7606a9ede5aa",
+    "cave": "72e76120fb44d61bbe2882fd45ce77715bde145e9fe1f160fb8512acd8b9bc9b",
+    "warehouse": "5c4a8a18c6ad874629377c0cecacf40b409fc55a521d7fdc5ff6764ba47dae65",
+}
+LATTICE = ("dfs", "rooms")
+SMALL = ("dfs", "obstacles", "rooms")
 
-    def test_the_same_seed_gives_the_same_maze(self, style):
-        first, again, other = (generate(style, 21, np.random.default_rng(seed)) for seed in (5, 5, 6))
+
+def sizes(kind: str) -> list[int]:
+    """From the smallest to the largest."""
+    some = [5, 7, 9] if kind in SMALL else []
+    return [*some, 13, 21, 31, 51, 63, 255] if kind in LATTICE else [*some, 13, 14, 20, 21, 30, 31, 42, 51, 63, 255]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+class TestEveryKind:
+    def test_mazes_of_all_sizes_are_legal(self, kind):
+        for size in sizes(kind):
+            for seed in range(20 if size <= 51 else 1):
+                # The constructor of Maze refuses what is not legal.
+                maze = generate(kind, size, np.random.default_rng(seed))
+                assert (maze.size, maze.kind, maze.name) == (size, kind, f"{kind}-{size}")
+
+    def test_the_same_seed_gives_the_same_maze(self, kind):
+        first, again, other = (generate(kind, 21, np.random.default_rng(seed)) for seed in (5, 5, 6))
         assert first == again
         assert first != other
 
-    def test_mazes_of_one_stream_differ(self, style):
+    def test_a_maze_of_seed_0_stays_as_it_is(self, kind):
+        text = format_maze(generate(kind, 31, np.random.default_rng(0)))
+        assert hashlib.sha256(text.encode()).hexdigest() == GOLDEN[kind]
+
+    def test_mazes_of_one_stream_differ(self, kind):
         rng = np.random.default_rng(0)
-        assert len({generate(style, 13, rng) for _ in range(20)}) == 20
+        assert len({generate(kind, 13, rng) for _ in range(20)}) == 20
 
     @pytest.mark.parametrize("size", [-1, 0, 4, 256, 10**9])
-    def test_a_size_out_of_bounds_is_refused(self, style, size):
+    def test_a_size_out_of_bounds_is_refused(self, kind, size):
         with pytest.raises(InputError, match=rf"^expected a size of 5 to 255 cells, found {size}$"):
-            generate(style, size, np.random.default_rng(0))
+            generate(kind, size, np.random.default_rng(0))
 
 
-@pytest.mark.parametrize("style", ["dfs", "rooms"])
+def test_every_kind_is_in_one_group():
+    assert sorted(KNOWN + NOVEL + CHECK) == sorted(KINDS)
+
+
+@pytest.mark.parametrize("kind", KNOWN + NOVEL)
+def test_pairs_of_up_to_40_cells_are_in_nearly_every_maze_of_31_cells(kind):
+    rng = np.random.default_rng(0)
+    assert np.mean([generate(kind, 31, rng).diameter >= 40 for _ in range(20)]) >= 0.9
+
+
+@pytest.mark.parametrize("mazes", [load_mazes(13, "eval"), load_track_mazes(31, "train")])
+def test_frozen_mazes_of_v1_and_v2_are_of_the_kind_dfs(mazes):
+    assert {maze.kind for maze in mazes} == {"dfs"}
+
+
+@pytest.mark.parametrize("kind", LATTICE)
 @pytest.mark.parametrize("size", [6, 14, 254])
-def test_an_even_size_is_refused_on_the_odd_lattice(style, size):
-    with pytest.raises(InputError, match=rf"^style '{style}' makes mazes of odd sizes only, found size {size}$"):
-        generate(style, size, np.random.default_rng(0))
+def test_an_even_size_is_refused_on_the_odd_lattice(kind, size):
+    with pytest.raises(InputError, match=rf"^kind '{kind}' makes mazes of odd sizes only, found size {size}$"):
+        generate(kind, size, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("kind", sorted(set(KINDS) - set(SMALL)))
+def test_a_building_of_fewer_than_13_cells_is_refused(kind):
+    with pytest.raises(InputError, match=rf"^kind '{kind}' makes mazes of 13 cells and more, found size 12$"):
+        generate(kind, 12, np.random.default_rng(0))
 
 
 def test_obstacles_may_have_an_even_size():
@@ -72,8 +124,8 @@ def test_rooms_has_rooms_of_9_or_15_cells_and_no_dead_ends(size):
         assert set(np.bincount(rooms.ravel())[1:]) <= {9, 15}
 
 
-def test_an_unknown_style_is_refused():
-    with pytest.raises(InputError, match=r"^unknown style 'spiral'; available: dfs, obstacles, rooms$"):
+def test_an_unknown_kind_is_refused():
+    with pytest.raises(InputError, match=rf"^unknown kind 'spiral'; available: {', '.join(sorted(KINDS))}$"):
         generate("spiral", 13, np.random.default_rng(0))
 
 

@@ -1,0 +1,85 @@
+"""Where the walls are: a log-odds occupancy grid of what lidar saw, with a map as its prior.
+
+Moravec & Elfes 1985; Thrun, Burgard & Fox 2005, Probabilistic Robotics, chapter 9. `beams` says what a scan tells.
+Lengths are in cells. `L` is the number of cells on a side.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from ..common.kernels import compiled
+from .beams import UNKNOWN, Beams, add_scan
+
+SURE = 3.0  # log odds of evidence, from which a cell counts as seen
+_BINS = np.array([0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98])  # of prior probabilities, within which the map errs alike
+_PRIOR_CELLS = 3.0  # seen cells that weigh as much as the prior when the map's reliability is estimated
+_LEAST = 1e-6  # count of cells of a kind, instead of none
+
+
+@dataclasses.dataclass
+class Occupancy:
+    """What was seen of the walls on one grid."""
+
+    evidence: np.ndarray  # [L, L] float, log odds of a wall
+
+    @classmethod
+    def unseen(cls, size: int) -> Occupancy:
+        """Returns a grid of `size` cells a side before anything was seen."""
+        return cls(np.zeros((size, size)))
+
+    def see(self, pose: tuple[float, float, float], ranges: np.ndarray, beams: Beams, deviation: float) -> None:
+        """Takes in a scan `[R]` from a pose x, y, yaw; `deviation` is the standard deviation of x and y."""
+        x, y, yaw = pose
+        add_scan(self.evidence, x, y, yaw, ranges, beams, deviation)
+
+    def seen_walls(self) -> np.ndarray:
+        """Returns `[L, L]` float: the probability of a wall by what was seen alone."""
+        return 1 / (1 + np.exp(-self.evidence) * ((1 - UNKNOWN) / UNKNOWN))
+
+    def walls(self, prior: np.ndarray) -> np.ndarray:
+        """Returns `[L, L]` float: the probability of a wall, by what was seen and a prior that may prove wrong."""
+        return posterior(prior, self.evidence, _BINS, _PRIOR_CELLS)
+
+    def is_seen(self) -> np.ndarray:
+        """Returns `[L, L]` bool: the cells of which lidar tells what they are."""
+        return np.abs(self.evidence) >= SURE
+
+
+@compiled
+def posterior(prior: np.ndarray, evidence: np.ndarray, bins: np.ndarray, prior_cells: float) -> np.ndarray:
+    """Returns `[L, L]` float: the probability of a wall, by evidence and a prior as reliable as it has proved to be.
+
+    Where a cell was seen, evidence alone counts: what was seen is no longer tried, however right the map has been.
+
+    Among cells of similar prior probability, the share of walls is estimated from those that were seen: the mean of a
+    beta distribution. Its prior counts weigh as much as `prior_cells` seen cells.
+
+    Args:
+      prior: `[L, L]` float; 1 for walls that are certain.
+      evidence: `[L, L]` float, log odds.
+      bins: the probabilities between which priors are similar, ascending.
+      prior_cells: see above.
+    """
+    bin_of = np.searchsorted(bins, prior.ravel(), side="right").reshape(prior.shape)
+    num_seen, num_walls = np.zeros(len(bins) + 1), np.zeros(len(bins) + 1)
+    for row in range(len(prior)):
+        for column in range(len(prior)):
+            if abs(evidence[row, column]) >= SURE and prior[row, column] < 1:
+                num_seen[bin_of[row, column]] += 1
+                num_walls[bin_of[row, column]] += evidence[row, column] > 0
+    probability = np.ones(prior.shape)
+    for row in range(len(prior)):
+        for column in range(len(prior)):
+            if prior[row, column] < 1:
+                similar = bin_of[row, column]
+                wall = prior_cells * prior[row, column] + num_walls[similar]
+                free = prior_cells * (1 - prior[row, column]) + num_seen[similar] - num_walls[similar]
+                odds_free = math.exp(-evidence[row, column])
+                if abs(evidence[row, column]) < SURE:
+                    odds_free *= max(free, _LEAST) / max(wall, _LEAST)
+                probability[row, column] = 1 / (1 + odds_free)
+    return probability

@@ -1,0 +1,203 @@
+"""The quickest drive to a goal cell, by a beam search over the body's own motion.
+
+A beam has the best states after a number of steps. A state is good if little of the way is left from where the body
+would come to rest, and little was driven. The way that is left is computed once for a goal, by fast marching (Sethian
+1996) on a grid of nodes. Lengths are metres. Walls are `[N, N]` bool, indexed by the cells' x and y.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mazebench.constants import NUM_ACTIONS, STEP_TIME, TOP_SPEED
+
+from ..common.kernels import compiled
+from .body import COASTING_TIME, LOOK_LEFT, LOOK_RIGHT, Point
+from .motion import REACH, moved, turned
+
+_NODES = 5  # a side of a cell
+_DETOUR = 3.0  # a metre of a way along which the body touches a wall counts as so many
+
+_TURNS = 2  # looks to either side of the first heading, at most: one of four drives is within 11 degrees of any way
+_WIDTH = 12  # states of a beam for each heading
+_BEHIND = 1.0  # m that a state may be behind the best one
+_SAME = 0.04  # m between states that count as the same one
+_DRIVEN_WEIGHT = 0.3  # of a metre that was driven against one that is left
+_ARRIVED = -1e9  # added to the score of a state in the goal cell: lower than all others
+
+_State = np.dtype(
+    [
+        *((name, np.float64) for name in ("x", "y", "vx", "vy", "driven", "score")),  # m, m/s; low scores are good
+        *((name, np.int64) for name in ("turns", "action", "parent")),  # looks to the left; how the state came about
+    ]
+)
+
+
+class Course(NamedTuple):
+    """A maze and a goal in it."""
+
+    walls: np.ndarray  # [N, N] bool
+    cell_size: float  # m
+    goal_x: int
+    goal_y: int
+    way_left: np.ndarray  # [N * _NODES, N * _NODES] float, m, from each node to the goal cell; infinite in walls
+
+
+def make_course(walls: np.ndarray, cell_size: float, goal: tuple[int, int]) -> Course:
+    """Returns the course to a goal (row, column) in a maze whose walls `[N, N]` are indexed by row and column.
+
+    The border is taken for wall, so that no drive leaves the maze.
+    """
+    by_x_and_y = np.ascontiguousarray(walls[::-1].T)
+    by_x_and_y[[0, -1]] = by_x_and_y[:, [0, -1]] = True
+    x, y = goal[1], len(walls) - 1 - goal[0]
+    return Course(by_x_and_y, cell_size, x, y, _way_left(by_x_and_y, cell_size, x, y))
+
+
+def quickest_drive(
+    course: Course, point: Point, velocity: Point, yaw: float, num_steps: int = 0, width: int = _WIDTH
+) -> tuple[list[int], list[Point]]:
+    """Returns the actions of the quickest drive, and the points (x, y) after each of them.
+
+    Of equally quick drives it is the shortest one. If the search does not find the goal in twice the steps that the way
+    takes at the top speed, and some to spare, the drive leads as near to the goal as it has come.
+
+    Args:
+      course: the way.
+      point: (x, y) of the body.
+      velocity: (x, y) of the body on the map, in m/s.
+      yaw: of the body, in rad.
+      num_steps: that are planned at most; 0 for as many as said above.
+      width: states of a beam for each heading.
+    """
+    way_left = _way_left_at(course, *point)
+    expected = way_left / (TOP_SPEED * STEP_TIME) if way_left < np.inf else 0.0
+    beams = np.zeros(((num_steps or int(2 * expected) + 49) + 1, width * (2 * _TURNS + 1)), _State)
+    first = beams[0, 0]
+    first["x"], first["y"], first["vx"], first["vy"] = *point, *velocity
+    last, index = _search(course, yaw, beams), 0
+    drive = []
+    for step in range(last, 0, -1):
+        state = beams[step, index]
+        drive.append((int(state["action"]), (float(state["x"]), float(state["y"]))))
+        index = state["parent"]
+    actions, points = zip(*drive[::-1], strict=True)
+    return list(actions), list(points)
+
+
+@compiled
+def _search(course: Course, yaw: float, beams: Any) -> int:
+    """Fills the beams after the first one; returns the number of steps after which the first state has arrived."""
+    children = np.empty(beams.shape[1] * NUM_ACTIONS, beams.dtype)
+    count = 1
+    for step in range(1, len(beams)):
+        num_children = 0
+        for parent in range(count):
+            for action in range(NUM_ACTIONS):
+                child = children[num_children]
+                child.parent, child.action = parent, action
+                num_children += _drive(course, yaw, beams[step - 1, parent], child)
+        count = _keep_best(children[:num_children], beams[step])
+        if beams[step, 0].score < 0:
+            return step
+    return len(beams) - 1
+
+
+@compiled
+def _drive(course: Course, yaw: float, state: Any, child: Any) -> bool:
+    """Makes `child` the state after an action from `state`; returns whether it turns no further than it may."""
+    child.turns = state.turns + (child.action == LOOK_LEFT) - (child.action == LOOK_RIGHT)
+    heading = turned(yaw, child.turns)
+    x, y, vx, vy = moved(course.walls, course.cell_size, state.x, state.y, state.vx, state.vy, heading, child.action)
+    child.x, child.y, child.vx, child.vy = x, y, vx, vy
+    child.driven = state.driven + math.hypot(x - state.x, y - state.y)
+    if int(x / course.cell_size) == course.goal_x and int(y / course.cell_size) == course.goal_y:
+        child.score = child.driven + _ARRIVED
+    else:
+        left = _way_left_at(course, x + COASTING_TIME * vx, y + COASTING_TIME * vy)
+        if left == np.inf:  # a wall would stop the body
+            left = _way_left_at(course, x, y)
+        child.score = left + _DRIVEN_WEIGHT * child.driven
+    return abs(child.turns) <= _TURNS
+
+
+@compiled
+def _keep_best(children: Any, beam: Any) -> int:
+    """Puts the best children that differ into a beam, the best one first, some of each heading; returns how many."""
+    order = np.argsort(children.score)
+    num_kept = np.zeros(2 * _TURNS + 1, np.int64)
+    count = 0
+    for index in order:
+        child = children[index]
+        if child.score > children[order[0]].score + _BEHIND:
+            break
+        is_new = num_kept[child.turns + _TURNS] < len(beam) // len(num_kept)
+        for other in beam[:count]:
+            apart = abs(other.x - child.x) + abs(other.y - child.y)
+            apart += COASTING_TIME * (abs(other.vx - child.vx) + abs(other.vy - child.vy))
+            is_new = is_new and (other.turns != child.turns or apart > _SAME)
+        if is_new:
+            beam[count] = child
+            num_kept[child.turns + _TURNS] += 1
+            count += 1
+    return count
+
+
+@compiled
+def _way_left(walls: np.ndarray, cell_size: float, goal_x: int, goal_y: int) -> np.ndarray:
+    """Returns `Course.way_left`."""
+    spacing = cell_size / _NODES
+    left = np.full((len(walls) * _NODES, len(walls) * _NODES), np.inf)
+    is_done = np.zeros(left.shape, np.bool_)
+    queue = [(0.0, goal_x * _NODES + i, goal_y * _NODES + j) for i in range(_NODES) for j in range(_NODES)]
+    for _, i, j in queue:
+        left[i, j] = 0.0
+    while queue:
+        _, i, j = heapq.heappop(queue)
+        if is_done[i, j]:
+            continue
+        is_done[i, j] = True
+        for a, b in ((i - 1, j), (i, j - 1), (i + 1, j), (i, j + 1)):
+            is_inside = _NODES <= a < len(left) - _NODES and _NODES <= b < len(left) - _NODES
+            if not is_inside or walls[a // _NODES, b // _NODES] or is_done[a, b]:
+                continue
+            # The eikonal equation with the nearer neighbours along x and y.
+            step = spacing * (_DETOUR if _is_beside_wall(walls, spacing, a, b) else 1.0)
+            by_x, by_y = min(left[a - 1, b], left[a + 1, b]), min(left[a, b - 1], left[a, b + 1])
+            found = min(by_x, by_y) + step
+            if abs(by_x - by_y) < step:
+                found = (by_x + by_y + math.sqrt(2 * step * step - (by_x - by_y) ** 2)) / 2
+            if found < left[a, b]:
+                left[a, b] = found
+                heapq.heappush(queue, (found, a, b))
+    return left
+
+
+@compiled
+def _is_beside_wall(walls: np.ndarray, spacing: float, i: int, j: int) -> bool:
+    """Returns whether the body at a node would touch a wall."""
+    reach = math.ceil(REACH / spacing)
+    for a in (i - reach, i, i + reach):
+        for b in (j - reach, j, j + reach):
+            if walls[a // _NODES, b // _NODES]:
+                return True
+    return False
+
+
+@compiled
+def _way_left_at(course: Course, x: float, y: float) -> float:
+    """Returns the way that is left from a point, between the nodes around it; infinite if they are all in walls."""
+    x_in_nodes, y_in_nodes = x * _NODES / course.cell_size - 0.5, y * _NODES / course.cell_size - 0.5
+    last = len(course.way_left) - 2
+    i, j = min(max(int(x_in_nodes), 0), last), min(max(int(y_in_nodes), 0), last)
+    total, weight = 0.0, 0.0
+    for a in (i, i + 1):
+        for b in (j, j + 1):
+            if course.way_left[a, b] < np.inf:
+                share = (1 - abs(x_in_nodes - a)) * (1 - abs(y_in_nodes - b))
+                total, weight = total + share * course.way_left[a, b], weight + share
+    return total / weight if weight > 0 else np.inf

@@ -1,0 +1,143 @@
+"""Makes benchmark v3, mazes of several kinds and episodes in them, byte for byte as they ship.
+
+`python -m benchmarks.freeze_kinds DIR` writes the splits train and dev. With `--commit HASH`, it adds the split eval to
+those that are installed: a draw from the hash of the commit that holds all generators, tracks and agents, which nobody
+chooses. benchmarks/v3_checks.py has the checks that come before.
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import itertools
+import json
+import pathlib
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from benchmarks.freeze import format_manifest, format_trials
+from mazebench.evaluation.oracle import measure_oracle_steps
+from mazebench.maps.benchmark import (
+    DEV,
+    FROZEN_SPLITS,
+    KINDS_SIZE,
+    KINDS_VERSION,
+    MANIFEST,
+    SPLITS,
+    kind_mazes_file,
+    load_kind_mazes,
+    load_track_mazes,
+    manifest,
+    read_asset,
+)
+from mazebench.maps.kinds import KNOWN, NOVEL, generate
+from mazebench.maps.maze import Maze, canonical_bytes
+from mazebench.maps.text import format_maze
+from mazebench.results.oracle import oracle_file
+from mazebench.tasks.build import make_spec
+from mazebench.tasks.episode import sample_pair
+from mazebench.tasks.shown_map import leg_context, show_map
+from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.tracks import TRACKS, tracks_of
+from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.trials import Trial, episodes_file, make_trial
+
+KINDS_TRACKS = tracks_of(KINDS_VERSION)
+KINDS = {"train": KNOWN, DEV: KNOWN, "eval": (*KNOWN, *NOVEL)}  # by split
+MAZES_PER_SPLIT = 48
+_SEED = 3  # of the splits train and dev
+_EPISODES_PER_MAZE = 5
+_DISTANCES = TRACKS[KINDS_TRACKS[0]].distances(1)
+
+
+def freeze_kinds(folder: pathlib.Path, commit: str | None = None) -> None:
+    """Writes the splits train and dev into `folder`; or, with the hash of a commit, the installed ones and eval."""
+    folder.mkdir(parents=True, exist_ok=True)
+    generator: dict[str, Any] = {"seed": _SEED, "kinds": {}, "contexts_sha256": {}}
+    files: dict[str, str] = {}
+    known = {canonical_bytes(maze.walls) for split in SPLITS for maze in load_track_mazes(KINDS_SIZE, split)}
+    if commit is not None:
+        installed = manifest(KINDS_VERSION)
+        generator = copy.deepcopy(installed["generator"]) | {"eval_commit": commit}
+        files = {name: read_asset(name, KINDS_VERSION) for name in installed["files"]}
+        known |= {canonical_bytes(maze.walls) for split in generator["kinds"] for maze in load_kind_mazes(split)}
+
+    for index, split in enumerate(("train", DEV) if commit is None else ("eval",)):
+        rng = np.random.default_rng([_SEED, index] if commit is None else [_SEED, int(commit, 16)])
+        mazes = [maze for kind in KINDS[split] for maze in draw_mazes(kind, split, known, rng)]
+        generator["kinds"][split] = KINDS[split]
+        for kind in KINDS[split]:
+            files[kind_mazes_file(kind, split)] = "\n".join(format_maze(maze) for maze in mazes if maze.kind == kind)
+        if split in FROZEN_SPLITS:
+            trials = draw_kind_trials(mazes, rng)
+            files[episodes_file("local", KINDS_SIZE, split)] = format_trials(trials)
+            steps = measure_oracle_steps(_task(KINDS_TRACKS[0], 1, mazes), trials)
+            files[oracle_file("local", KINDS_SIZE, split)] = json.dumps({"steps": steps}) + "\n"
+            generator["contexts_sha256"][split] = {
+                f"{track}-{level}": contexts_hash(track, level, mazes, trials)
+                for track, level in itertools.product(KINDS_TRACKS, LEVELS)
+            }
+    files[MANIFEST] = format_manifest(KINDS_VERSION, generator, files)
+    for name, text in files.items():
+        folder.joinpath(name).write_bytes(text.encode("ascii"))
+
+
+def draw_mazes(kind: str, split: str, known: set[bytes], rng: np.random.Generator) -> list[Maze]:
+    """Returns the mazes of a kind in a split.
+
+    None is like one of `known`, to which they are added, under rotations and mirror images. In each of them, goals can
+    be as far away as the tracks want.
+    """
+    mazes: list[Maze] = []
+    while len(mazes) < MAZES_PER_SPLIT // len(KINDS[split]):
+        maze = generate(kind, KINDS_SIZE, rng, f"{kind}-{len(mazes)}")
+        if maze.diameter >= max(_DISTANCES) and canonical_bytes(maze.walls) not in known:
+            known.add(canonical_bytes(maze.walls))
+            mazes.append(maze)
+    return mazes
+
+
+def draw_kind_trials(mazes: Sequence[Maze], rng: np.random.Generator) -> list[Trial]:
+    """Returns five episodes in each maze, by maze; every distance comes up about as often as every other one."""
+    distances = _shuffled_rounds(_DISTANCES, rng)
+    return [
+        make_trial(maze, index, sample_pair(maze, distance, rng), rng)
+        for index, maze in enumerate(mazes)
+        for distance in sorted(itertools.islice(distances, _EPISODES_PER_MAZE))
+    ]
+
+
+def contexts_hash(track: str, level: int, mazes: Sequence[Maze], trials: Sequence[Trial]) -> str:
+    """Returns the SHA-256 of the contexts of the episodes of a track and level, with 8 bits a value."""
+    spec = _task(track, level, mazes)
+    digest = hashlib.sha256()
+    for trial in trials:
+        episode = trial.episode
+        context = leg_context(spec, show_map(spec, episode), episode.start, episode.goal)
+        digest.update(np.rint(255 * context).astype(np.uint8).tobytes())
+    return digest.hexdigest()
+
+
+def _task(track: str, level: int, mazes: Sequence[Maze]) -> TaskSpec:
+    return make_spec(track, maps=list(mazes), level=level, distances=TRACKS[track].distances(level))
+
+
+def _shuffled_rounds(values: Sequence[int], rng: np.random.Generator) -> Iterator[int]:
+    """Yields all of `values` in a random order, then all of them in another one, and so on."""
+    while True:
+        yield from rng.permutation(values).tolist()
+
+
+def main(
+    folder: pathlib.Path,
+    commit: Annotated[str | None, typer.Option(help="Add the split eval, drawn from this hash of a commit.")] = None,
+) -> None:
+    """Write the files of benchmark v3."""
+    freeze_kinds(folder, commit)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,49 @@
+"""Random mazes of several kinds of layouts. A kind is one file and one entry of `KINDS`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mazebench.errors import InputError, unknown
+from mazebench.maps.kinds.base import Kind
+from mazebench.maps.kinds.cave import CAVE
+from mazebench.maps.kinds.dfs import DFS
+from mazebench.maps.kinds.hospital import HOSPITAL
+from mazebench.maps.kinds.house import HOUSE
+from mazebench.maps.kinds.museum import MUSEUM
+from mazebench.maps.kinds.obstacles import OBSTACLES
+from mazebench.maps.kinds.office import OFFICE
+from mazebench.maps.kinds.rooms import ROOMS
+from mazebench.maps.kinds.warehouse import WAREHOUSE
+from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, Maze
+
+KINDS: dict[str, Kind] = {
+    "dfs": DFS,
+    "house": HOUSE,
+    "rooms": ROOMS,
+    "office": OFFICE,
+    "hospital": HOSPITAL,
+    "museum": MUSEUM,
+    "obstacles": OBSTACLES,
+    "cave": CAVE,
+    "warehouse": WAREHOUSE,
+}
+KNOWN = ("dfs", "house", "rooms")  # of the mazes to train and to choose agents on
+NOVEL = ("office", "hospital", "museum")  # of eval mazes only; no learned agent meets them before its one play
+CHECK = ("obstacles", "cave", "warehouse")  # in which a map is worth little; agents may be chosen on them
+
+
+def generate(kind: str, size: int, rng: np.random.Generator, name: str | None = None) -> Maze:
+    """Returns a random maze of `size` x `size` cells.
+
+    Raises:
+      InputError: if the kind is unknown or has no mazes of this size.
+    """
+    if kind not in KINDS:
+        raise unknown("kind", kind, KINDS)
+    if not (isinstance(size, int | np.integer) and MIN_SIZE <= size <= MAX_SIZE):
+        raise InputError(f"expected a size of {MIN_SIZE} to {MAX_SIZE} cells, found {size!r}")
+    if not isinstance(rng, np.random.Generator):
+        raise InputError(f"expected rng as a numpy.random.Generator, found {type(rng).__name__}")
+    KINDS[kind].check(kind, size)
+    return Maze(KINDS[kind].walls(size, rng), name or f"{kind}-{size}", kind=kind)

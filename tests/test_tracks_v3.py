@@ -1,0 +1,216 @@
+"""The tracks of v3: what each shows, which senses they have, and that their files are frozen."""
+
+from __future__ import annotations
+
+import collections
+
+import numpy as np
+import pytest
+
+import mazebench
+from benchmarks.freeze_kinds import freeze_kinds
+from mazebench.errors import InputError
+from mazebench.evaluation.evaluate import evaluate
+from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.plan import make_plan
+from mazebench.maps.benchmark import (
+    DEV,
+    KINDS_VERSION,
+    MANIFEST,
+    load_kind_mazes,
+    load_track_mazes,
+    manifest,
+    read_asset,
+)
+from mazebench.maps.kinds import KNOWN, NOVEL, generate
+from mazebench.maps.maze import Maze, canonical_bytes
+from mazebench.tasks.build import make_spec
+from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, START
+from mazebench.tasks.episode import Episode, sample_episode
+from mazebench.tasks.perturbations.base import ShownMap
+from mazebench.tasks.shown_map import leg_context, show_map
+from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.tracks import TRACKS, tracks_of
+from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.tracks.building import TurnedSheet
+from mazebench.tasks.trials import frozen_trials
+from mazebench.world.lidar import TURTLEBOT3
+from tests.simple_mazes import field
+
+PLAYED = [(name, level) for name in tracks_of(KINDS_VERSION) for level in LEVELS]
+
+
+def episodes(spec: TaskSpec, count: int = 20) -> list[Episode]:
+    rng = np.random.default_rng(0)
+    return [sample_episode(spec, rng) for _ in range(count)]
+
+
+def context(spec: TaskSpec, episode: Episode) -> np.ndarray:
+    return leg_context(spec, show_map(spec, episode), episode.start, episode.goal)
+
+
+class TestFiles:
+    def test_one_command_makes_them_byte_for_byte(self, tmp_path):
+        freeze_kinds(tmp_path)
+        made = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+        assert set(made) == {*manifest(KINDS_VERSION)["files"], MANIFEST}
+        for name in manifest(KINDS_VERSION)["files"]:
+            assert made[name] == read_asset(name, KINDS_VERSION).encode("ascii"), name
+
+    def test_the_split_eval_has_novel_kinds_and_depends_on_the_commit_alone(self, tmp_path):
+        for name, commit in (("a", "0123abcd"), ("again", "0123abcd"), ("b", "0123abce")):
+            freeze_kinds(tmp_path / name, commit)
+        made = {
+            name: {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()} for name in ("a", "again", "b")
+        }
+        assert made["a"] == made["again"]
+        new = {name for name in made["a"] if "eval" in name}
+        assert new == {
+            *(f"mazes-{kind}-eval.txt" for kind in (*KNOWN, *NOVEL)),
+            *("episodes-local-31-eval.csv", "oracle-local-31-eval.json"),
+        }
+        assert all(made["a"][name] != made["b"][name] for name in new)
+        for name in manifest(KINDS_VERSION)["files"]:
+            assert made["a"][name] == read_asset(name, KINDS_VERSION).encode("ascii"), name
+
+    def test_mazes_are_new_and_of_known_kinds_with_far_goals(self):
+        mazes = [maze for split in ("train", DEV) for maze in load_kind_mazes(split)]
+        assert collections.Counter(maze.kind for maze in mazes) == dict.fromkeys(KNOWN, 32)
+        others = [maze for split in ("train", "eval") for maze in load_track_mazes(31, split)]
+        assert len({canonical_bytes(maze.walls) for maze in [*mazes, *others]}) == len(mazes) + len(others)
+        assert min(maze.diameter for maze in mazes) >= 40
+
+    def test_five_pairs_in_each_maze_of_dev(self):
+        trials, mazes = frozen_trials("local", 31, KINDS_VERSION, DEV), load_kind_mazes(DEV)
+        assert collections.Counter(trial.episode.maze for trial in trials) == dict.fromkeys(range(48), 5)
+        for trial in trials:
+            maze = mazes[trial.episode.maze]
+            assert maze.distance(trial.episode.start, trial.episode.goal) == trial.distance
+        assert {trial.distance for trial in trials} == set(range(15, 41))
+
+    def test_a_split_that_is_not_frozen_is_refused_in_a_line(self):
+        with pytest.raises(InputError, match="its split 'eval' is not frozen yet; play the split 'dev'"):
+            make_spec("rebuilt", split="eval")
+        with pytest.raises(InputError, match="split"):
+            make_spec(size=13, split="dev")
+
+
+@pytest.mark.parametrize(("track", "level"), PLAYED)
+def test_the_task_of_a_level(track, level):
+    spec = make_spec(track, level=level)
+    assert (spec.size, spec.version, spec.lidar, spec.sensors) == (31, 3, TURTLEBOT3, ("lidar",))
+    assert spec.context_size == (62 if track == "rough" else 31)
+    is_lost = track in ("adrift", "rough")
+    assert spec.odometry_noise_at(level) == ((0.01, 0.05, 0.2)[level - 1] if is_lost else 0.0)
+    assert TRACKS[track].time_limit(level, 20) == (270 if is_lost else 170)
+    env = mazebench.load(track, level=level, seed=0)
+    state = env.reset().observation["state"]
+    assert (state[[0, 1, 5]] == 0).all() == is_lost
+
+
+class TestBuilding:
+    def test_level_1_shows_the_building(self):
+        spec = make_spec("building")
+        for episode in episodes(spec):
+            planes = context(spec, episode)
+            assert (planes[GLOBAL_MAP] == spec.mazes[episode.maze].walls).all()
+            assert planes[GOAL][episode.goal] == planes[START][episode.start] == 1
+
+    @pytest.mark.parametrize(("level", "num_sheets"), [(2, 4), (3, 8)])
+    def test_the_sheet_lies_in_any_way_and_the_goal_with_it(self, level, num_sheets):
+        spec = make_spec("building", level=level)
+        seen = set()
+        for episode in episodes(spec, 100):
+            maze, planes = spec.mazes[episode.maze], context(spec, episode)
+            assert not planes[[LOCAL_MAP, START]].any()
+            marked = maze.walls.astype(int)
+            marked[episode.goal] = 2
+            sheets = [np.rot90(grid, turns) for grid in (marked, marked[:, ::-1]) for turns in range(4)]
+            shown = planes[GLOBAL_MAP] + 2 * planes[GOAL]
+            (lies,) = (index for index, sheet in enumerate(sheets) if (sheet == shown).all())
+            seen.add(lies)
+        assert seen == set(range(num_sheets))
+
+    @pytest.mark.parametrize("seed", range(12))
+    def test_points_and_cells_lie_at_the_same_place_of_the_sheet(self, seed):
+        maze = generate("house", 21, np.random.default_rng(seed))
+        sheet, rng = TurnedSheet(turns=True, mirrors=True), np.random.default_rng(seed)
+        shown = sheet.show(ShownMap(maze.walls), 1, ((1, 1), (1, 1)), rng)
+        cell = tuple(maze.free_cells[seed].tolist())
+        x, y = shown.seen_points(np.array([[cell[1] + 0.5, 21 - cell[0] - 0.5]]))[0]
+        assert (int(21 - y), int(x)) == shown.seen_cell(cell)
+        assert not shown.seen_walls()[shown.seen_cell(cell)]
+
+
+class TestRebuilt:
+    @pytest.mark.parametrize(("level", "share"), [(1, 0.45), (2, 0.7), (3, 0.9)])
+    def test_so_many_doors_moved_that_the_share_of_paths_is_blocked(self, level, share):
+        plan = make_plan(EvalOptions.of("random", track="rebuilt", level=level, split=DEV))
+        facts = [
+            TRACKS["rebuilt"].facts(
+                plan.task.mazes[trial.episode.maze], show_map(plan.task, trial.episode), ends(trial)
+            )
+            for trial in plan.trials
+        ]
+        blocked = np.array([fact["blocked"] for fact in facts])
+        assert abs(blocked.mean() - share) < 0.08
+        assert collections.Counter(fact["kind"] for fact in facts) == dict.fromkeys(KNOWN, 80)
+
+    def test_start_and_goal_are_free_on_the_map_and_all_of_it_is_joined(self):
+        spec = make_spec("rebuilt", level=3)
+        for episode in episodes(spec, 10):
+            shown = show_map(spec, episode).walls
+            earlier = Maze(shown, "earlier")  # raises if its free cells are not joined
+            assert all(map(earlier.is_free, (episode.start, episode.goal)))
+            assert (shown != spec.mazes[episode.maze].walls).any()
+
+    def test_the_doors_of_a_share_are_the_same_on_adrift(self):
+        rebuilt, adrift = make_spec("rebuilt", level=2), make_spec("adrift", level=1)
+        for episode in episodes(rebuilt, 5):
+            assert (show_map(rebuilt, episode).walls == show_map(adrift, episode).walls).all()
+
+    def test_a_maze_with_too_few_doors_is_refused_in_a_line(self):
+        with pytest.raises(InputError, match=r"expected \d doors that can move, found 0"):
+            make_spec("rebuilt", maps=field(9), distances=(2,))
+
+
+def ends(trial) -> tuple:
+    return trial.episode.start, trial.episode.goal
+
+
+class TestAdriftAndRough:
+    def test_the_start_is_marked_at_level_1_only(self):
+        for track, level in ((track, level) for track in ("adrift", "rough") for level in LEVELS):
+            spec = make_spec(track, level=level)
+            planes = context(spec, episodes(spec, 1)[0])
+            assert planes[START].any() == planes[LOCAL_MAP].any() == (level == 1)
+            assert planes[GOAL].sum() == 1
+
+    def test_the_pose_is_the_true_one_with_exact_pose(self):
+        for exact in (False, True):
+            env = mazebench.make_vec("adrift", 2, level=3, seed=1, exact_pose=exact)
+            observation, info = env.reset()
+            for action in (0, 0, 4, 0):
+                observation, *_, info = env.step(np.full(2, action))
+            is_true = np.allclose(observation["state"][:, :2], info["position"], atol=1e-5)
+            assert is_true == exact
+            env.close()
+
+    def test_exact_pose_belongs_to_lost_poses(self):
+        with pytest.raises(InputError, match="'rebuilt': expected no exact_pose"):
+            make_spec("rebuilt", exact_pose=True)
+        with pytest.raises(InputError, match="exact_pose: expected a track whose pose is odometry"):
+            make_spec(exact_pose=True)
+
+    def test_a_rough_sheet_is_mirrored_in_half_of_the_episodes_of_level_3(self):
+        straight, mirrored = (make_spec("rough", level=level) for level in (2, 3))
+        drawn = [show_map(mirrored, episode).drawing for episode in episodes(mirrored, 40)]
+        assert 8 < sum(sheet.is_mirrored for sheet in drawn) < 32
+        assert not any(hasattr(show_map(straight, episode).drawing, "quarters") for episode in episodes(straight, 3))
+
+
+def test_summaries_have_the_figures_of_each_kind_and_of_blocked_episodes(tmp_path):
+    summary = evaluate("planner-closed-loop", tmp_path / "run", track="rebuilt", split=DEV, distances=(15,))
+    assert list(summary.by_fact) == ["blocked", "not blocked", *KNOWN]
+    assert sum(summary.by_fact[kind].n for kind in KNOWN) == summary.episodes
+    assert summary.benchmark == "v3"
