@@ -30,7 +30,7 @@ def test_resets_are_measured():
 
 
 def test_the_range_sensor_is_measured():
-    row = bench._lidar_row(SPEC, 2, seconds=0.05, rounds=2)
+    row = bench._lidar_row(SPEC, 2, None, seconds=0.05, rounds=2)
     assert row["what"] == "2 environments"
     assert row["ratio"] > 0
 
