@@ -13,7 +13,6 @@ from typing import Any
 
 from mazebench.agent import Agent, SingleAgent, as_agent_class
 from mazebench.errors import InputError, shortened, unknown
-from mazebench.renamed import present_name
 from mazebench.tasks.sensors import SENSORS
 
 ENTRY_POINT_GROUP = "mazebench.agents"
@@ -52,8 +51,6 @@ def load_agent_class(name: str) -> type[Agent]:
         return checked_agent_class(name, _import_class(name))
     entry_points = _entry_points()
     if name not in entry_points:
-        if now := present_name(name):
-            raise InputError(f"agent {name!r} is now {now!r}")
         raise InputError(f"{unknown('agent', name, entry_points)}; one of your own is named as module:Class")
     try:
         loaded = entry_points[name].load()

@@ -13,7 +13,6 @@ import torch
 
 from mazebench.errors import InputError, UnplayableError
 from mazebench.maps.maze import MAX_SIZE
-from mazebench.renamed import describe_former
 from mazebench.storage.files import open_whole, read_at_most
 from mazebench.storage.json_files import parse_json
 
@@ -47,9 +46,7 @@ def load_checkpoint(path: pathlib.Path, agent: str) -> tuple[dict[str, torch.Ten
     except (safetensors.SafetensorError, ValueError, KeyError) as error:
         fault = str(error)[:120]
         raise InputError(f"{path}: expected a checkpoint of {FORMAT}, found a damaged one: {fault}") from error
-    name, config = (metadata.get("agent"), metadata.get("config")) if isinstance(metadata, dict) else (metadata, None)
-    if former := describe_former(name, config):
-        raise InputError(f"{path}: expected a checkpoint of agent {agent!r}, found one of {former}")
+    name = metadata.get("agent") if isinstance(metadata, dict) else metadata
     if not isinstance(metadata, dict) or name != agent:
         raise InputError(f"{path}: expected a checkpoint of agent {agent!r}, found one of {str(name)[:80]!r}")
     return tensors, metadata

@@ -18,7 +18,6 @@ import pydantic
 from mazebench.errors import InputError, RunError, describe_fault
 from mazebench.evaluation.chunk import Ended
 from mazebench.evaluation.plan import Plan
-from mazebench.renamed import describe_unfinished
 from mazebench.results.metrics import Steps
 from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, ORACLE, SUMMARY, load_result, read_oracle_steps
 from mazebench.results.records import Record, Summary
@@ -61,11 +60,9 @@ def load_finished(folder: pathlib.Path) -> Summary:
 def check_same_run(folder: pathlib.Path, plan: Plan) -> None:
     """Raises `InputError` unless `folder` holds the run of `plan`; the message names the first difference."""
     before = read_json(folder / CONFIG)
-    if isinstance(before, dict) and (former := describe_unfinished(before)):
-        raise InputError(f"{folder}: holds a run of {former}; name another folder")
     for key, value in json.loads(json.dumps(plan.identity)).items():
         found = before.get(key) if isinstance(before, dict) else before
-        if found == value or (key == "agent_code_sha256" and found is None):  # which was not noted before the rename
+        if found == value:
             continue
         if key == "agent_code_sha256" and found and value:
             what = "file" if ":" in str(before.get("agent")) else "package"

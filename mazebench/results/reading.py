@@ -10,11 +10,10 @@ import numpy as np
 import pydantic
 
 from mazebench.errors import InputError, describe_fault
-from mazebench.renamed import describe_unfinished, name_of_class
 from mazebench.results.metrics import Steps, scores, spl
 from mazebench.results.records import Record, Summary, column
 from mazebench.storage.files import read_at_most
-from mazebench.storage.json_files import read_json, read_lines
+from mazebench.storage.json_files import read_lines
 
 CONFIG = "config.json"
 JOURNAL = "journal.jsonl"
@@ -65,7 +64,7 @@ class Suite(pydantic.BaseModel):
 
 
 def load_result(folder: pathlib.Path) -> Result:
-    """Returns the finished evaluation in `folder`, under the agent's present name; changes nothing there.
+    """Returns the finished evaluation in `folder`; changes nothing there.
 
     Raises:
       InputError: if there is none, it is damaged, or its summary contradicts its records.
@@ -78,9 +77,6 @@ def load_result(folder: pathlib.Path) -> Result:
     fault = _contradiction(summary, records, oracle_steps)
     if fault:
         raise InputError(f"{folder}: {SUMMARY} contradicts {EPISODES}: {fault}")
-    if now := name_of_class(summary.provenance.agent_class):
-        summary = summary.model_copy(update={"agent": now})
-        records = tuple(record.model_copy(update={"agent": now}) for record in records)
     return Result(folder, summary, records, oracle_steps)
 
 
@@ -200,8 +196,5 @@ def _describe_content(folder: pathlib.Path) -> str:
         return "a file"
     names = sorted(path.name for path in folder.iterdir())
     if CONFIG in names:
-        config = read_json(folder / CONFIG)
-        if former := describe_unfinished(config if isinstance(config, dict) else {}):
-            return f"one of {former}, that is not finished"
         return "one that is not finished; go on with `mazebench eval` and --resume"
     return f"{names[0]!r} in it" if names else "an empty folder"

@@ -17,7 +17,6 @@ from typing import Any
 import pydantic
 
 from mazebench.errors import InputError, RunError, describe_fault
-from mazebench.renamed import describe_former
 from mazebench.storage.files import WriteError, make_folder, open_to_write, open_whole, writing_to
 from mazebench.storage.json_files import read_json, repair_and_read_lines, to_line, write_json
 from mazebench.storage.locks import FolderLock
@@ -137,11 +136,7 @@ class RunFolder:
             return
         before, now = read_json(path), json.loads(json.dumps(config))
         if before != now:
-            names = []
-            if isinstance(before, dict):
-                if former := describe_former(before.get("agent"), before.get("agent_config")):
-                    raise InputError(f"{path}: holds a run of {former}; name another folder")
-                names = sorted(set(before) | set(now))
+            names = sorted(set(before) | set(now)) if isinstance(before, dict) else []
             name = next((name for name in names if before.get(name) != now.get(name)), "content")
             raise InputError(f"{path}: holds another run, differing in {name!r}")
 
