@@ -144,7 +144,7 @@ def _cost(seen: np.ndarray, wall: np.ndarray) -> np.ndarray:
 
 def _next_cell(cost: np.ndarray, ends: np.ndarray, cell: Cell) -> Cell:
     """Returns the next cell on a cheapest way from `cell` to one of `ends` (`[N, N]` bool)."""
-    ways = cheapest_ways(cost, np.zeros_like(cost), np.where(ends, 0.0, np.inf))
+    ways = cheapest_ways(cost, np.where(ends, 0.0, np.inf))
     row, column = divmod(int(ways.following[cell[0] * len(cost) + cell[1]]), len(cost))
     return row, column
 

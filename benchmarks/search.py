@@ -29,7 +29,7 @@ import numpy as np
 import torch
 from mazebench_agents.common import kernels
 from mazebench_agents.common.actor import one_torch_thread
-from mazebench_agents.common.kernel_layers import Linear, add_product, kernel, linear, normalize, rectify
+from mazebench_agents.mmn.kernel_layers import Linear, add_product, kernel, linear, normalize, rectify
 from mazebench_agents.muzero.search import KernelModel, Root, gumbel_muzero_policy, muzero_policy
 from mazebench_agents.muzero.tree import ROOT, Evaluation, backward, empty_evaluation, expand, simulate
 

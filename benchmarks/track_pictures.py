@@ -1,6 +1,7 @@
-"""Draws a maze and the map that the agent is shown of it at each level of a track: docs/images/track-*.png.
+"""Draws a maze and the map that the agent is shown of it at each level of a track.
 
-`python benchmarks/track_pictures.py [stale lost sketch far]`. The episodes are played by `oracle` in train mazes.
+`python benchmarks/track_pictures.py [stale lost sketch far v3]`. The tracks of v2 have a picture each,
+docs/images/track-*.png, and those of v3 share docs/images/tracks-v3.png. `oracle` plays the episodes in train mazes.
 """
 
 from __future__ import annotations
@@ -16,25 +17,45 @@ from matplotlib.patches import Rectangle
 
 import mazebench
 from mazebench.maps import colors
+from mazebench.maps.benchmark import KINDS_VERSION as V3
+from mazebench.maps.benchmark import TRACKS_VERSION
 from mazebench.maps.maze import Cell, Maze
 from mazebench.maps.pictures import draw_grid
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, load_trajectories
-from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks import TRACKS, tracks_of
 from mazebench.tasks.tracks.base import LEVELS
 
 IMAGES = pathlib.Path(__file__).parent.parent / "docs" / "images"
 PANEL = 520  # pixels a side, about
 MAZE = 3  # index of the train maze
+HOUSE = 17  # the same on the tracks of v3
 DISTANCES = {13: 18, 31: 40, 51: 60}  # cells from start to goal, by the maze's size
+ROWS = ("building", "rebuilt", "rough")  # of v3; `adrift` shows the maps of `rebuilt`
 
 
-def main(tracks: list[str]) -> None:
-    """Draws the pictures of some tracks."""
-    for track in tracks:
-        figure = draw_track(track)
-        figure.savefig(IMAGES / f"track-{track}.png", dpi=110, metadata={"Software": None})
-        print(IMAGES / f"track-{track}.png")
+def main(names: list[str]) -> None:
+    """Draws the pictures of some tracks of v2, or the one of v3."""
+    for name in names:
+        path = IMAGES / (f"tracks-{V3}.png" if name == V3 else f"track-{name}.png")
+        figure = draw_v3() if name == V3 else draw_track(name)
+        figure.savefig(path, dpi=110, metadata={"Software": None})
+        print(path)
+
+
+def draw_v3() -> Figure:
+    """Returns a figure with a row for each track of v3: the maze, and the shown map at levels 1 to 3."""
+    figure = Figure(figsize=(9.6, 7.8), layout="constrained")
+    for row, track in zip(figure.subplots(len(ROWS), 1 + len(LEVELS)), ROWS, strict=True):
+        for axes in row:
+            axes.set_axis_off()
+        for level in LEVELS:
+            maze, trajectory = play(track, level, HOUSE)
+            _show(row[level], _shown_map(trajectory), f"{track} {level}")
+            if track == "rebuilt":
+                _mark_moved_doors(row[level], maze, trajectory)
+        _show(row[0], _true_maze(maze, trajectory), "the maze, and a path")
+    return figure
 
 
 def draw_track(track: str) -> Figure:
@@ -56,15 +77,15 @@ def draw_track(track: str) -> Figure:
     return figure
 
 
-def play(track: str, level: int) -> tuple[Maze, Trajectory]:
-    """Returns a train maze and what was recorded of an episode in it."""
+def play(track: str, level: int, index: int = MAZE) -> tuple[Maze, Trajectory]:
+    """Returns the train maze of an index and what was recorded of an episode in it."""
     mazes = TRACKS[track].mazes((level,), "train")
     options = {"track": track, "level": level, "split": "train", "distances": DISTANCES[mazes[0].size]}
     with tempfile.TemporaryDirectory() as folder:
         mazebench.evaluate("oracle", folder, record=True, episodes_per_distance=1, **options)
         records = load_result(pathlib.Path(folder)).records
         recorded = load_trajectories(pathlib.Path(folder) / TRAJECTORIES, len(records))
-        return mazes[MAZE], recorded[[record.maze for record in records].index(mazes[MAZE].name)]
+        return mazes[index], recorded[[record.maze for record in records].index(mazes[index].name)]
 
 
 def _true_maze(maze: Maze, trajectory: Trajectory) -> np.ndarray:
@@ -117,4 +138,4 @@ def _show(axes: Axes, picture: np.ndarray, title: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or list(TRACKS))
+    main(sys.argv[1:] or [*tracks_of(TRACKS_VERSION), V3])

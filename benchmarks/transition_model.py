@@ -11,16 +11,17 @@ from typing import NamedTuple
 import numpy as np
 import torch
 from mazebench_agents.common import symmetry
-from mazebench_agents.common.layers import state_features
+from mazebench_agents.common.layers import marked_position, state_features
 from mazebench_agents.common.overrides import override
 from mazebench_agents.mmn.config import MMNConfig
+from mazebench_agents.mmn.learner import parameter_groups
 from mazebench_agents.mmn.network import Code, MMNNetwork
 
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.build import make_spec
-from mazebench.tasks.context import build_context
+from mazebench.tasks.context import START, build_context
 from mazebench.training.experience import Collector
 
 _SIZE = 13
@@ -98,6 +99,11 @@ def draw(mazes: tuple[Maze, ...], recorded: list[Transitions], turned: int, rng:
     )
 
 
+def encoded(network: MMNNetwork, batch: Batch) -> Code:
+    """Returns the codes of a batch's contexts; displacements are measured from the marked starts."""
+    return network.hypermodel(batch.context, marked_position(batch.context[:, START]))
+
+
 def errors(network: MMNNetwork, batch: Batch, code: Code) -> tuple[torch.Tensor, torch.Tensor]:
     """Returns the errors `[G, K]` of the displacement (m) and of the rest of the body after one step."""
     latent = network.encode(batch.features)
@@ -111,7 +117,7 @@ def compare(network: MMNNetwork, batches: list[Batch]) -> tuple[float, float]:
     """Returns the mean errors (m) with the right weights, and with those of another maze."""
     own, other = [], []
     for batch in batches:
-        code = network.hypermodel(batch.context)
+        code = encoded(network, batch)
         rolled = Code(code.positions, *(part.roll(1, 0) for part in code[1:]))
         own.append(errors(network, batch, code)[0])
         other.append(errors(network, batch, rolled)[0][batch.maze != batch.maze.roll(1, 0)])
@@ -132,12 +138,12 @@ def main(num_updates: int, overrides: dict[str, str]) -> None:
     with torch.no_grad():
         network.scale.copy_(torch.tensor(_TRUE_SCALE))
     network.scale.requires_grad_(False)
-    optimizer = torch.optim.AdamW(network.parameter_groups(), lr=config.learning_rate)
+    optimizer = torch.optim.AdamW(parameter_groups(network, config), lr=config.learning_rate)
     for update in range(1, num_updates + 1):
         for group in optimizer.param_groups:
             group["lr"] = group["rate"] * config.learning_rate * min(1.0, 0.6 * num_updates / update)
         batch = draw(splits["train"], recorded["train"], int(rng.integers(symmetry.NUM_SYMMETRIES)), rng)
-        moved, body = errors(network, batch, network.hypermodel(batch.context))
+        moved, body = errors(network, batch, encoded(network, batch))
         optimizer.zero_grad()
         (2 * moved + body).mean().backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), config.max_gradient_norm)

@@ -1,8 +1,8 @@
-"""Prints an agent's success rates on held-out 13 x 13 mazes whose shown maps, or observed poses, are wrong.
+"""Prints an agent's success rates on held-out mazes whose shown maps, or observed poses, are right or wrong.
 
-Call it as `python benchmarks/wrong_maps.py AGENT [CHECKPOINT...] [--rows NAME,...] [--seed N]`. Each row is a task.
-Each checkpoint is a column with 95 % intervals over mazes and episodes. The mazes are of no split; another seed draws
-other ones. The tracks are played with a lidar, the other tasks without.
+Call it as `python benchmarks/wrong_maps.py AGENT [CHECKPOINT...] [--rows NAME,...] [--kind KIND] [--size N]`. Each row is
+a task. Each checkpoint is a column with 95 % intervals over mazes and episodes. The mazes are of no split; another
+--seed draws other ones. The tracks are played with a lidar, the other tasks without.
 """
 
 from __future__ import annotations
@@ -23,12 +23,13 @@ from mazebench.tasks.build import make_spec
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.trials import draw_trials
 
-_SIZE = 13
 _NUM_MAZES = 40
 _HIERARCHICAL = {"task": "hierarchical"}
-# Options of each task; those of the local task that have no distances are played at 4, 8 and 12 cells.
+# Options of each task; those of the local task that have no distances are played at 4, 8 and 12 cells, or as much
+# farther as the mazes are larger than 13 x 13.
 ROWS = {
     "clean": {"distances": tuple(range(1, 16))},
+    "right": {},
     "far": {"distances": (16, 20)},
     "flip .1": {"map_flip": 0.1},
     "flip .2": {"map_flip": 0.2},
@@ -48,16 +49,15 @@ ROWS = {
 _EPISODES = 2  # a maze and distance
 
 
-def held_out_task(options: dict, seed: int, num_mazes: int) -> TaskSpec:
+def held_out_task(options: dict, seed: int, num_mazes: int, kind: str = "dfs", size: int = 13) -> TaskSpec:
     """Returns the task of a row in mazes that are drawn like the benchmark's."""
     options = dict(options)
     task = options.pop("task", "local")
     if task == "local":
-        options.setdefault("distances", (4, 8, 12))
-    spec = make_spec(task, _SIZE, **options)
-    streams = np.random.SeedSequence([seed, _SIZE]).spawn(num_mazes)
-    mazes = [generate("dfs", _SIZE, np.random.default_rng(stream), f"held-out-{i}") for i, stream in enumerate(streams)]
-    return dataclasses.replace(spec, mazes=tuple(mazes))
+        options.setdefault("distances", tuple(distance * size // 13 for distance in (4, 8, 12)))
+    streams = np.random.SeedSequence([seed, size]).spawn(num_mazes)
+    mazes = [generate(kind, size, np.random.default_rng(stream), f"held-out-{i}") for i, stream in enumerate(streams)]
+    return make_spec(task, maps=mazes, **options)
 
 
 def outcomes(agent: Agent, spec: TaskSpec, needs_truth: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -78,6 +78,8 @@ def main() -> None:
     parser.add_argument("agent")
     parser.add_argument("checkpoints", nargs="*", type=pathlib.Path)
     parser.add_argument("--rows", default=",".join(ROWS), help="names of rows, with commas between")
+    parser.add_argument("--kind", default="dfs")
+    parser.add_argument("--size", type=int, default=13)
     parser.add_argument("--seed", type=int, default=30_000)
     parser.add_argument("--mazes", type=int, default=_NUM_MAZES)
     given = parser.parse_args()
@@ -87,11 +89,11 @@ def main() -> None:
             continue
         cells, begin = [], time.perf_counter()
         for checkpoint in given.checkpoints or [None]:
-            spec = held_out_task(options, given.seed, given.mazes)
+            spec = held_out_task(options, given.seed, given.mazes, given.kind, given.size)
             if spec.track is None:
-                spec = dataclasses.replace(spec, context_size=agent_class.context_size(_SIZE))
+                spec = dataclasses.replace(spec, context_size=agent_class.context_size(given.size))
             spec = dataclasses.replace(spec, sensors=tuple({*spec.sensors, *agent_class.needs_sensors}))
-            interface = Interface(spec.task, _SIZE, spec.context_size, sensors=spec.sensors)
+            interface = Interface(spec.task, given.size, spec.context_size, sensors=spec.sensors)
             agent = agent_class.build(interface, checkpoint=checkpoint)
             success, maze = outcomes(agent, spec, agent_class.needs_truth)
             estimate = mean_interval(success, maze)

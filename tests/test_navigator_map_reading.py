@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mazebench_agents.navigator.drawing import compare, widths_of_pixels
-from mazebench_agents.navigator.gauss_newton import normal_equations, variances
-from mazebench_agents.navigator.map_reading import read_map
+from mazebench_agents.robot.drawing import compare, widths_of_pixels
+from mazebench_agents.robot.gauss_newton import normal_equations, variances
+from mazebench_agents.robot.map_reading import read_map
 
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import cell_to_point

@@ -104,7 +104,7 @@ def _cache_folder(function: Callable[..., Any], given: str) -> pathlib.Path:
 
 @functools.cache
 def _digest(module: str) -> str:
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(module.encode())  # kept kernels import their module by its name
     for name in sorted(_used_by(module)):
         digest.update(pathlib.Path(str(sys.modules[name].__file__)).read_bytes())
         for value in vars(sys.modules[name]).values():

@@ -20,6 +20,7 @@ from ..common.kernels import compiled
 
 _ERROR = 0.05  # probability that a cell of the map is wrong
 _OUTSIDE = 1e-3  # probability that a cell outside of the sheet, or of its border, is free
+_MIRRORED = 0.05  # probability that a sheet that may lie in any way is mirrored
 _UNTOLD = 1e-4  # probability of a goal in a cell that the mark excludes
 _CHANGED = 0.02  # difference of probabilities of a wall, from which a cell is weighed anew
 _UNLIKELY = 1e-3  # of the likeliest hypothesis, up to which one is not considered, or not used in mixtures
@@ -65,6 +66,8 @@ class MapBelief:
             placements = np.argwhere(turned > _UNLIKELY * turned.max())
             log_weights = np.log(turned[tuple(placements.T)])
             placements -= [0, size // 2, size // 2]
+        if num_turns == 8:
+            log_weights += np.where(placements[:, 0] < 4, np.log(1 - _MIRRORED), np.log(_MIRRORED))
         return cls(
             walls=orientations(walls, num_turns),
             goals=orientations(goal, num_turns),

@@ -1,4 +1,4 @@
-"""Where the walls are: a log-odds occupancy grid of what lidar saw, with a map as its prior.
+"""Where the walls are: a log-odds occupancy grid of what was seen by lidar or felt, with a map as its prior.
 
 Moravec & Elfes 1985; Thrun, Burgard & Fox 2005, Probabilistic Robotics, chapter 9. `beams` says what a scan tells.
 Lengths are in cells. `L` is the number of cells on a side.
@@ -11,10 +11,14 @@ import math
 
 import numpy as np
 
+from mazebench.maps.maze import Cell
+
 from ..common.kernels import compiled
 from .beams import UNKNOWN, Beams, add_scan
 
 SURE = 3.0  # log odds of evidence, from which a cell counts as seen
+_VISITED = 4.0  # log odds that a cell is free in which the body was
+_LARGEST = 8.0  # log odds of a cell, so that errors can be undone
 _BINS = np.array([0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98])  # of prior probabilities, within which the map errs alike
 _PRIOR_CELLS = 3.0  # seen cells that weigh as much as the prior when the map's reliability is estimated
 _LEAST = 1e-6  # count of cells of a kind, instead of none
@@ -36,6 +40,14 @@ class Occupancy:
         x, y, yaw = pose
         add_scan(self.evidence, x, y, yaw, ranges, beams, deviation)
 
+    def visit(self, cell: Cell) -> None:
+        """Takes in that the body is in a cell."""
+        self.evidence[cell] = max(self.evidence[cell] - _VISITED, -_LARGEST)
+
+    def feel(self, cell: Cell, log_odds: float) -> None:
+        """Takes in that a cell may have stopped the body, with the log odds that this adds."""
+        self.evidence[cell] = min(self.evidence[cell] + log_odds, _LARGEST)
+
     def seen_walls(self) -> np.ndarray:
         """Returns `[L, L]` float: the probability of a wall by what was seen alone."""
         return 1 / (1 + np.exp(-self.evidence) * ((1 - UNKNOWN) / UNKNOWN))
@@ -45,7 +57,7 @@ class Occupancy:
         return posterior(prior, self.evidence, _BINS, _PRIOR_CELLS)
 
     def is_seen(self) -> np.ndarray:
-        """Returns `[L, L]` bool: the cells of which lidar tells what they are."""
+        """Returns `[L, L]` bool: the cells of which is known what they are."""
         return np.abs(self.evidence) >= SURE
 
 

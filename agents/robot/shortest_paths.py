@@ -18,25 +18,22 @@ class Ways(NamedTuple):
 
     cost: np.ndarray  # [N, N] float, of the way; infinite without one
     following: np.ndarray  # [N * N] int32, the next cell on the way; the cell itself where the way ends
-    order: np.ndarray  # [N * N] int32, the cells from near to far
 
 
 @compiled
-def cheapest_ways(entering: np.ndarray, leaving: np.ndarray, end: np.ndarray) -> Ways:
+def cheapest_ways(entering: np.ndarray, end: np.ndarray) -> Ways:
     """Returns the cheapest ways through cells side by side.
 
-    A step costs what leaving a cell costs and what entering the next one costs. Of equal ways, the one is taken whose
-    next cell is nearer to its end, and of these the one whose next cell has the lower index.
+    A step costs what entering the next cell costs. Of equal ways, the one is taken whose next cell is nearer to its
+    end, and of these the one whose next cell has the lower index.
 
     Args:
-      entering: `[N, N]` float, the costs of entering each cell, at least 0.
-      leaving: `[N, N]` float, the costs of leaving it; one of both is more than 0.
+      entering: `[N, N]` float, the costs of entering each cell, more than 0.
       end: `[N, N]` float, what it costs if the way ends in a cell; infinite where none does.
     """
     height, width = end.shape
     least = end.copy()
     following = np.arange(end.size).astype(np.int32)
-    order = np.empty(end.size, np.int32)
     num_done = 0
 
     # The search begins at the ends. What is popped is settled, so that cells come from near to far.
@@ -47,13 +44,12 @@ def cheapest_ways(entering: np.ndarray, leaving: np.ndarray, end: np.ndarray) ->
         row, column = cell // width, cell % width
         if near > least[row, column]:
             continue  # a cheaper way was found after this one
-        order[num_done] = cell
         num_done += 1
         for down, right in ((-1, 0), (0, -1), (1, 0), (0, 1)):
             r, c = row + down, column + right
             if 0 <= r < height and 0 <= c < width:
-                through = near + entering[row, column] + leaving[r, c]
+                through = near + entering[row, column]
                 if through < least[r, c]:
                     least[r, c], following[r * width + c] = through, cell
                     heapq.heappush(queue, (through, r * width + c))
-    return Ways(least, following, order)
+    return Ways(least, following)

@@ -29,6 +29,7 @@ _AGENT_ORDER = (
     "oracle",
     "navigator",
     "belief-planner",
+    "belief-rule",
     "mmn",
     "mah",
     "mah-paper",

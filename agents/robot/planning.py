@@ -10,14 +10,14 @@ import numpy as np
 
 from mazebench.maps.maze import Cell
 
-from ..robot.shortest_paths import cheapest_ways
+from .shortest_paths import cheapest_ways
 
-# Cells: what a try of a cell costs if it turns out to be a wall (Canadian traveller's problem, Papadimitriou &
-# Yannakakis 1991). A try pays if what it saves, times the chance that the cell is free, is more than this times the
-# chance that it is not. So a cell costs 1, and this times the odds of a wall.
-_DETOUR = 1.0
+# Cells that a path may be longer to be free with e times the probability. The product of its cells' probabilities to be
+# free is the chance that a path is open at all: such a path is a cheap answer to the Canadian traveller's problem
+# (Papadimitriou & Yannakakis 1991). Chosen on train mazes.
+_RISK = 3.0
 _GOAL_DETOUR = 3.0  # cells by which a goal that is half as likely as another must be nearer to be searched before it
-_LARGEST_COST = 1e4  # cells; of a certain wall
+_CLOSED = 1e4  # cells; what a certain wall costs, longer than any way around
 _UNLIKELY = 1e-9  # of the likeliest goal's probability, up to which a goal is too far to be searched on any map
 
 
@@ -25,7 +25,7 @@ def plan(walls: np.ndarray, goal: np.ndarray, start: Cell) -> list[Cell]:
     """Returns the cells of a cheapest path from `start` to one of the goals.
 
     Args:
-      walls: `[N, N]` float, the probability of a wall.
+      walls: `[N, N]` float, the probability of a wall; 1 for walls that are never tried.
       goal: `[N, N]` float, how likely a cell is the goal, not zero everywhere.
       start: the cell of the body.
     """
@@ -38,15 +38,14 @@ def plan(walls: np.ndarray, goal: np.ndarray, start: Cell) -> list[Cell]:
     start = (start[0] - top, start[1] - left)
 
     # Entering a cell costs more the likelier it is a wall.
-    odds = walls / np.maximum(1 - walls, 1e-9)
-    entering = np.minimum(1 + _DETOUR * odds, _LARGEST_COST)
+    entering = np.where(walls < 1, 1 - _RISK * np.log(np.maximum(1 - walls, 1e-9)), _CLOSED)
 
     # Ending in a cell costs more the likelier the goal is elsewhere.
     end = np.full(goal.shape, np.inf)
     possible = goal > _UNLIKELY * goal.max()
     end[possible] = _GOAL_DETOUR * (goal.max() / goal[possible] - 1)
 
-    following = cheapest_ways(entering, np.zeros(walls.shape), end).following
+    following = cheapest_ways(entering, end).following
     width = walls.shape[1]
     index = start[0] * width + start[1]
     path = [index]

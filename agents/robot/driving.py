@@ -14,8 +14,8 @@ import numpy as np
 from mazebench.constants import TOP_SPEED
 from mazebench.maps.maze import Cell
 
-from ..robot.body import Body, Point
-from ..robot.quickest import make_course, quickest_drive
+from .body import Body, Point
+from .quickest import make_course, quickest_drive
 
 _CELLS_AHEAD = 7  # of the path
 _STEPS_AHEAD = 7  # that are planned

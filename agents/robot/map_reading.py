@@ -13,8 +13,8 @@ import numpy as np
 from mazebench.maps.maze import Cell
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, START
 
-from ..robot.body import Point
-from ..robot.cells import marked_cell, nearest_cell
+from .body import Point
+from .cells import marked_cell, nearest_cell
 from .drawn_map import register, with_border
 
 _ERROR = 0.1  # probability that a cell is shown wrong, before anything was seen
