@@ -24,8 +24,8 @@ def test_shipped_agent_keeps_the_contract(name):
 def test_shipped_checkpoint_has_its_config_and_curve_beside_it(name):
     path = load_agent_class(name).default_checkpoint()
     _, metadata = load_checkpoint(path, name)
-    config = json.loads(path.with_name(f"{name}-13.config.json").read_text())
-    curve = [json.loads(line) for line in path.with_name(f"{name}-13.metrics.jsonl").read_text().splitlines()]
+    config = json.loads(path.with_suffix(".config.json").read_text())
+    curve = [json.loads(line) for line in path.with_suffix(".metrics.jsonl").read_text().splitlines()]
     assert metadata["config"] == config["agent_config"]
     assert metadata["provenance"]["env_steps"] == curve[-1]["env_steps"]
 

@@ -1,4 +1,4 @@
-"""A planner with a learned belief over the map and a learned driver."""
+"""The belief planner: a robot whose belief of walls and goal is learned."""
 
 from .agent import BeliefPlanner
 

@@ -55,6 +55,7 @@ class NetworkAgent(LearningAgent):
     name: ClassVar[str]
     default_config: ClassVar[Any]  # a frozen dataclass that has num_envs, epsilon_base and epsilon_alpha
     learner_class: ClassVar[Any]  # called with the agent, the task to learn in and a seed
+    shipped_size: ClassVar[int] = 13  # of the mazes in which the checkpoint that ships was trained
     learns_on_gpu: ClassVar[bool] = False  # whether the learner uses a GPU if there is one
     config: Any
     network: Any  # a torch.nn.Module
@@ -147,7 +148,7 @@ class NetworkAgent(LearningAgent):
     @classmethod
     def default_checkpoint(cls) -> pathlib.Path:
         """Returns the checkpoint that ships."""
-        path = resources.files("mazebench_assets").joinpath("checkpoints", f"{cls.name}-13.safetensors")
+        path = resources.files("mazebench_assets").joinpath("checkpoints", f"{cls.name}-{cls.shipped_size}.safetensors")
         return pathlib.Path(str(path))
 
     def _explored(self, actions: np.ndarray, num_actions: int) -> np.ndarray:
