@@ -1,26 +1,65 @@
-"""MMN: its transition is generated from the map, and kernels search in it."""
+"""MMN: its transition is generated from the map; its learner, and how it acts."""
 
-import copy
 import dataclasses
 
 import numpy as np
 import pytest
 import torch
 from acting import inputs_of
-from mazebench_agents.common import kernels
+from mazebench_agents.common.layers import marked_position
 from mazebench_agents.mmn import MMN
+from mazebench_agents.mmn.batches import make_batch
 from mazebench_agents.mmn.config import MMNConfig
-from mazebench_agents.mmn.kernel_model import kernel_model, step, weights_of
+from mazebench_agents.mmn.losses import unrolled_losses
 from mazebench_agents.mmn.network import MMNNetwork
-from mazebench_agents.mmn.planning import torch_model
-from mazebench_agents.muzero.network import rows_of
-from mazebench_agents.muzero.search import gumbel_muzero_policy
-from mazebench_agents.muzero.tree import empty_evaluation
-from test_muzero import CONFIGS, a_context, an_observation, make_learner
+from mazebench_agents.mmn.targets import Targets, lookahead
+from small_world import learn
 
 from mazebench.agent import Interface
 from mazebench.errors import UnplayableError
 from mazebench.maps.kinds import generate
+from mazebench.tasks.build import make_spec
+from mazebench.tasks.context import START
+from mazebench.training.experience import Collector
+
+SMALL = MMNConfig(hidden=16, head_hidden=16, latent=8, embedding=8, task_code=8, groups=4, num_envs=8, min_rows=100)
+CONFIGS = {
+    "mmn": SMALL,
+    "mmn, one code": dataclasses.replace(SMALL, rows=False, reading=False),
+    "mmn, no hypermodel": dataclasses.replace(SMALL, rows=False, hypermodel=False),
+}
+OF_ALL = pytest.mark.parametrize("config", CONFIGS.values(), ids=CONFIGS)
+
+
+def a_context(seed=0, size=7, batch=1):
+    """Mazes with a start and a goal."""
+    rng = np.random.default_rng(seed)
+    context = np.zeros((batch, 4, size, size), dtype=np.float32)
+    context[:, :2] = rng.random((batch, 2, size, size)) < 0.4
+    context[:, 2, 1, size - 2] = context[:, 3, size - 2, 1] = 1
+    return torch.from_numpy(context)
+
+
+def code_of(network, context):
+    """What the hypermodel makes of contexts, if displacements are measured from the marked start."""
+    return network.hypermodel(context, marked_position(context[:, START]))
+
+
+def an_observation(batch):
+    rng = np.random.default_rng(0)
+    return {"state": rng.normal(size=(batch, 12)).astype(np.float32), "context": a_context(batch=batch).numpy()}
+
+
+def make_learner(mazes, config=SMALL, seed=0, steps=100):
+    """A small learner that has seen some steps of random driving."""
+    overrides = {name: str(value) for name, value in dataclasses.asdict(config).items()}
+    spec = make_spec(maps=mazes, distances=(1, 2, 3), num_goals=config.num_goals)
+    learner = MMN.build_learner(spec, seed=seed, overrides=overrides)
+    collector = Collector(spec, learner.num_envs, seed=seed)
+    rng = np.random.default_rng(seed)
+    for _ in range(steps):
+        learner.observe(collector.step(rng.integers(6, size=learner.num_envs)))
+    return learner
 
 
 @pytest.fixture(scope="module")
@@ -28,20 +67,147 @@ def mazes():
     return tuple(generate("dfs", 7, np.random.default_rng(index), f"m{index}") for index in range(3))
 
 
-@torch.no_grad()
-def test_trees_are_searched_alike_in_one_thread_and_in_several(monkeypatch):
-    network = random_network()
-    latent, code = network.encode(torch.randn(100, 1, 9)), network.hypermodel(a_context(batch=100))
-    found = []
-    for num_threads in (1, 3):
-        monkeypatch.setattr(kernels, "num_threads", lambda num_threads=num_threads: num_threads)
-        found.append(gumbel_muzero_policy(*kernel_model(network, latent, code), 6, np.zeros((100, 6))))
-    for one, several in zip(*found, strict=True):
-        np.testing.assert_array_equal(one, several)
+@OF_ALL
+def test_another_map_gives_other_transition_weights_and_predictions(config):
+    torch.manual_seed(0)
+    network = MMN(config, 7).network
+    first, second = code_of(network, a_context(0)), code_of(network, a_context(1))
+    assert not torch.equal(first.weights, second.weights)
+    latent = network.encode(torch.randn(1, 5, 9))
+
+    def next_latent(code):
+        return network.step(
+            latent, network.first_layer(latent, network.look(latent, code), code), torch.arange(5)[None], code
+        )
+
+    assert not torch.allclose(next_latent(first), next_latent(second), atol=1e-6)
+
+
+def test_every_weight_of_the_papers_transition_is_generated():
+    """Motion is still in a network all of whose generated weights are 0, whatever its other parameters are."""
+    network = MMNNetwork(SMALL, 7)
+    for parameter in network.parameters():
+        torch.nn.init.normal_(parameter)
+    code = code_of(network, a_context())
+    code = code._replace(weights=torch.zeros_like(code.weights), rows=torch.zeros_like(code.rows))
+    latent = network.encode(torch.randn(1, 6, 9))
+    first = network.first_layer(latent, network.look(latent, code), code)
+    after = network.step(latent, first, torch.arange(6)[None], code)
+    torch.testing.assert_close(after[..., :4], latent[..., :4])  # the pose stays
+    torch.testing.assert_close(after[..., 4:7], torch.zeros(1, 6, 3))
+
+
+@OF_ALL
+def test_task_and_model_losses_reach_the_hypermodels_weights(config, mazes):
+    """The paper's point: psi learns from both, and through the transition network whose weights it predicts."""
+    learner = make_learner(mazes, config)
+    network = learner.actor.network
+    with torch.no_grad():  # heads that are zero pass nothing on
+        network.heads.weight.normal_(std=0.1)
+    sample = learner.replay.sample_sequences(
+        8, 3, config.sequence_steps, hindsight=learner.hindsight, rng=np.random.default_rng(0)
+    )
+    device = network.support.device
+    batch = make_batch(sample, maps=learner.maps, turned=0, device=device)
+    wanted = Targets(-torch.rand(batch.exists.shape), torch.softmax(torch.randn(*batch.exists.shape, 6), dim=-1))
+    losses, _ = unrolled_losses(network, config, batch, Targets(*(each.to(device) for each in wanted)))
+    for loss in ("value_loss", "policy_loss", "goal_loss", "model_loss"):
+        (gradient,) = torch.autograd.grad(losses[loss], network.hypermodel.hyper.weight, retain_graph=True)
+        assert gradient.abs().sum() > 0, loss
+
+
+@OF_ALL
+def test_lookahead_is_every_action_of_the_model_by_itself(config):
+    torch.manual_seed(0)
+    network = MMN(config, 7).network
+    torch.nn.init.normal_(network.heads.weight)
+    code = code_of(network, a_context(batch=2))
+    latent = network.encode(torch.randn(2, 3, 9))
+    qvalues = lookahead(network, latent, code)
+    first = network.first_layer(latent, network.look(latent, code), code)
+    for action in range(6):
+        after = network.step(latent, first, torch.full((2, 3), action), code)
+        out = network.predict(after, network.look(after, code), code)
+        # -1 and the value, unless it ends there
+        expected = torch.sigmoid(-out.goal_logit) * (network.value(out.value_logits) - 1)
+        torch.testing.assert_close(qvalues[..., action], expected)
+
+
+@pytest.mark.parametrize(
+    "config",
+    [*CONFIGS.values(), dataclasses.replace(SMALL, value_target="tree_backup", policy_target="lookahead")],
+)
+def test_same_seed_gives_the_same_first_updates(config, mazes):
+    learners = [make_learner(mazes, config) for _ in range(2)]
+    for _ in range(5):
+        first, second = (learner.update() for learner in learners)
+        assert first == second
+    assert all(np.isfinite(list(first.values())))
+
+
+def test_what_tells_early_whether_a_run_will_work_is_logged(mazes):
+    losses = {"value_loss", "policy_loss", "goal_loss", "model_loss"}
+    others = {"gradient_norm", "value_error", "value", "model_error_1", "model_error_5", "map_ratio"}
+    assert set(make_learner(mazes).update()) == losses | others
+
+
+def test_learner_goes_on_as_if_it_had_not_been_saved(tmp_path, mazes):
+    learner = make_learner(mazes)
+    for _ in range(3):
+        learner.update()
+    learner.save(tmp_path, {})
+    expected = [learner.update() for _ in range(3)]
+    resumed = make_learner(mazes, seed=1, steps=1)
+    resumed.load(tmp_path)
+    assert [resumed.update() for _ in range(3)] == expected
+
+
+@OF_ALL
+def test_saved_and_built_agent_acts_identically(config, tmp_path, mazes):
+    learner = make_learner(mazes, config)
+    learner.update()
+    learner.save(tmp_path, {})
+    agent = MMN.build(Interface("local", 7, 7), checkpoint=tmp_path / "agent.safetensors")
+    inputs = inputs_of(an_observation(40), np.ones(40, dtype=bool))
+    expected, _ = learner.actor.act(inputs, learner.actor.initial_state(40))
+    actions, _ = agent.act(inputs, agent.initial_state(40))
+    np.testing.assert_array_equal(actions, expected)
+
+
+def test_agent_with_one_code_a_context_says_which_sizes_it_serves(tmp_path, mazes):
+    make_learner(mazes).save(tmp_path, {})
+    with pytest.raises(UnplayableError, match=r"'mmn': its checkpoint reads maps of 7 x 7 only, found 13 x 13"):
+        MMN.build(Interface("local", 13, 13), checkpoint=tmp_path / "agent.safetensors")
+
+
+def test_actions_do_not_depend_on_what_else_is_in_the_batch():
+    agent = MMN(SMALL, 7, seed=2)
+    torch.nn.init.normal_(agent.network.heads.weight)
+    observation = an_observation(77)
+
+    def actions(rows):
+        part = {key: value[rows] for key, value in observation.items()}
+        return agent.act(inputs_of(part, np.ones(len(rows), dtype=bool)), agent.initial_state(len(rows)))[0]
+
+    together = actions(np.arange(77))
+    for rows in (np.array([76]), np.arange(40, 77), np.random.default_rng(0).permutation(77)):
+        np.testing.assert_array_equal(actions(rows), together[rows])
+
+
+@pytest.mark.parametrize("active", [[False, True, False], [True, False, True]])
+def test_environments_that_rest_change_no_action_of_the_others(active):
+    agent = MMN(SMALL, 7)
+    torch.manual_seed(1)
+    torch.nn.init.normal_(agent.network.heads.weight)
+    inputs = inputs_of(an_observation(3), np.ones(3, dtype=bool))
+    every, _ = agent.act(inputs, agent.initial_state(3))
+    assert every.all()  # no action is that of a resting environment
+    some, _ = agent.act(inputs._replace(active=np.array(active)), agent.initial_state(3))
+    np.testing.assert_array_equal(some, np.where(active, every, 0))
 
 
 def test_anchor_stays_as_long_as_it_agrees_with_the_cell_marked_as_start():
-    network = MMNNetwork(CONFIGS["mmn"], 7)
+    network = MMNNetwork(SMALL, 7)
     with torch.no_grad():
         network.scale.copy_(torch.tensor([[0.0, 0.2], [-0.2, 0.0]]))
     anchor, moved = torch.tensor([[5.0, 1.0], [5.0, 1.0]]), torch.tensor([[2.3, 0.4], [2.3, 0.4]])  # so in (4.6, 3.3)
@@ -50,102 +216,7 @@ def test_anchor_stays_as_long_as_it_agrees_with_the_cell_marked_as_start():
     torch.testing.assert_close(network.reanchored(anchor, moved, start), expected)
 
 
-def random_network(name="mmn"):
-    torch.manual_seed(0)
-    network = MMN(CONFIGS[name], 7).network
-    for parameter in network.parameters():
-        torch.nn.init.normal_(parameter, std=0.2)
-    return network
-
-
-@pytest.mark.parametrize("name", ["mmn", "mmn, one code", "mmn, no hypermodel", "shipped"])
-@torch.no_grad()
-def test_model_by_kernels_equals_the_model_by_pytorch(name):
-    if name == "shipped":
-        network, size = MMN.build(Interface("local", 13, 13)).network, 13
-    else:
-        network, size = random_network(name), 7
-    torch.manual_seed(1)
-    latent, code = network.encode(3 * torch.randn(5, 3, 9)), network.hypermodel(a_context(batch=5, size=size))
-    (root, kernels_step), (expected, torch_step) = (
-        prepare(network, latent, code) for prepare in (kernel_model, torch_model)
-    )
-    close = {"rtol": 1e-4, "atol": 1e-4}
-    np.testing.assert_allclose(root.prior_logits, expected.prior_logits, **close)
-    np.testing.assert_allclose(root.value, expected.value, **close)
-    for action in range(6):
-        actions = np.full(15, action)
-        predicted, after = torch_step(expected.embedding, actions)
-        found, states = evaluated(kernels_step.model, root.embedding, actions)
-        # The other numbers are the next step's first layer, which the kernels keep without its bias.
-        num_latent = network.latent_size
-        torch.testing.assert_close(states[:, :num_latent], after[:, :num_latent], **close)
-        for part, other in zip(found, predicted, strict=True):
-            np.testing.assert_allclose(part, other, **close)
-
-
-def evaluated(model, embedding, actions):
-    """What the kernels predict of actions `[B]` in states `[B, D + H]`, and the states that follow."""
-    states = np.repeat(embedding.numpy()[:, None], 2, axis=1)
-    evaluation = empty_evaluation(len(states), 6)
-    step(model, 0, states, np.zeros(len(states), np.int64), actions, 1, evaluation)
-    return evaluation, torch.from_numpy(states[:, 1])
-
-
-@torch.no_grad()
-def test_search_of_a_root_does_not_depend_on_the_other_roots_nor_on_their_number():
-    network = random_network()
-    latent, code = network.encode(torch.randn(256, 1, 9)), network.hypermodel(a_context(batch=256))
-    together = gumbel_muzero_policy(*kernel_model(network, latent, code), 6, np.zeros((256, 6)))
-    for size in (1, 2, 3, 7, 64, 256):
-        rows = torch.randperm(256, generator=torch.Generator().manual_seed(size))[:size]
-        alone = kernel_model(network, latent[rows], rows_of(code, rows))
-        for found, expected in zip(gumbel_muzero_policy(*alone, 6, np.zeros((size, 6))), together, strict=True):
-            np.testing.assert_array_equal(found, expected[rows.numpy()])
-
-
-@torch.no_grad()
-def test_weights_are_copied_for_kernels_only_after_training_has_changed_them():
-    network = random_network()
-    first = weights_of(network)
-    assert weights_of(network) is first
-    other = copy.deepcopy(network)
-    for parameter in (network.scale, network.hypermodel.sharpness, network.body[2].weight, network.heads.bias):
-        before = weights_of(network)
-        parameter.add_(0.5)
-        assert weights_of(network) is not before
-        before = weights_of(network)
-        parameter.data.mul_(2.0)  # which PyTorch does not count as a new version
-        assert weights_of(network) is not before
-    network.load_state_dict(other.state_dict())
-    for found, expected in zip(weights_of(network).heads, first.heads, strict=True):
-        np.testing.assert_array_equal(found, expected)
-
-
-def test_kernels_search_with_the_weights_that_an_update_left(mazes):
-    learner = make_learner(mazes, CONFIGS["mmn"])
-    network = learner.actor.network
-    before = weights_of(network)
-    learner.update()
-    assert weights_of(network) is not before
-    np.testing.assert_array_equal(weights_of(network).heads.weight, network.heads.weight.detach().numpy().T)
-
-
-@pytest.mark.parametrize("name", ["mmn", "mmn, one code", "mmn, no hypermodel"])
-def test_search_by_kernels_finds_what_the_search_by_pytorch_finds(name):
-    network = random_network(name)
-    with torch.no_grad():
-        latent, code = network.encode(3 * torch.randn(5, 3, 9)), network.hypermodel(a_context(batch=5))
-        found, expected = (
-            gumbel_muzero_policy(*prepare(network, latent, code), 6, np.zeros((15, 6)), rescale_values=False)
-            for prepare in (kernel_model, torch_model)
-        )
-    np.testing.assert_array_equal(found.visit_counts, expected.visit_counts)
-    np.testing.assert_allclose(found.qvalues, expected.qvalues, rtol=1e-4)
-    np.testing.assert_allclose(found.action_weights, expected.action_weights, rtol=1e-3, atol=1e-5)
-
-
-@pytest.mark.parametrize("config", [CONFIGS["mmn"], dataclasses.replace(CONFIGS["mmn"], keep_anchor=False)])
+@pytest.mark.parametrize("config", [SMALL, dataclasses.replace(SMALL, keep_anchor=False)])
 def test_motion_is_told_from_where_the_episode_began_through_its_landmarks(config):
     agent = MMN(config, 7)
     with torch.no_grad():
@@ -165,10 +236,25 @@ def test_motion_is_told_from_where_the_episode_began_through_its_landmarks(confi
         torch.testing.assert_close(state.code.positions[env, :2], torch.tensor(anchor, dtype=torch.float32))
 
 
-def test_agent_with_one_code_a_context_says_which_sizes_it_serves(tmp_path, mazes):
-    make_learner(mazes, CONFIGS["mmn"]).save(tmp_path, {})
-    with pytest.raises(UnplayableError, match=r"'mmn': its checkpoint reads maps of 7 x 7 only, found 13 x 13"):
-        MMN.build(Interface("local", 13, 13), checkpoint=tmp_path / "agent.safetensors")
+def test_mmn_after_a_minute_beats_random_in_a_small_maze():
+    """The learning test: goals 2 and 3 cells away in 25 steps."""
+    values = {
+        "hidden": 32,
+        "head_hidden": 64,
+        "num_simulations": 4,
+        "num_eval_simulations": 8,
+        "num_envs": 64,
+        "groups": 12,
+        "min_rows": 2000,
+        "steps_per_update": 64,
+        "target_rate": 0.1,
+        "longest_value": 25,
+        "hindsight_mean_offset": 8,
+        "hindsight_window": 30,
+    }
+    before, after = learn(MMN, 3, (2, 3), 600, values)
+    assert before < 0.6
+    assert after > 0.8
 
 
 def test_config_has_what_the_paper_states():
@@ -177,15 +263,11 @@ def test_config_has_what_the_paper_states():
     assert (paper.model_weight, paper.relabel_start, paper.n_step) == (1, False, 5)
 
 
-def test_every_weight_of_the_papers_transition_is_generated():
-    """Motion is still in a network all of whose generated weights are 0, whatever its other parameters are."""
-    network = MMNNetwork(CONFIGS["mmn"], 7)
-    for parameter in network.parameters():
-        torch.nn.init.normal_(parameter)
-    code = network.hypermodel(a_context())
-    code = code._replace(weights=torch.zeros_like(code.weights), rows=torch.zeros_like(code.rows))
-    latent = network.encode(torch.randn(1, 6, 9))
-    first = network.first_layer(latent, network.look(latent, code), code)
-    after = network.step(latent, first, torch.arange(6)[None], code)
-    torch.testing.assert_close(after[..., :4], latent[..., :4])  # the pose stays
-    torch.testing.assert_close(after[..., 4:7], torch.zeros(1, 6, 3))
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+def test_first_update_on_a_gpu_is_that_on_a_cpu(mazes, monkeypatch):
+    on_gpu = make_learner(mazes)
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    on_cpu = make_learner(mazes)
+    found, expected = on_gpu.update(), on_cpu.update()
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value, rel=0.05, abs=1e-3), name

@@ -1,20 +1,14 @@
-"""Targets and losses of a learned model, by numbers one can do by hand."""
+"""Targets and losses of MMN, by numbers one can do by hand."""
 
 import math
 
 import pytest
 import torch
-from mazebench_agents.belief_planner.config import BeliefPlannerConfig
-from mazebench_agents.belief_planner.network import BeliefPlannerNetwork
-from mazebench_agents.muzero.batches import Batch
-from mazebench_agents.muzero.losses import unrolled_losses
-from mazebench_agents.muzero.targets import (
-    Targets,
-    cross_entropy,
-    n_step_returns,
-    tree_backup_returns,
-    two_hot,
-)
+from mazebench_agents.mmn.batches import Batch
+from mazebench_agents.mmn.config import MMNConfig
+from mazebench_agents.mmn.losses import cross_entropy, two_hot, unrolled_losses
+from mazebench_agents.mmn.network import MMNNetwork
+from mazebench_agents.mmn.targets import Targets, n_step_returns, tree_backup_returns
 
 NEVER = torch.zeros(4, dtype=torch.bool)
 ALL = torch.ones(4, dtype=torch.bool)
@@ -78,11 +72,14 @@ def test_cross_entropy_by_hand():
     assert cross_entropy(target, logits).item() == pytest.approx(0.5 * math.log(2) + 0.5 * math.log(4))
 
 
-def make_batch(config, at_goal_step=None):
+SMALL = MMNConfig(hidden=8, head_hidden=8, latent=4, embedding=4, task_code=4, longest_value=9)
+
+
+def make_batch(at_goal_step=None):
     """Two contexts, a sequence each; all states alike, standing still in the start, one cell left of the goal."""
-    length = config.sequence_steps + 1
-    belief = torch.zeros(2, 2, 7, 7)
-    belief[:, 1, 3, 3] = 1
+    length = SMALL.sequence_steps + 1
+    context = torch.zeros(2, 4, 7, 7)
+    context[:, 3, 3, 2] = context[:, 2, 3, 3] = 1
     features = torch.zeros(2, 1, length, 9)
     features[..., 3] = 1  # cosine of yaw
     at_goal = torch.zeros(2, 1, length, dtype=torch.bool)
@@ -90,42 +87,48 @@ def make_batch(config, at_goal_step=None):
     if at_goal_step is not None:
         at_goal[..., at_goal_step] = True
         exists[..., at_goal_step + 1 :] = False
-    place = torch.tensor([3.0, 2.0]).expand(2, 1, length, 2)
-    action = torch.zeros(2, 1, config.sequence_steps, dtype=torch.long)
-    relabelled = torch.ones(2, dtype=torch.bool)
-    maze = torch.arange(2)
-    anchor = torch.tensor([3.0, 2.0]).expand(2, 2)
-    batch = Batch(belief, anchor, maze, relabelled, features, place, action, exists, at_goal)
-    value = torch.full((2, 1, length), -3.0)
-    policy = torch.full((2, 1, length, 6), 1 / 6)
-    return batch, Targets(value, policy)
+    batch = Batch(
+        context=context,
+        anchor=torch.tensor([3.0, 2.0]).expand(2, 2),
+        maze=torch.arange(2),
+        relabelled=torch.ones(2, dtype=torch.bool),
+        features=features,
+        action=torch.zeros(2, 1, SMALL.sequence_steps, dtype=torch.long),
+        exists=exists,
+        at_goal=at_goal,
+    )
+    return batch, Targets(torch.full((2, 1, length), -3.0), torch.full((2, 1, length, 6), 1 / 6))
 
 
-SMALL = BeliefPlannerConfig(channels=4, num_distances=1, hidden=8, head_hidden=8, latent=4, longest_value=9)
+def make_network():
+    """A network that is untrained, but for values: they are uniform over ten bins."""
+    torch.manual_seed(0)
+    network = MMNNetwork(SMALL, 7)
+    torch.nn.init.zeros_(network.heads.bias[6:-1])
+    return network
 
 
 def test_losses_of_an_untrained_network_by_hand():
-    """Its heads are zero: uniform values over ten bins, uniform policies, the goal at a logit of -4."""
-    batch, targets = make_batch(SMALL)
-    losses, metrics = unrolled_losses(BeliefPlannerNetwork(SMALL), SMALL, batch, targets)
+    """Its heads are zero: uniform policies, the goal at a logit of -4."""
+    batch, targets = make_batch()
+    losses, metrics = unrolled_losses(make_network(), SMALL, batch, targets)
     assert losses["value_loss"].item() == pytest.approx(math.log(10), rel=1e-5)
     assert losses["policy_loss"].item() == pytest.approx(math.log(6), rel=1e-5)
     assert losses["goal_loss"].item() == pytest.approx(math.log(1 + math.exp(-4)), rel=1e-4)
-    assert losses["localization_loss"].item() == 0.0  # it believes to be at the start, and is
     assert metrics["value_error"].item() == pytest.approx(1.5)  # the mean of -9 to 0 is -4.5, and -3 is the target
     assert metrics["value"].item() == -3.0
 
 
 def test_map_ratio_compares_the_weights_of_two_mazes():
     """A model whose weights do not depend on the map errs as much with those of the other maze."""
-    batch, targets = make_batch(SMALL)
+    batch, targets = make_batch()
     steps = torch.arange(SMALL.sequence_steps + 1.0)
     batch.features[..., 0] = torch.stack([steps, -steps])[:, None]  # a metre a step, forwards and backwards
     batch.context[0, 0, 3, 3] = 1  # a wall ahead in one of the two
-    torch.manual_seed(3)
-    network = BeliefPlannerNetwork(SMALL)
+    network = make_network()
     _, metrics = unrolled_losses(network, SMALL, batch, targets)
     assert metrics["map_ratio"].item() != 1.0
+    torch.nn.init.zeros_(network.hypermodel.hyper.weight)
     torch.nn.init.zeros_(network.hypermodel.rows.weight)
     _, metrics = unrolled_losses(network, SMALL, batch, targets)
     assert metrics["map_ratio"].item() == pytest.approx(1.0)
@@ -133,35 +136,32 @@ def test_map_ratio_compares_the_weights_of_two_mazes():
 
 def test_losses_stop_counting_at_the_goal():
     """The goal in the second state: its end is learned, but neither a value nor a policy there, nor anything later."""
-    batch, targets = make_batch(SMALL, at_goal_step=1)
-    torch.manual_seed(0)
-    network = BeliefPlannerNetwork(SMALL)
+    batch, targets = make_batch(at_goal_step=1)
+    network = make_network()
     losses, _ = unrolled_losses(network, SMALL, batch, targets)
     later = batch._replace(features=batch.features.clone())
     later.features[:, :, 2:] = 5.0
     again, _ = unrolled_losses(network, SMALL, later, targets)
     assert {name: value.item() for name, value in losses.items()} == {name: v.item() for name, v in again.items()}
-    # The root says "not the goal" and weighs 1, the state after it "the goal" and weighs 1 / 4.
-    ends = (math.log(1 + math.exp(-4)) + 0.25 * math.log(1 + math.exp(4))) / 1.25
+    # The root says "not the goal" and weighs 1, the state after it "the goal" and weighs 1 / 5.
+    ends = (math.log(1 + math.exp(-4)) + 0.2 * math.log(1 + math.exp(4))) / 1.2
     assert losses["goal_loss"].item() == pytest.approx(ends, rel=1e-4)
 
 
 def test_model_loss_by_hand():
     """A network whose transition changes nothing, where the body in truth moved by (0.3, -0.1) metres in each step."""
-    network = BeliefPlannerNetwork(SMALL)
-    with torch.no_grad():
-        for parameter in network.hypermodel.transition.later[-1].parameters():
-            parameter.zero_()
-        for parameter in [*network.free.parameters(), *network.encoder[2].parameters()]:
-            parameter.zero_()
-    batch, targets = make_batch(SMALL)
+    network = make_network()
+    for module in (network.hypermodel.hyper, network.hypermodel.rows, network.encoder[2]):
+        for parameter in module.parameters():
+            torch.nn.init.zeros_(parameter)
+    batch, targets = make_batch()
     steps = torch.arange(SMALL.sequence_steps + 1.0)[:, None]
     batch.features[..., :2] = steps * torch.tensor([0.3, -0.1])
     batch.features[..., 3] = 0.0
     losses, metrics = unrolled_losses(network, SMALL, batch, targets)
     assert metrics["model_error_1"].item() == pytest.approx(0.4, rel=1e-5)
-    assert metrics["model_error_4"].item() == pytest.approx(1.6, rel=1e-5)
-    # 2 * (0.4 + 0.8 + 1.2 + 1.6) / 4, and squares of 0.3 k and 0.1 k in two of the latent state's eleven numbers; all
-    # others are zero, and so they are.
-    squares = 0.1 * (1 + 4 + 9 + 16) / 4 / 11
-    assert losses["model_loss"].item() == pytest.approx(2.0 + squares, rel=1e-4)
+    assert metrics["model_error_5"].item() == pytest.approx(2.0, rel=1e-5)
+    # 2 * (0.4 + 0.8 + 1.2 + 1.6 + 2.0) / 5, and squares of 0.3 k and 0.1 k in two of the latent state's eleven numbers;
+    # all others are zero, and so they are.
+    squares = 0.1 * (1 + 4 + 9 + 16 + 25) / 5 / 11
+    assert losses["model_loss"].item() == pytest.approx(2.4 + squares, rel=1e-4)

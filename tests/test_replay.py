@@ -57,12 +57,6 @@ class Reference:
             found.append(row)
         return found
 
-    def before(self, x: int) -> list[Row]:
-        """The kept rows of a row's trajectory up to the row itself."""
-        env, position = self.where[x]
-        rows = [row for row in self.rows[env][: position + 1] if self.is_kept(row.x)]
-        return [row for row in rows if first_of(row) == first_of(rows[-1])]
-
     def outcome(self, x: int, goal: int, n: int) -> tuple[float, float, int]:
         """Reward, discount and the x of the last row of a return of up to n steps."""
         reward, (row, *later) = 0.0, self.after(x, n)
@@ -210,13 +204,13 @@ def test_a_sample_is_what_the_trajectories_say(both, hindsight, n, seed):
 
 
 @settings(max_examples=60, deadline=None)
-@given(PLAYED, HINDSIGHT, strategies.integers(1, 5), strategies.integers(0, 8), strategies.integers(0, 2**32))
-def test_sequences_are_what_the_trajectories_say(both, hindsight, num_steps, num_past, seed):
+@given(PLAYED, HINDSIGHT, strategies.integers(1, 5), strategies.integers(0, 2**32))
+def test_sequences_are_what_the_trajectories_say(both, hindsight, num_steps, seed):
     replay, reference = both
     if not any(row.action is not None and reference.is_kept(row.x) for rows in reference.rows for row in rows):
         return
     rng = np.random.default_rng(seed)
-    sample = replay.sample_sequences(8, 2, num_steps, hindsight=hindsight, rng=rng, num_past=num_past)
+    sample = replay.sample_sequences(8, 2, num_steps, hindsight=hindsight, rng=rng)
     assert sample.relabelled.all() == sample.relabelled.any() == bool(hindsight.ratio)
     xs = sample.state[..., 0].astype(int)
     for g in range(8):
@@ -232,13 +226,6 @@ def test_sequences_are_what_the_trajectories_say(both, hindsight, num_steps, num
             assert xs[g, s][exists].tolist() == [row.x for row in rows]
             assert sample.cell[g, s][exists].tolist() == [row.cell for row in rows]
             assert sample.action[g, s, : len(rows) - 1].tolist() == [row.action for row in rows[:-1]]
-        # What came before the earliest step, and nothing later.
-        earliest = min(xs[g, :, 0].tolist(), key=lambda x: reference.where[x])
-        rows = reference.before(earliest)[-num_past:] if num_past else []
-        past, exists = sample.past, sample.past.exists[g]
-        assert past.state[g, :, 0][exists].tolist() == [row.x for row in rows]
-        assert past.cell[g][exists].tolist() == [row.cell for row in rows]
-        assert past.action[g][exists].tolist() == [row.action or 0 for row in rows]
 
 
 def filled(cells: list[int], goal: int, final_cell: int, priority_exponent: float = 0.0) -> Replay:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_results import make_record, make_result
+from made_results import edit_summary, make_record, make_result
 
 from mazebench.errors import InputError
 from mazebench.results.comparison import Comparison, compare_folders, compare_results, to_json
@@ -117,3 +117,13 @@ class TestResults:
             "local, eval mazes 13 x 13"
         )
         assert found.parts[""].overall.num_episodes == 20
+
+    def test_the_title_says_what_an_agent_was_told_less_or_more(self, tmp_path):
+        told = {"shown": {}, "hidden": {"hide": "map,goal"}, "exact": {"exact_pose": True}}
+        for name, changes in told.items():
+            make_result(tmp_path / name, "navigator", track="lost", num_mazes=2, record=False)
+            edit_summary(tmp_path / name, **changes)
+        for name, who in (("hidden", "navigator without map and goal"), ("exact", "navigator with the true pose")):
+            title = compare_folders(tmp_path / "shown", tmp_path / name).title
+            assert title.startswith("A is navigator (track lost, level 1) in ")
+            assert f"B is {who} (track lost, level 1) in {tmp_path / name}; " in title

@@ -10,8 +10,19 @@ import pytest
 from made_results import edit_records, edit_summary, make_result, read_summary
 
 from mazebench.errors import InputError
-from mazebench.maps.benchmark import TRACKS_VERSION
-from mazebench.report.scoreboard import BEGIN, END, check, kept_entries, read_entries, to_markdown, write_scoreboard
+from mazebench.maps.benchmark import KINDS_VERSION, TRACKS_VERSION
+from mazebench.report.scoreboard import (
+    BEGIN,
+    END,
+    Configuration,
+    Entry,
+    Part,
+    check,
+    kept_entries,
+    read_entries,
+    to_markdown,
+    write_scoreboard,
+)
 from mazebench.results.reading import SUITE
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.tracks import tracks_of
@@ -93,6 +104,18 @@ class TestPage:
         for agent in ("whole", "part"):
             write_scoreboard(read_entries([suite / agent]), page)
         assert [row[0] for row in rows(kept_entries(page))[2:]] == ["whole (privileged)", "part"]
+
+    def test_rows_of_v3_are_ranked_by_the_share_on_time_and_of_equals_by_success(self, page):
+        def entry(agent, success, on_time):
+            part = Part(success_rate=success, on_time={"1.25": on_time, "2": success})
+            mean, code = (success, 0.0, 1.0), Configuration(package=None, code_sha256="c", checkpoint_sha256=None)
+            parts = {f"{track} {level}": part for track in tracks_of(KINDS_VERSION) for level in (1, 2, 3)}
+            return Entry(
+                agent=agent, privileged=False, benchmark=KINDS_VERSION, parts=parts, mean=mean, configurations=(code,)
+            )
+
+        write_scoreboard([entry("slow", 0.9, 0.1), entry("never", 0.0, 0.1), entry("quick", 0.6, 0.5)], page)
+        assert [kept.agent for kept in kept_entries(page)] == ["quick", "slow", "never"]
 
     def test_an_entry_replaces_one_of_the_same_agent_code_and_checkpoint_only(self, page, tmp_path):
         for name, successes, code in (("a", 20, "c"), ("b", 40, "c"), ("c", 60, "d")):

@@ -37,8 +37,7 @@ class Descent:
           max_gradient_norm: to which a longer gradient is shortened.
           target_rate: of the moving average, a step.
           constant_steps: after so many steps, the learning rate falls as one over their number; None if it never falls.
-            Then each of the optimizer's groups has a `rate` that multiplies it, and may have a `constant_updates` that
-            stands for `constant_steps`.
+            Then each of the optimizer's groups has a `rate` that multiplies it.
         """
         self.network = network
         self.target: Any = copy.deepcopy(network).requires_grad_(False)
@@ -51,8 +50,8 @@ class Descent:
         """Takes one step of the optimizer, moves the target network along, and returns the gradient's norm."""
         self._num_steps += 1
         if self._constant_steps is not None:
+            falling = min(1.0, self._constant_steps / int(self._num_steps[0]))
             for group in self._optimizer.param_groups:
-                falling = min(1.0, group.get("constant_updates", self._constant_steps) / int(self._num_steps[0]))
                 group["lr"] = group["rate"] * self._optimizer.defaults["lr"] * falling
 
         self._optimizer.zero_grad()

@@ -27,16 +27,16 @@ NUM_TO_GOAL = 2 + len(WIDTHS)
 class MapEncoder(nn.Module):
     """Features of every cell of the map, of the walls and the goal around that cell."""
 
-    def __init__(self, channels: int, dilations: tuple[int, ...], num_planes: int = NUM_PLANES):
+    def __init__(self, channels: int, dilations: tuple[int, ...]):
         """Stacks one residual 3 x 3 convolution for each of `dilations`; a feature sees their sum and one cell more."""
         super().__init__()
-        self.inputs = nn.Conv2d(num_planes, channels, 3, padding=1)
+        self.inputs = nn.Conv2d(NUM_PLANES, channels, 3, padding=1)
         self.layers = nn.ModuleList(
             nn.Conv2d(channels, channels, 3, padding=dilation, dilation=dilation) for dilation in dilations
         )
 
     def forward(self, context: torch.Tensor) -> torch.Tensor:
-        """Returns `[G, C, M, M]` of planes of a map, such as contexts `[G, 4, M, M]`."""
+        """Returns `[G, C, M, M]` of contexts `[G, 4, M, M]`."""
         features = functional.relu(self.inputs(context))
         for layer in self.layers:
             features = features + functional.relu(layer(features))

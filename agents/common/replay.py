@@ -65,8 +65,6 @@ class Sample(NamedTuple):
 class SequenceSample(NamedTuple):
     """G groups of S sequences of L steps and so L + 1 states; the sequences of a group share one context."""
 
-    row: np.ndarray  # [G] int, the rows whose priorities the groups were drawn by
-    weight: np.ndarray  # [G] float32, importance weights, at most 1
     maze: np.ndarray  # [G] int
     start: np.ndarray  # [G] int, cell
     goal: np.ndarray  # [G] int, cell
@@ -78,16 +76,6 @@ class SequenceSample(NamedTuple):
     action: np.ndarray  # [G, S, L] int, taken in the first L states
     exists: np.ndarray  # [G, S, L + 1] bool, whether the trajectory goes as far; then its last state is repeated
     shown: np.ndarray | None  # [G, N, N] bool, walls on the shown maps; None unless the replay keeps them
-    past: Past
-
-
-class Past(NamedTuple):
-    """Up to T rows of each group's trajectory, oldest first; the last one is the group's earliest step."""
-
-    state: np.ndarray  # [G, T, 12] float32
-    action: np.ndarray  # [G, T] int, taken in the state
-    cell: np.ndarray  # [G, T] int, the body's true cell
-    exists: np.ndarray  # [G, T] bool, False before the trajectory
 
 
 @dataclasses.dataclass(frozen=True)
@@ -312,13 +300,8 @@ class Replay:
         *,
         hindsight: Hindsight,
         rng: np.random.Generator,
-        beta: float = 0.0,
-        num_past: int = 0,
     ) -> SequenceSample:
-        """Draws groups as `sample` does, of sequences of `num_steps` L, or fewer where their trajectory ends.
-
-        `num_past` is T, of `Past`.
-        """
+        """Draws groups as `sample` does, of sequences of `num_steps` L, or fewer where their trajectory ends."""
         group = self._draw_groups(num_groups, num_sequences, hindsight, rng)
 
         # From the first row of each sequence on, as long as its trajectory goes.
@@ -332,8 +315,6 @@ class Replay:
             exists.append(going)
         env, steps = env[..., None], np.stack(indices, axis=-1)
         return SequenceSample(
-            row=group.row,
-            weight=self._weights(group.row, beta),
             maze=group.maze,
             start=group.start,
             goal=group.goal,
@@ -345,18 +326,7 @@ class Replay:
             action=np.maximum(self._action[env, steps[..., :-1]], 0).astype(np.int64),
             exists=np.stack(exists, axis=-1),
             shown=self._shown_walls(group),
-            past=self._past(group, num_past),
         )
-
-    def _past(self, group: _Groups, num_rows: int) -> Past:
-        """Returns what came before the groups, and nothing of what came after their earliest steps."""
-        env, earliest = group.env[:, None], self._earliest(group.env, group.row % self._length, group.steps)[:, None]
-        back = np.arange(num_rows)[::-1]
-        index = (earliest - back) % self._length
-        age = (self._next[env] - 1 - earliest) % self._length + back
-        exists = (age < self._length) & (self._trajectory[env, index] == self._trajectory[env, earliest])
-        action = np.maximum(self._action[env, index], 0).astype(np.int64)
-        return Past(self._state[env, index], action, self._cell[env, index].astype(np.int64), exists)
 
     def _draw_groups(self, num_groups: int, num_steps: int, hindsight: Hindsight, rng: np.random.Generator) -> _Groups:
         """Draws the rows of groups, and relabels a share of them."""
@@ -377,10 +347,10 @@ class Replay:
         # Where the context starts, and from where displacements are measured.
         start, origin = self._start[env, index].astype(np.int64), self._origin[env, index]
         if hindsight.relabel_start:
-            first = self._earliest(env, index, steps)
-            moved = relabelled[:, None]
+            age = (self._next[env, None] - 1 - steps) % self._length
+            first = np.take_along_axis(steps, age.argmax(axis=1)[:, None], axis=1)[:, 0]  # each group's earliest step
             start = np.where(relabelled, self._cell[env, first], start)
-            origin = np.where(moved, self._state[env, first, :2], origin)
+            origin = np.where(relabelled[:, None], self._state[env, first, :2], origin)
         anchor = start
         if hindsight.keep_anchor:
             anchor, origin = self._anchor[env, index].astype(np.int64), self._anchor_origin[env, index]
@@ -459,11 +429,6 @@ class Replay:
         same = part[env[:, None], steps] == part[env, index][:, None]
         inside = same & self._is_later(env[:, None], steps, end[:, None])
         return np.where(inside, steps, index[:, None])
-
-    def _earliest(self, env: np.ndarray, index: np.ndarray, steps: np.ndarray) -> np.ndarray:
-        """Returns the index `[G]` of each group's earliest step."""
-        age = (self._next[env, None] - 1 - steps) % self._length
-        return np.take_along_axis(steps, age.argmax(axis=1)[:, None], axis=1)[:, 0]
 
     def _returns(
         self, env: np.ndarray, steps: np.ndarray, goal: np.ndarray, n: int

@@ -1,10 +1,11 @@
-"""The paper's DQN-dagger: Ape-X DQN with hindsight that gets no task context.
+"""How DQN and MAH act, and the paper's DQN-dagger: Ape-X DQN with hindsight that gets no task context.
 
 docs/agents/dqn.md describes the training, and how it differs from the paper.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from typing import ClassVar
 
 import numpy as np
@@ -18,17 +19,54 @@ from ..common.actor import NetworkAgent, acting
 from ..common.layers import in_batches, state_features
 from .config import DQNConfig
 from .learner import DQNLearner
-from .network import STATES_AT_ONCE, QNetwork
+from .network import CONTEXTS_AT_ONCE, STATES_AT_ONCE, QNetwork
 
 
-class DQN(NetworkAgent):
-    """Acts greedily by a Q-network that gets no context."""
+@dataclasses.dataclass
+class ActorState:
+    """The state of acting in B environments."""
 
-    name: ClassVar[str] = "dqn"
-    default_config: ClassVar[DQNConfig] = DQNConfig(use_context=False)
+    origin: np.ndarray  # [B, 2] float32, x and y observed where the context was new
+    code: torch.Tensor | None  # [B, ...], the encoded contexts; None before the first step, and without context
+
+
+class QAgent(NetworkAgent):
+    """Acts greedily by a Q-network."""
+
     learner_class: ClassVar[type[DQNLearner]] = DQNLearner
     config: DQNConfig
     network: QNetwork
+
+    def initial_state(self, batch_size: int) -> ActorState:
+        """Returns a state without codes: `act` encodes a context where it is new."""
+        return ActorState(np.zeros((batch_size, 2), dtype=np.float32), None)
+
+    @acting
+    def act(self, inputs: Inputs, state: ActorState, explore: bool = False) -> tuple[np.ndarray, ActorState]:
+        """Returns actions `[B]`."""
+        # A new leg begins where the body is now; its context is encoded once.
+        observed = inputs.observation["state"]
+        new = np.flatnonzero(inputs.new_context)
+        state.origin[new] = observed[new, :2]
+        if len(new) and self.config.use_context:
+            contexts = torch.from_numpy(inputs.observation["context"][new])
+            code = in_batches(self.network.encode, CONTEXTS_AT_ONCE, contexts)
+            if state.code is None:
+                state.code = code.new_zeros(len(state.origin), *code.shape[1:])
+            state.code[new] = code
+
+        # The best action by the network, or now and then a random one.
+        features = state_features(torch.from_numpy(observed), torch.from_numpy(state.origin))[:, None]
+        arguments = (features,) if state.code is None else (features, state.code)
+        actions = in_batches(self.network, STATES_AT_ONCE, *arguments)[:, 0].argmax(dim=-1).numpy()
+        return self._explored(actions, NUM_ACTIONS) if explore else actions, state
+
+
+class DQN(QAgent):
+    """The Ape-X DQN of the paper, whose Q-network gets no context."""
+
+    name: ClassVar[str] = "dqn"
+    default_config: ClassVar[DQNConfig] = DQNConfig(use_context=False)
 
     @classmethod
     def make_network(cls, config: DQNConfig, context_size: int) -> QNetwork:
@@ -40,19 +78,3 @@ class DQN(NetworkAgent):
         if config.use_context:
             raise InputError("agent 'dqn': expected use_context False, found True; agent 'mah' gets the context")
         return QNetwork(config.hidden)
-
-    def initial_state(self, batch_size: int) -> np.ndarray:
-        """Returns the positions `[B, 2]` float32 (x, y) that were observed where the leg began."""
-        return np.zeros((batch_size, 2), dtype=np.float32)
-
-    @acting
-    def act(self, inputs: Inputs, state: np.ndarray, explore: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Returns actions `[B]`."""
-        # A new leg begins where the body is now.
-        observed = inputs.observation["state"]
-        state[inputs.new_context] = observed[inputs.new_context, :2]
-
-        # The best action by the network, or now and then a random one.
-        features = state_features(torch.from_numpy(observed), torch.from_numpy(state))[:, None]
-        actions = in_batches(self.network, STATES_AT_ONCE, features)[:, 0].argmax(dim=-1).numpy()
-        return self._explored(actions, NUM_ACTIONS) if explore else actions, state

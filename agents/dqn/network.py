@@ -11,7 +11,9 @@ from torch import nn
 from mazebench.constants import NUM_ACTIONS
 
 NUM_STATE_FEATURES = 7
-STATES_AT_ONCE = 64  # always as many, since PyTorch rounds differently at another batch size
+# Contexts and states are computed as many at once, always, since PyTorch rounds differently at another batch size.
+CONTEXTS_AT_ONCE = 8  # few are new in one step
+STATES_AT_ONCE = 64
 _VALUE_SCALE = 10.0  # steps; outputs of order one then span the values that matter
 
 

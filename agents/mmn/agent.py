@@ -12,14 +12,14 @@ import numpy as np
 import torch
 
 from mazebench.agent import Inputs, Observation
+from mazebench.constants import NUM_ACTIONS
 from mazebench.tasks.context import START
 
 from ..common.actor import NetworkAgent, acting
 from ..common.layers import in_batches, marked_position, state_features
-from ..muzero.network import CONTEXTS_AT_ONCE, NUM_ACTIONS, STATES_AT_ONCE, Code, rows_of, with_codes
 from .config import MMNConfig
 from .learner import MMNLearner
-from .network import MMNNetwork
+from .network import CONTEXTS_AT_ONCE, STATES_AT_ONCE, Code, MMNNetwork, rows_of
 from .planning import plan
 
 
@@ -112,7 +112,10 @@ class MMN(NetworkAgent):
             anchor = torch.where(torch.from_numpy(new_anchor[:, None]).to(self._device), start, kept)
 
         code = in_batches(self.network.hypermodel, CONTEXTS_AT_ONCE, context, anchor)
-        state.code = with_codes(state.code, len(state.origin), rows, code)
+        if state.code is None:
+            state.code = Code(*(part.new_zeros(len(state.origin), *part.shape[1:]) for part in code))
+        for whole, part in zip(state.code, code, strict=True):
+            whole[rows] = part
 
     @property
     def _device(self) -> torch.device:

@@ -15,7 +15,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import torch
 
-from ..common.kernel_layers import (
+from mazebench.constants import NUM_ACTIONS
+
+from ..common.layers import DISPLACEMENT_UNIT, NUM_PLACE, NUM_TO_GOAL, PERIODS, WAY_UNIT, WIDTHS, steepness
+from ..muzero.search import KernelModel, Root
+from ..muzero.tree import ROOT, Evaluation, Settings, backward, empty_evaluation, expand, simulate
+from .kernel_layers import (
     ONE,
     ZERO,
     Linear,
@@ -27,12 +32,8 @@ from ..common.kernel_layers import (
     normalize,
     rectify,
 )
-from ..common.layers import DISPLACEMENT_UNIT, NUM_PLACE, NUM_TO_GOAL, PERIODS, WAY_UNIT, WIDTHS, steepness
-from ..muzero.network import NUM_ACTIONS, NUM_BODY, NUM_CHANGES, NUM_FREE, NUM_POSE, SCALE_RATE
-from ..muzero.reading import REACH
-from ..muzero.search import KernelModel, Root
-from ..muzero.tree import ROOT, Evaluation, Settings, backward, empty_evaluation, expand, simulate
-from .network import Code, MMNNetwork
+from .network import NUM_BODY, NUM_CHANGES, NUM_FREE, NUM_POSE, SCALE_RATE, Code, MMNNetwork
+from .reading import REACH
 
 _TURN = np.float32(2 * math.pi)
 _TWO = np.float32(2.0)
@@ -41,8 +42,8 @@ _WAY_UNIT = np.float32(WAY_UNIT)
 _SCALE_RATE = np.float32(SCALE_RATE)
 _PERIODS = np.array(PERIODS, np.float32)
 _WIDTHS = np.array(WIDTHS, np.float32)
-# What the numbers of a latent state and of a step are, as in `muzero.network.moved_by`: first in the body's frame, then
-# in the map's.
+# What the numbers of a latent state and of a step are, as in `network._moved_by`: first in the body's frame, then in
+# the map's.
 X, Y, SINE, COSINE, SPEED_FORWARD, SPEED_LEFT, SPEED_TURN = range(NUM_BODY)
 FORWARD, LEFT, TURN, NEXT_FORWARD, NEXT_LEFT, NEXT_TURN = range(NUM_FREE)
 MAP_X, MAP_Y, MAP_SPEED_X, MAP_SPEED_Y = range(NUM_FREE, NUM_CHANGES)
@@ -257,7 +258,7 @@ def weigh_cells(
 ) -> tuple[int, int]:
     """Writes the weights of the rows and of the columns around a position into `near` `[2, 2 * REACH]`.
 
-    Returns the first row and the first column; see `muzero.reading.read`.
+    Returns the first row and the first column; see `reading.read`.
     """
     first = np.empty(2, np.int64)
     for axis in range(2):
@@ -321,7 +322,7 @@ def write_way(row: np.float32, column: np.float32, positions: np.ndarray, out: n
 
 @inlined
 def move(before: np.ndarray, free: np.ndarray, change: np.ndarray, after: np.ndarray) -> None:
-    """Writes the body after a step; see `muzero.network.moved_by`."""
+    """Writes the body after a step; see `network._moved_by`."""
     sine, cosine = before[SINE], before[COSINE]
     x, y = rotated(free[FORWARD] + change[FORWARD], free[LEFT] + change[LEFT], sine, cosine)
     after[X] = before[X] + x + change[MAP_X]
@@ -360,6 +361,6 @@ def conclude(outputs: np.ndarray, num_bins: int, evaluation: Evaluation) -> None
                 weighted += weight * np.float32(j + 1 - num_bins)
         evaluation.value[b] = weighted / total
 
-        # Reward and discount of arriving there; see `muzero.lookahead.outcome`.
+        # Reward and discount of arriving there; see `network.reward_and_discount`.
         discount = ONE / (ONE + np.float32(math.exp(outputs[b, NUM_ACTIONS + num_bins])))
         evaluation.reward[b], evaluation.discount[b] = -discount, discount

@@ -1,8 +1,4 @@
-"""The learner of MMN: sequences with goals relabelled in hindsight, a model that is unrolled along them, and targets of
-values and policies that the config names.
-
-`G` is the number of contexts in a batch, `S` of sequences in each, `L` of steps of a sequence, so L + 1 of states.
-"""
+"""The learner of MMN: sequences with goals relabelled in hindsight, along which the model is unrolled."""
 
 from __future__ import annotations
 
@@ -14,25 +10,29 @@ from mazebench.tasks.spec import TaskSpec
 
 from ..common import symmetry
 from ..common.actor import one_torch_thread
-from ..common.descent import in_numbers
+from ..common.descent import Descent, in_numbers
 from ..common.learner import HindsightLearner
-from ..muzero.batches import Batch, make_batch
-from ..muzero.descent import make_descent
-from ..muzero.lookahead import lookahead_targets
-from ..muzero.losses import unrolled_losses
-from ..muzero.network import Code, Predictions, rows_of
-from ..muzero.targets import Targets, n_step_returns
+from .batches import make_batch
 from .config import MMNConfig
+from .losses import unrolled_losses
 from .network import MMNNetwork
-from .planning import plan
+from .targets import targets_of
 
 
 class MMNLearner(HindsightLearner):
     """Updates the network of its actor."""
 
     def __init__(self, actor: Any, task: TaskSpec, seed: int):
-        descent = make_descent(actor.network, actor.config)
-        super().__init__(actor, task, seed, descent, keep_anchor=actor.config.keep_anchor)
+        config = actor.config
+        groups = parameter_groups(actor.network, config)
+        descent = Descent(
+            actor.network,
+            torch.optim.AdamW(groups, lr=config.learning_rate, weight_decay=config.weight_decay),
+            max_gradient_norm=config.max_gradient_norm,
+            target_rate=config.target_rate,
+            constant_steps=config.constant_updates,
+        )
+        super().__init__(actor, task, seed, descent, keep_anchor=config.keep_anchor)
 
     @one_torch_thread()
     def update(self) -> dict[str, float]:
@@ -44,8 +44,7 @@ class MMNLearner(HindsightLearner):
             config.groups, config.sequences, config.sequence_steps, hindsight=self.hindsight, rng=self.rng
         )
         turned = int(self.rng.integers(symmetry.NUM_SYMMETRIES)) if config.symmetries else 0
-        contexts = self.maps.contexts(sample, turned)
-        batch = make_batch(sample, maps=self.maps, turned=turned, context=contexts, device=network.support.device)
+        batch = make_batch(sample, maps=self.maps, turned=turned, device=network.support.device)
 
         # Targets of values and policies in all states, by the target network.
         targets = targets_of(self.descent.target, config, batch)
@@ -57,31 +56,12 @@ class MMNLearner(HindsightLearner):
         return in_numbers(losses | metrics)
 
 
-@torch.no_grad()
-def targets_of(network: MMNNetwork, config: MMNConfig, batch: Batch) -> Targets:
-    """Returns the targets of a batch by the target network; the batch's goals are real or relabelled."""
-    code = network.hypermodel(batch.context, batch.anchor)
-    latent = network.encode(batch.features.flatten(1, 2))  # [G, S (L + 1), D]
-
-    if config.value_target == "tree_backup" or config.policy_target == "lookahead":
-        value, policy = lookahead_targets(network, config, batch, latent, code)
-
-    if config.value_target == "n_step":
-        bootstrap = network.value(_predict(network, latent, code).value_logits).unflatten(1, batch.exists.shape[1:])
-        value = n_step_returns(bootstrap, batch.at_goal, batch.exists, config.n_step)
-
-    if config.policy_target != "lookahead":
-        policy = torch.softmax(_predict(network, latent, code).policy_logits, dim=-1)
-        # With the policy target "paper", relabelled contexts keep the network's own policy.
-        searched = ~batch.relabelled if config.policy_target == "paper" else torch.ones_like(batch.relabelled)
-        if searched.any():
-            result = plan(network, config, latent[searched], rows_of(code, searched), config.num_simulations)
-            weights = torch.from_numpy(result.action_weights).to(policy.device)
-            policy[searched] = weights.unflatten(0, (-1, policy.shape[1]))
-        policy = policy.unflatten(1, batch.exists.shape[1:])
-
-    return Targets(value.clamp(-config.longest_value, 0.0), policy)
-
-
-def _predict(network: MMNNetwork, latent: torch.Tensor, code: Code) -> Predictions:
-    return network.predict(latent, network.look(latent, code), code)
+def parameter_groups(network: MMNNetwork, config: MMNConfig) -> list[dict[str, Any]]:
+    """Returns the optimizer's groups of parameters, whose `rate` multiplies the learning rate."""
+    hyper, scale = network.hypermodel.hyper.weight, network.scale
+    others = [parameter for parameter in network.parameters() if parameter is not hyper and parameter is not scale]
+    return [
+        {"params": others, "rate": 1.0},
+        {"params": [hyper], "rate": config.hyper_rate},
+        {"params": [scale], "rate": config.scale_rate},
+    ]

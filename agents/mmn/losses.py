@@ -1,4 +1,4 @@
-"""The losses of a learned model, unrolled from encoded states: against experience, and against planned targets.
+"""The losses of MMN's model, unrolled from encoded states: against experience, and against planned targets.
 
 `G` is the number of contexts in a batch, `S` of sequences in each, `L` of steps of a sequence, so L + 1 of states. A
 root is a state from which the model is unrolled for `K` steps; `R` roots belong to a context.
@@ -10,9 +10,9 @@ import torch
 from torch.nn import functional
 
 from .batches import Batch
-from .config import MuZeroConfig
-from .network import Code, Network, Roots
-from .targets import Targets, cross_entropy, scale_gradient, two_hot
+from .config import MMNConfig
+from .network import Code, MMNNetwork
+from .targets import Targets
 
 _HIDDEN_GRADIENT = 0.5  # of an unrolled state at each step: MuZero's
 _OTHER_MAP = "model_error_other_map"
@@ -39,7 +39,7 @@ class Means:
 
 
 def unrolled_losses(
-    network: Network, config: MuZeroConfig, batch: Batch, targets: Targets
+    network: MMNNetwork, config: MMNConfig, batch: Batch, targets: Targets
 ) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor]]:
     """Returns losses by name, to be summed, and other scalars by name.
 
@@ -81,9 +81,6 @@ def unrolled_losses(
             if step in (1, config.unroll):
                 watched.add(f"model_error_{step}", moved_error, exists)
         else:
-            encoded = Roots(latent, at(batch.position, 0), value, exists, going)
-            for name, errors, weights in network.extra_losses(encoded, code):
-                losses.add(name, errors, weights)
             error = (network.value(out.value_logits.detach()) - value) * going
             watched.add("value_error", error.abs(), going)
             watched.add("value", value, going)
@@ -100,8 +97,8 @@ def unrolled_losses(
 
 def _add_model(
     losses: Means,
-    config: MuZeroConfig,
-    network: Network,
+    config: MMNConfig,
+    network: MMNNetwork,
     latent: torch.Tensor,
     features: torch.Tensor,
     weight: torch.Tensor,
@@ -125,7 +122,7 @@ def _add_model(
 @torch.no_grad()
 def _watch_other_maps(
     watched: Means,
-    network: Network,
+    network: MMNNetwork,
     latent: torch.Tensor,
     action: torch.Tensor,
     features: torch.Tensor,
@@ -134,8 +131,27 @@ def _watch_other_maps(
     maze: torch.Tensor,
 ) -> None:
     """Adds the model's error after one step with the weights of another maze of the batch."""
-    other = code._make([code.positions, *(part.roll(1, 0) for part in code[1:])])
+    other = Code(code.positions, *(part.roll(1, 0) for part in code[1:]))
     first = network.first_layer(latent, network.look(latent, other), other)
     moved = network.decode(network.step(latent, first, action, other))[..., :2]
     error = (moved - features[..., :2]).abs().sum(dim=-1)
     watched.add(_OTHER_MAP, error, exists & (maze != maze.roll(1, 0))[:, None])
+
+
+def two_hot(value: torch.Tensor, num_bins: int) -> torch.Tensor:
+    """Returns values `[...]` as weights `[..., bins]` of the two nearest integers in [1 - bins, 0]."""
+    position = (value + (num_bins - 1)).clamp(0, num_bins - 1)
+    low = position.floor().clamp(max=num_bins - 2)
+    share = (position - low)[..., None]
+    low = low.long()
+    return functional.one_hot(low, num_bins) * (1 - share) + functional.one_hot(low + 1, num_bins) * share
+
+
+def cross_entropy(target: torch.Tensor, logits: torch.Tensor) -> torch.Tensor:
+    """Returns the cross-entropy `[...]` of logits under target probabilities, both `[..., n]`."""
+    return -(target * logits.log_softmax(dim=-1)).sum(dim=-1)
+
+
+def scale_gradient(tensor: torch.Tensor, scale: float) -> torch.Tensor:
+    """Returns `tensor` with its gradient scaled; MuZero halves that of unrolled states at each step."""
+    return tensor * scale + tensor.detach() * (1 - scale)

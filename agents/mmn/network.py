@@ -1,17 +1,21 @@
-"""The network of MMN: the weights of the transition are generated from the context.
+"""The network of MMN: a model in latent states, the weights of whose transition are generated from the context.
 
-`G` is the number of contexts, `K` of latent states in each, `M` the side of the context, `H` the size of the
-transition's hidden layer, `T` of the heads' code of the context, `C` the number of features of a cell.
+`G` is the number of contexts, `K` of latent states in each, `M` the side of the context, `D` the size of a latent
+state, `H` of the transition's hidden layer, `T` of the heads' code of the context, `C` the number of a cell's features.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+import numpy as np
 import torch
 from torch import nn
 from torch.nn import functional
+
+from mazebench.constants import NUM_ACTIONS
+from mazebench.tasks.context import GOAL
 
 from ..common.layers import (
     DISPLACEMENT_UNIT,
@@ -20,71 +24,109 @@ from ..common.layers import (
     NUM_TO_GOAL,
     MapEncoder,
     goal_code,
+    marked_position,
     place_code,
 )
-from ..muzero.network import (
-    NUM_ACTIONS,
-    NUM_BODY,
-    NUM_CHANGES,
-    NUM_FREE,
-    NUM_POSE,
-    NUM_STOPPED,
-    Network,
-    Predictions,
-    ahead_of,
-    marked_positions,
-    moved_by,
-)
-from ..muzero.reading import read
 from .config import MMNConfig
+from .reading import read
 
+NUM_POSE = 4  # x and y moved, sine and cosine of yaw: the first numbers of a latent state, as of state features
+NUM_BODY = 7  # and velocities forward, left and of yaw
+NUM_FREE = 6  # of a step in the body's frame: a move, a turn, velocities forward, left and of yaw
+NUM_STOPPED = 4  # in the map's: a move, velocities
+NUM_CHANGES = NUM_FREE + NUM_STOPPED
+# Contexts and states are computed as many at once, always, since PyTorch rounds differently at another batch size.
+CONTEXTS_AT_ONCE = 16  # few are new in one step
+STATES_AT_ONCE = 64
+SCALE_RATE = 5.0  # the scale's parameters are multiplied by it, so that they are of the order of other weights
 _CHANNELS = 24  # of the map's convolutions
 _NEAR = (1, 1, 1, 1)  # dilations of the hypermodel's convolutions
 _FAR = (1, 1, 2, 2, 4, 4, 2, 1, 1)  # of the heads', which see 19 cells far, across a 13 x 13 map
-_FIRST_VALUE = -20.0  # steps; the middle of the values before anything is learned
-_FIRST_CHANGE = 0.1  # times the usual size: the transition's output before anything is learned
+# Before anything is learned:
+_FIRST_VALUE = -20.0  # steps; the middle of the values
+_FIRST_GOAL = -4.0  # logit of being in the goal
+_FIRST_CHANGE = 0.1  # times the usual size: the transition's output
 
 
 class Code(NamedTuple):
     """The output of the hypermodel for a context, and what the heads get of the context."""
 
-    positions: torch.Tensor  # [G, 4], start and goal on the map, each (row, column)
+    positions: torch.Tensor  # [G, 4], anchor and goal on the map, each (row, column)
     weights: torch.Tensor  # [G, W], the transition's, but for those below
     rows: torch.Tensor  # [G, M * M, H], the first layer's weights of each cell's position; no columns without them
     task: torch.Tensor  # [G, T], the heads' code of the context
     features: torch.Tensor  # [G, M * M, C], the heads' features of each cell; no columns without them
 
 
-class MMNNetwork(Network):
-    """Has a transition of one hidden layer, all of whose weights are generated.
+class Predictions(NamedTuple):
+    """The outputs of the heads for latent states."""
+
+    policy_logits: torch.Tensor  # [G, K, 6]
+    value_logits: torch.Tensor  # [G, K, bins], of whole values from 1 - bins to 0
+    goal_logit: torch.Tensor  # [G, K], of being in the goal cell, which ends the episode
+
+
+class MMNNetwork(nn.Module):
+    """The paper's e (`encode`), h (`hypermodel`), f (`first_layer`, then `step`) and g (`predict`).
+
+    A latent state holds the displacement from an anchor (m), heading, velocities and a learned code of the motion. The
+    estimated position on the map is the anchor plus a learned linear map of the displacement. The transition f has one
+    hidden layer, and all its weights are generated.
 
     It learns, and on a GPU it acts. On a CPU, searches use `kernel_model.py`, which computes the same: a change of what
     acts is made in both.
     """
 
-    hypermodel: Hypermodel
+    support: torch.Tensor  # [bins], the values that a categorical value weighs
 
     def __init__(self, config: MMNConfig, context_size: int):
-        super().__init__(config)
-        self.hidden_size = config.hidden
+        super().__init__()
+        self.latent_size, self.hidden_size = NUM_BODY + config.latent, config.hidden
+        self.num_bins = config.longest_value + 1
         self._size = context_size
-        num_inputs = NUM_BODY + config.latent + NUM_PLACE
+        values = np.arange(-config.longest_value, 1, dtype=np.float32)
+        self.register_buffer("support", torch.from_numpy(values), persistent=False)
+        self.encoder = nn.Sequential(
+            nn.Linear(NUM_BODY - NUM_POSE, config.hidden),
+            nn.ReLU(inplace=True),
+            nn.Linear(config.hidden, config.latent),
+            nn.LayerNorm(config.latent),
+        )
+
+        num_inputs = self.latent_size + NUM_PLACE
         self._shapes = _weight_shapes(num_inputs, config.hidden, NUM_CHANGES + config.latent)
         self.hypermodel = Hypermodel(config, self._shapes, context_size)
         self.scale = nn.Parameter(torch.zeros(2, 2))
-        num_inputs += NUM_TO_GOAL + config.task_code + self.hypermodel.num_features
-        self._make_heads(num_inputs, NUM_ACTIONS + self.num_bins + 1, config)
-        with torch.no_grad():
-            self.heads.bias[NUM_ACTIONS:-1] = -(self.support - _FIRST_VALUE).abs() / 3
-        self._rates = {"hypermodel.hyper.weight": config.hyper_rate, "scale": config.scale_rate}
 
-    def parameter_groups(self) -> list[dict[str, Any]]:
-        """Returns groups of their own for the layer that generates weights, and for the map's scale."""
-        groups: list[dict[str, Any]] = [{"params": [], "rate": rate} for rate in (1.0, *self._rates.values())]
-        for name, parameter in self.named_parameters():
-            index = next((1 + i for i, prefix in enumerate(self._rates) if name.startswith(prefix)), 0)
-            groups[index]["params"].append(parameter)
-        return groups
+        num_inputs += NUM_TO_GOAL + config.task_code + self.hypermodel.num_features
+        self.body = nn.Sequential(
+            nn.Linear(num_inputs, config.head_hidden),
+            nn.ReLU(inplace=True),
+            nn.Linear(config.head_hidden, config.head_hidden),
+            nn.ReLU(inplace=True),
+        )
+        self.heads = nn.Linear(config.head_hidden, NUM_ACTIONS + self.num_bins + 1)
+        nn.init.zeros_(self.heads.weight)
+        with torch.no_grad():
+            self.heads.bias[:NUM_ACTIONS] = 0.0
+            self.heads.bias[NUM_ACTIONS:-1] = -(self.support - _FIRST_VALUE).abs() / 3
+            self.heads.bias[-1] = _FIRST_GOAL
+
+    def encode(self, features: torch.Tensor) -> torch.Tensor:
+        """Returns latent states `[G, K, D]` of state features `[G, K, 9]`; see `state_features`."""
+        return torch.cat([features[..., :NUM_BODY], self.encoder(features[..., NUM_POSE:NUM_BODY])], dim=-1)
+
+    def decode(self, latent: torch.Tensor) -> torch.Tensor:
+        """Returns the first seven state features `[G, K, 7]` of latent states."""
+        return latent[..., :NUM_BODY]
+
+    def on_map(self, moved: torch.Tensor) -> torch.Tensor:
+        """Returns displacements `[..., 2]` on the map (row, column) of those in metres (x, y)."""
+        return SCALE_RATE * (moved[..., None] * self.scale).sum(-2)
+
+    def locate(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
+        """Returns the estimated positions `[G, K, 2]` (row, column) of latent states on the map."""
+        return code.positions[:, None, :2] + self.on_map(latent[..., :2])
 
     def reanchored(self, anchor: torch.Tensor, moved: torch.Tensor, start: torch.Tensor) -> torch.Tensor:
         """Returns `anchor` `[G, 2]`, shifted just enough that the estimated position lies in the `start` cell.
@@ -95,9 +137,10 @@ class MMNNetwork(Network):
         return anchor + torch.clamp(position, start - 0.5, start + 0.5) - position
 
     def look(self, latent: torch.Tensor, code: Code) -> torch.Tensor:
-        """Returns a code of the estimated position, start and goal; then the rows and the features read there.
+        """Returns what is read from the context at the positions of latent states, `[G, K, W]`.
 
-        No gradient reaches the position from here: what tells goals apart, in `predict`, trains it.
+        It is a code of the estimated position, anchor and goal; then the rows and the features read there. No gradient
+        reaches the position from here: what tells goals apart, in `predict`, trains it.
         """
         position = self.locate(latent, code).detach()
         table = torch.cat([code.rows, code.features], dim=-1)
@@ -112,7 +155,7 @@ class MMNNetwork(Network):
         }
 
     def first_layer(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
-        """Returns the layer with generated weights."""
+        """Returns the transition's first layer without the action, `[G, K, H]`."""
         weights = self.generated(code)
         first = self._inputs(latent, seen) @ weights["inputs"] + weights["bias"]
         if code.rows.shape[-1]:
@@ -120,15 +163,15 @@ class MMNNetwork(Network):
         return first
 
     def step(self, latent: torch.Tensor, first: torch.Tensor, action: torch.Tensor, code: Code) -> torch.Tensor:
-        """Returns the next latent states."""
+        """Returns the next latent states `[G, K, D]`, from the output of `first_layer` and actions `[G, K]`."""
         weights = self.generated(code)
         chosen = functional.one_hot(action, NUM_ACTIONS).to(first.dtype)
         free = (
             latent[..., NUM_POSE:NUM_BODY] @ weights["free"] + weights["free_bias"] + chosen @ weights["free_actions"]
         )
-        first = first + chosen @ weights["actions"] + ahead_of(free, latent) @ weights["ahead"]
+        first = first + chosen @ weights["actions"] + _ahead_of(free, latent) @ weights["ahead"]
         hidden = functional.relu(functional.layer_norm(first, first.shape[-1:]))
-        body, motion = moved_by(latent, free, hidden @ weights["second"] + weights["second_bias"])
+        body, motion = _moved_by(latent, free, hidden @ weights["second"] + weights["second_bias"])
         motion = functional.layer_norm(latent[..., NUM_BODY:] + motion, motion.shape[-1:])
         return torch.cat([body, motion], dim=-1)
 
@@ -139,6 +182,10 @@ class MMNNetwork(Network):
         features = seen[..., NUM_PLACE + code.rows.shape[-1] :]
         out = self.heads(self.body(torch.cat([self._inputs(latent, seen), to_goal, task, features], dim=-1)))
         return Predictions(out[..., :NUM_ACTIONS], out[..., NUM_ACTIONS:-1], out[..., -1])
+
+    def value(self, value_logits: torch.Tensor) -> torch.Tensor:
+        """Returns the means `[G, K]` of categorical values, in steps."""
+        return torch.softmax(value_logits, dim=-1) @ self.support
 
     def _inputs(self, latent: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
         """Returns `[G, K, D + 34]`: the latent state, with 5 m as the unit of the displacement, and the places."""
@@ -174,7 +221,7 @@ class Hypermodel(nn.Module):
         self.num_features = num_encoded * config.reading
         self.sharpness = nn.Parameter(torch.tensor(0.0))
 
-    def forward(self, context: torch.Tensor, anchor: torch.Tensor | None = None) -> Code:
+    def forward(self, context: torch.Tensor, anchor: torch.Tensor) -> Code:
         """Returns the code of contexts `[G, 4, M, M]`; displacements are measured from `anchor` `[G, 2]`."""
         encoded = self.encoder(context)
         embedding = self.embedding(encoded.flatten(1))
@@ -188,7 +235,19 @@ class Hypermodel(nn.Module):
         if self.reader is not None:
             features = torch.cat([self.reader(context), context], dim=1)
         rows, features = (planes.flatten(2).transpose(1, 2) for planes in (rows, features))
-        return Code(marked_positions(context, anchor), weights, rows, self.task(functional.relu(embedding)), features)
+        positions = torch.cat([anchor, marked_position(context[:, GOAL])], dim=-1)
+        return Code(positions, weights, rows, self.task(functional.relu(embedding)), features)
+
+
+def reward_and_discount(predictions: Predictions) -> tuple[torch.Tensor, torch.Tensor]:
+    """Returns reward and discount `[G, K]` of arriving in states: a goal ends the episode, any other step costs 1."""
+    discount = torch.sigmoid(-predictions.goal_logit)
+    return -discount, discount
+
+
+def rows_of(code: Code, rows: torch.Tensor) -> Code:
+    """Returns the codes of some of the contexts."""
+    return Code(*(part[rows] for part in code))
 
 
 def _weight_shapes(num_inputs: int, hidden: int, num_changes: int) -> dict[str, tuple[int, int]]:
@@ -222,3 +281,34 @@ def _ordinary(name: str, shapes: dict[str, tuple[int, int]]) -> torch.Tensor:
     }
     scale = _FIRST_CHANGE if name == "second" else 1.0
     return scale * torch.randn(rows, columns, device="cpu") / math.sqrt(num_inputs.get(name, rows))
+
+
+def _ahead_of(free: torch.Tensor, latent: torch.Tensor) -> torch.Tensor:
+    """Returns `[G, K, 4]`, in the map's frame: the move and the velocity of free motion, given in the body's frame."""
+    heading = latent[..., 2:NUM_POSE]
+    return torch.cat([_rotate(free[..., :2], heading), _rotate(free[..., 3:5], heading)], dim=-1)
+
+
+def _moved_by(latent: torch.Tensor, free: torch.Tensor, change: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Returns the body `[G, K, 7]` after a step, and the change of the motion's code `[G, K, D - 7]`.
+
+    Args:
+      latent: `[G, K, D]`, before the step.
+      free: `[G, K, 6]`, the step in the body's frame without obstacles.
+      change: `[G, K, 10 + D - 7]`, what is added to it in the body's frame, then in the map's frame, along whose axes
+        walls stop the body, then to the motion's code.
+    """
+    heading = latent[..., 2:NUM_POSE]
+    in_body, in_map, motion = change.split([NUM_FREE, NUM_STOPPED, change.shape[-1] - NUM_CHANGES], dim=-1)
+    in_body = free + in_body
+    moved = latent[..., :2] + _rotate(in_body[..., :2], heading) + in_map[..., :2]
+    turn = torch.stack([torch.sin(in_body[..., 2]), torch.cos(in_body[..., 2])], dim=-1)
+    turned = _rotate(heading.flip(-1), turn).flip(-1)
+    planar = in_body[..., 3:5] + _rotate(in_map[..., 2:], heading * heading.new_tensor([-1.0, 1.0]))
+    return torch.cat([moved, turned, planar, in_body[..., 5:]], dim=-1), motion
+
+
+def _rotate(vector: torch.Tensor, heading: torch.Tensor) -> torch.Tensor:
+    """Returns vectors `[..., 2]`, turned by the angles whose sines and cosines are `heading` `[..., 2]`."""
+    (x, y), (sine, cosine) = vector.unbind(-1), heading.unbind(-1)
+    return torch.stack([cosine * x - sine * y, sine * x + cosine * y], dim=-1)

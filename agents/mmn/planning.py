@@ -8,13 +8,13 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from ..muzero.lookahead import outcome
-from ..muzero.network import NUM_ACTIONS, Code, Predictions
+from mazebench.constants import NUM_ACTIONS
+
 from ..muzero.search import RecurrentFn, Root, SearchResult, gumbel_muzero_policy, muzero_policy
 from ..muzero.tree import Evaluation
 from .config import MMNConfig
 from .kernel_model import kernel_model
-from .network import MMNNetwork
+from .network import Code, MMNNetwork, Predictions, reward_and_discount
 
 _DIRICHLET_ALPHA = 0.3  # MuZero's, in its board games with the fewest actions
 _DIRICHLET_FRACTION = 0.25  # MuZero's
@@ -75,7 +75,7 @@ def torch_model(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple[
         latent, first = embedding.unflatten(0, shape).split(sizes, dim=-1)
         chosen = torch.from_numpy(action).to(embedding.device).unflatten(0, shape)
         predictions, after = arrive(network.step(latent, first, chosen, code))
-        reward, discount = outcome(predictions)
+        reward, discount = reward_and_discount(predictions)
         value = network.value(predictions.value_logits)
         return Evaluation(*_arrays(reward, discount, predictions.policy_logits, value)), after
 

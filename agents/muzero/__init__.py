@@ -1,1 +1,1 @@
-"""The parts of MuZero: a network with a latent model, its targets and losses, and search, which MMN alone uses."""
+"""The tree search of MuZero and Gumbel MuZero, which knows no network; MMN uses it."""
