@@ -79,9 +79,23 @@ class Entry(_Kept):
         return f"{re.sub(r'[^A-Za-z0-9_]+', '-', self.agent)}-{identity[:8]}.json"
 
     @property
+    def score(self) -> float | None:
+        """What ranks the entry: on v3 the share of all episodes on time by the smaller factor, on v2 the success rate.
+
+        It is None if parts are missing.
+        """
+        if self.mean is None:
+            return None
+        return self.mean[0] if self.benchmark == TRACKS_VERSION else self.on_time(f"{ON_TIME[0]:g}")
+
+    @property
     def missing(self) -> list[str]:
         """The parts that were not played."""
         return [part for part in _parts(self.benchmark) if part not in self.parts]
+
+    def on_time(self, factor: str) -> float:
+        """Returns the share of the episodes of all parts that are on time by a factor."""
+        return sum(part.on_time[factor] for part in self.parts.values()) / len(self.parts)
 
 
 def read_entries(paths: Iterable[pathlib.Path]) -> list[Entry]:
@@ -97,7 +111,7 @@ def read_entries(paths: Iterable[pathlib.Path]) -> list[Entry]:
 
 
 def kept_entries(page: pathlib.Path) -> list[Entry]:
-    """Returns the entries that are kept beside a page, the highest mean first, those without one last.
+    """Returns the entries that are kept beside a page, the highest score first, those without one last.
 
     Raises:
       InputError: if a file is not an entry.
@@ -108,7 +122,13 @@ def kept_entries(page: pathlib.Path) -> list[Entry]:
             entries.append(Entry.model_validate_json(read_at_most(path, _MAX_ENTRY_BYTES, "file")))
         except pydantic.ValidationError as error:
             raise InputError(f"{path}: expected an entry of the scoreboard, found {describe_fault(error)}") from error
-    return sorted(entries, key=lambda e: (-e.mean[0] if e.mean else 1.0, not e.privileged, e.agent, e.file_name))
+    return sorted(entries, key=_rank)
+
+
+def _rank(entry: Entry) -> tuple[float, float, bool, str, str]:
+    """Returns what entries are sorted by; the success rate decides between equal scores."""
+    score, success = (1.0, 0.0) if entry.score is None or entry.mean is None else (-entry.score, -entry.mean[0])
+    return score, success, not entry.privileged, entry.agent, entry.file_name
 
 
 def to_markdown(entries: Sequence[Entry]) -> str:
@@ -282,7 +302,7 @@ def _on_time(entry: Entry) -> str:
     if entry.mean is None or not all(part.on_time for part in parts):
         return ""
     factors = next(iter(parts)).on_time
-    return ", ".join(f"{sum(part.on_time[factor] for part in parts) / len(parts):.2f}" for factor in factors)
+    return ", ".join(f"{entry.on_time(factor):.2f}" for factor in factors)
 
 
 def _origin(entry: Entry) -> str:

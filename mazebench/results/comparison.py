@@ -158,11 +158,11 @@ def _named(parts: dict[str, pathlib.Path]) -> str:
 
 
 def _who(summary: Summary, parts: list[str]) -> str:
-    """Returns the agent and, for a single evaluation, its track and level or its perturbations."""
+    """Returns the agent's row and, for a single evaluation, its track and level or its perturbations."""
     wrong = [*(f"{key} {value}" for key, value in summary.perturbation.items() if value), *summary.senses]
     if summary.track is not None:
         wrong.insert(0, f"track {summary.track}, level {summary.level}")
-    return summary.agent + (f" ({', '.join(wrong)})" if wrong and parts == [""] else "")
+    return summary.row + (f" ({', '.join(wrong)})" if wrong and parts == [""] else "")
 
 
 def _check_pairs(a: Result, b: Result) -> None:
