@@ -1,7 +1,7 @@
 """Prints an agent's success rates on held-out mazes whose shown maps, or observed poses, are right or wrong.
 
-Call it as `python benchmarks/wrong_maps.py AGENT [CHECKPOINT...] [--rows NAME,...] [--kind KIND] [--size N]`. Each row is
-a task. Each checkpoint is a column with 95 % intervals over mazes and episodes. The mazes are of no split; another
+Call it as `python benchmarks/wrong_maps.py AGENT [CHECKPOINT...] [--rows NAME,...] [--kind KIND] [--size N]`. Each row
+is a task. Each checkpoint is a column with 95 % intervals over mazes and episodes. The mazes are of no split; another
 --seed draws other ones. The tracks are played with a lidar, the other tasks without.
 """
 

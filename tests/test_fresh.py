@@ -196,8 +196,8 @@ class TestTraining:
         train(options(agent, env_steps=480), tmp_path / "resumed")
         drawn._fresh_maze.cache_clear()
         train(options(agent), tmp_path / "resumed", resume=True)
-        names = ["agent.safetensors", "training.safetensors", *(("random.json", "replay.npz") if agent == "dqn" else ())]
-        for name in names:
+        of_replay = ("random.json", "replay.npz") if agent == "dqn" else ()
+        for name in ("agent.safetensors", "training.safetensors", *of_replay):
             files = [tmp_path / run / "checkpoints" / "000000000960" / name for run in ("unbroken", "resumed")]
             assert files[0].read_bytes() == files[1].read_bytes(), name
         config = json.loads((tmp_path / "resumed" / "config.json").read_text())
