@@ -23,7 +23,6 @@ from .network import BeliefNetwork, View, believe
 
 _PATIENCE = 3  # steps between two revisions of a belief on a leg, at least
 _LEAST = 0.05  # probability of what came true, at least, so that no cell decides alone
-_SHARED = 0.5  # weight of a cell's score: cells that are seen together err together
 
 
 @dataclasses.dataclass
@@ -117,7 +116,7 @@ class BeliefPlanner(NetworkAgent):
                 return belief
             is_wall = memory.occupancy.evidence[came] > 0
             scores = [_log_score(walls[came], is_wall) for walls in (belief.walls, belief.by_rule)]
-            advantage = belief.advantage + _SHARED * (scores[0] - scores[1])
+            advantage = belief.advantage + scores[0] - scores[1]
         view = View(memory.prior, memory.occupancy.evidence, memory.goal, memory.searched)
         ((walls, goal),) = believe(self.network, [view])
         return Belief(walls, goal, believed_by_rule(memory)[0], is_seen, memory.prior, advantage)
