@@ -43,8 +43,9 @@ def main() -> None:
             for checkpoint in given.checkpoints or [None]:
                 agent = agent_class.build(Interface("local", _SIZE, _SIZE), checkpoint=checkpoint)
                 agent.config = dataclasses.replace(agent.config, search=kind, num_eval_simulations=int(num_simulations))
-                for part, found in zip((success, maze), outcomes(agent, spec, False), strict=True):
-                    part.append(found)
+                reached, _, mazes = outcomes(agent, spec, False)
+                success.append(reached)
+                maze.append(mazes)
             estimate = mean_interval(np.concatenate(success), np.concatenate(maze))
             cells.append(f"{estimate.value:.3f} [{estimate.low:.2f}, {estimate.high:.2f}]")
         print(f"{search}:", "  ".join(cells), flush=True)

@@ -1,8 +1,9 @@
-"""Prints an agent's success rates on held-out mazes whose shown maps, or observed poses, are right or wrong.
+"""Prints agents' success rates and SPL on held-out mazes whose shown maps, or observed poses, are right or wrong.
 
-Call it as `python benchmarks/wrong_maps.py AGENT [CHECKPOINT...] [--rows NAME,...] [--kind KIND] [--size N]`. Each row
-is a task. Each checkpoint is a column with 95 % intervals over mazes and episodes. The mazes are of no split; another
---seed draws other ones. The tracks are played with a lidar, the other tasks without.
+Call it as `python benchmarks/wrong_maps.py AGENT[=CHECKPOINT]... [--rows NAME,...] [--kind KIND] [--size N]`. Each row
+is a task, and each agent a column: success with its 95 % interval over mazes and episodes, and SPL. With two agents or
+more, the last columns are the differences of the first one and the second, success and SPL, in the same episodes. The
+mazes are of no split; another --seed draws other ones. The tracks are played with a lidar, the other tasks without.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from mazebench.agent import Agent, Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.kinds import generate
-from mazebench.results.intervals import mean_interval
+from mazebench.results.intervals import Estimate, difference_interval, mean_interval
+from mazebench.results.metrics import spl
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.trials import draw_trials
@@ -60,45 +62,53 @@ def held_out_task(options: dict, seed: int, num_mazes: int, kind: str = "dfs", s
     return make_spec(task, maps=mazes, **options)
 
 
-def outcomes(agent: Agent, spec: TaskSpec, needs_truth: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the success and the maze of each episode."""
+def outcomes(agent: Agent, spec: TaskSpec, needs_truth: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns the success, the SPL and the maze of each episode, in the order of the trials."""
     trials = list(enumerate(draw_trials(spec, 1 if len(spec.distances) > 9 else _EPISODES)))
-    ended = [
-        (outcome.success, outcome.trial.episode.maze)
-        for some in run_trials(agent, spec, trials, len(trials), needs_truth=needs_truth)
-        for outcome in some
-    ]
-    success, maze = np.array(ended).T
-    return success.astype(float), maze
+    played = run_trials(agent, spec, trials, len(trials), needs_truth=needs_truth)
+    ended = sorted((outcome for some in played for outcome in some), key=lambda outcome: outcome.index)
+    success = np.array([outcome.success for outcome in ended])
+    shortest = np.array([outcome.trial.shortest_path for outcome in ended])
+    driven = np.array([outcome.path_length for outcome in ended])
+    return success.astype(float), spl(success, shortest, driven), np.array([each.trial.episode.maze for each in ended])
 
 
 def main() -> None:
     """Prints the table."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("agent")
-    parser.add_argument("checkpoints", nargs="*", type=pathlib.Path)
+    parser.add_argument("agents", nargs="+", metavar="AGENT[=CHECKPOINT]")
     parser.add_argument("--rows", default=",".join(ROWS), help="names of rows, with commas between")
     parser.add_argument("--kind", default="dfs")
     parser.add_argument("--size", type=int, default=13)
     parser.add_argument("--seed", type=int, default=30_000)
     parser.add_argument("--mazes", type=int, default=_NUM_MAZES)
     given = parser.parse_args()
-    agent_class = load_agent_class(given.agent)
-    for name, options in ROWS.items():
-        if name not in given.rows.split(","):
-            continue
-        cells, begin = [], time.perf_counter()
-        for checkpoint in given.checkpoints or [None]:
-            spec = held_out_task(options, given.seed, given.mazes, given.kind, given.size)
-            if spec.track is None:
-                spec = dataclasses.replace(spec, context_size=agent_class.context_size(given.size))
-            spec = dataclasses.replace(spec, sensors=tuple({*spec.sensors, *agent_class.needs_sensors}))
-            interface = Interface(spec.task, given.size, spec.context_size, sensors=spec.sensors)
-            agent = agent_class.build(interface, checkpoint=checkpoint)
-            success, maze = outcomes(agent, spec, agent_class.needs_truth)
-            estimate = mean_interval(success, maze)
-            cells.append(f"{estimate.value:.3f} [{estimate.low:.2f}, {estimate.high:.2f}]")
-        print(f"{name:24}", "  ".join(cells), f" ({time.perf_counter() - begin:.0f} s)", flush=True)
+    for name in given.rows.split(","):
+        begin, cells, scores = time.perf_counter(), [], []
+        for agent in given.agents:
+            scores.append(_play(agent, held_out_task(ROWS[name], given.seed, given.mazes, given.kind, given.size)))
+            success, lengths, maze = scores[-1]
+            cells.append(f"{_text(mean_interval(success, maze))} {lengths.mean():.3f}")
+        if len(scores) > 1:
+            (*of_first, maze), (*of_second, _) = scores[:2]
+            cells += [_text(difference_interval(a - b, maze)) for a, b in zip(of_first, of_second, strict=True)]
+        print(f"{name:12} {len(maze):5}", "  ".join(cells), f" ({time.perf_counter() - begin:.0f} s)", flush=True)
+
+
+def _play(name: str, spec: TaskSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns `outcomes` of an agent, `AGENT` or `AGENT=CHECKPOINT`."""
+    name, _, checkpoint = name.partition("=")
+    agent_class = load_agent_class(name)
+    if spec.track is None:
+        spec = dataclasses.replace(spec, context_size=agent_class.context_size(spec.size))
+    spec = dataclasses.replace(spec, sensors=tuple({*spec.sensors, *agent_class.needs_sensors}))
+    interface = Interface(spec.task, spec.size, spec.context_size, sensors=spec.sensors)
+    agent = agent_class.build(interface, checkpoint=pathlib.Path(checkpoint) if checkpoint else None)
+    return outcomes(agent, spec, agent_class.needs_truth)
+
+
+def _text(estimate: Estimate) -> str:
+    return f"{estimate.value:.3f} [{estimate.low:.2f}, {estimate.high:.2f}]"
 
 
 if __name__ == "__main__":
