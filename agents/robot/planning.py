@@ -12,10 +12,10 @@ from mazebench.maps.maze import Cell
 
 from .shortest_paths import cheapest_ways
 
-# Cells that a path may be longer to be free with e times the probability. The product of its cells' probabilities to be
-# free is the chance that a path is open at all: such a path is a cheap answer to the Canadian traveller's problem
-# (Papadimitriou & Yannakakis 1991). Chosen on train mazes.
-_RISK = 3.0
+# What a cell that may be a wall costs beside its length, in cells: the larger one of two answers to the Canadian
+# traveller's problem (Papadimitriou & Yannakakis 1991), which were chosen on train mazes.
+_RISK = 3.0  # times minus the log that it is free: by so much, a path may be longer to be open e times as probably
+_DETOUR = 1.0  # times the odds that it is a wall: what a failed try costs. It keeps the robot from trying shown walls
 _GOAL_DETOUR = 3.0  # cells by which a goal that is half as likely as another must be nearer to be searched before it
 _CLOSED = 1e4  # cells; what a certain wall costs, longer than any way around
 _UNLIKELY = 1e-9  # of the likeliest goal's probability, up to which a goal is too far to be searched on any map
@@ -38,7 +38,8 @@ def plan(walls: np.ndarray, goal: np.ndarray, start: Cell) -> list[Cell]:
     start = (start[0] - top, start[1] - left)
 
     # Entering a cell costs more the likelier it is a wall.
-    entering = np.where(walls < 1, 1 - _RISK * np.log(np.maximum(1 - walls, 1e-9)), _CLOSED)
+    free = np.maximum(1 - walls, 1e-9)
+    entering = np.where(walls < 1, 1 + np.maximum(-_RISK * np.log(free), _DETOUR * walls / free), _CLOSED)
 
     # Ending in a cell costs more the likelier the goal is elsewhere.
     end = np.full(goal.shape, np.inf)
