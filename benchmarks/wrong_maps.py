@@ -57,8 +57,11 @@ def held_out_task(options: dict, seed: int, num_mazes: int, kind: str = "dfs", s
     task = options.pop("task", "local")
     if task == "local":
         options.setdefault("distances", tuple(distance * size // 13 for distance in (4, 8, 12)))
-    streams = np.random.SeedSequence([seed, size]).spawn(num_mazes)
-    mazes = [generate(kind, size, np.random.default_rng(stream), f"held-out-{i}") for i, stream in enumerate(streams)]
+    streams, mazes = np.random.SeedSequence([seed, size]), []
+    while len(mazes) < num_mazes:  # but for those in which no goal is as far away
+        maze = generate(kind, size, np.random.default_rng(streams.spawn(1)[0]), f"held-out-{len(mazes)}")
+        if maze.diameter >= max(options.get("distances", (0,))):
+            mazes.append(maze)
     return make_spec(task, maps=mazes, **options)
 
 
