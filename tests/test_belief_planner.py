@@ -41,7 +41,7 @@ class TestMixture:
         return Belief(walls, goal, believed_by_rule(memory)[0], memory.occupancy.is_seen(), memory.prior, advantage)
 
     def test_a_network_that_predicted_as_well_as_the_rule_counts_half(self, memory):
-        walls, _ = _mixture(self.belief(memory, 0.0), memory)
+        walls, _ = _mixture(self.belief(memory, 0.0), memory, *believed_by_rule(memory))
         by_rule = believed_by_rule(memory)[0]
         is_seen = memory.occupancy.is_seen()
         np.testing.assert_allclose(walls[~is_seen], (by_rule[~is_seen] + 0.25) / 2)
@@ -49,13 +49,12 @@ class TestMixture:
 
     @pytest.mark.parametrize("advantage", [-1e6, -20.0])
     def test_a_network_that_predicted_worse_counts_nothing(self, memory, advantage):
-        for mixed, by_rule in zip(
-            _mixture(self.belief(memory, advantage), memory), believed_by_rule(memory), strict=True
-        ):
+        rule = believed_by_rule(memory)
+        for mixed, by_rule in zip(_mixture(self.belief(memory, advantage), memory, *rule), rule, strict=True):
             np.testing.assert_allclose(mixed, by_rule, atol=1e-6)
 
     def test_the_goal_is_in_no_cell_that_was_searched(self, memory):
-        _, goal = _mixture(self.belief(memory, 1e6), memory)
+        _, goal = _mixture(self.belief(memory, 1e6), memory, *believed_by_rule(memory))
         assert goal[memory.cell] == 0
         assert goal.sum() > 0.9
 
@@ -79,11 +78,11 @@ class TestRevision:
     def test_the_advantage_is_what_the_network_gave_to_what_came_true(self):
         planner = BeliefPlanner(BeliefPlanner.default_config, 13, interface=INTERFACE)
         memory = Robot(INTERFACE).observe(None, first_inputs(), 0)
-        belief = planner._revised(None, memory, True)
+        belief = planner._revised(None, memory, believed_by_rule(memory)[0], True)
         cell = (6, 6)
         belief.walls[cell], belief.by_rule[cell], belief.waited = 0.8, 0.2, 10
         memory.occupancy.evidence[cell] = 8.0
-        revised = planner._revised(belief, memory, False)
+        revised = planner._revised(belief, memory, believed_by_rule(memory)[0], False)
         assert revised.advantage == pytest.approx(np.log(0.8 / 0.2))
 
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
+from mazebench_agents.belief_planner import BeliefPlanner
 from mazebench_agents.belief_planner.config import BeliefPlannerConfig
 from mazebench_agents.belief_planner.layouts import draw_layout
 from mazebench_agents.belief_planner.learner import BeliefPlannerLearner, draw_batch, losses
@@ -31,7 +32,8 @@ def make_network(config: BeliefPlannerConfig = CONFIG, trained: bool = False) ->
 
 
 def make_learner(seed: int = 0) -> BeliefPlannerLearner:
-    actor = SimpleNamespace(name="belief-planner", config=CONFIG, network=make_network(), trained_size=15)
+    actor = BeliefPlanner(CONFIG, 15)
+    actor.network = make_network()
     return BeliefPlannerLearner(actor, SimpleNamespace(mazes=MAZES), seed)  # type: ignore[arg-type]
 
 

@@ -96,16 +96,19 @@ class BeliefPlanner(NetworkAgent):
             state.memories[slot] = known = self._robot.observe(memory, inputs, slot)
             if inputs.new_episode[slot]:
                 state.beliefs[slot] = None
-            if explore:
-                actions[slot] = self._robot.command(known, *believed_by_rule(known))
-                continue
-            belief = self._revised(state.beliefs[slot], known, bool(inputs.new_context[slot]))
-            state.beliefs[slot] = belief
-            actions[slot] = self._robot.command(known, *_mixture(belief, known))
+            believed = by_rule = believed_by_rule(known)
+            if not explore:
+                belief = self._revised(state.beliefs[slot], known, by_rule[0], bool(inputs.new_context[slot]))
+                state.beliefs[slot] = belief
+                believed = _mixture(belief, known, *by_rule)
+            actions[slot] = self._robot.command(known, *believed)
         return actions, state
 
-    def _revised(self, belief: Belief | None, memory: Memory, is_new_leg: bool) -> Belief:
-        """Returns the belief after what was just sensed: a new one on a new leg, or where some steps told more."""
+    def _revised(self, belief: Belief | None, memory: Memory, by_rule: np.ndarray, is_new_leg: bool) -> Belief:
+        """Returns the belief after what was just sensed: a new one on a new leg, or where some steps told more.
+
+        `by_rule` `[L, L]` is the probability of a wall by the rule.
+        """
         is_seen = memory.occupancy.is_seen()
         advantage = 0.0
         if belief is not None:
@@ -119,16 +122,17 @@ class BeliefPlanner(NetworkAgent):
             advantage = belief.advantage + scores[0] - scores[1]
         view = View(memory.prior, memory.occupancy.evidence, memory.goal, memory.searched)
         ((walls, goal),) = believe(self.network, [view])
-        return Belief(walls, goal, believed_by_rule(memory)[0], is_seen, memory.prior, advantage)
+        return Belief(walls, goal, by_rule, is_seen, memory.prior, advantage)
 
 
-def _mixture(belief: Belief, memory: Memory) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the probabilities of a wall and of the goal, `[L, L]` each, by the network and the rule.
+def _mixture(
+    belief: Belief, memory: Memory, by_rule: np.ndarray, goal_by_rule: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the probabilities of a wall and of the goal, `[L, L]` each, by the network and the rule together.
 
     Both predicted each cell before it was seen. Their weights are the probabilities that they gave to what came true,
     as in Bayesian model averaging. Where a cell was seen, the rule tells what it is.
     """
-    by_rule, goal_by_rule = believed_by_rule(memory)
     is_seen = memory.occupancy.is_seen()
     share = 1 / (1 + math.exp(-max(belief.advantage, -50.0)))
     walls = np.where(is_seen, by_rule, share * belief.walls + (1 - share) * by_rule)

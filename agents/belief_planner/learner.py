@@ -23,7 +23,7 @@ from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Experience
 
 from ..common.actor import one_torch_thread
-from ..common.checkpoint import AGENT_FILE, load_checkpoint, load_into, save_checkpoint
+from ..common.checkpoint import AGENT_FILE, load_checkpoint, save_checkpoint
 from ..common.descent import Descent
 from .layouts import draw_layout
 from .network import GOAL, NUM_PLANES, WALL, BeliefNetwork, Picture, picture
@@ -138,13 +138,7 @@ class BeliefPlannerLearner:
 
     def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:
         """Writes the agent, the optimizer and the counts."""
-        metadata = {
-            "agent": self.actor.name,
-            "config": self.config(),
-            "context_size": self.actor.trained_size,
-            "provenance": dict(provenance),
-        }
-        save_checkpoint(folder / AGENT_FILE, self.actor.network.state_dict(), metadata)
+        self.actor.save(folder / AGENT_FILE, provenance)
         tensors = self._descent.tensors() | {"counts": self._counts}
         save_checkpoint(folder / _TRAINING_FILE, tensors, {"agent": self.actor.name})
 
@@ -154,8 +148,7 @@ class BeliefPlannerLearner:
         Raises:
           InputError: if a file is damaged, or another agent's.
         """
-        tensors, _ = load_checkpoint(folder / AGENT_FILE, self.actor.name)
-        load_into(folder / AGENT_FILE, self.actor.network, tensors)
+        self.actor.load(folder / AGENT_FILE)
         tensors, _ = load_checkpoint(folder / _TRAINING_FILE, self.actor.name)
         counts = tensors.pop("counts", torch.zeros(0))
         if counts.shape != (2,) or counts.dtype != torch.int64 or counts.min() < 0:

@@ -43,7 +43,8 @@ class View(NamedTuple):
 class Picture(NamedTuple):
     """A view as the network reads it, in the box around what may be free."""
 
-    box: tuple[slice, slice]  # of the grid
+    box: tuple[slice, slice]  # of the grid; outside of it, walls are certain
+    walls: np.ndarray  # [H, W] float, the probability of a wall by the rule
     planes: np.ndarray  # [C, H, W] float32
     rule: np.ndarray  # [2, H, W] float32: log odds of a wall, and log weights of the goal, by the rule
     unseen: np.ndarray  # [H, W] bool, cells whose walls are to be estimated
@@ -83,7 +84,7 @@ def picture(view: View) -> Picture:
         np.full(prior.shape, share_seen),
     )
     rule = np.stack([_log_odds(walls), goal_weight]).astype(np.float32)
-    return Picture(box, np.stack(planes).astype(np.float32), rule, is_open & ~is_seen, possible)
+    return Picture(box, walls, np.stack(planes).astype(np.float32), rule, is_open & ~is_seen, possible)
 
 
 class BeliefNetwork(nn.Module):
@@ -128,8 +129,8 @@ def _believe(network: BeliefNetwork, view: View) -> tuple[np.ndarray, np.ndarray
     seen = picture(view)
     planes = torch.from_numpy(seen.planes)[None]
     logits = (seen.rule + network(planes, planes.new_ones(1, 1, *seen.unseen.shape))[0].numpy()).astype(np.float64)
-    walls = Occupancy(view.evidence).walls(view.prior)
-    walls[seen.box] = np.where(seen.unseen, 1 / (1 + np.exp(-logits[WALL])), walls[seen.box])
+    walls = np.ones(view.prior.shape)
+    walls[seen.box] = np.where(seen.unseen, 1 / (1 + np.exp(-logits[WALL])), seen.walls)
     goal = np.zeros_like(walls)
     if seen.possible.any():
         weights = np.where(seen.possible, np.exp(logits[GOAL] - logits[GOAL][seen.possible].max()), 0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import functools
 import pathlib
 from collections.abc import Callable, Iterator, Mapping
@@ -17,7 +18,7 @@ from mazebench.tasks.spec import TaskSpec
 from mazebench.training.protocol import Learner, LearningAgent
 
 from .bounds import bounded
-from .checkpoint import check_shapes, check_size, load_agent, load_into
+from .checkpoint import check_shapes, check_size, load_agent, load_checkpoint, load_into, save_checkpoint
 from .overrides import override
 
 
@@ -144,6 +145,25 @@ class NetworkAgent(LearningAgent):
     def set_parameters(self, parameters: dict[str, np.ndarray]) -> None:
         """Takes over the parameters of another network."""
         self.network.load_state_dict({name: torch.from_numpy(value.copy()) for name, value in parameters.items()})
+
+    def save(self, path: pathlib.Path, provenance: Mapping[str, Any]) -> None:
+        """Writes the checkpoint that `build` reads."""
+        metadata = {
+            "agent": self.name,
+            "config": dataclasses.asdict(self.config),
+            "context_size": self.trained_size,
+            "provenance": dict(provenance),
+        }
+        save_checkpoint(path, self.network.state_dict(), metadata)
+
+    def load(self, path: pathlib.Path) -> None:
+        """Takes over the network of a checkpoint.
+
+        Raises:
+          InputError: if the file is damaged, or another agent's.
+        """
+        tensors, _ = load_checkpoint(path, self.name)
+        load_into(path, self.network, tensors)
 
     @classmethod
     def default_checkpoint(cls) -> pathlib.Path:

@@ -17,7 +17,7 @@ from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Experience
 
 from .actor import NetworkAgent
-from .checkpoint import AGENT_FILE, load_checkpoint, load_into, save_checkpoint
+from .checkpoint import AGENT_FILE, load_checkpoint, save_checkpoint
 from .descent import Descent
 from .replay import Hindsight, Replay
 from .training_maps import TrainingMaps, shows_other_maps
@@ -89,13 +89,7 @@ class HindsightLearner:
 
     def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:
         """Writes the agent, the target network, the optimizer, the random generator and the replay."""
-        metadata = {
-            "agent": self.actor.name,
-            "config": self.config(),
-            "context_size": self.actor.trained_size,
-            "provenance": dict(provenance),
-        }
-        save_checkpoint(folder / AGENT_FILE, self.actor.network.state_dict(), metadata)
+        self.actor.save(folder / AGENT_FILE, provenance)
         save_checkpoint(folder / _TRAINING_FILE, self.descent.tensors(), {"agent": self.actor.name})
         (folder / _RANDOM_FILE).write_text(json.dumps(self.rng.bit_generator.state), encoding="ascii")
         self.replay.save(folder / _REPLAY_FILE)
@@ -106,8 +100,7 @@ class HindsightLearner:
         Raises:
           InputError: if a file is damaged, or another agent's.
         """
-        tensors, _ = load_checkpoint(folder / AGENT_FILE, self.actor.name)
-        load_into(folder / AGENT_FILE, self.actor.network, tensors)
+        self.actor.load(folder / AGENT_FILE)
         tensors, _ = load_checkpoint(folder / _TRAINING_FILE, self.actor.name)
         self.descent.load(folder / _TRAINING_FILE, tensors)
         self._load_random(folder / _RANDOM_FILE)
