@@ -71,20 +71,23 @@ class TestScripts:
         needs(module)
         assert re.search(printed, run(EXAMPLES / script, *options.split(), folder=tmp_path))
 
-    def test_sb3_tracks(self, tmp_path):
-        needs("stable_baselines3")
+    @pytest.mark.parametrize(
+        ("agent", "options"), [("PPOAgent", ()), ("RecurrentPPOAgent", ("--recurrent", "--kinds", "dfs"))]
+    )
+    def test_sb3_tracks(self, tmp_path, agent, options):
+        needs("stable_baselines3", "sb3_contrib")
         budget = ("--steps", "512", "--num-envs", "4", "--out", "ppo.zip")
-        output = run(EXAMPLES / "sb3_tracks.py", *budget, folder=tmp_path)
+        output = run(EXAMPLES / "sb3_tracks.py", *budget, *options, folder=tmp_path)
         assert output.startswith("context: [4, 13, 13]\nlidar: [32]\nstate: [12]\n")
         # The policy is an agent, also where contexts are larger than those that it was trained on.
         shutil.copy(EXAMPLES / "sb3_agent.py", tmp_path)
-        which = ("--agent", "sb3_agent:PPOAgent", "--checkpoint", "ppo.zip", "--distances", "3")
+        which = ("--agent", f"sb3_agent:{agent}", "--checkpoint", "ppo.zip", "--distances", "3")
         run("-m", "mazebench", "eval", *which, "--track", "sketch", "--out", "results", folder=tmp_path)
         assert json.loads((tmp_path / "results" / "summary.json").read_text())["episodes"] == 11
         check = (
             "from mazebench.agent import Interface\n"
             "from mazebench.testing import check_agent\n"
-            "check_agent('sb3_agent:PPOAgent', Interface('local', 13, 13, sensors=('lidar',)), 'ppo.zip')\n"
+            f"check_agent('sb3_agent:{agent}', Interface('local', 13, 13, sensors=('lidar',)), 'ppo.zip')\n"
         )
         run("-c", check, folder=tmp_path)
 

@@ -1,42 +1,87 @@
-"""The policy that sb3_tracks.py saved, as an agent of mazebench."""
+"""The policy that sb3_tracks.py saved, as an agent of mazebench, and the features that it reads."""
 
 import cv2
 import numpy as np
 import torch
+from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from torch import nn
 
 import mazebench
+
+
+class MapFeatures(BaseFeaturesExtractor):
+    """Convolutions of the context, beside state and lidar, which are scaled to an order of 1."""
+
+    def __init__(self, observation_space, num_features=256):
+        super().__init__(observation_space, num_features + 12 + observation_space["lidar"].shape[0])
+        channels, side, _ = observation_space["context"].shape
+        self.scale = torch.tensor([1 / side] * 3 + [1.0] * 9)  # positions are in metres
+        self.reach = float(observation_space["lidar"].high.max())
+        layers = []
+        for wider in (32, 64, 64):
+            layers += [nn.Conv2d(channels, wider, 3, stride=2, padding=1), nn.ReLU()]
+            channels, side = wider, (side + 1) // 2
+        self.context = nn.Sequential(*layers, nn.Flatten(), nn.Linear(channels * side**2, num_features), nn.ReLU())
+
+    def forward(self, observations):
+        features = self.context(observations["context"])
+        return torch.cat([features, observations["state"] * self.scale, observations["lidar"] / self.reach], dim=1)
 
 
 class PPOAgent(mazebench.Agent):
     """Draws its actions from the policy's distribution, with a random stream for each episode."""
 
     needs_sensors = ("lidar",)
+    algorithm = PPO
 
     @classmethod
     def build(cls, interface, *, seed=0, checkpoint=None):
         if checkpoint is None:
             raise mazebench.InputError("expected --checkpoint, the file that sb3_tracks.py saved, found none")
-        return cls(PPO.load(checkpoint, device="cpu").policy)
+        return cls(cls.algorithm.load(checkpoint, device="cpu").policy)
 
     def __init__(self, policy):
         self.policy = policy
         self.side = policy.observation_space["context"].shape[-1]  # M of the contexts that it was trained on
 
     def initial_state(self, batch_size):
-        return [None] * batch_size  # a random stream for each environment
+        return [None] * batch_size, self.initial_memory(batch_size)  # a random stream for each environment
 
     def act(self, inputs, state, explore=False):
+        streams, memory = state
         for slot in np.flatnonzero(inputs.new_episode):
-            state[slot] = np.random.default_rng(inputs.seed[slot])
+            streams[slot] = np.random.default_rng(inputs.seed[slot])
         observation = dict(inputs.observation)
         if observation["context"].shape[-1] != self.side:
             observation["context"] = np.stack([self.resized(planes) for planes in observation["context"]])
         with torch.no_grad():
             observation = {name: torch.as_tensor(values) for name, values in observation.items()}
-            shares = self.policy.get_distribution(observation).distribution.probs.double().numpy()
-        return np.array([rng.choice(6, p=p / p.sum()) for rng, p in zip(state, shares, strict=True)]), state
+            distribution, memory = self.distribution(observation, memory, torch.as_tensor(inputs.new_episode))
+        shares = distribution.distribution.probs.double().numpy()
+        actions = np.array([rng.choice(6, p=p / p.sum()) for rng, p in zip(streams, shares, strict=True)])
+        return actions, (streams, memory)
+
+    def initial_memory(self, batch_size):
+        return None  # the policy has no memory
+
+    def distribution(self, observation, memory, new_episode):
+        return self.policy.get_distribution(observation), memory
 
     def resized(self, planes):
         """Returns `[4, side, side]`: the planes of a context with another number of cells."""
         return np.stack([cv2.resize(plane, (self.side, self.side), interpolation=cv2.INTER_AREA) for plane in planes])
+
+
+class RecurrentPPOAgent(PPOAgent):
+    """The same with an LSTM, whose state is the agent's memory."""
+
+    algorithm = RecurrentPPO
+
+    def initial_memory(self, batch_size):
+        lstm = self.policy.lstm_actor
+        return tuple(torch.zeros(lstm.num_layers, batch_size, lstm.hidden_size) for _ in range(2))
+
+    def distribution(self, observation, memory, new_episode):
+        return self.policy.get_distribution(observation, memory, new_episode.float())

@@ -1,4 +1,4 @@
-"""Trains Stable-Baselines3's PPO on the train mazes of a track, at all of its levels, and saves the policy.
+"""Trains Stable-Baselines3's PPO on a track, at all of its levels, and saves the policy.
 
 python docs/examples/sb3_tracks.py --steps 400000 --out ppo.zip
 """
@@ -7,7 +7,7 @@ import argparse
 
 import gymnasium
 import numpy as np
-from stable_baselines3 import PPO
+from sb3_agent import MapFeatures, PPOAgent, RecurrentPPOAgent
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
 import mazebench  # noqa: F401  (registers the ids)
@@ -57,31 +57,38 @@ class MazeVecEnv(VecEnv):
 parser = argparse.ArgumentParser()
 parser.add_argument("--track", default="mazebench/Stale-13-v2", help="its Gymnasium id")
 parser.add_argument("--level", type=int, nargs="+", default=[1, 2, 3], help="of several, each episode draws one")
-parser.add_argument("--distances", type=int, nargs="+", default=[1, 2, 3, 4, 5, 6], help="cells from start to goal")
+parser.add_argument("--distances", type=int, nargs=2, default=[1, 6], help="cells from start to goal, from and to")
+parser.add_argument("--kinds", nargs="*", default=[], help="of a new maze in each episode, instead of the train mazes")
+parser.add_argument("--recurrent", action="store_true", help="a policy with an LSTM, by sb3-contrib")
 parser.add_argument("--steps", type=int, default=400_000)
 parser.add_argument("--num-envs", type=int, default=64)
 parser.add_argument("--seed", type=int, default=0)
 parser.add_argument("--out", default="ppo.zip")
 arguments = parser.parse_args()
 
-options = {"split": "train", "level": arguments.level, "distances": arguments.distances}
+nearest, farthest = arguments.distances
+options = {"level": arguments.level, "distances": range(nearest, farthest + 1)}
+if arguments.kinds:
+    options |= {"kinds": arguments.kinds, "fresh": True}
 envs = gymnasium.make_vec(arguments.track, num_envs=arguments.num_envs, **options)
 for name, space in envs.single_observation_space.spaces.items():
     print(f"{name}: {list(space.shape)}")
-model = PPO(
-    "MultiInputPolicy",
-    VecNormalize(VecMonitor(MazeVecEnv(envs)), norm_obs=False, gamma=0.98),  # rewards of an order of 1
+
+agent = RecurrentPPOAgent if arguments.recurrent else PPOAgent
+model = agent.algorithm(
+    "MultiInputLstmPolicy" if arguments.recurrent else "MultiInputPolicy",
+    VecNormalize(VecMonitor(MazeVecEnv(envs)), norm_obs=False, gamma=0.99),  # rewards of an order of 1
     n_steps=128,
     batch_size=1024,
     n_epochs=4,
     learning_rate=5e-4,
-    gamma=0.98,
+    gamma=0.99,
     ent_coef=0.01,
-    policy_kwargs={"net_arch": [256, 256]},
+    policy_kwargs={"net_arch": [256], "features_extractor_class": MapFeatures},
     seed=arguments.seed,
     device="cpu",
     verbose=1,
 )
 model.learn(arguments.steps)
 model.save(arguments.out)
-print(f"saved {arguments.out}, which sb3_agent.py plays")
+print(f"saved {arguments.out}, which sb3_agent:{agent.__name__} plays")
