@@ -1,13 +1,13 @@
 """Makes benchmark v3, mazes of several kinds and episodes in them, byte for byte as they ship.
 
-`python -m benchmarks.freeze_kinds DIR` writes the splits train and dev. With `--commit HASH`, it adds the split eval to
-those that are installed: a draw from the hash of the commit that holds all generators, tracks and agents, which nobody
-chooses. benchmarks/v3_checks.py has the checks that come before.
+`python -m benchmarks.freeze_kinds DIR --commit HASH` writes the splits train, dev and eval. The seed of eval is the
+hash of the commit that holds all generators, tracks and agents, which nobody chooses; the manifest has it as
+`eval_commit`.
+benchmarks/v3_checks.py has the checks that came before.
 """
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import itertools
 import json
@@ -28,10 +28,7 @@ from mazebench.maps.benchmark import (
     MANIFEST,
     SPLITS,
     kind_mazes_file,
-    load_kind_mazes,
     load_track_mazes,
-    manifest,
-    read_asset,
 )
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.maps.maze import Maze, canonical_bytes
@@ -53,20 +50,14 @@ _EPISODES_PER_MAZE = 5
 _DISTANCES = TRACKS[KINDS_TRACKS[0]].distances(1)
 
 
-def freeze_kinds(folder: pathlib.Path, commit: str | None = None) -> None:
-    """Writes the splits train and dev into `folder`; or, with the hash of a commit, the installed ones and eval."""
+def freeze_kinds(folder: pathlib.Path, commit: str) -> None:
+    """Writes the splits train, dev and eval into `folder`; eval is drawn from the hash of a commit."""
     folder.mkdir(parents=True, exist_ok=True)
-    generator: dict[str, Any] = {"seed": _SEED, "kinds": {}, "contexts_sha256": {}}
+    generator: dict[str, Any] = {"seed": _SEED, "kinds": {}, "contexts_sha256": {}, "eval_commit": commit}
     files: dict[str, str] = {}
     known = {canonical_bytes(maze.walls) for split in SPLITS for maze in load_track_mazes(KINDS_SIZE, split)}
-    if commit is not None:
-        installed = manifest(KINDS_VERSION)
-        generator = copy.deepcopy(installed["generator"]) | {"eval_commit": commit}
-        files = {name: read_asset(name, KINDS_VERSION) for name in installed["files"]}
-        known |= {canonical_bytes(maze.walls) for split in generator["kinds"] for maze in load_kind_mazes(split)}
-
-    for index, split in enumerate(("train", DEV) if commit is None else ("eval",)):
-        rng = np.random.default_rng([_SEED, index] if commit is None else [_SEED, int(commit, 16)])
+    for split, seed in (("train", 0), (DEV, 1), ("eval", int(commit, 16))):
+        rng = np.random.default_rng([_SEED, seed])
         mazes = [maze for kind in KINDS[split] for maze in draw_mazes(kind, split, known, rng)]
         generator["kinds"][split] = KINDS[split]
         for kind in KINDS[split]:
@@ -133,7 +124,7 @@ def _shuffled_rounds(values: Sequence[int], rng: np.random.Generator) -> Iterato
 
 def main(
     folder: pathlib.Path,
-    commit: Annotated[str | None, typer.Option(help="Add the split eval, drawn from this hash of a commit.")] = None,
+    commit: Annotated[str, typer.Option(help="The hash of the commit from which the split eval is drawn.")],
 ) -> None:
     """Write the files of benchmark v3."""
     freeze_kinds(folder, commit)

@@ -51,46 +51,35 @@ def context(spec: TaskSpec, episode: Episode) -> np.ndarray:
 
 class TestFiles:
     def test_one_command_makes_them_byte_for_byte(self, tmp_path):
-        freeze_kinds(tmp_path)
+        freeze_kinds(tmp_path, manifest(KINDS_VERSION)["generator"]["eval_commit"])
         made = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
         assert set(made) == {*manifest(KINDS_VERSION)["files"], MANIFEST}
         for name in manifest(KINDS_VERSION)["files"]:
             assert made[name] == read_asset(name, KINDS_VERSION).encode("ascii"), name
 
-    def test_the_split_eval_has_novel_kinds_and_depends_on_the_commit_alone(self, tmp_path):
-        for name, commit in (("a", "0123abcd"), ("again", "0123abcd"), ("b", "0123abce")):
-            freeze_kinds(tmp_path / name, commit)
-        made = {
-            name: {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()} for name in ("a", "again", "b")
-        }
-        assert made["a"] == made["again"]
-        new = {name for name in made["a"] if "eval" in name}
-        assert new == {
-            *(f"mazes-{kind}-eval.txt" for kind in (*KNOWN, *NOVEL)),
-            *("episodes-local-31-eval.csv", "oracle-local-31-eval.json"),
-        }
-        assert all(made["a"][name] != made["b"][name] for name in new)
+    def test_the_split_eval_depends_on_the_commit_alone_and_no_other_split_does(self, tmp_path):
+        freeze_kinds(tmp_path, "0123abcd")
         for name in manifest(KINDS_VERSION)["files"]:
-            assert made["a"][name] == read_asset(name, KINDS_VERSION).encode("ascii"), name
+            is_as_shipped = tmp_path.joinpath(name).read_bytes() == read_asset(name, KINDS_VERSION).encode("ascii")
+            assert is_as_shipped != ("eval" in name), name
 
-    def test_mazes_are_new_and_of_known_kinds_with_far_goals(self):
-        mazes = [maze for split in ("train", DEV) for maze in load_kind_mazes(split)]
-        assert collections.Counter(maze.kind for maze in mazes) == dict.fromkeys(KNOWN, 32)
+    def test_mazes_are_new_with_far_goals_and_only_eval_has_novel_kinds(self):
+        mazes = [maze for split in ("train", DEV, "eval") for maze in load_kind_mazes(split)]
+        assert collections.Counter(maze.kind for maze in mazes) == dict.fromkeys(KNOWN, 40) | dict.fromkeys(NOVEL, 8)
         others = [maze for split in ("train", "eval") for maze in load_track_mazes(31, split)]
         assert len({canonical_bytes(maze.walls) for maze in [*mazes, *others]}) == len(mazes) + len(others)
         assert min(maze.diameter for maze in mazes) >= 40
 
-    def test_five_pairs_in_each_maze_of_dev(self):
-        trials, mazes = frozen_trials("local", 31, KINDS_VERSION, DEV), load_kind_mazes(DEV)
+    @pytest.mark.parametrize("split", [DEV, "eval"])
+    def test_five_pairs_in_each_maze(self, split):
+        trials, mazes = frozen_trials("local", 31, KINDS_VERSION, split), load_kind_mazes(split)
         assert collections.Counter(trial.episode.maze for trial in trials) == dict.fromkeys(range(48), 5)
         for trial in trials:
             maze = mazes[trial.episode.maze]
             assert maze.distance(trial.episode.start, trial.episode.goal) == trial.distance
         assert {trial.distance for trial in trials} == set(range(15, 41))
 
-    def test_a_split_that_is_not_frozen_is_refused_in_a_line(self):
-        with pytest.raises(InputError, match="its split 'eval' is not frozen yet; play the split 'dev'"):
-            make_spec("rebuilt", split="eval")
+    def test_the_split_dev_belongs_to_v3(self):
         with pytest.raises(InputError, match="split"):
             make_spec(size=13, split="dev")
 

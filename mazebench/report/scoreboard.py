@@ -18,7 +18,7 @@ import pydantic
 
 from mazebench.constants import ON_TIME
 from mazebench.errors import InputError, describe_fault
-from mazebench.maps.benchmark import DEV, KINDS_VERSION, TRACKS_VERSION, manifest_hash
+from mazebench.maps.benchmark import KINDS_VERSION, TRACKS_VERSION, manifest_hash
 from mazebench.report.table import escape_markdown
 from mazebench.results.intervals import mean_interval
 from mazebench.results.metrics import is_on_time
@@ -34,8 +34,6 @@ from mazebench.tasks.trials import frozen_trials
 BEGIN, END = "<!-- scoreboard begins -->\n", "<!-- scoreboard ends -->\n"
 UNTRAINED = "\\*"  # behind the success rates of an agent that learned on maps of another scale
 
-# The split that counts, by benchmark. The eval mazes of v3 are not frozen yet.
-_SPLITS = {KINDS_VERSION: DEV, TRACKS_VERSION: "eval"}
 _MAX_ENTRY_BYTES = 2**16
 
 
@@ -248,17 +246,17 @@ def _part(result: Result) -> str:
     """Returns track and level of a result; raises `InputError` if it is not of all their frozen episodes."""
     summary = result.summary
     part = f"{summary.track or summary.task} {summary.level or ''}".strip()
-    benchmark, split = summary.benchmark, _SPLITS.get(summary.benchmark, "eval")
-    if summary.track not in TRACKS or part not in _parts(benchmark) or summary.split != split:
-        raise InputError(f"{result.folder}: expected {split} episodes of a track, found {summary.split} {part}")
+    benchmark = summary.benchmark
+    if summary.track not in TRACKS or part not in _parts(benchmark) or summary.split != "eval":
+        raise InputError(f"{result.folder}: expected eval episodes of a track, found {summary.split} {part}")
     if summary.senses:
         raise InputError(f"{result.folder}: expected the senses of the track, found {', '.join(summary.senses)}")
     if summary.provenance.benchmark_manifest_sha256 != manifest_hash(benchmark):
         raise InputError(f"{result.folder}: expected results of the installed benchmark, found those of another one")
-    trials = frozen_trials("local", summary.size, benchmark, split)
+    trials = frozen_trials("local", summary.size, benchmark, "eval")
     if summary.episodes != len(trials):
         raise InputError(f"{result.folder}: expected {len(trials)} episodes, found {summary.episodes}")
-    mazes = TRACKS[summary.track].mazes((summary.level or 0,), split)
+    mazes = TRACKS[summary.track].mazes((summary.level or 0,), "eval")
     for record, trial in zip(result.records, trials, strict=True):
         episode = trial.episode
         frozen = mazes[episode.maze].name, episode.start, episode.goal, episode.seed
