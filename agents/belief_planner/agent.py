@@ -121,7 +121,7 @@ class BeliefPlanner(NetworkAgent):
             scores = [_log_score(walls[came], is_wall) for walls in (belief.walls, belief.by_rule)]
             advantage = belief.advantage + scores[0] - scores[1]
         view = View(memory.prior, memory.occupancy.evidence, memory.goal, memory.searched)
-        ((walls, goal),) = believe(self.network, [view])
+        walls, goal = believe(self.network, view)
         return Belief(walls, goal, by_rule, is_seen, memory.prior, advantage)
 
 

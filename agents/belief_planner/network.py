@@ -7,7 +7,6 @@ anything is learned, its corrections are zero. `C` is the number of planes, `L` 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +15,6 @@ from scipy import ndimage
 from torch import nn
 from torch.nn import functional
 
-from ..common.actor import one_torch_thread
 from ..robot.occupancy import SURE, Occupancy
 
 _LARGEST = 8.0  # log odds and log weights, to which they are clipped
@@ -115,17 +113,12 @@ class BeliefNetwork(nn.Module):
 
 
 @torch.no_grad()
-@one_torch_thread()
-def believe(network: BeliefNetwork, views: Sequence[View]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Returns of each view the probability of a wall, `[L, L]` float, and that of the goal, `[L, L]` float.
+def believe(network: BeliefNetwork, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the probability of a wall, `[L, L]` float, and that of the goal, `[L, L]` float.
 
     Where a cell was seen, the probability of a wall is the rule's; where a wall is certain, it is 1. The goal is in no
-    cell that was searched or seen to be a wall; if none is left, all are 0. A result does not depend on other views.
+    cell that was searched or seen to be a wall; if none is left, all are 0.
     """
-    return [_believe(network, view) for view in views]
-
-
-def _believe(network: BeliefNetwork, view: View) -> tuple[np.ndarray, np.ndarray]:
     seen = picture(view)
     planes = torch.from_numpy(seen.planes)[None]
     logits = (seen.rule + network(planes, planes.new_ones(1, 1, *seen.unseen.shape))[0].numpy()).astype(np.float64)
