@@ -6,7 +6,7 @@ PYTHONS := python3.11 python3.12 python3.13 python3.14 python3
 BIN := .venv/bin
 AGENT ?= mmn
 
-.PHONY: eval test test-slow docs check check-full release pythons bench clean
+.PHONY: eval test test-slow docs check check-full release pythons results bench clean
 
 # Installs an extra: `agents` is what an evaluation needs, `dev` has everything. Made anew where it may have changed.
 # Modules become bytecode when they are first imported, unless Python may not keep it: then pip makes it.
@@ -49,6 +49,10 @@ release: .venv/installed-dev
 # On every Python found; needs wheels of all dependencies.
 pythons: release
 	.ci/pythons "$$(ls -t dist/*.whl | head -n 1)"
+
+# The tables of results in README.md and docs, from records/.
+results: .venv/installed-agents
+	$(BIN)/python -m benchmarks.results
 
 bench: .venv/installed-agents
 	$(BIN)/mazebench bench

@@ -36,8 +36,9 @@ def evaluate(
         str | None,
         typer.Option(
             help="Evaluations by name instead: paper, the whole protocol; quick, minutes of it; tracks, every track of "
-            "v2 at all levels; v3, those of v3; or what these are measured against: v3-no-map, hiding the map, "
-            "v3-no-goal, the goal too, v3-true-pose, with the true pose where it is lost."
+            "v2 at all levels; v3, those of v3; v3-dev, in the mazes to choose agents by; or what these are measured "
+            "against: v3-no-map, hiding the map, v3-no-goal, the goal too, v3-true-pose, with the true pose where it "
+            "is lost."
         ),
     ] = None,
     out: Annotated[

@@ -56,9 +56,7 @@ def write_report(
       InputError: if there is nothing to report, results are of another benchmark, or `out` can't be used.
     """
     with _noting_remarks() as notes:
-        results = read_results(paths, names)
-    labels = sorted({result.label for result in results}, key=_rank)
-    results.sort(key=lambda result: (result.setting, labels.index(result.label)))
+        results, labels = read_in_order(paths, names)
     episodes, looks = join_episodes(results, labels), all_looks(labels)
     tables = build_tables(episodes)
     curves = {table.name: describe_table(table, looks) for table in tables if table.x}
@@ -80,6 +78,16 @@ def write_report(
         write_text(out / DOCUMENT, build_document(results, labels, tables, pictures, notes))
         write_text(out / PAGE, build_page(results, labels, tables, curves, violins, looks, notes))
     return results
+
+
+def read_in_order(
+    paths: Sequence[pathlib.Path], names: Sequence[tuple[str, str]] = ()
+) -> tuple[list[ReportedResult], list[str]]:
+    """Returns the results as `read_results` does, in a report's order, and the agents' labels in theirs."""
+    results = read_results(paths, names)
+    labels = sorted({result.label for result in results}, key=_rank)
+    results.sort(key=lambda result: (result.setting, labels.index(result.label)))
+    return results, labels
 
 
 @contextlib.contextmanager

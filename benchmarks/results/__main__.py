@@ -1,0 +1,42 @@
+"""Writes the tables and figures of results into README.md and docs, from the records that are kept: `make results`.
+
+`records/` holds finished evaluations, an archive for each folder of results: `tar xf records/v3.tar.xz` gives a folder
+that `mazebench report` and `mazebench compare` read. `python -m benchmarks.results keep FOLDER...` adds some.
+"""
+
+from __future__ import annotations
+
+import pathlib
+
+import typer
+
+from benchmarks.results.figures import draw_figures
+from benchmarks.results.kept import keep, read_kept
+from benchmarks.results.pages import PAGES, RECORDS, ROOT, with_tables
+from mazebench.storage.files import open_whole
+
+app = typer.Typer(help="Write the tables and figures of results into the pages, from the records that are kept.")
+
+
+@app.callback(invoke_without_command=True)
+def write(context: typer.Context) -> None:
+    """Write all tables and figures anew."""
+    if context.invoked_subcommand is None:
+        kept = read_kept(RECORDS)
+        draw_figures(kept, ROOT / "docs" / "images")
+        for name in PAGES:
+            text = with_tables((ROOT / name).read_text(encoding="utf-8"), kept)
+            with open_whole(ROOT / name) as file:
+                file.write(text.encode())
+
+
+@app.command("keep")
+def keep_folders(folders: list[pathlib.Path]) -> None:
+    """Keep folders of results in records/."""
+    for folder in folders:
+        path = keep(folder, RECORDS)
+        print(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,146 @@
+"""The figures of README.md and docs/results.md, from the records that are kept; `make results` draws them."""
+
+from __future__ import annotations
+
+import pathlib
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.results.kept import (
+    BELIEF_PLANNER,
+    BELIEF_RULE,
+    IN_TIME,
+    NAVIGATOR,
+    NO_MAP,
+    TRACKS_V3,
+    TRUE_POSE,
+    Kept,
+)
+from mazebench.maps.kinds import KNOWN, NOVEL
+from mazebench.report.figures.describe import describe_distributions, describe_table
+from mazebench.report.figures.draw import draw_figure
+from mazebench.report.figures.figure import Figure, Panel, Point, Series
+from mazebench.report.looks import all_looks
+from mazebench.results.intervals import Estimate, mean_interval
+from mazebench.results.metrics import scores
+from mazebench.results.reading import Result
+from mazebench.results.records import column
+from mazebench.tasks.tracks.base import LEVELS
+
+_DODGE = 0.09  # of the step between two ticks, by which series stand beside one another
+_SCORES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
+
+# What a panel shows: by the name of a series, an estimate at each tick; None where there is none.
+_Lines = dict[str, list[Estimate | None]]
+
+
+def draw_figures(kept: Kept, folder: pathlib.Path) -> None:
+    """Writes the figures as PNG into a folder."""
+    with tempfile.TemporaryDirectory() as temporary:
+        for figure in (map_worth(kept), learning(kept), novel_kinds(kept), what_fails(kept), *of_report(kept)):
+            draw_figure(figure, pathlib.Path(temporary) / figure.name)
+            shutil.copy(pathlib.Path(temporary, f"{figure.name}.png"), folder)
+
+
+def of_report(kept: Kept) -> list[Figure]:
+    """Returns the figures of the report of the suite `paper` that pages show."""
+    assert kept.episodes is not None
+    looks = all_looks(list(kept.episodes.label.cat.categories))
+    violins = {figure.name: figure for figure in describe_distributions(kept.episodes, looks)}
+    return [describe_table(kept.report["local-13"], looks), violins["violins-noise-local-13"]]
+
+
+def map_worth(kept: Kept) -> Figure:
+    """Returns the navigator on time with and without the map, by track and level."""
+    rows = {"navigator": NAVIGATOR, "navigator without the map": NO_MAP, "navigator with the true pose": TRUE_POSE}
+    panels = {track: {label: _levels(kept, row, track) for label, row in rows.items()} for track in TRACKS_V3}
+    return _figure("map-worth", "What the map is worth: episodes on time (1.25)", panels)
+
+
+def novel_kinds(kept: Kept) -> Figure:
+    """Returns the robots on time in known and in novel kinds of mazes, by track and level."""
+    panels = {
+        track: {
+            f"{row}, {name} kinds": _levels(kept, row, track, "kind", kinds)
+            for row in (NAVIGATOR, BELIEF_PLANNER)
+            for name, kinds in (("known", KNOWN), ("novel", NOVEL))
+        }
+        for track in TRACKS_V3
+    }
+    return _figure("novel-kinds", "What novel kinds of buildings cost: episodes on time (1.25)", panels)
+
+
+def what_fails(kept: Kept) -> Figure:
+    """Returns the navigator on time where the shortest path on the map is open and where it is blocked."""
+    panels = {
+        track: {
+            f"navigator, path on the map {name}": _levels(kept, NAVIGATOR, track, "blocked", (is_blocked,))
+            for name, is_blocked in (("open", False), ("blocked", True))
+        }
+        for track in TRACKS_V3
+    }
+    return _figure("what-fails", "Where the navigator is late: episodes on time (1.25)", panels)
+
+
+def learning(kept: Kept) -> Figure:
+    """Returns success rates on wrong maps of v1, without a lidar."""
+    rows = ("planner-closed-loop", "mah", "mmn", BELIEF_RULE, BELIEF_PLANNER)
+    parts = {
+        "Hierarchical, share of cells flipped": ("hierarchical-13-k5", "flip-0.05", "flip-0.1", "flip-0.2", "flip-0.3"),
+        "Local, maps warped by": ("local-13", "warp-0.05", "warp-0.1", "warp-0.2"),
+    }
+    panels = {
+        title: {row: [_estimate(kept.results.get((row, part)), "success_rate") for part in chosen] for row in rows}
+        for title, chosen in parts.items()
+    }
+    ticks = [["0", *(part.rpartition("-")[2] for part in chosen[1:])] for chosen in parts.values()]
+    return _figure("learning", "Wrong maps without a lidar: success rate", panels, "", ticks)
+
+
+def _levels(kept: Kept, row: str, track: str, field: str = "", values: Sequence[Any] = ()) -> list[Estimate | None]:
+    """Returns the share on time at the levels of a track, of the records whose `field` is among `values`, or of all."""
+    return [_estimate(kept.results.get((row, f"{track}-{level}")), IN_TIME, field, values) for level in LEVELS]
+
+
+def _estimate(result: Result | None, metric: str, field: str = "", values: Sequence[Any] = ()) -> Estimate | None:
+    if result is None:
+        return None
+    chosen = np.isin(column(result.records, field), values) if field else np.ones(len(result.records), dtype=bool)
+    if not chosen.any():
+        return None
+    return mean_interval(
+        scores(result.records, result.oracle_steps)[metric][chosen], column(result.records, "maze")[chosen]
+    )
+
+
+def _figure(
+    name: str, title: str, panels: Mapping[str, _Lines], x_name: str = "level", ticks: Sequence[Sequence[str]] = ()
+) -> Figure:
+    labels = list(dict.fromkeys(label for lines in panels.values() for label in lines))
+    described = tuple(
+        _panel(panel, lines, labels, x_name, ticks[index] if ticks else [str(level) for level in LEVELS])
+        for index, (panel, lines) in enumerate(panels.items())
+    )
+    return Figure(name, title, "", described, all_looks(labels), panel_height=2.1)
+
+
+def _panel(title: str, lines: _Lines, labels: Sequence[str], x_name: str, ticks: Sequence[str]) -> Panel:
+    series = []
+    for label, estimates in lines.items():
+        shift = (labels.index(label) - (len(labels) - 1) / 2) * _DODGE
+        points = [Point(x + shift, each.value, each.low, each.high) for x, each in enumerate(estimates) if each]
+        if points:
+            series.append(Series(label, tuple(points), has_bars=True))
+    return Panel(
+        title,
+        x_name,
+        tuple(series),
+        ticks=tuple((float(x), text) for x, text in enumerate(ticks)),
+        x_range=(-0.5, len(ticks) - 0.5),
+        y_range=(-0.05, 1.05),
+        y_ticks=_SCORES,
+    )
