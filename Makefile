@@ -50,8 +50,8 @@ release: .venv/installed-dev
 pythons: release
 	.ci/pythons "$$(ls -t dist/*.whl | head -n 1)"
 
-# The tables of results in README.md and docs, from records/.
-results: .venv/installed-agents
+# The tables and figures of results in README.md and docs, from records/.
+results: .venv/installed-dev
 	$(BIN)/python -m benchmarks.results
 
 bench: .venv/installed-agents

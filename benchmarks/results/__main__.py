@@ -7,12 +7,14 @@ that `mazebench report` and `mazebench compare` read. `python -m benchmarks.resu
 from __future__ import annotations
 
 import pathlib
+import sys
 
 import typer
 
-from benchmarks.results.figures import draw_figures
+from benchmarks.results.figures import draw_figures, figures
 from benchmarks.results.kept import keep, read_kept
 from benchmarks.results.pages import PAGES, RECORDS, ROOT, with_tables
+from mazebench.errors import InputError
 from mazebench.storage.files import open_whole
 
 app = typer.Typer(help="Write the tables and figures of results into the pages, from the records that are kept.")
@@ -23,9 +25,9 @@ def write(context: typer.Context) -> None:
     """Write all tables and figures anew."""
     if context.invoked_subcommand is None:
         kept = read_kept(RECORDS)
-        draw_figures(kept, ROOT / "docs" / "images")
-        for name in PAGES:
-            text = with_tables((ROOT / name).read_text(encoding="utf-8"), kept)
+        pages = {name: with_tables((ROOT / name).read_text(encoding="utf-8"), kept) for name in PAGES}
+        draw_figures(figures(kept), ROOT / "docs" / "images")
+        for name, text in pages.items():
             with open_whole(ROOT / name) as file:
                 file.write(text.encode())
 
@@ -39,4 +41,8 @@ def keep_folders(folders: list[pathlib.Path]) -> None:
 
 
 if __name__ == "__main__":
-    app()
+    try:
+        app()
+    except InputError as error:
+        print(f"benchmarks.results: {error}", file=sys.stderr)
+        sys.exit(2)

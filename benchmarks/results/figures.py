@@ -8,50 +8,51 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from benchmarks.results.kept import (
     BELIEF_PLANNER,
     BELIEF_RULE,
-    IN_TIME,
     NAVIGATOR,
     NO_MAP,
+    ON_TIME_125,
     TRACKS_V3,
     TRUE_POSE,
     Kept,
+    estimate,
 )
 from mazebench.maps.kinds import KNOWN, NOVEL
 from mazebench.report.figures.describe import describe_distributions, describe_table
 from mazebench.report.figures.draw import draw_figure
 from mazebench.report.figures.figure import Figure, Panel, Point, Series
 from mazebench.report.looks import all_looks
-from mazebench.results.intervals import Estimate, mean_interval
-from mazebench.results.metrics import scores
-from mazebench.results.reading import Result
-from mazebench.results.records import column
+from mazebench.report.table import Cell
+from mazebench.results.intervals import Estimate
+from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 
 _DODGE = 0.09  # of the step between two ticks, by which series stand beside one another
+# Of the report of the suite `paper`.
+_LOCAL, _FLIPS, _WARPS = "local-13", "flip-hierarchical-13", "warp-local-13"
+_VIOLINS = "violins-noise-local-13"
 _SCORES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 # What a panel shows: by the name of a series, an estimate at each tick; None where there is none.
 _Lines = dict[str, list[Estimate | None]]
 
 
-def draw_figures(kept: Kept, folder: pathlib.Path) -> None:
-    """Writes the figures as PNG into a folder."""
+def figures(kept: Kept) -> list[Figure]:
+    """Returns all figures that pages show."""
+    looks = all_looks(list(kept.episodes.label.cat.categories))
+    violins = [each for each in describe_distributions(kept.episodes, looks) if each.name == _VIOLINS]
+    of_report = [describe_table(kept.report[_LOCAL], looks), *violins]
+    return [map_worth(kept), learning(kept), novel_kinds(kept), what_fails(kept), *of_report]
+
+
+def draw_figures(chosen: Sequence[Figure], folder: pathlib.Path) -> None:
+    """Writes figures as PNG into a folder."""
     with tempfile.TemporaryDirectory() as temporary:
-        for figure in (map_worth(kept), learning(kept), novel_kinds(kept), what_fails(kept), *of_report(kept)):
+        for figure in chosen:
             draw_figure(figure, pathlib.Path(temporary) / figure.name)
             shutil.copy(pathlib.Path(temporary, f"{figure.name}.png"), folder)
-
-
-def of_report(kept: Kept) -> list[Figure]:
-    """Returns the figures of the report of the suite `paper` that pages show."""
-    assert kept.episodes is not None
-    looks = all_looks(list(kept.episodes.label.cat.categories))
-    violins = {figure.name: figure for figure in describe_distributions(kept.episodes, looks)}
-    return [describe_table(kept.report["local-13"], looks), violins["violins-noise-local-13"]]
 
 
 def map_worth(kept: Kept) -> Figure:
@@ -89,32 +90,26 @@ def what_fails(kept: Kept) -> Figure:
 def learning(kept: Kept) -> Figure:
     """Returns success rates on wrong maps of v1, without a lidar."""
     rows = ("planner-closed-loop", "mah", "mmn", BELIEF_RULE, BELIEF_PLANNER)
-    parts = {
-        "Hierarchical, share of cells flipped": ("hierarchical-13-k5", "flip-0.05", "flip-0.1", "flip-0.2", "flip-0.3"),
-        "Local, maps warped by": ("local-13", "warp-0.05", "warp-0.1", "warp-0.2"),
-    }
-    panels = {
-        title: {row: [_estimate(kept.results.get((row, part)), "success_rate") for part in chosen] for row in rows}
-        for title, chosen in parts.items()
-    }
-    ticks = [["0", *(part.rpartition("-")[2] for part in chosen[1:])] for chosen in parts.values()]
+    tables = {"Hierarchical, share of cells flipped": _FLIPS, "Local, maps warped by": _WARPS}
+    panels = {}
+    for title, name in tables.items():
+        columns = {column.label: column.cells["success_rate"] for column in kept.report[name].columns}
+        panels[title] = {row: [_of_cell(cell) for cell in columns[row]] for row in rows if row in columns}
+    ticks = [kept.report[name].rows for name in tables.values()]
     return _figure("learning", "Wrong maps without a lidar: success rate", panels, "", ticks)
 
 
 def _levels(kept: Kept, row: str, track: str, field: str = "", values: Sequence[Any] = ()) -> list[Estimate | None]:
-    """Returns the share on time at the levels of a track, of the records whose `field` is among `values`, or of all."""
-    return [_estimate(kept.results.get((row, f"{track}-{level}")), IN_TIME, field, values) for level in LEVELS]
+    """Returns the share on time at the levels of a track, of the episodes that `estimate` counts."""
+    if row == TRUE_POSE and not TRACKS[track].hides_pose(LEVELS[0]):
+        return []
+    return [estimate(kept.result(row, f"{track}-{level}"), ON_TIME_125, field, values) for level in LEVELS]
 
 
-def _estimate(result: Result | None, metric: str, field: str = "", values: Sequence[Any] = ()) -> Estimate | None:
-    if result is None:
+def _of_cell(cell: Cell | None) -> Estimate | None:
+    if cell is None or cell.low is None or cell.high is None:
         return None
-    chosen = np.isin(column(result.records, field), values) if field else np.ones(len(result.records), dtype=bool)
-    if not chosen.any():
-        return None
-    return mean_interval(
-        scores(result.records, result.oracle_steps)[metric][chosen], column(result.records, "maze")[chosen]
-    )
+    return Estimate(cell.value, cell.low, cell.high)
 
 
 def _figure(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import pathlib
 import tarfile
 import tempfile
+from collections.abc import Sequence
+from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from mazebench.errors import InputError
@@ -15,19 +17,22 @@ from mazebench.report.frame import join_episodes
 from mazebench.report.report import read_in_order
 from mazebench.report.table import Table
 from mazebench.report.tables import build_tables
-from mazebench.results.metrics import ON_TIME_METRICS
+from mazebench.results.intervals import Estimate, mean_interval
+from mazebench.results.metrics import ON_TIME_METRICS, scores
 from mazebench.results.reading import CONFIG, EPISODES, ORACLE, SUITE, SUMMARY, Result, load_result
-from mazebench.storage.files import open_whole
+from mazebench.results.records import column
+from mazebench.storage.files import make_folder, open_whole
 from mazebench.tasks.tracks import tracks_of
 
 PAPER, V3 = "paper", "v3"  # the suites
 TRACKS_V3 = tracks_of(V3)
-IN_TIME, IN_DOUBLE_TIME = ON_TIME_METRICS  # by the smaller and the larger factor of the oracle's steps
+ON_TIME_125, ON_TIME_2 = ON_TIME_METRICS  # within 1.25 and 2 times the oracle's steps
 # Agents, with what they were told less or more than others.
 NAVIGATOR, NO_MAP, TRUE_POSE = "navigator", "navigator without map", "navigator with the true pose"
 BELIEF_PLANNER, BELIEF_RULE = "belief-planner", "belief-rule"
 
-_KEPT_FILES = (CONFIG, EPISODES, ORACLE, SUITE, SUMMARY)
+_SUFFIX = ".tar.xz"
+_KEPT_FILES = (CONFIG, EPISODES, ORACLE, SUMMARY)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,50 +41,81 @@ class Kept:
 
     results: dict[tuple[str, str], Result]  # by row of the agent, and part of a suite
     report: dict[str, Table]  # tables of the report of the suite `paper`, by name
-    episodes: pd.DataFrame | None  # of that report; None if no such suite is kept
+    episodes: pd.DataFrame  # of that report
+
+    def result(self, row: str, part: str) -> Result:
+        """Returns the evaluation of an agent on a part of a suite.
+
+        Raises:
+          InputError: if it is not kept.
+        """
+        if (row, part) not in self.results:
+            raise InputError(f"expected an evaluation of {row} on {part} among the records, found none")
+        return self.results[row, part]
 
 
 def read_kept(folder: pathlib.Path) -> Kept:
     """Returns the evaluations in all archives of `folder`.
 
     Raises:
-      InputError: if two are of the same agent and part, or one is damaged.
+      InputError: if two are of the same agent and part, one is damaged, or none is of the suite `paper`.
     """
     results: dict[tuple[str, str], Result] = {}
     with tempfile.TemporaryDirectory() as temporary:
-        for path in sorted(folder.glob("*.tar.xz")):
+        for path in sorted(folder.glob(f"*{_SUFFIX}")):
             with tarfile.open(path) as archive:
-                archive.extractall(temporary, filter="data")
+                archive.extractall(pathlib.Path(temporary, path.name), filter="data")
         for summary in sorted(pathlib.Path(temporary).rglob(SUMMARY)):
             result = load_result(summary.parent)
             key = result.summary.row, result.summary.part or summary.parent.name
             if key in results:
-                raise InputError(f"{folder}: expected one evaluation of {key[0]} on {key[1]}, found two")
+                archives = [each.folder.relative_to(temporary).parts[0] for each in (results[key], result)]
+                raise InputError(f"expected one evaluation of {key[0]} on {key[1]}, found two: {', '.join(archives)}")
             results[key] = result
-        paper = sorted(pathlib.Path(temporary).glob(f"{PAPER}*"))
-        episodes = join_episodes(*read_in_order(paper)) if paper else None
-    tables = [] if episodes is None else build_tables(episodes)
-    return Kept(results, {table.name: table for table in tables}, episodes)
+        paper = [result.folder for result in results.values() if result.summary.suite == PAPER]
+        if not paper:
+            raise InputError(f"{folder}: expected records of the suite {PAPER!r}, found none")
+        episodes = join_episodes(*read_in_order(paper))
+    return Kept(results, {table.name: table for table in build_tables(episodes)}, episodes)
 
 
 def keep(folder: pathlib.Path, records: pathlib.Path) -> pathlib.Path:
-    """Writes an archive of the evaluations in `folder` into `records`; equal folders give equal bytes.
+    """Writes an archive of the finished evaluations in `folder` into `records`, in the place of one of its name.
+
+    Equal evaluations give equal bytes.
 
     Raises:
       InputError: if nothing in the folder is finished.
     """
-    paths = sorted(path for path in folder.rglob("*") if path.name in _KEPT_FILES)
-    if not any(path.name == SUMMARY for path in paths):
+    folder = folder.resolve()
+    finished = sorted(path.parent for path in folder.rglob(SUMMARY))
+    if not finished:
         raise InputError(f"{folder}: expected finished evaluations, found none")
-    content = io.BytesIO()
-    with tarfile.open(fileobj=content, mode="w:xz", preset=9) as archive:
+    paths = [path for each in finished for name in _KEPT_FILES if (path := each / name).exists()]
+    paths += sorted(folder.rglob(SUITE))
+    make_folder(records)
+    target = records / f"{folder.name}{_SUFFIX}"
+    with open_whole(target) as file, tarfile.open(fileobj=file, mode="w:xz", preset=9) as archive:
         for path in paths:
             entry = tarfile.TarInfo(f"{folder.name}/{path.relative_to(folder).as_posix()}")
             entry.size = path.stat().st_size
-            with path.open("rb") as file:
-                archive.addfile(entry, file)
-    records.mkdir(exist_ok=True)
-    target = records / f"{folder.name}.tar.xz"
-    with open_whole(target) as file:
-        file.write(content.getvalue())
+            with path.open("rb") as content:
+                archive.addfile(entry, content)
     return target
+
+
+def estimate(result: Result, metric: str, field: str = "", values: Sequence[Any] = ()) -> Estimate | None:
+    """Returns the mean of a metric with its interval; None if there are no episodes to count.
+
+    Args:
+      result: an evaluation.
+      metric: as in a summary, or `ON_TIME_125` or `ON_TIME_2`.
+      field: of a record; all episodes count if it is empty, else those that have one of `values` there.
+      values: of the field.
+    """
+    counted = np.isin(column(result.records, field), values) if field else np.ones(len(result.records), dtype=bool)
+    if not counted.any():
+        return None
+    return mean_interval(
+        scores(result.records, result.oracle_steps)[metric][counted], column(result.records, "maze")[counted]
+    )

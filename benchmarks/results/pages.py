@@ -17,16 +17,17 @@ ROOT = pathlib.Path(__file__).parent.parent.parent
 RECORDS = ROOT / "records"
 PAGES = ("README.md", "docs/results.md", "docs/tracks.md", "docs/agents/navigator.md", "docs/agents/belief-planner.md")
 
-_BLOCK = re.compile(r"(<!-- table: (.+?) -->\n).*?(<!-- end of table -->\n)", re.DOTALL)
+_BEGIN, _END = "<!-- table: ", "<!-- end of table -->"
+_BLOCK = re.compile(rf"({_BEGIN}([^\n]+) -->\n)(?:\|[^\n]*\n)*({_END}\n)")
 
 
 def with_tables(text: str, kept: Kept) -> str:
     """Returns a page with its tables made anew.
 
     Raises:
-      InputError: if a table is unknown, or the page has none.
+      InputError: if a table is unknown, there is none, or there is more than a table between the two lines.
     """
     text, count = _BLOCK.subn(lambda block: block[1] + make_table(kept, block[2]) + block[3], text)
-    if not count:
-        raise InputError("expected a page with tables of results, found none")
+    if not count or not count == text.count(_BEGIN) == text.count(_END):
+        raise InputError(f"expected tables between the lines {_BEGIN}NAME --> and {_END}, found {count} such tables")
     return text

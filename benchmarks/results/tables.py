@@ -4,31 +4,31 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Sequence
-
-import numpy as np
+from collections.abc import Callable, Iterable, Sequence
 
 from benchmarks.results.kept import (
     BELIEF_PLANNER,
-    IN_DOUBLE_TIME,
-    IN_TIME,
+    BELIEF_RULE,
     NAVIGATOR,
     NO_MAP,
+    ON_TIME_2,
+    ON_TIME_125,
     PAPER,
     TRACKS_V3,
     TRUE_POSE,
+    V3,
     Kept,
+    estimate,
 )
-from mazebench.constants import ON_TIME
 from mazebench.errors import InputError
 from mazebench.maps.kinds import KNOWN, NOVEL
+from mazebench.report.looks import PAPER_MARKERS
 from mazebench.report.settings import DEFAULT_LANDMARK_DISTANCE
-from mazebench.report.table import escape_markdown
+from mazebench.report.table import METRICS, Cell, Table, escape_markdown
 from mazebench.results.comparison import compare_results
-from mazebench.results.intervals import Estimate, mean_interval
-from mazebench.results.metrics import ON_TIME_METRICS, scores
-from mazebench.results.reading import Result
-from mazebench.results.records import column
+from mazebench.results.intervals import Estimate
+from mazebench.results.metrics import ON_TIME_METRICS
+from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 
 _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints success rates
@@ -38,17 +38,17 @@ _PAPER_ROWS = {
     "dqn": "`dqn`, learned, no map",
     "mah-paper": "`mah-paper`, learned, model-free, closer to the paper",
     "mah": "`mah`, learned, model-free",
-    "mmn": "`mmn`, after the paper: learned model and search",
+    "mmn": "`mmn`, follows the paper: learned model and search",
     "MMN (paper)": "the paper's MMN, as printed",
-    "belief-planner": "`belief-planner`, classical with a learned belief",
+    BELIEF_RULE: "`belief-rule`, a classical robot that feels walls",
+    BELIEF_PLANNER: "`belief-planner`, the same with a learned belief",
     "planner": "`planner`, hand-written",
     "planner-closed-loop": "`planner-closed-loop`, hand-written",
     "oracle (privileged)": "`oracle`, privileged: gets the true maze and pose",
 }
 
 _PARTS = tuple((track, level) for track in TRACKS_V3 for level in LEVELS)
-_FACTORS = tuple(f"on time ({factor:g})" for factor in ON_TIME)
-_NOT_LOST = "not lost"  # of tracks that are not played with the true pose, since they tell it
+_NOT_LOST = "not lost"  # of the navigator with the true pose, on tracks that tell it to all
 # The rows of v3's tables, by the agent and what it was told less or more than others.
 _ROWS = {
     "oracle": "`oracle`, privileged: gets the true maze and pose",
@@ -70,41 +70,50 @@ def make_table(kept: Kept, name: str) -> str:
     """Returns a table: one of `TABLES`, or one of the report of the suite `paper` and a metric: "paper local-13 spl".
 
     Raises:
-      InputError: if there is no such table.
+      InputError: if there is no such table, or a record that it needs is missing.
     """
     if name in TABLES:
         return TABLES[name](kept)
-    suite, *of_report = name.split()
-    if suite != PAPER or len(of_report) != 2 or of_report[0] not in kept.report:
-        raise InputError(f"unknown table {name!r}; tables: {', '.join(TABLES)}, {PAPER} TABLE METRIC")
-    return paper(kept, *of_report)
+    suite, _, of_report = name.partition(" ")
+    report, _, metric = of_report.partition(" ")
+    if suite != PAPER or report not in kept.report or metric not in kept.report[report].metrics:
+        reports = ", ".join(kept.report)
+        raise InputError(f"unknown table {name!r}; tables: {', '.join(TABLES)}, {PAPER} TABLE METRIC, of: {reports}")
+    return report_table(kept, report, metric)
 
 
-def paper(kept: Kept, name: str, metric: str) -> str:
+def report_table(kept: Kept, name: str, metric: str) -> str:
     """Returns a metric of a table of the report of the suite `paper`."""
     header, *rows = kept.report[name].lines(metric, escape_markdown)
     return _table(header, rows)
 
 
-def paper_local(kept: Kept) -> str:
+def paper_table(kept: Kept) -> str:
     """Returns success rates by distance and in the hierarchical task, a row for each agent, and the paper's MMN."""
     local, routes = (kept.report[name] for name in ("local-13", "hierarchical-13"))
-    chosen = [(local, local.rows.index(str(distance))) for distance in _PRINTED_DISTANCES]
-    chosen.append((routes, routes.rows.index(str(DEFAULT_LANDMARK_DISTANCE))))
-    labels = [label for label in _PAPER_ROWS if label in {column.label for column in local.columns}]
+    chosen = [(local, str(distance)) for distance in _PRINTED_DISTANCES] + [(routes, str(DEFAULT_LANDMARK_DISTANCE))]
+    labels = {column.label for column in local.columns}
+    if unnamed := labels - _PAPER_ROWS.keys() - PAPER_MARKERS.keys():
+        raise InputError(f"expected results of {', '.join(_PAPER_ROWS)}, found those of {', '.join(sorted(unnamed))}")
 
-    def cells(label: str) -> Iterator[str]:
-        for table, row in chosen:
-            (column,) = (column for column in table.columns_of("success_rate") if column.label == label)
-            yield str(column.cells["success_rate"][row] or "")
+    def cell(label: str, table: Table, row: str) -> Cell | str | None:
+        values = next((each.cells["success_rate"] for each in table.columns if each.label == label), None)
+        return values and values[table.rows.index(row)]
 
     header = ["agent", *map(str, _PRINTED_DISTANCES), "hierarchical"]
-    return _table(header, [[_PAPER_ROWS[label], *cells(label)] for label in labels])
+    rows = [
+        [description, *(str(cell(label, *each) or "") for each in chosen)]
+        for label, description in _PAPER_ROWS.items()
+        if label in labels
+    ]
+    return _table(header, rows)
 
 
-def v3_rows(metric: str, kept: Kept) -> str:
+def v3_table(metric: str, kept: Kept) -> str:
     """Returns a metric of all agents on v3."""
-    played = {row for row, _ in kept.results}
+    played = {row for (row, _), result in kept.results.items() if result.summary.benchmark == V3}
+    if unnamed := played - _ROWS.keys():
+        raise InputError(f"expected results of {', '.join(_ROWS)}, found those of {', '.join(sorted(unnamed))}")
     rows = [
         [description, *(_levels(kept, row, track, metric) for track in TRACKS_V3)]
         for row, description in _ROWS.items()
@@ -117,67 +126,83 @@ def v3_map_worth(kept: Kept) -> str:
     """Returns the navigator's headline numbers with their intervals, and what the map is worth to it."""
     rows = []
     for track, level in _PARTS:
-        navigator, without = (kept.results[row, f"{track}-{level}"] for row in (NAVIGATOR, NO_MAP))
-        worth = compare_results(navigator, without).overall.metrics[IN_TIME].difference
-        figures = [_estimate(navigator, metric) for metric in ("success_rate", IN_DOUBLE_TIME, IN_TIME)]
-        rows.append([f"`{track}` {level}", *map(_interval, [*figures, _estimate(without, IN_TIME), worth])])
-    return _table(["part", "success", *reversed(_FACTORS), "the same without the map", "map worth"], rows)
+        navigator, without = (kept.result(row, f"{track}-{level}") for row in (NAVIGATOR, NO_MAP))
+        worth = compare_results(navigator, without).overall.metrics[ON_TIME_125].difference
+        figures = [estimate(navigator, metric) for metric in ("success_rate", ON_TIME_2, ON_TIME_125)]
+        rows.append([f"`{track}` {level}", *map(_interval, [*figures, estimate(without, ON_TIME_125), worth])])
+    names = [METRICS[metric] for metric in (ON_TIME_2, ON_TIME_125)]
+    return _table(["part", "success", *names, f"without the map, {names[1]}", "map worth"], rows)
 
 
 def v3_belief_planner(kept: Kept) -> str:
     """Returns belief-planner's numbers and its paired differences to the navigator."""
     rows = []
     for track, level in _PARTS:
-        ours, theirs = (kept.results[row, f"{track}-{level}"] for row in (BELIEF_PLANNER, NAVIGATOR))
+        ours, theirs = (kept.result(row, f"{track}-{level}") for row in (BELIEF_PLANNER, NAVIGATOR))
         paired = compare_results(ours, theirs).overall.metrics
         numbers = [_number(paired[metric].a) for metric in ("success_rate", *ON_TIME_METRICS)]
-        differences = [_interval(paired[metric].difference) for metric in ("success_rate", IN_TIME, "spl")]
+        differences = [_interval(paired[metric].difference) for metric in ("success_rate", ON_TIME_125, "spl")]
         rows.append([f"`{track}` {level}", *numbers, *differences])
-    return _table(["part", "success", *_FACTORS, "less `navigator`, success", _FACTORS[0], "SPL"], rows)
+    names = [METRICS[metric] for metric in ON_TIME_METRICS]
+    differences = [f"difference in {name}" for name in ("success", names[0], "SPL")]
+    return _table(["part", "success", *names, *differences], rows)
 
 
 def v3_novel_kinds(kept: Kept) -> str:
     """Returns what the two robots reach in the kinds that they could know, and in those that are in eval alone."""
+    chosen = list(itertools.product(("success_rate", ON_TIME_125), (("known", KNOWN), ("novel", NOVEL))))
     rows = [
-        [
-            *map(_code, (track, row)),
-            *(
-                _levels(kept, row, track, *each)
-                for each in itertools.product(("success_rate", IN_TIME), (KNOWN, NOVEL))
-            ),
-        ]
+        [*map(_code, (track, row)), *(_levels(kept, row, track, metric, kinds) for metric, (_, kinds) in chosen)]
         for track in TRACKS_V3
         for row in (NAVIGATOR, BELIEF_PLANNER)
     ]
-    header = ["track", "agent", "success, known kinds", "novel kinds", f"{_FACTORS[0]}, known kinds", "novel kinds"]
-    return _table(header, rows)
+    return _table(["track", "agent", *(f"{METRICS[metric]}, {name} kinds" for metric, (name, _) in chosen)], rows)
+
+
+def v3_blocked(kept: Kept) -> str:
+    """Returns the navigator's share on time where the shortest path on the map is open, and where it is blocked."""
+    chosen = (("open", False), ("blocked", True))
+    rows = [
+        [
+            f"`{track}` {level}",
+            *(
+                _interval(estimate(kept.result(NAVIGATOR, f"{track}-{level}"), ON_TIME_125, "blocked", (is_blocked,)))
+                for _, is_blocked in chosen
+            ),
+        ]
+        for track, level in _PARTS
+        if track != TRACKS_V3[0]  # whose maps are right
+    ]
+    return _table(["part", *(f"{METRICS[ON_TIME_125]}, path on the map {name}" for name, _ in chosen)], rows)
 
 
 def v3_navigator(kept: Kept) -> str:
     """Returns the navigator's numbers on v3."""
     metrics = ("success_rate", *ON_TIME_METRICS, "spl")
     rows = [[_code(track), *(_levels(kept, NAVIGATOR, track, metric) for metric in metrics)] for track in TRACKS_V3]
-    return _table(["track", "success", *_FACTORS, "SPL"], rows)
+    return _table(["track", *(METRICS[metric] for metric in metrics)], rows)
 
 
 def v3_navigator_kinds(kept: Kept) -> str:
     """Returns the navigator's share on time in each kind of maze."""
     kinds = (*KNOWN, *NOVEL)
     rows = [
-        [_code(track), *(_levels(kept, NAVIGATOR, track, IN_TIME, (kind,)) for kind in kinds)] for track in TRACKS_V3
+        [_code(track), *(_levels(kept, NAVIGATOR, track, ON_TIME_125, (kind,)) for kind in kinds)]
+        for track in TRACKS_V3
     ]
-    return _table(["track", *map(_code, kinds)], rows)
+    return _table([f"track, {METRICS[ON_TIME_125]}", *map(_code, kinds)], rows)
 
 
 # By the name that a page gives.
 TABLES: dict[str, Callable[[Kept], str]] = {
-    "paper-local": paper_local,
-    "v3-success": functools.partial(v3_rows, "success_rate"),
-    "v3-on-time": functools.partial(v3_rows, IN_TIME),
-    "v3-on-time-2": functools.partial(v3_rows, IN_DOUBLE_TIME),
+    "paper-local": paper_table,
+    "v3-success": functools.partial(v3_table, "success_rate"),
+    "v3-on-time": functools.partial(v3_table, ON_TIME_125),
+    "v3-on-time-2": functools.partial(v3_table, ON_TIME_2),
     "v3-map-worth": v3_map_worth,
     "v3-belief-planner": v3_belief_planner,
     "v3-novel-kinds": v3_novel_kinds,
+    "v3-blocked": v3_blocked,
     "v3-navigator": v3_navigator,
     "v3-navigator-kinds": v3_navigator_kinds,
 }
@@ -185,24 +210,15 @@ TABLES: dict[str, Callable[[Kept], str]] = {
 
 def _levels(kept: Kept, row: str, track: str, metric: str, kinds: Sequence[str] = ()) -> str:
     """Returns the means of a metric at the levels of a track, of all kinds of mazes or of some."""
-    numbers = []
-    for level in LEVELS:
-        result = kept.results.get((row, f"{track}-{level}"))
-        if result is None:
-            return _NOT_LOST
-        values = scores(result.records, result.oracle_steps)[metric]
-        if kinds:
-            values = values[np.isin(column(result.records, "kind"), kinds)]
-        numbers.append(_number(float(values.mean())))
-    return " / ".join(numbers)
+    if row == TRUE_POSE and not TRACKS[track].hides_pose(LEVELS[0]):
+        return _NOT_LOST
+    results = [kept.result(row, f"{track}-{level}") for level in LEVELS]
+    means = [estimate(result, metric, "kind" if kinds else "", kinds) for result in results]
+    return " / ".join("none" if mean is None else _number(mean.value) for mean in means)
 
 
-def _estimate(result: Result, metric: str) -> Estimate:
-    return mean_interval(scores(result.records, result.oracle_steps)[metric], column(result.records, "maze"))
-
-
-def _interval(estimate: Estimate) -> str:
-    return f"{_number(estimate.value)} [{_number(estimate.low)}, {_number(estimate.high)}]"
+def _interval(mean: Estimate | None) -> str:
+    return "none" if mean is None else f"{_number(mean.value)} [{_number(mean.low)}, {_number(mean.high)}]"
 
 
 def _number(value: float) -> str:

@@ -41,17 +41,18 @@ class MazeVecEnv(VecEnv):
     def close(self):
         self.envs.close()
 
+    # The environments are one object, so all of them have its attributes.
     def get_attr(self, attr_name, indices=None):
-        return [getattr(self.envs, attr_name)] * self.num_envs
+        return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name, value, indices=None):
         setattr(self.envs, attr_name, value)
 
     def env_method(self, method_name, *arguments, indices=None, **options):
-        return [getattr(self.envs, method_name)(*arguments, **options)]
+        return [getattr(self.envs, method_name)(*arguments, **options) for _ in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class, indices=None):
-        return [False] * self.num_envs
+        return [False for _ in self._get_indices(indices)]
 
 
 parser = argparse.ArgumentParser()

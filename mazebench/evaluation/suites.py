@@ -55,8 +55,8 @@ def _tracks(benchmark: str, **changes: Any) -> tuple[Part, ...]:
     )
 
 
-_KINDS = _tracks(KINDS_VERSION)
-_LOST_KINDS = tuple(part for part in _KINDS if TRACKS[part.changes["track"]].hides_pose(part.changes["level"]))
+_V3 = _tracks(KINDS_VERSION)
+_V3_LOST = tuple(part for part in _V3 if TRACKS[part.changes["track"]].hides_pose(part.changes["level"]))
 
 
 def _with(parts: tuple[Part, ...], **changes: Any) -> tuple[Part, ...]:
@@ -82,12 +82,12 @@ SUITES: dict[str, tuple[Part, ...]] = {
         _local("noise-0.5", (2, 6, 10), position_noise=0.5, episodes_per_distance=1),
     ),
     "tracks": _tracks(TRACKS_VERSION),
-    "v3": _KINDS,
-    "v3-dev": _with(_KINDS, split=DEV),  # to choose agents by
+    "v3": _V3,
+    "v3-dev": _with(_V3, split=DEV),  # to choose agents by
     # What agents are measured against: without the map, without map and goal, with the true pose.
-    "v3-no-map": _with(_KINDS, hide=("map",)),
-    "v3-no-goal": _with(_KINDS, hide=("map", "goal")),
-    "v3-true-pose": _with(_LOST_KINDS, exact_pose=True),
+    "v3-no-map": _with(_V3, hide=("map",)),
+    "v3-no-goal": _with(_V3, hide=("map", "goal")),
+    "v3-true-pose": _with(_V3_LOST, exact_pose=True),
 }
 
 
