@@ -17,10 +17,10 @@ class Adrift(BuildingTrack):
 
     help = "Doors have moved since the map was drawn, and the pose is odometry, which does not tell the place on it."
     levels = (
-        ".7 of the shortest paths on the map are blocked; the start is marked, the heading is unknown",
-        ".7 of them; the start is unknown, too: planes 1 and 3 of the context are zero",
-        ".85 of them; and the odometry drifts: its scale is off by up to 10 %, its heading walks by 2 degrees per root "
-        "second",
+        "doors have moved: .7 of the paths are blocked; the start is marked, the heading is unknown",
+        "the same doors; the start is unknown, too: planes 1 and 3 of the context are zero",
+        "doors have moved: .85 of the paths are blocked; the odometry drifts: its scale is off by up to 10 %, its "
+        "heading walks by 2 degrees per root second",
     )
     refused_sensors = Lost.refused_sensors
     spare_steps = 150  # so that a lost robot can look for its place

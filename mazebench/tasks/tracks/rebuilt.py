@@ -35,9 +35,9 @@ class Rebuilt(BuildingTrack):
 
     help = "Doors have moved since the map was drawn."
     levels = (
-        "so many that .45 of the shortest paths on the map are blocked",
-        "so many that .7 of them are",
-        "so many that .85 of them are",
+        "doors have moved: .45 of the shortest paths on the map are blocked",
+        "doors have moved: .7 of the paths are blocked",
+        "doors have moved: .85 of the paths are blocked",
     )
 
     def parts(self, level: int) -> Sequence[tuple[Perturbation, float]]:

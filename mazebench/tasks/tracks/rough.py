@@ -23,9 +23,9 @@ class Rough(Adrift):
 
     help = "The map is drawn by hand, doors have moved since, and the pose is odometry."
     levels = (
-        "bent by up to 0.5 cells, .45 of the shortest paths on it are blocked; the start is marked",
-        "bent by up to 1 cell, .7 of them; the start is unknown, too",
-        "bent by up to 1.5 cells, .7 of them; mirrored with probability .5, and the odometry drifts",
+        "bent by up to 0.5 cells, and doors have moved: .45 of the paths are blocked; the start is marked",
+        "bent by up to 1 cell, .7 of the paths are blocked; the start is unknown, too",
+        "bent by up to 1.5 cells, .7 of the paths are blocked; mirrored with probability .5, and the odometry drifts",
     )
 
     def parts(self, level: int) -> Sequence[tuple[Perturbation, float]]:
