@@ -101,7 +101,9 @@ def num_bytes(folder: pathlib.Path) -> int:
 
 def num_metrics(folder: pathlib.Path) -> int:
     """Lines of metrics that trainings below `folder` have written."""
-    return sum(path.read_bytes().count(b"\n") for path in folder.rglob("metrics.jsonl"))
+    # os.walk passes over folders that are renamed meanwhile, which rglob does not.
+    paths = [pathlib.Path(root) / "metrics.jsonl" for root, _, files in os.walk(folder) if "metrics.jsonl" in files]
+    return sum(path.read_bytes().count(b"\n") for path in paths)
 
 
 def run_through_kills(
