@@ -26,7 +26,6 @@ from mazebench.report.figures.figure import Figure, Panel, Point, Series
 from mazebench.report.looks import all_looks
 from mazebench.report.table import Cell
 from mazebench.results.intervals import Estimate
-from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 
 _DODGE = 0.09  # of the step between two ticks, by which series stand beside one another
@@ -94,16 +93,14 @@ def learning(kept: Kept) -> Figure:
     panels = {}
     for title, name in tables.items():
         columns = {column.label: column.cells["success_rate"] for column in kept.report[name].columns}
-        panels[title] = {row: [_of_cell(cell) for cell in columns[row]] for row in rows if row in columns}
+        panels[title] = {row: [_of_cell(cell) for cell in columns[row]] for row in rows}
     ticks = [kept.report[name].rows for name in tables.values()]
     return _figure("learning", "Wrong maps without a lidar: success rate", panels, "", ticks)
 
 
 def _levels(kept: Kept, row: str, track: str, field: str = "", values: Sequence[Any] = ()) -> list[Estimate | None]:
     """Returns the share on time at the levels of a track, of the episodes that `estimate` counts."""
-    if row == TRUE_POSE and not TRACKS[track].hides_pose(LEVELS[0]):
-        return []
-    return [estimate(kept.result(row, f"{track}-{level}"), ON_TIME_125, field, values) for level in LEVELS]
+    return [estimate(result, ON_TIME_125, field, values) for result in kept.levels(row, track)]
 
 
 def _of_cell(cell: Cell | None) -> Estimate | None:

@@ -22,7 +22,8 @@ from mazebench.results.metrics import ON_TIME_METRICS, scores
 from mazebench.results.reading import CONFIG, EPISODES, ORACLE, SUITE, SUMMARY, Result, load_result
 from mazebench.results.records import column
 from mazebench.storage.files import make_folder, open_whole
-from mazebench.tasks.tracks import tracks_of
+from mazebench.tasks.tracks import TRACKS, tracks_of
+from mazebench.tasks.tracks.base import LEVELS
 
 PAPER, V3 = "paper", "v3"  # the suites
 TRACKS_V3 = tracks_of(V3)
@@ -52,6 +53,16 @@ class Kept:
         if (row, part) not in self.results:
             raise InputError(f"expected an evaluation of {row} on {part} among the records, found none")
         return self.results[row, part]
+
+    def levels(self, row: str, track: str) -> list[Result]:
+        """Returns an agent's evaluations at the levels of a track; none with the true pose on a track that tells it.
+
+        Raises:
+          InputError: if one is not kept.
+        """
+        if row == TRUE_POSE and not TRACKS[track].hides_pose(LEVELS[0]):
+            return []
+        return [self.result(row, f"{track}-{level}") for level in LEVELS]
 
 
 def read_kept(folder: pathlib.Path) -> Kept:

@@ -28,7 +28,6 @@ from mazebench.report.table import METRICS, Cell, Table, escape_markdown
 from mazebench.results.comparison import compare_results
 from mazebench.results.intervals import Estimate
 from mazebench.results.metrics import ON_TIME_METRICS
-from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 
 _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints success rates
@@ -210,11 +209,8 @@ TABLES: dict[str, Callable[[Kept], str]] = {
 
 def _levels(kept: Kept, row: str, track: str, metric: str, kinds: Sequence[str] = ()) -> str:
     """Returns the means of a metric at the levels of a track, of all kinds of mazes or of some."""
-    if row == TRUE_POSE and not TRACKS[track].hides_pose(LEVELS[0]):
-        return _NOT_LOST
-    results = [kept.result(row, f"{track}-{level}") for level in LEVELS]
-    means = [estimate(result, metric, "kind" if kinds else "", kinds) for result in results]
-    return " / ".join("none" if mean is None else _number(mean.value) for mean in means)
+    means = [estimate(result, metric, "kind" if kinds else "", kinds) for result in kept.levels(row, track)]
+    return " / ".join("none" if mean is None else _number(mean.value) for mean in means) or _NOT_LOST
 
 
 def _interval(mean: Estimate | None) -> str:
