@@ -28,6 +28,7 @@ CONFIGS = {
     "mmn, one code": dataclasses.replace(SMALL, rows=False, reading=False),
     "mmn, no hypermodel": dataclasses.replace(SMALL, rows=False, hypermodel=False),
 }
+WITHOUT_MODEL = dataclasses.replace(SMALL, model=False)
 OF_ALL = pytest.mark.parametrize("config", CONFIGS.values(), ids=CONFIGS)
 
 
@@ -135,7 +136,11 @@ def test_lookahead_is_every_action_of_the_model_by_itself(config):
 
 @pytest.mark.parametrize(
     "config",
-    [*CONFIGS.values(), dataclasses.replace(SMALL, value_target="tree_backup", policy_target="lookahead")],
+    [
+        *CONFIGS.values(),
+        dataclasses.replace(SMALL, value_target="tree_backup", policy_target="lookahead"),
+        WITHOUT_MODEL,
+    ],
 )
 def test_same_seed_gives_the_same_first_updates(config, mazes):
     learners = [make_learner(mazes, config) for _ in range(2)]
@@ -151,18 +156,19 @@ def test_what_tells_early_whether_a_run_will_work_is_logged(mazes):
     assert set(make_learner(mazes).update()) == losses | others
 
 
-def test_learner_goes_on_as_if_it_had_not_been_saved(tmp_path, mazes):
-    learner = make_learner(mazes)
+@pytest.mark.parametrize("config", [SMALL, WITHOUT_MODEL])
+def test_learner_goes_on_as_if_it_had_not_been_saved(config, tmp_path, mazes):
+    learner = make_learner(mazes, config)
     for _ in range(3):
         learner.update()
     learner.save(tmp_path, {})
     expected = [learner.update() for _ in range(3)]
-    resumed = make_learner(mazes, seed=1, steps=1)
+    resumed = make_learner(mazes, config, seed=1, steps=1)
     resumed.load(tmp_path)
     assert [resumed.update() for _ in range(3)] == expected
 
 
-@OF_ALL
+@pytest.mark.parametrize("config", [*CONFIGS.values(), WITHOUT_MODEL])
 def test_saved_and_built_agent_acts_identically(config, tmp_path, mazes):
     learner = make_learner(mazes, config)
     learner.update()
@@ -180,8 +186,9 @@ def test_agent_with_one_code_a_context_says_which_sizes_it_serves(tmp_path, maze
         MMN.build(Interface("local", 13, 13), checkpoint=tmp_path / "agent.safetensors")
 
 
-def test_actions_do_not_depend_on_what_else_is_in_the_batch():
-    agent = MMN(SMALL, 7, seed=2)
+@pytest.mark.parametrize("config", [SMALL, WITHOUT_MODEL])
+def test_actions_do_not_depend_on_what_else_is_in_the_batch(config):
+    agent = MMN(config, 7, seed=2)
     torch.nn.init.normal_(agent.network.heads.weight)
     observation = an_observation(77)
 
@@ -236,9 +243,11 @@ def test_motion_is_told_from_where_the_episode_began_through_its_landmarks(confi
         torch.testing.assert_close(state.code.positions[env, :2], torch.tensor(anchor, dtype=torch.float32))
 
 
-def test_mmn_after_a_minute_beats_random_in_a_small_maze():
+@pytest.mark.parametrize("model", [True, False])
+def test_mmn_after_a_minute_beats_random_in_a_small_maze(model):
     """The learning test: goals 2 and 3 cells away in 25 steps."""
     values = {
+        "model": model,
         "hidden": 32,
         "head_hidden": 64,
         "num_simulations": 4,

@@ -1,12 +1,13 @@
 """Targets and losses of MMN, by numbers one can do by hand."""
 
+import dataclasses
 import math
 
 import pytest
 import torch
 from mazebench_agents.mmn.batches import Batch
 from mazebench_agents.mmn.config import MMNConfig
-from mazebench_agents.mmn.losses import cross_entropy, two_hot, unrolled_losses
+from mazebench_agents.mmn.losses import cross_entropy, q_losses, two_hot, unrolled_losses
 from mazebench_agents.mmn.network import MMNNetwork
 from mazebench_agents.mmn.targets import Targets, n_step_returns, tree_backup_returns
 
@@ -100,11 +101,11 @@ def make_batch(at_goal_step=None):
     return batch, Targets(torch.full((2, 1, length), -3.0), torch.full((2, 1, length, 6), 1 / 6))
 
 
-def make_network():
+def make_network(config=SMALL):
     """A network that is untrained, but for values: they are uniform over ten bins."""
     torch.manual_seed(0)
-    network = MMNNetwork(SMALL, 7)
-    torch.nn.init.zeros_(network.heads.bias[6:-1])
+    network = MMNNetwork(config, 7)
+    torch.nn.init.zeros_(network.heads.bias[6:-1] if config.model else network.heads.bias)
     return network
 
 
@@ -117,6 +118,43 @@ def test_losses_of_an_untrained_network_by_hand():
     assert losses["goal_loss"].item() == pytest.approx(math.log(1 + math.exp(-4)), rel=1e-4)
     assert metrics["value_error"].item() == pytest.approx(1.5)  # the mean of -9 to 0 is -4.5, and -3 is the target
     assert metrics["value"].item() == -3.0
+
+
+class TestWithoutModel:
+    CONFIG = dataclasses.replace(SMALL, model=False)
+
+    def test_targets_by_hand(self):
+        """All values are -4.5. A return takes 5 steps, or fewer at the end, and is -9 at least."""
+        batch, _ = make_batch()
+        network = make_network(self.CONFIG)
+        losses, metrics = q_losses(network, network, self.CONFIG, batch)
+        returns = [-9.0] * 6 + [-4.5 - steps for steps in (4, 3, 2, 1)]
+        assert metrics["value"].item() == pytest.approx(sum(returns) / 10)
+        assert losses["value_loss"].item() == pytest.approx(math.log(10), rel=1e-5)
+
+    def test_the_step_into_the_goal_is_worth_nothing_and_ends_what_is_learned(self):
+        batch, _ = make_batch(at_goal_step=3)
+        network = make_network(self.CONFIG)
+        _, metrics = q_losses(network, network, self.CONFIG, batch)
+        assert metrics["value"].item() == pytest.approx((-2 - 1 + 0) / 3)
+
+    def test_the_network_chooses_the_action_whose_value_the_target_network_tells(self):
+        batch, _ = make_batch()
+        network, target = make_network(self.CONFIG), make_network(self.CONFIG)
+        with torch.no_grad():
+            network.heads.bias[2 * 10 + 9] = 20.0  # by the network, action 2 is worth 0
+            target.heads.bias[2 * 10 + 7] = 20.0  # by the target network it is worth -2
+        _, metrics = q_losses(network, target, self.CONFIG, batch)
+        returns = [-7.0] * 6 + [-2.0 - steps for steps in (4, 3, 2, 1)]
+        assert metrics["value"].item() == pytest.approx(sum(returns) / 10, rel=1e-4)
+
+    def test_only_the_action_that_was_taken_learns(self):
+        batch, _ = make_batch()
+        network = make_network(self.CONFIG)
+        losses, _ = q_losses(network, network, self.CONFIG, batch)
+        (gradient,) = torch.autograd.grad(losses["value_loss"], network.heads.bias)
+        assert gradient[:10].abs().sum() > 0
+        assert not gradient[10:].any()
 
 
 def test_map_ratio_compares_the_weights_of_two_mazes():

@@ -21,6 +21,7 @@ class MMNConfig:
     """
 
     # Networks
+    model: bool = True  # False, an ablation: no model and no search; the heads give action values, by Q-learning
     hypermodel: bool = True  # False, an ablation: the code of the context is an input of an ordinary transition
     rows: bool = True  # generates the first layer's weights of a position with convolutions, for each cell
     reading: bool = True  # the heads, the paper's g(s, c), read convolutions of the context at the estimated position

@@ -14,7 +14,7 @@ from ..common.descent import Descent, in_numbers
 from ..common.learner import HindsightLearner
 from .batches import make_batch
 from .config import MMNConfig
-from .losses import unrolled_losses
+from .losses import q_losses, unrolled_losses
 from .network import MMNNetwork
 from .targets import targets_of
 
@@ -46,11 +46,14 @@ class MMNLearner(HindsightLearner):
         turned = int(self.rng.integers(symmetry.NUM_SYMMETRIES)) if config.symmetries else 0
         batch = make_batch(sample, maps=self.maps, turned=turned, device=network.support.device)
 
-        # Targets of values and policies in all states, by the target network.
-        targets = targets_of(self.descent.target, config, batch)
+        if config.model:
+            # Targets of values and policies in all states, by the target network.
+            targets = targets_of(self.descent.target, config, batch)
 
-        # Losses of the model, unrolled from some of the states.
-        losses, metrics = unrolled_losses(network, config, batch, targets)
+            # Losses of the model, unrolled from some of the states.
+            losses, metrics = unrolled_losses(network, config, batch, targets)
+        else:
+            losses, metrics = q_losses(network, self.descent.target, config, batch)
 
         metrics["gradient_norm"] = self.descent.step(torch.stack(list(losses.values())).sum())
         return in_numbers(losses | metrics)

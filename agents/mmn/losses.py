@@ -11,8 +11,8 @@ from torch.nn import functional
 
 from .batches import Batch
 from .config import MMNConfig
-from .network import Code, MMNNetwork
-from .targets import Targets
+from .network import Q_SCALE, Code, MMNNetwork
+from .targets import Targets, n_step_returns
 
 _HIDDEN_GRADIENT = 0.5  # of an unrolled state at each step: MuZero's
 _OTHER_MAP = "model_error_other_map"
@@ -93,6 +93,41 @@ def unrolled_losses(
     metrics = watched.means()
     metrics["map_ratio"] = metrics.pop(_OTHER_MAP) / metrics["model_error_1"].clamp(min=1e-6)
     return losses.means(), metrics
+
+
+def q_losses(
+    network: MMNNetwork, target_network: MMNNetwork, config: MMNConfig, batch: Batch
+) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor]]:
+    """Returns losses by name, to be summed, and other scalars by name: what is learned without a model.
+
+    Action values learn n-step returns along the experience, which end with the target network's value of the action
+    that `network` chooses (double Q-learning, van Hasselt et al. 2016). Ends are learned as with a model, since they
+    teach the position on the map.
+    """
+    states, features = batch.exists.shape[1:], batch.features.flatten(1, 2)
+
+    def predict(network: MMNNetwork) -> list[torch.Tensor]:
+        """Returns action values `[G, S, L + 1, 6]` and goal logits `[G, S, L + 1]`."""
+        code = network.hypermodel(batch.context, batch.anchor)
+        return [out.unflatten(1, states) for out in network.predict_without_model(network.encode(features), code)]
+
+    values, goal_logit = predict(network)
+    with torch.no_grad():
+        best = values.argmax(dim=-1, keepdim=True)
+        bootstrap = predict(target_network)[0].gather(-1, best)[..., 0]
+        returns = n_step_returns(bootstrap, batch.at_goal, batch.exists, config.n_step)[..., :-1]
+        returns = returns.clamp(-config.longest_value, 0.0)
+
+    # Of the actions that were taken, in states before the last one and outside of the goal.
+    taken = values[..., :-1, :].gather(-1, batch.action[..., None])[..., 0]
+    going = batch.exists[..., 1:] & ~batch.at_goal[..., :-1]
+    losses, watched = Means(), Means()
+    losses.add("value_loss", functional.smooth_l1_loss(taken, returns, reduction="none") / Q_SCALE, going)
+    ends = functional.binary_cross_entropy_with_logits(goal_logit, batch.at_goal.float(), reduction="none")
+    losses.add("goal_loss", ends, batch.exists)
+    watched.add("value_error", (taken.detach() - returns).abs(), going)
+    watched.add("value", returns, going)
+    return losses.means(), watched.means()
 
 
 def _add_model(

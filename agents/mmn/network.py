@@ -38,6 +38,7 @@ NUM_CHANGES = NUM_FREE + NUM_STOPPED
 # Contexts and states are computed as many at once, always, since PyTorch rounds differently at another batch size.
 CONTEXTS_AT_ONCE = 16  # few are new in one step
 STATES_AT_ONCE = 64
+Q_SCALE = 10.0  # steps; action values are learned in this unit
 SCALE_RATE = 5.0  # the scale's parameters are multiplied by it, so that they are of the order of other weights
 _CHANNELS = 24  # of the map's convolutions
 _NEAR = (1, 1, 1, 1)  # dilations of the hypermodel's convolutions
@@ -98,19 +99,27 @@ class MMNNetwork(nn.Module):
         self.hypermodel = Hypermodel(config, self._shapes, context_size)
         self.scale = nn.Parameter(torch.zeros(2, 2))
 
-        num_inputs += NUM_TO_GOAL + config.task_code + self.hypermodel.num_features
+        self._has_model = config.model
+        if config.model:
+            num_inputs += config.task_code
+            num_outputs = NUM_ACTIONS + self.num_bins + 1
+        else:
+            num_inputs -= config.latent
+            num_outputs = 1 + NUM_ACTIONS + 1
+        num_inputs += NUM_TO_GOAL + self.hypermodel.num_features
         self.body = nn.Sequential(
             nn.Linear(num_inputs, config.head_hidden),
             nn.ReLU(inplace=True),
             nn.Linear(config.head_hidden, config.head_hidden),
             nn.ReLU(inplace=True),
         )
-        self.heads = nn.Linear(config.head_hidden, NUM_ACTIONS + self.num_bins + 1)
+        self.heads = nn.Linear(config.head_hidden, num_outputs)
         nn.init.zeros_(self.heads.weight)
         with torch.no_grad():
-            self.heads.bias[:NUM_ACTIONS] = 0.0
-            self.heads.bias[NUM_ACTIONS:-1] = -(self.support - _FIRST_VALUE).abs() / 3
+            self.heads.bias[:] = 0.0
             self.heads.bias[-1] = _FIRST_GOAL
+            if config.model:
+                self.heads.bias[NUM_ACTIONS:-1] = -(self.support - _FIRST_VALUE).abs() / 3
 
     def encode(self, features: torch.Tensor) -> torch.Tensor:
         """Returns latent states `[G, K, D]` of state features `[G, K, 9]`; see `state_features`."""
@@ -177,15 +186,33 @@ class MMNNetwork(nn.Module):
 
     def predict(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> Predictions:
         """Returns the outputs of the heads."""
-        to_goal = goal_code(self.locate(latent, code), code.positions[:, 2:])
-        task = code.task[:, None].expand(-1, latent.shape[1], -1)
-        features = seen[..., NUM_PLACE + code.rows.shape[-1] :]
-        out = self.heads(self.body(torch.cat([self._inputs(latent, seen), to_goal, task, features], dim=-1)))
+        out = self._outputs(latent, seen, code)
         return Predictions(out[..., :NUM_ACTIONS], out[..., NUM_ACTIONS:-1], out[..., -1])
+
+    def predict_without_model(self, latent: torch.Tensor, code: Code) -> tuple[torch.Tensor, torch.Tensor]:
+        """Returns action values `[G, K, 6]` in steps, dueling (Wang et al. 2016), and goal logits `[G, K]`."""
+        out = self._outputs(latent, self.look(latent, code), code)
+        value, advantage, goal = out.split([1, NUM_ACTIONS, 1], dim=-1)
+        return Q_SCALE * (value + advantage - advantage.mean(dim=-1, keepdim=True)), goal[..., 0]
 
     def value(self, value_logits: torch.Tensor) -> torch.Tensor:
         """Returns the means `[G, K]` of categorical values, in steps."""
         return torch.softmax(value_logits, dim=-1) @ self.support
+
+    def _outputs(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
+        """Returns the outputs of the heads, `[G, K, ...]`.
+
+        Without a model they get neither the learned code of the motion nor that of the context: with either, Q-learning
+        did not learn a small world.
+        """
+        to_goal = goal_code(self.locate(latent, code), code.positions[:, 2:])
+        features = seen[..., NUM_PLACE + code.rows.shape[-1] :]
+        if self._has_model:
+            task = code.task[:, None].expand(-1, latent.shape[1], -1)
+            parts = [self._inputs(latent, seen), to_goal, task, features]
+        else:
+            parts = [self._inputs(self.decode(latent), seen), to_goal, features]
+        return self.heads(self.body(torch.cat(parts, dim=-1)))
 
     def _inputs(self, latent: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
         """Returns `[G, K, D + 34]`: the latent state, with 5 m as the unit of the displacement, and the places."""
