@@ -1,44 +1,62 @@
-"""Prints success rates on held-out mazes over the training runs of an agent, one checkpoint each.
+"""Prints success rates on held-out mazes over the training runs of one agent or more, one checkpoint each.
 
-Call it as `python benchmarks/over_seeds.py AGENT CHECKPOINT...`. The interval is Student's over the runs: it
-speaks of another run of the same training on these mazes.
+Call it as `python benchmarks/over_seeds.py AGENT CHECKPOINT... [--agent AGENT CHECKPOINT...]...`. Intervals are over
+runs and mazes together. Of several agents, it also prints the difference of each one and the next. The mazes are of no
+split, and none of them is one on which training runs are watched.
 """
 
 from __future__ import annotations
 
+import argparse
+import itertools
 import pathlib
-import sys
+from collections.abc import Sequence
 
 import numpy as np
-from scipy import stats
+from wrong_maps import held_out_task, outcomes
 
 from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
-from mazebench.tasks.build import make_spec
-from mazebench.training.held_out import HeldOutEvaluation
+from mazebench.results.intervals import Estimate, runs_interval
 
 _SIZE = 13
-_NUM_MAZES = 40  # two episodes in each at each distance
 _DISTANCES = (2, 4, 6, 8, 10)
 
 
-def main(name: str, checkpoints: list[str]) -> None:
-    """Prints one row for each checkpoint, then their means."""
-    agent_class = load_agent_class(name)
-    evaluation = HeldOutEvaluation(make_spec("local", _SIZE), _NUM_MAZES, _DISTANCES)
+def main() -> None:
+    """Prints a row for each checkpoint, then one for each agent, and for each agent and the next."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("first", nargs="+", metavar="AGENT CHECKPOINT...")
+    parser.add_argument("--agent", nargs="+", action="append", default=[], metavar=("AGENT", "CHECKPOINT"))
+    parser.add_argument("--seed", type=int, default=60_000)
+    parser.add_argument("--mazes", type=int, default=100, help="with two episodes in each at each distance")
+    given = parser.parse_args()
+    tasks = [held_out_task({"distances": (distance,)}, given.seed, given.mazes) for distance in _DISTANCES]
     print("success rate at", " ".join(f"{distance} cells" for distance in _DISTANCES))
-    rows = []
-    for checkpoint in checkpoints:
-        agent = agent_class.build(Interface("local", _SIZE, _SIZE), checkpoint=pathlib.Path(checkpoint))
-        rows.append(list(evaluation.success_rates(agent, lambda done, of: None).values()))
-        print(*(f"{rate:.3f}" for rate in rows[-1]), checkpoint, flush=True)
-    rates = np.array(rows)
-    if len(rates) > 1:
-        half = stats.t.ppf(0.975, len(rates) - 1) * stats.sem(rates, axis=0)
-        for mean, width in zip(rates.mean(axis=0), half, strict=True):
-            print(f"{mean:.2f} [{max(mean - width, 0):.2f}, {min(mean + width, 1):.2f}]", end="  ")
-        print("mean and 95 % interval")
+
+    scores, mazes = [], []
+    for name, *checkpoints in (given.first, *given.agent):
+        played = []
+        for checkpoint in checkpoints:
+            agent = load_agent_class(name).build(Interface("local", _SIZE, _SIZE), checkpoint=pathlib.Path(checkpoint))
+            results = [outcomes(agent, task, needs_truth=False) for task in tasks]
+            played.append([success for success, _, _ in results])
+            mazes = [maze for _, _, maze in results]
+            print(*(f"{success.mean():.3f}" for success in played[-1]), f" {name} {checkpoint}", flush=True)
+        scores.append((name, np.array(played)))  # [R, distances, E]
+
+    for name, values in scores:
+        if len(values) > 1:
+            _print_row([runs_interval(*at) for at in zip(values.swapaxes(0, 1), mazes, strict=True)], name)
+    for (name, values), (other, others) in itertools.pairwise(scores):
+        if min(len(values), len(others)) > 1:
+            pairs = zip(values.swapaxes(0, 1), mazes, others.swapaxes(0, 1), strict=True)
+            _print_row([runs_interval(*at) for at in pairs], f"{name} - {other}")
+
+
+def _print_row(estimates: Sequence[Estimate], name: str) -> None:
+    print(*(f"{each.value:.2f} [{each.low:.2f}, {each.high:.2f}]" for each in estimates), name, sep="  ")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2:])
+    main()

@@ -102,10 +102,13 @@ def make_batch(at_goal_step=None):
 
 
 def make_network(config=SMALL):
-    """A network that is untrained, but for values: they are uniform over ten bins."""
+    """A network that is untrained, but for values: they are -4.5, of ten bins or of actions."""
     torch.manual_seed(0)
     network = MMNNetwork(config, 7)
-    torch.nn.init.zeros_(network.heads.bias[6:-1] if config.model else network.heads.bias)
+    if config.model:
+        torch.nn.init.zeros_(network.heads.bias[6:-1])
+    else:
+        torch.nn.init.constant_(network.heads.bias[0], -0.45)
     return network
 
 
@@ -130,7 +133,8 @@ class TestWithoutModel:
         losses, metrics = q_losses(network, network, self.CONFIG, batch)
         returns = [-9.0] * 6 + [-4.5 - steps for steps in (4, 3, 2, 1)]
         assert metrics["value"].item() == pytest.approx(sum(returns) / 10)
-        assert losses["value_loss"].item() == pytest.approx(math.log(10), rel=1e-5)
+        errors = [-4.5 - value for value in returns]
+        assert losses["value_loss"].item() == pytest.approx(sum(error - 0.5 for error in errors) / 10 / 10)
 
     def test_the_step_into_the_goal_is_worth_nothing_and_ends_what_is_learned(self):
         batch, _ = make_batch(at_goal_step=3)
@@ -142,19 +146,21 @@ class TestWithoutModel:
         batch, _ = make_batch()
         network, target = make_network(self.CONFIG), make_network(self.CONFIG)
         with torch.no_grad():
-            network.heads.bias[2 * 10 + 9] = 20.0  # by the network, action 2 is worth 0
-            target.heads.bias[2 * 10 + 7] = 20.0  # by the target network it is worth -2
+            network.heads.bias[1 + 2] = 0.6  # by the network, action 2 is the best
+            target.heads.bias[:7] = torch.tensor([-0.55, 0.0, 0.0, 0.6, 0.0, 0.9, 0.0])  # -2 by the target, 4 is best
         _, metrics = q_losses(network, target, self.CONFIG, batch)
         returns = [-7.0] * 6 + [-2.0 - steps for steps in (4, 3, 2, 1)]
         assert metrics["value"].item() == pytest.approx(sum(returns) / 10, rel=1e-4)
 
     def test_only_the_action_that_was_taken_learns(self):
+        """An advantage counts from the mean of all six."""
         batch, _ = make_batch()
         network = make_network(self.CONFIG)
         losses, _ = q_losses(network, network, self.CONFIG, batch)
         (gradient,) = torch.autograd.grad(losses["value_loss"], network.heads.bias)
-        assert gradient[:10].abs().sum() > 0
-        assert not gradient[10:].any()
+        taken, *others = gradient[1:7].tolist()
+        assert taken != 0
+        assert others == pytest.approx([-taken / 5] * 5)
 
 
 def test_map_ratio_compares_the_weights_of_two_mazes():

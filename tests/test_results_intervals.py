@@ -14,6 +14,7 @@ from mazebench.results.intervals import (
     mean_interval,
     pool_runs,
     probability_of_improvement,
+    runs_interval,
     wilson_interval,
 )
 
@@ -199,3 +200,40 @@ class TestRuns:
         scores = np.full((3, 4), 0.7)
         found = probability_of_improvement(scores, scores)
         assert (found.value, found.low, found.high) == (0.5, 0.5, 0.5)
+
+
+class TestRunsAndMazes:
+    RUNS = np.array([outcomes([2, 3, 1, 4], 4)[0], outcomes([3, 4, 1, 4], 4)[0], outcomes([4, 4, 4, 4], 4)[0]])
+    MAZES = np.arange(4).repeat(4)
+
+    def test_half_widths_over_runs_and_mazes_add_as_squares(self):
+        means = np.array([10, 12, 16]) / 16
+        student = stats.t.ppf(0.975, 2) * stats.sem(means)
+        over_mazes = mean_interval(self.RUNS.mean(axis=0), self.MAZES)
+        found = runs_interval(self.RUNS, self.MAZES)
+        assert found.value == pytest.approx(means.mean())
+        assert found.low == pytest.approx(found.value - np.hypot(student, over_mazes.value - over_mazes.low))
+        assert found.high == 1
+
+    def test_equal_runs_have_the_interval_over_mazes(self):
+        assert runs_interval(self.RUNS[[0, 0]], self.MAZES) == mean_interval(self.RUNS[0], self.MAZES)
+        none = np.zeros_like(self.RUNS)
+        expected = difference_interval(self.RUNS[0], self.MAZES)
+        assert runs_interval(self.RUNS[[0, 0]], self.MAZES, none) == expected
+
+    def test_a_difference_has_the_degrees_of_freedom_of_welch(self):
+        others = np.array([outcomes([1, 0, 1, 1], 4)[0], outcomes([1, 2, 1, 3], 4)[0]])
+        over_mazes = difference_interval(self.RUNS.mean(axis=0) - others.mean(axis=0), self.MAZES)
+        welch = stats.ttest_ind(self.RUNS.mean(axis=1), others.mean(axis=1), equal_var=False)
+        low = welch.confidence_interval(0.95).low
+        found = runs_interval(self.RUNS, self.MAZES, others)
+        expected = np.hypot(found.value - low, found.value - over_mazes.low)
+        assert found.value - found.low == pytest.approx(expected)
+        assert found.high == 1
+
+    def test_an_agent_that_is_not_trained_has_one_run(self):
+        constant = np.full((1, 16), 0.5)
+        alone = runs_interval(self.RUNS, self.MAZES)
+        found = runs_interval(self.RUNS, self.MAZES, constant)
+        assert found.value == pytest.approx(alone.value - 0.5)
+        assert runs_interval(constant, self.MAZES) == mean_interval(constant[0], self.MAZES)

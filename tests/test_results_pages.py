@@ -15,7 +15,7 @@ from benchmarks.results.pages import PAGES, RECORDS, ROOT, with_tables
 from mazebench.errors import InputError
 from mazebench.results.reading import load_result
 
-NOTHING = Kept({}, {}, pd.DataFrame())
+NOTHING = Kept({}, {}, pd.DataFrame(), {})
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ class TestPages:
 
     def test_an_unknown_table_is_refused_in_a_line(self):
         for name in ("v9", "paper", "paper local-13 spl"):
-            with pytest.raises(InputError, match=f"unknown table '{name}'; tables: paper-local, v3-success"):
+            with pytest.raises(InputError, match=f"unknown table '{name}'; tables: paper-local, paper-runs"):
                 with_tables(f"<!-- table: {name} -->\n<!-- end of table -->\n", NOTHING)
 
     @pytest.mark.parametrize(

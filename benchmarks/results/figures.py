@@ -11,6 +11,7 @@ from typing import Any
 from benchmarks.results.kept import (
     BELIEF_PLANNER,
     BELIEF_RULE,
+    LOCAL,
     NAVIGATOR,
     NO_MAP,
     ON_TIME_125,
@@ -30,7 +31,7 @@ from mazebench.tasks.tracks.base import LEVELS
 
 _DODGE = 0.09  # of the step between two ticks, by which series stand beside one another
 # Of the report of the suite `paper`.
-_LOCAL, _FLIPS, _WARPS = "local-13", "flip-hierarchical-13", "warp-local-13"
+_FLIPS, _WARPS = "flip-hierarchical-13", "warp-local-13"
 _VIOLINS = "violins-noise-local-13"
 _SCORES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 
@@ -42,7 +43,7 @@ def figures(kept: Kept) -> list[Figure]:
     """Returns all figures that pages show."""
     looks = all_looks(list(kept.episodes.label.cat.categories))
     violins = [each for each in describe_distributions(kept.episodes, looks) if each.name == _VIOLINS]
-    of_report = [describe_table(kept.report[_LOCAL], looks), *violins]
+    of_report = [describe_table(kept.report[LOCAL], looks), *violins]
     return [map_worth(kept), learning(kept), novel_kinds(kept), what_fails(kept), *of_report]
 
 

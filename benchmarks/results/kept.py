@@ -26,6 +26,7 @@ from mazebench.tasks.tracks import TRACKS, tracks_of
 from mazebench.tasks.tracks.base import LEVELS
 
 PAPER, V3 = "paper", "v3"  # the suites
+LOCAL = "local-13"  # the part of `paper` that other training runs of an agent play, too
 TRACKS_V3 = tracks_of(V3)
 ON_TIME_125, ON_TIME_2 = ON_TIME_METRICS  # within 1.25 and 2 times the oracle's steps
 # Agents, with what they were told less or more than others.
@@ -33,6 +34,7 @@ NAVIGATOR, NO_MAP, TRUE_POSE = "navigator", "navigator without map", "navigator 
 BELIEF_PLANNER, BELIEF_RULE = "belief-planner", "belief-rule"
 
 _SUFFIX = ".tar.xz"
+_RUNS = f"runs{_SUFFIX}"  # other training runs of agents that ship
 _KEPT_FILES = (CONFIG, EPISODES, ORACLE, SUMMARY)
 
 
@@ -43,6 +45,11 @@ class Kept:
     results: dict[tuple[str, str], Result]  # by row of the agent, and part of a suite
     report: dict[str, Table]  # tables of the report of the suite `paper`, by name
     episodes: pd.DataFrame  # of that report
+    others: dict[str, list[Result]]  # by row of an agent, of its training runs that do not ship, on the part `LOCAL`
+
+    def runs(self, row: str) -> list[Result]:
+        """Returns the evaluations of all training runs of an agent on the part `LOCAL`, that which ships first."""
+        return [self.result(row, LOCAL), *self.others.get(row, ())]
 
     def result(self, row: str, part: str) -> Result:
         """Returns the evaluation of an agent on a part of a suite.
@@ -72,12 +79,16 @@ def read_kept(folder: pathlib.Path) -> Kept:
       InputError: if two are of the same agent and part, one is damaged, or none is of the suite `paper`.
     """
     results: dict[tuple[str, str], Result] = {}
+    others: dict[str, list[Result]] = {}
     with tempfile.TemporaryDirectory() as temporary:
         for path in sorted(folder.glob(f"*{_SUFFIX}")):
             with tarfile.open(path) as archive:
                 archive.extractall(pathlib.Path(temporary, path.name), filter="data")
         for summary in sorted(pathlib.Path(temporary).rglob(SUMMARY)):
             result = load_result(summary.parent)
+            if _RUNS in summary.parts:
+                others.setdefault(result.summary.row, []).append(result)
+                continue
             key = result.summary.row, result.summary.part or summary.parent.name
             if key in results:
                 archives = [each.folder.relative_to(temporary).parts[0] for each in (results[key], result)]
@@ -87,7 +98,7 @@ def read_kept(folder: pathlib.Path) -> Kept:
         if not paper:
             raise InputError(f"{folder}: expected records of the suite {PAPER!r}, found none")
         episodes = join_episodes(*read_in_order(paper))
-    return Kept(results, {table.name: table for table in build_tables(episodes)}, episodes)
+    return Kept(results, {table.name: table for table in build_tables(episodes)}, episodes, others)
 
 
 def keep(folder: pathlib.Path, records: pathlib.Path) -> pathlib.Path:

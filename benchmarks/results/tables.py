@@ -6,9 +6,12 @@ import functools
 import itertools
 from collections.abc import Callable, Iterable, Sequence
 
+import numpy as np
+
 from benchmarks.results.kept import (
     BELIEF_PLANNER,
     BELIEF_RULE,
+    LOCAL,
     NAVIGATOR,
     NO_MAP,
     ON_TIME_2,
@@ -26,8 +29,9 @@ from mazebench.report.looks import PAPER_MARKERS
 from mazebench.report.settings import DEFAULT_LANDMARK_DISTANCE
 from mazebench.report.table import METRICS, Cell, Table, escape_markdown
 from mazebench.results.comparison import compare_results
-from mazebench.results.intervals import Estimate
+from mazebench.results.intervals import Estimate, runs_interval
 from mazebench.results.metrics import ON_TIME_METRICS
+from mazebench.results.records import column
 from mazebench.tasks.tracks.base import LEVELS
 
 _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints success rates
@@ -45,6 +49,8 @@ _PAPER_ROWS = {
     "planner-closed-loop": "`planner-closed-loop`, hand-written",
     "oracle (privileged)": "`oracle`, privileged: gets the true maze and pose",
 }
+
+_BY_RANK = ("mmn", "mah", "dqn", "random")  # learned agents, and the one that they are to beat
 
 _PARTS = tuple((track, level) for track in TRACKS_V3 for level in LEVELS)
 _NOT_LOST = "not lost"  # of the navigator with the true pose, on tracks that tell it to all
@@ -89,7 +95,7 @@ def report_table(kept: Kept, name: str, metric: str) -> str:
 
 def paper_table(kept: Kept) -> str:
     """Returns success rates by distance and in the hierarchical task, a row for each agent, and the paper's MMN."""
-    local, routes = (kept.report[name] for name in ("local-13", "hierarchical-13"))
+    local, routes = (kept.report[name] for name in (LOCAL, "hierarchical-13"))
     chosen = [(local, str(distance)) for distance in _PRINTED_DISTANCES] + [(routes, str(DEFAULT_LANDMARK_DISTANCE))]
     labels = {column.label for column in local.columns}
     if unnamed := labels - _PAPER_ROWS.keys() - PAPER_MARKERS.keys():
@@ -106,6 +112,28 @@ def paper_table(kept: Kept) -> str:
         if label in labels
     ]
     return _table(header, rows)
+
+
+def paper_runs(kept: Kept) -> str:
+    """Returns mean success rates over training runs, and the differences of each agent and the one below it."""
+    runs = {row: kept.runs(row) for row in _BY_RANK}
+    records = runs[_BY_RANK[0]][0].records
+    success = {
+        row: np.array([column(each.records, "success") for each in of_agent], dtype=float)
+        for row, of_agent in runs.items()
+    }  # [R, E]
+    maze, distance = column(records, "maze"), column(records, "distance")
+
+    def cells(*rows: str) -> list[str]:
+        chosen = [distance == each for each in _PRINTED_DISTANCES]
+        return [
+            _interval(runs_interval(success[rows[0]][:, at], maze[at], *(success[row][:, at] for row in rows[1:])))
+            for at in chosen
+        ]
+
+    means = [[f"`{row}`, runs: {len(runs[row])}", *cells(row)] for row in _BY_RANK]
+    steps = [[f"`{row}` - `{below}`", *cells(row, below)] for row, below in itertools.pairwise(_BY_RANK)]
+    return _table(["agent", *map(str, _PRINTED_DISTANCES)], [*means, *steps])
 
 
 def v3_table(metric: str, kept: Kept) -> str:
@@ -195,6 +223,7 @@ def v3_navigator_kinds(kept: Kept) -> str:
 # By the name that a page gives.
 TABLES: dict[str, Callable[[Kept], str]] = {
     "paper-local": paper_table,
+    "paper-runs": paper_runs,
     "v3-success": functools.partial(v3_table, "success_rate"),
     "v3-on-time": functools.partial(v3_table, ON_TIME_125),
     "v3-on-time-2": functools.partial(v3_table, ON_TIME_2),

@@ -96,6 +96,36 @@ def difference_interval(differences: np.ndarray, mazes: np.ndarray) -> Estimate:
     return Estimate(mean, float(max(centre - half_width, -1)), float(min(centre + half_width, 1)))
 
 
+def runs_interval(values: np.ndarray, mazes: np.ndarray, others: np.ndarray | None = None) -> Estimate:
+    """Returns a mean over training runs and mazes, or the difference of two, with an interval over both together.
+
+    The half-widths of two intervals add as squares (Zou and Donner 2008): that over mazes, `mean_interval` or
+    `difference_interval` of each episode's mean over the runs, and Student's over runs (Welch's of a difference). The
+    chance in single episodes is in both, so it is on the wide side.
+
+    Args:
+      values: `[R, E]` in [0, 1], of R training runs in the same E episodes; one run if the agent is not trained.
+      mazes: `[E]`, any names or numbers.
+      others: `[R', E]`, R' runs of another agent in these episodes, whose mean is taken off.
+    """
+    if others is None:
+        runs, lowest = [values], 0.0
+        over_mazes = mean_interval(values.mean(axis=0), mazes)
+    else:
+        runs, lowest = [values, others], -1.0
+        over_mazes = difference_interval(values.mean(axis=0) - others.mean(axis=0), mazes)
+
+    means = [of_agent.mean(axis=1) for of_agent in runs if len(of_agent) > 1]
+    variances = np.array([np.var(each, ddof=1) / len(each) for each in means])
+    half_width = 0.0
+    if variances.any():
+        freedom = variances.sum() ** 2 / (variances**2 / [len(each) - 1 for each in means]).sum()
+        half_width = special.stdtrit(freedom, _UPPER_TAIL) * np.sqrt(variances.sum())
+    value = over_mazes.value
+    low, high = (np.hypot(value - end, half_width) for end in (over_mazes.low, over_mazes.high))
+    return Estimate(value, float(max(value - low, lowest)), float(min(value + high, 1)))
+
+
 def interquartile_mean(scores: np.ndarray) -> float:
     """Returns the mean of the middle half of all scores (Agarwal et al. 2021): a quarter goes at either end."""
     return float(stats.trim_mean(scores, 0.25, axis=None))
