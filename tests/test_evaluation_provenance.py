@@ -75,7 +75,7 @@ def test_an_installed_agent_is_named_by_the_hash_of_all_python_files_of_its_pack
     (package / "deep.py").write_text("def act(self, observation):\n    return 0\n")
     monkeypatch.syspath_prepend(tmp_path)
     agent_class = load_agent_class("packaged_at_hand:Mine")
-    found = code_hash(EvalOptions.of("mine"), agent_class)
+    found = code_hash("mine", agent_class)
     expected = hashlib.sha256()
     for name in ("__init__.py", "deep.py"):
         content = (package / name).read_bytes()

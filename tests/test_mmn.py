@@ -243,11 +243,9 @@ def test_motion_is_told_from_where_the_episode_began_through_its_landmarks(confi
         torch.testing.assert_close(state.code.positions[env, :2], torch.tensor(anchor, dtype=torch.float32))
 
 
-@pytest.mark.parametrize("model", [True, False])
-def test_mmn_after_a_minute_beats_random_in_a_small_maze(model):
+def test_mmn_after_a_minute_beats_random_in_a_small_maze():
     """The learning test: goals 2 and 3 cells away in 25 steps."""
     values = {
-        "model": model,
         "hidden": 32,
         "head_hidden": 64,
         "num_simulations": 4,

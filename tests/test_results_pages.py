@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pathlib
+import re
 import tarfile
 
 import pandas as pd
@@ -15,7 +16,8 @@ from benchmarks.results.pages import PAGES, RECORDS, ROOT, with_tables
 from mazebench.errors import InputError
 from mazebench.results.reading import load_result
 
-NOTHING = Kept({}, {}, pd.DataFrame(), {})
+RESULTS = "docs/results.md"
+NOTHING = Kept({}, {}, pd.DataFrame(), {}, {})
 
 
 @pytest.fixture(scope="module")
@@ -35,6 +37,17 @@ class TestPages:
     def test_the_tables_of_a_page_are_those_of_the_records(self, page, kept):
         text = (ROOT / page).read_text(encoding="utf-8")
         assert with_tables(text, kept) == text, "`make results` writes them anew"
+
+    @pytest.mark.parametrize(("page", "begin", "end"), [("README.md", "## Results", "## An agent"), (RESULTS, "", "")])
+    def test_numbers_in_prose_are_in_a_table_of_results(self, page, begin, end):
+        """Such as 0.52: those that are of two digits after the point, unless a command is printed beside them."""
+        tables = "".join(re.findall(r"^\|.*$", (ROOT / RESULTS).read_text(encoding="utf-8"), re.MULTILINE))
+        text = (ROOT / page).read_text(encoding="utf-8")
+        text = text[text.index(begin) : text.index(end) if end else None]
+        prose = re.sub(r"```.*?```|^\|.*?$", "", text, flags=re.DOTALL | re.MULTILINE)
+        found = set(re.findall(r"(?<![\w.])\d\.\d\d(?![\w.])", prose))
+        assert len(found) > 10
+        assert not found - set(re.findall(r"\d\.\d\d", tables))
 
     def test_no_other_page_has_such_tables(self):
         pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
@@ -70,6 +83,9 @@ class TestPages:
 
 
 class TestRecords:
+    def test_training_runs_are_read_by_name(self, kept):
+        assert [run.name for run in kept.training["mmn-hypermodel-false"]] == ["seed-0", "seed-1", "seed-2"]
+
     def test_an_archive_holds_the_evaluation_that_was_kept(self, folder, tmp_path):
         path = keep(folder, tmp_path / "records")
         with tarfile.open(path) as archive:
@@ -83,8 +99,22 @@ class TestRecords:
         assert keep(folder, tmp_path / "again").read_bytes() == path.read_bytes()
 
     def test_what_is_not_finished_is_not_kept(self, tmp_path):
-        with pytest.raises(InputError, match="expected finished evaluations, found none"):
+        with pytest.raises(InputError, match="expected finished evaluations or training runs, found neither"):
             keep(tmp_path, tmp_path / "records")
+
+    def test_a_training_run_is_kept_with_its_last_checkpoint(self, tmp_path):
+        run = tmp_path / "mine" / "seed-3"
+        for steps in ("000000000100", "000000000200"):
+            (run / "checkpoints" / steps).mkdir(parents=True)
+            (run / "checkpoints" / steps / "agent.safetensors").write_text(steps)
+            (run / "checkpoints" / steps / "replay.npz").write_text("large")
+        (run / "config.json").write_text('{"seed": 3}')
+        (run / "metrics.jsonl").write_text('{"env_steps": 100, "success_rate_2": 0.5}\n')
+        path = keep(run.parent, tmp_path / "records")
+        assert path == tmp_path / "records" / "training" / "mine.tar.xz"
+        with tarfile.open(path) as archive:
+            inside = ("config.json", "metrics.jsonl", "checkpoints/000000000200/agent.safetensors")
+            assert archive.getnames() == [f"mine/seed-3/{name}" for name in inside]
 
     def test_two_evaluations_of_one_agent_on_one_part_are_refused(self, folder, tmp_path):
         path = keep(folder, tmp_path)

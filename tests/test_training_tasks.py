@@ -36,6 +36,7 @@ def task_in(folder) -> dict[str, Any]:
     with safetensors.safe_open(folder / "checkpoints" / "000000001600" / "agent.safetensors", "numpy") as file:
         (metadata,) = map(json.loads, file.metadata().values())
     assert metadata["provenance"]["task"] == task
+    assert len(metadata["provenance"]["agent_code_sha256"]) == 64
     return task
 
 

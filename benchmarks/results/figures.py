@@ -8,6 +8,8 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from benchmarks.results.kept import (
     BELIEF_PLANNER,
     BELIEF_RULE,
@@ -44,7 +46,8 @@ def figures(kept: Kept) -> list[Figure]:
     looks = all_looks(list(kept.episodes.label.cat.categories))
     violins = [each for each in describe_distributions(kept.episodes, looks) if each.name == _VIOLINS]
     of_report = [describe_table(kept.report[LOCAL], looks), *violins]
-    return [map_worth(kept), learning(kept), novel_kinds(kept), what_fails(kept), *of_report]
+    own = [each(kept) for each in (map_worth, learning, novel_kinds, what_fails, model_and_search)]
+    return [*own, *of_report]
 
 
 def draw_figures(chosen: Sequence[Figure], folder: pathlib.Path) -> None:
@@ -97,6 +100,32 @@ def learning(kept: Kept) -> Figure:
         panels[title] = {row: [_of_cell(cell) for cell in columns[row]] for row in rows}
     ticks = [kept.report[name].rows for name in tables.values()]
     return _figure("learning", "Wrong maps without a lidar: success rate", panels, "", ticks)
+
+
+def model_and_search(kept: Kept) -> Figure:
+    """Returns learning curves with and without a model: means over training runs, with the lowest and the highest."""
+    runs = {
+        "mmn": kept.training["mmn"],
+        "mmn without model and search": kept.training["mmn-model-false"],
+        "mah": kept.training["mah"],
+    }
+    panels = []
+    for distance in (6, 8, 10):
+        series = []
+        for label, of_agent in runs.items():
+            rates: dict[float, list[float]] = {}
+            for line in (line for run in of_agent for line in run.lines):
+                if (name := f"success_rate_{distance}") in line:
+                    rates.setdefault(line["env_steps"] / 1e6, []).append(line[name])
+            points = [
+                Point(x, float(np.mean(at)), min(at), max(at)) for x, at in rates.items() if len(at) == len(of_agent)
+            ]
+            series.append(Series(label, tuple(points), has_bars=True))
+        panels.append(
+            Panel(f"{distance} cells", "million agent steps", tuple(series), y_range=(-0.05, 1.05), y_ticks=_SCORES)
+        )
+    title = "What model and search bring: success rate on held-out mazes over training"
+    return Figure("model-and-search", title, "", tuple(panels), all_looks(list(runs)), panel_height=2.1)
 
 
 def _levels(kept: Kept, row: str, track: str, field: str = "", values: Sequence[Any] = ()) -> list[Estimate | None]:

@@ -1,4 +1,4 @@
-"""The evaluations that are kept in archives, an archive for each folder of results."""
+"""The evaluations and training runs that are kept in archives, an archive for each folder of them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from mazebench_agents.common.checkpoint import AGENT_FILE
 
 from mazebench.errors import InputError
 from mazebench.report.frame import join_episodes
+from mazebench.report.learning_curves import Run, read_run
 from mazebench.report.report import read_in_order
 from mazebench.report.table import Table
 from mazebench.report.tables import build_tables
@@ -24,6 +26,7 @@ from mazebench.results.records import column
 from mazebench.storage.files import make_folder, open_whole
 from mazebench.tasks.tracks import TRACKS, tracks_of
 from mazebench.tasks.tracks.base import LEVELS
+from mazebench.training.run_folder import CHECKPOINTS, METRICS
 
 PAPER, V3 = "paper", "v3"  # the suites
 LOCAL = "local-13"  # the part of `paper` that other training runs of an agent play, too
@@ -34,6 +37,7 @@ NAVIGATOR, NO_MAP, TRUE_POSE = "navigator", "navigator without map", "navigator 
 BELIEF_PLANNER, BELIEF_RULE = "belief-planner", "belief-rule"
 
 _SUFFIX = ".tar.xz"
+_TRAINING = "training"  # the folder of archives of training runs
 _RUNS = f"runs{_SUFFIX}"  # other training runs of agents that ship
 _KEPT_FILES = (CONFIG, EPISODES, ORACLE, SUMMARY)
 
@@ -46,6 +50,7 @@ class Kept:
     report: dict[str, Table]  # tables of the report of the suite `paper`, by name
     episodes: pd.DataFrame  # of that report
     others: dict[str, list[Result]]  # by row of an agent, of its training runs that do not ship, on the part `LOCAL`
+    training: dict[str, list[Run]]  # by name of the archive, what training runs logged
 
     def runs(self, row: str) -> list[Result]:
         """Returns the evaluations of all training runs of an agent on the part `LOCAL`, that which ships first."""
@@ -73,57 +78,76 @@ class Kept:
 
 
 def read_kept(folder: pathlib.Path) -> Kept:
-    """Returns the evaluations in all archives of `folder`.
+    """Returns what all archives of `folder` hold, and those of training runs in its folder `training`.
 
     Raises:
-      InputError: if two are of the same agent and part, one is damaged, or none is of the suite `paper`.
+      InputError: if two evaluations are of the same agent and part, one is damaged, or none is of the suite `paper`.
     """
     results: dict[tuple[str, str], Result] = {}
     others: dict[str, list[Result]] = {}
+    training: dict[str, list[Run]] = {}
     with tempfile.TemporaryDirectory() as temporary:
-        for path in sorted(folder.glob(f"*{_SUFFIX}")):
+        unpacked = pathlib.Path(temporary)
+        for path in sorted(folder.rglob(f"*{_SUFFIX}")):
             with tarfile.open(path) as archive:
-                archive.extractall(pathlib.Path(temporary, path.name), filter="data")
-        for summary in sorted(pathlib.Path(temporary).rglob(SUMMARY)):
+                archive.extractall(unpacked / path.relative_to(folder), filter="data")
+
+        for config in sorted((unpacked / _TRAINING).rglob(CONFIG)):
+            name = config.relative_to(unpacked / _TRAINING).parts[0].removesuffix(_SUFFIX)
+            if run := read_run(config.parent, config.parent.name):
+                training.setdefault(name, []).append(run)
+
+        for summary in sorted(unpacked.rglob(SUMMARY)):
             result = load_result(summary.parent)
             if _RUNS in summary.parts:
                 others.setdefault(result.summary.row, []).append(result)
                 continue
             key = result.summary.row, result.summary.part or summary.parent.name
             if key in results:
-                archives = [each.folder.relative_to(temporary).parts[0] for each in (results[key], result)]
+                archives = [each.folder.relative_to(unpacked).parts[0] for each in (results[key], result)]
                 raise InputError(f"expected one evaluation of {key[0]} on {key[1]}, found two: {', '.join(archives)}")
             results[key] = result
         paper = [result.folder for result in results.values() if result.summary.suite == PAPER]
         if not paper:
             raise InputError(f"{folder}: expected records of the suite {PAPER!r}, found none")
         episodes = join_episodes(*read_in_order(paper))
-    return Kept(results, {table.name: table for table in build_tables(episodes)}, episodes, others)
+    return Kept(results, {table.name: table for table in build_tables(episodes)}, episodes, others, training)
 
 
 def keep(folder: pathlib.Path, records: pathlib.Path) -> pathlib.Path:
     """Writes an archive of the finished evaluations in `folder` into `records`, in the place of one of its name.
 
-    Equal evaluations give equal bytes.
+    A folder without any may hold training runs. Their configs, curves and last checkpoints go to `records/training`.
+    Equal contents give equal bytes.
 
     Raises:
-      InputError: if nothing in the folder is finished.
+      InputError: if there is neither.
     """
     folder = folder.resolve()
     finished = sorted(path.parent for path in folder.rglob(SUMMARY))
-    if not finished:
-        raise InputError(f"{folder}: expected finished evaluations, found none")
-    paths = [path for each in finished for name in _KEPT_FILES if (path := each / name).exists()]
-    paths += sorted(folder.rglob(SUITE))
-    make_folder(records)
-    target = records / f"{folder.name}{_SUFFIX}"
-    with open_whole(target) as file, tarfile.open(fileobj=file, mode="w:xz", preset=9) as archive:
-        for path in paths:
-            entry = tarfile.TarInfo(f"{folder.name}/{path.relative_to(folder).as_posix()}")
-            entry.size = path.stat().st_size
-            with path.open("rb") as content:
+    if finished:
+        paths = [path for each in finished for name in _KEPT_FILES if (path := each / name).exists()]
+        paths += sorted(folder.rglob(SUITE))
+        return _archive(folder, paths, records)
+    runs = sorted(path.parent for path in folder.rglob(METRICS))
+    if not runs:
+        raise InputError(f"{folder}: expected finished evaluations or training runs, found neither")
+    paths = [run / name for run in runs for name in (CONFIG, METRICS)]
+    paths += [path for run in runs for path in sorted(run.glob(f"{CHECKPOINTS}/*/{AGENT_FILE}"))[-1:]]
+    return _archive(folder, paths, records / _TRAINING)
+
+
+def _archive(folder: pathlib.Path, paths: Sequence[pathlib.Path], target: pathlib.Path) -> pathlib.Path:
+    """Writes files of `folder` into an archive of its name in the folder `target`."""
+    make_folder(target)
+    path = target / f"{folder.name}{_SUFFIX}"
+    with open_whole(path) as file, tarfile.open(fileobj=file, mode="w:xz", preset=9) as archive:
+        for each in paths:
+            entry = tarfile.TarInfo(f"{folder.name}/{each.relative_to(folder).as_posix()}")
+            entry.size = each.stat().st_size
+            with each.open("rb") as content:
                 archive.addfile(entry, content)
-    return target
+    return path
 
 
 def estimate(result: Result, metric: str, field: str = "", values: Sequence[Any] = ()) -> Estimate | None:

@@ -46,7 +46,7 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
         "checkpoint_metadata": checkpoint_metadata(options.checkpoint),
         "agent_class": f"{agent_class.__module__}:{agent_class.__qualname__}",
         "agent_package": _package_of(options.agent, agent_class),
-        "agent_code_sha256": code_hash(options, agent_class),
+        "agent_code_sha256": code_hash(options.agent, agent_class),
         "seed": options.seed,
         # With the distances and the time limit that are played, of which the options may only say to choose them.
         "options": {
@@ -76,7 +76,7 @@ def mazes_hash(task: TaskSpec) -> str:
     return hashlib.sha256(walls + scale.encode("ascii")).hexdigest()
 
 
-def code_hash(options: EvalOptions, agent_class: type[Agent]) -> str | None:
+def code_hash(agent: str, agent_class: type[Agent]) -> str | None:
     """Returns the SHA-256 of an agent's code, which may be edited between two sittings of a run.
 
     It is that of the file of a `module:Class`, and that of all Python files of the package of an installed agent. None
@@ -87,7 +87,7 @@ def code_hash(options: EvalOptions, agent_class: type[Agent]) -> str | None:
     except (TypeError, OSError):
         return None
     package = sys.modules[agent_class.__module__.partition(".")[0]]
-    if ":" in options.agent or not hasattr(package, "__path__"):
+    if ":" in agent or not hasattr(package, "__path__"):
         return file_hash(file)
     return _package_hash(tuple(package.__path__))
 

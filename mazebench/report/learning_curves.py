@@ -60,7 +60,7 @@ def write_learning_curves(folders: Sequence[pathlib.Path], out: pathlib.Path) ->
     Raises:
       InputError: if no run has logged anything, or `out` can't be used.
     """
-    runs = [run for folder, name in zip(folders, _names(folders), strict=True) if (run := _read(folder, name))]
+    runs = [run for folder, name in zip(folders, _names(folders), strict=True) if (run := read_run(folder, name))]
     if not runs:
         raise InputError("expected training runs with metrics, found none to report")
     looks = all_looks([run.name for run in runs])
@@ -82,14 +82,7 @@ def write_learning_curves(folders: Sequence[pathlib.Path], out: pathlib.Path) ->
     return runs
 
 
-def _names(folders: Sequence[pathlib.Path]) -> list[str]:
-    """Returns the folders' names, as short as they can be while no two are alike."""
-    whole = [folder.resolve() for folder in folders]
-    common = whole[0].parent if len(whole) == 1 else os.path.commonpath(whole)
-    return [str(folder.relative_to(common)) for folder in whole]
-
-
-def _read(folder: pathlib.Path, name: str) -> Run | None:
+def read_run(folder: pathlib.Path, name: str) -> Run | None:
     """Returns what a run logged, but for a line that is written just now; nothing if it logged nothing yet."""
     try:
         config = read_json(folder / CONFIG)
@@ -101,6 +94,13 @@ def _read(folder: pathlib.Path, name: str) -> Run | None:
         remark(f"{folder}: expected a training run with metrics, found none yet; skipped")
         return None
     return Run(name, config, lines)
+
+
+def _names(folders: Sequence[pathlib.Path]) -> list[str]:
+    """Returns the folders' names, as short as they can be while no two are alike."""
+    whole = [folder.resolve() for folder in folders]
+    common = whole[0].parent if len(whole) == 1 else os.path.commonpath(whole)
+    return [str(folder.relative_to(common)) for folder in whole]
 
 
 def _parse(line: bytes) -> dict[str, float]:

@@ -22,7 +22,7 @@ from mazebench import stopping
 from mazebench.agent_loading import learning_agents, load_agent_class
 from mazebench.errors import InputError, RunError, unknown
 from mazebench.evaluation.checked_agent import context_size_of
-from mazebench.evaluation.provenance import mazes_hash
+from mazebench.evaluation.provenance import code_hash, mazes_hash
 from mazebench.maps.options import DrawnOptions
 from mazebench.options import fields_of, from_names
 from mazebench.tasks.build import build_task
@@ -256,7 +256,12 @@ def _begin_or_resume(
 
 
 def _save(options: TrainOptions, folder: RunFolder, learner: Learner, task: TaskSpec, counters: Counters) -> None:
-    provenance = {"env_steps": counters.env_steps, "updates": counters.updates, **_origin(options, task)}
+    provenance = {
+        "env_steps": counters.env_steps,
+        "updates": counters.updates,
+        "agent_code_sha256": code_hash(options.agent, type(learner.actor)),
+        **_origin(options, task),
+    }
     folder.save_checkpoint(counters, lambda path: learner.save(path, provenance))
 
 
