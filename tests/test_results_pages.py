@@ -13,6 +13,7 @@ import mazebench
 from benchmarks.results.figures import figures
 from benchmarks.results.kept import Kept, keep, read_kept
 from benchmarks.results.pages import PAGES, RECORDS, ROOT, with_tables
+from benchmarks.results.tables import make_table
 from mazebench.errors import InputError
 from mazebench.results.reading import load_result
 
@@ -58,6 +59,13 @@ class TestPages:
         for figure in figures(kept):
             assert all(panel.series for panel in figure.panels), figure.name
             assert (ROOT / "docs" / "images" / f"{figure.name}.png").exists()
+
+    def test_agents_that_are_at_1_in_every_row_have_a_sentence_instead_of_a_column(self, kept):
+        header, *_, sentence = make_table(kept, "paper size-local success_rate").splitlines()
+        assert header == "| success rate, by cells a side | mmn | mah | mah-paper | dqn | random |"
+        assert sentence.startswith(
+            "At 1.00 in every row, and so not in the table: oracle (privileged), belief-planner,"
+        )
 
     def test_an_unknown_table_is_refused_in_a_line(self):
         for name in ("v9", "paper", "paper local-13 spl"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 from collections.abc import Callable, Iterable, Sequence
@@ -88,9 +89,13 @@ def make_table(kept: Kept, name: str) -> str:
 
 
 def report_table(kept: Kept, name: str, metric: str) -> str:
-    """Returns a metric of a table of the report of the suite `paper`."""
-    header, *rows = kept.report[name].lines(metric, escape_markdown)
-    return _table(header, rows)
+    """Returns a metric of a table of the report of the suite `paper`; a sentence has the agents that are at 1.00."""
+    table = kept.report[name]
+    full = [column for column in table.columns_of(metric) if all(_is_full(cell) for cell in column.cells[metric])]
+    columns = tuple(column for column in table.columns if column not in full)
+    header, *rows = dataclasses.replace(table, columns=columns).lines(metric, escape_markdown)
+    labels = ", ".join(column.label for column in full)
+    return _table(header, rows) + (f"\n{FULL}{labels}.\n" if full else "")
 
 
 def paper_table(kept: Kept) -> str:
@@ -220,6 +225,8 @@ def v3_navigator_kinds(kept: Kept) -> str:
     return _table([f"track, {METRICS[ON_TIME_125]}", *map(_code, kinds)], rows)
 
 
+FULL = "At 1.00 in every row, and so not in the table: "  # begins the sentence below a table
+
 # By the name that a page gives.
 TABLES: dict[str, Callable[[Kept], str]] = {
     "paper-local": paper_table,
@@ -234,6 +241,10 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "v3-navigator": v3_navigator,
     "v3-navigator-kinds": v3_navigator_kinds,
 }
+
+
+def _is_full(cell: Cell | None) -> bool:
+    return cell is not None and _number(cell.value) == "1.00"
 
 
 def _levels(kept: Kept, row: str, track: str, metric: str, kinds: Sequence[str] = ()) -> str:
