@@ -1,8 +1,8 @@
 """Prints what search adds at decision time: success rates on held-out mazes by kind and number of simulations.
 
 Call it as `python benchmarks/simulations.py AGENT [CHECKPOINT...] [--searches KIND:N,...]`; `--help` lists the rest.
-Rates are means over the checkpoints, with 95 % intervals over mazes and episodes. The mazes are of no split; they are
-neither those on which training runs are watched nor those of `wrong_maps.py`.
+Rates are means over the checkpoints, with 95 % intervals over training runs and mazes together. The mazes are of no
+split; they are neither those on which training runs are watched nor those of `wrong_maps.py`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from wrong_maps import held_out_task, outcomes
 
 from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
-from mazebench.results.intervals import mean_interval
+from mazebench.results.intervals import runs_interval
 
 _SIZE = 13
 _SEARCHES = "gumbel:0,gumbel:4,gumbel:16,gumbel:64,puct:4,puct:16,puct:64"
@@ -39,14 +39,13 @@ def main() -> None:
         cells = []
         for distance in distances:
             spec = held_out_task({"distances": (distance,)}, given.seed, given.mazes)
-            success, maze = [], []
+            success = []
             for checkpoint in given.checkpoints or [None]:
                 agent = agent_class.build(Interface("local", _SIZE, _SIZE), checkpoint=checkpoint)
                 agent.config = dataclasses.replace(agent.config, search=kind, num_eval_simulations=int(num_simulations))
-                reached, _, mazes = outcomes(agent, spec, False)
+                reached, _, maze = outcomes(agent, spec, False)
                 success.append(reached)
-                maze.append(mazes)
-            estimate = mean_interval(np.concatenate(success), np.concatenate(maze))
+            estimate = runs_interval(np.array(success), maze)
             cells.append(f"{estimate.value:.3f} [{estimate.low:.2f}, {estimate.high:.2f}]")
         print(f"{search}:", "  ".join(cells), flush=True)
 
