@@ -9,12 +9,14 @@ Wilson's interval of independent episodes where all episodes ended alike. docs/m
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from scipy import special
 
-from mazebench.results.intervals import difference_interval, mean_interval, wilson_interval
+from mazebench.results.intervals import difference_interval, mean_interval, runs_interval, wilson_interval
 
 NUM_EVALUATIONS = 2000
 NUM_RESAMPLES = 2000
@@ -25,6 +27,8 @@ DESIGNS = (
 )
 RATES = (0.02, 0.1, 0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0)
 WINS_AND_LOSSES = ((0.0, 0.0), (0.02, 0.02), (0.05, 0.02), (0.1, 0.1), (0.2, 0.05), (0.6, 0.02))
+# Standard deviations of training runs and of mazes, on the logit scale.
+SPREADS = ((0.0, 0.0), (0.0, 1.0), (0.3, 0.5), (0.6, 0.5))
 EFFICIENCY = (0.7, 1.0)  # of successful episodes, whose SPL is uniform between them
 
 
@@ -37,6 +41,43 @@ def main() -> None:
     print_tables("SPL, by success rate", rates, draw_spl, bootstrap_interval, new_mean)
     title = "Difference of success, by shares of wins and losses"
     print_tables(title, shares, draw_outcomes, old_difference_interval, new_difference)
+    print_runs()
+
+
+def print_runs() -> None:
+    """Prints a table of coverage and mean width of means over training runs and mazes together, by success rate."""
+    rates = (0.5, 0.8, 0.95, 0.99)
+    print("\nMean over training runs and mazes, by success rate: coverage, mean width\n")
+    for line in (("runs", "mazes x episodes", "spread of runs, mazes", *map(str, rates)), ["---"] * (3 + len(rates))):
+        print(f"| {' | '.join(line)} |")
+    for num_runs, (num_mazes, num_episodes), spreads in itertools.product((3, 5), ((20, 5), (100, 2)), SPREADS):
+        mazes = np.arange(num_mazes).repeat(num_episodes)
+        cells = []
+        for rate in rates:
+            values, truth = draw_runs(rate, num_runs, num_mazes, num_episodes, spreads, np.random.default_rng(0))
+            estimates = [runs_interval(each.reshape(num_runs, -1), mazes) for each in values]
+            covered = np.mean([each.low <= truth <= each.high for each in estimates])
+            cells.append(f"{covered:.2f}, {np.mean([each.high - each.low for each in estimates]):.2f}")
+        design = (str(num_runs), f"{num_mazes} x {num_episodes}", ", ".join(map(str, spreads)))
+        print(f"| {' | '.join((*design, *cells))} |")
+
+
+def draw_runs(
+    rate: float,
+    num_runs: int,
+    num_mazes: int,
+    num_episodes: int,
+    spreads: tuple[float, float],
+    rng: np.random.Generator,
+) -> tuple[np.ndarray, float]:
+    """Returns successes `[R, runs, K, M]`, and their expectation; logits are normal about that of `rate`."""
+    of_runs, of_mazes = spreads
+    logit = np.log(rate / (1 - rate))
+    truth = special.expit(logit + np.hypot(of_runs, of_mazes) * rng.normal(size=100_000)).mean()
+    runs = of_runs * rng.normal(size=(NUM_EVALUATIONS, num_runs, 1, 1))
+    mazes = of_mazes * rng.normal(size=(NUM_EVALUATIONS, 1, num_mazes, 1))
+    drawn = rng.random((NUM_EVALUATIONS, num_runs, num_mazes, num_episodes))
+    return (drawn < special.expit(logit + runs + mazes)).astype(float), float(truth)
 
 
 def print_tables(title: str, settings: Mapping[str, Any], draw: Callable, old: Callable, new: Callable) -> None:
