@@ -28,7 +28,7 @@ DESIGNS = (
 RATES = (0.02, 0.1, 0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0)
 WINS_AND_LOSSES = ((0.0, 0.0), (0.02, 0.02), (0.05, 0.02), (0.1, 0.1), (0.2, 0.05), (0.6, 0.02))
 # Standard deviations of training runs and of mazes, on the logit scale.
-SPREADS = ((0.0, 0.0), (0.0, 1.0), (0.3, 0.5), (0.6, 0.5))
+SPREADS = ((0.0, 0.0), (0.0, 1.0), (0.3, 0.5), (0.6, 0.5), (1.0, 0.5))
 EFFICIENCY = (0.7, 1.0)  # of successful episodes, whose SPL is uniform between them
 
 

@@ -1,8 +1,9 @@
 """Prints what search adds at decision time: success rates on held-out mazes by kind and number of simulations.
 
 Call it as `python benchmarks/simulations.py AGENT [CHECKPOINT...] [--searches KIND:N,...]`; `--help` lists the rest.
-Rates are means over the checkpoints, with 95 % intervals over training runs and mazes together. The mazes are of no
-split; they are neither those on which training runs are watched nor those of `wrong_maps.py`.
+Rates are means over the checkpoints, with 95 % intervals over training runs and mazes together; over mazes alone, if
+there is one checkpoint. The mazes are of no split; they are neither those on which training runs are watched nor those
+of `wrong_maps.py`.
 """
 
 from __future__ import annotations

@@ -211,7 +211,7 @@ class TestRunsAndMazes:
         student = stats.t.ppf(0.975, 2) * stats.sem(means)
         over_mazes = mean_interval(self.RUNS.mean(axis=0), self.MAZES)
         found = runs_interval(self.RUNS, self.MAZES)
-        assert found.value == pytest.approx(means.mean())
+        assert (found.value, found.low) == pytest.approx((0.79, 0.22), abs=5e-3)  # docs/metrics.md
         assert found.low == pytest.approx(found.value - np.hypot(student, over_mazes.value - over_mazes.low))
         assert found.high == 1
 

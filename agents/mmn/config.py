@@ -21,7 +21,8 @@ class MMNConfig:
     """
 
     # Networks
-    model: bool = True  # False, an ablation: no model and no search; the heads give action values, by Q-learning
+    model: bool = True  # False, an ablation: the heads give action values, learned by double Q-learning with values of
+    # n_step; what concerns the model, search and policies is then without effect
     hypermodel: bool = True  # False, an ablation: the code of the context is an input of an ordinary transition
     rows: bool = True  # generates the first layer's weights of a position with convolutions, for each cell
     reading: bool = True  # the heads, the paper's g(s, c), read convolutions of the context at the estimated position
@@ -78,6 +79,8 @@ class MMNConfig:
     model_weight: Factor = 1.0  # of the paper's auxiliary loss; 1 in the paper
 
     def __post_init__(self):
+        if not self.model and not self.reading:
+            raise InputError("expected reading where there is no model, for the heads see the map by it; found neither")
         if self.sequence_steps < self.unroll:
             raise InputError(f"expected sequence_steps of at least unroll {self.unroll}, found {self.sequence_steps}")
         rows = self.replay_capacity // self.num_envs * self.num_envs

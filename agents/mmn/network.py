@@ -74,6 +74,9 @@ class MMNNetwork(nn.Module):
     estimated position on the map is the anchor plus a learned linear map of the displacement. The transition f has one
     hidden layer, and all its weights are generated.
 
+    Without a model (`config.model`), the heads give action values instead of policy and value. The learned codes of
+    motion and context and the generated weights are then computed, but not used.
+
     It learns, and on a GPU it acts. On a CPU, searches use `kernel_model.py`, which computes the same: a change of what
     acts is made in both.
     """
@@ -200,11 +203,7 @@ class MMNNetwork(nn.Module):
         return torch.softmax(value_logits, dim=-1) @ self.support
 
     def _outputs(self, latent: torch.Tensor, seen: torch.Tensor, code: Code) -> torch.Tensor:
-        """Returns the outputs of the heads, `[G, K, ...]`.
-
-        Without a model they get neither the learned code of the motion nor that of the context: with either, Q-learning
-        did not learn a small world.
-        """
+        """Returns the outputs of the heads, `[G, K, ...]`; without a model they get no learned codes."""
         to_goal = goal_code(self.locate(latent, code), code.positions[:, 2:])
         features = seen[..., NUM_PLACE + code.rows.shape[-1] :]
         if self._has_model:
@@ -215,7 +214,10 @@ class MMNNetwork(nn.Module):
         return self.heads(self.body(torch.cat(parts, dim=-1)))
 
     def _inputs(self, latent: torch.Tensor, seen: torch.Tensor) -> torch.Tensor:
-        """Returns `[G, K, D + 34]`: the latent state, with 5 m as the unit of the displacement, and the places."""
+        """Returns `[G, K, D + 34]`: the latent state, with 5 m as the unit of the displacement, and the places.
+
+        Of states without the learned code, `[G, K, 7]`, it returns `[G, K, 7 + 34]`.
+        """
         return torch.cat([latent[..., 2:], latent[..., :2] / DISPLACEMENT_UNIT, seen[..., :NUM_PLACE]], dim=-1)
 
 

@@ -103,20 +103,24 @@ def learning(kept: Kept) -> Figure:
 
 
 def model_and_search(kept: Kept) -> Figure:
-    """Returns learning curves with and without a model: means over training runs, with the lowest and the highest."""
+    """Returns learning curves of mmn, of Q-learning with its reading of the map, and of mah: means over three runs.
+
+    Bars reach from the lowest to the highest run.
+    """
     runs = {
-        "mmn": kept.training["mmn"],
-        "mmn without model and search": kept.training["mmn-model-false"],
-        "mah": kept.training["mah"],
+        "mmn": kept.curves("mmn"),
+        "mmn without model and search": kept.curves("mmn-model-false"),
+        "mah": kept.curves("mah"),
     }
     panels = []
     for distance in (6, 8, 10):
         series = []
         for label, of_agent in runs.items():
             rates: dict[float, list[float]] = {}
-            for line in (line for run in of_agent for line in run.lines):
-                if (name := f"success_rate_{distance}") in line:
-                    rates.setdefault(line["env_steps"] / 1e6, []).append(line[name])
+            for run in of_agent:
+                for line in run.lines:
+                    if (name := f"success_rate_{distance}") in line:
+                        rates.setdefault(line["env_steps"] / 1e6, []).append(line[name])
             points = [
                 Point(x, float(np.mean(at)), min(at), max(at)) for x, at in rates.items() if len(at) == len(of_agent)
             ]
@@ -124,7 +128,7 @@ def model_and_search(kept: Kept) -> Figure:
         panels.append(
             Panel(f"{distance} cells", "million agent steps", tuple(series), y_range=(-0.05, 1.05), y_ticks=_SCORES)
         )
-    title = "What model and search bring: success rate on held-out mazes over training"
+    title = "Success rate on held-out mazes over training: mean, lowest and highest of three runs"
     return Figure("model-and-search", title, "", tuple(panels), all_looks(list(runs)), panel_height=2.1)
 
 

@@ -19,6 +19,7 @@ from mazebench.report.learning_curves import Run, read_run
 from mazebench.report.report import read_in_order
 from mazebench.report.table import Table
 from mazebench.report.tables import build_tables
+from mazebench.results.comparison import check_pairs
 from mazebench.results.intervals import Estimate, mean_interval
 from mazebench.results.metrics import ON_TIME_METRICS, scores
 from mazebench.results.reading import CONFIG, EPISODES, ORACLE, SUITE, SUMMARY, Result, load_result
@@ -26,7 +27,7 @@ from mazebench.results.records import column
 from mazebench.storage.files import make_folder, open_whole
 from mazebench.tasks.tracks import TRACKS, tracks_of
 from mazebench.tasks.tracks.base import LEVELS
-from mazebench.training.run_folder import CHECKPOINTS, METRICS
+from mazebench.training.run_folder import METRICS, checkpoints
 
 PAPER, V3 = "paper", "v3"  # the suites
 LOCAL = "local-13"  # the part of `paper` that other training runs of an agent play, too
@@ -53,8 +54,28 @@ class Kept:
     training: dict[str, list[Run]]  # by name of the archive, what training runs logged
 
     def runs(self, row: str) -> list[Result]:
-        """Returns the evaluations of all training runs of an agent on the part `LOCAL`, that which ships first."""
-        return [self.result(row, LOCAL), *self.others.get(row, ())]
+        """Returns the evaluations of all training runs of an agent on the part `LOCAL`, that which ships first.
+
+        Raises:
+          InputError: if one is of other episodes, or two are of one checkpoint.
+        """
+        found = [self.result(row, LOCAL), *self.others.get(row, ())]
+        for each in found[1:]:
+            check_pairs(found[0], each)
+        played = {each.summary.provenance.checkpoint_sha256 for each in found}
+        if len(played) < len(found):
+            raise InputError(f"expected an evaluation of each training run of {row}, found one checkpoint twice")
+        return found
+
+    def curves(self, name: str) -> list[Run]:
+        """Returns what the training runs of an archive logged.
+
+        Raises:
+          InputError: if it is not kept.
+        """
+        if name not in self.training:
+            raise InputError(f"expected training runs {name} among the records, found none")
+        return self.training[name]
 
     def result(self, row: str, part: str) -> Result:
         """Returns the evaluation of an agent on a part of a suite.
@@ -133,7 +154,7 @@ def keep(folder: pathlib.Path, records: pathlib.Path) -> pathlib.Path:
     if not runs:
         raise InputError(f"{folder}: expected finished evaluations or training runs, found neither")
     paths = [run / name for run in runs for name in (CONFIG, METRICS)]
-    paths += [path for run in runs for path in sorted(run.glob(f"{CHECKPOINTS}/*/{AGENT_FILE}"))[-1:]]
+    paths += [last / AGENT_FILE for run in runs for last in checkpoints(run)[-1:]]
     return _archive(folder, paths, records / _TRAINING)
 
 

@@ -10,7 +10,7 @@ import pathlib
 import re
 
 from benchmarks.results.kept import Kept
-from benchmarks.results.tables import FULL, make_table
+from benchmarks.results.tables import SATURATED, make_table
 from mazebench.errors import InputError
 
 ROOT = pathlib.Path(__file__).parent.parent.parent
@@ -18,7 +18,7 @@ RECORDS = ROOT / "records"
 PAGES = ("README.md", "docs/results.md", "docs/tracks.md", "docs/agents/navigator.md", "docs/agents/belief-planner.md")
 
 _BEGIN, _END = "<!-- table: ", "<!-- end of table -->"
-_BLOCK = re.compile(rf"({_BEGIN}([^\n]+) -->\n)(?:\|[^\n]*\n)*(?:\n{FULL}[^\n]*\n)?({_END}\n)")
+_BLOCK = re.compile(rf"({_BEGIN}([^\n]+) -->\n)(?:\|[^\n]*\n)*(?:\n{re.escape(SATURATED)}[^\n]*\n)?({_END}\n)")
 
 
 def with_tables(text: str, kept: Kept) -> str:

@@ -32,9 +32,11 @@ from mazebench.report.table import METRICS, Cell, Table, escape_markdown
 from mazebench.results.comparison import compare_results
 from mazebench.results.intervals import Estimate, runs_interval
 from mazebench.results.metrics import ON_TIME_METRICS
+from mazebench.results.reading import Result
 from mazebench.results.records import column
 from mazebench.tasks.tracks.base import LEVELS
 
+SATURATED = "At 1.00 ["  # begins the sentence below a table
 _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints success rates
 # The rows of the paper's protocol, by the report's label.
 _PAPER_ROWS = {
@@ -51,7 +53,7 @@ _PAPER_ROWS = {
     "oracle (privileged)": "`oracle`, privileged: gets the true maze and pose",
 }
 
-_BY_RANK = ("mmn", "mah", "dqn", "random")  # learned agents, and the one that they are to beat
+_COMPARED = ("mmn", "mah", "dqn", "random")  # learned agents of the paper, and one that learns nothing
 
 _PARTS = tuple((track, level) for track in TRACKS_V3 for level in LEVELS)
 _NOT_LOST = "not lost"  # of the navigator with the true pose, on tracks that tell it to all
@@ -89,13 +91,20 @@ def make_table(kept: Kept, name: str) -> str:
 
 
 def report_table(kept: Kept, name: str, metric: str) -> str:
-    """Returns a metric of a table of the report of the suite `paper`; a sentence has the agents that are at 1.00."""
+    """Returns a metric of a table of the report of the suite `paper`; a sentence has the agents that saturate it."""
     table = kept.report[name]
-    full = [column for column in table.columns_of(metric) if all(_is_full(cell) for cell in column.cells[metric])]
-    columns = tuple(column for column in table.columns if column not in full)
+    lowest = {  # of the intervals of agents that are at 1 in every row
+        each.label: min(cell.low for cell in each.cells[metric])
+        for each in table.columns_of(metric)
+        if all(cell is not None and cell.value == 1 and cell.low is not None for cell in each.cells[metric])
+    }
+    columns = tuple(each for each in table.columns if each.label not in lowest)
     header, *rows = dataclasses.replace(table, columns=columns).lines(metric, escape_markdown)
-    labels = ", ".join(column.label for column in full)
-    return _table(header, rows) + (f"\n{FULL}{labels}.\n" if full else "")
+    text = _table(header, rows)
+    if not lowest:
+        return text
+    low, labels = _number(min(lowest.values())), ", ".join(lowest)
+    return f"{text}\n{SATURATED}{low}, 1.00] in every row, and so not in the table: {labels}.\n"
 
 
 def paper_table(kept: Kept) -> str:
@@ -120,24 +129,28 @@ def paper_table(kept: Kept) -> str:
 
 
 def paper_runs(kept: Kept) -> str:
-    """Returns mean success rates over training runs, and the differences of each agent and the one below it."""
-    runs = {row: kept.runs(row) for row in _BY_RANK}
-    records = runs[_BY_RANK[0]][0].records
-    success = {
-        row: np.array([column(each.records, "success") for each in of_agent], dtype=float)
-        for row, of_agent in runs.items()
-    }  # [R, E]
+    """Returns mean success rates over training runs, and the differences of each of `_COMPARED` and the next.
+
+    Raises:
+      InputError: if only one run of a learned agent is kept.
+    """
+    runs = {row: kept.runs(row) for row in _COMPARED}
+    for row in _COMPARED[:-1]:
+        if len(runs[row]) < 2:
+            raise InputError(f"expected several training runs of {row} among the records, found one")
+    success = {row: np.array([_success(each) for each in of_agent]) for row, of_agent in runs.items()}  # [R, E]
+    records = runs[_COMPARED[0]][0].records
     maze, distance = column(records, "maze"), column(records, "distance")
 
-    def cells(*rows: str) -> list[str]:
-        chosen = [distance == each for each in _PRINTED_DISTANCES]
+    def cells(values: np.ndarray, others: np.ndarray | None = None) -> list[str]:
+        counted = [distance == each for each in _PRINTED_DISTANCES]
         return [
-            _interval(runs_interval(success[rows[0]][:, at], maze[at], *(success[row][:, at] for row in rows[1:])))
-            for at in chosen
+            _interval(runs_interval(values[:, at], maze[at], None if others is None else others[:, at]))
+            for at in counted
         ]
 
-    means = [[f"`{row}`, runs: {len(runs[row])}", *cells(row)] for row in _BY_RANK]
-    steps = [[f"`{row}` - `{below}`", *cells(row, below)] for row, below in itertools.pairwise(_BY_RANK)]
+    means = [[f"`{row}`", *cells(success[row])] for row in _COMPARED]
+    steps = [[f"`{a}` - `{b}`", *cells(success[a], success[b])] for a, b in itertools.pairwise(_COMPARED)]
     return _table(["agent", *map(str, _PRINTED_DISTANCES)], [*means, *steps])
 
 
@@ -225,8 +238,6 @@ def v3_navigator_kinds(kept: Kept) -> str:
     return _table([f"track, {METRICS[ON_TIME_125]}", *map(_code, kinds)], rows)
 
 
-FULL = "At 1.00 in every row, and so not in the table: "  # begins the sentence below a table
-
 # By the name that a page gives.
 TABLES: dict[str, Callable[[Kept], str]] = {
     "paper-local": paper_table,
@@ -243,8 +254,8 @@ TABLES: dict[str, Callable[[Kept], str]] = {
 }
 
 
-def _is_full(cell: Cell | None) -> bool:
-    return cell is not None and _number(cell.value) == "1.00"
+def _success(result: Result) -> np.ndarray:
+    return column(result.records, "success").astype(float)
 
 
 def _levels(kept: Kept, row: str, track: str, metric: str, kinds: Sequence[str] = ()) -> str:

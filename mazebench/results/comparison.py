@@ -97,7 +97,7 @@ def compare_results(a: Result, b: Result) -> PairedResults:
     Raises:
       InputError: if the two are not of the same episodes of one version of the benchmark.
     """
-    _check_pairs(a, b)
+    check_pairs(a, b)
     ours, theirs = by_distance(a.records), by_distance(b.records)
     return PairedResults(
         overall=_compare(a, b, a.records, b.records),
@@ -165,7 +165,7 @@ def _who(summary: Summary, parts: list[str]) -> str:
     return summary.row + (f" ({', '.join(wrong)})" if wrong and parts == [""] else "")
 
 
-def _check_pairs(a: Result, b: Result) -> None:
+def check_pairs(a: Result, b: Result) -> None:
     for key in (*_SAME_TASK, *_SAME_PROVENANCE):
         ours, theirs = (
             getattr(result.summary.provenance if key in _SAME_PROVENANCE else result.summary, key) for result in (a, b)

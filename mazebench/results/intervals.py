@@ -99,12 +99,14 @@ def difference_interval(differences: np.ndarray, mazes: np.ndarray) -> Estimate:
 def runs_interval(values: np.ndarray, mazes: np.ndarray, others: np.ndarray | None = None) -> Estimate:
     """Returns a mean over training runs and mazes, or the difference of two, with an interval over both together.
 
-    The half-widths of two intervals add as squares (Zou and Donner 2008): that over mazes, `mean_interval` or
-    `difference_interval` of each episode's mean over the runs, and Student's over runs (Welch's of a difference). The
-    chance in single episodes is in both, so it is on the wide side.
+    The half-widths of two intervals add as squares, after Zou and Donner (2008): that over mazes, `mean_interval` or
+    `difference_interval` of each episode's mean over the runs, and Student's over runs (Welch's of a difference).
+    docs/metrics.md has a simulation of its coverage: too wide where runs differ little, since the chance in single
+    episodes is in both parts, and too narrow where runs near 1 differ much.
 
     Args:
-      values: `[R, E]` in [0, 1], of R training runs in the same E episodes; one run if the agent is not trained.
+      values: `[R, E]` in [0, 1], of R training runs in the same E episodes; one run if the agent is not trained:
+        a single run adds nothing to the interval.
       mazes: `[E]`, any names or numbers.
       others: `[R', E]`, R' runs of another agent in these episodes, whose mean is taken off.
     """
