@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pathlib
 import re
 import tarfile
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import mazebench
 from benchmarks.results.figures import figures
-from benchmarks.results.kept import Kept, keep, read_kept
+from benchmarks.results.kept import LOCAL, Kept, keep, read_kept
 from benchmarks.results.pages import PAGES, RECORDS, ROOT, with_tables
 from benchmarks.results.tables import make_table
 from mazebench.errors import InputError
@@ -82,7 +84,7 @@ class TestPages:
 
     def test_an_unknown_table_is_refused_in_a_line(self):
         for name in ("v9", "paper", "paper local-13 spl"):
-            with pytest.raises(InputError, match=f"unknown table '{name}'; tables: paper-local, paper-runs"):
+            with pytest.raises(InputError, match=f"unknown table '{name}'; tables: paper-local, paper-runs, mmn-runs"):
                 with_tables(f"<!-- table: {name} -->\n<!-- end of table -->\n", NOTHING)
 
     @pytest.mark.parametrize(
@@ -147,3 +149,25 @@ class TestRecords:
         keep(folder, tmp_path)
         with pytest.raises(InputError, match="expected records of the suite 'paper', found none"):
             read_kept(tmp_path)
+
+
+class TestTrainingRuns:
+    def test_means_are_over_the_runs(self, kept):
+        runs = kept.training_runs("mmn")
+        assert len(runs) == 3
+        far = [[record.success for record in run.records if record.distance == 10] for run in runs]
+        line = make_table(kept, "paper-runs").splitlines()[2]
+        assert line.startswith("| `mmn` | 1.00 [")
+        assert f" {np.mean(far):.2f} [" in line.split("|")[-2]
+
+    @pytest.mark.parametrize("found", [[], ["mmn"], ["mmn", "mmn"]])
+    def test_fewer_than_two_checkpoints_are_refused(self, found, kept):
+        few = dataclasses.replace(kept, runs={"mmn": [kept.result(row, LOCAL) for row in found]})
+        message = f"several training runs mmn, found {len(found)} of {len(set(found))} checkpoints"
+        with pytest.raises(InputError, match=message):
+            few.training_runs("mmn")
+
+    def test_a_run_in_other_episodes_is_refused(self, kept):
+        others = dataclasses.replace(kept, runs={"mah": [kept.result("mmn", LOCAL), kept.result("mah", "local-15")]})
+        with pytest.raises(InputError, match="size"):
+            others.training_runs("mah")

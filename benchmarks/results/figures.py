@@ -105,7 +105,7 @@ def learning(kept: Kept) -> Figure:
 def model_and_search(kept: Kept) -> Figure:
     """Returns learning curves of mmn, of Q-learning with its reading of the map, and of mah: means over three runs.
 
-    Bars reach from the lowest to the highest run.
+    Bars reach from the lowest to the highest run. Milestones count as the nearest tenth of a million steps.
     """
     runs = {
         "mmn": kept.curves("mmn"),
@@ -120,13 +120,20 @@ def model_and_search(kept: Kept) -> Figure:
             for run in of_agent:
                 for line in run.lines:
                     if (name := f"success_rate_{distance}") in line:
-                        rates.setdefault(line["env_steps"] / 1e6, []).append(line[name])
+                        rates.setdefault(round(line["env_steps"] / 1e6, 1), []).append(line[name])
             points = [
                 Point(x, float(np.mean(at)), min(at), max(at)) for x, at in rates.items() if len(at) == len(of_agent)
             ]
             series.append(Series(label, tuple(points), has_bars=True))
         panels.append(
-            Panel(f"{distance} cells", "million agent steps", tuple(series), y_range=(-0.05, 1.05), y_ticks=_SCORES)
+            Panel(
+                f"{distance} cells",
+                "million agent steps",
+                tuple(series),
+                ticks=tuple((x, f"{x:g}") for x in (0.2, 0.4, 0.6, 0.8, 1.0)),
+                y_range=(-0.05, 1.05),
+                y_ticks=_SCORES,
+            )
         )
     title = "Success rate on held-out mazes over training: mean, lowest and highest of three runs"
     return Figure("model-and-search", title, "", tuple(panels), all_looks(list(runs)), panel_height=2.1)

@@ -30,16 +30,16 @@ from mazebench.tasks.tracks.base import LEVELS
 from mazebench.training.run_folder import METRICS, checkpoints
 
 PAPER, V3 = "paper", "v3"  # the suites
-LOCAL = "local-13"  # the part of `paper` that other training runs of an agent play, too
+LOCAL = "local-13"  # the part of `paper` that training runs play
 TRACKS_V3 = tracks_of(V3)
 ON_TIME_125, ON_TIME_2 = ON_TIME_METRICS  # within 1.25 and 2 times the oracle's steps
 # Agents, with what they were told less or more than others.
 NAVIGATOR, NO_MAP, TRUE_POSE = "navigator", "navigator without map", "navigator with the true pose"
-BELIEF_PLANNER, BELIEF_RULE = "belief-planner", "belief-rule"
+BELIEF_PLANNER, BELIEF_RULE, RANDOM = "belief-planner", "belief-rule", "random"
 
 _SUFFIX = ".tar.xz"
 _TRAINING = "training"  # the folder of archives of training runs
-_RUNS = f"runs{_SUFFIX}"  # other training runs of agents that ship
+_RUNS = f"runs{_SUFFIX}"  # evaluations of training runs, in folders NAME-SEED
 _KEPT_FILES = (CONFIG, EPISODES, ORACLE, SUMMARY)
 
 
@@ -50,21 +50,22 @@ class Kept:
     results: dict[tuple[str, str], Result]  # by row of the agent, and part of a suite
     report: dict[str, Table]  # tables of the report of the suite `paper`, by name
     episodes: pd.DataFrame  # of that report
-    others: dict[str, list[Result]]  # by row of an agent, of its training runs that do not ship, on the part `LOCAL`
-    training: dict[str, list[Run]]  # by name of the archive, what training runs logged
+    runs: dict[str, list[Result]]  # of training runs on the part `LOCAL`, by name of the agent that was trained
+    training: dict[str, list[Run]]  # what training runs logged, by name of the archive
 
-    def runs(self, row: str) -> list[Result]:
-        """Returns the evaluations of all training runs of an agent on the part `LOCAL`, that which ships first.
+    def training_runs(self, name: str) -> list[Result]:
+        """Returns the evaluations of an agent's training runs, two at least, in the same episodes.
 
         Raises:
-          InputError: if one is of other episodes, or two are of one checkpoint.
+          InputError: if fewer are kept, one is of other episodes, or two are of one checkpoint.
         """
-        found = [self.result(row, LOCAL), *self.others.get(row, ())]
+        found = self.runs.get(name, [])
+        checkpoints = {each.summary.provenance.checkpoint_sha256 for each in found}
+        if len(checkpoints) < max(2, len(found)):
+            of = f"{len(found)} of {len(checkpoints)} checkpoints"
+            raise InputError(f"expected evaluations of several training runs {name}, found {of}")
         for each in found[1:]:
             check_pairs(found[0], each)
-        played = {each.summary.provenance.checkpoint_sha256 for each in found}
-        if len(played) < len(found):
-            raise InputError(f"expected an evaluation of each training run of {row}, found one checkpoint twice")
         return found
 
     def curves(self, name: str) -> list[Run]:
@@ -105,7 +106,7 @@ def read_kept(folder: pathlib.Path) -> Kept:
       InputError: if two evaluations are of the same agent and part, one is damaged, or none is of the suite `paper`.
     """
     results: dict[tuple[str, str], Result] = {}
-    others: dict[str, list[Result]] = {}
+    runs: dict[str, list[Result]] = {}
     training: dict[str, list[Run]] = {}
     with tempfile.TemporaryDirectory() as temporary:
         unpacked = pathlib.Path(temporary)
@@ -121,7 +122,7 @@ def read_kept(folder: pathlib.Path) -> Kept:
         for summary in sorted(unpacked.rglob(SUMMARY)):
             result = load_result(summary.parent)
             if _RUNS in summary.parts:
-                others.setdefault(result.summary.row, []).append(result)
+                runs.setdefault(summary.parent.name.rpartition("-")[0], []).append(result)
                 continue
             key = result.summary.row, result.summary.part or summary.parent.name
             if key in results:
@@ -132,7 +133,7 @@ def read_kept(folder: pathlib.Path) -> Kept:
         if not paper:
             raise InputError(f"{folder}: expected records of the suite {PAPER!r}, found none")
         episodes = join_episodes(*read_in_order(paper))
-    return Kept(results, {table.name: table for table in build_tables(episodes)}, episodes, others, training)
+    return Kept(results, {table.name: table for table in build_tables(episodes)}, episodes, runs, training)
 
 
 def keep(folder: pathlib.Path, records: pathlib.Path) -> pathlib.Path:

@@ -15,7 +15,14 @@ from mazebench.errors import InputError
 
 ROOT = pathlib.Path(__file__).parent.parent.parent
 RECORDS = ROOT / "records"
-PAGES = ("README.md", "docs/results.md", "docs/tracks.md", "docs/agents/navigator.md", "docs/agents/belief-planner.md")
+PAGES = (
+    "README.md",
+    "docs/results.md",
+    "docs/tracks.md",
+    "docs/agents/navigator.md",
+    "docs/agents/belief-planner.md",
+    "docs/agents/mmn.md",
+)
 
 _BEGIN, _END = "<!-- table: ", "<!-- end of table -->"
 _BLOCK = re.compile(rf"({_BEGIN}([^\n]+) -->\n)(?:\|[^\n]*\n)*(?:\n{re.escape(SATURATED)}[^\n]*\n)?({_END}\n)")

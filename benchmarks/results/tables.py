@@ -18,6 +18,7 @@ from benchmarks.results.kept import (
     ON_TIME_2,
     ON_TIME_125,
     PAPER,
+    RANDOM,
     TRACKS_V3,
     TRUE_POSE,
     V3,
@@ -37,15 +38,16 @@ from mazebench.results.records import column
 from mazebench.tasks.tracks.base import LEVELS
 
 SATURATED = "At 1.00 ["  # begins the sentence below a table
+_PAPERS_MMN = "MMN (paper)"
 _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints success rates
 # The rows of the paper's protocol, by the report's label.
 _PAPER_ROWS = {
-    "random": "`random`",
+    RANDOM: "`random`",
     "dqn": "`dqn`, learned, no map",
     "mah-paper": "`mah-paper`, learned, model-free, closer to the paper",
     "mah": "`mah`, learned, model-free",
     "mmn": "`mmn`, follows the paper: learned model and search",
-    "MMN (paper)": "the paper's MMN, as printed",
+    _PAPERS_MMN: "the paper's MMN, as printed",
     BELIEF_RULE: "`belief-rule`, a classical robot that feels walls",
     BELIEF_PLANNER: "`belief-planner`, the same with a learned belief",
     "planner": "`planner`, hand-written",
@@ -53,7 +55,19 @@ _PAPER_ROWS = {
     "oracle (privileged)": "`oracle`, privileged: gets the true maze and pose",
 }
 
-_COMPARED = ("mmn", "mah", "dqn", "random")  # learned agents of the paper, and one that learns nothing
+_TRAINED = {  # by name of the kept runs
+    "mmn": "`mmn`",
+    "mmn-model-false": "`mmn` without model and search",
+    "mah": "`mah`",
+    "dqn": "`dqn`",
+}
+_PAIRS = (
+    ("mmn", "mmn-model-false"),
+    ("mmn-model-false", "mah"),
+    ("mmn", "mah"),
+    ("mah", "dqn"),
+    ("dqn", RANDOM),
+)
 
 _PARTS = tuple((track, level) for track in TRACKS_V3 for level in LEVELS)
 _NOT_LOST = "not lost"  # of the navigator with the true pose, on tracks that tell it to all
@@ -70,7 +84,7 @@ _ROWS = {
     "sb3_agent:RecurrentPPOAgent": "PPO of sb3-contrib, with an LSTM",
     "mah": "`mah`, learned, no lidar",
     "dqn": "`dqn`, learned, no map",
-    "random": "`random`",
+    RANDOM: "`random`",
 }
 
 
@@ -129,29 +143,23 @@ def paper_table(kept: Kept) -> str:
 
 
 def paper_runs(kept: Kept) -> str:
-    """Returns mean success rates over training runs, and the differences of each of `_COMPARED` and the next.
+    """Returns mean success rates over training runs, and the differences of `_PAIRS`."""
+    success = {name: _successes(kept.training_runs(name)) for name in _TRAINED}
+    success[RANDOM] = _successes([kept.result(RANDOM, LOCAL)])
+    labels = {**_TRAINED, RANDOM: _code(RANDOM)}
+    means = [[labels[name], *_over_runs(kept, values)] for name, values in success.items()]
+    differences = [[f"{labels[a]} - {labels[b]}", *_over_runs(kept, success[a], success[b])] for a, b in _PAIRS]
+    return _table(["agent", *map(str, _PRINTED_DISTANCES)], [*means, *differences])
 
-    Raises:
-      InputError: if only one run of a learned agent is kept.
-    """
-    runs = {row: kept.runs(row) for row in _COMPARED}
-    for row in _COMPARED[:-1]:
-        if len(runs[row]) < 2:
-            raise InputError(f"expected several training runs of {row} among the records, found one")
-    success = {row: np.array([_success(each) for each in of_agent]) for row, of_agent in runs.items()}  # [R, E]
-    records = runs[_COMPARED[0]][0].records
-    maze, distance = column(records, "maze"), column(records, "distance")
 
-    def cells(values: np.ndarray, others: np.ndarray | None = None) -> list[str]:
-        counted = [distance == each for each in _PRINTED_DISTANCES]
-        return [
-            _interval(runs_interval(values[:, at], maze[at], None if others is None else others[:, at]))
-            for at in counted
-        ]
-
-    means = [[f"`{row}`", *cells(success[row])] for row in _COMPARED]
-    steps = [[f"`{a}` - `{b}`", *cells(success[a], success[b])] for a, b in itertools.pairwise(_COMPARED)]
-    return _table(["agent", *map(str, _PRINTED_DISTANCES)], [*means, *steps])
+def mmn_runs(kept: Kept) -> str:
+    """Returns mmn's mean success rates over its training runs, and the paper's."""
+    local = kept.report[LOCAL]
+    (printed,) = [each.cells["success_rate"] for each in local.columns if each.label == _PAPERS_MMN]
+    paper = [str(printed[local.rows.index(str(distance))]) for distance in _PRINTED_DISTANCES]
+    ours = _over_runs(kept, _successes(kept.training_runs("mmn")))
+    rows = [["`mmn`, three runs", *ours], ["the paper's MMN, as printed", *paper]]
+    return _table(["agent", *map(str, _PRINTED_DISTANCES)], rows)
 
 
 def v3_table(metric: str, kept: Kept) -> str:
@@ -242,6 +250,7 @@ def v3_navigator_kinds(kept: Kept) -> str:
 TABLES: dict[str, Callable[[Kept], str]] = {
     "paper-local": paper_table,
     "paper-runs": paper_runs,
+    "mmn-runs": mmn_runs,
     "v3-success": functools.partial(v3_table, "success_rate"),
     "v3-on-time": functools.partial(v3_table, ON_TIME_125),
     "v3-on-time-2": functools.partial(v3_table, ON_TIME_2),
@@ -254,8 +263,19 @@ TABLES: dict[str, Callable[[Kept], str]] = {
 }
 
 
-def _success(result: Result) -> np.ndarray:
-    return column(result.records, "success").astype(float)
+def _successes(runs: Sequence[Result]) -> np.ndarray:
+    """Returns `[R, E]` float."""
+    return np.array([column(each.records, "success") for each in runs], dtype=float)
+
+
+def _over_runs(kept: Kept, values: np.ndarray, others: np.ndarray | None = None) -> list[str]:
+    """Returns the mean of successes `[R, E]`, or the difference to others' mean, at each distance of the paper."""
+    records = kept.result(RANDOM, LOCAL).records
+    maze, distance = column(records, "maze"), column(records, "distance")
+    counted = [distance == each for each in _PRINTED_DISTANCES]
+    return [
+        _interval(runs_interval(values[:, at], maze[at], None if others is None else others[:, at])) for at in counted
+    ]
 
 
 def _levels(kept: Kept, row: str, track: str, metric: str, kinds: Sequence[str] = ()) -> str:

@@ -166,6 +166,11 @@ def _who(summary: Summary, parts: list[str]) -> str:
 
 
 def check_pairs(a: Result, b: Result) -> None:
+    """Checks that two evaluations are of the same task and episodes.
+
+    Raises:
+      InputError: if they are not.
+    """
     for key in (*_SAME_TASK, *_SAME_PROVENANCE):
         ours, theirs = (
             getattr(result.summary.provenance if key in _SAME_PROVENANCE else result.summary, key) for result in (a, b)
