@@ -1,5 +1,7 @@
 """Checkpoints: what is saved comes back; a damaged one or one of another agent is refused in one line."""
 
+import pathlib
+
 import numpy as np
 import pytest
 import torch
@@ -11,6 +13,7 @@ from mazebench_agents.mah import MAH
 from mazebench.agent import Interface
 from mazebench.errors import InputError
 
+ROOT = pathlib.Path(__file__).parent.parent
 INTERFACE = Interface("local", 13, 13)
 
 
@@ -81,3 +84,14 @@ def test_checkpoint_with_a_wrong_config_is_refused(tmp_path, config):
 def test_missing_checkpoint_is_refused(tmp_path):
     with pytest.raises(InputError, match="can't read the checkpoint"):
         MAH.build(INTERFACE, checkpoint=tmp_path / "none")
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "assets" / "checkpoints").glob("*.safetensors")), ids=lambda path: path.stem
+)
+def test_the_page_of_shipped_checkpoints_says_what_their_files_say(path):
+    tensors, metadata = load_checkpoint(path, path.stem.rpartition("-")[0])
+    parameters = sum(tensor.numel() for tensor in tensors.values())
+    steps, updates = (metadata["provenance"][name] for name in ("env_steps", "updates"))
+    row = f"| `{path.stem}` | {parameters:,} | {steps:,} | {updates:,} |"
+    assert row in (ROOT / "docs" / "checkpoints.md").read_text(encoding="utf-8")
