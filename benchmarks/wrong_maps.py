@@ -2,7 +2,8 @@
 
 Call it as `python benchmarks/wrong_maps.py AGENT[=CHECKPOINT]... [--rows NAME,...] [--kind KIND] [--size N]`. Each row
 is a task, and each agent a column: success with its 95 % interval over mazes and episodes, and SPL. With two agents or
-more, the last columns are the differences of the first one and the second, success and SPL, in the same episodes. The
+more, the last columns are the differences of the first one and the second, success and SPL, in the same episodes; if
+several checkpoints of one are given, those of their means, with intervals over runs and mazes together. The
 mazes are of no split; another --seed draws other ones. The tracks are played with a lidar, the other tasks without.
 """
 
@@ -19,7 +20,7 @@ from mazebench.agent import Agent, Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.kinds import generate
-from mazebench.results.intervals import Estimate, difference_interval, mean_interval
+from mazebench.results.intervals import Estimate, mean_interval, runs_interval
 from mazebench.results.metrics import spl
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.spec import TaskSpec
@@ -87,14 +88,18 @@ def main() -> None:
     parser.add_argument("--mazes", type=int, default=_NUM_MAZES)
     given = parser.parse_args()
     for name in given.rows.split(","):
-        begin, cells, scores = time.perf_counter(), [], []
+        begin, cells = time.perf_counter(), []
+        # By agent, successes and SPL of its checkpoints.
+        scores: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
         for agent in given.agents:
-            scores.append(_play(agent, held_out_task(ROWS[name], given.seed, given.mazes, given.kind, given.size)))
-            success, lengths, maze = scores[-1]
+            success, lengths, maze = _play(
+                agent, held_out_task(ROWS[name], given.seed, given.mazes, given.kind, given.size)
+            )
+            scores.setdefault(agent.partition("=")[0], []).append((success, lengths))
             cells.append(f"{_text(mean_interval(success, maze))} {lengths.mean():.3f}")
         if len(scores) > 1:
-            (*of_first, maze), (*of_second, _) = scores[:2]
-            cells += [_text(difference_interval(a - b, maze)) for a, b in zip(of_first, of_second, strict=True)]
+            first, second = (np.array(of_agent).swapaxes(0, 1) for of_agent in list(scores.values())[:2])  # [2, R, E]
+            cells += [_text(runs_interval(a, maze, b)) for a, b in zip(first, second, strict=True)]
         print(f"{name:12} {len(maze):5}", "  ".join(cells), f" ({time.perf_counter() - begin:.0f} s)", flush=True)
 
 
