@@ -15,7 +15,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from wrong_maps import held_out_task, outcomes
+from wrong_maps import held_out_task, outcomes, text_of
 
 from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
@@ -65,7 +65,7 @@ def _play(
 
 
 def _texts(estimates: Iterable[Estimate]) -> str:
-    return "  ".join(f"{each.value:.3f} [{each.low:.2f}, {each.high:.2f}]" for each in estimates)
+    return "  ".join(map(text_of, estimates))
 
 
 if __name__ == "__main__":

@@ -3,8 +3,8 @@
 Call it as `python benchmarks/wrong_maps.py AGENT[=CHECKPOINT]... [--rows NAME,...] [--kind KIND] [--size N]`. Each row
 is a task, and each agent a column: success with its 95 % interval over mazes and episodes, and SPL. With two agents or
 more, the last columns are the differences of the first one and the second, success and SPL, in the same episodes; if
-several checkpoints of one are given, those of their means, with intervals over runs and mazes together. The
-mazes are of no split; another --seed draws other ones. The tracks are played with a lidar, the other tasks without.
+several checkpoints of one are given, those of their means, with intervals over runs and mazes together. The mazes are
+of no split; another --seed draws other ones. The tracks are played with a lidar, the other tasks without.
 """
 
 from __future__ import annotations
@@ -89,17 +89,16 @@ def main() -> None:
     given = parser.parse_args()
     for name in given.rows.split(","):
         begin, cells = time.perf_counter(), []
+        task = held_out_task(ROWS[name], given.seed, given.mazes, given.kind, given.size)
         # By agent, successes and SPL of its checkpoints.
         scores: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
         for agent in given.agents:
-            success, lengths, maze = _play(
-                agent, held_out_task(ROWS[name], given.seed, given.mazes, given.kind, given.size)
-            )
+            success, lengths, maze = _play(agent, task)
             scores.setdefault(agent.partition("=")[0], []).append((success, lengths))
-            cells.append(f"{_text(mean_interval(success, maze))} {lengths.mean():.3f}")
+            cells.append(f"{text_of(mean_interval(success, maze))} {lengths.mean():.3f}")
         if len(scores) > 1:
             first, second = (np.array(of_agent).swapaxes(0, 1) for of_agent in list(scores.values())[:2])  # [2, R, E]
-            cells += [_text(runs_interval(a, maze, b)) for a, b in zip(first, second, strict=True)]
+            cells += [text_of(runs_interval(a, maze, b)) for a, b in zip(first, second, strict=True)]
         print(f"{name:12} {len(maze):5}", "  ".join(cells), f" ({time.perf_counter() - begin:.0f} s)", flush=True)
 
 
@@ -115,7 +114,8 @@ def _play(name: str, spec: TaskSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray
     return outcomes(agent, spec, agent_class.needs_truth)
 
 
-def _text(estimate: Estimate) -> str:
+def text_of(estimate: Estimate) -> str:
+    """Returns a figure and its interval."""
     return f"{estimate.value:.3f} [{estimate.low:.2f}, {estimate.high:.2f}]"
 
 

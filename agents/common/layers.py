@@ -19,6 +19,7 @@ _FREQUENCIES = (0.25, 0.5, 1.0, 2.0)  # per metre, octaves
 PERIODS = (24.0, 12.0, 6.0, 4.0, 3.0, 2.0, 1.0)  # cells, of the waves that code a position
 DISPLACEMENT_UNIT = 5.0  # m, of displacements among the inputs of a network
 WAY_UNIT = 10.0  # cells, of ways to the goal
+VALUE_UNIT = 10.0  # steps, of action values; outputs of order one then span the values that matter
 NUM_PLACE = 6 + 4 * len(PERIODS)
 WIDTHS = (0.5, 2.0, 8.0, 32.0)  # square cells, of the bells that code the distance to the goal
 NUM_TO_GOAL = 2 + len(WIDTHS)
@@ -85,6 +86,11 @@ def goal_code(position: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
     to_goal = goal[:, None] - position
     bells = torch.exp(-(to_goal**2).sum(dim=-1, keepdim=True) / torch.tensor(WIDTHS, device=position.device))
     return torch.cat([to_goal / WAY_UNIT, bells], dim=-1)
+
+
+def dueling_values(value: torch.Tensor, advantage: torch.Tensor) -> torch.Tensor:
+    """Returns action values `[..., A]` in steps of outputs `[..., 1]` and `[..., A]` (Wang et al. 2016, eq. 9)."""
+    return VALUE_UNIT * (value + advantage - advantage.mean(dim=-1, keepdim=True))
 
 
 def state_features(state: torch.Tensor, origin: torch.Tensor) -> torch.Tensor:

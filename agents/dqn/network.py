@@ -10,11 +10,12 @@ from torch import nn
 
 from mazebench.constants import NUM_ACTIONS
 
+from ..common.layers import dueling_values
+
 NUM_STATE_FEATURES = 7
 # Contexts and states are computed as many at once, always, since PyTorch rounds differently at another batch size.
 CONTEXTS_AT_ONCE = 8  # few are new in one step
 STATES_AT_ONCE = 64
-_VALUE_SCALE = 10.0  # steps; outputs of order one then span the values that matter
 
 
 class QNetwork(nn.Module):
@@ -34,8 +35,7 @@ class QNetwork(nn.Module):
         if code is not None:
             features = torch.cat([features, self.read(state[..., :2], code)], dim=-1)
         hidden = self.body(features)
-        advantage = self.advantage(hidden)
-        return _VALUE_SCALE * (self.value(hidden) + advantage - advantage.mean(dim=-1, keepdim=True))
+        return dueling_values(self.value(hidden), self.advantage(hidden))
 
     def encode(self, context: torch.Tensor) -> torch.Tensor:
         """Returns codes `[G, ...]` of contexts `[G, 4, M, M]`."""

@@ -9,9 +9,10 @@ from __future__ import annotations
 import torch
 from torch.nn import functional
 
+from ..common.layers import VALUE_UNIT
 from .batches import Batch
 from .config import MMNConfig
-from .network import Q_SCALE, Code, MMNNetwork
+from .network import Code, MMNNetwork
 from .targets import Targets, n_step_returns
 
 _HIDDEN_GRADIENT = 0.5  # of an unrolled state at each step: MuZero's
@@ -122,7 +123,7 @@ def q_losses(
     taken = values[..., :-1, :].gather(-1, batch.action[..., None])[..., 0]
     going = batch.exists[..., 1:] & ~batch.at_goal[..., :-1]
     losses, watched = Means(), Means()
-    losses.add("value_loss", functional.smooth_l1_loss(taken, returns, reduction="none") / Q_SCALE, going)
+    losses.add("value_loss", functional.smooth_l1_loss(taken, returns, reduction="none") / VALUE_UNIT, going)
     ends = functional.binary_cross_entropy_with_logits(goal_logit, batch.at_goal.float(), reduction="none")
     losses.add("goal_loss", ends, batch.exists)
     watched.add("value_error", (taken.detach() - returns).abs(), going)

@@ -23,6 +23,7 @@ from ..common.layers import (
     NUM_PLANES,
     NUM_TO_GOAL,
     MapEncoder,
+    dueling_values,
     goal_code,
     marked_position,
     place_code,
@@ -38,7 +39,6 @@ NUM_CHANGES = NUM_FREE + NUM_STOPPED
 # Contexts and states are computed as many at once, always, since PyTorch rounds differently at another batch size.
 CONTEXTS_AT_ONCE = 16  # few are new in one step
 STATES_AT_ONCE = 64
-Q_SCALE = 10.0  # steps; action values are learned in this unit
 SCALE_RATE = 5.0  # the scale's parameters are multiplied by it, so that they are of the order of other weights
 _CHANNELS = 24  # of the map's convolutions
 _NEAR = (1, 1, 1, 1)  # dilations of the hypermodel's convolutions
@@ -196,7 +196,7 @@ class MMNNetwork(nn.Module):
         """Returns action values `[G, K, 6]` in steps, dueling (Wang et al. 2016), and goal logits `[G, K]`."""
         out = self._outputs(latent, self.look(latent, code), code)
         value, advantage, goal = out.split([1, NUM_ACTIONS, 1], dim=-1)
-        return Q_SCALE * (value + advantage - advantage.mean(dim=-1, keepdim=True)), goal[..., 0]
+        return dueling_values(value, advantage), goal[..., 0]
 
     def value(self, value_logits: torch.Tensor) -> torch.Tensor:
         """Returns the means `[G, K]` of categorical values, in steps."""
