@@ -15,6 +15,7 @@ from .motion import REACH, moved
 _NO_WALLS = np.zeros((3, 3), dtype=bool)
 _STOPPED = 0.25  # m/s along an axis that the body is slower than it would be in the open, if a wall stopped it
 _SLACK = 0.04  # m from which a wall pushes more than the model says, for errors of both
+_GIVE = 0.06  # m by which a body gets into a wall's reach, at most; nearer to the cell, a corner beside it has stopped it
 _CLEAR = 0.36  # cells aside from the middle of a cell, at most, where the body touches no corner of a wall
 SURELY, PERHAPS = 4.0, 1.0  # log odds of a wall: where no other one can have stopped the body, and where one can
 
@@ -44,7 +45,8 @@ def felt_walls(
         gap = cell_size * (0.5 - sign * off_middle[axis])
         # Beside an edge of its cell, then or before, the corner of another wall may have stopped it.
         off_aside = max(abs(off_middle[1 - axis]), abs(off_before[1 - axis]))
-        if is_slow and off_aside < 0.5 and gap < REACH + _SLACK + deviation:
+        is_near = -_GIVE - deviation < gap - REACH < _SLACK + deviation
+        if is_slow and off_aside < 0.5 and is_near:
             row = size - 1 - level - (sign if axis == 1 else 0)
             cell = row, column + (sign if axis == 0 else 0)
             if min(cell) >= 0 and max(cell) < size:
