@@ -1,7 +1,7 @@
 """Planners that doubt the map without a belief: a shown wall is a detour, and a wall that was felt is a longer one.
 
 Call them as `mazebench eval --agent benchmarks.bumping_planner:BumpingPlanner`, or in `benchmarks/wrong_maps.py`.
-`LatticePlanner` knows the mazes of the kind `dfs`, too. Both tell what a robot that revises its map must be better than.
+`LatticePlanner` knows the mazes of the kind `dfs`, too. A robot that revises its map must be better than both.
 """
 
 from __future__ import annotations

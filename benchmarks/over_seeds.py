@@ -2,7 +2,7 @@
 
 Call it as `python benchmarks/over_seeds.py AGENT CHECKPOINT... [--agent AGENT CHECKPOINT...]...`. Intervals are over
 runs and mazes together. Of several agents, it also prints the difference of each one and the next. The mazes are of no
-split, and none of them is one on which training runs are watched.
+split, and none of them is one on which training runs are watched. With `--trained-in`, they are train mazes instead.
 """
 
 from __future__ import annotations
@@ -18,8 +18,11 @@ from wrong_maps import held_out_task, outcomes
 from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.results.intervals import Estimate, runs_interval
+from mazebench.tasks.build import make_spec
+from mazebench.tasks.spec import TaskSpec
 
 _SIZE = 13
+_NUM_TRAIN = 20  # mazes of the benchmark's train split
 _DISTANCES = (2, 4, 6, 8, 10)
 
 
@@ -30,8 +33,10 @@ def main() -> None:
     parser.add_argument("--agent", nargs="+", action="append", default=[], metavar=("AGENT", "CHECKPOINT"))
     parser.add_argument("--seed", type=int, default=60_000)
     parser.add_argument("--mazes", type=int, default=100, help="with two episodes in each at each distance")
+    parser.add_argument("--kind", default="dfs")
+    parser.add_argument("--trained-in", type=int, help="train mazes: the benchmark's for 20, else so many drawn ones")
     given = parser.parse_args()
-    tasks = [held_out_task({"distances": (distance,)}, given.seed, given.mazes) for distance in _DISTANCES]
+    tasks = [_task(distance, given) for distance in _DISTANCES]
     print("success rate at", " ".join(f"{distance} cells" for distance in _DISTANCES))
 
     scores, mazes = [], []
@@ -52,6 +57,14 @@ def main() -> None:
         if min(len(values), len(others)) > 1:
             pairs = zip(values.swapaxes(0, 1), mazes, others.swapaxes(0, 1), strict=True)
             _print_row([runs_interval(*at) for at in pairs], f"{name} - {other}")
+
+
+def _task(distance: int, given: argparse.Namespace) -> TaskSpec:
+    """Returns the local task at one distance in the mazes that the options name."""
+    if given.trained_in is None:
+        return held_out_task({"distances": (distance,)}, given.seed, given.mazes, given.kind, _SIZE)
+    drawn = {} if given.trained_in == _NUM_TRAIN else {"kinds": (given.kind,), "num_mazes": given.trained_in}
+    return make_spec("local", _SIZE, "train", distances=(distance,), **drawn)
 
 
 def _print_row(estimates: Sequence[Estimate], name: str) -> None:

@@ -12,13 +12,14 @@ import mazebench
 
 
 class MapFeatures(BaseFeaturesExtractor):
-    """Convolutions of the context, beside state and lidar, which are scaled to an order of 1."""
+    """Convolutions of the context, beside state and lidar if there is one, which are scaled to an order of 1."""
 
     def __init__(self, observation_space, num_features=256):
-        super().__init__(observation_space, num_features + 12 + observation_space["lidar"].shape[0])
+        lidar = observation_space.spaces.get("lidar")
+        super().__init__(observation_space, num_features + 12 + (lidar.shape[0] if lidar else 0))
         channels, side, _ = observation_space["context"].shape
         self.scale = torch.tensor([1 / side] * 3 + [1.0] * 9)  # positions are in metres
-        self.reach = float(observation_space["lidar"].high.max())
+        self.reach = float(lidar.high.max()) if lidar else None
         layers = []
         for wider in (32, 64, 64):
             layers += [nn.Conv2d(channels, wider, 3, stride=2, padding=1), nn.ReLU()]
@@ -26,8 +27,10 @@ class MapFeatures(BaseFeaturesExtractor):
         self.context = nn.Sequential(*layers, nn.Flatten(), nn.Linear(channels * side**2, num_features), nn.ReLU())
 
     def forward(self, observations):
-        features = self.context(observations["context"])
-        return torch.cat([features, observations["state"] * self.scale, observations["lidar"] / self.reach], dim=1)
+        parts = [self.context(observations["context"]), observations["state"] * self.scale]
+        if self.reach:
+            parts.append(observations["lidar"] / self.reach)
+        return torch.cat(parts, dim=1)
 
 
 class PPOAgent(mazebench.Agent):
@@ -72,6 +75,12 @@ class PPOAgent(mazebench.Agent):
     def resized(self, planes):
         """Returns `[4, side, side]`: the planes of a context with another number of cells."""
         return np.stack([cv2.resize(plane, (self.side, self.side), interpolation=cv2.INTER_AREA) for plane in planes])
+
+
+class MapPPOAgent(PPOAgent):
+    """The same without a lidar."""
+
+    needs_sensors = ()
 
 
 class RecurrentPPOAgent(PPOAgent):

@@ -1,12 +1,12 @@
-"""Trains Stable-Baselines3's DQN with hindsight on the goal-conditioned environment, then counts its successes.
+"""Trains Stable-Baselines3's DQN with hindsight on the goal-conditioned environment, and saves the policy.
 
-python docs/examples/sb3_her.py --steps 100000
+python docs/examples/sb3_her.py --steps 100000 --out her.zip
 """
 
 import argparse
 
 import gymnasium
-import numpy as np
+from sb3_her_agent import GoalFeatures
 from stable_baselines3 import DQN, HerReplayBuffer
 from stable_baselines3.common.type_aliases import DictReplayBufferSamples
 
@@ -24,38 +24,28 @@ class EndingHerReplayBuffer(HerReplayBuffer):
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--steps", type=int, default=100_000)
-parser.add_argument("--episodes", type=int, default=50, help="of the evaluation, in mazes it was not trained in")
+parser.add_argument("--distance", type=int, default=3, help="of the farthest starts from their goals, in cells")
 parser.add_argument("--seed", type=int, default=0)
+parser.add_argument("--out", default="her.zip")
 arguments = parser.parse_args()
 
-distances = [1, 2, 3]
-env = gymnasium.make("mazebench/LocalGoal-13-v1", distances=distances)
 model = DQN(
     "MultiInputPolicy",
-    env,
+    gymnasium.make("mazebench/LocalGoal-13-v1", distances=range(1, arguments.distance + 1)),
     replay_buffer_class=EndingHerReplayBuffer,
     replay_buffer_kwargs={"n_sampled_goal": 4, "goal_selection_strategy": "future"},
     learning_starts=200,  # more than an episode's 100 steps: hindsight needs one that has ended
     learning_rate=5e-4,
-    batch_size=256,
-    policy_kwargs={"net_arch": [256, 256]},
-    buffer_size=min(arguments.steps, 100_000),
+    batch_size=64,
+    policy_kwargs={"net_arch": [256], "features_extractor_class": GoalFeatures},
+    buffer_size=min(arguments.steps, 200_000),
     gamma=0.95,
     target_update_interval=500,
     exploration_fraction=0.3,
     seed=arguments.seed,
+    device="cpu",
+    verbose=1,
 )
-model.learn(arguments.steps)
-
-test = gymnasium.make("mazebench/LocalGoal-13-v1", split="eval", distances=distances)
-successes = []
-for episode in range(arguments.episodes):
-    observation, info = test.reset(seed=episode)
-    terminated = truncated = False
-    while not (terminated or truncated):
-        action, _ = model.predict(observation, deterministic=True)
-        observation, _, terminated, truncated, info = test.step(int(action))
-    successes.append(info["success"])
-print(
-    f"success rate {np.mean(successes):.2f} in {len(successes)} episodes of unseen mazes, {distances} cells to the goal"
-)
+model.learn(arguments.steps, log_interval=100)
+model.policy.save(arguments.out)
+print(f"saved {arguments.out}, which sb3_her_agent:HerAgent plays")

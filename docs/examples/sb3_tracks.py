@@ -1,4 +1,4 @@
-"""Trains Stable-Baselines3's PPO on a track, at all of its levels, and saves the policy.
+"""Trains Stable-Baselines3's PPO on a track, at all of its levels, or on a task, and saves the policy.
 
 python docs/examples/sb3_tracks.py --steps 400000 --out ppo.zip
 """
@@ -7,7 +7,7 @@ import argparse
 
 import gymnasium
 import numpy as np
-from sb3_agent import MapFeatures, PPOAgent, RecurrentPPOAgent
+from sb3_agent import MapFeatures, MapPPOAgent, PPOAgent, RecurrentPPOAgent
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
 import mazebench  # noqa: F401  (registers the ids)
@@ -56,8 +56,8 @@ class MazeVecEnv(VecEnv):
 
 
 parser = argparse.ArgumentParser()
-parser.add_argument("--track", default="mazebench/Stale-13-v2", help="its Gymnasium id")
-parser.add_argument("--level", type=int, nargs="+", default=[1, 2, 3], help="of several, each episode draws one")
+parser.add_argument("--track", default="mazebench/Stale-13-v2", help="the Gymnasium id of it or of a task")
+parser.add_argument("--level", type=int, nargs="+", default=[1, 2, 3], help="of a track; each episode draws one")
 parser.add_argument("--distances", type=int, nargs=2, default=[1, 6], help="cells from start to goal, from and to")
 parser.add_argument("--kinds", nargs="*", default=[], help="of a new maze in each episode, instead of the train mazes")
 parser.add_argument("--recurrent", action="store_true", help="a policy with an LSTM, by sb3-contrib")
@@ -68,7 +68,9 @@ parser.add_argument("--out", default="ppo.zip")
 arguments = parser.parse_args()
 
 nearest, farthest = arguments.distances
-options = {"level": arguments.level, "distances": range(nearest, farthest + 1)}
+options = {"distances": range(nearest, farthest + 1)}
+if "level" in gymnasium.spec(arguments.track).kwargs:
+    options["level"] = arguments.level
 if arguments.kinds:
     options |= {"kinds": arguments.kinds, "fresh": True}
 envs = gymnasium.make_vec(arguments.track, num_envs=arguments.num_envs, **options)
@@ -76,6 +78,8 @@ for name, space in envs.single_observation_space.spaces.items():
     print(f"{name}: {list(space.shape)}")
 
 agent = RecurrentPPOAgent if arguments.recurrent else PPOAgent
+if "lidar" not in envs.single_observation_space.spaces:
+    agent = MapPPOAgent
 model = agent.algorithm(
     "MultiInputLstmPolicy" if arguments.recurrent else "MultiInputPolicy",
     VecNormalize(VecMonitor(MazeVecEnv(envs)), norm_obs=False, gamma=0.99),  # rewards of an order of 1

@@ -1,0 +1,66 @@
+"""The policy that sb3_her.py saved, as an agent of mazebench, and the features that it reads."""
+
+import numpy as np
+import torch
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.dqn.policies import MultiInputPolicy
+from torch import nn
+
+import mazebench
+from mazebench.tasks.context import GOAL
+
+
+class GoalFeatures(BaseFeaturesExtractor):
+    """Convolutions of the map, on which the body's cell and the goal's are drawn, beside the state."""
+
+    def __init__(self, observation_space, num_features=256):
+        super().__init__(observation_space, num_features + 12)
+        self.metres = float(observation_space["desired_goal"].high[0])  # on a side of the maze
+        self.side = side = round(((observation_space["observation"].shape[0] - 12) / 3) ** 0.5)  # M of the planes
+        self.scale = torch.tensor([1 / self.metres] * 3 + [1.0] * 9)
+        layers, channels = [], 5
+        for wider in (32, 64, 64):
+            layers += [nn.Conv2d(channels, wider, 3, stride=2, padding=1), nn.ReLU()]
+            channels, side = wider, (side + 1) // 2
+        self.planes = nn.Sequential(*layers, nn.Flatten(), nn.Linear(channels * side**2, num_features), nn.ReLU())
+
+    def forward(self, observations):
+        state, shown = observations["observation"][:, :12], observations["observation"][:, 12:]
+        drawn = [self.drawn(observations[key]) for key in ("achieved_goal", "desired_goal")]
+        planes = torch.cat([shown.unflatten(1, (3, self.side, self.side)), torch.stack(drawn, dim=1)], dim=1)
+        return torch.cat([self.planes(planes), state * self.scale], dim=1)
+
+    def drawn(self, points):
+        """Returns `[B, M, M]`: planes that are 1 in the cell of each point `[B, 2]`, x to the right and y up, in m."""
+        cells = (points * self.side / self.metres).long().clamp(0, self.side - 1)
+        planes = points.new_zeros(len(points), self.side, self.side)
+        planes[torch.arange(len(points)), self.side - 1 - cells[:, 1], cells[:, 0]] = 1
+        return planes
+
+
+class HerAgent(mazebench.Agent):
+    """Takes the action of the highest value; its cell is that of the observed position."""
+
+    @classmethod
+    def build(cls, interface, *, seed=0, checkpoint=None):
+        if checkpoint is None:
+            raise mazebench.InputError("expected --checkpoint, the file that sb3_her.py saved, found none")
+        return cls(MultiInputPolicy.load(checkpoint, device="cpu"), interface.size * interface.cell_size)
+
+    def __init__(self, policy, metres):
+        self.policy, self.metres = policy, metres
+
+    def act(self, inputs, state, explore=False):
+        return self.policy.predict(self.goal_conditioned(inputs.observation), deterministic=True)[0], state
+
+    def goal_conditioned(self, observation):
+        """Returns what the goal-conditioned environment shows, which has the goal in no plane."""
+        state, context = observation["state"], observation["context"]
+        batch, side = len(context), context.shape[-1]
+        row, column = np.divmod(context[:, GOAL].reshape(batch, -1).argmax(axis=1), side)
+        shown = {
+            "observation": np.hstack([state, np.delete(context, GOAL, axis=1).reshape(batch, -1)]),
+            "achieved_goal": state[:, :2],
+            "desired_goal": np.stack([column + 0.5, side - row - 0.5], axis=1) * self.metres / side,
+        }
+        return {name: values.astype(np.float32) for name, values in shown.items()}
