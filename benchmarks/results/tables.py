@@ -145,8 +145,8 @@ def paper_table(kept: Kept) -> str:
 def paper_runs(kept: Kept) -> str:
     """Returns mean success rates over training runs, and the differences of `_PAIRS`."""
     success = {name: _successes(kept.training_runs(name)) for name in _TRAINED}
-    success[RANDOM] = _successes([kept.result(RANDOM, LOCAL)])
-    labels = {**_TRAINED, RANDOM: _code(RANDOM)}
+    labels = {name: label + ", one run" * (len(success[name]) == 1) for name, label in _TRAINED.items()}
+    success[RANDOM], labels[RANDOM] = _successes([kept.result(RANDOM, LOCAL)]), _code(RANDOM)
     means = [[labels[name], *_over_runs(kept, values)] for name, values in success.items()]
     differences = [[f"{labels[a]} - {labels[b]}", *_over_runs(kept, success[a], success[b])] for a, b in _PAIRS]
     return _table(["agent", *map(str, _PRINTED_DISTANCES)], [*means, *differences])

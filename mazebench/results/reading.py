@@ -161,9 +161,10 @@ def _contradiction(summary: Summary, records: tuple[Record, ...], oracle_steps: 
     same = ("agent", "task", "size", "split", "cell_size", "track", "level", "lidar_noise", "odometry_noise")
     expected = {key: getattr(summary, key) for key in same} | summary.perturbation
     for record in records:
+        found = vars(record) | (record.model_extra or {})
         for key, value in expected.items():
-            if getattr(record, key, None) != value:
-                return f"expected {key} {value!r} in episode {record.episode}, found {getattr(record, key, None)!r}"
+            if found.get(key) != value:
+                return f"expected {key} {value!r} in episode {record.episode}, found {found.get(key)!r}"
     success, driven = column(records, "success"), column(records, "path_length")
     for name, shortest, metres in (("spl", "shortest_path", 1.0), ("spl_grid", "distance", summary.cell_size or 1.0)):
         scores = spl(success, column(records, shortest) * metres, driven)
