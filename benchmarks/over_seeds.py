@@ -22,7 +22,6 @@ from mazebench.tasks.build import make_spec
 from mazebench.tasks.spec import TaskSpec
 
 _SIZE = 13
-_NUM_TRAIN = 20  # mazes of the benchmark's train split
 _DISTANCES = (2, 4, 6, 8, 10)
 
 
@@ -34,7 +33,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=60_000)
     parser.add_argument("--mazes", type=int, default=100, help="with two episodes in each at each distance")
     parser.add_argument("--kind", default="dfs")
-    parser.add_argument("--trained-in", type=int, help="train mazes: the benchmark's for 20, else so many drawn ones")
+    parser.add_argument("--trained-in", type=int, help="so many drawn train mazes, 0 for the benchmark's")
     given = parser.parse_args()
     tasks = [_task(distance, given) for distance in _DISTANCES]
     print("success rate at", " ".join(f"{distance} cells" for distance in _DISTANCES))
@@ -63,7 +62,7 @@ def _task(distance: int, given: argparse.Namespace) -> TaskSpec:
     """Returns the local task at one distance in the mazes that the options name."""
     if given.trained_in is None:
         return held_out_task({"distances": (distance,)}, given.seed, given.mazes, given.kind, _SIZE)
-    drawn = {} if given.trained_in == _NUM_TRAIN else {"kinds": (given.kind,), "num_mazes": given.trained_in}
+    drawn = {"kinds": (given.kind,), "num_mazes": given.trained_in} if given.trained_in else {}
     return make_spec("local", _SIZE, "train", distances=(distance,), **drawn)
 
 
