@@ -1,55 +1,57 @@
-"""Planners that doubt the map without a belief: a shown wall is a detour, and a wall that was felt is a longer one.
+"""Planners that drive into shown walls at a cost and mark the walls that they feel, without a belief.
 
 Call them as `mazebench eval --agent benchmarks.bumping_planner:BumpingPlanner`, or in `benchmarks/wrong_maps.py`.
-`LatticePlanner` knows the mazes of the kind `dfs`, too. A robot that revises its map must be better than both.
+`LatticePlanner` knows the mazes of the kind `dfs`, too. Both are baselines for robots that revise their map.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from mazebench_agents.robot.body import LOOK_LEFT, Body, observed_body
-from mazebench_agents.robot.cells import marked_cell, nearest_cell, start_cell
+from mazebench_agents.robot.cells import marked_cell, nearest_cell
 from mazebench_agents.robot.contacts import felt_walls
-from mazebench_agents.robot.odometry import DeadReckoning
 from mazebench_agents.robot.pilot import Pilot
 from mazebench_agents.robot.planning import plan
+from scipy import ndimage
 
 from mazebench.agent import Observation, SingleAgent
-from mazebench.maps.maze import cell_to_point
 from mazebench.tasks.context import GLOBAL_MAP, GOAL
 
-# Probabilities of a wall, by which a cell costs 10 and 60 cells.
-_SHOWN, _FELT = 0.9, 0.983
-_POSITION_GAIN = 0.1  # weight of an observed position against the one predicted from velocities
+# Probabilities of a wall, by which a cell costs 10 and 60 cells. Walls that are certain are never tried.
+_SHOWN, _FELT, _CERTAIN = 0.9, 0.983, 1.0
 _DEVIATION = 0.01  # cells, standard deviation of the position
 
 
 class BumpingPlanner(SingleAgent):
-    """Drives as `planner-closed-loop` does, in cells of 1 m, and plans again where it has felt a wall."""
+    """Drives as `planner-closed-loop` does, in cells of 1 m, and plans again where it has felt a wall.
+
+    It takes the observed position for a point of the maze, and a goal that is marked in a certain wall for one beside.
+    """
 
     def reset(self, observation: Observation) -> None:
         """Takes in a new goal; in a new episode, the map too."""
         context = observation["context"]
         if self.new_episode:
-            shown = context[GLOBAL_MAP] > 0.5
-            self._walls = self.believed(shown)
-            self._walls[[0, -1]] = self._walls[:, [0, -1]] = 1.0
-            self._dead_reckoning: DeadReckoning | None = None
-            self._start, self._action = start_cell(context), LOOK_LEFT
+            self._walls = self.believed(context[GLOBAL_MAP] > 0.5)
+            self._walls[[0, -1]] = self._walls[:, [0, -1]] = _CERTAIN
+            self._before: Body | None = None
+            self._action = LOOK_LEFT
+        beside = ndimage.distance_transform_edt(self._walls == _CERTAIN, return_distances=False, return_indices=True)
         self._goal = np.zeros(self._walls.shape)
-        self._goal[marked_cell(context[GOAL])] = 1.0
+        self._goal[tuple(beside[(slice(None), *marked_cell(context[GOAL]))])] = 1.0
         self._pilot: Pilot | None = None
 
     def act(self, observation: Observation) -> int:
         """Returns an action."""
-        size = len(self._walls)
-        body = self._estimate(observed_body(observation["state"].tolist()))
+        body, size = observed_body(observation["state"].tolist()), len(self._walls)
+        if self._before is not None:
+            self._mark_felt_walls(self._before, body)
         cell = nearest_cell(body.x, body.y, size)
-        if self._walls[cell] < 1:
+        if self._walls[cell] < _CERTAIN:
             self._walls[cell] = 0.0
         if self._pilot is None:
             self._pilot = Pilot.along(plan(self._walls, self._goal, cell), size)
-        self._action = self._pilot.action(body)
+        self._before, self._action = body, self._pilot.action(body)
         return self._action
 
     @staticmethod
@@ -57,26 +59,19 @@ class BumpingPlanner(SingleAgent):
         """Returns `[N, N]` float: the probability of a wall on a map of shown walls `[N, N]` bool."""
         return np.where(shown, _SHOWN, 0.0)
 
-    def _estimate(self, observed: Body) -> Body:
-        """Returns the body at its estimated position; marks the walls that have stopped it on its way there."""
-        if self._dead_reckoning is None:
-            x, y = cell_to_point(self._start, len(self._walls)).tolist()
-            self._dead_reckoning = DeadReckoning((x, y), observed.velocity(), _POSITION_GAIN)
-            self._body = observed._replace(x=x, y=y)
-            return self._body
-        before, self._body = self._body, self._dead_reckoning.update(observed)
-        for cell, _ in felt_walls(before, self._action, self._body, 1.0, _DEVIATION, len(self._walls)):
+    def _mark_felt_walls(self, before: Body, body: Body) -> None:
+        """Marks the walls that may have stopped the body in its last step; where one is new, it plans again."""
+        for cell, _ in felt_walls(before, self._action, body, 1.0, _DEVIATION, len(self._walls)):
             if self._walls[cell] < _FELT:
                 self._walls[cell], self._pilot = _FELT, None
-        return self._body
 
 
 class LatticePlanner(BumpingPlanner):
-    """The same, and knows of the kind `dfs` that rooms, at odd rows and columns, are free, and pillars are walls."""
+    """The same, and knows `dfs`: a cell in an odd row and column is free, one in an even row and column is a wall."""
 
     @staticmethod
     def believed(shown: np.ndarray) -> np.ndarray:
         """Returns `[N, N]` float: the probability of a wall on a map of shown walls `[N, N]` bool."""
         walls = BumpingPlanner.believed(shown)
-        walls[1::2, 1::2], walls[::2, ::2] = 0.0, 1.0
+        walls[1::2, 1::2], walls[::2, ::2] = 0.0, _CERTAIN
         return walls

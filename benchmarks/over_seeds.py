@@ -2,7 +2,8 @@
 
 Call it as `python benchmarks/over_seeds.py AGENT CHECKPOINT... [--agent AGENT CHECKPOINT...]...`. Intervals are over
 runs and mazes together. Of several agents, it also prints the difference of each one and the next. The mazes are of no
-split, and none of them is one on which training runs are watched. With `--trained-in`, they are train mazes instead.
+split, and none of them is one on which training runs are watched. With `--trained-in NUM`, they are the train mazes of
+runs with `--num-mazes NUM` instead, with 0 those of the benchmark.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=60_000)
     parser.add_argument("--mazes", type=int, default=100, help="with two episodes in each at each distance")
     parser.add_argument("--kind", default="dfs")
-    parser.add_argument("--trained-in", type=int, help="so many drawn train mazes, 0 for the benchmark's")
+    parser.add_argument("--trained-in", type=int, metavar="NUM", help="train mazes instead")
     given = parser.parse_args()
     tasks = [_task(distance, given) for distance in _DISTANCES]
     print("success rate at", " ".join(f"{distance} cells" for distance in _DISTANCES))

@@ -84,10 +84,14 @@ from sb3_her_agent import HerAgent
 check_agent('sb3_her_agent:HerAgent', Interface('local', 13, 13), 'her.zip')
 
 # The agent sees what the goal-conditioned environment shows.
-observation, shown = (gymnasium.make(f'mazebench/{name}-13-v1').reset(seed=1)[0] for name in ('Local', 'LocalGoal'))
-seen = HerAgent(None, 13.0).goal_conditioned({name: values[None] for name, values in observation.items()})
-for name, values in shown.items():
-    np.testing.assert_array_equal(seen[name][0], values)
+agent, envs = HerAgent(None, 13, 1.0), [gymnasium.make(f'mazebench/{name}-13-v1') for name in ('Local', 'LocalGoal')]
+steps = [env.reset(seed=1) for env in envs]
+for action in (0, 0, 2, 2, 4, 0, 0):
+    (observation, *_), (shown, *_) = steps
+    seen = agent.goal_conditioned({name: values[None] for name, values in observation.items()})
+    for name, values in shown.items():
+        np.testing.assert_array_equal(seen[name][0], values)
+    steps = [env.step(action) for env in envs]
 """
         run("-c", check, folder=tmp_path)
 

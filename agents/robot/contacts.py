@@ -15,7 +15,7 @@ from .motion import REACH, moved
 _NO_WALLS = np.zeros((3, 3), dtype=bool)
 _STOPPED = 0.25  # m/s along an axis that the body is slower than it would be in the open, if a wall stopped it
 _SLACK = 0.04  # m from which a wall pushes more than the model says, for errors of both
-_GIVE = 0.06  # m by which a body gets into a wall's reach, at most; nearer to the cell, a corner beside it has stopped it
+_GIVE = 0.06  # m that a wall lets the body come into its reach, at most; a body that is deeper was stopped by a corner
 _CLEAR = 0.36  # cells aside from the middle of a cell, at most, where the body touches no corner of a wall
 SURELY, PERHAPS = 4.0, 1.0  # log odds of a wall: where no other one can have stopped the body, and where one can
 

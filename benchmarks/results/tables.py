@@ -145,13 +145,13 @@ def paper_table(kept: Kept) -> str:
     return _table(header, rows)
 
 
-def paper_runs(kept: Kept) -> str:
-    """Returns mean success rates over training runs, and the differences of `_PAIRS`."""
-    success = {name: _successes(kept.training_runs(name)) for name in _TRAINED}
-    labels = {name: label + ", one run" * (len(success[name]) == 1) for name, label in _TRAINED.items()}
-    success[RANDOM], labels[RANDOM] = _successes([kept.result(RANDOM, LOCAL)]), _code(RANDOM)
-    means = [[labels[name], *_over_runs(kept, values)] for name, values in success.items()]
-    differences = [[f"{labels[a]} - {labels[b]}", *_over_runs(kept, success[a], success[b])] for a, b in _PAIRS]
+def paper_runs(field: str, kept: Kept) -> str:
+    """Returns the mean of a field of records over training runs, and the differences of `_PAIRS`."""
+    found = {name: _values(kept.training_runs(name), field) for name in _TRAINED}
+    labels = {name: label + ", one run" * (len(found[name]) == 1) for name, label in _TRAINED.items()}
+    found[RANDOM], labels[RANDOM] = _values([kept.result(RANDOM, LOCAL)], field), _code(RANDOM)
+    means = [[labels[name], *_over_runs(kept, values)] for name, values in found.items()]
+    differences = [[f"{labels[a]} - {labels[b]}", *_over_runs(kept, found[a], found[b])] for a, b in _PAIRS]
     return _table(["agent", *map(str, _PRINTED_DISTANCES)], [*means, *differences])
 
 
@@ -160,7 +160,7 @@ def mmn_runs(kept: Kept) -> str:
     local = kept.report[LOCAL]
     (printed,) = [each.cells["success_rate"] for each in local.columns if each.label == _PAPERS_MMN]
     paper = [str(printed[local.rows.index(str(distance))]) for distance in _PRINTED_DISTANCES]
-    ours = _over_runs(kept, _successes(kept.training_runs("mmn")))
+    ours = _over_runs(kept, _values(kept.training_runs("mmn"), "success"))
     rows = [["`mmn`, three runs", *ours], ["the paper's MMN, as printed", *paper]]
     return _table(["agent", *map(str, _PRINTED_DISTANCES)], rows)
 
@@ -252,7 +252,8 @@ def v3_navigator_kinds(kept: Kept) -> str:
 # By the name that a page gives.
 TABLES: dict[str, Callable[[Kept], str]] = {
     "paper-local": paper_table,
-    "paper-runs": paper_runs,
+    "paper-runs": functools.partial(paper_runs, "success"),
+    "paper-runs-spl": functools.partial(paper_runs, "spl"),
     "mmn-runs": mmn_runs,
     "v3-success": functools.partial(v3_table, "success_rate"),
     "v3-on-time": functools.partial(v3_table, ON_TIME_125),
@@ -266,13 +267,13 @@ TABLES: dict[str, Callable[[Kept], str]] = {
 }
 
 
-def _successes(runs: Sequence[Result]) -> np.ndarray:
-    """Returns `[R, E]` float."""
-    return np.array([column(each.records, "success") for each in runs], dtype=float)
+def _values(runs: Sequence[Result], field: str) -> np.ndarray:
+    """Returns `[R, E]` float: a field of the records of each run."""
+    return np.array([column(each.records, field) for each in runs], dtype=float)
 
 
 def _over_runs(kept: Kept, values: np.ndarray, others: np.ndarray | None = None) -> list[str]:
-    """Returns the mean of successes `[R, E]`, or the difference to others' mean, at each distance of the paper."""
+    """Returns the mean of values `[R, E]`, or the difference to others' mean, at each distance of the paper."""
     records = kept.result(RANDOM, LOCAL).records
     maze, distance = column(records, "maze"), column(records, "distance")
     counted = [distance == each for each in _PRINTED_DISTANCES]

@@ -24,7 +24,7 @@ class EndingHerReplayBuffer(HerReplayBuffer):
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--steps", type=int, default=100_000)
-parser.add_argument("--distance", type=int, default=3, help="of the farthest starts from their goals, in cells")
+parser.add_argument("--distance", type=int, default=3, help="cells from start to goal, at most")
 parser.add_argument("--seed", type=int, default=0)
 parser.add_argument("--out", default="her.zip")
 arguments = parser.parse_args()

@@ -45,10 +45,10 @@ class HerAgent(mazebench.Agent):
     def build(cls, interface, *, seed=0, checkpoint=None):
         if checkpoint is None:
             raise mazebench.InputError("expected --checkpoint, the file that sb3_her.py saved, found none")
-        return cls(MultiInputPolicy.load(checkpoint, device="cpu"), interface.size * interface.cell_size)
+        return cls(MultiInputPolicy.load(checkpoint, device="cpu"), interface.size, interface.cell_size)
 
-    def __init__(self, policy, metres):
-        self.policy, self.metres = policy, metres
+    def __init__(self, policy, size, cell_size):
+        self.policy, self.size, self.cell_size = policy, size, cell_size
 
     def act(self, inputs, state, explore=False):
         return self.policy.predict(self.goal_conditioned(inputs.observation), deterministic=True)[0], state
@@ -58,9 +58,10 @@ class HerAgent(mazebench.Agent):
         state, context = observation["state"], observation["context"]
         batch, side = len(context), context.shape[-1]
         row, column = np.divmod(context[:, GOAL].reshape(batch, -1).argmax(axis=1), side)
+        goal = np.stack([column, side - 1 - row], axis=1) + 0.5  # x, y in pixels of the map
         shown = {
             "observation": np.hstack([state, np.delete(context, GOAL, axis=1).reshape(batch, -1)]),
-            "achieved_goal": state[:, :2],
-            "desired_goal": np.stack([column + 0.5, side - row - 0.5], axis=1) * self.metres / side,
+            "achieved_goal": (state[:, :2] // self.cell_size + 0.5) * self.cell_size,
+            "desired_goal": goal * self.size * self.cell_size / side,
         }
         return {name: values.astype(np.float32) for name, values in shown.items()}

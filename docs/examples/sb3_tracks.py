@@ -56,8 +56,8 @@ class MazeVecEnv(VecEnv):
 
 
 parser = argparse.ArgumentParser()
-parser.add_argument("--track", default="mazebench/Stale-13-v2", help="the Gymnasium id of it or of a task")
-parser.add_argument("--level", type=int, nargs="+", default=[1, 2, 3], help="of a track; each episode draws one")
+parser.add_argument("--track", default="mazebench/Stale-13-v2", help="Gymnasium id of a track or a task")
+parser.add_argument("--level", type=int, nargs="+", default=[1, 2, 3], help="of a track; episodes draw one")
 parser.add_argument("--distances", type=int, nargs=2, default=[1, 6], help="cells from start to goal, from and to")
 parser.add_argument("--kinds", nargs="*", default=[], help="of a new maze in each episode, instead of the train mazes")
 parser.add_argument("--recurrent", action="store_true", help="a policy with an LSTM, by sb3-contrib")
@@ -79,6 +79,8 @@ for name, space in envs.single_observation_space.spaces.items():
 
 agent = RecurrentPPOAgent if arguments.recurrent else PPOAgent
 if "lidar" not in envs.single_observation_space.spaces:
+    if arguments.recurrent:
+        parser.error("expected a track with --recurrent, found a task without a lidar")
     agent = MapPPOAgent
 model = agent.algorithm(
     "MultiInputLstmPolicy" if arguments.recurrent else "MultiInputPolicy",

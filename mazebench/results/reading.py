@@ -161,7 +161,7 @@ def _contradiction(summary: Summary, records: tuple[Record, ...], oracle_steps: 
     same = ("agent", "task", "size", "split", "cell_size", "track", "level", "lidar_noise", "odometry_noise")
     expected = {key: getattr(summary, key) for key in same} | summary.perturbation
     for record in records:
-        found = vars(record) | (record.model_extra or {})
+        found = vars(record) | (record.model_extra or {})  # `getattr` is slow for what pydantic has as extra
         for key, value in expected.items():
             if found.get(key) != value:
                 return f"expected {key} {value!r} in episode {record.episode}, found {found.get(key)!r}"
