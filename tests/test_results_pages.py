@@ -84,7 +84,9 @@ class TestPages:
 
     def test_an_unknown_table_is_refused_in_a_line(self):
         for name in ("v9", "paper", "paper local-13 spl"):
-            with pytest.raises(InputError, match=f"unknown table '{name}'; tables: paper-local, paper-runs, paper-runs-spl, mmn-runs"):
+            with pytest.raises(
+                InputError, match=f"unknown table '{name}'; tables: paper-local, paper-runs, paper-runs-spl, mmn-runs"
+            ):
                 with_tables(f"<!-- table: {name} -->\n<!-- end of table -->\n", NOTHING)
 
     @pytest.mark.parametrize(
