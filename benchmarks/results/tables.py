@@ -60,12 +60,14 @@ _TRAINED = {  # by name of the kept runs
     "mmn-model-false": "`mmn` without model and search",
     "mah": "`mah`",
     "dqn": "`dqn`",
+    "sb3-her": "DQN with hindsight of Stable-Baselines3",
     "sb3-ppo": "PPO of Stable-Baselines3",
 }
 _PAIRS = (
     ("mmn", "mmn-model-false"),
     ("mmn-model-false", "mah"),
     ("mmn", "mah"),
+    ("mah", "sb3-her"),
     ("mah", "sb3-ppo"),
     ("sb3-ppo", "dqn"),
     ("mah", "dqn"),
