@@ -53,6 +53,14 @@ def test_a_checkpoint_is_named_by_its_hash_and_tells_its_config(tmp_path):
     found = provenance(options, load_agent_class("mah"), build_task(options.task, options.mazes)).model_dump()
     assert found["checkpoint_sha256"] == hashlib.sha256((tmp_path / "x.safetensors").read_bytes()).hexdigest()
     assert found["checkpoint_metadata"] == {"mine": {"config": {"width": 8}}}
+    assert found["options"]["checkpoint"] == checkpoint
+
+
+def test_a_checkpoint_that_ships_is_told_without_the_path_to_it():
+    agent_class = load_agent_class("mah")
+    options = EvalOptions.of("mah", checkpoint=str(agent_class.default_checkpoint()))
+    found = provenance(options, agent_class, build_task(options.task, options.mazes)).model_dump()
+    assert found["options"]["checkpoint"] == "mah-13.safetensors"
 
 
 def test_an_agent_at_hand_is_named_by_the_hash_of_its_file(tmp_path, monkeypatch):

@@ -52,6 +52,7 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
         "options": {
             **by_name(options),
             **by_name(Variants()),
+            "checkpoint": _told_checkpoint(options.checkpoint, agent_class),
             "distances": task.distances,
             "time_limit": task.time_limit,
         },
@@ -67,6 +68,12 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
         "mazes_sha256": mazes_hash(task),
     }
     return Provenance.model_validate_json(json.dumps(content))  # as a reader will find it
+
+
+def _told_checkpoint(path: str | None, agent_class: type[Agent]) -> str | None:
+    """Returns the path of a checkpoint as given; a file that ships is told by its name alone."""
+    shipped = agent_class.default_checkpoint()
+    return shipped.name if shipped and str(shipped) == path else path
 
 
 def mazes_hash(task: TaskSpec) -> str:
