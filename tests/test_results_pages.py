@@ -17,6 +17,7 @@ from benchmarks.results.kept import LOCAL, Kept, keep, read_kept
 from benchmarks.results.pages import PAGES, RECORDS, ROOT, with_tables
 from benchmarks.results.tables import make_table
 from mazebench.errors import InputError
+from mazebench.report.learning_curves import Run
 from mazebench.results.reading import load_result
 
 RESULTS = "docs/results.md"
@@ -173,3 +174,12 @@ class TestTrainingRuns:
         others = dataclasses.replace(kept, runs={"mah": [kept.result("mmn", LOCAL), kept.result("mah", "local-15")]})
         with pytest.raises(InputError, match="size"):
             others.training_runs("mah")
+
+    def test_success_rates_are_of_milestones_that_all_runs_reached(self):
+        first = ({"env_steps": 200_064, "success_rate_2": 0.1}, {"env_steps": 300_000, "td_loss": 1.0})
+        last = ({"env_steps": 6_600_000, "success_rate_2": 0.8}, {"env_steps": 6_648_448, "success_rate_2": 0.9})
+        second = ({"env_steps": 200_128, "success_rate_2": 0.3},)
+        kept = dataclasses.replace(NOTHING, training={"a": [Run("0", {}, (*first, *last)), Run("1", {}, second)]})
+        assert kept.success_rates("a", 2) == {0.2: [0.1, 0.3]}
+        alone = dataclasses.replace(kept, training={"a": kept.training["a"][:1]})
+        assert alone.success_rates("a", 2) == {0.2: [0.1], 6.6: [0.9]}

@@ -17,6 +17,7 @@ from benchmarks.results.kept import (
     NAVIGATOR,
     NO_MAP,
     ON_TIME_125,
+    PATHS,
     TRACKS_V3,
     TRUE_POSE,
     Kept,
@@ -82,8 +83,8 @@ def what_fails(kept: Kept) -> Figure:
     """Returns the navigator on time where the shortest path on the map is open and where it is blocked."""
     panels = {
         track: {
-            f"navigator, path on the map {name}": _levels(kept, NAVIGATOR, track, "blocked", (is_blocked,))
-            for name, is_blocked in (("open", False), ("blocked", True))
+            f"navigator, {name}": _levels(kept, NAVIGATOR, track, "blocked", (is_blocked,))
+            for name, is_blocked in PATHS.items()
         }
         for track in TRACKS_V3
     }
@@ -107,23 +108,13 @@ def model_and_search(kept: Kept) -> Figure:
 
     Bars reach from the lowest to the highest run. Milestones count as the nearest tenth of a million steps.
     """
-    runs = {
-        "mmn": kept.curves("mmn"),
-        "mmn without model and search": kept.curves("mmn-model-false"),
-        "mah": kept.curves("mah"),
-    }
+    archives = {"mmn": "mmn", "mmn without model and search": "mmn-model-false", "mah": "mah"}
     panels = []
     for distance in (6, 8, 10):
         series = []
-        for label, of_agent in runs.items():
-            rates: dict[float, list[float]] = {}
-            for run in of_agent:
-                for line in run.lines:
-                    if (name := f"success_rate_{distance}") in line:
-                        rates.setdefault(round(line["env_steps"] / 1e6, 1), []).append(line[name])
-            points = [
-                Point(x, float(np.mean(at)), min(at), max(at)) for x, at in rates.items() if len(at) == len(of_agent)
-            ]
+        for label, name in archives.items():
+            rates = kept.success_rates(name, distance).items()
+            points = [Point(steps, float(np.mean(runs)), min(runs), max(runs)) for steps, runs in rates]
             series.append(Series(label, tuple(points), has_bars=True))
         panels.append(
             Panel(
@@ -136,7 +127,7 @@ def model_and_search(kept: Kept) -> Figure:
             )
         )
     title = "Success rate on held-out mazes over training: mean, lowest and highest of three runs"
-    return Figure("model-and-search", title, "", tuple(panels), all_looks(list(runs)), panel_height=2.1)
+    return Figure("model-and-search", title, "", tuple(panels), all_looks(list(archives)), panel_height=2.1)
 
 
 def _levels(kept: Kept, row: str, track: str, field: str = "", values: Sequence[Any] = ()) -> list[Estimate | None]:

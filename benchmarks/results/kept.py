@@ -29,13 +29,15 @@ from mazebench.tasks.tracks import TRACKS, tracks_of
 from mazebench.tasks.tracks.base import LEVELS
 from mazebench.training.run_folder import METRICS, checkpoints
 
-PAPER, V3 = "paper", "v3"  # the suites
+PAPER = "paper"  # the suite
+V2, V3 = "v2", "v3"  # the benchmarks with tracks
 LOCAL = "local-13"  # the part of `paper` that training runs play
 TRACKS_V3 = tracks_of(V3)
 ON_TIME_125, ON_TIME_2 = ON_TIME_METRICS  # within 1.25 and 2 times the oracle's steps
 # Agents, with what they were told less or more than others.
 NAVIGATOR, NO_MAP, TRUE_POSE = "navigator", "navigator without map", "navigator with the true pose"
 BELIEF_PLANNER, BELIEF_RULE, RANDOM = "belief-planner", "belief-rule", "random"
+PATHS = {"path on the map open": False, "path on the map blocked": True}  # whether a record is of a blocked one
 
 _SUFFIX = ".tar.xz"
 _TRAINING = "training"  # the folder of archives of training runs
@@ -77,6 +79,21 @@ class Kept:
         if name not in self.training:
             raise InputError(f"expected training runs {name} among the records, found none")
         return self.training[name]
+
+    def success_rates(self, name: str, distance: int) -> dict[float, list[float]]:
+        """Returns the success rates of an archive's training runs on watched mazes, where all have one.
+
+        Keys are millions of agent steps, rounded to a tenth.
+
+        Raises:
+          InputError: if the archive is not kept.
+        """
+        field = f"success_rate_{distance}"
+        runs = [
+            {round(line["env_steps"] / 1e6, 1): line[field] for line in run.lines if field in line}
+            for run in self.curves(name)
+        ]
+        return {steps: [run[steps] for run in runs] for steps in runs[0] if all(steps in run for run in runs)}
 
     def result(self, row: str, part: str) -> Result:
         """Returns the evaluation of an agent on a part of a suite.

@@ -19,9 +19,11 @@ PAGES = (
     "README.md",
     "docs/results.md",
     "docs/tracks.md",
+    "docs/tracks_v2.md",
     "docs/agents/navigator.md",
     "docs/agents/belief-planner.md",
     "docs/agents/mmn.md",
+    "docs/experiments/dqn.md",
 )
 
 _BEGIN, _END = "<!-- table: ", "<!-- end of table -->"

@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import itertools
 from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +19,11 @@ from benchmarks.results.kept import (
     ON_TIME_2,
     ON_TIME_125,
     PAPER,
+    PATHS,
     RANDOM,
     TRACKS_V3,
     TRUE_POSE,
+    V2,
     V3,
     Kept,
     estimate,
@@ -35,11 +38,13 @@ from mazebench.results.intervals import Estimate, runs_interval
 from mazebench.results.metrics import ON_TIME_METRICS
 from mazebench.results.reading import Result
 from mazebench.results.records import column
+from mazebench.tasks.tracks import tracks_of
 from mazebench.tasks.tracks.base import LEVELS
 
 SATURATED = "At 1.00 ["  # begins the sentence below a table
 _PAPERS_MMN = "MMN (paper)"
 _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints success rates
+_MILESTONES = (0.2, 0.6, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.6)  # million agent steps
 # The rows of the paper's protocol, by the report's label.
 _PAPER_ROWS = {
     RANDOM: "`random`",
@@ -59,7 +64,9 @@ _TRAINED = {  # by name of the kept runs
     "mmn": "`mmn`",
     "mmn-model-false": "`mmn` without model and search",
     "mah": "`mah`",
+    "mah-long": "`mah`, 6.6 million steps",
     "dqn": "`dqn`",
+    "dqn-long": "`dqn`, 6.6 million steps",
     "sb3-her": "DQN with hindsight of Stable-Baselines3, one run",
     "sb3-ppo": "PPO of Stable-Baselines3",
 }
@@ -68,16 +75,18 @@ _PAIRS = (
     ("mmn", "mmn-model-false"),
     ("mmn-model-false", "mah"),
     ("mmn", "mah"),
+    ("mmn", "mah-long"),
     ("mah", "sb3-her"),
     ("mah", "sb3-ppo"),
     ("sb3-ppo", "dqn"),
     ("mah", "dqn"),
+    ("mah-long", "dqn-long"),
     ("dqn", RANDOM),
 )
 
 _PARTS = tuple((track, level) for track in TRACKS_V3 for level in LEVELS)
 _NOT_LOST = "not lost"  # of the navigator with the true pose, on tracks that tell it to all
-# The rows of v3's tables, by the agent and what it was told less or more than others.
+# The rows of tables of tracks, by the agent and what it was told less or more than others.
 _ROWS = {
     "oracle": "`oracle`, privileged: gets the true maze and pose",
     NAVIGATOR: "`navigator`, classical",
@@ -88,10 +97,12 @@ _ROWS = {
     "planner-closed-loop": "`planner-closed-loop`, trusts the map",
     "sb3_agent:PPOAgent": "PPO of Stable-Baselines3",
     "sb3_agent:RecurrentPPOAgent": "PPO of sb3-contrib, with an LSTM",
+    "mmn": "`mmn`, learned model and search, no lidar",
     "mah": "`mah`, learned, no lidar",
     "dqn": "`dqn`, learned, no map",
     RANDOM: "`random`",
 }
+_REFUSED = (("mmn", "sketch"), ("mmn", "far"))  # an agent, and a track whose maps it can't read
 
 
 def make_table(kept: Kept, name: str) -> str:
@@ -159,6 +170,16 @@ def paper_runs(field: str, kept: Kept) -> str:
     return _table(["agent", *map(str, _PRINTED_DISTANCES)], [*means, *differences])
 
 
+def mah_curve(kept: Kept) -> str:
+    """Returns success rates of mah over training on the watched mazes: the mean, lowest and highest of the runs."""
+    rates = [kept.success_rates("mah-long", distance) for distance in _PRINTED_DISTANCES]
+    rows = []
+    for steps in _MILESTONES:
+        runs = [at[steps] for at in rates]
+        rows.append([f"{steps:g}", *(_interval(Estimate(float(np.mean(at)), min(at), max(at))) for at in runs)])
+    return _table(["million steps", *map(str, _PRINTED_DISTANCES)], rows)
+
+
 def mmn_runs(kept: Kept) -> str:
     """Returns mmn's mean success rates over its training runs, and the paper's."""
     local = kept.report[LOCAL]
@@ -169,17 +190,23 @@ def mmn_runs(kept: Kept) -> str:
     return _table(["agent", *map(str, _PRINTED_DISTANCES)], rows)
 
 
-def v3_table(metric: str, kept: Kept) -> str:
-    """Returns a metric of all agents on v3."""
-    played = {row for (row, _), result in kept.results.items() if result.summary.benchmark == V3}
-    if unnamed := played - _ROWS.keys():
-        raise InputError(f"expected results of {', '.join(_ROWS)}, found those of {', '.join(sorted(unnamed))}")
+def tracks_table(benchmark: str, metric: str, kept: Kept) -> str:
+    """Returns a metric of all agents on the tracks of a benchmark."""
+    tracks = tracks_of(benchmark)
     rows = [
-        [description, *(_levels(kept, row, track, metric) for track in TRACKS_V3)]
-        for row, description in _ROWS.items()
-        if row in played
+        [description, *(_levels(kept, row, track, metric) for track in tracks)]
+        for row, description in _rows_of(kept, benchmark).items()
     ]
-    return _table(["agent", *map(_code, TRACKS_V3)], rows)
+    return _table(["agent", *map(_code, tracks)], rows)
+
+
+def v2_blocked(kept: Kept) -> str:
+    """Returns success rates on `stale` where the shortest path on the map is open, and where it is blocked."""
+    rows = [
+        [description, *(_levels(kept, row, "stale", "success_rate", "blocked", (each,)) for each in PATHS.values())]
+        for row, description in _rows_of(kept, V2).items()
+    ]
+    return _table(["agent", *PATHS], rows)
 
 
 def v3_map_worth(kept: Kept) -> str:
@@ -212,7 +239,10 @@ def v3_novel_kinds(kept: Kept) -> str:
     """Returns what the two robots reach in the kinds that they could know, and in those that are in eval alone."""
     chosen = list(itertools.product(("success_rate", ON_TIME_125), (("known", KNOWN), ("novel", NOVEL))))
     rows = [
-        [*map(_code, (track, row)), *(_levels(kept, row, track, metric, kinds) for metric, (_, kinds) in chosen)]
+        [
+            *map(_code, (track, row)),
+            *(_levels(kept, row, track, metric, "kind", kinds) for metric, (_, kinds) in chosen),
+        ]
         for track in TRACKS_V3
         for row in (NAVIGATOR, BELIEF_PLANNER)
     ]
@@ -221,19 +251,13 @@ def v3_novel_kinds(kept: Kept) -> str:
 
 def v3_blocked(kept: Kept) -> str:
     """Returns the navigator's share on time where the shortest path on the map is open, and where it is blocked."""
-    chosen = (("open", False), ("blocked", True))
-    rows = [
-        [
-            f"`{track}` {level}",
-            *(
-                _interval(estimate(kept.result(NAVIGATOR, f"{track}-{level}"), ON_TIME_125, "blocked", (is_blocked,)))
-                for _, is_blocked in chosen
-            ),
-        ]
-        for track, level in _PARTS
-        if track != TRACKS_V3[0]  # whose maps are right
-    ]
-    return _table(["part", *(f"{METRICS[ON_TIME_125]}, path on the map {name}" for name, _ in chosen)], rows)
+    rows = []
+    for track, level in _PARTS:
+        if track != TRACKS_V3[0]:  # whose maps are right
+            result = kept.result(NAVIGATOR, f"{track}-{level}")
+            shares = [estimate(result, ON_TIME_125, "blocked", (is_blocked,)) for is_blocked in PATHS.values()]
+            rows.append([f"`{track}` {level}", *map(_interval, shares)])
+    return _table(["part", *(f"{METRICS[ON_TIME_125]}, {name}" for name in PATHS)], rows)
 
 
 def v3_navigator(kept: Kept) -> str:
@@ -247,7 +271,7 @@ def v3_navigator_kinds(kept: Kept) -> str:
     """Returns the navigator's share on time in each kind of maze."""
     kinds = (*KNOWN, *NOVEL)
     rows = [
-        [_code(track), *(_levels(kept, NAVIGATOR, track, ON_TIME_125, (kind,)) for kind in kinds)]
+        [_code(track), *(_levels(kept, NAVIGATOR, track, ON_TIME_125, "kind", (kind,)) for kind in kinds)]
         for track in TRACKS_V3
     ]
     return _table([f"track, {METRICS[ON_TIME_125]}", *map(_code, kinds)], rows)
@@ -259,9 +283,13 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "paper-runs": functools.partial(paper_runs, "success"),
     "paper-runs-spl": functools.partial(paper_runs, "spl"),
     "mmn-runs": mmn_runs,
-    "v3-success": functools.partial(v3_table, "success_rate"),
-    "v3-on-time": functools.partial(v3_table, ON_TIME_125),
-    "v3-on-time-2": functools.partial(v3_table, ON_TIME_2),
+    "mah-curve": mah_curve,
+    "v2-success": functools.partial(tracks_table, V2, "success_rate"),
+    "v2-spl": functools.partial(tracks_table, V2, "spl"),
+    "v2-blocked": v2_blocked,
+    "v3-success": functools.partial(tracks_table, V3, "success_rate"),
+    "v3-on-time": functools.partial(tracks_table, V3, ON_TIME_125),
+    "v3-on-time-2": functools.partial(tracks_table, V3, ON_TIME_2),
     "v3-map-worth": v3_map_worth,
     "v3-belief-planner": v3_belief_planner,
     "v3-novel-kinds": v3_novel_kinds,
@@ -286,9 +314,19 @@ def _over_runs(kept: Kept, values: np.ndarray, others: np.ndarray | None = None)
     ]
 
 
-def _levels(kept: Kept, row: str, track: str, metric: str, kinds: Sequence[str] = ()) -> str:
-    """Returns the means of a metric at the levels of a track, of all kinds of mazes or of some."""
-    means = [estimate(result, metric, "kind" if kinds else "", kinds) for result in kept.levels(row, track)]
+def _rows_of(kept: Kept, benchmark: str) -> dict[str, str]:
+    """Returns those of `_ROWS` that played a benchmark."""
+    played = {row for (row, _), result in kept.results.items() if result.summary.benchmark == benchmark}
+    if unnamed := played - _ROWS.keys():
+        raise InputError(f"expected results of {', '.join(_ROWS)}, found those of {', '.join(sorted(unnamed))}")
+    return {row: description for row, description in _ROWS.items() if row in played}
+
+
+def _levels(kept: Kept, row: str, track: str, metric: str, field: str = "", values: Sequence[Any] = ()) -> str:
+    """Returns the means of a metric at the levels of a track, of the episodes that `estimate` counts."""
+    if (row, track) in _REFUSED:
+        return "refused"
+    means = [estimate(result, metric, field, values) for result in kept.levels(row, track)]
     return " / ".join("none" if mean is None else _number(mean.value) for mean in means) or _NOT_LOST
 
 
