@@ -22,7 +22,6 @@ from mazebench.results.intervals import Estimate, runs_interval
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.spec import TaskSpec
 
-_SIZE = 13
 _DISTANCES = (2, 4, 6, 8, 10)
 
 
@@ -34,16 +33,18 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=60_000)
     parser.add_argument("--mazes", type=int, default=100, help="with two episodes in each at each distance")
     parser.add_argument("--kind", default="dfs")
+    parser.add_argument("--size", type=int, default=13, help="cells a side")
     parser.add_argument("--trained-in", type=int, metavar="NUM", help="train mazes instead")
     given = parser.parse_args()
     tasks = [_task(distance, given) for distance in _DISTANCES]
+    interface = Interface("local", given.size, given.size)
     print("success rate at", " ".join(f"{distance} cells" for distance in _DISTANCES))
 
     scores, mazes = [], []
     for name, *checkpoints in (given.first, *given.agent):
         played = []
         for checkpoint in checkpoints:
-            agent = load_agent_class(name).build(Interface("local", _SIZE, _SIZE), checkpoint=pathlib.Path(checkpoint))
+            agent = load_agent_class(name).build(interface, checkpoint=pathlib.Path(checkpoint))
             results = [outcomes(agent, task, needs_truth=False) for task in tasks]
             played.append([success for success, _, _ in results])
             mazes = [maze for _, _, maze in results]
@@ -62,9 +63,9 @@ def main() -> None:
 def _task(distance: int, given: argparse.Namespace) -> TaskSpec:
     """Returns the local task at one distance in the mazes that the options name."""
     if given.trained_in is None:
-        return held_out_task({"distances": (distance,)}, given.seed, given.mazes, given.kind, _SIZE)
+        return held_out_task({"distances": (distance,)}, given.seed, given.mazes, given.kind, given.size)
     drawn = {"kinds": (given.kind,), "num_mazes": given.trained_in} if given.trained_in else {}
-    return make_spec("local", _SIZE, "train", distances=(distance,), **drawn)
+    return make_spec("local", given.size, "train", distances=(distance,), **drawn)
 
 
 def _print_row(estimates: Sequence[Estimate], name: str) -> None:

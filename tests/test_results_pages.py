@@ -106,6 +106,8 @@ class TestPages:
     def test_a_record_that_is_missing_is_named(self):
         with pytest.raises(InputError, match="expected an evaluation of navigator on building-1 among the records"):
             with_tables("<!-- table: v3-map-worth -->\n<!-- end of table -->\n", NOTHING)
+        with pytest.raises(InputError, match="expected evaluations on benchmark v2 among the records, found none"):
+            with_tables("<!-- table: v2-success -->\n<!-- end of table -->\n", NOTHING)
 
 
 class TestRecords:

@@ -317,6 +317,8 @@ def _over_runs(kept: Kept, values: np.ndarray, others: np.ndarray | None = None)
 def _rows_of(kept: Kept, benchmark: str) -> dict[str, str]:
     """Returns those of `_ROWS` that played a benchmark."""
     played = {row for (row, _), result in kept.results.items() if result.summary.benchmark == benchmark}
+    if not played:
+        raise InputError(f"expected evaluations on benchmark {benchmark} among the records, found none")
     if unnamed := played - _ROWS.keys():
         raise InputError(f"expected results of {', '.join(_ROWS)}, found those of {', '.join(sorted(unnamed))}")
     return {row: description for row, description in _ROWS.items() if row in played}
