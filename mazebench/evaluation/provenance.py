@@ -72,8 +72,7 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
 
 def _told_checkpoint(path: str | None, agent_class: type[Agent]) -> str | None:
     """Returns the path of a checkpoint as given; a file that ships is told by its name alone."""
-    shipped = agent_class.default_checkpoint()
-    return shipped.name if shipped and str(shipped) == path else path
+    return pathlib.Path(path).name if path and path == str(agent_class.default_checkpoint()) else path
 
 
 def mazes_hash(task: TaskSpec) -> str:
