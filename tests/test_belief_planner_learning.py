@@ -39,7 +39,7 @@ def make_learner(seed: int = 0) -> BeliefPlannerLearner:
 
 def situations(count: int, is_lost: bool = False) -> list[Situation]:
     rng = np.random.default_rng(1)
-    return [draw_situation(draw_layout(MAZES, 15, rng), is_lost, rng) for _ in range(count)]
+    return [draw_situation(draw_layout(MAZES, 0.5, 15, rng), is_lost, rng) for _ in range(count)]
 
 
 def views(count: int, is_lost: bool = False) -> list[View]:
@@ -55,11 +55,19 @@ def rule(view: View) -> np.ndarray:
 def test_layouts_are_connected_and_closed(size):
     rng = np.random.default_rng(0)
     for _ in range(30):
-        walls = draw_layout(MAZES, size, rng)
+        walls = draw_layout(MAZES, 0.5, size, rng)
         assert walls.shape == (size, size)
         assert walls[[0, -1]].all()
         assert walls[:, [0, -1]].all()
         assert ndimage.label(~walls)[1] == 1
+
+
+def test_all_layouts_may_be_from_the_mazes_of_the_task():
+    rng = np.random.default_rng(0)
+    drawn = [draw_layout(MAZES, 1.0, 15, rng) for _ in range(60)]
+    is_from_one = [any(np.array_equal(walls, maze.walls) for maze in MAZES) for walls in drawn]
+    assert 0.65 < np.mean(is_from_one) < 0.95  # in a fifth, something is built or torn down
+    assert not any(np.array_equal(draw_layout(MAZES, 0.0, 15, rng), maze.walls) for maze in MAZES for _ in range(10))
 
 
 @pytest.mark.parametrize("is_lost", [False, True])

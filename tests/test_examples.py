@@ -71,24 +71,39 @@ class TestScripts:
         needs(module)
         assert re.search(printed, run(EXAMPLES / script, *options.split(), folder=tmp_path))
 
-    def test_sb3_her(self, tmp_path):
+    @pytest.mark.parametrize(
+        ("flags", "agent", "side", "options"),
+        [
+            ((), "HerAgent", 13, {}),
+            (("--v3",), "LidarHerAgent", 31, {"size": 31, "context_size": 31, "fresh": True, "sensors": "lidar"}),
+        ],
+    )
+    def test_sb3_her(self, tmp_path, flags, agent, side, options):
         needs("stable_baselines3")
-        run(EXAMPLES / "sb3_her.py", "--steps", "320", "--out", "her.zip", folder=tmp_path)
+        output = run(EXAMPLES / "sb3_her.py", "--steps", "320", "--out", "her.zip", *flags, folder=tmp_path)
+        assert output.endswith(f"saved her.zip, which sb3_her_agent:{agent} plays\n")
         shutil.copy(EXAMPLES / "sb3_her_agent.py", tmp_path)
-        check = """
+        check = f"""
 import gymnasium, mazebench, numpy as np
 from mazebench.agent import Interface
 from mazebench.testing import check_agent
-from sb3_her_agent import HerAgent
+from sb3_her_agent import {agent} as Agent
 
-check_agent('sb3_her_agent:HerAgent', Interface('local', 13, 13), 'her.zip')
+# Also where contexts are larger than those that it was trained on.
+for context_size in ({side}, {side + 2}):
+    interface = Interface('local', {side}, context_size, sensors=Agent.needs_sensors)
+    check_agent('sb3_her_agent:{agent}', interface, 'her.zip')
 
 # The agent sees what the goal-conditioned environment shows.
-agent, envs = HerAgent(None, 13, 1.0), [gymnasium.make(f'mazebench/{name}-13-v1') for name in ('Local', 'LocalGoal')]
+names = ("Local", "LocalGoal")
+agent, envs = (
+    Agent(None, {side}, {side}, 1.0), [gymnasium.make(f'mazebench/{{name}}-13-v1', **{options}) for name in names]
+)
 steps = [env.reset(seed=1) for env in envs]
 for action in (0, 0, 2, 2, 4, 0, 0):
     (observation, *_), (shown, *_) = steps
-    seen = agent.goal_conditioned({name: values[None] for name, values in observation.items()})
+    seen = agent.goal_conditioned({{name: values[None] for name, values in observation.items()}})
+    assert seen.keys() == shown.keys()
     for name, values in shown.items():
         np.testing.assert_array_equal(seen[name][0], values)
     steps = [env.step(action) for env in envs]

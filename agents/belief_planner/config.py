@@ -19,6 +19,7 @@ class BeliefPlannerConfig:
     dilations: tuple[Size, ...] = (1, 1, 2, 4, 8, 1, 2, 4)  # of the layers, which see 24 cells far
     batch_size: Count = 32  # scenes in an update
     lost_share: Share = 0.125  # of updates from scenes where the place on the map is unknown; they are larger
+    task_share: Share = 0.5  # of layouts that are from the task's mazes; the others are of our own
     least_size: Size = 13  # cells on a side of a scene, drawn from this to the task's
     near_weight: Factor = 4.0  # of cells near seen ones, beside the 1 of all: the next decisions are made there
     near_cells: Size = 6  # how near

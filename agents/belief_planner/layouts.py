@@ -1,7 +1,8 @@
 """True layouts to learn from: parts of a task's mazes, and layouts of our own that vary much more than any kind does.
 
-The learned belief is to serve buildings of kinds that nobody trained on. So half of the layouts are random mixtures of
-what walls can look like: rock, walls with gaps, open areas, tunnels and pillars. `N` is the number of cells on a side.
+The learned belief is to serve buildings of kinds that nobody trained on. So half of the layouts, or as many as the
+config says, are random mixtures of what walls can look like: rock, walls with gaps, open areas, tunnels and pillars.
+`N` is the number of cells on a side.
 """
 
 from __future__ import annotations
@@ -11,17 +12,19 @@ from scipy import ndimage
 
 from mazebench.maps.drawn import Mazes
 
-_SHARE_OF_TASK = 0.5  # of layouts that are from the task's mazes
-_CHANGED = 0.2  # share of these in which something is built or torn down, too
+_CHANGED = 0.2  # share of the layouts from the task's mazes in which something is built or torn down, too
 _MOST_CHANGES = 15  # of a layout of our own
 _LEAST_FREE = 0.2  # share of inner cells; with fewer, there is hardly a way to choose
 _MAX_DRAWS = 100
 
 
-def draw_layout(mazes: Mazes, size: int, rng: np.random.Generator) -> np.ndarray:
-    """Returns `[N, N]` bool: walls of a maze of `size` N cells a side, which is at most the size of `mazes`."""
+def draw_layout(mazes: Mazes, task_share: float, size: int, rng: np.random.Generator) -> np.ndarray:
+    """Returns `[N, N]` bool: walls of a maze of `size` N cells a side, which is at most the size of `mazes`.
+
+    It is a part of one of `mazes` with probability `task_share`, else of our own.
+    """
     for _ in range(_MAX_DRAWS):
-        if rng.random() < _SHARE_OF_TASK:
+        if rng.random() < task_share:
             walls = _part(mazes[int(rng.integers(len(mazes)))].walls, size, rng)
             num_changes = rng.integers(1, 4) if rng.random() < _CHANGED else 0
         else:

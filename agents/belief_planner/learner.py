@@ -56,7 +56,7 @@ def draw_batch(mazes: Mazes, config: Any, rng: np.random.Generator) -> Batch:
     is_lost = rng.random() < config.lost_share
     scenes: list[tuple[Picture, Situation]] = []
     while len(scenes) < config.batch_size:
-        situation = draw_situation(draw_layout(mazes, size, rng), is_lost, rng)
+        situation = draw_situation(draw_layout(mazes, config.task_share, size, rng), is_lost, rng)
         scenes += [(picture(view), situation) for view in walk_to_goal(situation, _VIEWS, rng)]
     return _batch(scenes[: config.batch_size], config)
 

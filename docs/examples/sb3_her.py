@@ -1,6 +1,7 @@
 """Trains Stable-Baselines3's DQN with hindsight on the goal-conditioned environment, and saves the policy.
 
 python docs/examples/sb3_her.py --steps 100000 --out her.zip
+python docs/examples/sb3_her.py --v3 --distance 20 --steps 1000000 --out her.zip
 """
 
 import argparse
@@ -25,16 +26,21 @@ class EndingHerReplayBuffer(HerReplayBuffer):
 parser = argparse.ArgumentParser()
 parser.add_argument("--steps", type=int, default=100_000)
 parser.add_argument("--distance", type=int, default=3, help="cells from start to goal, at most")
+parser.add_argument("--v3", action="store_true", help="mazes of v3's size and known kinds, right maps, and its lidar")
 parser.add_argument("--seed", type=int, default=0)
 parser.add_argument("--out", default="her.zip")
 arguments = parser.parse_args()
 
+options = {"distances": range(1, arguments.distance + 1), "time_limit": max(100, 10 * arguments.distance)}
+if arguments.v3:
+    options |= {"size": 31, "context_size": 31, "kinds": ("dfs", "house", "rooms"), "fresh": True}
+    options |= {"sensors": "lidar", "lidar_noise": "turtlebot3"}
 model = DQN(
     "MultiInputPolicy",
-    gymnasium.make("mazebench/LocalGoal-13-v1", distances=range(1, arguments.distance + 1)),
+    gymnasium.make("mazebench/LocalGoal-13-v1", **options),
     replay_buffer_class=EndingHerReplayBuffer,
     replay_buffer_kwargs={"n_sampled_goal": 4, "goal_selection_strategy": "future"},
-    learning_starts=200,  # more than an episode's 100 steps: hindsight needs one that has ended
+    learning_starts=2 * options["time_limit"],  # hindsight needs an episode that has ended
     learning_rate=5e-4,
     batch_size=64,
     policy_kwargs={"net_arch": [256], "features_extractor_class": GoalFeatures},
@@ -48,4 +54,5 @@ model = DQN(
 )
 model.learn(arguments.steps, log_interval=100)
 model.policy.save(arguments.out)
-print(f"saved {arguments.out}, which sb3_her_agent:HerAgent plays")
+agent = "LidarHerAgent" if arguments.v3 else "HerAgent"
+print(f"saved {arguments.out}, which sb3_her_agent:{agent} plays")

@@ -1,5 +1,6 @@
 """The policy that sb3_her.py saved, as an agent of mazebench, and the features that it reads."""
 
+import cv2
 import numpy as np
 import torch
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
@@ -11,10 +12,12 @@ from mazebench.tasks.context import GOAL
 
 
 class GoalFeatures(BaseFeaturesExtractor):
-    """Convolutions of the map, on which the body's cell and the goal's are drawn, beside the state."""
+    """Convolutions of the map, on which the body's cell and the goal's are drawn, beside state and lidar."""
 
     def __init__(self, observation_space, num_features=256):
-        super().__init__(observation_space, num_features + 12)
+        lidar = observation_space.spaces.get("lidar")
+        super().__init__(observation_space, num_features + 12 + (lidar.shape[0] if lidar else 0))
+        self.reach = float(lidar.high.max()) if lidar else None
         self.metres = float(observation_space["desired_goal"].high[0])  # on a side of the maze
         self.side = side = round(((observation_space["observation"].shape[0] - 12) / 3) ** 0.5)  # M of the planes
         self.scale = torch.tensor([1 / self.metres] * 3 + [1.0] * 9)
@@ -28,7 +31,10 @@ class GoalFeatures(BaseFeaturesExtractor):
         state, shown = observations["observation"][:, :12], observations["observation"][:, 12:]
         drawn = [self.drawn(observations[key]) for key in ("achieved_goal", "desired_goal")]
         planes = torch.cat([shown.unflatten(1, (3, self.side, self.side)), torch.stack(drawn, dim=1)], dim=1)
-        return torch.cat([self.planes(planes), state * self.scale], dim=1)
+        parts = [self.planes(planes), state * self.scale]
+        if self.reach:
+            parts.append(observations["lidar"] / self.reach)
+        return torch.cat(parts, dim=1)
 
     def drawn(self, points):
         """Returns `[B, M, M]`: planes that are 1 in the cell of each point `[B, 2]`, x to the right and y up, in m."""
@@ -45,10 +51,12 @@ class HerAgent(mazebench.Agent):
     def build(cls, interface, *, seed=0, checkpoint=None):
         if checkpoint is None:
             raise mazebench.InputError("expected --checkpoint, the file that sb3_her.py saved, found none")
-        return cls(MultiInputPolicy.load(checkpoint, device="cpu"), interface.size, interface.cell_size)
+        policy = MultiInputPolicy.load(checkpoint, device="cpu")
+        return cls(policy, policy.q_net.features_extractor.side, interface.size, interface.cell_size)
 
-    def __init__(self, policy, size, cell_size):
-        self.policy, self.size, self.cell_size = policy, size, cell_size
+    def __init__(self, policy, side, size, cell_size):
+        """`side` is M of the contexts that the policy was trained on."""
+        self.policy, self.side, self.size, self.cell_size = policy, side, size, cell_size
 
     def act(self, inputs, state, explore=False):
         return self.policy.predict(self.goal_conditioned(inputs.observation), deterministic=True)[0], state
@@ -59,9 +67,23 @@ class HerAgent(mazebench.Agent):
         batch, side = len(context), context.shape[-1]
         row, column = np.divmod(context[:, GOAL].reshape(batch, -1).argmax(axis=1), side)
         goal = np.stack([column, side - 1 - row], axis=1) + 0.5  # x, y in pixels of the map
+        planes = np.delete(context, GOAL, axis=1)
+        if side != self.side:
+            planes = np.stack([self.resized(each) for each in planes])
         shown = {
-            "observation": np.hstack([state, np.delete(context, GOAL, axis=1).reshape(batch, -1)]),
+            "observation": np.hstack([state, planes.reshape(batch, -1)]),
             "achieved_goal": (state[:, :2] // self.cell_size + 0.5) * self.cell_size,
             "desired_goal": goal * self.size * self.cell_size / side,
         }
+        shown |= {name: observation[name] for name in self.needs_sensors}
         return {name: values.astype(np.float32) for name, values in shown.items()}
+
+    def resized(self, planes):
+        """Returns `[3, side, side]`: the planes of a context with another number of cells."""
+        return np.stack([cv2.resize(plane, (self.side, self.side), interpolation=cv2.INTER_AREA) for plane in planes])
+
+
+class LidarHerAgent(HerAgent):
+    """The same with a lidar: the policy of `--v3`."""
+
+    needs_sensors = ("lidar",)
