@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,39 +45,53 @@ def main() -> None:
 
 
 def print_runs() -> None:
-    """Prints a table of coverage and mean width of means over training runs and mazes together, by success rate."""
-    rates = (0.5, 0.8, 0.95, 0.99)
-    print("\nMean over training runs and mazes, by success rate: coverage, mean width\n")
-    for line in (("runs", "mazes x episodes", "spread of runs, mazes", *map(str, rates)), ["---"] * (3 + len(rates))):
+    """Prints tables of coverage and mean width over training runs and mazes together: of means, and of differences."""
+    print_runs_table("Mean over training runs and mazes, by success rate", [(rate,) for rate in (0.5, 0.8, 0.95, 0.99)])
+    pairs = [(0.5, 0.5), (0.95, 0.95), (0.8, 0.5), (0.95, 0.8), (0.99, 0.95)]
+    print_runs_table("Difference over training runs and mazes, by the two success rates", pairs)
+
+
+def print_runs_table(title: str, settings: Sequence[tuple[float, ...]]) -> None:
+    """Prints a table with a column for each of `settings`: a success rate, or those of two agents."""
+    columns = (" and ".join(map(str, rates)) for rates in settings)
+    print(f"\n{title}: coverage, mean width\n")
+    for line in (("runs", "mazes x episodes", "spread of runs, mazes", *columns), ["---"] * (3 + len(settings))):
         print(f"| {' | '.join(line)} |")
     for num_runs, (num_mazes, num_episodes), spreads in itertools.product((3, 5), ((20, 5), (100, 2)), SPREADS):
         mazes = np.arange(num_mazes).repeat(num_episodes)
         cells = []
-        for rate in rates:
-            values, truth = draw_runs(rate, num_runs, num_mazes, num_episodes, spreads, np.random.default_rng(0))
-            estimates = [runs_interval(each.reshape(num_runs, -1), mazes) for each in values]
+        for rates in settings:
+            values, truths = draw_runs(rates, num_runs, num_mazes, num_episodes, spreads, np.random.default_rng(0))
+            agents = [each.reshape(NUM_EVALUATIONS, num_runs, -1) for each in values]
+            estimates = [runs_interval(ours, mazes, *others) for ours, *others in zip(*agents, strict=True)]
+            truth = truths[0] - sum(truths[1:])
             covered = np.mean([each.low <= truth <= each.high for each in estimates])
             cells.append(f"{covered:.2f}, {np.mean([each.high - each.low for each in estimates]):.2f}")
         design = (str(num_runs), f"{num_mazes} x {num_episodes}", ", ".join(map(str, spreads)))
-        print(f"| {' | '.join((*design, *cells))} |")
+        print(f"| {' | '.join((*design, *cells))} |", flush=True)
 
 
 def draw_runs(
-    rate: float,
+    rates: Sequence[float],
     num_runs: int,
     num_mazes: int,
     num_episodes: int,
     spreads: tuple[float, float],
     rng: np.random.Generator,
-) -> tuple[np.ndarray, float]:
-    """Returns successes `[R, runs, K, M]`, and their expectation; logits are normal about that of `rate`."""
+) -> tuple[list[np.ndarray], list[float]]:
+    """Returns successes `[R, runs, K, M]` of each agent in the same mazes, and their expectations.
+
+    Logits are normal about that of the agent's rate. What a maze adds to it, it adds for all agents.
+    """
     of_runs, of_mazes = spreads
-    logit = np.log(rate / (1 - rate))
-    truth = special.expit(logit + np.hypot(of_runs, of_mazes) * rng.normal(size=100_000)).mean()
-    runs = of_runs * rng.normal(size=(NUM_EVALUATIONS, num_runs, 1, 1))
     mazes = of_mazes * rng.normal(size=(NUM_EVALUATIONS, 1, num_mazes, 1))
-    drawn = rng.random((NUM_EVALUATIONS, num_runs, num_mazes, num_episodes))
-    return (drawn < special.expit(logit + runs + mazes)).astype(float), float(truth)
+    drawn, truths = [], []
+    for rate in rates:
+        logit = np.log(rate / (1 - rate))
+        truths.append(float(special.expit(logit + np.hypot(of_runs, of_mazes) * rng.normal(size=100_000)).mean()))
+        chances = special.expit(logit + mazes + of_runs * rng.normal(size=(NUM_EVALUATIONS, num_runs, 1, 1)))
+        drawn.append((rng.random((NUM_EVALUATIONS, num_runs, num_mazes, num_episodes)) < chances).astype(float))
+    return drawn, truths
 
 
 def print_tables(title: str, settings: Mapping[str, Any], draw: Callable, old: Callable, new: Callable) -> None:

@@ -17,4 +17,5 @@ def test_simulation_prints_the_tables_of_the_docs(capsys):
     shown = (ROOT / "docs" / "metrics.md").read_text().splitlines()
     heads = [line for line in printed if line.startswith("| mazes x episodes")]
     assert len(heads) == 6
+    assert sum(line.startswith("| runs | mazes x episodes") for line in printed) == 2  # of means and of differences
     assert set(heads) <= set(shown)
