@@ -165,6 +165,17 @@ class TestTrainingRuns:
         assert line.startswith("| `mmn` | 1.00 [")
         assert f" {np.mean(far):.2f} [" in line.split("|")[-2]
 
+    def test_a_mean_over_runs_has_students_interval(self):
+        # Of .6, .6 and .65: 4.303 times the standard error .0167 to either side. One run has no interval.
+        lines = [{"env_steps": 4e5, "success_rate_2": rate} for rate in (0.6, 0.6, 0.65)]
+        metrics = [line | {f"success_rate_{distance}": 1.0 for distance in (4, 6, 8, 10)} for line in lines]
+        runs = [Run(str(seed), {}, (line,)) for seed, line in enumerate(metrics)]
+        names = ("mmn", "mmn-5-mazes", "mmn-fresh", "mmn-fixed", "mmn-one-goal")
+        kept = dataclasses.replace(NOTHING, training={**dict.fromkeys(names, runs), "mmn-one-goal": runs[2:]})
+        _, _, first, *_, last = make_table(kept, "mmn-regimes").splitlines()
+        assert "| 0.62 [0.54, 0.69] | 1.00 | 1.00 | 1.00 | 1.00 |" in first
+        assert "| 0.65 | 1.00 | 1.00 | 1.00 | 1.00 |" in last
+
     @pytest.mark.parametrize("found", [[], ["mmn"], ["mmn", "mmn"]])
     def test_fewer_than_two_checkpoints_are_refused(self, found, kept):
         few = dataclasses.replace(kept, runs={"mmn": [kept.result(row, LOCAL) for row in found]})

@@ -42,6 +42,7 @@ PATHS = {"path on the map open": False, "path on the map blocked": True}  # whet
 _SUFFIX = ".tar.xz"
 _TRAINING = "training"  # the folder of archives of training runs
 _RUNS = f"runs{_SUFFIX}"  # evaluations of training runs, in folders NAME-SEED
+_WATCHED = "success_rate_"  # how metrics of milestones begin; the distance in cells follows
 _KEPT_FILES = (CONFIG, EPISODES, ORACLE, SUMMARY)
 
 
@@ -80,20 +81,25 @@ class Kept:
             raise InputError(f"expected training runs {name} among the records, found none")
         return self.training[name]
 
-    def success_rates(self, name: str, distance: int) -> dict[float, list[float]]:
-        """Returns the success rates of an archive's training runs on watched mazes, where all have one.
+    def milestones(self, name: str) -> dict[float, list[dict[str, float]]]:
+        """Returns what an archive's training runs logged at the milestones that all of them reached, a line each.
 
         Keys are millions of agent steps, rounded to a tenth.
 
         Raises:
           InputError: if the archive is not kept.
         """
-        field = f"success_rate_{distance}"
         runs = [
-            {round(line["env_steps"] / 1e6, 1): line[field] for line in run.lines if field in line}
+            {round(line["env_steps"] / 1e6, 1): line for line in run.lines if any(map(_is_watched, line))}
             for run in self.curves(name)
         ]
         return {steps: [run[steps] for run in runs] for steps in runs[0] if all(steps in run for run in runs)}
+
+    def success_rates(self, name: str, distance: int) -> dict[float, list[float]]:
+        """Returns the success rates on watched mazes in the lines of `milestones`."""
+        return {
+            steps: [line[f"{_WATCHED}{distance}"] for line in lines] for steps, lines in self.milestones(name).items()
+        }
 
     def result(self, row: str, part: str) -> Result:
         """Returns the evaluation of an agent on a part of a suite.
@@ -174,6 +180,10 @@ def keep(folder: pathlib.Path, records: pathlib.Path) -> pathlib.Path:
     paths = [run / name for run in runs for name in (CONFIG, METRICS)]
     paths += [last / AGENT_FILE for run in runs for last in checkpoints(run)[-1:]]
     return _archive(folder, paths, records / _TRAINING)
+
+
+def _is_watched(metric: str) -> bool:
+    return metric.startswith(_WATCHED)
 
 
 def _archive(folder: pathlib.Path, paths: Sequence[pathlib.Path], target: pathlib.Path) -> pathlib.Path:

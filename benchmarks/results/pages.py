@@ -24,6 +24,7 @@ PAGES = (
     "docs/agents/belief-planner.md",
     "docs/agents/mmn.md",
     "docs/experiments/dqn.md",
+    "docs/experiments/mmn.md",
 )
 
 _BEGIN, _END = "<!-- table: ", "<!-- end of table -->"

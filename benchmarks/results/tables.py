@@ -5,10 +5,11 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from benchmarks.results.kept import (
     BELIEF_PLANNER,
@@ -34,7 +35,7 @@ from mazebench.report.looks import PAPER_MARKERS
 from mazebench.report.settings import DEFAULT_LANDMARK_DISTANCE
 from mazebench.report.table import METRICS, Cell, Table, escape_markdown
 from mazebench.results.comparison import compare_results
-from mazebench.results.intervals import Estimate, runs_interval
+from mazebench.results.intervals import CONFIDENCE, Estimate, runs_interval
 from mazebench.results.metrics import ON_TIME_METRICS
 from mazebench.results.reading import Result
 from mazebench.results.records import column
@@ -83,6 +84,25 @@ _PAIRS = (
     ("mah-long", "dqn-long"),
     ("dqn", RANDOM),
 )
+
+_SHORT = 0.4  # million agent steps
+# Archives of runs of mmn of this length, or longer.
+_INGREDIENTS = {
+    "mmn": "`mmn`",
+    "mmn-hypermodel-false": "nothing generated: features of the map at the position and the code are inputs "
+    "(`hypermodel=false`)",
+    "mmn-nothing-read": "generated from the code, nothing read at the position (`rows=false reading=false`)",
+    "mmn-neither": "neither generated nor read: the code is an input (`hypermodel=false rows=false reading=false`)",
+    "mmn-no-search": "without search in training (`num_simulations=0`)",
+    "mmn-model-false": "without model and search: Q-learning (`model=false`)",
+}
+_REGIMES = {
+    "mmn": "20 mazes (`mmn`)",
+    "mmn-5-mazes": "5 mazes, the same ones in each run (`--kinds dfs --num-mazes 5`)",
+    "mmn-fresh": "a new maze in each episode (`--fresh`)",
+    "mmn-fixed": "20 mazes, a fixed pair in each (`--pairs fixed`)",
+    "mmn-one-goal": "20 mazes, one goal an episode (`num_goals=1`), one run",
+}
 
 _PARTS = tuple((track, level) for track in TRACKS_V3 for level in LEVELS)
 _NOT_LOST = "not lost"  # of the navigator with the true pose, on tracks that tell it to all
@@ -178,6 +198,27 @@ def mah_curve(kept: Kept) -> str:
         runs = [at[steps] for at in rates]
         rows.append([f"{steps:g}", *(_interval(Estimate(float(np.mean(at)), min(at), max(at))) for at in runs)])
     return _table(["million steps", *map(str, _PRINTED_DISTANCES)], rows)
+
+
+def short_runs(rows: Mapping[str, str], metrics: Mapping[str, str], kept: Kept) -> str:
+    """Returns what runs logged after 0.4 million steps: mean success rates, and metrics of the single runs.
+
+    Intervals are Student's over the runs.
+
+    Args:
+      rows: descriptions of the runs, by the name of their archive.
+      metrics: formats, by the name that the runs logged.
+      kept: the records.
+    """
+    lines = []
+    for name, description in rows.items():
+        rates = [_over_values(kept.success_rates(name, distance)[_SHORT]) for distance in _PRINTED_DISTANCES]
+        runs = kept.milestones(name)[_SHORT]
+        logged = [
+            ", ".join(format(run[metric], form) for run in runs if metric in run) for metric, form in metrics.items()
+        ]
+        lines.append([description, *rates, *logged])
+    return _table(["trained", *map(str, _PRINTED_DISTANCES), *(name.replace("_", " ") for name in metrics)], lines)
 
 
 def mmn_runs(kept: Kept) -> str:
@@ -284,6 +325,8 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "paper-runs-spl": functools.partial(paper_runs, "spl"),
     "mmn-runs": mmn_runs,
     "mah-curve": mah_curve,
+    "mmn-ingredients": functools.partial(short_runs, _INGREDIENTS, {"model_error_1": ".3f", "map_ratio": ".1f"}),
+    "mmn-regimes": functools.partial(short_runs, _REGIMES, {}),
     "v2-success": functools.partial(tracks_table, V2, "success_rate"),
     "v2-spl": functools.partial(tracks_table, V2, "spl"),
     "v2-blocked": v2_blocked,
@@ -312,6 +355,15 @@ def _over_runs(kept: Kept, values: np.ndarray, others: np.ndarray | None = None)
     return [
         _interval(runs_interval(values[:, at], maze[at], None if others is None else others[:, at])) for at in counted
     ]
+
+
+def _over_values(rates: Sequence[float]) -> str:
+    """Returns the mean of success rates of training runs, with Student's interval if they differ."""
+    mean = round(float(np.mean(rates)), 9)  # 0.675, not 0.67499
+    if len(set(rates)) == 1:
+        return _number(mean)
+    low, high = np.clip(stats.t.interval(CONFIDENCE, len(rates) - 1, mean, stats.sem(rates)), 0, 1)
+    return _interval(Estimate(mean, float(low), float(high)))
 
 
 def _rows_of(kept: Kept, benchmark: str) -> dict[str, str]:
