@@ -262,10 +262,10 @@ def v3_map_worth(kept: Kept) -> str:
     return _table(["part", "success", *names, f"without the map, {names[1]}", "map worth"], rows)
 
 
-def v3_belief_planner(kept: Kept) -> str:
-    """Returns belief-planner's numbers and its paired differences to the navigator."""
+def belief_planner_table(benchmark: str, kept: Kept) -> str:
+    """Returns belief-planner's numbers on a benchmark's tracks and its paired differences to the navigator."""
     rows = []
-    for track, level in _PARTS:
+    for track, level in itertools.product(tracks_of(benchmark), LEVELS):
         ours, theirs = (kept.result(row, f"{track}-{level}") for row in (BELIEF_PLANNER, NAVIGATOR))
         paired = compare_results(ours, theirs).overall.metrics
         numbers = [_number(paired[metric].a) for metric in ("success_rate", *ON_TIME_METRICS)]
@@ -330,11 +330,12 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "v2-success": functools.partial(tracks_table, V2, "success_rate"),
     "v2-spl": functools.partial(tracks_table, V2, "spl"),
     "v2-blocked": v2_blocked,
+    "v2-belief-planner": functools.partial(belief_planner_table, V2),
     "v3-success": functools.partial(tracks_table, V3, "success_rate"),
     "v3-on-time": functools.partial(tracks_table, V3, ON_TIME_125),
     "v3-on-time-2": functools.partial(tracks_table, V3, ON_TIME_2),
     "v3-map-worth": v3_map_worth,
-    "v3-belief-planner": v3_belief_planner,
+    "v3-belief-planner": functools.partial(belief_planner_table, V3),
     "v3-novel-kinds": v3_novel_kinds,
     "v3-blocked": v3_blocked,
     "v3-navigator": v3_navigator,
