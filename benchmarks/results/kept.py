@@ -56,15 +56,15 @@ class Kept:
     runs: dict[str, list[Result]]  # of training runs on the part `LOCAL`, by name of the agent that was trained
     training: dict[str, list[Run]]  # what training runs logged, by name of the archive
 
-    def training_runs(self, name: str, least: int = 2) -> list[Result]:
-        """Returns the evaluations of an agent's training runs, `least` at least, in the same episodes.
+    def training_runs(self, name: str) -> list[Result]:
+        """Returns the evaluations of an agent's training runs, two at least, in the same episodes.
 
         Raises:
           InputError: if fewer are kept, one is of other episodes, or two are of one checkpoint.
         """
         found = self.runs.get(name, [])
         checkpoints = {each.summary.provenance.checkpoint_sha256 for each in found}
-        if len(checkpoints) < max(least, len(found)):
+        if len(checkpoints) < max(2, len(found)):
             of = f"{len(found)} of {len(checkpoints)} checkpoints"
             raise InputError(f"expected evaluations of several training runs {name}, found {of}")
         for each in found[1:]:

@@ -68,10 +68,9 @@ _TRAINED = {  # by name of the kept runs
     "mah-long": "`mah`, 6.6 million steps",
     "dqn": "`dqn`",
     "dqn-long": "`dqn`, 6.6 million steps",
-    "sb3-her": "DQN with hindsight of Stable-Baselines3, one run",
+    "sb3-her": "DQN with hindsight of Stable-Baselines3",
     "sb3-ppo": "PPO of Stable-Baselines3",
 }
-_TRAINED_ONCE = ("sb3-her",)  # all others were trained several times
 _PAIRS = (
     ("mmn", "mmn-model-false"),
     ("mmn-model-false", "mah"),
@@ -181,7 +180,7 @@ def paper_table(kept: Kept) -> str:
 
 def paper_runs(field: str, kept: Kept) -> str:
     """Returns the mean of a field of records over training runs, and the differences of `_PAIRS`."""
-    runs = {name: kept.training_runs(name, 1 if name in _TRAINED_ONCE else 2) for name in _TRAINED}
+    runs = {name: kept.training_runs(name) for name in _TRAINED}
     runs[RANDOM] = [kept.result(RANDOM, LOCAL)]
     found = {name: _values(each, field) for name, each in runs.items()}
     labels = {**_TRAINED, RANDOM: _code(RANDOM)}
