@@ -116,6 +116,7 @@ _ROWS = {
     "planner-closed-loop": "`planner-closed-loop`, trusts the map",
     "sb3_agent:PPOAgent": "PPO of Stable-Baselines3",
     "sb3_agent:RecurrentPPOAgent": "PPO of sb3-contrib, with an LSTM",
+    "sb3_her_agent:LidarHerAgent": "DQN with hindsight of Stable-Baselines3",
     "mmn": "`mmn`, learned model and search, no lidar",
     "mah": "`mah`, learned, no lidar",
     "dqn": "`dqn`, learned, no map",
