@@ -18,6 +18,7 @@ from mazebench_agents.robot.occupancy import SURE, Occupancy
 from scipy import ndimage
 
 import mazebench
+from benchmarks import belief_losses
 
 CONFIG = BeliefPlannerConfig(channels=8, dilations=(1, 2), batch_size=8, least_size=9)
 MAZES = tuple(mazebench.generate(kind, 15, np.random.default_rng(0)) for kind in ("dfs", "house", "rooms"))
@@ -181,6 +182,15 @@ def test_a_goal_that_can_be_nowhere_has_no_probability():
     view = views(1)[0]
     _, goal = believe(make_network(), view._replace(searched=np.ones_like(view.searched)))
     assert not goal.any()
+
+
+@pytest.mark.parametrize("options", [(), ("--trained-in", "1")])
+def test_before_training_the_losses_are_those_of_the_rule(tmp_path, monkeypatch, capsys, options):
+    path = tmp_path / "agent.safetensors"
+    BeliefPlanner(CONFIG, 21).save(path, {})
+    monkeypatch.setattr("sys.argv", ["", str(path), "--batches", "2", "--kind", "rooms", *options])
+    belief_losses.main()
+    assert capsys.readouterr().out.split() == ["rooms", "1.000", "[1.000,", "1.000]"]
 
 
 def test_learning_lowers_the_loss_on_scenes_that_it_sees_again():
