@@ -32,7 +32,7 @@ def main() -> None:
     """Prints a row for each kind, with a number for each checkpoint."""
     parser = argparse.ArgumentParser()
     parser.add_argument("checkpoints", nargs="+", type=pathlib.Path, metavar="CHECKPOINT")
-    parser.add_argument("--kind", action="append", help="all that have no eval mazes of v3, if none is given")
+    parser.add_argument("--kind", action="append", help="three that it trains in and three others, if none is given")
     parser.add_argument("--trained-in", type=int, metavar="NUM", help="train mazes instead")
     parser.add_argument("--seed", type=int, default=61_000)
     parser.add_argument("--batches", type=int, default=100, help="of a kind")

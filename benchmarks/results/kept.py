@@ -90,7 +90,11 @@ class Kept:
           InputError: if the archive is not kept.
         """
         runs = [
-            {round(line["env_steps"] / 1e6, 1): line for line in run.lines if any(map(_is_watched, line))}
+            {
+                round(line["env_steps"] / 1e6, 1): line
+                for line in run.lines
+                if any(metric.startswith(_WATCHED) for metric in line)
+            }
             for run in self.curves(name)
         ]
         return {steps: [run[steps] for run in runs] for steps in runs[0] if all(steps in run for run in runs)}
@@ -180,10 +184,6 @@ def keep(folder: pathlib.Path, records: pathlib.Path) -> pathlib.Path:
     paths = [run / name for run in runs for name in (CONFIG, METRICS)]
     paths += [last / AGENT_FILE for run in runs for last in checkpoints(run)[-1:]]
     return _archive(folder, paths, records / _TRAINING)
-
-
-def _is_watched(metric: str) -> bool:
-    return metric.startswith(_WATCHED)
 
 
 def _archive(folder: pathlib.Path, paths: Sequence[pathlib.Path], target: pathlib.Path) -> pathlib.Path:

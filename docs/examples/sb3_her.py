@@ -1,7 +1,7 @@
 """Trains Stable-Baselines3's DQN with hindsight on the goal-conditioned environment, and saves the policy.
 
 python docs/examples/sb3_her.py --steps 100000 --out her.zip
-python docs/examples/sb3_her.py --v3 --distance 20 --steps 1000000 --out her.zip
+python docs/examples/sb3_her.py --v3 --distance 20 --steps 400000 --out her.zip
 """
 
 import argparse
