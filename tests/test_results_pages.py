@@ -170,7 +170,7 @@ class TestTrainingRuns:
         lines = [{"env_steps": 4e5, "success_rate_2": rate} for rate in (0.6, 0.6, 0.65)]
         metrics = [line | {f"success_rate_{distance}": 1.0 for distance in (4, 6, 8, 10)} for line in lines]
         runs = [Run(str(seed), {}, (line,)) for seed, line in enumerate(metrics)]
-        names = ("mmn", "mmn-5-mazes", "mmn-fresh", "mmn-fixed", "mmn-one-goal")
+        names = ("mmn", "mmn-5-mazes", "mmn-100-mazes", "mmn-fresh", "mmn-fixed", "mmn-one-goal")
         kept = dataclasses.replace(NOTHING, training={**dict.fromkeys(names, runs), "mmn-one-goal": runs[2:]})
         _, _, first, *_, last = make_table(kept, "mmn-regimes").splitlines()
         assert "| 0.62 [0.54, 0.69] | 1.00 | 1.00 | 1.00 | 1.00 |" in first

@@ -98,6 +98,7 @@ _INGREDIENTS = {
 _REGIMES = {
     "mmn": "20 mazes (`mmn`)",
     "mmn-5-mazes": "5 mazes, the same ones in each run (`--kinds dfs --num-mazes 5`)",
+    "mmn-100-mazes": "100 mazes (`--kinds dfs --num-mazes 100`), one run",
     "mmn-fresh": "a new maze in each episode (`--fresh`)",
     "mmn-fixed": "20 mazes, a fixed pair in each (`--pairs fixed`)",
     "mmn-one-goal": "20 mazes, one goal an episode (`num_goals=1`), one run",
