@@ -15,7 +15,7 @@ from mazebench_agents.common.checkpoint import AGENT_FILE
 
 from mazebench.errors import InputError
 from mazebench.report.frame import join_episodes
-from mazebench.report.learning_curves import Run, read_run
+from mazebench.report.learning_curves import SUCCESS, Run, read_run
 from mazebench.report.report import read_in_order
 from mazebench.report.table import Table
 from mazebench.report.tables import build_tables
@@ -42,7 +42,6 @@ PATHS = {"path on the map open": False, "path on the map blocked": True}  # whet
 _SUFFIX = ".tar.xz"
 _TRAINING = "training"  # the folder of archives of training runs
 _RUNS = f"runs{_SUFFIX}"  # evaluations of training runs, in folders NAME-SEED
-_WATCHED = "success_rate_"  # how metrics of milestones begin; the distance in cells follows
 _KEPT_FILES = (CONFIG, EPISODES, ORACLE, SUMMARY)
 
 
@@ -93,7 +92,7 @@ class Kept:
             {
                 round(line["env_steps"] / 1e6, 1): line
                 for line in run.lines
-                if any(metric.startswith(_WATCHED) for metric in line)
+                if any(metric.startswith(SUCCESS) for metric in line)
             }
             for run in self.curves(name)
         ]
@@ -102,7 +101,7 @@ class Kept:
     def success_rates(self, name: str, distance: int) -> dict[float, list[float]]:
         """Returns the success rates on watched mazes in the lines of `milestones`."""
         return {
-            steps: [line[f"{_WATCHED}{distance}"] for line in lines] for steps, lines in self.milestones(name).items()
+            steps: [line[f"{SUCCESS}{distance}"] for line in lines] for steps, lines in self.milestones(name).items()
         }
 
     def result(self, row: str, part: str) -> Result:

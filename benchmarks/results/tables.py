@@ -31,6 +31,7 @@ from benchmarks.results.kept import (
 )
 from mazebench.errors import InputError
 from mazebench.maps.kinds import KNOWN, NOVEL
+from mazebench.report.learning_curves import SUCCESS
 from mazebench.report.looks import PAPER_MARKERS
 from mazebench.report.settings import DEFAULT_LANDMARK_DISTANCE
 from mazebench.report.table import METRICS, Cell, Table, escape_markdown
@@ -213,8 +214,8 @@ def short_runs(rows: Mapping[str, str], metrics: Mapping[str, str], kept: Kept) 
     """
     lines = []
     for name, description in rows.items():
-        rates = [_over_values(kept.success_rates(name, distance)[_SHORT]) for distance in _PRINTED_DISTANCES]
         runs = kept.milestones(name)[_SHORT]
+        rates = [_over_values([run[f"{SUCCESS}{distance}"] for run in runs]) for distance in _PRINTED_DISTANCES]
         logged = [
             ", ".join(format(run[metric], form) for run in runs if metric in run) for metric, form in metrics.items()
         ]

@@ -19,7 +19,7 @@ from mazebench.storage.json_files import parse_json, read_json, read_lines
 from mazebench.training.run_folder import CHECKPOINTS, CONFIG, METRICS
 
 _STEPS = "env_steps"
-_SUCCESS, _LOSS = "success_rate_", "_loss"  # how the names of such metrics begin, and end
+SUCCESS, _LOSS = "success_rate_", "_loss"  # how the names of such metrics begin, and end
 _MARKS = 12  # on a curve
 
 
@@ -65,9 +65,9 @@ def write_learning_curves(folders: Sequence[pathlib.Path], out: pathlib.Path) ->
         raise InputError("expected training runs with metrics, found none to report")
     looks = all_looks([run.name for run in runs])
     metrics = list(dict.fromkeys(metric for run in runs for line in run.lines for metric in line))
-    rates = sorted((metric for metric in metrics if metric.startswith(_SUCCESS)), key=lambda rate: (len(rate), rate))
+    rates = sorted((metric for metric in metrics if metric.startswith(SUCCESS)), key=lambda rate: (len(rate), rate))
     losses = [metric for metric in metrics if metric.endswith(_LOSS)]
-    of_rates = tuple(_panel(runs, rate, f"distance {rate.removeprefix(_SUCCESS)}") for rate in rates)
+    of_rates = tuple(_panel(runs, rate, f"distance {rate.removeprefix(SUCCESS)}") for rate in rates)
     of_losses = tuple(_panel(runs, loss, loss.replace("_", " ")) for loss in losses)
     lines = ["# Learning curves", _table(runs, rates)]
     with new_report(out):
@@ -116,7 +116,7 @@ def _parse(line: bytes) -> dict[str, float]:
 
 
 def _table(runs: Sequence[Run], rates: Sequence[str]) -> str:
-    head = ("run", "agent", "seed", "agent steps", "updates", *(f"success, {rate[len(_SUCCESS) :]}" for rate in rates))
+    head = ("run", "agent", "seed", "agent steps", "updates", *(f"success, {rate[len(SUCCESS) :]}" for rate in rates))
     lines = [head, ("---",) * len(head)]
     for run in runs:
         of_config = [escape_markdown(str(run.config.get(key, ""))) for key in ("agent", "seed")]
@@ -131,5 +131,5 @@ def _panel(runs: Sequence[Run], metric: str, title: str) -> Panel:
     for run in runs:
         points = tuple(Point(line[_STEPS], line[metric]) for line in run.lines if metric in line)
         series.append(Series(run.name, points, mark_every=-(-len(points) // _MARKS) or 1))
-    is_rate = metric.startswith(_SUCCESS)
+    is_rate = metric.startswith(SUCCESS)
     return Panel(title, "agent steps", tuple(series), y_range=(-0.05, 1.05) if is_rate else None)
