@@ -36,6 +36,9 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=13, help="cells a side")
     parser.add_argument("--trained-in", type=int, metavar="NUM", help="train mazes instead")
     given = parser.parse_args()
+    of_held_out = any(getattr(given, name) != parser.get_default(name) for name in ("seed", "mazes"))
+    if of_held_out and given.trained_in is not None:
+        parser.error("--seed and --mazes are of held-out mazes, so they can't be given with --trained-in")
     tasks = [_task(distance, given) for distance in _DISTANCES]
     interface = Interface("local", given.size, given.size)
     print("success rate at", " ".join(f"{distance} cells" for distance in _DISTANCES))

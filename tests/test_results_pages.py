@@ -159,10 +159,10 @@ class TestRecords:
 class TestTrainingRuns:
     def test_means_are_over_the_runs(self, kept):
         runs = kept.training_runs("mmn")
-        assert len(runs) == 3
+        assert len(runs) == 5
         far = [[record.success for record in run.records if record.distance == 10] for run in runs]
         line = make_table(kept, "paper-runs").splitlines()[2]
-        assert line.startswith("| `mmn` | 1.00 [")
+        assert line.startswith("| `mmn` | 5 | 1.00 [")
         assert f" {np.mean(far):.2f} [" in line.split("|")[-2]
 
     def test_a_mean_over_runs_has_students_interval(self):
@@ -173,8 +173,8 @@ class TestTrainingRuns:
         names = ("mmn", "mmn-5-mazes", "mmn-100-mazes", "mmn-fresh", "mmn-fixed", "mmn-one-goal")
         kept = dataclasses.replace(NOTHING, training={**dict.fromkeys(names, runs), "mmn-one-goal": runs[2:]})
         _, _, first, *_, last = make_table(kept, "mmn-regimes").splitlines()
-        assert "| 0.62 [0.54, 0.69] | 1.00 | 1.00 | 1.00 | 1.00 |" in first
-        assert "| 0.65 | 1.00 | 1.00 | 1.00 | 1.00 |" in last
+        assert "| 3 | 0.62 [0.54, 0.69] | 1.00 | 1.00 | 1.00 | 1.00 |" in first
+        assert "| 1 | 0.65 | 1.00 | 1.00 | 1.00 | 1.00 |" in last
 
     @pytest.mark.parametrize("found", [[], ["mmn"], ["mmn", "mmn"]])
     def test_fewer_than_two_checkpoints_are_refused(self, found, kept):

@@ -104,7 +104,7 @@ def learning(kept: Kept) -> Figure:
 
 
 def model_and_search(kept: Kept) -> Figure:
-    """Returns learning curves of mmn, of Q-learning with its reading of the map, and of mah: means over three runs.
+    """Returns learning curves of mmn, of Q-learning with its reading of the map, and of mah: means over their runs.
 
     Bars reach from the lowest to the highest run. Milestones count as the nearest tenth of a million steps.
     """
@@ -126,7 +126,7 @@ def model_and_search(kept: Kept) -> Figure:
                 y_ticks=_SCORES,
             )
         )
-    title = "Success rate on held-out mazes over training: mean, lowest and highest of three runs"
+    title = "Success rate on held-out mazes over training: mean, lowest and highest run"
     return Figure("model-and-search", title, "", tuple(panels), all_looks(list(archives)), panel_height=2.1)
 
 

@@ -99,10 +99,10 @@ _INGREDIENTS = {
 _REGIMES = {
     "mmn": "20 mazes (`mmn`)",
     "mmn-5-mazes": "5 mazes, the same ones in each run (`--kinds dfs --num-mazes 5`)",
-    "mmn-100-mazes": "100 mazes (`--kinds dfs --num-mazes 100`), one run",
+    "mmn-100-mazes": "100 mazes (`--kinds dfs --num-mazes 100`)",
     "mmn-fresh": "a new maze in each episode (`--fresh`)",
     "mmn-fixed": "20 mazes, a fixed pair in each (`--pairs fixed`)",
-    "mmn-one-goal": "20 mazes, one goal an episode (`num_goals=1`), one run",
+    "mmn-one-goal": "20 mazes, one goal an episode (`num_goals=1`)",
 }
 
 _PARTS = tuple((track, level) for track in TRACKS_V3 for level in LEVELS)
@@ -187,9 +187,12 @@ def paper_runs(field: str, kept: Kept) -> str:
     runs[RANDOM] = [kept.result(RANDOM, LOCAL)]
     found = {name: _values(each, field) for name, each in runs.items()}
     labels = {**_TRAINED, RANDOM: _code(RANDOM)}
-    means = [[labels[name], *_over_runs(kept, values)] for name, values in found.items()]
-    differences = [[f"{labels[a]} - {labels[b]}", *_over_runs(kept, found[a], found[b])] for a, b in _PAIRS]
-    return _table(["agent", *map(str, _PRINTED_DISTANCES)], [*means, *differences])
+    means = [[labels[name], str(len(values)), *_over_runs(kept, values)] for name, values in found.items()]
+    differences = [
+        [f"{labels[a]} - {labels[b]}", f"{len(found[a])}, {len(found[b])}", *_over_runs(kept, found[a], found[b])]
+        for a, b in _PAIRS
+    ]
+    return _table(["agent", "runs", *map(str, _PRINTED_DISTANCES)], [*means, *differences])
 
 
 def mah_curve(kept: Kept) -> str:
@@ -219,8 +222,9 @@ def short_runs(rows: Mapping[str, str], metrics: Mapping[str, str], kept: Kept) 
         logged = [
             ", ".join(format(run[metric], form) for run in runs if metric in run) for metric, form in metrics.items()
         ]
-        lines.append([description, *rates, *logged])
-    return _table(["trained", *map(str, _PRINTED_DISTANCES), *(name.replace("_", " ") for name in metrics)], lines)
+        lines.append([description, str(len(runs)), *rates, *logged])
+    logs = (name.replace("_", " ") for name in metrics)
+    return _table(["trained", "runs", *map(str, _PRINTED_DISTANCES), *logs], lines)
 
 
 def mmn_runs(kept: Kept) -> str:
@@ -228,9 +232,12 @@ def mmn_runs(kept: Kept) -> str:
     local = kept.report[LOCAL]
     (printed,) = [each.cells["success_rate"] for each in local.columns if each.label == _PAPERS_MMN]
     paper = [str(printed[local.rows.index(str(distance))]) for distance in _PRINTED_DISTANCES]
-    ours = _over_runs(kept, _values(kept.training_runs("mmn"), "success"))
-    rows = [["`mmn`, three runs", *ours], ["the paper's MMN, as printed", *paper]]
-    return _table(["agent", *map(str, _PRINTED_DISTANCES)], rows)
+    runs = kept.training_runs("mmn")
+    rows = [
+        [_code("mmn"), str(len(runs)), *_over_runs(kept, _values(runs, "success"))],
+        ["the paper's MMN, as printed", "", *paper],
+    ]
+    return _table(["agent", "runs", *map(str, _PRINTED_DISTANCES)], rows)
 
 
 def tracks_table(benchmark: str, metric: str, kept: Kept) -> str:
