@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 from dm_env import specs
-from rendering import run_with_egl
+from processes import run_with_egl
 
 from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv

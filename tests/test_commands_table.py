@@ -30,24 +30,3 @@ def test_all_numbers_stand_whole_in_lines_that_fit(capsys, monkeypatch, columns,
     for text in ("1500", "20", "0.99 [0.97, 1.00]", "0.84 [0.83, 0.86]", "1.00 [0.84, 1.00]"):
         assert len(re.findall(rf"(?<!\S){re.escape(text)}(?!\S)", output)) == 1
     assert re.sub(r"\s", "", output).startswith(f"{NAME}:suitepaper")
-
-
-def test_a_terminal_with_room_for_no_column_gets_whole_numbers_too(capsys, monkeypatch):
-    assert "0.99 [0.97, 1.00]" in printed(capsys, monkeypatch, 12)
-
-
-def test_columns_that_do_not_fit_stand_below_with_the_names_again(capsys, monkeypatch):
-    output = printed(capsys, monkeypatch, 44, narrow=True)
-    heads = [line.split() for line in output.splitlines() if line.startswith("part")]
-    assert heads == [["part", "n", "success", "rate"], ["part", "SPL"]]
-    assert output.count("local-13") == 2
-
-
-def test_totals_stand_below_a_line(capsys, monkeypatch):
-    lines = printed(capsys, monkeypatch, 80, totals=[["all", "1520", "0.99", "0.84"]]).splitlines()
-    before, after = (
-        (index, line.split())
-        for index, line in enumerate(lines)
-        if line.split()[:1] in (["hierarchical-13-k5"], ["all"])
-    )
-    assert after[0] - before[0] == 2

@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium import wrappers
-from rendering import run_with_egl
+from processes import run_with_egl
 
 import mazebench
 from mazebench.envs.dm_control import Environment

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import functools
 import importlib.util
-import os
 import pathlib
 import re
-import subprocess
 import sys
 import unicodedata
 
@@ -15,6 +13,7 @@ import numpy as np
 import pytest
 import typer
 from pages import PAGES, ROOT, Block, blocks, name_of, read
+from processes import run_python
 
 from mazebench import cli
 from mazebench.maps.kinds import generate
@@ -23,7 +22,6 @@ from mazebench.maps.readers.ros import write_ros_map
 from mazebench.maps.text import write_text_maze
 
 EVERY_PAGE = pytest.mark.parametrize("page", PAGES, ids=name_of)
-LANGUAGES = {"python", "sh", "text", "toml", "json", "yaml", "bibtex", "diff"}
 COMMANDS = typer.main.get_command(cli.app).commands
 # Quick, and without a checkpoint.
 PLAIN_AGENTS = {"random", "planner", "planner-closed-loop"}
@@ -83,10 +81,6 @@ class TestCommands:
                 option for parameter in COMMANDS[name].params for option in parameter.opts + parameter.secondary_opts
             }
             assert {word for word in words if word.startswith("--")} <= known, text
-
-    @EVERY_PAGE
-    def test_fences_name_their_language(self, page):
-        assert {block.language for block in blocks(page)} <= LANGUAGES
 
 
 def page_commands(page: pathlib.Path) -> list[list[str]]:
@@ -165,8 +159,8 @@ class Reader:
         arguments = shortened(command)
         if arguments is None:
             return ""
-        if arguments[0] == "render":
-            return render(arguments)
+        if arguments[0] == "render":  # in a process of its own, because MuJoCo takes its backend when it is imported
+            return run_python("-m", "mazebench", *arguments, variables={"MUJOCO_GL": "egl"}).stdout if renders() else ""
         self._monkeypatch.setattr(sys, "argv", ["mazebench", *arguments])
         with pytest.raises(SystemExit) as caught:
             cli.main()
@@ -198,21 +192,7 @@ def shortened(command: list[str]) -> list[str] | None:
     return None
 
 
-def render(arguments: list[str]) -> str:
-    """Renders in a process of its own, as MuJoCo takes its backend when imported; where there is none, nothing."""
-    if not renders():
-        return ""
-    result = run_python("-m", "mazebench", *arguments)
-    assert result.returncode == 0, result.stderr
-    return result.stdout
-
-
 @functools.cache
 def renders() -> bool:
-    return run_python("-c", "import mujoco; mujoco.GLContext(64, 64).free()").returncode == 0
-
-
-def run_python(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, *arguments], env=os.environ | {"MUJOCO_GL": "egl"}, capture_output=True, text=True
-    )
+    probe = "import mujoco; mujoco.GLContext(64, 64).free()"
+    return run_python("-c", probe, status=None, variables={"MUJOCO_GL": "egl"}).returncode == 0

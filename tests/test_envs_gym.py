@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import subprocess
-import sys
 import warnings
 
 import gymnasium
@@ -14,7 +12,7 @@ from gymnasium.envs import registration
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import env_checker
 from gymnasium.vector import AutoresetMode
-from rendering import run_with_egl
+from processes import run_python, run_with_egl
 from simple_mazes import corridor
 
 from mazebench.envs.gym import MazeEnv
@@ -55,7 +53,7 @@ def test_it_steps_without_dm_control():
         "import sys; sys.modules['dm_control'] = None\nimport gymnasium, mazebench\n"
         "env = gymnasium.make('mazebench/Local-13-v1'); env.reset(seed=0); env.step(0); print('done')"
     )
-    assert subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout == "done\n"
+    assert run_python("-c", program).stdout == "done\n"
 
 
 class TestRegistration:
@@ -81,7 +79,7 @@ class TestRegistration:
         ],
     )
     def test_an_environment_is_made_by_its_name_in_a_fresh_process(self, program):
-        subprocess.run([sys.executable, "-c", program], check=True)
+        run_python("-c", program)
 
     def test_each_task_track_and_size_has_an_id(self):
         assert {name for name in registration.registry if name.startswith("mazebench/")} == {*IDS, *TRACK_IDS}

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 
 import numpy as np
 import pytest
 from acting import inputs_of
+from processes import run_python
 
 from mazebench.agent import Agent
 from mazebench.evaluation.checked_agent import AgentError, CheckedAgent
@@ -136,13 +136,9 @@ class TestEvaluation:
 
 def test_the_command_says_what_is_kept_and_shows_a_traceback_if_asked(tmp_path):
     # With one environment at a time, so that some episodes end before the agent breaks.
-    command = [sys.executable, "-m", "mazebench", "eval", "--distances", "1", "--episodes-per-distance", "1"]
+    command = ["-m", "mazebench", "eval", "--distances", "1", "--episodes-per-distance", "1"]
     command += ["--num-envs", "1", "--agent", "contract_at_hand:Late", "--out", "run"]
-    plain, loud = (
-        subprocess.run([*command, *words], cwd=tmp_path, capture_output=True, text=True)
-        for words in ([], ["--resume", "--traceback"])
-    )
-    assert (plain.returncode, loud.returncode) == (1, 1)
+    plain, loud = (run_python(*command, *words, status=1, cwd=tmp_path) for words in ([], ["--resume", "--traceback"]))
     *_, line = plain.stderr.splitlines()
     said = r"mazebench: agent 'contract_at_hand:Late': act\(\) raised AssertionError \(contract_at_hand.py:\d+\)"
     assert re.fullmatch(said + "; 1 of 20 episodes are kept in run", line)

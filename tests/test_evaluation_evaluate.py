@@ -7,12 +7,11 @@ import json
 import os
 import pathlib
 import shutil
-import subprocess
-import sys
 from typing import ClassVar
 
 import numpy as np
 import pytest
+from processes import run_python
 from run_folders import FEW, FILES, IMPORTS, RECORDED, Killed, files_of, kill_after, records_of, results_of, summary_of
 
 from mazebench.agent import Agent, SingleAgent
@@ -149,8 +148,8 @@ class TestAgents:
         script += "class Mine(SingleAgent):\n    def act(self, observation):\n        return 0\n"
         script += "options = {'distances': (1,), 'episodes_per_distance': 1}\n"
         script += "print(evaluate(Mine, **options).agent, flush=True)\nevaluate(Mine, workers=2, **options)\n"
-        done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True)
-        assert done.stdout == "__main__:Mine\n", done.stderr
+        done = run_python("-c", script, status=1, cwd=tmp_path)
+        assert done.stdout == "__main__:Mine\n"
         assert (
             "InputError: expected a class that other processes can import by its name, found __main__:Mine"
             in done.stderr

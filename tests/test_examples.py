@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
 import pathlib
 import re
 import shutil
-import subprocess
-import sys
 
 import cv2
 import mujoco
 import pytest
+from processes import run_python
 
 from mazebench.maps.files import read_maze
 
@@ -25,15 +23,7 @@ PPO_BUDGET = ("--steps", "512", "--num-envs", "4", "--out", "ppo.zip")
 
 def run(*arguments: str | pathlib.Path, folder: pathlib.Path, **variables: str) -> str:
     """What a Python process prints on standard output; it must succeed."""
-    result = subprocess.run(
-        [sys.executable, *map(str, arguments)],
-        cwd=folder,
-        env=os.environ | SERIAL | {"TMPDIR": str(folder)} | variables,
-        capture_output=True,
-        text=True,
-    )
-    assert result.returncode == 0, result.stderr
-    return result.stdout
+    return run_python(*arguments, cwd=folder, variables=SERIAL | {"TMPDIR": str(folder)} | variables).stdout
 
 
 def needs(*modules: str) -> None:
@@ -146,7 +136,7 @@ for action in (0, 0, 2, 2, 4, 0, 0):
         needs("torch")
         probe = "import mujoco; mujoco.GLContext(64, 64).free()"
         egl = {"MUJOCO_GL": "egl"}
-        if subprocess.run([sys.executable, "-c", probe], env=os.environ | egl, capture_output=True).returncode:
+        if run_python("-c", probe, status=None, variables=egl).returncode:
             pytest.skip("EGL is not usable here")
         run(EXAMPLES / "pixels.py", "--steps", "2", "--out", "seen.png", folder=tmp_path, **egl)
         assert cv2.imread(str(tmp_path / "seen.png")).shape == (2 * 84, 4 * 84, 3)

@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 import pytest
 from faults import TINY
-from rendering import run_with_egl
+from processes import run_with_egl
 
 import mazebench
 from mazebench.constants import STEPS_PER_ACTION

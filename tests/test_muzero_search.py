@@ -2,13 +2,12 @@
 
 import json
 import pathlib
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 import torch
 from mazebench_agents.muzero import search
+from processes import run_python
 
 torch.set_num_threads(1)  # two that share a core with other tests wait for each other
 
@@ -224,8 +223,7 @@ def test_considered_visits_by_hand():
 @pytest.mark.slow
 def test_speed_of_the_search_is_measured_beside_that_of_mctx():
     script = pathlib.Path(__file__).parent.parent / "benchmarks" / "search.py"
-    command = [sys.executable, script, "--seconds", "0.01"]
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    said = run_python(script, "--seconds", "0.01").stdout
     rows = [line.split(" | ") for line in said.splitlines() if "," in line and line.startswith("| ")][1:]
     assert [row[0] for row in rows] == ["| gumbel, 1", "| gumbel, 64", "| gumbel, 256", "| puct, 64"]
     assert all(float(row[1].replace(",", "")) > 0 for row in rows)

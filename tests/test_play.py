@@ -19,6 +19,7 @@ import mujoco
 import numpy as np
 import pytest
 from acting import inputs_of
+from processes import run_python
 from simple_mazes import field
 
 from mazebench.agent import Interface
@@ -275,9 +276,7 @@ class TestViewer:
         np.testing.assert_allclose(middles, (game.path[-1] + game.rays) / 2, atol=1e-5)
 
     def test_only_the_range_sensor_is_shown(self):
-        command = [sys.executable, "-m", "mazebench", "play", "--sensors", "top"]
-        result = subprocess.run(command, capture_output=True, text=True)
-        assert result.returncode == 2
+        result = run_python("-m", "mazebench", "play", "--sensors", "top", status=2)
         said = "mazebench: expected sensors lidar or none, found top, which is not shown while you drive\n"
         assert result.stderr == said
 

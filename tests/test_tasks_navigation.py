@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from absl.testing import absltest
 from dm_env import test_utils
-from rendering import run_with_egl
+from processes import run_with_egl
 from simple_mazes import field
 
 import mazebench

@@ -6,11 +6,10 @@ import collections
 import dataclasses
 import itertools
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from processes import run_python
 from simple_mazes import corridor, field
 
 from mazebench.errors import InputError
@@ -159,7 +158,7 @@ class TestOptions:
     def test_reading_the_options_does_not_load_mujoco(self):
         # The command line reads them before it chooses MuJoCo's rendering backend.
         program = "import sys, mazebench.tasks.options; sys.exit('mujoco' in sys.modules)"
-        assert subprocess.run([sys.executable, "-c", program]).returncode == 0
+        run_python("-c", program)
 
     def test_the_context_has_the_mazes_size_by_default_and_21_at_most(self):
         assert make_spec(maps=CORRIDOR).context_size == 9

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
-from rendering import run_with_egl
+from processes import run_with_egl
 
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.kinds import generate

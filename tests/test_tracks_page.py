@@ -46,14 +46,6 @@ def test_the_table_of_levels_follows_from_the_code(benchmark):
     assert derived_table(benchmark) in page, "python tests/test_tracks_page.py rewrites it"
 
 
-@pytest.mark.parametrize(("track", "spare"), [("far", 50), ("building", 50), ("rebuilt", 50), ("adrift", 150)])
-def test_the_time_limit_is_6_steps_a_cell_and_some_more(track, spare):
-    played = TRACKS[track]
-    for level in LEVELS:
-        for cells in played.distances(level):
-            assert played.time_limit(level, cells) == 6 * cells + spare
-
-
 if __name__ == "__main__":
     for benchmark, page in PAGES.items():
         text = page.read_text(encoding="utf-8")
