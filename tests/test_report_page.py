@@ -42,14 +42,24 @@ def data_of(page):
 class TestContent:
     def test_the_page_asks_no_network_for_anything(self, page):
         text = page.read_text()
-        assert set(re.findall(r"https?://[^\s\"']+", text)) == {"http://www.w3.org/2000/svg"}  # a name, not a place
+        names = {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}  # not places
+        assert set(re.findall(r"https?://[^\s\"']+", text)) == names
         assert "default-src 'none'" in text
+
+    def test_no_two_elements_have_one_id(self, page):
+        ids = re.findall(r' id="([^"]+)"', page.read_text())
+        assert len(set(ids)) == len(ids) > 100
+
+    def test_every_figure_has_the_values_as_a_table(self, page):
+        figure = re.search(r'<section class="figure">.*?Local navigation, 13 × 13.*?</section>', page.read_text(), re.S)
+        assert "<svg" in figure[0]
+        assert re.search(r"<th>success rate, by distance</th><th>mah</th>.*<td>2</td><td>\d\.\d\d \[", figure[0])
 
     def test_an_agent_named_like_a_script_is_shown_as_text(self, page):
         text = page.read_text()
         assert "window.hacked=1</script>" not in text
         assert "<img" not in text
-        assert NASTY in data_of(page)["labels"]
+        assert NASTY in [result["label"] for result in data_of(page)["results"]]
         for path in (page.parent / "tables").glob("*.md"):
             assert not re.search(r"(?<!\\)<", path.read_text())
 
@@ -218,56 +228,6 @@ class TestOwnMaps:
         assert "may have been shown" in opened.run("document.getElementById('shown-caption').textContent")
 
 
-@pytest.fixture(scope="module")
-def crowded_page(tmp_path_factory):
-    """The page over twelve agents with long names."""
-    folder = tmp_path_factory.mktemp("crowd")
-    for number in range(12):
-        agent = f"mylab.navigation.experiments.variant_{number}.agents:PlannerWithRecurrentMemory"
-        make_result(folder / "results" / str(number), agent, num_mazes=2)
-    write_report([folder / "results"], folder / "report")
-    return folder / "report" / "report.html"
-
-
-@pytest.fixture
-def crowded(browser, crowded_page):
-    """The browser with the page of many agents loaded anew."""
-    yield from loaded(browser, crowded_page)
-
-
-class TestManyAgents:
-    def test_no_two_look_alike_and_their_lines_look_as_in_the_key(self, crowded):
-        look = (
-            "[...svg.querySelectorAll('polyline, path')].map(node => node.getAttribute('d') ||"
-            "node.getAttribute('stroke') + node.getAttribute('stroke-dasharray'))"
-        )
-        keys = crowded.run(f"[...document.querySelectorAll('#agents svg')].map(svg => {look}.join())")
-        assert len(set(keys)) == len(keys) > 12  # with those of the paper
-        drawn = crowded.run(f"[document.querySelector('#charts svg[role]')].map(svg => {look})[0]")
-        assert all(part in drawn for key in keys[:12] for part in key.split(","))
-
-    def test_tables_have_a_row_for_each(self, crowded):
-        crowded.run("document.querySelector('#charts details').open = true")
-        heads = "[...document.querySelectorAll('#charts table')][0].tBodies[0].rows"
-        names = crowded.run(f"[...{heads}].map(row => row.cells[0].textContent)")
-        assert names[:12] == crowded.run("data.labels")
-
-    @pytest.mark.parametrize("width", [400, 800, 1400])
-    def test_everything_is_reached_without_scrolling_sideways(self, crowded, width):
-        crowded.resize(width, 800)
-        crowded.wait_for(f"document.documentElement.clientWidth === {width}")
-        assert crowded.run("document.documentElement.scrollWidth") <= width
-        assert crowded.run("document.getElementById('provenance').getBoundingClientRect().right") <= width
-
-    def test_provenance_is_a_list_in_a_narrow_window(self, crowded):
-        crowded.resize(400, 800)
-        crowded.wait_for("document.documentElement.clientWidth === 400")
-        cells = "[...document.querySelectorAll('#provenance td')].filter(cell => cell.checkVisibility())"
-        assert crowded.run(f"{cells}.every(cell => cell.textContent && cell.getBoundingClientRect().width > 300)")
-        name = "getComputedStyle(document.querySelector('#provenance td'), '::before').content"
-        assert crowded.run(name) in ('"agent"', "attr(data-name)")
-
-
 class TestReading:
     def test_the_slider_and_the_arrow_keys_move_through_time(self, opened):
         last = int(opened.run("document.getElementById('time').max"))
@@ -320,25 +280,15 @@ class TestReading:
         browser.wait_for("document.getElementById('episodes').value === '2'")
         assert browser.run("location.hash") == "#episode=1-2"
 
-    def test_charts_follow_the_chosen_metric(self, opened):
-        assert opened.run("document.querySelectorAll('#charts svg').length") >= 5
-        label = "document.querySelector('#charts svg').getAttribute('aria-label')"
-        assert "success rate by" in opened.run(label)
-        opened.run("document.querySelector('input[value=spl]').click()")
-        assert "SPL by" in opened.run(label)
-
-    def test_few_distances_have_an_interval_for_each_agent_beside_one_another(self, opened):
-        lines = (
-            "[...document.querySelector('#charts svg').querySelectorAll('line[stroke]')].map(node => node.getAttribute"
-        )
-        places = opened.run(f"{lines}('x1'))")
-        assert len(set(places)) == len(places) == 2 * 3  # distances and agents
-
-    def test_charts_are_read_with_the_arrow_keys(self, opened):
-        opened.run("document.querySelector('#charts svg').focus()")
-        opened.press("ArrowRight", 39)
-        tip = opened.run("document.querySelector('#charts .tip').textContent")
-        assert re.match(r"distance \(cells\) 2mah: \d\.\d\d \[", tip)
+    def test_a_figure_fills_its_section_and_is_dark_on_white_in_either_scheme(self, opened):
+        assert opened.run("document.querySelectorAll('#figures svg[role=img]').length") >= 5
+        for scheme in ("light", "dark"):
+            opened.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+            svg = "document.querySelector('#figures svg')"
+            assert opened.run(f"getComputedStyle({svg}).backgroundColor") == "rgb(255, 255, 255)"
+            assert opened.run(f"getComputedStyle({svg}.querySelector('text')).fill") == "rgb(0, 0, 0)"
+            assert opened.run(f"{svg}.getBoundingClientRect().width") > 600
+        opened.call("Emulation.setEmulatedMedia", features=[])
 
     @pytest.mark.parametrize("width", [360, 1200])
     def test_the_page_fits_narrow_and_wide_windows(self, opened, width):

@@ -36,7 +36,7 @@ def build_document(
         "# mazebench report",
         f"Benchmark {benchmark_versions(results)}; {escape_markdown(', '.join(labels))}; "
         f"{counted(count, 'episode')} in {counted(len(results), 'result')}. "
-        f"[{PAGE}]({PAGE}) has interactive charts and every episode.",
+        f"[{PAGE}]({PAGE}) has every episode.",
         "Means with 95 % intervals, which allow for the likeness of episodes in one maze. Columns marked (paper) are "
         f"the values printed in {escape_markdown(citation())}. {reference()['note']}",
         *(f"- {escape_markdown(warning)}" for warning in warnings),

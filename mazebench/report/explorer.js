@@ -1,7 +1,15 @@
 "use strict";
-// The episode explorer. A result's episodes and paths are packed and unpacked only when picked.
+// The episode explorer. Text from results goes through textContent. A result's episodes and paths are packed and unpacked only when picked.
 
 const MAX_LISTED = 2000;
+const data = JSON.parse(document.getElementById("data").textContent);
+
+function element(tag, attributes = {}, ...children) {
+  const node = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
+  node.append(...children);
+  return node;
+}
 
 const byId = (id) => document.getElementById(id);
 const inCells = (count) => `${count} ${count === 1 ? "cell" : "cells"}`;
@@ -236,7 +244,7 @@ function remember() {
 function writeOutcome() {
   const { current } = view;
   const verdict = element("strong", { class: current.success ? "reached" : "failed" }, current.success ? "reached the goal" : "did not reach the goal");
-  byId("outcome").replaceChildren(...breakable(data.results[view.result].label), " ", verdict, ` in maze ${current.maze}, ${current.steps} steps, ${current.driven.toFixed(2)} m driven.`);
+  byId("outcome").replaceChildren(data.results[view.result].label, " ", verdict, ` in maze ${current.maze}, ${current.steps} steps, ${current.driven.toFixed(2)} m driven.`);
 }
 
 function writeNumbers() {
@@ -281,7 +289,7 @@ async function writeOthers() {
 }
 
 function otherRow(number, index, columns) {
-  const button = element("button", { type: "button", class: "link" }, ...breakable(data.results[number].label));
+  const button = element("button", { type: "button", class: "link" }, data.results[number].label);
   if (number === view.result) button.setAttribute("aria-current", "true");
   button.addEventListener("click", () => {
     chooseResult(number);
@@ -478,7 +486,7 @@ function listen() {
 
 function startExplorer() {
   if (typeof DecompressionStream === "undefined") {
-    byId("explorer").replaceChildren(byId("explorer-title"), element("p", { class: "notice" }, "This browser is too old for the episode explorer, which needs DecompressionStream (Chrome 80, Firefox 113, Safari 16.4). The charts and tables are complete."));
+    byId("explorer").replaceChildren(byId("explorer-title"), element("p", { class: "notice" }, "This browser is too old for the episode explorer, which needs DecompressionStream (Chrome 80, Firefox 113, Safari 16.4). The figures and tables are complete."));
     return;
   }
   const linked = linkedEpisode();

@@ -1,42 +1,36 @@
-"""The report as one page that needs no network: figures and an explorer of the episodes, all data inside.
+"""The report as one page that needs no network: figures, tables, and an explorer of the episodes, all data inside.
 
-charts.js draws the figures of `figures/figure.py`; explorer.js and drawing.js replay episodes.
+explorer.js and drawing.js replay episodes.
 """
 
 from __future__ import annotations
 
 import base64
-import dataclasses
 import hashlib
+import html
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.markers import MarkerStyle
-from matplotlib.path import Path
-from matplotlib.transforms import Affine2D
 
 from mazebench.constants import STEP_TIME
 from mazebench.maps import colors
-from mazebench.report.document import PROVENANCE_HEAD, benchmark_versions, provenance_rows
-from mazebench.report.figures.figure import Figure
+from mazebench.report.document import PROVENANCE_HEAD, Picture, benchmark_versions, counted, provenance_rows
 from mazebench.report.figures.trajectories import CELL_COLORS, TIME_COLORS
-from mazebench.report.looks import INKS, Look
 from mazebench.report.mazes import real_walls
 from mazebench.report.packed_episodes import POSITION_UNITS, YAW_UNITS, pack_drives, pack_trials, to_base64
 from mazebench.report.results import ReportedResult
 from mazebench.report.settings import Setting
-from mazebench.report.table import METRICS, Table
+from mazebench.report.table import Table
 from mazebench.results.paper import citation, reference
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.options import TaskOptions
 from mazebench.world.lidar import NUM_RAYS
 from mazebench.world.mjcf import BODY_RADIUS
 
-_SVG_LETTERS = {Path.MOVETO: "M", Path.LINETO: "L", Path.CURVE3: "Q", Path.CURVE4: "C", Path.CLOSEPOLY: "Z"}
 _NUM_TIME_COLORS = 32
 
 
@@ -44,75 +38,111 @@ def build_page(
     results: Sequence[ReportedResult],
     labels: Sequence[str],
     tables: Sequence[Table],
-    curves: Mapping[str, Figure],
-    violins: Sequence[Figure],
-    looks: Mapping[str, Look],
+    figures: Mapping[Picture, str],
     warnings: Sequence[str],
 ) -> str:
-    """Returns the page as HTML; text from results is in it as JSON and base64 only.
+    """Returns the page as HTML; text from results is escaped in it, or stands in it as JSON and base64.
 
     Args:
       results: all results.
       labels: of the agents, in the order in which they are listed.
       tables: all tables.
-      curves: the figures of tables, by the tables' names.
-      violins: further figures.
-      looks: of all series in the figures.
+      figures: the SVG of each figure.
       warnings: lines about the results.
     """
-    settings = sorted({result.setting for result in results})
-    mazes, places = _mazes(results)
+    count = sum(len(result.episodes) for result in results)
+    style = f":root {{ {' '.join(f'--{name}: {color};' for name, color in _colors().items())} }}\n{_read('page.css')}"
+    script = "".join(map(_read, ("drawing.js", "explorer.js")))
     trials = [pack_trials(result, results) for result in results]
     packed_trials = list(dict.fromkeys(trials))
+    packed = [_block(f"trials-{number}", text) for number, text in enumerate(packed_trials)]
+    packed += [_block(f"drives-{number}", pack_drives(result)) for number, result in enumerate(results)]
+    parts = {
+        # Figures have attributes `style`.
+        "POLICY": f"default-src 'none'; style-src '{_hash(style)}'; style-src-attr 'unsafe-inline'; "
+        f"script-src '{_hash(script)}'",
+        "STYLE": style,
+        "SUBTITLE": html.escape(
+            f"Benchmark {benchmark_versions(results)}; {', '.join(labels)}; {counted(count, 'episode')} in "
+            f"{counted(len(results), 'result')}."
+        ),
+        "NOTES": _notes(warnings),
+        "CITATION": html.escape(f"{citation()}. {reference()['note']}"),
+        "FIGURES": "\n".join(_sections(tables, figures)),
+        "PROVENANCE": _to_html([PROVENANCE_HEAD, *provenance_rows(results)]),
+        "DATA": _json(_explorer_data(results, [packed_trials.index(each) for each in trials])),
+        "EPISODES": "\n".join(packed),
+        "SCRIPT": script,
+    }
+    pieces = _read("page.html").split("@")  # names of parts stand between the odd and even @
+    return "".join(parts[piece] if index % 2 else piece for index, piece in enumerate(pieces))
+
+
+def _colors() -> dict[str, str]:
+    return {"start": colors.to_hex(colors.START), "goal": colors.to_hex(colors.GOAL), **CELL_COLORS}
+
+
+def _block(name: str, text: str) -> str:
+    return f'<script type="text/plain" id="{name}">{text}</script>'
+
+
+def _notes(warnings: Sequence[str]) -> str:
+    if not warnings:
+        return ""
+    lines = "".join(f"<li>{html.escape(line)}</li>" for line in warnings)
+    return (
+        f'<details class="notice"><summary>Notes on the results ({len(warnings)})</summary><ul>{lines}</ul></details>'
+    )
+
+
+def _sections(tables: Sequence[Table], figures: Mapping[Picture, str]) -> Iterator[str]:
+    """Yields each figure with the table of its name, then the tables that have no figure."""
+    by_name = {table.name: table for table in tables}
+    for picture, svg in figures.items():
+        yield _section(picture.title, picture.note, svg, by_name.pop(picture.name, None), is_open=False)
+    for table in by_name.values():
+        yield _section(table.title, table.note, "", table, is_open=True)
+
+
+def _section(title: str, note: str, svg: str, table: Table | None, is_open: bool) -> str:
+    hidden = ' class="hidden"' if svg else ""  # the figure has its title
+    parts = [f"<h3{hidden}>{html.escape(title)}</h3>", svg]
+    if note:
+        parts.append(f'<p class="note">{html.escape(note)}</p>')
+    if table is not None:
+        forms = "".join(f'<div class="scroll">{_to_html(table.lines(metric))}</div>' for metric in table.metrics)
+        parts.append(f"<details{' open' * is_open}><summary>The values as a table</summary>{forms}</details>")
+    return f'<section class="figure">{"".join(parts)}</section>'
+
+
+def _to_html(lines: Sequence[Sequence[str]]) -> str:
+    """Returns the table of lines of texts, the head first."""
+    head, *body = ([html.escape(text) for text in line] for line in lines)
+    rows = "".join(f"<tr><td>{'</td><td>'.join(line)}</td></tr>" for line in body)
+    return f"<table><thead><tr><th>{'</th><th>'.join(head)}</th></tr></thead><tbody>{rows}</tbody></table>"
+
+
+def _explorer_data(results: Sequence[ReportedResult], trials: Sequence[int]) -> dict[str, Any]:
+    settings = sorted({result.setting for result in results})
+    mazes, places = _mazes(results)
     listed = [
         {
             **_describe(result),
             "setting": settings.index(result.setting),
             "mazes": here,
-            "trials": packed_trials.index(of_result),
+            "trials": of_result,
         }
         for result, here, of_result in zip(results, places, trials, strict=True)
     ]
-    printed = {column.label: None for table in tables for column in table.columns if column.is_paper}
-    content = {
-        "benchmark": benchmark_versions(results),
-        "citation": citation(),
-        "paperNote": reference()["note"],
-        "labels": labels,
-        "printed": list(printed),
-        "looks": {label: _look(look) for label, look in looks.items()},
-        "metrics": {name: text for name, text in METRICS.items() if any(name in table.metrics for table in tables)},
-        "warnings": warnings,
-        "charts": [_chart(table, curves) for table in sorted(tables, key=lambda table: not table.x)],
-        "violins": [_figure(figure) for figure in violins],
+    return {
         "settings": [_names(setting) for setting in settings],
         "rays": NUM_RAYS,
         "units": {"position": POSITION_UNITS, "yaw": YAW_UNITS, "step": STEP_TIME, "body": BODY_RADIUS},
         "timeColors": [mpl.colors.to_hex(TIME_COLORS(n / (_NUM_TIME_COLORS - 1))) for n in range(_NUM_TIME_COLORS)],
         "mazes": mazes,
         "results": listed,
-        "provenance": [PROVENANCE_HEAD, *provenance_rows(results)],
         "first": _first(results),
     }
-    marks = {"start": colors.to_hex(colors.START), "goal": colors.to_hex(colors.GOAL), **CELL_COLORS}
-    style = f":root {{ {' '.join(f'--{name}: {color};' for name, color in marks.items())} }}\n{_read('page.css')}"
-    script = "".join(map(_read, ("charts.js", "drawing.js", "explorer.js")))
-    policy = f"default-src 'none'; style-src '{_hash(style)}'; script-src '{_hash(script)}'"
-    packed = [f'<script type="text/plain" id="trials-{n}">{text}</script>' for n, text in enumerate(packed_trials)]
-    packed += [
-        f'<script type="text/plain" id="drives-{number}">{pack_drives(result)}</script>'
-        for number, result in enumerate(results)
-    ]
-    parts = {
-        "POLICY": policy,
-        "STYLE": style,
-        "DATA": _json(content),
-        "EPISODES": "\n".join(packed),
-        "SCRIPT": script,
-    }
-    page = _read("page.html")
-    pieces = page.split("@")  # names of parts stand between the odd and even @
-    return "".join(parts[piece] if index % 2 else piece for index, piece in enumerate(pieces))
 
 
 def _read(name: str) -> str:
@@ -125,43 +155,7 @@ def _hash(text: str) -> str:
 
 def _json(content: Any) -> str:
     """Returns JSON for a script element: no text in it can end the element or open a comment."""
-    return json.dumps(_plain(content), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-
-
-def _plain(value: Any) -> Any:
-    """Returns what JSON has of a value: dataclasses as objects, numbers with three digits behind the point."""
-    if dataclasses.is_dataclass(value):
-        return {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
-    if isinstance(value, Mapping):
-        return {name: _plain(each) for name, each in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(each) for each in value]
-    return round(float(value), 3) if isinstance(value, float) else value
-
-
-def _chart(table: Table, curves: Mapping[str, Figure]) -> dict[str, Any]:
-    """Returns a table, its texts line by line for each metric, and the panels of its figure."""
-    chart: dict[str, Any] = {"title": table.title, "note": table.note, "panels": ()}
-    if table.name in curves:
-        chart = _figure(curves[table.name])
-    return chart | {"lines": {metric: table.lines(metric) for metric in table.metrics}}
-
-
-def _figure(figure: Figure) -> dict[str, Any]:
-    """Returns a figure without its looks, which all figures share."""
-    return {"title": figure.title, "note": figure.note, "panels": figure.panels}
-
-
-def _look(look: Look) -> dict[str, Any]:
-    """Returns a look with its marker as an SVG path of size 1, and the ink as the page's text has it."""
-    style = MarkerStyle(look.marker)
-    path = style.get_path().transformed(style.get_transform() + Affine2D().scale(1, -1))
-    marker = ""
-    for corners, code in path.iter_segments(simplify=False):
-        marker += _SVG_LETTERS[code] + ("" if code == Path.CLOSEPOLY else " ".join(f"{at:.3g}" for at in corners))
-    color = "var(--ink)" if look.color in INKS else look.color
-    changed = {"color": color, "marker": marker, "isFilled": bool(style.is_filled())}
-    return {name: value for name, value in dataclasses.asdict(look).items() if name != "name"} | changed
+    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
 def _mazes(results: Sequence[ReportedResult]) -> tuple[list[dict[str, Any]], list[list[int]]]:

@@ -59,9 +59,8 @@ def write_report(
         results, labels = read_in_order(paths, names)
     episodes, looks = join_episodes(results, labels), all_looks(labels)
     tables = build_tables(episodes)
-    curves = {table.name: describe_table(table, looks) for table in tables if table.x}
-    violins = describe_distributions(episodes, looks)
-    figures = [*curves.values(), *describe_several_tables(tables, looks), *violins]
+    figures = [describe_table(table, looks) for table in tables if table.x]
+    figures += [*describe_several_tables(tables, looks), *describe_distributions(episodes, looks)]
     galleries = build_galleries(episodes)
     pictures = [Picture(each.name, each.title, each.note) for each in figures]
     pictures += [Picture(each.name, each.title, each.note) for each in galleries]
@@ -71,12 +70,14 @@ def write_report(
                 write_text(out / TABLES / (table.name + suffix), form(table))
             for metric in table.metrics:
                 write_text(out / TABLES / f"{latex_name(table, metric)}.tex", to_latex(table, metric))
-        for figure in figures:
-            draw_figure(figure, out / FIGURES / figure.name)
+        drawn = {
+            Picture(figure.name, figure.title, figure.note): draw_figure(figure, out / FIGURES / figure.name)
+            for figure in figures
+        }
         for gallery in galleries:
             draw_gallery(gallery, looks, out / FIGURES / gallery.name)
         write_text(out / DOCUMENT, build_document(results, labels, tables, pictures, notes))
-        write_text(out / PAGE, build_page(results, labels, tables, curves, violins, looks, notes))
+        write_text(out / PAGE, build_page(results, labels, tables, drawn, notes))
     return results
 
 

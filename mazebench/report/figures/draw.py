@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import html
 import io
 import pathlib
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -46,10 +48,12 @@ _MAX_TICKS = 8
 _Y_AXIS = 0.5  # inches, of a panel's width
 
 
-def draw_figure(figure: Figure, path: pathlib.Path) -> None:
-    """Writes PATH.png and PATH.pdf."""
+def draw_figure(figure: Figure, path: pathlib.Path) -> str:
+    """Writes PATH.png and PATH.pdf, and returns the figure as SVG."""
     with mpl.rc_context(STYLE):
-        save(lay_out(figure), path)
+        canvas = lay_out(figure)
+        save(canvas, path)
+        return to_svg(canvas, figure.name, figure.title)
 
 
 def lay_out(figure: Figure) -> Canvas:
@@ -98,6 +102,18 @@ def save(canvas: Canvas, path: pathlib.Path) -> None:
         canvas.savefig(content, format=form, **options)
         with open_whole(path.with_name(f"{path.name}.{form}")) as file:
             file.write(content.getbuffer())
+
+
+def to_svg(canvas: Canvas, name: str, title: str) -> str:
+    """Returns a figure as an SVG element for a page: its ids begin with `name`, so that no other figure has them."""
+    content = io.StringIO()
+    undated = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
+        canvas.savefig(content, format="svg", metadata=undated)
+    svg = content.getvalue()
+    svg = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", svg[svg.index("<svg") :], count=1, flags=re.DOTALL)
+    svg = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{name}-", svg)
+    return svg.replace("<svg", f'<svg role="img" aria-label="{html.escape(title)}"', 1)
 
 
 def _draw_series(axes: Axes, series: Series, look: Look) -> None:

@@ -1,7 +1,6 @@
 """A figure as one value: what is drawn where, and how it looks.
 
-`describe.py` makes it from tables and episodes. `draw.py` draws it by matplotlib for files, and charts.js on the page.
-Neither adds anything of its own but the fonts, the room, and which of its ticks have texts.
+`describe.py` makes it from tables and episodes. `draw.py` draws it by matplotlib.
 """
 
 from __future__ import annotations
