@@ -58,7 +58,6 @@ WALLS = {
     "ray": ("mazebench/evaluation/cluster.py", "mazebench/training/distributed.py"),
     "matplotlib": ("mazebench/report",),
     "pandas": ("mazebench/report",),
-    "curses": ("mazebench/play/terminal.py",),
 }
 FOLDERS = {"mazebench": "mazebench", "mazebench_agents": "agents", "mazebench_assets": "assets"}
 

@@ -20,16 +20,13 @@ def play(
     context: typer.Context,
     values: dict[str, Any],
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode and those after it.")] = 0,
-    terminal: Annotated[
-        bool, typer.Option("--terminal", help="In this terminal, where there is a display too.")
-    ] = False,
 ) -> None:
-    """Drive yourself, with the keyboard: in MuJoCo's viewer, or without a display in the terminal."""
+    """Drive yourself, with the keyboard, in a window."""
     refuse_ignored_by_task(context, values)
     mazes = chosen(MazeOptions, values)
     task = watched(chosen(TaskOptions, values), mazes)
-    in_window = has_display() and not terminal
-    load_mujoco(renders=in_window)
+    load_mujoco(renders=has_display())
+    from mazebench.play import viewer
     from mazebench.play.game import LIDAR, Game
     from mazebench.tasks.build import build_task
 
@@ -37,9 +34,5 @@ def play(
         if sensor != LIDAR:
             raise InputError(f"expected sensors {LIDAR} or none, found {sensor}, which is not shown while you drive")
     game = Game(build_task(task, mazes), seed)
-    if in_window:
-        from mazebench.play import viewer as screen
-    else:
-        from mazebench.play import terminal as screen  # type: ignore[no-redef]
-    screen.play(game)
+    viewer.play(game)
     print(game.outcome())

@@ -1,4 +1,4 @@
-"""The colours of start and goal: the same in worlds, maps, the terminal, figures and the page of a report."""
+"""The colours of start and goal: the same in worlds, maps, figures and the page of a report."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Driving by hand, in MuJoCo's viewer or in a terminal."""
+"""Driving by hand in MuJoCo's viewer, and films of episodes."""

@@ -1,14 +1,12 @@
-"""Episodes that a person drives, one agent step for each key, independent of how they are shown."""
+"""Episodes that a person drives, one agent step per key."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from mazebench.envs.gym import MazeEnv
-from mazebench.maps.maze import Cell
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.lidar import ray_ends
@@ -65,11 +63,6 @@ class Game:
         self.num_reached += terminated
 
     @property
-    def walls(self) -> np.ndarray:
-        """`[N, N]` bool: the true walls."""
-        return self.task_spec.mazes[self.env.task.episode.maze].walls
-
-    @property
     def context(self) -> np.ndarray:
         """`[4, M, M]` float32: the context that an agent would get."""
         return self.observation["context"]
@@ -81,16 +74,6 @@ class Game:
             return None
         pose = np.array([*self.path[-1], self.env.simulation.yaw()])
         return ray_ends(pose, self.observation[LIDAR])
-
-    def to_cells(self, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
-        """Returns `[..., 2]` points in metres in cells, in which pictures are drawn."""
-        return np.asarray(points) / self.task_spec.cell_size
-
-    @property
-    def landmarks(self) -> list[Cell]:
-        """The landmarks that are still to be reached before the goal, as cells of the true maze."""
-        task = self.env.task
-        return [] if task.spec.task == "local" else task.route.cells[task.route.leg + 1 : -1]
 
     def title(self) -> str:
         """Returns a line that describes the episode."""
@@ -110,7 +93,8 @@ class Game:
         heading = math.degrees(simulation.yaw())
         left = task.route.deadline - task.steps
         where = f"x {x:.2f}  y {y:.2f} m  heading {heading:+.0f} deg  {simulation.speed():.2f} m/s"
-        return f"{where}  {driven}, {left} steps left" + (f", landmark {task.route.leg + 1}" if self.landmarks else "")
+        to_landmark = self.task_spec.task == "hierarchical" and task.route.leg < len(task.route.cells) - 2
+        return f"{where}  {driven}, {left} steps left" + (f", landmark {task.route.leg + 1}" if to_landmark else "")
 
     def outcome(self) -> str:
         """Returns a line that says how many episodes ended at the goal."""

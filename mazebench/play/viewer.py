@@ -1,4 +1,4 @@
-"""The game in MuJoCo's viewer."""
+"""A window to drive in, MuJoCo's viewer, with the shown map in a corner."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ import types
 import warnings
 from typing import Any
 
+import cv2
 import mujoco
 import numpy as np
 
 from mazebench.errors import InputError
+from mazebench.maps.pictures import draw_grid
 from mazebench.play.game import HELP, Game
-from mazebench.play.picture import map_pixels
+from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.world.mjcf import BODY_HEIGHT
 
 _ESCAPE = 256  # GLFW's key codes; those of letters are the codes of capital letters
@@ -22,6 +24,7 @@ _MAP_PIXELS = 260  # side of the map in the corner of the window
 _SECONDS_A_FRAME = 0.02
 _RAY_COLOUR = np.array([0.16, 0.6, 0.75, 1], dtype=np.float32)
 _RAY_RADIUS = 0.008  # m
+_WITHOUT = "`mazebench render` films episodes without a window"
 
 
 def play(game: Game) -> None:
@@ -38,7 +41,7 @@ def play(game: Game) -> None:
             model, data, key_callback=keys.put, show_left_ui=False, show_right_ui=False
         )
     except RuntimeError as error:  # macOS without mjpython
-        raise InputError(f"can't open MuJoCo's viewer: {error}; or play with --terminal") from error
+        raise InputError(f"can't open MuJoCo's viewer: {error}; {_WITHOUT}") from error
     with contextlib.suppress(KeyboardInterrupt), viewer:
         viewer.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
         viewer.cam.fixedcamid = model.camera("chase").id
@@ -70,12 +73,12 @@ def _import_viewer() -> types.ModuleType:
         import glfw
         import mujoco.viewer
     except (ImportError, RuntimeError) as error:
-        raise InputError(f"can't open MuJoCo's viewer: {error}; play with --terminal") from error
+        raise InputError(f"can't open MuJoCo's viewer: {error}; {_WITHOUT}") from error
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", glfw.GLFWError)  # reported below, in one line
         opens = glfw.init()
     if not opens:
-        raise InputError("can't open a window on this display; play with --terminal")
+        raise InputError(f"can't open a window: there is no display, or it refuses; {_WITHOUT}")
     return mujoco.viewer
 
 
@@ -99,7 +102,7 @@ def _overlay(viewer: Any, game: Game) -> None:
         return
     side = min(_MAP_PIXELS, window.width // 3, window.height // 2)
     area = mujoco.MjrRect(window.width - side - 10, window.height - side - 10, side, side)
-    viewer.set_images((area, map_pixels(game, side)))
+    viewer.set_images((area, _map_picture(game.context, side)))
     corner = mujoco.mjtGridPos
     viewer.set_texts(
         [
@@ -107,3 +110,11 @@ def _overlay(viewer: Any, game: Game) -> None:
             (None, corner.mjGRID_BOTTOMLEFT, f"{game.status()}\n{HELP}", ""),
         ]
     )
+
+
+def _map_picture(context: np.ndarray, side: int) -> np.ndarray:
+    """Returns `[side, side, 3]` uint8: a context `[4, M, M]` as a picture of its walls, start and goal."""
+    num_cells = context.shape[-1]
+    start, goal = (divmod(int(context[plane].argmax()), num_cells) for plane in (START, GOAL))
+    picture = draw_grid(context[GLOBAL_MAP], -(-side // num_cells), start, goal)
+    return cv2.resize(picture, (side, side), interpolation=cv2.INTER_AREA)
