@@ -4,7 +4,6 @@ import inspect
 import re
 
 import pytest
-from mazebench_agents.belief_planner.config import BeliefPlannerConfig
 from mazebench_agents.common.overrides import override
 from mazebench_agents.dqn.config import DQNConfig
 from mazebench_agents.mmn.config import MMNConfig
@@ -12,7 +11,7 @@ from mazebench_agents.mmn.config import MMNConfig
 from mazebench.errors import InputError
 from mazebench.options import fields_of
 
-OF_ALL = pytest.mark.parametrize("config", [DQNConfig, MMNConfig, BeliefPlannerConfig])
+OF_ALL = pytest.mark.parametrize("config", [DQNConfig, MMNConfig])
 
 
 @OF_ALL

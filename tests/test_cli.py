@@ -159,7 +159,7 @@ BAD_INPUT = [
     (("train", "--agent", "mah"), "expected --minutes or --env-steps, found neither"),
     (
         ("train", "--agent", "planner", "--minutes", "1"),
-        "agent 'planner' doesn't learn; agents that do: belief-planner, dqn, mah, mah-paper, mmn",
+        "agent 'planner' doesn't learn; agents that do: dqn, mah, mah-paper, mmn",
     ),
     # eval: files
     ((*TINY, "--out", ""), "expected a value of --out, found an empty one"),

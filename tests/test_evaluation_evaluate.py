@@ -193,10 +193,15 @@ class TestAgents:
         evaluate(Witness, tmp_path / "given", sensors=("lidar",), **FEW)
         assert results_of(tmp_path / "declared") == results_of(tmp_path / "given")
 
-    def test_a_sensor_that_a_track_offers_is_not_added(self):
-        assert make_plan(EvalOptions.of("navigator", track="stale")).options.task.sensors == ()
-        assert make_plan(EvalOptions.of("navigator")).options.task.sensors == ("lidar",)
-        assert make_plan(EvalOptions.of("navigator", sensors=("top",))).task.sensors == ("top", "lidar")
+    def test_a_sensor_that_a_track_offers_is_not_added(self, monkeypatch):
+        monkeypatch.setattr(Witness, "needs_sensors", ("lidar",))
+
+        def plan(**options):
+            return make_plan(EvalOptions.of("mine:Witness", **options), Witness)
+
+        assert plan(track="building").options.task.sensors == ()
+        assert plan().options.task.sensors == ("lidar",)
+        assert plan(sensors=("top",)).task.sensors == ("top", "lidar")
 
 
 class TestSeeds:

@@ -180,30 +180,27 @@ class TestEnvironments:
         assert set(infos["maze"]) == {0, 1}
 
 
-def options(agent, **changes):
-    tiny = {name: value for name, value in TINY.items() if name != "channels"} if agent == "dqn" else {"batch_size": 2}
-    overrides = tuple((name, str(value)) for name, value in tiny.items())
+def options(**changes):
+    overrides = tuple((name, str(value)) for name, value in TINY.items() if name != "channels")
     values = {"checkpoint_steps": 480, "eval_mazes": 1, "env_steps": 960}
     return from_names(
-        TrainOptions, {"kinds": KINDS, "fresh": True, **values, **changes}, agent=agent, overrides=overrides
+        TrainOptions, {"kinds": KINDS, "fresh": True, **values, **changes}, agent="dqn", overrides=overrides
     )
 
 
 class TestTraining:
-    @pytest.mark.parametrize("agent", ["dqn", "belief-planner"])
-    def test_a_run_in_fresh_mazes_that_is_resumed_equals_the_unbroken_one(self, tmp_path, agent):
-        train(options(agent), tmp_path / "unbroken")
-        train(options(agent, env_steps=480), tmp_path / "resumed")
+    def test_a_run_in_fresh_mazes_that_is_resumed_equals_the_unbroken_one(self, tmp_path):
+        train(options(), tmp_path / "unbroken")
+        train(options(env_steps=480), tmp_path / "resumed")
         drawn._fresh_maze.cache_clear()
-        train(options(agent), tmp_path / "resumed", resume=True)
-        of_replay = ("random.json", "replay.npz") if agent == "dqn" else ()
-        for name in ("agent.safetensors", "training.safetensors", *of_replay):
+        train(options(), tmp_path / "resumed", resume=True)
+        for name in ("agent.safetensors", "training.safetensors", "random.json", "replay.npz"):
             files = [tmp_path / run / "checkpoints" / "000000000960" / name for run in ("unbroken", "resumed")]
             assert files[0].read_bytes() == files[1].read_bytes(), name
         config = json.loads((tmp_path / "resumed" / "config.json").read_text())
         assert config["mazes"] == {"kinds": list(KINDS), "num_mazes": 0, "fresh": True}
         with pytest.raises(InputError, match="holds another run, differing in 'mazes'"):
-            train(options(agent, fresh=False), tmp_path / "resumed", resume=True)
+            train(options(fresh=False), tmp_path / "resumed", resume=True)
 
     def test_held_out_mazes_are_of_the_kinds_that_are_trained_in(self):
         evaluation = HeldOutEvaluation(make_spec(kinds=KINDS, fresh=True), 4)
@@ -212,6 +209,6 @@ class TestTraining:
     def test_maps_of_your_own_are_trained_and_evaluated_in(self, tmp_path):
         path = tmp_path / "plan.txt"
         path.write_text(format_maze(draw_mazes(("house",), 13, "dev", 1)[0]))
-        train(options("dqn", maps=str(path), kinds=(), fresh=False, env_steps=480), tmp_path / "run")
+        train(options(maps=str(path), kinds=(), fresh=False, env_steps=480), tmp_path / "run")
         assert "sha256" in json.loads((tmp_path / "run" / "config.json").read_text())["mazes"]
         assert HeldOutEvaluation(make_spec(maps=str(path)), 4).task.mazes[0].name == "plan"

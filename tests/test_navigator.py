@@ -11,7 +11,6 @@ from simple_mazes import field
 
 from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
-from mazebench.errors import InputError
 from mazebench.evaluation.chunk import Outcome, run_trials
 from mazebench.maps.benchmark import load_mazes
 from mazebench.tasks.build import make_spec
@@ -104,10 +103,6 @@ def track_success_rate(track: str, level: int, distances: tuple[int, ...], num_m
 
 
 class TestNavigator:
-    def test_lidar_is_needed(self):
-        with pytest.raises(InputError, match=r"^navigator needs the sensor lidar; give the interface sensors="):
-            load_agent_class("navigator").build(Interface("local", 13, 13))
-
     def test_goals_are_reached_where_the_map_is_true(self):
         mazes = load_mazes(13, "train")[:4]
         distances = tuple(range(1, 16))

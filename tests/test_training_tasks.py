@@ -113,7 +113,7 @@ def test_a_learner_that_wants_an_unknown_option_is_refused(tmp_path):
         ({"distances": 60}, "expected distances of at most "),
         (
             {"agent": "planner"},
-            "agent 'planner' doesn't learn; agents that do: belief-planner, dqn, mah, mah-paper, mmn",
+            "agent 'planner' doesn't learn; agents that do: dqn, mah, mah-paper, mmn",
         ),
     ],
 )

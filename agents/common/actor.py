@@ -14,11 +14,12 @@ import numpy as np
 import torch
 
 from mazebench.agent import Inputs, Interface
+from mazebench.errors import UnplayableError
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.protocol import Learner, LearningAgent
 
 from .bounds import bounded
-from .checkpoint import check_shapes, check_size, load_agent, load_checkpoint, load_into, save_checkpoint
+from .checkpoint import check_shapes, load_agent, load_checkpoint, load_into, save_checkpoint
 from .overrides import override
 
 
@@ -56,16 +57,12 @@ class NetworkAgent(LearningAgent):
     name: ClassVar[str]
     default_config: ClassVar[Any]  # a frozen dataclass that has num_envs, epsilon_base and epsilon_alpha
     learner_class: ClassVar[Any]  # called with the agent, the task to learn in and a seed
-    shipped_size: ClassVar[int] = 13  # of the mazes in which the checkpoint that ships was trained
     learns_on_gpu: ClassVar[bool] = False  # whether the learner uses a GPU if there is one
     config: Any
     network: Any  # a torch.nn.Module
     trained_size: int  # M of the contexts that the network was made for
-    interface: Interface  # the environments that it acts in
 
-    def __init__(
-        self, config: Any, context_size: int, seed: int = 0, device: str = "cpu", *, interface: Interface | None = None
-    ):
+    def __init__(self, config: Any, context_size: int, seed: int = 0, device: str = "cpu"):
         """Makes an agent with a new network.
 
         Args:
@@ -73,11 +70,9 @@ class NetworkAgent(LearningAgent):
           context_size: M of the contexts that the network is made for.
           seed: of the network's parameters, and of exploration.
           device: of the network.
-          interface: the environments to act in, by default mazes of M x M cells of a metre.
         """
         self.config = config
         self.trained_size = context_size
-        self.interface = interface or Interface("local", context_size, context_size)
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             self.network = self.make_network(config, context_size).to(device)
@@ -108,10 +103,12 @@ class NetworkAgent(LearningAgent):
         """
         path = cls.default_checkpoint() if checkpoint is None else checkpoint
         tensors, config, trained_size = load_agent(path, cls.name, cls.default_config)
-        if not cls.serves_any_size(config):
-            check_size(cls.name, trained_size, interface.context_size)
+        size = interface.context_size
+        if size != trained_size and not cls.serves_any_size(config):
+            expected = f"its checkpoint reads maps of {trained_size} x {trained_size} only, found {size} x {size}"
+            raise UnplayableError(f"agent {cls.name!r}: {expected}; mah reads maps of any size")
         check_shapes(path, lambda: cls.make_network(config, trained_size), tensors)
-        agent = cls(config, trained_size, seed, interface=interface)
+        agent = cls(config, trained_size, seed)
         load_into(path, agent.network, tensors)
         return agent
 
@@ -168,8 +165,9 @@ class NetworkAgent(LearningAgent):
     @classmethod
     def default_checkpoint(cls) -> pathlib.Path:
         """Returns the checkpoint that ships."""
-        path = resources.files("mazebench_assets").joinpath("checkpoints", f"{cls.name}-{cls.shipped_size}.safetensors")
-        return pathlib.Path(str(path))
+        return pathlib.Path(
+            str(resources.files("mazebench_assets").joinpath("checkpoints", f"{cls.name}-13.safetensors"))
+        )
 
     def _explored(self, actions: np.ndarray, num_actions: int) -> np.ndarray:
         """Returns `actions` `[B]`, some of them replaced by random ones."""

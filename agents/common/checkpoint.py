@@ -11,7 +11,7 @@ import safetensors
 import safetensors.torch
 import torch
 
-from mazebench.errors import InputError, UnplayableError
+from mazebench.errors import InputError
 from mazebench.maps.maze import MAX_SIZE
 from mazebench.storage.files import open_whole, read_at_most
 from mazebench.storage.json_files import parse_json
@@ -67,19 +67,6 @@ def load_agent(path: pathlib.Path, agent: str, default: Config) -> tuple[dict[st
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{path}: expected metadata with config and context_size, found {error}") from error
     return tensors, config, context_size
-
-
-def check_size(agent: str, trained_size: int, size: int) -> None:
-    """Checks the side of contexts, for a network that serves those that it was trained on only.
-
-    Raises:
-      UnplayableError: if the sizes differ.
-    """
-    if size != trained_size:
-        raise UnplayableError(
-            f"agent {agent!r}: its checkpoint reads maps of {trained_size} x {trained_size} only, found {size} x "
-            f"{size}; belief-planner reads maps of any size"
-        )
 
 
 def check_shapes(path: pathlib.Path, make: Callable[[], torch.nn.Module], tensors: Mapping[str, torch.Tensor]) -> None:

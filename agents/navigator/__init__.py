@@ -1,5 +1,5 @@
-"""The navigator: a classical agent that estimates its pose and the map from what its lidar measures, or by touch."""
+"""The navigator: a classical agent that localizes itself and corrects its map by lidar, or by touch."""
 
-from .navigator import BeliefRule, Navigator
+from .navigator import Navigator
 
-__all__ = ["BeliefRule", "Navigator"]
+__all__ = ["Navigator"]

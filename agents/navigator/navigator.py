@@ -1,4 +1,4 @@
-"""The navigator, and the same robot without a need for a lidar: both believe the map as far as it has proved right."""
+"""The navigator: a classical robot that senses walls by its lidar, or by touch where there is none."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from typing import Self
 import numpy as np
 
 from mazebench.agent import Agent, Inputs, Interface
-from mazebench.errors import InputError
 
 from ..common.bounds import bounded
 from ..robot.robot import Memory, Robot, believed_by_rule
 
 
-class BeliefRule(Agent):
+class Navigator(Agent):
     """A classical robot: it localizes itself, maps what it senses, plans again at each step, and pursues its path."""
 
     def __init__(self, interface: Interface):
@@ -46,20 +45,3 @@ class BeliefRule(Agent):
                 state[slot] = known = self._robot.observe(memory, inputs, slot)
                 actions[slot] = self._robot.command(known, *believed_by_rule(known))
         return actions, state
-
-
-class Navigator(BeliefRule):
-    """The same, where a lidar is required."""
-
-    needs_sensors = ("lidar",)
-
-    @classmethod
-    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
-        """Returns a navigator for the interface's mazes.
-
-        Raises:
-          InputError: if the environments have no lidar.
-        """
-        if "lidar" not in interface.sensors:
-            raise InputError("navigator needs the sensor lidar; give the interface sensors=('lidar',)")
-        return cls(interface)

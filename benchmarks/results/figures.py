@@ -11,8 +11,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks.results.kept import (
-    BELIEF_PLANNER,
-    BELIEF_RULE,
     LOCAL,
     NAVIGATOR,
     NO_MAP,
@@ -67,11 +65,10 @@ def map_worth(kept: Kept) -> Figure:
 
 
 def novel_kinds(kept: Kept) -> Figure:
-    """Returns the robots on time in known and in novel kinds of mazes, by track and level."""
+    """Returns the navigator on time in known and in novel kinds of mazes, by track and level."""
     panels = {
         track: {
-            f"{row}, {name} kinds": _levels(kept, row, track, "kind", kinds)
-            for row in (NAVIGATOR, BELIEF_PLANNER)
+            f"navigator, {name} kinds": _levels(kept, NAVIGATOR, track, "kind", kinds)
             for name, kinds in (("known", KNOWN), ("novel", NOVEL))
         }
         for track in TRACKS_V3
@@ -93,7 +90,7 @@ def what_fails(kept: Kept) -> Figure:
 
 def learning(kept: Kept) -> Figure:
     """Returns success rates on wrong maps of v1, without a lidar."""
-    rows = ("planner-closed-loop", "mah", "mmn", BELIEF_RULE, BELIEF_PLANNER)
+    rows = ("planner-closed-loop", "mah", "mmn", NAVIGATOR)
     tables = {"Hierarchical, share of cells flipped": _FLIPS, "Local, maps warped by": _WARPS}
     panels = {}
     for title, name in tables.items():

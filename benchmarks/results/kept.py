@@ -36,7 +36,7 @@ TRACKS_V3 = tracks_of(V3)
 ON_TIME_125, ON_TIME_2 = ON_TIME_METRICS  # within 1.25 and 2 times the oracle's steps
 # Agents, with what they were told less or more than others.
 NAVIGATOR, NO_MAP, TRUE_POSE = "navigator", "navigator without map", "navigator with the true pose"
-BELIEF_PLANNER, BELIEF_RULE, RANDOM = "belief-planner", "belief-rule", "random"
+RANDOM = "random"
 PATHS = {"path on the map open": False, "path on the map blocked": True}  # whether a record is of a blocked one
 
 _SUFFIX = ".tar.xz"

@@ -21,7 +21,6 @@ PAGES = (
     "docs/tracks.md",
     "docs/tracks_v2.md",
     "docs/agents/navigator.md",
-    "docs/agents/belief-planner.md",
     "docs/agents/mmn.md",
     "docs/experiments/dqn.md",
     "docs/experiments/mmn.md",

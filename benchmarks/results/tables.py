@@ -12,8 +12,6 @@ import numpy as np
 from scipy import stats
 
 from benchmarks.results.kept import (
-    BELIEF_PLANNER,
-    BELIEF_RULE,
     LOCAL,
     NAVIGATOR,
     NO_MAP,
@@ -55,8 +53,7 @@ _PAPER_ROWS = {
     "mah": "`mah`, learned, model-free",
     "mmn": "`mmn`, follows the paper: learned model and search",
     _PAPERS_MMN: "the paper's MMN, as printed",
-    BELIEF_RULE: "`belief-rule`, a classical robot that feels walls",
-    BELIEF_PLANNER: "`belief-planner`, the same with a learned belief",
+    NAVIGATOR: "`navigator`, a classical robot that feels walls",
     "planner": "`planner`, hand-written",
     "planner-closed-loop": "`planner-closed-loop`, hand-written",
     "oracle (privileged)": "`oracle`, privileged: gets the true maze and pose",
@@ -114,7 +111,6 @@ _ROWS = {
     NO_MAP: "`navigator` without the map",
     "navigator without map and goal": "`navigator` without map and goal",
     TRUE_POSE: "`navigator` with the true pose",
-    BELIEF_PLANNER: "`belief-planner`, the same robot with a learned belief",
     "planner-closed-loop": "`planner-closed-loop`, trusts the map",
     "sb3_agent:PPOAgent": "PPO of Stable-Baselines3",
     "sb3_agent:RecurrentPPOAgent": "PPO of sb3-contrib, with an LSTM",
@@ -271,32 +267,14 @@ def v3_map_worth(kept: Kept) -> str:
     return _table(["part", "success", *names, f"without the map, {names[1]}", "map worth"], rows)
 
 
-def belief_planner_table(benchmark: str, kept: Kept) -> str:
-    """Returns belief-planner's numbers on a benchmark's tracks and its paired differences to the navigator."""
-    rows = []
-    for track, level in itertools.product(tracks_of(benchmark), LEVELS):
-        ours, theirs = (kept.result(row, f"{track}-{level}") for row in (BELIEF_PLANNER, NAVIGATOR))
-        paired = compare_results(ours, theirs).overall.metrics
-        numbers = [_number(paired[metric].a) for metric in ("success_rate", *ON_TIME_METRICS)]
-        differences = [_interval(paired[metric].difference) for metric in ("success_rate", ON_TIME_125, "spl")]
-        rows.append([f"`{track}` {level}", *numbers, *differences])
-    names = [METRICS[metric] for metric in ON_TIME_METRICS]
-    differences = [f"difference in {name}" for name in ("success", names[0], "SPL")]
-    return _table(["part", "success", *names, *differences], rows)
-
-
 def v3_novel_kinds(kept: Kept) -> str:
-    """Returns what the two robots reach in the kinds that they could know, and in those that are in eval alone."""
+    """Returns the navigator's numbers in the kinds of all splits, and in those that are in eval alone."""
     chosen = list(itertools.product(("success_rate", ON_TIME_125), (("known", KNOWN), ("novel", NOVEL))))
     rows = [
-        [
-            *map(_code, (track, row)),
-            *(_levels(kept, row, track, metric, "kind", kinds) for metric, (_, kinds) in chosen),
-        ]
+        [_code(track), *(_levels(kept, NAVIGATOR, track, metric, "kind", kinds) for metric, (_, kinds) in chosen)]
         for track in TRACKS_V3
-        for row in (NAVIGATOR, BELIEF_PLANNER)
     ]
-    return _table(["track", "agent", *(f"{METRICS[metric]}, {name} kinds" for metric, (name, _) in chosen)], rows)
+    return _table(["track", *(f"{METRICS[metric]}, {name} kinds" for metric, (name, _) in chosen)], rows)
 
 
 def v3_blocked(kept: Kept) -> str:
@@ -339,12 +317,10 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "v2-success": functools.partial(tracks_table, V2, "success_rate"),
     "v2-spl": functools.partial(tracks_table, V2, "spl"),
     "v2-blocked": v2_blocked,
-    "v2-belief-planner": functools.partial(belief_planner_table, V2),
     "v3-success": functools.partial(tracks_table, V3, "success_rate"),
     "v3-on-time": functools.partial(tracks_table, V3, ON_TIME_125),
     "v3-on-time-2": functools.partial(tracks_table, V3, ON_TIME_2),
     "v3-map-worth": v3_map_worth,
-    "v3-belief-planner": functools.partial(belief_planner_table, V3),
     "v3-novel-kinds": v3_novel_kinds,
     "v3-blocked": v3_blocked,
     "v3-navigator": v3_navigator,

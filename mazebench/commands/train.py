@@ -21,9 +21,7 @@ def train(
     context: typer.Context,
     agent: Annotated[
         str,
-        typer.Option(
-            help="A learning agent: belief-planner, dqn, mah, mah-paper, mmn or another installed one, or module:Class."
-        ),
+        typer.Option(help="A learning agent: dqn, mah, mah-paper, mmn or another installed one, or module:Class."),
     ],
     values: dict[str, Any],
     out: Annotated[

@@ -28,8 +28,6 @@ _SUFFIXES = {TABLES: (*_FORMS, ".tex"), FIGURES: (".png", ".pdf")}
 _AGENT_ORDER = (
     "oracle",
     "navigator",
-    "belief-planner",
-    "belief-rule",
     "mmn",
     "mah",
     "mah-paper",
