@@ -1,7 +1,7 @@
 """How well a network tells moved doors of v3 from the map alone: the check `cue` of `benchmarks.v3_checks`.
 
 `B` is the number of maps in a batch, `N` of cells on a side, `D` of door slots. Mazes are drawn from a seed of the
-check, and doors are moved as on the track `rebuilt`. `benchmarks/stale_classifier.py` has the same for v2.
+check, and doors are moved as on the track `rebuilt`.
 """
 
 from __future__ import annotations
@@ -11,12 +11,11 @@ from typing import NamedTuple
 import numpy as np
 import torch
 from mazebench_agents.common.kernels import compiled
-from scipy import special
+from scipy import special, stats
 from torch import nn
 from torch.nn import functional
 
 from benchmarks.ideal_agents import Cue
-from benchmarks.stale_classifier import area, area_within
 from mazebench.maps.benchmark import KINDS_SIZE
 from mazebench.maps.doors import door_slots, swap_doors
 from mazebench.maps.kinds import generate
@@ -66,6 +65,24 @@ def measure_cue(kind: str, share: float) -> Measured:
     return Measured(
         aucs, lambda shown: special.expit(_scores(network, _planes(shown.walls, door_slots(shown))[None])[0])
     )
+
+
+def area(score: np.ndarray, label: np.ndarray) -> float:
+    """Returns the area under the ROC curve: how often a true label scores higher than a false one; ties are halves."""
+    num_true = int(label.sum())
+    above = stats.rankdata(score)[label].sum() - num_true * (num_true + 1) / 2
+    return float(above / (num_true * (len(label) - num_true)))
+
+
+def area_within(score: np.ndarray, label: np.ndarray, group: np.ndarray) -> float:
+    """Returns the area under the ROC curve over pairs of one group."""
+    areas, num_pairs = [], []
+    for index in np.unique(group):
+        inside = label[group == index]
+        if 0 < inside.sum() < len(inside):
+            areas.append(area(score[group == index], inside))
+            num_pairs.append(inside.sum() * (~inside).sum())
+    return float(np.average(areas, weights=num_pairs))
 
 
 def draw_maps(kind: str, share: float, count: int, rng: np.random.Generator) -> Maps:

@@ -26,9 +26,7 @@ from mazebench.maps.benchmark import (
     KINDS_SIZE,
     KINDS_VERSION,
     MANIFEST,
-    SPLITS,
     kind_mazes_file,
-    load_track_mazes,
 )
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.maps.maze import Maze, canonical_bytes
@@ -38,16 +36,14 @@ from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.tracks import TRACKS, tracks_of
-from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks.base import DISTANCES, LEVELS
 from mazebench.tasks.trials import Trial, episodes_file, make_trial
 
-KINDS_TRACKS = tracks_of(KINDS_VERSION)
 KINDS = {"train": KNOWN, DEV: KNOWN, "eval": (*KNOWN, *NOVEL)}  # by split
 MAZES_PER_SPLIT = 48
 _SEED = 3  # of benchmark v3; each split adds one of its own
 _EPISODES_PER_MAZE = 5
-_DISTANCES = TRACKS[KINDS_TRACKS[0]].distances(1)
 
 
 def freeze_kinds(folder: pathlib.Path, commit: str) -> None:
@@ -55,7 +51,7 @@ def freeze_kinds(folder: pathlib.Path, commit: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     generator: dict[str, Any] = {"seed": _SEED, "kinds": {}, "contexts_sha256": {}, "eval_commit": commit}
     files: dict[str, str] = {}
-    known = {canonical_bytes(maze.walls) for split in SPLITS for maze in load_track_mazes(KINDS_SIZE, split)}
+    known: set[bytes] = set()
     for split, seed in (("train", 0), (DEV, 1), ("eval", int(commit, 16))):
         rng = np.random.default_rng([_SEED, seed])
         mazes = [maze for kind in KINDS[split] for maze in draw_mazes(kind, split, known, rng)]
@@ -65,11 +61,11 @@ def freeze_kinds(folder: pathlib.Path, commit: str) -> None:
         if split in FROZEN_SPLITS:
             trials = draw_kind_trials(mazes, rng)
             files[episodes_file("local", KINDS_SIZE, split)] = format_trials(trials)
-            steps = measure_oracle_steps(_task(KINDS_TRACKS[0], 1, mazes), trials)
+            steps = measure_oracle_steps(_task("building", 1, mazes), trials)
             files[oracle_file("local", KINDS_SIZE, split)] = json.dumps({"steps": steps}) + "\n"
             generator["contexts_sha256"][split] = {
                 f"{track}-{level}": contexts_hash(track, level, mazes, trials)
-                for track, level in itertools.product(KINDS_TRACKS, LEVELS)
+                for track, level in itertools.product(TRACKS, LEVELS)
             }
     files[MANIFEST] = format_manifest(KINDS_VERSION, generator, files)
     for name, text in files.items():
@@ -85,7 +81,7 @@ def draw_mazes(kind: str, split: str, known: set[bytes], rng: np.random.Generato
     mazes: list[Maze] = []
     while len(mazes) < MAZES_PER_SPLIT // len(KINDS[split]):
         maze = generate(kind, KINDS_SIZE, rng, f"{kind}-{len(mazes)}")
-        if maze.diameter >= max(_DISTANCES) and canonical_bytes(maze.walls) not in known:
+        if maze.diameter >= max(DISTANCES) and canonical_bytes(maze.walls) not in known:
             known.add(canonical_bytes(maze.walls))
             mazes.append(maze)
     return mazes
@@ -93,7 +89,7 @@ def draw_mazes(kind: str, split: str, known: set[bytes], rng: np.random.Generato
 
 def draw_kind_trials(mazes: Sequence[Maze], rng: np.random.Generator) -> list[Trial]:
     """Returns five episodes in each maze, by maze; every distance comes up about as often as every other one."""
-    distances = _shuffled_rounds(_DISTANCES, rng)
+    distances = _shuffled_rounds(DISTANCES, rng)
     return [
         make_trial(maze, index, sample_pair(maze, distance, rng), rng)
         for index, maze in enumerate(mazes)
@@ -113,7 +109,7 @@ def contexts_hash(track: str, level: int, mazes: Sequence[Maze], trials: Sequenc
 
 
 def _task(track: str, level: int, mazes: Sequence[Maze]) -> TaskSpec:
-    return make_spec(track, maps=list(mazes), level=level, distances=TRACKS[track].distances(level))
+    return make_spec(track, maps=list(mazes), level=level, distances=DISTANCES)
 
 
 def _shuffled_rounds(values: Sequence[int], rng: np.random.Generator) -> Iterator[int]:

@@ -59,7 +59,7 @@ def tell(task: TaskSpec, trial: Trial, with_map: bool, cue: Cue | None = None) -
     episode, track, level = trial.episode, TRACKS[task.track or ""], task.level[0]
     maze, shown = task.mazes[episode.maze], show_map(task, episode)
     parts = dict(track.parts(level))
-    lost = track.hides_pose(level)
+    lost = track.hides_pose
 
     # The sheet in all the ways in which it may lie, as indices of cells.
     sheet = next((part for part in parts if isinstance(part, TurnedSheet)), TurnedSheet(turns=False, mirrors=False))

@@ -1,7 +1,6 @@
-"""Plays the oracle in the frozen episodes of v1 and v2 and writes its steps: `python benchmarks/oracle_steps.py FILE`.
+"""Plays the oracle in the frozen episodes of v1 and writes its steps: `python benchmarks/oracle_steps.py FILE`.
 
-`assets/oracle/steps.json` was made this way; `mazebench/results/oracle.py` has its SHA-256. Tracks in mazes of one size
-have the same episodes in the same worlds, so one track stands for all of them.
+`assets/oracle/steps.json` was made this way; `mazebench/results/oracle.py` has its SHA-256.
 """
 
 from __future__ import annotations
@@ -12,22 +11,17 @@ import pathlib
 import sys
 
 from mazebench.evaluation.oracle import measure_oracle_steps
-from mazebench.maps.benchmark import TRACKS_VERSION, VERSION
 from mazebench.results.oracle import oracle_key
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.trials import benchmark_task_sizes, frozen_trials
 
-_TRACKS = (("stale", 1), ("far", 1), ("far", 2))
-
 
 def main(path: pathlib.Path) -> None:
     """Writes the steps in each episode to `path`, in the order of the frozen episodes, and prints the file's hash."""
-    tasks = [(VERSION, make_spec(task, size, "eval")) for task, size, _ in benchmark_task_sizes()]
-    tasks += [(TRACKS_VERSION, make_spec(track, level=level, split="eval")) for track, level in _TRACKS]
     lines = []
-    for version, task in tasks:
-        steps = measure_oracle_steps(task, frozen_trials(task.task, task.size, version))
-        key = oracle_key(version, task.task, task.size)
+    for name, size, _ in benchmark_task_sizes():
+        steps = measure_oracle_steps(make_spec(name, size, "eval"), frozen_trials(name, size))
+        key = oracle_key(name, size)
         reached = [each for each in steps if each is not None]
         print(f"{key}: {len(reached)} of {len(steps)} goals, {sum(reached) / len(reached):.2f} steps on average")
         lines.append(f'"{key}": {json.dumps(steps, separators=(",", ":"))}')

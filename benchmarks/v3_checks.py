@@ -33,7 +33,7 @@ import typer
 
 from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
-from mazebench.constants import KINDS_VERSION, ON_TIME
+from mazebench.constants import ON_TIME
 from mazebench.errors import InputError
 from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.oracle import measure_oracle_steps
@@ -44,17 +44,16 @@ from mazebench.maps.maze import Cell, Maze
 from mazebench.results.intervals import Estimate, difference_interval, mean_interval
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import sample_pair
-from mazebench.tasks.imperfections import time_limit
+from mazebench.tasks.shown_map import is_blocked
 from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.tracks import TRACKS, tracks_of
-from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.time_limit import track_time_limit
+from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks.base import DISTANCES, LEVELS
 from mazebench.tasks.tracks.rebuilt import SWAPS
-from mazebench.tasks.tracks.stale import is_blocked
 from mazebench.tasks.trials import Trial, make_trial
 
 KINDS = (*KNOWN, *NOVEL)
-PARTS = [(track, level) for track in tracks_of(f"v{KINDS_VERSION}") for level in LEVELS]
-DISTANCES = TRACKS[PARTS[0][0]].distances(1)
+PARTS = [(track, level) for track in TRACKS for level in LEVELS]
 _SEED = 7_900  # of the check mazes and their episodes
 _PER_MAZE = 5  # episodes
 _SPARE = 1.15  # steps that the ideal agent takes for a cell, by those of the oracle: it turns round
@@ -210,7 +209,7 @@ def drive_ideally(run: Run, steps_per_cell: float = 2.0, cue: Callable[[Maze], n
             spec.mazes[trial.episode.maze].walls,
             trial.episode.goal,
             tell(spec, trial, not run.hide, cue),
-            int(time_limit(spec, trial.episode) / steps_per_cell),
+            int(track_time_limit(run.track, trial.distance) / steps_per_cell),
         )
         for trial in trials
     ]

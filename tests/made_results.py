@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mazebench.evaluation.recorder import Recorder
-from mazebench.maps.benchmark import TRACKS_VERSION, VERSION, manifest_hash
+from mazebench.maps.benchmark import KINDS_VERSION, VERSION, manifest_hash
 from mazebench.maps.maze import cell_to_point, path_through_walls
 from mazebench.results.metrics import spl, summarize, summarize_facts
 from mazebench.results.reading import EPISODES, SUMMARY
@@ -69,7 +69,7 @@ def make_result(
     """
     if track is not None:
         spec = make_spec(track, split=split, level=level)
-        size, version, labels = spec.size, TRACKS_VERSION, {"track": track, "level": level}
+        size, version, labels = spec.size, KINDS_VERSION, {"track": track, "level": level}
         trials = select_trials(spec, split if split == "eval" else None, episodes_per_distance)
     else:
         version, labels = VERSION, {}

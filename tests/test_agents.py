@@ -456,28 +456,28 @@ class Small(Counting):
 
     @classmethod
     def context_size(cls, size):
-        return 13
+        return 31
 
 
 class TestTracks:
     def test_an_agent_that_asks_for_one_size_is_refused_where_a_track_shows_another(self):
-        assert make_plan(EvalOptions.of("mine:Small", track="stale"), Small).build_agent().name == "mine:Small"
-        plan = make_plan(EvalOptions.of("mine:Small", track="sketch"), Small)
-        message = r"context_size\(\) asks for maps of 13 x 13 only; the track 'sketch' shows 26 x 26$"
+        assert make_plan(EvalOptions.of("mine:Small", track="building"), Small).build_agent().name == "mine:Small"
+        plan = make_plan(EvalOptions.of("mine:Small", track="rough"), Small)
+        message = r"context_size\(\) asks for maps of 31 x 31 only; the track 'rough' shows 62 x 62$"
         with pytest.raises(UnplayableError, match=message):
             plan.build_agent()
 
     def test_a_track_that_shows_another_map_than_asked_for_is_remarked(self):
-        remark = "navigator asks for a map of 51 x 51; the track 'far' shows 21 x 21 to all agents"
-        assert make_plan(EvalOptions.of("navigator", track="far", level=3)).remark == remark
-        assert make_plan(EvalOptions.of("navigator", track="far")).remark is None
-        assert make_plan(EvalOptions.of("random", track="far", level=3)).remark is None
+        remark = "navigator asks for a map of 31 x 31; the track 'rough' shows 62 x 62 to all agents"
+        assert make_plan(EvalOptions.of("navigator", track="rough")).remark == remark
+        assert make_plan(EvalOptions.of("navigator", track="building")).remark is None
+        assert make_plan(EvalOptions.of("random", track="rough")).remark is None
 
     @pytest.mark.parametrize("name", agent_names())
     @pytest.mark.parametrize(
         "options",
-        [{"task": "lost", "level": 3}, {"task": "far", "level": 3}, {"size": 13, "context_size": 26}],
-        ids=["lost", "far", "finer map"],
+        [{"task": "adrift", "level": 3}, {"task": "rough", "level": 3}, {"size": 13, "context_size": 26}],
+        ids=["adrift", "rough", "finer map"],
     )
     def test_every_agent_acts_or_says_that_it_serves_one_size(self, name, options):
         agent_class = load_agent_class(name)

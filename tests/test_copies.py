@@ -29,10 +29,9 @@ TASKS: dict[str, dict[str, Any]] = {
     "continuous": {"continuous": True, "time_limit": 40},
     "lidar": {"sensors": "lidar", "time_limit": 40},
     "fresh": {"kinds": ("dfs", "house"), "fresh": True, "sensors": "lidar", "num_goals": 2, "time_limit": 20},
-    "stale": {"task": "stale", "level": (1, 2, 3)},
-    "lost": {"task": "lost", "level": 3},
-    "lost, any level": {"task": "lost", "level": (1, 2, 3)},
-    "sketch": {"task": "sketch", "level": (1, 2, 3)},
+    "rebuilt": {"task": "rebuilt", "level": (1, 2, 3)},
+    "adrift": {"task": "adrift", "level": 3},
+    "rough": {"task": "rough", "level": (1, 2, 3)},
 }
 SEEDS = range(3)
 EVERYWHERE = pytest.mark.parametrize("seed", SEEDS)
@@ -198,7 +197,7 @@ class TestStates:
         assert_equal(expected, play(env, actions))
 
     def test_gymnasium_goes_back_to_a_state(self):
-        env = MazeEnv(make_spec("lost", size=13, level=3), seed=1)
+        env = MazeEnv(make_spec("adrift", level=3), seed=1)
         env.reset()
         actions = [int(action) for action in actions_of(mazebench.load(), seed=1)]
         for action in actions[:30]:

@@ -97,3 +97,12 @@ def test_an_installed_agent_is_named_by_the_hash_of_all_python_files_of_its_pack
 def test_a_checkpoint_of_another_kind_tells_nothing(tmp_path, content):
     (tmp_path / "x").write_bytes(content)
     assert checkpoint_metadata(str(tmp_path / "x")) is None
+
+
+def test_a_summary_of_a_track_has_the_time_limit_of_its_farthest_goals(tmp_path):
+    evaluate("random", tmp_path, track="adrift", split="dev", distances=(15,))
+    options = summary_of(tmp_path)["provenance"]["options"]
+    records = [json.loads(line) for line in (tmp_path / "episodes.jsonl").read_text().splitlines()]
+    assert options["time_limit"] == max(record["steps"] for record in records) == 6 * 15 + 150
+    again = EvalOptions.of(**options)
+    assert build_task(again.task, again.mazes).longest_time_limit == 240

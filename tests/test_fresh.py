@@ -170,7 +170,7 @@ class TestEnvironments:
         goal = gymnasium.make("mazebench/LocalGoal-13-v1", fresh=True)
         mazes = {goal.reset(seed=seed)[1]["maze"] for seed in range(3)}
         assert len(mazes) == 3
-        env = mazebench.make_vec("stale", 3, fresh=True, seed=0)
+        env = mazebench.make_vec("rebuilt", 3, fresh=True, seed=0)
         _, infos = env.reset(seed=0)
         assert len(set(infos["maze"])) == 3
 

@@ -13,7 +13,7 @@ from mazebench.maps.maze import cell_to_point
 from mazebench.tasks.context import START, build_context
 from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.perturbations.base import ShownMap
-from mazebench.tasks.tracks.sketch import Sketch
+from mazebench.tasks.tracks.hand_drawing import DISPLACEMENTS, draw_by_hand
 
 SIZE = 13
 
@@ -23,7 +23,7 @@ def sketched(seed, level, kind="dfs"):
     rng = np.random.default_rng(seed)
     maze = generate(kind, SIZE, rng)
     start, goal = sample_pair(maze, 8, rng)
-    shown = Sketch().show(ShownMap(maze.walls), level, (start, goal), rng)
+    shown = ShownMap(maze.walls, draw_by_hand(maze.size, DISPLACEMENTS[level - 1], rng))
     return maze, start, goal, build_context(shown.seen_walls(), shown.seen_cell(start), shown.seen_cell(goal), 2 * SIZE)
 
 

@@ -183,8 +183,8 @@ class TestEnvironments:
             make_spec(maps=dfs(cell_size=0.35))
 
     def test_tracks_keep_their_scale(self):
-        with pytest.raises(InputError, match=r"track 'lost': expected cells of 1 m, found 0.5 m"):
-            make_spec("lost", maps=dfs(13, cell_size=0.5))
+        with pytest.raises(InputError, match=r"track 'building': expected cells of 1 m, found 0.5 m"):
+            make_spec("building", maps=dfs(13, cell_size=0.5))
 
 
 class TestAgents:
@@ -230,7 +230,7 @@ class TestAgents:
             "(docs/agents.md)"
         )
         assert make_plan(EvalOptions.of("planner", maps=str(tmp_path / "large.txt"))).remark is None
-        assert make_plan(EvalOptions.of("random", track="far")).remark is None
+        assert make_plan(EvalOptions.of("random", track="building")).remark is None
 
     def test_a_film_has_the_map_as_it_is_shown(self, tmp_path):
         maze = generate("dfs", 31, np.random.default_rng(0))
@@ -300,7 +300,7 @@ class TestEnds:
             ({"start": (1, 1), "goal": (7, 7), "distances": (2,)}, r"found distances \(2,\), which would be ignored"),
             ({"start": (1, 1), "pairs": "fixed"}, r"expected pairs 'random' beside a start or a goal, found 'fixed'"),
             ({"goal": (1, 1), "num_goals": 2}, r"expected num_goals 1 beside a goal, found 2"),
-            ({"start": (1, 1), "track": "lost"}, r"track 'lost': expected start None, found '1,1'"),
+            ({"start": (1, 1), "track": "building"}, r"track 'building': expected start None, found '1,1'"),
         ],
     )
     def test_ends_that_contradict_are_refused_in_a_line(self, options, message):

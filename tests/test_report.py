@@ -179,7 +179,7 @@ def joined(results, tmp_path_factory):
     """The episodes of `results`, of tracks, and of three training runs of one agent, in one table."""
     folder = tmp_path_factory.mktemp("joined")
     for level in (1, 2):
-        make_result(folder / f"far-{level}", "mah", track="far", level=level, num_mazes=1, record=False)
+        make_result(folder / f"building-{level}", "mah", track="building", level=level, num_mazes=1, record=False)
     for checkpoint in "abc":
         make_result(folder / checkpoint, "dqn", num_mazes=3, record=False, checkpoint=64 * checkpoint)
     return episodes_of(results, folder)
@@ -229,55 +229,55 @@ class TestRows:
 class TestTracks:
     def test_a_row_for_each_track_and_level_and_a_column_for_each_agent(self, tmp_path):
         for agent in ("mah", "random"):
-            make_result(tmp_path / agent / "lost-1", agent, track="lost", level=1, num_mazes=2, record=False)
+            make_result(tmp_path / agent / "adrift-1", agent, track="adrift", level=1, num_mazes=2, record=False)
             make_result(tmp_path / agent / "v1", agent, num_mazes=2, record=False)
         for level in (1, 2):
-            make_result(tmp_path / f"stale-{level}", "mah", track="stale", level=level, num_mazes=2, record=False)
+            make_result(tmp_path / f"rebuilt-{level}", "mah", track="rebuilt", level=level, num_mazes=2, record=False)
         tables = tables_of(tmp_path)
-        assert tables["tracks"].rows == ("stale 1", "stale 2", "lost 1")
+        assert tables["tracks"].rows == ("rebuilt 1", "rebuilt 2", "adrift 1")
         columns = tables["tracks"].columns
         episodes = {column.label: [cell and cell.episodes for cell in column.cells["spl"]] for column in columns}
-        assert episodes == {"mah": [20, 20, 20], "random": [None, None, 20]}
-        assert tables["track-stale"].x == (1.0, 2.0)
-        rows = [f"{name}, 13 × 13" for name in ("local", "lost, level 1", "stale, level 1", "stale, level 2")]
-        assert tables["all"].rows == tuple(rows)
+        assert episodes == {"mah": [10, 10, 10], "random": [None, None, 10]}
+        assert tables["track-rebuilt"].x == (1.0, 2.0)
+        rows = [f"{name}, 31 × 31" for name in ("adrift, level 1", "rebuilt, level 1", "rebuilt, level 2")]
+        assert set(tables["all"].rows) == {"local, 13 × 13", *rows}
         assert tables["local-13"].columns[0].cells["spl"][0].episodes == 2
 
     def test_episodes_with_a_blocked_path_and_others_have_rows(self, tmp_path):
-        folder = make_result(tmp_path / "a", "mah", track="stale", level=2, num_mazes=2, record=False)
+        folder = make_result(tmp_path / "a", "mah", track="rebuilt", level=2, num_mazes=4, record=False)
         edit_records(folder, lambda record: record | {"blocked": record["episode"] % 4 == 0})
         set_outcomes(folder, [index % 4 > 0 for index in range(20)])
-        table = tables_of(folder)["track-stale"]
+        table = tables_of(folder)["track-rebuilt"]
         assert table.rows == ("2", "2, blocked", "2, not blocked")
         cells = table.columns[0].cells
         assert [(cell.value, cell.episodes) for cell in cells["success_rate"]] == [(0.75, 20), (0.0, 5), (1.0, 15)]
 
     def test_a_map_scale_that_an_agent_was_never_trained_on_is_marked(self, tmp_path):
-        folder = make_result(tmp_path / "a", "mah", track="lost", num_mazes=2, record=False)
+        folder = make_result(tmp_path / "a", "mah", track="adrift", num_mazes=2, record=False)
         edit_summary(folder, untrained_scale=True)
-        make_result(tmp_path / "b", "random", track="lost", num_mazes=2, record=False)
+        make_result(tmp_path / "b", "random", track="adrift", num_mazes=2, record=False)
         table = tables_of(tmp_path)["tracks"]
-        assert re.search(r"\| lost 1 \| \d\.\d\d\* \[.*\] \| \d\.\d\d \[", to_markdown(table))
+        assert re.search(r"\| adrift 1 \| \d\.\d\d\* \[.*\] \| \d\.\d\d \[", to_markdown(table))
         assert table.note.endswith("* The agent was never trained on maps of this scale.")
         assert [line["mark"] for line in csv.DictReader(io.StringIO(to_csv(table)))][:2] == ["*", ""]
 
     def test_they_have_a_figure_and_trajectories(self, tmp_path):
-        for track in ("lost", "sketch"):
-            make_result(tmp_path / "results" / track, "mah", track=track, num_mazes=1, record=track == "sketch")
+        for track in ("adrift", "rough"):
+            make_result(tmp_path / "results" / track, "mah", track=track, num_mazes=1, record=track == "rough")
         write_report([tmp_path / "results"], tmp_path / "report")
         figures = {path.name for path in (tmp_path / "report" / "figures").iterdir()}
-        assert {"tracks.png", "track-lost.pdf", "trajectories-sketch-1.png"} <= figures
+        assert {"tracks.png", "track-adrift.pdf", "trajectories-rough-1.png"} <= figures
         assert "![Tracks: success rate by level](figures/tracks.png)" in (tmp_path / "report" / "report.md").read_text()
 
     def test_training_runs_are_pooled_by_level(self, tmp_path):
         for checkpoint in "ab":
-            options = {"track": "lost", "num_mazes": 2, "record": False, "checkpoint": 64 * checkpoint}
+            options = {"track": "adrift", "num_mazes": 2, "record": False, "checkpoint": 64 * checkpoint}
             make_result(tmp_path / checkpoint, "mah", **options)
-        pooled = tables_of(tmp_path)["pooled-lost"]
+        pooled = tables_of(tmp_path)["pooled-adrift"]
         assert (pooled.row_name, pooled.rows, pooled.title) == (
             "level",
             ("1",),
-            "Track lost, pooled over training runs",
+            "Track adrift, pooled over training runs",
         )
 
 

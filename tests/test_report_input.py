@@ -55,8 +55,8 @@ def rename_split(folder):
 
 
 def raise_level(folder):
-    edit_records(folder, lambda record: record | {"track": "lost", "level": 4})
-    edit_summary(folder, track="lost", level=4)
+    edit_records(folder, lambda record: record | {"track": "adrift", "level": 4})
+    edit_summary(folder, track="adrift", level=4)
 
 
 FAULTS = {
@@ -164,11 +164,11 @@ class TestRefused:
         assert f"found 'v0' (manifest b2b2e5a6) in {run / 'old'}; 'v1' (manifest b2b2e5a6) in {run / 'good'}" in message
 
     def test_results_on_tracks_of_another_version(self, run):
-        folder = make_result(run / "track", "mah", track="lost", num_mazes=1, record=False)
+        folder = make_result(run / "track", "mah", track="adrift", num_mazes=1, record=False)
         assert read(run) == (["mah", "mah"], [])
         changed = read_summary(folder)["provenance"] | {"benchmark_manifest_sha256": "00"}
         edit_summary(folder, provenance=changed)
-        with pytest.raises(InputError, match=r"results of benchmark 'v1' .* or 'v2' .*, found .*'v2' \(manifest 00\)"):
+        with pytest.raises(InputError, match=r"results of benchmark 'v1' .* or 'v3' .*, found .*'v3' \(manifest 00\)"):
             read(run)
 
     def test_the_command_prints_one_line_for_each_fault(self, run, tmp_path, monkeypatch, capsys):

@@ -113,9 +113,9 @@ class TestCurves:
         assert set(band) == {(point.x, end) for point in series.points for end in (point.low, point.high)}
 
     def test_the_star_of_an_untrained_scale_is_in_the_legend(self, tmp_path):
-        folder = make_result(tmp_path / "mah", "mah", track="lost", num_mazes=2, record=False)
+        folder = make_result(tmp_path / "mah", "mah", track="adrift", num_mazes=2, record=False)
         edit_summary(folder, untrained_scale=True)
-        [legend] = lay_out(describe(tmp_path, "track-lost")).legends
+        [legend] = lay_out(describe(tmp_path, "track-adrift")).legends
         assert [text.get_text() for text in legend.get_texts()] == ["mah", "never trained on maps of this scale"]
 
 

@@ -12,7 +12,7 @@ from made_results import edit_records, make_result
 
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.maps import colors
-from mazebench.maps.benchmark import load_track_mazes
+from mazebench.maps.benchmark import load_kind_mazes
 from mazebench.report.report import write_report
 from mazebench.tasks.context import resized_map
 from mazebench.world.lidar import Lidar
@@ -119,11 +119,11 @@ def track_page(tmp_path_factory):
     for agent in ("mah", "random"):
         here = folder / "results" / agent
         for level in (1, 2):
-            make_result(here / f"lost-{level}", agent, skill=0.8, track="lost", level=level, num_mazes=2)
-        make_result(here / "sketch", agent, skill=0.8, track="sketch", num_mazes=1)
+            make_result(here / f"adrift-{level}", agent, skill=0.8, track="adrift", level=level, num_mazes=2)
+        make_result(here / "rough", agent, skill=0.8, track="rough", num_mazes=1)
         make_result(here / "local", agent, num_mazes=2)
-        stale = make_result(here / "stale", agent, skill=0.5, track="stale", num_mazes=2)
-        edit_records(stale, lambda record: record | {"blocked": record["episode"] % 4 == 0})
+        rebuilt = make_result(here / "rebuilt", agent, skill=0.5, track="rebuilt", num_mazes=4)
+        edit_records(rebuilt, lambda record: record | {"blocked": record["episode"] % 4 == 0})
     write_report([folder / "results"], folder / "report")
     return folder / "report" / "report.html"
 
@@ -140,7 +140,7 @@ def is_seen(name):
 
 class TestTracks:
     def test_failures_are_found_by_track_level_and_group(self, on_tracks):
-        choose_setting(on_tracks, "track stale")
+        choose_setting(on_tracks, "track rebuilt")
         on_tracks.wait_for(is_seen("group"))
         on_tracks.run(set_value("group", "blocked"))
         assert on_tracks.run("document.getElementById('count').textContent") == "5 of 20 episodes"
@@ -150,7 +150,7 @@ class TestTracks:
         assert len(texts) < 5
 
     def test_the_level_changes_what_is_shown_of_the_same_episode(self, on_tracks):
-        choose_setting(on_tracks, "track lost")
+        choose_setting(on_tracks, "track adrift")
         on_tracks.wait_for(is_seen("odometry"))
         on_tracks.run(set_value("episodes", 7))
         shown = "document.getElementById('shown').toDataURL()"
@@ -162,7 +162,7 @@ class TestTracks:
         assert on_tracks.run("document.getElementById('episodes').value") == "7"
 
     def test_the_path_by_odometry_stands_beside_the_true_one(self, on_tracks):
-        choose_setting(on_tracks, "track lost")
+        choose_setting(on_tracks, "track adrift")
         on_tracks.wait_for(is_seen("odometry"))
         assert "odometry" in on_tracks.run("document.getElementById('key').textContent")
         # Level 1 has no drift: laid on the first pose, odometry is the true path.
@@ -171,25 +171,25 @@ class TestTracks:
             "(at, index) => at - view.current.observed[axis][index]))"
         )
         assert max(map(abs, apart)) <= 2  # 32 are a metre
-        choose_setting(on_tracks, "track stale")
+        choose_setting(on_tracks, "track rebuilt")
         on_tracks.wait_for(f"!{is_seen('odometry')}")
 
     def test_a_drawn_map_is_shown_as_it_was_given(self, on_tracks):
-        choose_setting(on_tracks, "track sketch")
-        on_tracks.wait_for("view.current.side === 26")
+        choose_setting(on_tracks, "track rough")
+        on_tracks.wait_for("view.current.side === 62")
         greys = on_tracks.run("[...new Set(view.current.shown)]")
         assert len(greys) > 10
         assert not on_tracks.run("differs(view.current)")
 
     def test_the_rays_are_those_of_the_sensor(self, on_tracks):
-        choose_setting(on_tracks, "track stale")
+        choose_setting(on_tracks, "track rebuilt")
         on_tracks.wait_for(is_seen("lidar"))
         with_rays = on_tracks.run(PIXELS)
         maze, x, y, yaw, *ranges = on_tracks.run(
             "[view.current.maze, ...['x', 'y', 'yaw'].map(name => view.current.path[name][view.time]),"
             "...rangesOf(view.current.real, view.current.size, view.current.path, view.time, view.current.sensor)]"
         )
-        mazes = load_track_mazes(13, "eval")
+        mazes = load_kind_mazes("eval")
         index = [known.name for known in mazes].index(maze)
         pose = np.array([[x / 32, y / 32, yaw * 2 * np.pi / 256]])
         np.testing.assert_allclose(ranges, Lidar(mazes).ranges(np.array([index]), pose)[0], atol=1e-4)
@@ -202,7 +202,7 @@ class TestTracks:
 
     @pytest.mark.parametrize("width", [360, 1200])
     def test_it_fits_narrow_and_wide_windows(self, on_tracks, width):
-        choose_setting(on_tracks, "track lost")
+        choose_setting(on_tracks, "track adrift")
         on_tracks.resize(width, 800)
         on_tracks.wait_for(f"document.documentElement.clientWidth === {width}")
         assert on_tracks.run("document.documentElement.scrollWidth") <= width

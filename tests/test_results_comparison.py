@@ -110,20 +110,20 @@ class TestResults:
 
     def test_two_levels_of_a_track_are_compared_on_the_same_pairs(self, tmp_path):
         for level in (1, 2):
-            make_result(tmp_path / str(level), "mah", track="lost", level=level, num_mazes=2, record=False)
+            make_result(tmp_path / str(level), "mah", track="adrift", level=level, num_mazes=2, record=False)
         found = compare_folders(tmp_path / "1", tmp_path / "2")
         assert found.title == (
-            f"A is mah (track lost, level 1) in {tmp_path / '1'}, B is mah (track lost, level 2) in {tmp_path / '2'}; "
-            "local, eval mazes 13 x 13"
+            f"A is mah (track adrift, level 1) in {tmp_path / '1'}, "
+            f"B is mah (track adrift, level 2) in {tmp_path / '2'}; local, eval mazes 31 x 31"
         )
-        assert found.parts[""].overall.num_episodes == 20
+        assert found.parts[""].overall.num_episodes == 10
 
     def test_the_title_says_what_an_agent_was_told_less_or_more(self, tmp_path):
         told = {"shown": {}, "hidden": {"hide": "map,goal"}, "exact": {"exact_pose": True}}
         for name, changes in told.items():
-            make_result(tmp_path / name, "navigator", track="lost", num_mazes=2, record=False)
+            make_result(tmp_path / name, "navigator", track="adrift", num_mazes=2, record=False)
             edit_summary(tmp_path / name, **changes)
         for name, who in (("hidden", "navigator without map and goal"), ("exact", "navigator with the true pose")):
             title = compare_folders(tmp_path / "shown", tmp_path / name).title
-            assert title.startswith("A is navigator (track lost, level 1) in ")
-            assert f"B is {who} (track lost, level 1) in {tmp_path / name}; " in title
+            assert title.startswith("A is navigator (track adrift, level 1) in ")
+            assert f"B is {who} (track adrift, level 1) in {tmp_path / name}; " in title

@@ -12,7 +12,7 @@ from run_folders import FEW, FILES, RECORDED, records_of
 from mazebench.agent import SingleAgent
 from mazebench.errors import InputError
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.maps.benchmark import TRACKS_VERSION, load_mazes
+from mazebench.maps.benchmark import KINDS_VERSION, load_mazes
 from mazebench.maps.maze import cell_to_point, point_to_cell
 from mazebench.results.trajectories import (
     TRAJECTORIES,
@@ -211,26 +211,26 @@ class TestRecording:
             num_changed += (found.shown != spec.mazes[trial.episode.maze].walls).sum()
         assert num_changed > 100
 
-    @pytest.mark.parametrize(("track", "level"), [("stale", 1), ("lost", 1), ("lost", 2), ("sketch", 3)])
+    @pytest.mark.parametrize(("track", "level"), [("rebuilt", 1), ("adrift", 1), ("adrift", 2), ("rough", 3)])
     def test_on_a_track_it_is_what_the_agent_was_given(self, tmp_path, track, level):
-        summary = evaluate("random", tmp_path, record=True, track=track, level=level, distances=(3,))
-        spec = make_spec(track, 13, "eval", level=level)
-        trials = [trial for trial in frozen_trials("local", 13, TRACKS_VERSION) if trial.distance == 3]
+        summary = evaluate("random", tmp_path, record=True, track=track, level=level, distances=(15,))
+        spec = make_spec(track, split="eval", level=level)
+        trials = [trial for trial in frozen_trials("local", 31, KINDS_VERSION) if trial.distance == 15]
         trajectories = load_trajectories(tmp_path / TRAJECTORIES, summary.episodes)
         for trial, found in list(zip(trials, trajectories, strict=True))[:2]:
             shown = show_map(spec, trial.episode)
             context = leg_context(spec, shown, trial.episode.start, trial.episode.goal)
             np.testing.assert_array_equal(found.shown, shown.walls)
-            if track == "sketch":
+            if track == "rough":
                 np.testing.assert_array_equal(found.picture, np.rint(context[GLOBAL_MAP] * 255))
             else:
                 assert found.picture is None
             assert found.marks[1] == context[GOAL].argmax()
-            assert found.marks[0] == (-1 if (track, level) == ("lost", 2) else context[START].argmax())
-            assert (found.observed is not None) == (track == "lost")
+            assert found.marks[0] == (-1 if level > 1 else context[START].argmax())
+            assert (found.observed is not None) == (track != "rebuilt")
 
     def test_the_observed_path_is_the_true_one_in_the_frame_of_the_first_pose(self, tmp_path):
-        summary = evaluate("random", tmp_path, record=True, track="lost", distances=(3,))
+        summary = evaluate("random", tmp_path, record=True, track="adrift", distances=(15,), odometry_noise=0.0)
         for found in load_trajectories(tmp_path / TRAJECTORIES, summary.episodes):
             true, observed = found.pose.astype(float), found.observed.astype(float)
             assert not observed[0].any()

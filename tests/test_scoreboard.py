@@ -10,7 +10,7 @@ import pytest
 from made_results import edit_records, edit_summary, make_result, read_summary
 
 from mazebench.errors import InputError
-from mazebench.maps.benchmark import KINDS_VERSION, TRACKS_VERSION
+from mazebench.maps.benchmark import KINDS_VERSION
 from mazebench.report.scoreboard import (
     BEGIN,
     END,
@@ -25,15 +25,17 @@ from mazebench.report.scoreboard import (
 )
 from mazebench.results.reading import SUITE
 from mazebench.storage.json_files import write_json
-from mazebench.tasks.tracks import tracks_of
+from mazebench.tasks.tracks import TRACKS
 
-PAGE = pathlib.Path(__file__).parent.parent / "docs" / "scoreboard_v2.md"
-PARTS = [(track, level) for track in tracks_of(TRACKS_VERSION) for level in (1, 2, 3)]
+PAGE = pathlib.Path(__file__).parent.parent / "docs" / "scoreboard.md"
+PARTS = [(track, level) for track in TRACKS for level in (1, 2, 3)]
 
 
-def make_part(folder, agent, track, level, successes=200, code="c" * 64, **options):
-    """Writes the result of an agent that reaches the first `successes` of the 200 goals."""
-    part = make_result(folder / f"{track}-{level}", agent, track=track, level=level, record=False, **options)
+def make_part(folder, agent, track, level, successes=240, code="c" * 64, num_mazes=48, **options):
+    """Writes the result of an agent that reaches the first `successes` of the 240 goals."""
+    part = make_result(
+        folder / f"{track}-{level}", agent, track=track, level=level, record=False, num_mazes=num_mazes, **options
+    )
     origin = {"agent_package": "made-up 1.0", "agent_code_sha256": code}
     edit_summary(part, provenance=read_summary(part)["provenance"] | origin)
 
@@ -62,11 +64,11 @@ def suite(tmp_path_factory):
     """A run of the suite with two agents: `whole` on all tracks and levels, `part` on two."""
     folder = tmp_path_factory.mktemp("suite")
     for track, level in PARTS:
-        make_part(folder / "whole", "whole", track, level, 200 if level < 3 else 100, privileged=True)
+        make_part(folder / "whole", "whole", track, level, 240 if level < 3 else 120, privileged=True)
     for level, checkpoint in ((1, "a" * 64), (2, "b" * 64)):
-        make_part(folder / "part", "part", "lost", level, 50, checkpoint=checkpoint)
-    edit_summary(folder / "part" / "lost-2", untrained_scale=True)
-    content = {"suite": "tracks", "parts": [f"{track}-{level}" for track, level in PARTS], "benchmark": "v2"}
+        make_part(folder / "part", "part", "adrift", level, 60, checkpoint=checkpoint)
+    edit_summary(folder / "part" / "adrift-2", untrained_scale=True)
+    content = {"suite": "v3", "parts": [f"{track}-{level}" for track, level in PARTS], "benchmark": KINDS_VERSION}
     content |= {"benchmark_manifest_sha256": "0" * 64, "seed": 0, "agents": ["part", "whole"]}
     write_json(folder / SUITE, content | {"folders": {"part": "part", "whole": "whole"}})
     return folder
@@ -80,12 +82,12 @@ class TestTable:
         # In 8 of 12 parts all goals are reached, in 4 half of them.
         assert whole[1].startswith("0.83 [0.")
         assert whole[0] == "whole (privileged)"
-        assert whole[2:] == ["0.83, 0.83", *["1.00", "1.00", "0.50"] * 4, "1", "made-up 1.0 cccccccc"]
-        assert part == ["part", *[""] * 5, "0.25", "0.25\\*", *[""] * 7, "2", "made-up 1.0 cccccccc"]
+        assert whole[2:] == ["0.83, 0.83", *["1.00, 1.00", "1.00, 1.00", "0.50, 0.50"] * 4, "1", "made-up 1.0 cccccccc"]
+        assert part == ["part", *[""] * 8, "0.25, 0.25", "0.25, 0.25\\*", *[""] * 4, "2", "made-up 1.0 cccccccc"]
 
     def test_a_folder_of_one_agent_gives_one_row(self, suite):
         assert read_entries([suite / "part"]) == read_entries([suite])[:1]
-        assert [entry.agent for entry in read_entries([suite / "part" / "lost-1", suite / "whole"])] == [
+        assert [entry.agent for entry in read_entries([suite / "part" / "adrift-1", suite / "whole"])] == [
             "part",
             "whole",
         ]
@@ -105,11 +107,11 @@ class TestPage:
             write_scoreboard(read_entries([suite / agent]), page)
         assert [row[0] for row in rows(kept_entries(page))[2:]] == ["whole (privileged)", "part"]
 
-    def test_rows_of_v3_are_ranked_by_the_share_on_time_and_of_equals_by_success(self, page):
+    def test_rows_are_ranked_by_the_share_on_time_and_of_equals_by_success(self, page):
         def entry(agent, success, on_time):
             part = Part(success_rate=success, on_time={"1.25": on_time, "2": success})
             mean, code = (success, 0.0, 1.0), Configuration(package=None, code_sha256="c", checkpoint_sha256=None)
-            parts = {f"{track} {level}": part for track in tracks_of(KINDS_VERSION) for level in (1, 2, 3)}
+            parts = {f"{track} {level}": part for track in TRACKS for level in (1, 2, 3)}
             return Entry(
                 agent=agent, privileged=False, benchmark=KINDS_VERSION, parts=parts, mean=mean, configurations=(code,)
             )
@@ -118,19 +120,19 @@ class TestPage:
         assert [kept.agent for kept in kept_entries(page)] == ["quick", "slow", "never"]
 
     def test_an_entry_replaces_one_of_the_same_agent_code_and_checkpoint_only(self, page, tmp_path):
-        for name, successes, code in (("a", 20, "c"), ("b", 40, "c"), ("c", 60, "d")):
-            make_part(tmp_path / name, "x", "lost", 1, successes, code * 64)
+        for name, successes, code in (("a", 24, "c"), ("b", 48, "c"), ("c", 72, "d")):
+            make_part(tmp_path / name, "x", "adrift", 1, successes, code * 64)
             write_scoreboard(read_entries([tmp_path / name]), page)
-        assert sorted(entry.parts["lost 1"].success_rate for entry in kept_entries(page)) == [0.2, 0.3]
+        assert sorted(entry.parts["adrift 1"].success_rate for entry in kept_entries(page)) == [0.2, 0.3]
 
     def test_an_entry_that_would_lose_parts_is_refused(self, page, tmp_path):
-        for name, track in (("a", "lost"), ("b", "stale")):
+        for name, track in (("a", "adrift"), ("b", "rebuilt")):
             make_part(tmp_path / name, "x", track, 1, 20, "c" * 64)
         write_scoreboard(read_entries([tmp_path / "a"]), page)
         before = page.read_text()
         for paths in ([tmp_path / "b"], [tmp_path / "a", tmp_path / "b"]):
             with pytest.raises(
-                InputError, match="x: expected all parts of its entry in one folder, found none of lost 1"
+                InputError, match="x: expected all parts of its entry in one folder, found none of adrift 1"
             ):
                 write_scoreboard(read_entries(paths), page)
         assert page.read_text() == before
@@ -168,11 +170,7 @@ class TestCheck:
     def test_missing_parts_are_named(self, suite):
         lines, are_complete = check(suite)
         assert not are_complete
-        assert [
-            line
-            for line in lines
-            if "2 of 12 parts of part, no mean; missing: stale 1, stale 2, stale 3, lost 3" in line
-        ]
+        assert [line for line in lines if "2 of 12 parts of part, no mean; missing: building 1, building 2," in line]
         assert [line for line in lines if "a complete entry of whole" in line]
 
     def test_nothing_is_written(self, suite, tmp_path):
@@ -184,14 +182,14 @@ class TestCheck:
 
 class TestRefused:
     def test_a_result_of_other_episodes_than_the_frozen_ones(self, tmp_path):
-        part = make_part(tmp_path, "x", "lost", 1)
+        part = make_part(tmp_path, "x", "adrift", 1)
         edit_records(part, lambda record: record | {"seed": record["seed"] + (record["episode"] == 7)})
-        with pytest.raises(InputError, match=r"lost-1: expected the frozen episode 7, found another one"):
+        with pytest.raises(InputError, match=r"adrift-1: expected the frozen episode 7, found another one"):
             read_entries([tmp_path])
 
     def test_a_result_without_the_hash_of_the_code(self, tmp_path):
-        make_part(tmp_path, "x", "lost", 1, code=None)
-        with pytest.raises(InputError, match=r"lost-1: expected the hash of the agent's code, found none"):
+        make_part(tmp_path, "x", "adrift", 1, code=None)
+        with pytest.raises(InputError, match=r"adrift-1: expected the hash of the agent's code, found none"):
             read_entries([tmp_path])
 
     def test_a_result_that_is_not_of_a_track(self, tmp_path):
@@ -200,32 +198,32 @@ class TestRefused:
             read_entries([tmp_path / "run"])
 
     def test_a_result_on_train_mazes(self, tmp_path):
-        make_part(tmp_path, "x", "lost", 1, split="train")
-        with pytest.raises(InputError, match=r"lost-1: expected eval episodes of a track, found train lost"):
+        make_part(tmp_path, "x", "adrift", 1, split="train")
+        with pytest.raises(InputError, match=r"adrift-1: expected eval episodes of a track, found train adrift"):
             read_entries([tmp_path])
 
     def test_a_result_of_some_of_the_episodes(self, tmp_path):
-        make_part(tmp_path, "x", "lost", 1, num_mazes=3)
-        with pytest.raises(InputError, match=r"lost-1: expected 200 episodes, found 30"):
+        make_part(tmp_path, "x", "adrift", 1, num_mazes=3)
+        with pytest.raises(InputError, match=r"adrift-1: expected 240 episodes, found 15"):
             read_entries([tmp_path])
 
     def test_a_result_of_another_benchmark(self, tmp_path):
-        part = make_part(tmp_path, "x", "lost", 1)
+        part = make_part(tmp_path, "x", "adrift", 1)
         provenance = read_summary(part)["provenance"] | {"benchmark_manifest_sha256": "0" * 64}
         edit_summary(part, provenance=provenance)
-        with pytest.raises(InputError, match=r"lost-1: expected results of the installed benchmark, found those of"):
+        with pytest.raises(InputError, match=r"adrift-1: expected results of the installed benchmark, found those of"):
             read_entries([tmp_path])
 
     def test_two_results_of_one_part(self, tmp_path):
-        make_part(tmp_path, "x", "lost", 1)
-        make_part(tmp_path, "x", "lost", 2)
-        (tmp_path / "lost-1").rename(tmp_path / "again")
-        make_part(tmp_path, "x", "lost", 1)
-        with pytest.raises(InputError, match="expected one result of lost 1, found two"):
+        make_part(tmp_path, "x", "adrift", 1)
+        make_part(tmp_path, "x", "adrift", 2)
+        (tmp_path / "adrift-1").rename(tmp_path / "again")
+        make_part(tmp_path, "x", "adrift", 1)
+        with pytest.raises(InputError, match="expected one result of adrift 1, found two"):
             read_entries([tmp_path])
 
     def test_a_folder_with_two_agents_results(self, tmp_path):
-        make_part(tmp_path, "x", "lost", 1)
-        make_part(tmp_path, "y", "lost", 2)
+        make_part(tmp_path, "x", "adrift", 1)
+        make_part(tmp_path, "y", "adrift", 2)
         with pytest.raises(InputError, match="expected results of one agent, found those of x, y"):
             read_entries([tmp_path])

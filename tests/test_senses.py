@@ -34,7 +34,6 @@ from mazebench.tasks.observation import state_errors
 from mazebench.tasks.odometry import NoisyMotion
 from mazebench.tasks.sensors.lidar_noise import model_of, noise_text, read
 from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.tracks import TRACKS
 from mazebench.world.angles import wrap_angle
 from mazebench.world.lidar import TURTLEBOT3, LidarModel
 
@@ -215,7 +214,7 @@ ACTIONS = np.random.default_rng(0).integers(6, size=60)
 SPECS = {
     "local": {"time_limit": 12, **NOISE},
     "hierarchical": {"task": "hierarchical", "landmark_distance": 2, "time_limit": 12, **NOISE},
-    "lost": {"task": "lost", "level": (1, 3), "lidar_noise": ".1,.1", "odometry_noise": 0.05},
+    "adrift": {"task": "adrift", "level": (1, 3), "lidar_noise": ".1,.1", "odometry_noise": 0.05},
 }
 
 
@@ -283,8 +282,8 @@ def test_dm_control_observes_the_same():
 def test_goal_conditioned_and_registered_environments_take_the_options():
     env = GoalMazeEnv(make_spec(**NOISE))
     assert env.observation_space.contains(env.reset(seed=0)[0])
-    made = gymnasium.make("mazebench/Lost-13-v2", lidar_noise="turtlebot3", odometry_noise=0.2)
-    assert made.observation_space["lidar"].high.max() == 3.5
+    made = gymnasium.make("mazebench/Adrift-31-v3", lidar_noise=".1,.1", odometry_noise=0.2)
+    assert made.observation_space["lidar"].high.max() == 5.0
 
 
 def test_a_slot_without_an_episode_draws_nothing():
@@ -348,7 +347,7 @@ class TestOptions:
                 r"^odometry_noise 0\.2: expected no position_noise beside it, found it$",
             ),
             (
-                {"task": "lost", "odometry_noise": 0.2, "exact_pose": True},
+                {"task": "adrift", "odometry_noise": 0.2, "exact_pose": True},
                 r"^odometry_noise 0\.2: expected no exact_pose beside it, found it$",
             ),
         ],
@@ -357,22 +356,19 @@ class TestOptions:
         with pytest.raises(InputError, match=message):
             make_spec(**options)
 
-    def test_a_track_has_senses_of_its_own_unless_others_are_set(self, monkeypatch):
-        stale = type(TRACKS["stale"])
-        monkeypatch.setattr(stale, "lidar", TURTLEBOT3)
-        monkeypatch.setattr(stale, "odometry_noise", lambda self, level: level / 10)
-        spec = make_spec("stale", level=(1, 3))
-        assert (spec.lidar, spec.odometry_noise_at(1), spec.odometry_noise_at(3)) == (TURTLEBOT3, 0.1, 0.3)
+    def test_a_track_has_senses_of_its_own_unless_others_are_set(self):
+        spec = make_spec("adrift", level=(1, 3))
+        assert (spec.lidar, spec.odometry_noise_at(1), spec.odometry_noise_at(3)) == (TURTLEBOT3, 0.01, 0.2)
         other = dataclasses.replace(spec, lidar_noise="0,0", odometry_noise=0.0)
         assert (other.lidar, other.odometry_noise_at(3)) == (LidarModel(), 0.0)
 
         # The noise of an episode is that of its level.
         rng = np.random.default_rng(0)
         drawn = {state_errors(spec, sample_episode(spec, rng))[0].alpha for _ in range(20)}
-        assert drawn == {0.1, 0.3}
+        assert drawn == {0.01, 0.2}
 
     def test_the_true_pose_has_no_noise(self):
-        spec = make_spec("lost", exact_pose=True)
+        spec = make_spec("adrift", exact_pose=True)
         assert state_errors(spec, sample_episode(spec, np.random.default_rng(0))) == []
 
 
@@ -411,7 +407,7 @@ class TestResults:
         assert "planner (odometry noise 0.2) in" in compare_folders(plain, noisy).title
 
     def test_the_scoreboard_refuses_them(self, tmp_path):
-        folder = make_result(tmp_path / "noisy", track="stale")
+        folder = make_result(tmp_path / "noisy", track="rebuilt")
         edit_records(folder, lambda record: record | {"lidar_noise": "0,0"})
         edit_summary(folder, lidar_noise="0,0")
         with pytest.raises(InputError, match=r"expected the senses of the track, found lidar noise 0,0$"):

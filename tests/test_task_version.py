@@ -83,11 +83,11 @@ def test_version_when_environments_are_asked():
     environment = gymnasium.make("mazebench/Local-13-v1")
     assert environment.spec.version == environment.unwrapped.task_spec.version == TASK_VERSION
     assert mazebench.make_vec("local", 1).task_spec.version == TASK_VERSION
-    track = gymnasium.make("mazebench/Far-31-v2")
+    track = gymnasium.make("mazebench/Building-31-v3")
     assert track.spec.version == track.unwrapped.task_spec.version == TRACKS_VERSION
 
 
-@pytest.mark.parametrize(("track", "version"), [(None, TASK_VERSION), ("far", TRACKS_VERSION)])
+@pytest.mark.parametrize(("track", "version"), [(None, TASK_VERSION), ("building", TRACKS_VERSION)])
 def test_version_when_a_result_says_what_it_came_from(track, version):
     options = EvalOptions.of("random", track=track)
     assert provenance(options, RandomAgent, build_task(options.task, options.mazes)).task_version == version

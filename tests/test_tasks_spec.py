@@ -73,8 +73,8 @@ class TestDistances:
     def test_distances_depend_on_the_split_and_the_track_by_default(self):
         assert make_spec(split="train").distances == tuple(range(1, 6))
         assert make_spec(split="eval").distances == tuple(range(1, 16))
-        assert make_spec("far", maps=field(25)).distances == tuple(range(20, 41))
-        assert make_spec("lost", maps=field(9)).distances == tuple(range(3, 13))
+        assert make_spec("building", maps=field(25)).distances == tuple(range(15, 41))
+        assert make_spec("building", maps=field(15)).distances == tuple(range(15, 25))
 
 
 class TestFixedPairs:
@@ -94,7 +94,7 @@ class TestOptions:
     @pytest.mark.parametrize(
         ("options", "message"),
         [
-            ({"task": "locl"}, r"unknown task 'locl'; available: adrift, building, far, hierarchical, local, lost"),
+            ({"task": "locl"}, r"unknown task 'locl'; available: adrift, building, hierarchical, local, rebuilt"),
             ({"split": "test", "maps": None}, r"unknown split 'test'; available: dev, eval, train"),
             ({"size": 13.0, "maps": None}, r"expected size of type int \| None, found 13\.0"),
             ({"size": 14, "maps": None}, r"unknown size 14; available: 13, 15, 17, 19, 21"),
@@ -129,23 +129,25 @@ class TestOptions:
                 {"level": 2},
                 "level 2: expected a track beside it, found none; tracks: building, rebuilt, adrift, rough",
             ),
-            ("local", {"track": "stail"}, "unknown track 'stail'; available: adrift, building, far"),
-            ("lost", {"track": "far"}, "expected one track, found 'lost' and 'far'"),
-            ("hierarchical", {"track": "far"}, "track 'far': expected task 'local', found 'hierarchical'"),
-            ("far", {"level": 0}, "expected level from 1 to 3, found 0"),
-            ("far", {"level": ()}, "expected at least one level, found none"),
-            ("far", {"level": (3, 3)}, "expected each level once, found 3, 3"),
-            ("far", {"level": (1, 2)}, "expected levels in mazes of one size, found levels 1, 2 with sizes 31, 51"),
-            ("far", {"level": (2, 3)}, "expected levels with one context_size, found levels 2, 3 with 51, 21"),
-            ("far", {"size": 51}, "'far', level 1: expected size 31, found 51; levels 1 to 3 have sizes 31, 51, 51"),
-            ("far", {"level": 3, "context_size": 51}, "track 'far': expected context_size 21, found 51"),
-            ("far", {"time_limit": 50}, "track 'far': has its own time limit, found time_limit 50"),
-            ("far", {"num_goals": 2}, "track 'far': expected num_goals 1, found 2"),
-            ("far", {"pairs": "fixed"}, "track 'far': expected pairs 'random', found 'fixed'"),
-            ("far", {"map_warp": 0.1}, "track 'far': expected no perturbation, found map_warp 0.1"),
-            ("lost", {"sensors": ("chase",)}, "'lost': expected sensors without 'chase', which shows where the body"),
+            ("local", {"track": "stail"}, "unknown track 'stail'; available: adrift, building, rebuilt, rough"),
+            ("adrift", {"track": "building"}, "expected one track, found 'adrift' and 'building'"),
+            ("hierarchical", {"track": "building"}, "track 'building': expected task 'local', found 'hierarchical'"),
+            ("building", {"level": 0}, "expected level from 1 to 3, found 0"),
+            ("building", {"level": ()}, "expected at least one level, found none"),
+            ("building", {"level": (3, 3)}, "expected each level once, found 3, 3"),
+            ("building", {"size": 51}, "track 'building': expected size 31, found 51"),
+            ("rough", {"context_size": 31}, "track 'rough': expected context_size 62, found 31"),
+            ("building", {"time_limit": 50}, "track 'building': has its own time limit, found time_limit 50"),
+            ("building", {"num_goals": 2}, "track 'building': expected num_goals 1, found 2"),
+            ("building", {"pairs": "fixed"}, "track 'building': expected pairs 'random', found 'fixed'"),
+            ("building", {"map_warp": 0.1}, "track 'building': expected no perturbation, found map_warp 0.1"),
             (
-                "far",
+                "adrift",
+                {"sensors": ("chase",)},
+                "'adrift': expected sensors without 'chase', which shows where the body",
+            ),
+            (
+                "building",
                 {"maps": CORRIDOR},
                 "corridor: expected distances of at most 6 cells, as far as the maze reaches, found 40; choose others",
             ),
@@ -275,11 +277,11 @@ class TestSeveralGoals:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"context_size": 7}, "track 'stale': expected context_size 13, found 7"),
-        ({"sensors": ()}, "track 'stale': expected the sensor lidar, found none"),
-        ({"pairs": "fixed"}, "track 'stale': expected pairs 'random', found 'fixed'"),
+        ({"context_size": 7}, "track 'rebuilt': expected context_size 31, found 7"),
+        ({"sensors": ()}, "track 'rebuilt': expected the sensor lidar, found none"),
+        ({"pairs": "fixed"}, "track 'rebuilt': expected pairs 'random', found 'fixed'"),
     ],
 )
 def test_a_task_of_a_track_holds_what_the_track_fixes(changes, message):
     with pytest.raises(InputError, match=message):
-        dataclasses.replace(make_spec("stale"), **changes)
+        dataclasses.replace(make_spec("rebuilt"), **changes)

@@ -1,1 +1,1 @@
-"""Benchmark v3: mazes of several kinds, in the splits train and dev, and their frozen episodes."""
+"""Benchmark v3: mazes of several kinds, in the splits train, dev and eval, and their frozen episodes."""

@@ -16,7 +16,6 @@ from benchmarks.results.kept import (
     NO_MAP,
     ON_TIME_125,
     PATHS,
-    TRACKS_V3,
     TRUE_POSE,
     Kept,
     estimate,
@@ -28,6 +27,7 @@ from mazebench.report.figures.figure import Figure, Panel, Point, Series
 from mazebench.report.looks import all_looks
 from mazebench.report.table import Cell
 from mazebench.results.intervals import Estimate
+from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 
 _DODGE = 0.09  # of the step between two ticks, by which series stand beside one another
@@ -60,7 +60,7 @@ def draw_figures(chosen: Sequence[Figure], folder: pathlib.Path) -> None:
 def map_worth(kept: Kept) -> Figure:
     """Returns the navigator on time with and without the map, by track and level."""
     rows = {"navigator": NAVIGATOR, "navigator without the map": NO_MAP, "navigator with the true pose": TRUE_POSE}
-    panels = {track: {label: _levels(kept, row, track) for label, row in rows.items()} for track in TRACKS_V3}
+    panels = {track: {label: _levels(kept, row, track) for label, row in rows.items()} for track in TRACKS}
     return _figure("map-worth", "What the map is worth: episodes on time (1.25)", panels)
 
 
@@ -71,7 +71,7 @@ def novel_kinds(kept: Kept) -> Figure:
             f"navigator, {name} kinds": _levels(kept, NAVIGATOR, track, "kind", kinds)
             for name, kinds in (("known", KNOWN), ("novel", NOVEL))
         }
-        for track in TRACKS_V3
+        for track in TRACKS
     }
     return _figure("novel-kinds", "What novel kinds of buildings cost: episodes on time (1.25)", panels)
 
@@ -83,7 +83,7 @@ def what_fails(kept: Kept) -> Figure:
             f"navigator, {name}": _levels(kept, NAVIGATOR, track, "blocked", (is_blocked,))
             for name, is_blocked in PATHS.items()
         }
-        for track in TRACKS_V3
+        for track in TRACKS
     }
     return _figure("what-fails", "Where the navigator is late: episodes on time (1.25)", panels)
 

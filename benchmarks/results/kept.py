@@ -25,14 +25,12 @@ from mazebench.results.metrics import ON_TIME_METRICS, scores
 from mazebench.results.reading import CONFIG, EPISODES, ORACLE, SUITE, SUMMARY, Result, load_result
 from mazebench.results.records import column
 from mazebench.storage.files import make_folder, open_whole
-from mazebench.tasks.tracks import TRACKS, tracks_of
+from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 from mazebench.training.run_folder import METRICS, checkpoints
 
 PAPER = "paper"  # the suite
-V2, V3 = "v2", "v3"  # the benchmarks with tracks
 LOCAL = "local-13"  # the part of `paper` that training runs play
-TRACKS_V3 = tracks_of(V3)
 ON_TIME_125, ON_TIME_2 = ON_TIME_METRICS  # within 1.25 and 2 times the oracle's steps
 # Agents, with what they were told less or more than others.
 NAVIGATOR, NO_MAP, TRUE_POSE = "navigator", "navigator without map", "navigator with the true pose"
@@ -120,7 +118,7 @@ class Kept:
         Raises:
           InputError: if one is not kept.
         """
-        if row == TRUE_POSE and not TRACKS[track].hides_pose(LEVELS[0]):
+        if row == TRUE_POSE and not TRACKS[track].hides_pose:
             return []
         return [self.result(row, f"{track}-{level}") for level in LEVELS]
 

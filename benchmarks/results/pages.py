@@ -19,7 +19,6 @@ PAGES = (
     "README.md",
     "docs/results.md",
     "docs/tracks.md",
-    "docs/tracks_v2.md",
     "docs/agents/navigator.md",
     "docs/agents/mmn.md",
     "docs/experiments/dqn.md",

@@ -20,10 +20,7 @@ from benchmarks.results.kept import (
     PAPER,
     PATHS,
     RANDOM,
-    TRACKS_V3,
     TRUE_POSE,
-    V2,
-    V3,
     Kept,
     estimate,
 )
@@ -38,7 +35,7 @@ from mazebench.results.intervals import CONFIDENCE, Estimate, runs_interval
 from mazebench.results.metrics import ON_TIME_METRICS
 from mazebench.results.reading import Result
 from mazebench.results.records import column
-from mazebench.tasks.tracks import tracks_of
+from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 
 SATURATED = "At 1.00 ["  # begins the sentence below a table
@@ -102,7 +99,7 @@ _REGIMES = {
     "mmn-one-goal": "20 mazes, one goal an episode (`num_goals=1`)",
 }
 
-_PARTS = tuple((track, level) for track in TRACKS_V3 for level in LEVELS)
+_PARTS = tuple((track, level) for track in TRACKS for level in LEVELS)
 _NOT_LOST = "not lost"  # of the navigator with the true pose, on tracks that tell it to all
 # The rows of tables of tracks, by the agent and what it was told less or more than others.
 _ROWS = {
@@ -120,7 +117,6 @@ _ROWS = {
     "dqn": "`dqn`, learned, no map",
     RANDOM: "`random`",
 }
-_REFUSED = (("mmn", "sketch"), ("mmn", "far"))  # an agent, and a track whose maps it can't read
 
 
 def make_table(kept: Kept, name: str) -> str:
@@ -236,23 +232,13 @@ def mmn_runs(kept: Kept) -> str:
     return _table(["agent", "runs", *map(str, _PRINTED_DISTANCES)], rows)
 
 
-def tracks_table(benchmark: str, metric: str, kept: Kept) -> str:
-    """Returns a metric of all agents on the tracks of a benchmark."""
-    tracks = tracks_of(benchmark)
+def tracks_table(metric: str, kept: Kept) -> str:
+    """Returns a metric of all agents on the tracks."""
     rows = [
-        [description, *(_levels(kept, row, track, metric) for track in tracks)]
-        for row, description in _rows_of(kept, benchmark).items()
+        [description, *(_levels(kept, row, track, metric) for track in TRACKS)]
+        for row, description in _rows_of_tracks(kept).items()
     ]
-    return _table(["agent", *map(_code, tracks)], rows)
-
-
-def v2_blocked(kept: Kept) -> str:
-    """Returns success rates on `stale` where the shortest path on the map is open, and where it is blocked."""
-    rows = [
-        [description, *(_levels(kept, row, "stale", "success_rate", "blocked", (each,)) for each in PATHS.values())]
-        for row, description in _rows_of(kept, V2).items()
-    ]
-    return _table(["agent", *PATHS], rows)
+    return _table(["agent", *map(_code, TRACKS)], rows)
 
 
 def v3_map_worth(kept: Kept) -> str:
@@ -272,7 +258,7 @@ def v3_novel_kinds(kept: Kept) -> str:
     chosen = list(itertools.product(("success_rate", ON_TIME_125), (("known", KNOWN), ("novel", NOVEL))))
     rows = [
         [_code(track), *(_levels(kept, NAVIGATOR, track, metric, "kind", kinds) for metric, (_, kinds) in chosen)]
-        for track in TRACKS_V3
+        for track in TRACKS
     ]
     return _table(["track", *(f"{METRICS[metric]}, {name} kinds" for metric, (name, _) in chosen)], rows)
 
@@ -281,7 +267,7 @@ def v3_blocked(kept: Kept) -> str:
     """Returns the navigator's share on time where the shortest path on the map is open, and where it is blocked."""
     rows = []
     for track, level in _PARTS:
-        if track != TRACKS_V3[0]:  # whose maps are right
+        if track != "building":  # whose maps are right
             result = kept.result(NAVIGATOR, f"{track}-{level}")
             shares = [estimate(result, ON_TIME_125, "blocked", (is_blocked,)) for is_blocked in PATHS.values()]
             rows.append([f"`{track}` {level}", *map(_interval, shares)])
@@ -291,7 +277,7 @@ def v3_blocked(kept: Kept) -> str:
 def v3_navigator(kept: Kept) -> str:
     """Returns the navigator's numbers on v3."""
     metrics = ("success_rate", *ON_TIME_METRICS, "spl")
-    rows = [[_code(track), *(_levels(kept, NAVIGATOR, track, metric) for metric in metrics)] for track in TRACKS_V3]
+    rows = [[_code(track), *(_levels(kept, NAVIGATOR, track, metric) for metric in metrics)] for track in TRACKS]
     return _table(["track", *(METRICS[metric] for metric in metrics)], rows)
 
 
@@ -300,7 +286,7 @@ def v3_navigator_kinds(kept: Kept) -> str:
     kinds = (*KNOWN, *NOVEL)
     rows = [
         [_code(track), *(_levels(kept, NAVIGATOR, track, ON_TIME_125, "kind", (kind,)) for kind in kinds)]
-        for track in TRACKS_V3
+        for track in TRACKS
     ]
     return _table([f"track, {METRICS[ON_TIME_125]}", *map(_code, kinds)], rows)
 
@@ -314,12 +300,9 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "mah-curve": mah_curve,
     "mmn-ingredients": functools.partial(short_runs, _INGREDIENTS, {"model_error_1": ".3f", "map_ratio": ".1f"}),
     "mmn-regimes": functools.partial(short_runs, _REGIMES, {}),
-    "v2-success": functools.partial(tracks_table, V2, "success_rate"),
-    "v2-spl": functools.partial(tracks_table, V2, "spl"),
-    "v2-blocked": v2_blocked,
-    "v3-success": functools.partial(tracks_table, V3, "success_rate"),
-    "v3-on-time": functools.partial(tracks_table, V3, ON_TIME_125),
-    "v3-on-time-2": functools.partial(tracks_table, V3, ON_TIME_2),
+    "v3-success": functools.partial(tracks_table, "success_rate"),
+    "v3-on-time": functools.partial(tracks_table, ON_TIME_125),
+    "v3-on-time-2": functools.partial(tracks_table, ON_TIME_2),
     "v3-map-worth": v3_map_worth,
     "v3-novel-kinds": v3_novel_kinds,
     "v3-blocked": v3_blocked,
@@ -352,11 +335,11 @@ def _over_values(rates: Sequence[float]) -> str:
     return _interval(Estimate(mean, float(low), float(high)))
 
 
-def _rows_of(kept: Kept, benchmark: str) -> dict[str, str]:
-    """Returns those of `_ROWS` that played a benchmark."""
-    played = {row for (row, _), result in kept.results.items() if result.summary.benchmark == benchmark}
+def _rows_of_tracks(kept: Kept) -> dict[str, str]:
+    """Returns those of `_ROWS` that are evaluated on the tracks."""
+    played = {row for (row, _), result in kept.results.items() if result.summary.track}
     if not played:
-        raise InputError(f"expected evaluations on benchmark {benchmark} among the records, found none")
+        raise InputError("expected evaluations on tracks among the records, found none")
     if unnamed := played - _ROWS.keys():
         raise InputError(f"expected results of {', '.join(_ROWS)}, found those of {', '.join(sorted(unnamed))}")
     return {row: description for row, description in _ROWS.items() if row in played}
@@ -364,8 +347,6 @@ def _rows_of(kept: Kept, benchmark: str) -> dict[str, str]:
 
 def _levels(kept: Kept, row: str, track: str, metric: str, field: str = "", values: Sequence[Any] = ()) -> str:
     """Returns the means of a metric at the levels of a track, of the episodes that `estimate` counts."""
-    if (row, track) in _REFUSED:
-        return "refused"
     means = [estimate(result, metric, field, values) for result in kept.levels(row, track)]
     return " / ".join("none" if mean is None else _number(mean.value) for mean in means) or _NOT_LOST
 

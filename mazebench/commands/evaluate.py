@@ -35,8 +35,8 @@ def evaluate(
     suite: Annotated[
         str | None,
         typer.Option(
-            help="Evaluations by name instead: paper, the whole protocol; quick, minutes of it; tracks, every track of "
-            "v2 at all levels; v3, those of v3; v3-dev, in the mazes to choose agents by; or what these are measured "
+            help="Evaluations by name instead: paper, the whole protocol; quick, minutes of it; v3, every track at all "
+            "levels; v3-dev, in the mazes to choose agents by; or what these are measured "
             "against: v3-no-map, hiding the map, v3-no-goal, the goal too, v3-true-pose, with the true pose where it "
             "is lost."
         ),

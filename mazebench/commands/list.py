@@ -6,13 +6,13 @@ from __future__ import annotations
 def list_() -> None:
     """List tasks, agents, sizes, kinds of mazes and Gymnasium ids."""
     from mazebench.agent_loading import agent_names
-    from mazebench.constants import KINDS_VERSION, TASK_VERSION, TRACKS_VERSION
+    from mazebench.constants import TASK_VERSION, TRACKS_VERSION
     from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS, VERSION
     from mazebench.maps.kinds import KINDS
     from mazebench.tasks.options import TASKS
     from mazebench.tasks.perturbations import PERTURBATIONS
     from mazebench.tasks.sensors import SENSORS
-    from mazebench.tasks.tracks import TRACKS, tracks_of
+    from mazebench.tasks.tracks import TRACKS
 
     ids = (f"mazebench/{kind}-{SIZES[0]}-v{TASK_VERSION}" for kind in ("Local", "Hierarchical", "LocalGoal"))
     rows = {
@@ -24,13 +24,12 @@ def list_() -> None:
         "perturbed": ", ".join(PERTURBATIONS),
         "sensors": ", ".join(SENSORS),
         "Gymnasium": f"{', '.join(ids)} and the other sizes; "
-        f"mazebench/Rebuilt-31-v{KINDS_VERSION} and the other tracks",
+        f"mazebench/Rebuilt-31-v{TRACKS_VERSION} and the other tracks",
     }
     for name, text in rows.items():
         print(f"{name + ':':<12} {text}")
-    for version in (KINDS_VERSION, TRACKS_VERSION):
-        print(f"\ntracks of v{version}, each with levels 1 to 3 and the sensor lidar:")
-        for name in tracks_of(f"v{version}"):
-            print(f"{name + ':':<12} {TRACKS[name].help}")
-            for level, meaning in enumerate(TRACKS[name].levels, 1):
-                print(f"{'':<12} {level}: {meaning}")
+    print("\ntracks, each with levels 1 to 3 and the sensor lidar:")
+    for name, track in TRACKS.items():
+        print(f"{name + ':':<12} {track.help}")
+        for level, meaning in enumerate(track.levels, 1):
+            print(f"{'':<12} {level}: {meaning}")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
-from mazebench.constants import BENCHMARK_SIZES, KINDS_VERSION, TASK_VERSION, TRACKS_VERSION
+from mazebench.constants import BENCHMARK_SIZES, TASK_VERSION, TRACKS_VERSION
 from mazebench.errors import InputError
 from mazebench.world.backend import load_mujoco, loading_backend
 
@@ -25,19 +25,9 @@ if TYPE_CHECKING:
     from mazebench.tasks.spec import TaskSpec
 
 _TASKS = {"Local": "local", "Hierarchical": "hierarchical"}
-# Tracks by title, size and version, with the level that is played if none is given. `TRACKS` has the same ones; it is
-# not read here because `import mazebench` should load little.
-_TRACKS = {
-    ("Building", 31, KINDS_VERSION): 1,
-    ("Rebuilt", 31, KINDS_VERSION): 1,
-    ("Adrift", 31, KINDS_VERSION): 1,
-    ("Rough", 31, KINDS_VERSION): 1,
-    ("Stale", 13, TRACKS_VERSION): 1,
-    ("Lost", 13, TRACKS_VERSION): 1,
-    ("Sketch", 13, TRACKS_VERSION): 1,
-    ("Far", 31, TRACKS_VERSION): 1,
-    ("Far", 51, TRACKS_VERSION): 2,
-}
+# `TRACKS` has the same ones; it is not read here because `import mazebench` should load little.
+_TRACKS = ("Building", "Rebuilt", "Adrift", "Rough")
+_TRACKS_SIZE = 31
 _ID_SIZE = "id_size"  # the keyword of an id's size, apart from the `size` that a user gives
 _SINGLE = ("seed", "render_mode", "camera")  # what a single environment takes besides its task's options
 _VECTOR = ("seed", "num_envs", "num_threads", "render_mode", "autoreset_mode")
@@ -53,9 +43,9 @@ def register_environments() -> None:
         for size in BENCHMARK_SIZES:
             env_id = f"mazebench/{title}-{size}-v{TASK_VERSION}"
             _register(env_id, {"task": task, _ID_SIZE: size})
-    for (title, size, version), level in _TRACKS.items():
-        env_id = f"mazebench/{title}-{size}-v{version}"
-        _register(env_id, {"task": title.lower(), _ID_SIZE: size, "level": level})
+    for title in _TRACKS:
+        env_id = f"mazebench/{title}-{_TRACKS_SIZE}-v{TRACKS_VERSION}"
+        _register(env_id, {"task": title.lower(), _ID_SIZE: _TRACKS_SIZE})
     for size in BENCHMARK_SIZES:
         env_id = f"mazebench/LocalGoal-{size}-v{TASK_VERSION}"
         if env_id not in gymnasium.registry:

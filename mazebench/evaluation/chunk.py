@@ -24,9 +24,8 @@ from mazebench.results.metrics import spl
 from mazebench.results.records import Record
 from mazebench.results.trajectories import Trajectory
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.shown_map import show_map
+from mazebench.tasks.shown_map import is_blocked, show_map
 from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.trials import Trial
 
 
@@ -198,8 +197,9 @@ def _to_record(plan: Plan, outcome: Outcome) -> Record:
 
 
 def _facts(task: TaskSpec, episode: Episode) -> dict[str, bool | str]:
-    """Returns what the task's track says of an episode."""
+    """Returns what the record of a track says of an episode beside its outcome; summaries report the groups."""
     if task.track is None:
         return {}
-    shown = show_map(task, episode)
-    return TRACKS[task.track].facts(task.mazes[episode.maze], shown, (episode.start, episode.goal))
+    maze, shown = task.mazes[episode.maze], show_map(task, episode)
+    kind = {"kind": maze.kind} if maze.kind else {}
+    return {"blocked": is_blocked(maze.walls, shown.walls, (episode.start, episode.goal))} | kind

@@ -9,11 +9,11 @@ from annotated_types import Ge
 
 from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.errors import InputError
-from mazebench.maps.benchmark import FROZEN_SPLITS, VERSION
+from mazebench.maps.benchmark import FROZEN_SPLITS, KINDS_VERSION, VERSION
 from mazebench.maps.options import MazeOptions
 from mazebench.options import Doc, fields_of, from_names, options
 from mazebench.tasks.options import TaskOptions, Variants, is_own
-from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks.base import DISTANCES
 
 NUM_ENVS = 256  # environments side by side in a process, unless another number is asked for
 
@@ -59,14 +59,13 @@ class EvalOptions:
             raise InputError("expected no fresh mazes in an evaluation; num_mazes says how many of each kind are drawn")
         if len(level) > 1:
             found = ", ".join(map(str, level))
-            raise InputError(f"expected one level in an evaluation, found {found}; the suite 'tracks' plays all levels")
-        if track is not None and self.is_frozen:
-            own = TRACKS[track].distances(level[0])
-            if other := ", ".join(str(distance) for distance in self.task.distances if distance not in own):
-                raise InputError(
-                    f"track {track!r}, level {level[0]}: expected distances from {own[0]} to {own[-1]}, "
-                    f"those of the frozen episodes, found {other}"
-                )
+            raise InputError(f"expected one level in an evaluation, found {found}; the suite 'v3' plays all levels")
+        other = ", ".join(str(distance) for distance in self.task.distances if distance not in DISTANCES)
+        if track is not None and self.is_frozen and other:
+            raise InputError(
+                f"track {track!r}: expected distances from {DISTANCES[0]} to {DISTANCES[-1]}, "
+                f"those of the frozen episodes, found {other}"
+            )
 
     @property
     def is_own(self) -> bool:
@@ -81,7 +80,7 @@ class EvalOptions:
     @property
     def benchmark(self) -> str:
         """The version of the benchmark that the evaluation belongs to."""
-        return VERSION if self.task.track is None else TRACKS[self.task.track].benchmark
+        return VERSION if self.task.track is None else KINDS_VERSION
 
 
 @options

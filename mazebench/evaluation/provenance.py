@@ -54,7 +54,7 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
             **by_name(Variants()),
             "checkpoint": _told_checkpoint(options.checkpoint, agent_class),
             "distances": task.distances,
-            "time_limit": task.time_limit,
+            "time_limit": task.longest_time_limit,
         },
         "command": [pathlib.Path(sys.argv[0]).name, *sys.argv[1:]],
         "python": platform.python_version(),

@@ -18,13 +18,13 @@ from mazebench.evaluation.options import EvalOptions, RunOptions
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import open_pool
 from mazebench.evaluation.store import check_same_run, is_finished
-from mazebench.maps.benchmark import DEV, KINDS_VERSION, SIZES, TRACKS_VERSION, manifest_hash
+from mazebench.maps.benchmark import DEV, SIZES, manifest_hash
 from mazebench.results.reading import CONFIG, SUITE, Suite, read_suite
 from mazebench.results.records import Summary
 from mazebench.storage.files import make_folder, writing_to
 from mazebench.storage.json_files import write_json
 from mazebench.storage.locks import FolderLock
-from mazebench.tasks.tracks import TRACKS, tracks_of
+from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 
 _DEFAULT_RUN = RunOptions()
@@ -47,16 +47,8 @@ def _local(name: str, distances: tuple[int, ...] = _TABLE_DISTANCES, **changes: 
     return Part(name, {"task": "local", "distances": distances, **changes})
 
 
-def _tracks(benchmark: str, **changes: Any) -> tuple[Part, ...]:
-    return tuple(
-        Part(f"{track}-{level}", {"track": track, "level": level, **changes})
-        for track in tracks_of(benchmark)
-        for level in LEVELS
-    )
-
-
-_V3 = _tracks(KINDS_VERSION)
-_V3_LOST = tuple(part for part in _V3 if TRACKS[part.changes["track"]].hides_pose(part.changes["level"]))
+_V3 = tuple(Part(f"{track}-{level}", {"track": track, "level": level}) for track in TRACKS for level in LEVELS)
+_V3_LOST = tuple(part for part in _V3 if TRACKS[part.changes["track"]].hides_pose)
 
 
 def _with(parts: tuple[Part, ...], **changes: Any) -> tuple[Part, ...]:
@@ -81,7 +73,6 @@ SUITES: dict[str, tuple[Part, ...]] = {
         _local("warp-0.1", (2, 6, 10), map_warp=0.1, episodes_per_distance=1),
         _local("noise-0.5", (2, 6, 10), position_noise=0.5, episodes_per_distance=1),
     ),
-    "tracks": _tracks(TRACKS_VERSION),
     "v3": _V3,
     "v3-dev": _with(_V3, split=DEV),  # to choose agents by
     # What agents are measured against: without the map, without map and goal, with the true pose.

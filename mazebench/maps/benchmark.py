@@ -1,8 +1,7 @@
 """The frozen mazes of the benchmark: read from the package's assets and checked against their manifests.
 
-Version v1 is the paper's protocol. Version v2 holds the mazes of the first tracks: eval mazes of size 13, whose train
-mazes are v1's, and train and eval mazes of sizes 31 and 51. Version v3 holds mazes of 31 x 31 cells of several kinds,
-in the splits train, dev and, once its agents are done, eval.
+Version v1 is the paper's protocol. Version v3 holds the tracks' mazes of 31 x 31 cells of several kinds, in the splits
+train, dev and eval.
 """
 
 from __future__ import annotations
@@ -20,10 +19,8 @@ from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 
 VERSION = "v1"
-TRACKS_VERSION = "v2"
 KINDS_VERSION = "v3"
 SIZES = BENCHMARK_SIZES
-TRACK_SIZES = (13, 31, 51)
 KINDS_SIZE = 31
 SPLITS = ("train", "eval")
 DEV = "dev"  # v3's split for choosing agents
@@ -44,19 +41,20 @@ def load_mazes(size: int, split: str) -> tuple[Maze, ...]:
     Raises:
       InputError: if there is no such size or split.
     """
-    _check_names(size, SIZES, split)
-    return _load_mazes(size, split, VERSION)
+    if isinstance(size, str | float):
+        raise InputError(f"expected size as a whole number, found {size!r}")
+    if size not in SIZES:
+        raise unknown("size", size, SIZES)
+    if split not in SPLITS:
+        raise unknown("split", split, SPLITS)
+    return _load_mazes(size, split)
 
 
-def load_track_mazes(size: int, split: str) -> tuple[Maze, ...]:
-    """Returns the 20 mazes of one size and split in which tracks are played.
-
-    Raises:
-      InputError: if there is no such size or split.
-    """
-    _check_names(size, TRACK_SIZES, split)
-    has_train_mazes = mazes_file(size, split) in manifest(TRACKS_VERSION)["files"]
-    return _load_mazes(size, split, TRACKS_VERSION if has_train_mazes else VERSION)
+@functools.cache
+def _load_mazes(size: int, split: str) -> tuple[Maze, ...]:
+    blocks = read_asset(mazes_file(size, split)).split("\n\n")
+    mazes = (parse_maze(block, f"{size}-{split}-{index:02d}") for index, block in enumerate(blocks))
+    return tuple(dataclasses.replace(maze, kind="dfs") for maze in mazes)
 
 
 def load_kind_mazes(split: str) -> tuple[Maze, ...]:
@@ -83,24 +81,6 @@ def _load_kind_mazes(split: str) -> tuple[Maze, ...]:
 def kind_mazes_file(kind: str, split: str) -> str:
     """Returns the name of the file with v3's mazes of one kind and split."""
     return f"mazes-{kind}-{split}.txt"
-
-
-def _check_names(size: int, sizes: tuple[int, ...], split: str) -> None:
-    """Raises `InputError` if there is no such size or split."""
-    if isinstance(size, str | float):
-        raise InputError(f"expected size as a whole number, found {size!r}")
-    if size not in sizes:
-        raise unknown("size", size, sizes)
-    if split not in SPLITS:
-        raise unknown("split", split, SPLITS)
-
-
-@functools.cache
-def _load_mazes(size: int, split: str, version: str) -> tuple[Maze, ...]:
-    blocks = read_asset(mazes_file(size, split), version).split("\n\n")
-    prefix = "" if version == VERSION else f"{version}-"
-    mazes = (parse_maze(block, f"{prefix}{size}-{split}-{index:02d}") for index, block in enumerate(blocks))
-    return tuple(dataclasses.replace(maze, kind="dfs") for maze in mazes)
 
 
 def read_asset(name: str, version: str = VERSION) -> str:

@@ -141,7 +141,7 @@ class MazeOptions(MapOptions, DrawnOptions):
     split: Annotated[
         str,
         OneOf(*ALL_SPLITS),
-        Doc("The benchmark's training mazes, unseen ones to choose agents on (tracks of v3), or those for results."),
+        Doc("The benchmark's training mazes, unseen ones to choose agents on (tracks), or those for results."),
     ] = "train"
     # A path, or in Python also mazes and arrays (`mazebench.maps.selection.Maps`).
     maps: Annotated[Any, Doc("Mazes of your own: a text, picture, array or ROS map, or a folder of them.")] = None

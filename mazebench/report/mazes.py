@@ -6,14 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mazebench.maps.benchmark import load_mazes
+from mazebench.maps.benchmark import load_kind_mazes, load_mazes
 from mazebench.maps.maze import Cell, Maze
 from mazebench.report.results import ReportedResult
 from mazebench.report.settings import known_levels
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.shown_map import show_map
-from mazebench.tasks.tracks import TRACKS
 
 
 def real_walls(result: ReportedResult, maze: str, results: Sequence[ReportedResult]) -> np.ndarray | None:
@@ -24,10 +23,7 @@ def real_walls(result: ReportedResult, maze: str, results: Sequence[ReportedResu
     """
     setting = result.setting
     if setting.split != "custom":
-        if setting.track:
-            mazes = TRACKS[setting.track].mazes((setting.level,), setting.split)
-        else:
-            mazes = load_mazes(setting.size, setting.split)
+        mazes = load_kind_mazes(setting.split) if setting.track else load_mazes(setting.size, setting.split)
         return next((known.walls for known in mazes if known.name == maze), None)
     for other in results:
         is_same = (other.setting.mazes, other.setting.size) == (setting.mazes, setting.size)

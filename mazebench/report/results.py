@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from mazebench.errors import InputError, remark, unknown
-from mazebench.maps.benchmark import KINDS_VERSION, TRACKS_VERSION, VERSION, manifest_hash
+from mazebench.maps.benchmark import KINDS_VERSION, VERSION, manifest_hash
 from mazebench.report.settings import Setting, make_setting
 from mazebench.results.metrics import ON_TIME_METRICS, by_fact, scores
 from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, Result, load_result
@@ -204,7 +204,7 @@ def _drop_repeats(results: list[ReportedResult]) -> list[ReportedResult]:
 
 
 def _require_installed_benchmark(results: list[ReportedResult]) -> None:
-    installed = [(version, manifest_hash(version)) for version in (VERSION, TRACKS_VERSION, KINDS_VERSION)]
+    installed = [(version, manifest_hash(version)) for version in (VERSION, KINDS_VERSION)]
     folders: dict[tuple[str, str], list[str]] = {}
     for result in results:
         folders.setdefault(result.benchmark, []).append(str(result.folder))

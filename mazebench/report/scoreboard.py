@@ -1,4 +1,4 @@
-"""The scoreboards of the tracks, one for v3 and one for v2: tables of agents, made from entries that are kept.
+"""The scoreboard of the tracks: a table of agents, made from entries that are kept.
 
 `python -m mazebench.report.scoreboard RESULTS... docs/scoreboard.md` keeps an entry of each agent in RESULTS in the
 folder docs/scoreboard, one file each, and writes the table of all entries into the page, between two comments. The
@@ -18,7 +18,7 @@ import pydantic
 
 from mazebench.constants import ON_TIME
 from mazebench.errors import InputError, describe_fault
-from mazebench.maps.benchmark import KINDS_VERSION, TRACKS_VERSION, manifest_hash
+from mazebench.maps.benchmark import load_kind_mazes, manifest_hash
 from mazebench.report.table import escape_markdown
 from mazebench.results.intervals import mean_interval
 from mazebench.results.metrics import is_on_time
@@ -27,7 +27,7 @@ from mazebench.results.reading import SUITE, Result, find_parts, load_result, re
 from mazebench.results.records import Name, Share, column
 from mazebench.storage.files import make_folder, open_whole, read_at_most
 from mazebench.storage.json_files import write_json
-from mazebench.tasks.tracks import TRACKS, tracks_of
+from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 from mazebench.tasks.trials import frozen_trials
 
@@ -35,6 +35,7 @@ BEGIN, END = "<!-- scoreboard begins -->\n", "<!-- scoreboard ends -->\n"
 UNTRAINED = "\\*"  # behind the success rates of an agent that learned on maps of another scale
 
 _MAX_ENTRY_BYTES = 2**16
+_PARTS = [f"{track} {level}" for track in TRACKS for level in LEVELS]
 
 
 class _Kept(pydantic.BaseModel):
@@ -64,8 +65,8 @@ class Entry(_Kept):
 
     agent: Name
     privileged: bool
-    benchmark: Name = TRACKS_VERSION
-    parts: dict[str, Part]  # by track and level, as "stale 1"
+    benchmark: Name
+    parts: dict[str, Part]  # by track and level, as "rebuilt 1"
     mean: tuple[Share, Share, Share] | None  # of all episodes, with its 95 % interval; None if parts are missing
     configurations: tuple[Configuration, ...]
 
@@ -78,18 +79,13 @@ class Entry(_Kept):
 
     @property
     def score(self) -> float | None:
-        """What ranks the entry: on v3 the share of all episodes on time by the smaller factor, on v2 the success rate.
-
-        It is None if parts are missing.
-        """
-        if self.mean is None:
-            return None
-        return self.mean[0] if self.benchmark == TRACKS_VERSION else self.on_time(f"{ON_TIME[0]:g}")
+        """The share of all episodes on time by the smaller factor, which ranks the entry; None if parts are missing."""
+        return None if self.mean is None else self.on_time(f"{ON_TIME[0]:g}")
 
     @property
     def missing(self) -> list[str]:
         """The parts that were not played."""
-        return [part for part in _parts(self.benchmark) if part not in self.parts]
+        return [part for part in _PARTS if part not in self.parts]
 
     def on_time(self, factor: str) -> float:
         """Returns the share of the episodes of all parts that are on time by a factor."""
@@ -100,7 +96,7 @@ def read_entries(paths: Iterable[pathlib.Path]) -> list[Entry]:
     """Returns the entries that folders of results make.
 
     Args:
-      paths: runs of the suites `v3` or `tracks`, agents' folders in them, or folders with evaluations of one agent.
+      paths: runs of the suite `v3`, agents' folders in them, or folders with evaluations of one agent.
 
     Raises:
       InputError: if a folder holds anything else than one agent's results of whole tracks, each once.
@@ -131,12 +127,11 @@ def _rank(entry: Entry) -> tuple[float, float, bool, str, str]:
 
 def to_markdown(entries: Sequence[Entry]) -> str:
     """Returns the scoreboard as a table in Markdown."""
-    parts = _parts(entries[0].benchmark) if entries else []
-    lines = [["agent", "mean", "on time", *parts, "configurations", "from"]]
+    lines = [["agent", "mean", "on time", *_PARTS, "configurations", "from"]]
     lines.append(["---"] * len(lines[0]))
     for entry in entries:
         name = escape_markdown(entry.agent) + (" (privileged)" if entry.privileged else "")
-        rates = (_rate(entry, part) for part in parts)
+        rates = (_rate(entry, part) for part in _PARTS)
         lines.append([name, _mean(entry), _on_time(entry), *rates, str(len(entry.configurations)), _origin(entry)])
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
@@ -209,9 +204,8 @@ def _make_entry(folder: pathlib.Path) -> Entry:
     benchmarks = sorted({summary.benchmark for summary in summaries})
     if len(benchmarks) > 1:
         raise InputError(f"{folder}: expected results of one benchmark, found {' and '.join(benchmarks)}")
-    parts = _parts(benchmarks[0])
     mean = None
-    if len(results) == len(parts):  # each has as many episodes
+    if len(results) == len(_PARTS):  # each has as many episodes
         records = [record for result in results.values() for record in result.records]
         estimate = mean_interval(column(records, "success"), column(records, "maze"))
         mean = estimate.value, estimate.low, estimate.high
@@ -225,7 +219,7 @@ def _make_entry(folder: pathlib.Path) -> Entry:
                 on_time=_shares_on_time(results[part]),
                 untrained_scale=results[part].summary.untrained_scale,
             )
-            for part in parts
+            for part in _PARTS
             if part in results
         },
         mean=mean,
@@ -247,7 +241,7 @@ def _part(result: Result) -> str:
     summary = result.summary
     part = f"{summary.track or summary.task} {summary.level or ''}".strip()
     benchmark = summary.benchmark
-    if summary.track not in TRACKS or part not in _parts(benchmark) or summary.split != "eval":
+    if summary.track not in TRACKS or part not in _PARTS or summary.split != "eval":
         raise InputError(f"{result.folder}: expected eval episodes of a track, found {summary.split} {part}")
     if summary.senses:
         raise InputError(f"{result.folder}: expected the senses of the track, found {', '.join(summary.senses)}")
@@ -256,7 +250,7 @@ def _part(result: Result) -> str:
     trials = frozen_trials("local", summary.size, benchmark, "eval")
     if summary.episodes != len(trials):
         raise InputError(f"{result.folder}: expected {len(trials)} episodes, found {summary.episodes}")
-    mazes = TRACKS[summary.track].mazes((summary.level or 0,), "eval")
+    mazes = load_kind_mazes("eval")
     for record, trial in zip(result.records, trials, strict=True):
         episode = trial.episode
         frozen = mazes[episode.maze].name, episode.start, episode.goal, episode.seed
@@ -274,17 +268,12 @@ def _configuration(result: Result) -> Configuration:
     )
 
 
-def _parts(benchmark: str) -> list[str]:
-    return [f"{track} {level}" for track in tracks_of(benchmark) for level in LEVELS]
-
-
 def _rate(entry: Entry, name: str) -> str:
-    """Returns the success rate of a part and, on v3, the share on time; nothing for a part that was not played."""
+    """Returns the success rate and the share on time of a part; nothing for a part that was not played."""
     part = entry.parts.get(name)
     if part is None:
         return ""
-    on_time = f", {part.on_time[f'{ON_TIME[0]:g}']:.2f}" if entry.benchmark == KINDS_VERSION else ""
-    return f"{part.success_rate:.2f}{on_time}{UNTRAINED if part.untrained_scale else ''}"
+    return f"{part.success_rate:.2f}, {part.on_time[f'{ON_TIME[0]:g}']:.2f}{UNTRAINED if part.untrained_scale else ''}"
 
 
 def _mean(entry: Entry) -> str:
@@ -317,7 +306,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         usage="%(prog)s [RESULTS...] PAGE.md\n       %(prog)s --check RESULTS...",
     )
     parser.add_argument("--check", action="store_true", help="say whether RESULTS are complete entries; write nothing")
-    about = "runs of the suites `v3` or `tracks`"
+    about = "runs of the suite `v3`"
     parser.add_argument("paths", nargs="+", type=pathlib.Path, metavar="RESULTS", help=about)
     options = parser.parse_args(arguments)
     try:

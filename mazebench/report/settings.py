@@ -7,12 +7,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from mazebench.errors import unknown
-from mazebench.maps.benchmark import ALL_SPLITS, SIZES
+from mazebench.maps.benchmark import ALL_SPLITS, KINDS_SIZE, SIZES
 from mazebench.options import options_of
 from mazebench.results.records import Record, Summary
 from mazebench.tasks.options import ENDS, TaskOptions
 from mazebench.tasks.perturbations import Perturbations
-from mazebench.tasks.tracks import TRACKS
 
 DEFAULT_LANDMARK_DISTANCE = 5  # cells; the paper's choice wherever it varies something else
 _CUSTOM = "custom"  # the split of mazes that are not the benchmark's
@@ -87,7 +86,7 @@ def make_setting(summary: Summary, records: tuple[Record, ...]) -> Setting:
     name, level = summary.track or "", (summary.level or 0) if summary.track else 0
     track: dict[str, Any] = {"track": name, "level": (level,)} if name else {}
     TaskOptions(task=summary.task, **track, **known_levels(summary.perturbation))  # raises if one is not allowed
-    sizes = (TRACKS[name].sizes[level - 1],) if name else SIZES
+    sizes = (KINDS_SIZE,) if name else SIZES
     if summary.split not in (*ALL_SPLITS, _CUSTOM):
         raise unknown("split", summary.split, (*ALL_SPLITS, _CUSTOM))
     if summary.split in ALL_SPLITS and summary.size not in sizes:

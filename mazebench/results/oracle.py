@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from importlib import resources
 
 from mazebench.errors import InputError
-from mazebench.maps.benchmark import manifest, read_asset
+from mazebench.maps.benchmark import VERSION, manifest, read_asset
 from mazebench.results.metrics import Steps
 from mazebench.tasks.trials import Trial, frozen_trials
 
-# Of steps.json. The manifests of v1 and v2 are older than it; those of later versions name files of their own.
-_SHA256 = "1ddd525d0266e046bafaf30b30bbb6a435991e2b3f9f8a643dd64cb2233b9706"
+# Of steps.json, which holds those of v1. The manifest of v3 names files of its own.
+_SHA256 = "985cc2c63489ed9b02a0a4e92705722864c6477e2c6576576c253c723fd65832"
 
 
 def frozen_oracle_steps(benchmark: str, task: str, size: int, split: str, trials: Sequence[Trial]) -> Steps | None:
@@ -29,9 +29,9 @@ def oracle_file(task: str, size: int, split: str) -> str:
     return f"oracle-{task}-{size}-{split}.json"
 
 
-def oracle_key(benchmark: str, task: str, size: int) -> str:
-    """Returns the name of the oracle's steps in the eval episodes of v1 or v2, in `assets/oracle/steps.json`."""
-    return f"{benchmark}-{task}-{size}"
+def oracle_key(task: str, size: int) -> str:
+    """Returns the name of the oracle's steps in the eval episodes of v1, in `assets/oracle/steps.json`."""
+    return f"{VERSION}-{task}-{size}"
 
 
 @functools.cache
@@ -41,14 +41,14 @@ def _steps_by_seed(benchmark: str, task: str, size: int, split: str) -> dict[int
     if name in manifest(benchmark)["files"]:
         steps = json.loads(read_asset(name, benchmark))["steps"]
     else:
-        steps = _first_steps().get(oracle_key(benchmark, task, size), []) if split == "eval" else []
+        steps = _first_steps().get(oracle_key(task, size), []) if split == "eval" else []
     seeds = [trial.episode.seed for trial in frozen_trials(task, size, benchmark, split)] if steps else []
     return dict(zip(seeds, steps, strict=True))
 
 
 @functools.cache
 def _first_steps() -> dict[str, list[int | None]]:
-    """Returns the steps in the eval episodes of v1 and v2.
+    """Returns the steps in the eval episodes of v1.
 
     Raises:
       InputError: if the file was changed.

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 
 from mazebench.errors import InputError, unknown
+from mazebench.maps.benchmark import KINDS_SIZE, load_kind_mazes
 from mazebench.maps.drawn import FreshMazes, Mazes
 from mazebench.maps.options import MAP_OPTIONS, MazeOptions
 from mazebench.maps.selection import Maps, load_mazes_of
@@ -17,7 +17,6 @@ from mazebench.tasks.context import default_context_size
 from mazebench.tasks.options import (
     EVAL_DISTANCES,
     TASKS,
-    TIME_LIMIT,
     TRAIN_DISTANCES,
     EnvironmentOptions,
     TaskOptions,
@@ -25,12 +24,12 @@ from mazebench.tasks.options import (
     is_own,
 )
 from mazebench.tasks.spec import TaskSpec, check_mazes
+from mazebench.tasks.time_limit import TIME_LIMIT, fitting_time_limit
 from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks.base import DISTANCES
 
 # Of the diameter of a large maze. Few pairs of cells are farther apart, so that they would be long to find.
 _FARTHEST_SHARE = 0.9
-# Agent steps. A metre takes 2 at the top speed, and a quarter turn in each cell 4; the track `far` has as many.
-_STEPS_A_METRE, _STEPS_A_CELL, _SPARE_STEPS = 2, 4, 50
 
 
 def make_spec(
@@ -111,17 +110,19 @@ def build_task(
     default_distances = default_distances or (EVAL_DISTANCES if mazes.split == "eval" else TRAIN_DISTANCES)
     distances = task.distances or _distances(task, chosen, fits_mazes, default_distances)
 
-    # The time limit: the given one, else one in which goals of one's own are reached.
-    time_limit = task.time_limit or TIME_LIMIT
-    if (fits_mazes or mazes.is_drawn) and task.track is None and not task.time_limit:
+    # The time limit: the given one, else one in which goals of one's own are reached. Tracks have their own.
+    time_limit = task.time_limit
+    if task.track is not None:
+        time_limit = 0
+    elif not time_limit:
         cells = task.landmark_distance if task.task == "hierarchical" else max(distances)
-        time_limit = fitting_time_limit(cells, chosen[0].cell_size)
+        is_drawn = fits_mazes or mazes.is_drawn
+        time_limit = fitting_time_limit(cells, chosen[0].cell_size) if is_drawn else TIME_LIMIT
 
     # The context: the given one, else the track's, else the one that is chosen for mazes of this size.
-    size, track = chosen[0].size, None if task.track is None else TRACKS[task.track]
-    context_size = variants.context_size
+    size, context_size = chosen[0].size, variants.context_size
     if context_size == 0:
-        context_size = choose_context_size(size) if track is None else track.context_size(task.level, size)
+        context_size = TRACKS[task.track].pixels_per_cell * size if task.track else choose_context_size(size)
 
     computed = {
         "mazes": chosen,
@@ -141,27 +142,17 @@ def load_task_mazes(task: TaskOptions, mazes: MazeOptions) -> Mazes:
     """
     if task.track is None:
         return load_mazes_of(mazes)
-    track = TRACKS[task.track]
     if mazes.maps is not None or mazes.is_drawn:
-        return load_mazes_of(mazes, default_size=track.sizes[task.level[0] - 1])
+        return load_mazes_of(mazes, default_size=KINDS_SIZE)
     mazes.require_defaults(MAP_OPTIONS, "maps of your own", f"the track {task.track!r}")
-    chosen = track.mazes(task.level, mazes.split)
-    if mazes.size not in (None, chosen[0].size):
-        raise InputError(
-            f"track {task.track!r}, level {task.level[0]}: expected size {chosen[0].size}, found {mazes.size}; "
-            f"levels 1 to 3 have sizes {', '.join(map(str, track.sizes))}"
-        )
-    return chosen
-
-
-def fitting_time_limit(num_cells: int, cell_size: float) -> int:
-    """Returns the agent steps in which a goal `num_cells` away is reached with some to spare, at least 100."""
-    return max(TIME_LIMIT, math.ceil((_STEPS_A_METRE * cell_size + _STEPS_A_CELL) * num_cells) + _SPARE_STEPS)
+    if mazes.size not in (None, KINDS_SIZE):
+        raise InputError(f"track {task.track!r}: expected size {KINDS_SIZE}, found {mazes.size}")
+    return load_kind_mazes(mazes.split)
 
 
 def _distances(task: TaskOptions, mazes: Mazes, fits_mazes: bool, default: tuple[int, ...]) -> tuple[int, ...]:
     """Returns the distances in cells of a task that names none."""
-    of_track = TRACKS[task.track].distances(min(task.level)) if task.track is not None else ()
+    of_track = DISTANCES if task.track is not None else ()
     if not fits_mazes or isinstance(mazes, FreshMazes):
         return of_track or default
 

@@ -11,6 +11,7 @@ from mazebench.errors import InputError
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.streams import Stream
 from mazebench.tasks.tracks import TRACKS
 
 _SEEDS = 2**31
@@ -29,9 +30,9 @@ class Episode:
     yaw: float  # rad, of the body at the start
     seed: int  # of everything else that is drawn in the episode: perturbations, and goals after the first one
 
-    def stream(self, index: int) -> np.random.Generator:
-        """Returns a new generator of random stream `index`; streams with different indices are independent."""
-        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(index,)))
+    def stream(self, stream: Stream) -> np.random.Generator:
+        """Returns a new generator of a random stream; different streams are independent."""
+        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(int(stream),)))
 
 
 def sample_episode(spec: TaskSpec, rng: np.random.Generator) -> Episode:
@@ -50,7 +51,7 @@ def _sample_episode(spec: TaskSpec, rng: np.random.Generator) -> Episode:
     index = int(rng.integers(len(spec.mazes)))
     maze = spec.mazes[index]
     if spec.track is not None and isinstance(spec.mazes, FreshMazes):
-        TRACKS[spec.track].check(maze, spec.level)
+        TRACKS[spec.track].require(maze, spec.level)
     start, goal = spec.ends(maze)
     if start is None or goal is None:
         pair_rng = np.random.default_rng([_FIXED_PAIR_SEED, index]) if spec.pairs == "fixed" else rng

@@ -10,12 +10,12 @@ from dm_env import specs
 from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.imperfections import episode_level, imperfections
-from mazebench.tasks.odometry import NOISE_STREAM, NoisyMotion
+from mazebench.tasks.odometry import NoisyMotion
 from mazebench.tasks.perturbations.base import StateError
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.base import Sensor, Worlds
-from mazebench.tasks.sensors.lidar_noise import STREAM
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.streams import Stream
 from mazebench.world.simulation import STATE_SIZE
 
 
@@ -35,13 +35,13 @@ def state_errors(spec: TaskSpec, episode: Episode) -> list[StateError]:
         return []
     errors = [perturbation.state_error(level, rng) for perturbation, level, rng in imperfections(spec, episode)]
     alpha = spec.odometry_noise_at(episode_level(spec, episode))
-    noise = NoisyMotion(alpha, episode.stream(NOISE_STREAM)) if alpha else None
+    noise = NoisyMotion(alpha, episode.stream(Stream.MOTION_NOISE)) if alpha else None
     return [error for error in (noise, *errors) if error is not None]
 
 
 def lidar_noise(spec: TaskSpec, episode: Episode) -> np.random.Generator | None:
     """Returns what draws the noise on the lidar's readings in `episode`; None if nothing is drawn."""
-    return episode.stream(STREAM) if "lidar" in spec.sensors and spec.lidar.is_random else None
+    return episode.stream(Stream.LIDAR_NOISE) if "lidar" in spec.sensors and spec.lidar.is_random else None
 
 
 class OpenSensors:

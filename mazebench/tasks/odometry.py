@@ -10,7 +10,6 @@ import numpy as np
 from mazebench.constants import STEP_TIME
 from mazebench.world.angles import wrap_angle
 
-NOISE_STREAM = 14  # number of the episode's random stream that `NoisyMotion` draws from; no other one draws from it
 _SCALES = (0.9, 1.1)  # lowest and highest of an episode's scale
 _HEADING_WALK = math.radians(2.0)  # rad per root second
 _X, _Y, _YAW, _FORWARD, _LEFT, _YAW_RATE = 0, 1, 5, 6, 7, 11  # indices in a state

@@ -16,18 +16,19 @@ from mazebench.tasks.perturbations import Perturbations, perturbation_levels
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.base import SensorOptions
 from mazebench.tasks.start_goal import cell_of_end, end_text
+from mazebench.tasks.time_limit import track_time_limit
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
-from mazebench.world.lidar import LidarModel
+from mazebench.world.lidar import TURTLEBOT3, LidarModel
 
 TASKS = ("local", "hierarchical")
 TRAIN_DISTANCES = tuple(range(1, 6))
 EVAL_DISTANCES = tuple(range(1, 16))
 ENDS = ("start", "goal")
 HIDEABLE = ("map", "goal")
-TIME_LIMIT = 100  # agent steps
 _FIRST_LEVEL = LEVELS[:1]
 _LIDAR = "lidar"  # the sensor that every track offers
+_SHOWING_POSE = ("top", "chase")  # the sensors that show where the body is
 
 Pairs = Annotated[
     str,
@@ -150,13 +151,13 @@ class TaskOptions(Perturbations, SensorOptions):
     @property
     def lidar(self) -> LidarModel:
         """What the sensor `lidar` measures: as the option says, or the track."""
-        return TRACKS[self.track].lidar if self.lidar_noise is None and self.track is not None else super().lidar
+        return TURTLEBOT3 if self.lidar_noise is None and self.track is not None else super().lidar
 
     def odometry_noise_at(self, level: int) -> float:
         """Returns alpha of the noise on the observed motion at a level: as the option says, or the track."""
         if self.odometry_noise is not None or self.track is None or self.exact_pose:
             return self.odometry_noise or 0.0
-        return TRACKS[self.track].odometry_noise(level)
+        return TRACKS[self.track].odometry_noise[level - 1]
 
     def ends(self, maze: Maze) -> tuple[Cell | None, Cell | None]:
         """Returns the start and the goal of all episodes in a maze; None for one that each episode draws.
@@ -193,7 +194,8 @@ class TaskOptions(Perturbations, SensorOptions):
 
     def _check_track(self, name: str) -> None:
         """Raises `InputError` if an option contradicts the track called `name`."""
-        if self.time_limit not in (0, TIME_LIMIT):
+        longest = track_time_limit(name, max(self.distances)) if self.distances else 0
+        if self.time_limit not in (0, longest):
             raise InputError(f"track {name!r}: has its own time limit, found time_limit {self.time_limit}")
         for option_name, value in {"task": "local", "start": None, "goal": None}.items():
             found = getattr(self, option_name)
@@ -202,9 +204,9 @@ class TaskOptions(Perturbations, SensorOptions):
         for perturbation, strength in perturbation_levels(self).items():
             if strength:
                 raise InputError(f"track {name!r}: expected no perturbation, found {perturbation} {strength}")
-        if self.exact_pose and not any(map(TRACKS[name].hides_pose, self.level)):
+        if self.exact_pose and not TRACKS[name].hides_pose:
             raise InputError(f"track {name!r}: expected no exact_pose, for the pose is exact; it belongs to lost poses")
-        for sensor in TRACKS[name].refused_sensors:
+        for sensor in _SHOWING_POSE if TRACKS[name].hides_pose else ():
             if sensor in self.sensors:
                 raise InputError(f"track {name!r}: expected sensors without {sensor!r}, which shows where the body is")
 

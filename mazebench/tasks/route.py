@@ -10,14 +10,13 @@ import numpy as np
 
 from mazebench.maps.maze import Cell, Maze, path_through_walls
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.imperfections import time_limit
 from mazebench.tasks.perturbations.base import ShownMap
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.streams import Stream
+from mazebench.tasks.time_limit import track_time_limit
 
 # What an agent step led to.
 Event = enum.Enum("Event", ["NONE", "LANDMARK", "REACHED", "TIMEOUT"])
-
-LATER_GOALS_STREAM = 3  # number of the episode's random stream that draws the goals after the first one
 
 
 class Route:
@@ -84,9 +83,12 @@ def plan_route(spec: TaskSpec, episode: Episode, shown: ShownMap) -> Route:
     Landmarks are cells of the maze, so they are planned before the change of perspective.
     """
     if spec.task == "local":
-        later_goals = _LaterGoals(spec.mazes[episode.maze], spec.distances, episode.stream(LATER_GOALS_STREAM))
+        maze, time_limit = spec.mazes[episode.maze], spec.time_limit
+        if spec.track is not None:
+            time_limit = track_time_limit(spec.track, maze.distance(episode.start, episode.goal))
+        later_goals = _LaterGoals(maze, spec.distances, episode.stream(Stream.LATER_GOALS))
         next_goal = later_goals if spec.num_goals > 1 else None
-        return Route([episode.start, episode.goal], time_limit(spec, episode), spec.num_goals, next_goal)
+        return Route([episode.start, episode.goal], time_limit, spec.num_goals, next_goal)
     path = path_through_walls(shown.walls, episode.start, episode.goal)
     return Route([*path[: -1 : spec.landmark_distance], path[-1]], spec.time_limit)
 

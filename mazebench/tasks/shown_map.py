@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mazebench.maps.maze import Cell
+from mazebench.maps.maze import Cell, path_through_walls
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, build_context
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.imperfections import imperfections
@@ -22,6 +22,11 @@ def show_map(spec: TaskSpec, episode: Episode) -> ShownMap:
     for perturbation, level, rng in imperfections(spec, episode):
         shown = perturbation.show(shown, level, (episode.start, episode.goal), rng)
     return shown
+
+
+def is_blocked(walls: np.ndarray, shown: np.ndarray, ends: tuple[Cell, Cell]) -> bool:
+    """Returns whether a shortest path on the shown map leads through a wall of the world; both `[N, N]` bool."""
+    return bool(walls[tuple(np.transpose(path_through_walls(shown, *ends)))].any())
 
 
 def leg_context(spec: TaskSpec, shown: ShownMap, start: Cell, goal: Cell) -> np.ndarray:

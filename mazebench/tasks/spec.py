@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pydantic import InstanceOf
 
-from mazebench.constants import TASK_VERSION
+from mazebench.constants import TASK_VERSION, TRACKS_VERSION
 from mazebench.errors import InputError
 from mazebench.maps.drawn import FreshMazes, Mazes
 from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, Maze, require_one_size
 from mazebench.maps.options import THIN_WALLS
 from mazebench.options import options
 from mazebench.tasks.options import ENDS, TaskOptions, Variants
+from mazebench.tasks.time_limit import track_time_limit
 from mazebench.tasks.tracks import TRACKS
 
 MIN_CONTEXT_SIZE = 3
@@ -22,7 +23,8 @@ class TaskSpec(TaskOptions, Variants):
     """A navigation task on mazes of one size and scale, which the dm_env, Gymnasium and vector environments all play.
 
     `mazebench.tasks.build` computes it from options. It is complete: its distances, time limit, context size and
-    sensors are those that are played. It holds plain values: no models, no simulation.
+    sensors are those that are played. The time limit is 0 on a track, where it depends on the distance. A task holds
+    plain values: no models, no simulation.
 
     Raises:
       InputError: if a value is not allowed, or the mazes do not fit it.
@@ -48,7 +50,7 @@ class TaskSpec(TaskOptions, Variants):
             raise InputError(f"expected num_goals 1 beside a goal, found {self.num_goals}")
         if not self.context_size >= MIN_CONTEXT_SIZE:
             raise InputError(f"expected context_size from {MIN_CONTEXT_SIZE} to {MAX_SIZE}, found {self.context_size}")
-        if self.time_limit < 1:
+        if self.time_limit < 1 and self.track is None:
             raise InputError(f"expected time_limit of at least 1, found {self.time_limit}")
         if self.task == "local":
             self._check_distances()
@@ -59,7 +61,7 @@ class TaskSpec(TaskOptions, Variants):
             found = getattr(self, option_name)
             if found != value:
                 raise InputError(f"track {name!r}: expected {option_name} {value!r}, found {found!r}")
-        context_size = TRACKS[name].context_size(self.level, self.size)
+        context_size = TRACKS[name].pixels_per_cell * self.size
         if self.context_size != context_size:
             raise InputError(f"track {name!r}: expected context_size {context_size}, found {self.context_size}")
         if self.sensors != self.observed_sensors:
@@ -100,9 +102,14 @@ class TaskSpec(TaskOptions, Variants):
         return self.mazes[0].cell_size
 
     @property
+    def longest_time_limit(self) -> int:
+        """The agent steps that a leg may take; on a track, those to the farthest goals."""
+        return self.time_limit if self.track is None else track_time_limit(self.track, max(self.distances))
+
+    @property
     def version(self) -> int:
         """The version of what an episode is."""
-        return TASK_VERSION if self.track is None else TRACKS[self.track].version
+        return TASK_VERSION if self.track is None else TRACKS_VERSION
 
     @property
     def has_legs(self) -> bool:
@@ -131,7 +138,7 @@ def check_mazes(task: TaskOptions, mazes: Mazes) -> None:
         raise InputError(f"track {task.track!r}: expected cells of 1 m, found {cell_size} m")
     for maze in mazes:
         if task.track is not None:
-            TRACKS[task.track].check(maze, task.level)
+            TRACKS[task.track].require(maze, task.level)
         if len(maze.free_cells) < 2:
             raise InputError(f"{maze.name}: expected two free cells for a start and a goal, found one")
         start, goal = task.ends(maze)

@@ -10,13 +10,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from mazebench.constants import EPISODES_PER_DISTANCE
-from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, VERSION, read_asset
+from mazebench.maps.benchmark import KINDS_VERSION, MAZES_PER_SPLIT, SIZES, VERSION, read_asset
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.episode import Episode, make_episode, sample_pair
 from mazebench.tasks.options import EVAL_DISTANCES
 from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.tracks import TRACKS
 from mazebench.world.mjcf import BODY_RADIUS
 
 COLUMNS = ("maze", "start_row", "start_column", "goal_row", "goal_column", "distance", "yaw", "seed", "shortest_path")
@@ -41,7 +40,7 @@ def episodes_file(task: str, size: int, split: str = "eval") -> str:
 def frozen_trials(task: str, size: int, version: str = VERSION, split: str = "eval") -> tuple[Trial, ...]:
     """Returns the frozen episodes of one task, size and split.
 
-    v1 has 1,500 of the local task and 20 of the hierarchical one; v2 has 200 and v3 240, which tracks share.
+    v1 has 1,500 of the local task and 20 of the hierarchical one; v3 has 240, which tracks share.
     """
     rows = csv.DictReader(read_asset(episodes_file(task, size, split), version).splitlines())
     return tuple(_trial_of_row(row) for row in rows)
@@ -74,7 +73,7 @@ def select_trials(
       InputError: if no two cells of a maze are a wanted distance apart.
     """
     if frozen_split is not None and spec.track is not None:
-        trials = frozen_trials("local", spec.size, TRACKS[spec.track].benchmark, frozen_split)
+        trials = frozen_trials("local", spec.size, KINDS_VERSION, frozen_split)
         return [trial for trial in trials if trial.distance in spec.distances]
     if frozen_split is not None and spec.task == "hierarchical":
         return list(frozen_trials(spec.task, spec.size))

@@ -1,4 +1,4 @@
-"""What may be wrong with what the agent is shown: one file a perturbation, and the table of all of them."""
+"""What may be wrong with what the agent is shown: one file per perturbation, and the table of all of them."""
 
 from __future__ import annotations
 
@@ -16,9 +16,7 @@ from mazebench.tasks.perturbations.warp import MapWarp
 class Perturbations:
     """The table of perturbations, as options of a task; they are applied in this order. Level 0 switches one off.
 
-    Each draws from a random stream of its own. Streams 0 to 2 are taken by these, stream 3 by the goals after the first
-    one (`mazebench.tasks.route`), streams 4 to 12 by the tracks, streams 13 and 14 by the noise of the lidar and of the
-    observed motion; a new perturbation takes 15, 16, ...
+    Each draws from a random stream of its own (`mazebench.tasks.streams`).
     """
 
     map_flip: Annotated[float, MapFlip()] = 0.0

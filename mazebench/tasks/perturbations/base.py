@@ -13,6 +13,7 @@ from annotated_types import Ge, GroupedMetadata, Le
 
 from mazebench.maps.maze import Cell, Maze
 from mazebench.options import Doc
+from mazebench.tasks.streams import Stream
 
 # Changes an observed state `[12]` float64 in place. It is called once for each observation of one episode. It is an
 # object that can be copied and pickled in the middle of an episode, so a function inside of another one will not do.
@@ -71,10 +72,10 @@ class Perturbation(GroupedMetadata):
     metadata of an option, it is the range of the level and what it means.
     """
 
-    help: ClassVar[str]  # what the level means, in one line
+    help: ClassVar[str]  # what the level means, in one line; of an option
     lowest: ClassVar[float] = 0
-    highest: ClassVar[float]
-    stream: ClassVar[int]  # number of the episode's random stream that it draws from; no other one draws from it
+    highest: ClassVar[float]  # of an option
+    stream: ClassVar[Stream]  # that it draws from; no other one draws from it
 
     def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
         """Returns the map that the agent is shown instead of `shown`; `ends` are the episode's start and goal."""

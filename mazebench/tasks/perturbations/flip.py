@@ -9,6 +9,7 @@ import numpy as np
 
 from mazebench.maps.maze import Cell
 from mazebench.tasks.perturbations.base import Perturbation, ShownMap
+from mazebench.tasks.streams import Stream
 
 
 class MapFlip(Perturbation):
@@ -16,7 +17,7 @@ class MapFlip(Perturbation):
 
     help = "Probability of each inner cell of the shown map, except start and goal, to be flipped."
     highest = 1
-    stream = 0
+    stream = Stream.MAP_FLIP
 
     def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
         return dataclasses.replace(shown, walls=flip(shown.walls, level, ends, rng))

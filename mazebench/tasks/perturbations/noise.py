@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 
 from mazebench.tasks.perturbations.base import Perturbation, StateError
+from mazebench.tasks.streams import Stream
 
 
 class PositionNoise(Perturbation):
@@ -14,7 +15,7 @@ class PositionNoise(Perturbation):
 
     help = "Standard deviation of the noise on x and y of each observation, in metres."
     highest = 1000  # m; more would be a mistake
-    stream = 2
+    stream = Stream.POSITION_NOISE
 
     def state_error(self, level: float, rng: np.random.Generator) -> StateError:
         return NormalNoise(level, rng)

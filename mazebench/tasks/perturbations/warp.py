@@ -10,6 +10,7 @@ import numpy as np
 from mazebench.maps.homography import warp_cell, warp_points, warp_walls
 from mazebench.maps.maze import Cell
 from mazebench.tasks.perturbations.base import Drawing, Perturbation, ShownMap
+from mazebench.tasks.streams import Stream
 
 # If every corner moves by less than this share of the side, the four corners stay a convex quadrilateral.
 MAX_WARP = 0.25
@@ -20,7 +21,7 @@ class MapWarp(Perturbation):
 
     help = "Largest shift of each corner of the shown map, as a share of its side."
     highest = MAX_WARP
-    stream = 1
+    stream = Stream.MAP_WARP
 
     def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
         return dataclasses.replace(shown, drawing=Perspective(random_homography(len(shown.walls), level, rng)))

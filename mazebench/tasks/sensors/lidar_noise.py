@@ -12,7 +12,6 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.world.lidar import NUM_RAYS, TURTLEBOT3, LidarModel
 
-STREAM = 13  # number of the episode's random stream that the noise is drawn from; no other one draws from it
 _NAMED = {"turtlebot3": TURTLEBOT3}
 
 

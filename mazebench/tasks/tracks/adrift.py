@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mazebench.tasks.perturbations.base import Perturbation
-from mazebench.tasks.tracks.buildings import BuildingTrack
-from mazebench.tasks.tracks.lost import Lost
+import numpy as np
+
+from mazebench.tasks.odometry import Odometry, corrupted_odometry
+from mazebench.tasks.perturbations.base import Perturbation, StateError
+from mazebench.tasks.streams import Stream
+from mazebench.tasks.tracks.base import Track
+from mazebench.tasks.tracks.building import HiddenStart
 from mazebench.tasks.tracks.rebuilt import MovedDoors
 
 _BLOCKED = (0.7, 0.7, 0.85)  # share of the shortest paths on the map, by level
 
 
-class Adrift(BuildingTrack):
-    """Doors have moved, and the pose counts from the place and the heading at the first step, as on `lost`."""
+class Adrift(Track):
+    """Doors have moved, and the pose counts from the place and the heading at the first step."""
 
     help = "Doors have moved since the map was drawn, and the pose is odometry, which does not tell the place on it."
     levels = (
@@ -22,14 +26,22 @@ class Adrift(BuildingTrack):
         "doors have moved: .85 of the paths are blocked; the odometry drifts: its scale is off by up to 10 %, its "
         "heading walks by 2 degrees per root second",
     )
-    refused_sensors = Lost.refused_sensors
-    spare_steps = 150  # so that a lost robot can look for its place
+    hides_pose = True
+    odometry_noise = (0.01, 0.05, 0.2)
 
     def parts(self, level: int) -> Sequence[tuple[Perturbation, float]]:
-        return (MovedDoors(), _BLOCKED[level - 1]), (Lost(), level)
+        return (MovedDoors(), _BLOCKED[level - 1]), *lost_pose(level)
 
-    def hides_pose(self, level: int) -> bool:
-        return True
 
-    def odometry_noise(self, level: int) -> float:
-        return (0.01, 0.05, 0.2)[level - 1]
+def lost_pose(level: int) -> Sequence[tuple[Perturbation, float]]:
+    """Returns what is wrong with the pose at a level; from level 2 on the start is unknown, at level 3 it drifts."""
+    return (LostPose(), level), *(((HiddenStart(), 1),) if level >= 2 else ())
+
+
+class LostPose(Perturbation):
+    """Counts the observed pose from the place and the heading at the first step; from level 3 on it drifts."""
+
+    stream = Stream.LOST_POSE
+
+    def state_error(self, level: float, rng: np.random.Generator) -> StateError:
+        return corrupted_odometry(rng) if level >= 3 else Odometry(rng)

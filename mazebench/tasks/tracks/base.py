@@ -1,105 +1,38 @@
-"""What a track is: a named way in which the map or the senses are imperfect, and the task in which it is measured."""
+"""A track: a named way in which the map or the senses are imperfect, and the task in which it is measured."""
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Sequence
 from typing import ClassVar
 
-from mazebench.constants import TRACKS_VERSION
-from mazebench.errors import InputError
-from mazebench.maps.benchmark import load_track_mazes
-from mazebench.maps.maze import Cell, Maze
-from mazebench.tasks.perturbations.base import Perturbation, ShownMap
-from mazebench.world.lidar import LidarModel
+from mazebench.maps.maze import Maze
+from mazebench.tasks.perturbations.base import Perturbation
 
 LEVELS = (1, 2, 3)
+DISTANCES = tuple(range(15, 41))  # cells between start and goal
 
 
-class Track(Perturbation):
+class Track(abc.ABC):
     """One way in which the map or the senses are imperfect, in three levels, and the task in which it is measured.
 
-    A track is played as the local task with one goal, and offers the sensor `lidar`. It fixes mazes, context size and
-    time limit, so that results of one track and level can be compared. A subclass overrides what its imperfection is
-    made of: `show`, `state_error`, or both, which take the level from 1 to 3; or `parts`, where several things are
-    wrong at once.
+    A track is played as the local task with one goal, in mazes of 31 x 31 cells of several kinds. It offers the sensor
+    `lidar`, that of a TurtleBot3. It fixes mazes, distances, context size and time limit, so that results of one track
+    and level can be compared.
     """
 
-    version: ClassVar[int] = TRACKS_VERSION  # of the benchmark that the track belongs to
+    help: ClassVar[str]  # what is imperfect, in one line
     levels: ClassVar[tuple[str, str, str]]  # what each level means, in words
-    sizes: ClassVar[tuple[int, int, int]] = (13, 13, 13)  # N, cells a side of the benchmark's mazes, by level
-    refused_sensors: ClassVar[tuple[str, ...]] = ()  # those that would give away what the track hides
-    lidar: ClassVar[LidarModel] = LidarModel()
+    hides_pose: ClassVar[bool] = False  # whether the observed pose is odometry, which does not tell where the body is
+    odometry_noise: ClassVar[tuple[float, float, float]] = (0.0, 0.0, 0.0)  # alpha of `NoisyMotion`, by level
+    pixels_per_cell: ClassVar[int] = 1  # of the shown map, along each axis
 
-    @property
-    def benchmark(self) -> str:
-        """The name of the benchmark that the track belongs to, as "v2"."""
-        return f"v{self.version}"
-
+    @abc.abstractmethod
     def parts(self, level: int) -> Sequence[tuple[Perturbation, float]]:
-        """Returns what is wrong at a level, in the order in which it applies; each part has a random stream."""
-        return ((self, level),)
+        """Returns what is wrong at a level with the strength of each part, in the order in which they apply."""
 
-    def odometry_noise(self, level: int) -> float:
-        """Returns alpha of the noise on the observed motion; see `mazebench.tasks.odometry.NoisyMotion`."""
-        return 0.0
-
-    def hides_pose(self, level: int) -> bool:
-        """Returns whether the observed pose does not tell where on the map the body is."""
-        return False
-
-    def mazes(self, levels: Sequence[int], split: str) -> tuple[Maze, ...]:
-        """Returns the benchmark's mazes for some levels.
-
-        Raises:
-          InputError: if the levels are not played in mazes of one size.
-        """
-        sizes = [self.sizes[level - 1] for level in levels]
-        if len(set(sizes)) > 1:
-            raise InputError(
-                f"expected levels in mazes of one size, found levels {_in_words(levels)} with sizes {_in_words(sizes)}"
-            )
-        return self._load_mazes(sizes[0], split)
-
-    def _load_mazes(self, size: int, split: str) -> tuple[Maze, ...]:
-        return load_track_mazes(size, split)
-
-    def distances(self, level: int) -> tuple[int, ...]:
-        """Returns the distances between start and goal that are drawn, in cells."""
-        return tuple(range(3, 21))
-
-    def context_size(self, levels: Sequence[int], size: int) -> int:
-        """Returns M for mazes of `size` cells a side.
-
-        Raises:
-          InputError: if the levels have contexts of different sizes.
-        """
-        sizes = [self._context_size(level, size) for level in levels]
-        if len(set(sizes)) > 1:
-            raise InputError(
-                f"expected levels with one context_size, found levels {_in_words(levels)} with {_in_words(sizes)}"
-            )
-        return sizes[0]
-
-    def _context_size(self, level: int, size: int) -> int:
-        return size
-
-    def time_limit(self, level: int, distance: int) -> int:
-        """Returns the agent steps of an episode whose goal is `distance` cells away."""
-        return 200
-
-    def check(self, maze: Maze, levels: Sequence[int]) -> None:
+    def require(self, maze: Maze, levels: Sequence[int]) -> None:
         """Raises `InputError` if the track can't be played in `maze`."""
-
-    def facts(self, maze: Maze, shown: ShownMap, ends: tuple[Cell, Cell]) -> dict[str, bool | str]:
-        """Returns what records say of an episode beside its outcome; summaries report the groups.
-
-        Args:
-          maze: the true one.
-          shown: the map that the agent is shown.
-          ends: the start and the goal.
-        """
-        return {}
-
-
-def _in_words(numbers: Sequence[int]) -> str:
-    return ", ".join(map(str, numbers))
+        for level in levels:
+            for part, strength in self.parts(level):
+                part.require(maze, strength)

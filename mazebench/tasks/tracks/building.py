@@ -10,10 +10,11 @@ import numpy as np
 from mazebench.maps.maze import Cell
 from mazebench.tasks.context import LOCAL_MAP, START
 from mazebench.tasks.perturbations.base import Drawing, Perturbation, ShownMap
-from mazebench.tasks.tracks.buildings import BuildingTrack
+from mazebench.tasks.streams import Stream
+from mazebench.tasks.tracks.base import Track
 
 
-class Building(BuildingTrack):
+class Building(Track):
     """Shows the building as it is. The pose is exact in the building's frame, of which the sheet need not tell."""
 
     help = "The map is right; the sheet that it is drawn on may be turned or mirrored."
@@ -35,8 +36,7 @@ class TurnedSheet(Perturbation):
     turns: bool
     mirrors: bool
 
-    help = "The sheet is turned or mirrored."
-    stream = 10
+    stream = Stream.TURNED_SHEET
 
     def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
         quarters, is_mirrored = int(rng.integers(4)), bool(rng.integers(2))
@@ -82,8 +82,7 @@ class _Sheet(Drawing):
 class HiddenStart(Perturbation):
     """Gives neither the mark of the start nor the map around it: planes 1 and 3 of the context are zero."""
 
-    help = "The start is unknown."
-    stream = 12  # it draws nothing
+    stream = Stream.HIDDEN_START
 
     def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
         return dataclasses.replace(shown, hidden=(LOCAL_MAP, START))

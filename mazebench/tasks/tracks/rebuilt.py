@@ -12,7 +12,8 @@ from mazebench.maps.benchmark import KINDS_SIZE
 from mazebench.maps.doors import door_slots, num_swappable, swap_doors
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.perturbations.base import Perturbation, ShownMap
-from mazebench.tasks.tracks.buildings import BuildingTrack
+from mazebench.tasks.streams import Stream
+from mazebench.tasks.tracks.base import Track
 
 # How many doors of a maze of 31 x 31 cells move, by kind, so that this share of the shortest paths on the map is
 # blocked in the maze (`python -m benchmarks.v3_checks swaps`). Mazes of no kind are taken for houses.
@@ -27,7 +28,7 @@ SWAPS: dict[str, dict[float, int]] = {
 _DEFAULT_KIND = "house"
 
 
-class Rebuilt(BuildingTrack):
+class Rebuilt(Track):
     """Shows a building in which some doors are closed that are open in the world, and as many are open that are closed.
 
     The pose is exact.
@@ -47,8 +48,7 @@ class Rebuilt(BuildingTrack):
 class MovedDoors(Perturbation):
     """Shows an earlier state of the building; the level is the share of shortest paths on the map that are blocked."""
 
-    help = "Doors have moved since the map was drawn."
-    stream = 9
+    stream = Stream.MOVED_DOORS
 
     def require(self, maze: Maze, level: float) -> None:
         needed, movable = num_swaps(maze, level), num_swappable(maze) - 2  # start and goal may be doors

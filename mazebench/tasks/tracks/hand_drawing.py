@@ -1,4 +1,11 @@
-"""The track `sketch`: the map as it is drawn by hand, bent, stretched along each axis, with thick or thin walls."""
+"""A map as it is drawn by hand: a grey picture of 2 N x 2 N pixels.
+
+- A smooth displacement bends the maze. Its largest value is the level's.
+- Each axis is scaled by 0.85 to 1.15, where 1.15 fills the sheet. The drawing lies anywhere on the sheet.
+- Walls are drawn up to a pixel thicker or thinner, where a cell is two pixels.
+- A pixel has the share of wall in it, to 8 bits. The paper around the maze is wall.
+- Marks are displaced as the maze is, and are never inside a wall.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +14,9 @@ import dataclasses
 import numpy as np
 
 from mazebench.maps.maze import Cell
-from mazebench.tasks.perturbations.base import Drawing, ShownMap
-from mazebench.tasks.tracks.base import Track
+from mazebench.tasks.perturbations.base import Drawing
 
-DISPLACEMENTS = (0.5, 1.0, 1.5)  # cells, the largest one at each level
+DISPLACEMENTS = (0.5, 1.0, 1.5)  # cells, the largest one at each level of `rough`
 PIXELS = 2  # pixels of the picture per cell of the maze, along each axis
 LARGEST_STRETCH = 0.15  # each axis is scaled by 1 - this to 1 + this
 LARGEST_THICKENING = 0.5  # cells, one pixel where a cell is PIXELS of them; negative for thin walls
@@ -20,32 +26,6 @@ _REACH = 3 * SIGMA  # cells outside of the maze whose noise is still smoothed in
 _SAMPLES = 12  # sample points per cell along each axis that are drawn; more than 5 a pixel at any stretch
 _NODES = 4  # points per cell along each axis where the displacement's size and folds are looked at
 _WHITE = 255  # the largest of the grey values, which are multiples of 1 / 255
-
-
-class Sketch(Track):
-    """Shows a grey picture of 2 N x 2 N pixels in which the maze is bent, stretched, and its walls thick or thin.
-
-    - A smooth displacement bends the maze. Its largest value is the level's.
-    - Each axis is scaled by 0.85 to 1.15, where 1.15 fills the sheet. The drawing lies anywhere on the sheet.
-    - Walls are drawn up to a pixel thicker or thinner, where a cell is two pixels.
-    - A pixel has the share of wall in it, to 8 bits. The paper around the maze is wall.
-    - Marks are displaced as the maze is, and are never inside a wall.
-    """
-
-    help = "The map is drawn by hand: bent, stretched, with thick or thin walls."
-    stream = 7
-    levels = (
-        "displaced by up to 0.5 cells, each axis scaled by .85 to 1.15",
-        "displaced by up to 1 cell, each axis scaled by .85 to 1.15",
-        "displaced by up to 1.5 cells, each axis scaled by .85 to 1.15",
-    )
-
-    def _context_size(self, level: int, size: int) -> int:
-        return PIXELS * size
-
-    def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
-        drawing = draw_by_hand(len(shown.walls), DISPLACEMENTS[int(level) - 1], rng)
-        return dataclasses.replace(shown, drawing=drawing)
 
 
 @dataclasses.dataclass(frozen=True)

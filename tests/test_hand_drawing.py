@@ -1,4 +1,4 @@
-"""The track `sketch`: what a map drawn by hand keeps of the maze, and what it changes."""
+"""A map as it is drawn by hand: what it keeps of the maze, and what it changes."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ from hypothesis import strategies
 
 from mazebench.maps.kinds.dfs import dfs_walls
 from mazebench.maps.maze import cell_to_point
-from mazebench.tasks.perturbations.base import ShownMap
-from mazebench.tasks.tracks.sketch import (
+from mazebench.tasks.tracks.hand_drawing import (
     DISPLACEMENTS,
     LARGEST_STRETCH,
     LARGEST_THICKENING,
     PIXELS,
     Displacement,
-    Sketch,
     draw_by_hand,
     draw_displacement,
     fitted_drawing,
@@ -183,16 +181,3 @@ class TestMarks:
 
     def test_mark_of_a_cell_without_distortions_is_at_its_centre(self):
         assert plain().pixel((2, 5), np.zeros((2 * SIZE, 2 * SIZE))) == (5, 11)
-
-
-class TestTrack:
-    @pytest.mark.parametrize("level", [1, 2, 3])
-    def test_shown_map_is_drawn_with_the_displacement_of_the_level(self, level):
-        walls, rng = maze(0), np.random.default_rng(3)
-        shown = Sketch().show(ShownMap(walls), level, ((1, 1), (1, 3)), rng)
-        expected = drawing(DISPLACEMENTS[level - 1], 3).picture(walls)
-        np.testing.assert_array_equal(shown.seen_walls(), expected)
-        np.testing.assert_array_equal(shown.walls, walls)
-
-    def test_context_has_the_size_of_the_picture(self):
-        assert Sketch().context_size((1, 2, 3), SIZE) == SHEET

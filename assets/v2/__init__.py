@@ -1,1 +1,0 @@
-"""Frozen mazes and episodes of benchmark v2, in which tracks are played."""

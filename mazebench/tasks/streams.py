@@ -1,0 +1,23 @@
+"""The random streams of an episode, by which one thing that is drawn does not change another one."""
+
+from __future__ import annotations
+
+import enum
+
+
+@enum.unique
+class Stream(enum.IntEnum):
+    """The numbers of the streams, whose values are frozen with the benchmark; a new one takes 15, 16, ..."""
+
+    MAP_FLIP = 0
+    MAP_WARP = 1
+    POSITION_NOISE = 2
+    LATER_GOALS = 3  # those after the first one
+    LEVEL = 4  # of the track, where a task has several
+    LOST_POSE = 6
+    MOVED_DOORS = 9
+    TURNED_SHEET = 10
+    DRAWN_SHEET = 11
+    HIDDEN_START = 12  # it draws nothing
+    LIDAR_NOISE = 13
+    MOTION_NOISE = 14
