@@ -14,15 +14,18 @@ import pathlib
 from collections.abc import Sequence
 
 import numpy as np
-from wrong_maps import held_out_task, outcomes
 
-from mazebench.agent import Interface
+from mazebench.agent import Agent, Interface
 from mazebench.agent_loading import load_agent_class
+from mazebench.evaluation.chunk import run_trials
+from mazebench.maps.kinds import generate
 from mazebench.results.intervals import Estimate, runs_interval
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.trials import draw_trials
 
 _DISTANCES = (2, 4, 6, 8, 10)
+_EPISODES = 2  # per maze and distance
 
 
 def main() -> None:
@@ -48,9 +51,9 @@ def main() -> None:
         played = []
         for checkpoint in checkpoints:
             agent = load_agent_class(name).build(interface, checkpoint=pathlib.Path(checkpoint))
-            results = [outcomes(agent, task, needs_truth=False) for task in tasks]
-            played.append([success for success, _, _ in results])
-            mazes = [maze for _, _, maze in results]
+            results = [_outcomes(agent, task) for task in tasks]
+            played.append([success for success, _ in results])
+            mazes = [maze for _, maze in results]
             print(*(f"{success.mean():.3f}" for success in played[-1]), f" {name} {checkpoint}", flush=True)
         scores.append((name, np.array(played)))  # [R, distances, E]
 
@@ -66,9 +69,26 @@ def main() -> None:
 def _task(distance: int, given: argparse.Namespace) -> TaskSpec:
     """Returns the local task at one distance in the mazes that the options name."""
     if given.trained_in is None:
-        return held_out_task({"distances": (distance,)}, given.seed, given.mazes, given.kind, given.size)
+        streams, mazes = np.random.SeedSequence([given.seed, given.size]), []
+        while len(mazes) < given.mazes:  # mazes in which no goal is as far away are left out
+            rng = np.random.default_rng(streams.spawn(1)[0])
+            maze = generate(given.kind, given.size, rng, f"held-out-{len(mazes)}")
+            if maze.diameter >= distance:
+                mazes.append(maze)
+        return make_spec("local", maps=mazes, distances=(distance,))
     drawn = {"kinds": (given.kind,), "num_mazes": given.trained_in} if given.trained_in else {}
     return make_spec("local", given.size, "train", distances=(distance,), **drawn)
+
+
+def _outcomes(agent: Agent, task: TaskSpec) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the success and the maze of each episode, in the order of the trials."""
+    trials = list(enumerate(draw_trials(task, _EPISODES)))
+    ended = [outcome for some in run_trials(agent, task, trials, len(trials)) for outcome in some]
+    ended.sort(key=lambda outcome: outcome.index)
+    return (
+        np.array([outcome.success for outcome in ended], dtype=float),
+        np.array([outcome.trial.episode.maze for outcome in ended]),
+    )
 
 
 def _print_row(estimates: Sequence[Estimate], name: str) -> None:
