@@ -1,4 +1,4 @@
-"""Perturbations: what a flip keeps, how much changes, where corners move, and that each draws by itself."""
+"""Perturbations: what a flip keeps, how much changes, and where corners move."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ from hypothesis import strategies
 
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import corner_cells
-from mazebench.options import options_of
 from mazebench.tasks.options import TaskOptions
-from mazebench.tasks.perturbations import Perturbations, active_perturbations, perturbation_levels
+from mazebench.tasks.perturbations import perturbation_levels
 from mazebench.tasks.perturbations.flip import flip
 from mazebench.tasks.perturbations.warp import MAX_WARP, random_homography
-from mazebench.tasks.route import LATER_GOALS_STREAM
 
 
 @pytest.fixture(scope="module")
@@ -23,11 +21,6 @@ def maze():
 
 
 class TestTable:
-    def test_streams_are_all_different(self):
-        everything = TaskOptions(**{name: option.highest for name, option in options_of(Perturbations).items()})
-        streams = [perturbation.stream for perturbation, _ in active_perturbations(everything)]
-        assert sorted({*streams, LATER_GOALS_STREAM}) == list(range(len(streams) + 1))
-
     def test_levels_are_given_by_name(self):
         levels = perturbation_levels(TaskOptions(position_noise=0.5))
         assert {name: level for name, level in levels.items() if level} == {"position_noise": 0.5}
