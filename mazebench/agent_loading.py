@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-import inspect
 import pathlib
 import sys
 import traceback
@@ -13,7 +12,6 @@ from typing import Any
 
 from mazebench.agent import Agent, SingleAgent, as_agent_class
 from mazebench.errors import InputError, shortened, unknown
-from mazebench.tasks.sensors import SENSORS
 
 ENTRY_POINT_GROUP = "mazebench.agents"
 _IMPORTLIB = pathlib.Path(importlib.__file__).parent
@@ -47,20 +45,26 @@ def load_agent_class(name: str) -> type[Agent]:
     Raises:
       InputError: if there is no such agent, it can't be imported, or it is not a subclass of either.
     """
+    entry_points, hint = _entry_points(), ""
     if ":" in name:
-        return checked_agent_class(name, _import_class(name))
-    entry_points = _entry_points()
-    if name not in entry_points:
+        module, _, class_name = name.partition(":")
+        hint = "; expected module:Class, such as my_agent:MyAgent"
+        if "/" in module or module.endswith(".py") or not (module and class_name):
+            raise InputError(f"agent {name!r}{hint}")
+        if "" not in sys.path and "." not in sys.path:
+            sys.path.insert(0, "")
+        entry_point = metadata.EntryPoint(name, name, ENTRY_POINT_GROUP)
+    elif name in entry_points:
+        entry_point = entry_points[name]
+    else:
         raise InputError(f"{unknown('agent', name, entry_points)}; one of your own is named as module:Class")
     try:
-        loaded = entry_points[name].load()
-    except ModuleNotFoundError as error:
-        raise InputError(
-            f"agent {name!r} needs the module {error.name!r}, which is not installed; "
-            "the extra [agents] brings it (docs/start.md)"
-        ) from error
+        loaded = entry_point.load()
     except Exception as error:  # other people's modules may raise anything
-        raise _import_error(name, error) from error
+        if isinstance(error, ModuleNotFoundError) and not hint:
+            hint = "; the extra [agents] brings it (docs/start.md)"
+        found = shortened(f"{type(error).__name__}: {error}")
+        raise InputError(f"agent {name!r} can't be imported: {found}{source_line(error)}{hint}") from error
     return checked_agent_class(name, loaded)
 
 
@@ -68,21 +72,10 @@ def checked_agent_class(name: str, loaded: Any) -> type[Agent]:
     """Returns `loaded` as an `Agent` class.
 
     Raises:
-      InputError: unless it is a subclass of `Agent` or `SingleAgent` that defines `act`, builds by a classmethod and
-        needs sensors that there are.
+      InputError: unless it is a subclass of `Agent` or `SingleAgent`.
     """
     if not isinstance(loaded, type) or not issubclass(loaded, (Agent, SingleAgent)):
-        found = " and ".join(base.__name__ for base in loaded.__bases__) if isinstance(loaded, type) else repr(loaded)
-        expected = "expected a subclass of mazebench.Agent or mazebench.SingleAgent"
-        raise InputError(f"agent {name!r}: {expected}, found {'one of ' if isinstance(loaded, type) else ''}{found}")
-    if loaded.act in (Agent.act, SingleAgent.act):
-        raise InputError(f"agent {name!r}: expected a class with act(), found none")
-    for method in ("build", "context_size", "default_checkpoint"):
-        if inspect.isfunction(inspect.getattr_static(loaded, method)):
-            raise InputError(f"agent {name!r}: expected {method}() to be a classmethod, found a method of its objects")
-    if not (isinstance(loaded.needs_sensors, tuple) and set(loaded.needs_sensors) <= set(SENSORS)):
-        expected = f"expected needs_sensors as a tuple of {', '.join(SENSORS)}"
-        raise InputError(f"agent {name!r}: {expected}, found {loaded.needs_sensors!r}")
+        raise InputError(f"agent {name!r}: expected a subclass of mazebench.Agent or SingleAgent, found {loaded!r}")
     return as_agent_class(loaded)
 
 
@@ -103,43 +96,5 @@ def _is_ours(filename: str) -> bool:
     return filename.startswith("<") or not {ours, _IMPORTLIB}.isdisjoint(pathlib.Path(filename).parents)
 
 
-def _import_class(name: str) -> Any:
-    module_name, _, class_name = name.partition(":")
-    if module_name.endswith(".py"):
-        file = pathlib.PurePath(module_name).with_suffix("")
-        if file.is_absolute() or ".." in file.parts:
-            wanted = f"{file.name}:{class_name} with {file.parent} as the working directory"
-        else:
-            wanted = f"{'.'.join(file.parts)}:{class_name}"
-        raise InputError(f"agent {name!r}: expected module:Class, such as {wanted}, found a file's name")
-    if "" not in sys.path and "." not in sys.path:
-        sys.path.insert(0, "")
-    try:
-        return getattr(importlib.import_module(module_name), class_name)
-    except (ImportError, AttributeError, ValueError, TypeError) as error:
-        found = f"{shortened(str(error))}{source_line(error)}"
-        raise InputError(f"agent {name!r}: expected module:Class that can be imported, found: {found}") from error
-    except Exception as error:  # other people's modules may raise anything
-        raise _import_error(name, error) from error
-
-
-def _import_error(name: str, error: Exception) -> InputError:
-    found = f"{shortened(f'{type(error).__name__}: {error}')}{source_line(error)}"
-    return InputError(f"agent {name!r}: its module can't be imported: {found}")
-
-
 def _entry_points() -> dict[str, metadata.EntryPoint]:
-    """Returns the entry points by name; raises `InputError` if two distributions claim one name."""
-    found: dict[str, metadata.EntryPoint] = {}
-    for entry_point in metadata.entry_points(group=ENTRY_POINT_GROUP):
-        known = found.setdefault(entry_point.name, entry_point)
-        if known.value != entry_point.value:
-            raise InputError(
-                f"two agents are called {entry_point.name!r}: {known.value} of {_distribution(known)} "
-                f"and {entry_point.value} of {_distribution(entry_point)}; uninstall one"
-            )
-    return found
-
-
-def _distribution(entry_point: metadata.EntryPoint) -> str:
-    return entry_point.dist.name if entry_point.dist else "an unknown distribution"
+    return {entry_point.name: entry_point for entry_point in metadata.entry_points(group=ENTRY_POINT_GROUP)}

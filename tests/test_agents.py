@@ -75,54 +75,9 @@ class Sensing(SingleAgent):
         return 0 if observation["lidar"][0] > 0.5 else 4
 
 
-def acting(act) -> type[Agent]:
-    """`Counting` with another act(), which is called without `self` and `explore`."""
-    return type("Broken", (Counting,), {"act": lambda self, inputs, state, explore=False: act(inputs, state)})
-
-
-def count_on(inputs, state, new):
-    """Acts as `Counting` does, where episodes are taken to begin in the slots of `new`."""
-    state = np.where(new, 0, state)
-    return state % 6, state + 1
-
-
-def halve_the_map(inputs, state):
-    inputs.observation["context"] *= 0.5
-    return count_on(inputs, state, inputs.new_episode)
-
-
-def clear_the_marks(inputs, state):
-    inputs.new_context[:] = False
-    return count_on(inputs, state, inputs.new_episode)
-
-
-def crash_at_landmarks(inputs, state):
-    if (inputs.new_context & ~inputs.new_episode).any():
-        raise ValueError("another start")
-    return count_on(inputs, state, inputs.new_episode)
-
-
-class SharesAList(Counting):
-    """One list for all slots."""
-
-    def initial_state(self, batch_size):
-        return [[0]] * batch_size
-
-    def act(self, inputs, state, explore=False):
-        for slot in range(len(state)):
-            state[slot][0] = 0 if inputs.new_episode[slot] else state[slot][0] + slot
-        return np.array([count[0] % 6 for count in state]), state
-
-
-class RemembersOnSelf(Counting):
-    def act(self, inputs, state, explore=False):
-        if inputs.new_episode.all():
-            self.count = np.zeros(len(inputs.seed), dtype=int)
-        self.count = np.where(inputs.new_episode, 0, self.count + 1)
-        return self.count % 6, state
-
-
 class DrawsOnSelf(Counting):
+    """Keeps a generator on itself, where batches that are played by turns share it."""
+
     @classmethod
     def build(cls, interface, *, seed=0, checkpoint=None):
         agent = cls()
@@ -133,61 +88,46 @@ class DrawsOnSelf(Counting):
         return self.rng.integers(6, size=len(inputs.seed)), state
 
 
-class Unbuilt(Counting):
-    @classmethod
-    def build(cls, interface, *, seed=0, checkpoint=None):
-        cls()
+def acting(act) -> type[Agent]:
+    """`Counting` with another act(), which is called without `self` and `explore`."""
+    return type("Broken", (Counting,), {"act": lambda self, inputs, state, explore=False: act(inputs, state)})
 
 
-class Unbuildable(Counting):
-    @classmethod
-    def build(cls, interface):
-        return cls()
-
-
-class OldSignature(Counting):
-    def act(self, observation, is_first, state, explore=False):
-        return np.zeros(len(is_first), dtype=int), state
-
-
-class NoBatch(Counting):
-    def initial_state(self):
-        return None
-
-
-class Sizeless(Counting):
-    @classmethod
-    def context_size(cls):
-        return 13
-
-
-class NamedMethod(Counting):
-    def context_size(self, size):
-        return size
-
-
-class Stranger:
-    def act(self, inputs, state, explore=False):
-        return np.zeros(len(inputs.seed), dtype=int), state
-
-
-class Motionless(Agent):
-    pass
-
-
-def acting_alone(act) -> type[SingleAgent]:
-    return type("Broken", (SingleAgent,), {"act": lambda self, observation: act()})
-
-
-CALLS: list[int] = []
-
-
-def number_of_calls() -> int:
-    CALLS.append(0)
-    return len(CALLS) % 6
+def halve_the_map(inputs, state):
+    inputs.observation["context"] *= 0.5
+    return np.zeros(len(inputs.seed), dtype=int), state
 
 
 SAME = r"expected the same actions in an episode "
+BROKEN = {
+    "float actions": (
+        acting(lambda inputs, state: (np.zeros(len(inputs.seed)), state)),
+        r"expected 3 integer actions from act\(\), found float64 of shape \(3,\)$",
+    ),
+    "too many": (acting(lambda inputs, state: (np.zeros(4, dtype=int), state)), r"found int64 of shape \(4,\)$"),
+    "out of range": (
+        acting(lambda inputs, state: (np.full(len(inputs.seed), 6), state)),
+        r"expected actions from 0 to 5 from act\(\), found 6$",
+    ),
+    "changes inputs": (acting(halve_the_map), r"expected act\(\) to leave its inputs; change a copy$"),
+    "global generator": (
+        acting(lambda inputs, state: (np.random.default_rng().integers(6, size=len(inputs.seed)), state)),
+        SAME + "when built anew",
+    ),
+    "generator on self": (DrawsOnSelf, SAME + "when another batch is played by turns"),
+    "counts on": (acting(lambda inputs, state: (state % 6, state + 1)), SAME + "after another episode"),
+    "slot": (acting(lambda inputs, state: (np.arange(len(inputs.seed)), state)), SAME),
+    "batch size": (acting(lambda inputs, state: (np.full(len(inputs.seed), len(inputs.seed)), state)), SAME + "alone"),
+    "raises": (
+        acting(lambda inputs, state: (inputs.observation["map"], state)),
+        r"act\(\) raised KeyError: 'map' \(test_agents\.py:\d+\)$",
+    ),
+    "no agent": (object, r"expected a subclass of mazebench\.Agent or SingleAgent, found <class 'object'>$"),
+    "no action": (
+        type("Broken", (SingleAgent,), {"act": lambda self, observation: None}),
+        r"expected 3 integer actions from act\(\), found object",
+    ),
+}
 
 
 class TestConformance:
@@ -208,98 +148,10 @@ class TestConformance:
         check_agent(agent_class)
         check_agent(agent_class, Interface("local", 9, 5, sensors=agent_class.needs_sensors))
 
-    @pytest.mark.parametrize("needed", ["lidar", ("sonar",)])
-    def test_needed_sensors_are_those_there_are(self, needed):
-        wrong = type("Wrong", (Sensing,), {"needs_sensors": needed})
-        with pytest.raises(ConformanceError, match=r"expected needs_sensors as a tuple of .*lidar, found"):
-            check_agent(wrong)
-
-    @pytest.mark.parametrize(
-        ("actions", "message"),
-        [
-            (lambda size: np.zeros(size + 1, dtype=int), "3 actions, one an environment, found shape (4,)"),
-            (lambda size: 0, "3 actions, one an environment, found shape ()"),
-            (lambda size: np.zeros(3, dtype=int), "1 actions, one an environment, found shape (3,)"),
-            (lambda size: np.zeros((size, 1), dtype=int), "3 actions, one an environment, found shape (3, 1)"),
-            (lambda size: np.zeros(size), "integer actions, found float64"),
-            (lambda size: np.zeros(size, dtype=bool), "integer actions, found bool"),
-            (lambda size: ["forward"] * size, "integer actions, found <U7"),
-            (lambda size: np.full(size, 6), "actions from 0 to 5, found 6"),
-            (lambda size: np.full(size, -1), "actions from 0 to 5, found -1"),
-        ],
-    )
-    def test_actions_that_cannot_be_taken_are_named_in_one_line(self, actions, message):
-        broken = acting(lambda inputs, state: (actions(len(inputs.seed)), state))
-        with pytest.raises(ConformanceError) as caught:
-            check_agent(broken)
-        assert str(caught.value) == f"agent 'Broken': expected act() to return {message}"
-
-    @pytest.mark.parametrize(
-        ("broken", "message"),
-        [
-            (acting(lambda inputs, state: ([[0], [0, 1], 0], state)), r"act\(\) raised ValueError: .*inhomogeneous"),
-            (acting(lambda inputs, state: [0, 0, 0]), r"expected act\(\) to return \(actions, state\), found "),
-            (
-                acting(halve_the_map),
-                r"expected act\(\) to leave inputs\.observation\['context'\] as it was; change a copy$",
-            ),
-            (acting(clear_the_marks), r"expected act\(\) to leave inputs\.new_context as it was; change a copy$"),
-            (
-                acting(lambda inputs, state: (np.random.default_rng().integers(6, size=len(inputs.seed)), state)),
-                SAME + r"when built anew from the same seed, found others; make weights in build\(\) from its seed, ",
-            ),
-            (
-                acting(lambda inputs, state: (np.random.randint(6, size=len(inputs.seed)), state)),  # noqa: NPY002
-                SAME + r"when built anew from the same seed, found others; ",
-            ),
-            (
-                acting(lambda inputs, state: count_on(inputs, state, False)),
-                SAME + r"after another episode, found others; begin anew where inputs\.new_episode is set$",
-            ),
-            (acting(lambda inputs, state: count_on(inputs, state, inputs.new_episode.any())), SAME),
-            (SharesAList, SAME),
-            (acting(lambda inputs, state: (np.arange(len(inputs.seed)) % 6, state)), SAME),
-            (acting(lambda inputs, state: (np.full(len(inputs.seed), len(inputs.seed)), state)), SAME),
-            (RemembersOnSelf, SAME + r"when another batch .* by turns, found others; keep all memory, .* on self$"),
-            (DrawsOnSelf, SAME + r"when another batch .* by turns, found others; keep all memory, generators too, "),
-            (acting(crash_at_landmarks), r"act\(\) raised ValueError: another start \(test_agents\.py:\d+\)$"),
-            (
-                acting(lambda inputs, state: (inputs.observation["map"], state)),
-                r"act\(\) raised KeyError: 'map' \(test_agents\.py:\d+\)$",
-            ),
-            (Unbuilt, r"expected build\(\) to return an agent, found NoneType$"),
-            (Unbuildable, r"build\(\) raised TypeError: .* unexpected keyword argument 'seed'$"),
-            (OldSignature, r"act\(\) raised TypeError: "),
-            (NoBatch, r"initial_state\(\) raised TypeError: .* 1 positional argument but 2 were given$"),
-            (Sizeless, r"context_size\(\) raised TypeError: "),
-            (NamedMethod, r"expected context_size\(\) to be a classmethod, found a method of its objects$"),
-            (Stranger, r"expected a subclass of mazebench\.Agent or mazebench\.SingleAgent, found one of object$"),
-            (Motionless, r"expected a class with act\(\), found none$"),
-            (acting_alone(lambda: None), r"expected act\(\) to return integer actions, found None$"),
-            (acting_alone(number_of_calls), SAME),
-        ],
-    )
+    @pytest.mark.parametrize(("broken", "message"), BROKEN.values(), ids=BROKEN)
     def test_fault_is_named_in_one_line(self, broken, message):
-        with pytest.raises(ConformanceError, match=message) as caught:
+        with pytest.raises(ConformanceError, match=rf"^agent '{broken.__name__}': .*{message}"):
             check_agent(broken)
-        assert str(caught.value).startswith(f"agent '{broken.__name__}': ")
-        assert "\n" not in str(caught.value)
-
-    @pytest.mark.parametrize("wrong", ["13", 13.0, 0, 100_000, [5, 5], None])
-    def test_a_context_of_no_possible_size_is_named_in_one_line(self, wrong):
-        class Sized(Counting):
-            @classmethod
-            def context_size(cls, size):
-                return wrong
-
-        expected = "agent 'Sized': expected context_size() to return a whole number from 3 to 255, found "
-        with pytest.raises(ConformanceError) as caught:
-            check_agent(Sized)
-        assert str(caught.value) == expected + repr(wrong)
-
-    def test_object_in_place_of_a_class_is_refused(self):
-        with pytest.raises(ConformanceError, match=r"expected a subclass of .*, found <.*Counting object at .*>$"):
-            check_agent(Counting())
 
 
 class TestSingleAgent:
@@ -375,14 +227,11 @@ class TestLoading:
                 "plannr",
                 r"^unknown agent 'plannr'; available: .*planner, planner-closed-loop.*; .* named as module:Class$",
             ),
-            ("no_such_module:Agent", r"^agent 'no_such_module:Agent': expected module:Class .* No module named"),
-            ("json:Agent", r"^agent 'json:Agent': expected module:Class .* module 'json' has no attribute 'Agent'$"),
-            ("json:JSONDecoder", r"^agent 'json:JSONDecoder': expected a subclass of .*, found one of object$"),
-            ("json:", r"^agent 'json:': expected module:Class"),
-            ("./mine.py:Agent", r"expected module:Class, such as mine:Agent, found a file's name$"),
-            ("agents/mine.py:Agent", r"such as agents\.mine:Agent, found a file's name$"),
-            ("../mine.py:Agent", r"such as mine:Agent with \.\. as the working directory, found a file's name$"),
-            ("/home/mine.py:Agent", r"such as mine:Agent with /home as the working directory, found a file's name$"),
+            ("no_such_module:Agent", r"^agent 'no_such_module:Agent' can't be imported: ModuleNotFoundError: "),
+            ("json:Agent", r"^agent 'json:Agent' can't be imported: AttributeError: module 'json' has no .*Agent"),
+            ("json:JSONDecoder", r"^agent 'json:JSONDecoder': expected a subclass of "),
+            ("json:", r"^agent 'json:'; expected module:Class"),
+            ("agents/mine.py:Agent", r"^agent 'agents/mine.py:Agent'; expected module:Class"),
         ],
     )
     def test_a_name_that_leads_to_no_agent_is_refused(self, name, message):

@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 import json
-import os
 import pathlib
-import re
-import subprocess
 import sys
 
 import cv2
 import numpy as np
 import pytest
 import typer
-from faults import COMMAND
-from run_folders import FILES, IMPORTS, RECORDED, files_of, summary_of
+from processes import run_python
+from run_folders import FILES, IMPORTS, files_of, summary_of
 
 from mazebench import __version__, cli
-from mazebench.agent_loading import agent_names, learning_agents
+from mazebench.agent_loading import agent_names
 from mazebench.commands.options import parse_numbers
 from mazebench.errors import InputError
 from mazebench.evaluation.suites import SUITES
 from mazebench.maps.files import read_maze
 from mazebench.maps.text import format_maze
-from mazebench.tasks.sensors import SENSORS
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.base import LEVELS
 
 COMMANDS = typer.main.get_command(cli.app).commands
 FEW = ("--distances", "1,2", "--episodes-per-distance", "1")
@@ -75,143 +69,33 @@ def one_line(run: tuple[int, str, str], status: int = 2) -> str:
     return errors
 
 
+# One of each kind of fault.
 BAD_INPUT = [
     (("--frobnicate",), "No such option"),
-    # generate
-    (("generate", "--size", "14"), "kind 'dfs' makes mazes of odd sizes only, found size 14"),
-    (("generate", "--kind", "pub"), "unknown kind 'pub'; available: cave, dfs, hospital, house, museum, obstacles, "),
-    (("generate", "--kind", "cave", "--size", "9"), "kind 'cave' makes mazes of 13 cells and more, found size 9"),
-    (("generate", "--style", "rooms"), "No such option: --style"),
-    (("generate", "--format", "txt,gif"), "unknown format 'gif'; available: glb, mjcf, mjcf-textured, obj, png, ros"),
-    (("generate", "--from-image", "x.png", "--seed", "1"), "the map shows one maze; found --seed, which would"),
-    (
-        ("generate", "--from-image", "{bad}/good.txt", "--size", "9"),
-        "good.txt: expected a maze of size 9, found size 5",
-    ),
-    (("generate", "--unknown", "free"), "unknown belongs to maps, found a generated maze"),
-    (
-        ("generate", "--from-image", "{bad}/good.txt", "--inflate", "1"),
-        "inflate belongs to ROS maps and arrays, found ",
-    ),
-    (("generate", "--from-image", "{bad}/binary.png"), "binary.png: expected a "),
-    # eval: names and numbers
     (("eval",), "Missing option '--agent'"),
     (("eval", "--agent", "nobody"), "unknown agent 'nobody'; available: "),
     ((*TINY, "--task", "locl"), "'locl' is not one of 'local', 'hierarchical'"),
     ((*TINY, "--size", "14"), "unknown size 14; available: 13, 15, 17, 19, 21"),
-    ((*TINY, "--checkpoint", "none"), "agent 'random' reads no checkpoint; found --checkpoint none"),
     ((*TINY, "--map-warp", "0.3"), "expected map_warp from 0 to 0.25, found 0.3"),
     ((*TINY, "--distances", "one"), "expected distances like 1-3 or 2,3, found 'one'"),
     ((*TINY, "--distances", "500"), "13-eval-00: expected distances of at most 50 cells"),
-    # eval: options that don't go together
     ((*TINY, "--agent", "planner"), "expected one --agent without --suite, found 2"),
     ((*TINY, "--resume"), "--resume needs --out"),
-    ((*TINY, "--workers", "2", "--traceback"), "the agent acts in other processes; found --traceback, which would be"),
-    ((*TINY, "--textures"), "no camera is among the --sensors; found --textures, which would be ignored"),
     ((*QUICK, "--suite", "papr"), "unknown suite 'papr'; available: paper, quick, v3"),
-    ((*QUICK, "--task", "local"), "the suite 'quick' has evaluations of its own; found --task, which would be ignored"),
-    ((*QUICK, "--agent", "random"), "expected agents with folders of their own, found two for 'random'"),
-    # eval: tracks
-    ((*RANDOM, "--track", "stail"), "'--track': 'stail' is not one of 'building', 'rebuilt', 'adrift'"),
-    ((*RANDOM, "--track", "building", "--level", "4"), "expected level from 1 to 3, found 4"),
-    ((*RANDOM, "--track", "building", "--level", "two"), "expected level like 1-3 or 2,3, found 'two'"),
-    (
-        (*RANDOM, "--track", "adrift", "--level", "1-3"),
-        "expected one level in an evaluation, found 1, 2, 3; the suite 'v3' plays all levels",
-    ),
-    ((*RANDOM, "--track", "adrift", "--task", "hierarchical"), "'adrift': expected task 'local', found 'hierarchical'"),
+    ((*QUICK, "--size", "15"), "the suite 'quick' has evaluations of its own; found --size"),
     ((*RANDOM, "--track", "adrift", "--map-flip", "0.1"), "'adrift': expected no perturbation, found map_flip 0.1"),
-    ((*RANDOM, "--track", "adrift", "--sensors", "top"), "'adrift': expected sensors without 'top', which shows where"),
-    (
-        (*RANDOM, "--track", "building", "--size", "13"),
-        "track 'building': expected size 31, found 13",
-    ),
-    (
-        (*RANDOM, "--track", "building", "--distances", "3,20,41"),
-        "track 'building': expected distances from 15 to 40, those of the frozen episodes, found 3, 41",
-    ),
-    (
-        (*RANDOM, "--track", "building", "--maps", "{bad}/good.txt"),
-        "good: expected distances of at most 4 cells, as far as the maze reaches, found 40; choose",
-    ),
-    (
-        (*RANDOM, "--track", "rebuilt", "--maps", "{bad}/good.txt"),
-        "good: expected 1 doors that can move, found 0",
-    ),
-    (
-        (*RANDOM, "--track", "building", "--episodes-per-distance", "1"),
-        "a track's eval episodes are frozen; found --episodes-per-distance, which would be ignored",
-    ),
-    ((*RANDOM, "--suite", "v3", "--track", "building"), "has evaluations of its own; found --track, which would be"),
-    (
-        (*TRAIN, "--track", "building", "--time-limit", "9"),
-        "a track has its own time limit; found --time-limit, which would",
-    ),
-    ((*TRAIN, "--level", "2"), "a level belongs to a track; found --level, which would be ignored"),
-    (
-        (*TRAIN, "--track", "rebuilt", "--map-flip", "0.1"),
-        "track 'rebuilt': expected no perturbation, found map_flip 0.1",
-    ),
-    ((*TRAIN, "--track", "rough"), "agent 'mah': learns only on maps of one pixel a cell"),
-    ((*TRAIN, "--size", "14"), "unknown size 14; available: 13, 15, 17, 19, 21"),
-    ((*TRAIN, "--pairs", "foo"), "'foo' is not one of 'random', 'fixed'"),
-    ((*TRAIN, "--minutes", "0"), "expected minutes from 0.01 to 527040, found 0.0"),
-    ((*TRAIN, "--checkpoint-minutes", "-1"), "expected checkpoint_minutes from 0 to 527040, found -1.0"),
-    ((*TRAIN, "--seed", "-1"), "expected seed from 0 to 9223372036854775807, found -1"),
-    ((*TRAIN, "--set", "colour"), "expected --set KEY=VALUE, found 'colour'"),
-    (("train", "--agent", "mah"), "expected --minutes or --env-steps, found neither"),
-    (
-        ("train", "--agent", "planner", "--minutes", "1"),
-        "agent 'planner' doesn't learn; agents that do: dqn, mah, mah-paper, mmn",
-    ),
-    # eval: files
     ((*TINY, "--out", ""), "expected a value of --out, found an empty one"),
-    ((*TINY, "--maps="), "expected a value of --maps, found an empty one"),
     ((*TINY, "--out", "{bad}/file/out"), "file/out: can't write there: Not a directory"),
     ((*TINY, "--out", "{bad}/used"), "expected an empty folder or an evaluation's, found 'thesis.tex' in it"),
-    ((*TINY, "--cell-size", "0.5"), "cell_size belongs to maps of your own, found the benchmark's mazes"),
-    (
-        (*RANDOM, "--track", "building", "--unknown", "free"),
-        "unknown belongs to maps of your own, found the track 'building'",
-    ),
-    ((*TINY, "--maps", "{bad}/good.txt", "--cell-size", "-1"), "expected cell_size from 0.01 to 100, found -1.0"),
-    ((*TINY, "--maps", "{bad}/zip.txt"), "zip.txt: expected a text map, found a ZIP archive"),
-    ((*TINY, "--maps", "{bad}/map.yaml"), "map.yaml: expected the YAML file of a ROS map, with resolution (the side"),
     ((*TINY, "--maps", "none.txt"), "none.txt: can't read the map: No such file or directory"),
     ((*TINY, "--maps", "{bad}/open.txt"), "open: expected a closed border, found cell (2, 4) free"),
-    # the others
+    (("generate", "--kind", "pub"), "unknown kind 'pub'; available: cave, dfs, hospital, house, museum, obstacles, "),
+    (("generate", "--from-image", "{bad}/binary.png"), "binary.png: expected a "),
+    (("train", "--agent", "mah"), "expected --minutes or --env-steps, found neither"),
+    (("train", "--agent", "planner", "--minutes", "1"), "agent 'planner' doesn't learn; agents that do: "),
+    ((*TRAIN, "--set", "colour"), "expected --set KEY=VALUE, found 'colour'"),
     (("compare", "{bad}/used"), "Missing argument 'B'"),
-    (
-        ("train", "--agent", "mah", "--ray-address", "auto"),
-        "without --workers this process collects by itself; found --ray-address",
-    ),
-    (("render",), "Missing option '--out'"),
     (("render", "--out", "film.avi"), "unknown suffix '.avi'; available: .gif, .mp4, .png"),
-    (("render", "--out", "x.png", "--pixels", "10"), "Invalid value for '--pixels'"),
-    (("render", "--out", "{bad}/file/x.png", "--view", "map"), "file/x.png: can't write"),
-    (("play", "--track", "rough", "--level", "1-3"), "can't open a window: there is no display, or it refuses"),
-    (("bench", "--fast"), "No such option: --fast"),
-    # options that another one leaves without effect
-    *(
-        ((*command, *options), said)
-        for command in (("eval", "--agent", "random"), ("render", "--out", "x.png"), ("play",))
-        for options, said in (
-            (
-                ("--task", "hierarchical", "--distances", "9"),
-                "to corner; found --distances, which would be",
-            ),
-            (
-                ("--landmark-distance", "3"),
-                "has no landmarks; found --landmark-distance, which would be",
-            ),
-            (("--level", "2"), "a level belongs to a track; found --level, which would be"),
-            (
-                ("--track", "building", "--time-limit", "9"),
-                "has its own time limit; found --time-limit, which would be",
-            ),
-            (("--maps", "{bad}/good.txt", "--split", "eval"), "the mazes are your own; found --split, which would be"),
-        )
-    ),
 ]
 
 
@@ -233,21 +117,15 @@ class TestBadInput:
         assert (status, errors) == (
             1,
             "wrong_at_hand:Wrong, local: 0 of 40 episodes\n"
-            "mazebench: agent 'wrong_at_hand:Wrong': expected act() to return integer actions, found float64\n",
+            "mazebench: agent 'wrong_at_hand:Wrong': expected 40 integer actions from act(), "
+            "found float64 of shape (40,)\n",
         )
-        said = "agent 'broken_at_hand:Broken': its module can't be imported: SyntaxError: invalid syntax"
+        said = "agent 'broken_at_hand:Broken' can't be imported: SyntaxError: invalid syntax"
         assert said in one_line(command("eval", "--agent", "broken_at_hand:Broken", *FEW))
 
-    def test_the_module_is_the_command(self):
-        arguments = [sys.executable, "-m", "mazebench", "eval", "--agent", "nobody"]
-        run = subprocess.run(arguments, capture_output=True, text=True)
-        assert one_line((run.returncode, run.stdout, run.stderr)).startswith("mazebench: unknown agent 'nobody'")
-
-    @pytest.mark.parametrize("program", [(sys.executable, "-m", "mazebench"), (COMMAND,)])
-    def test_the_program_is_called_mazebench_however_it_was_started(self, program, tmp_path):
-        usage = subprocess.run([*program, "eval", "--help"], capture_output=True, text=True).stdout
-        assert usage.startswith("Usage: mazebench eval [OPTIONS]\n")
-        subprocess.run([*program, *TINY, "--out", "run"], cwd=tmp_path, capture_output=True, check=True)
+    def test_the_program_is_called_mazebench_however_it_was_started(self, tmp_path):
+        assert run_python("-m", "mazebench", "eval", "--help").stdout.startswith("Usage: mazebench eval [OPTIONS]\n")
+        run_python("-m", "mazebench", *TINY, "--out", "run", cwd=tmp_path)
         assert summary_of(tmp_path / "run")["provenance"]["command"] == ["mazebench", *TINY, "--out", "run"]
 
 
@@ -264,7 +142,7 @@ def test_ranges_and_commas_give_sorted_numbers(text, numbers):
     assert parse_numbers("distances", text) == numbers
 
 
-@pytest.mark.parametrize("text", ["", ",", "1,", "1-", "-1", "1-2-3", "1.5", "1e2", "²", "0-3", "5-1", "123456", "1:5"])
+@pytest.mark.parametrize("text", ["", "1,", "1-", "1.5", "0-3", "5-1"])
 def test_other_texts_are_no_numbers(text):
     with pytest.raises(InputError, match=r"^expected distances "):
         parse_numbers("distances", text)
@@ -281,22 +159,6 @@ class TestHelp:
         status, output, errors = command(name, "--help")
         assert (status, errors) == (0, "")
         assert f" {name} [OPTIONS]" in output.splitlines()[0]
-
-    @pytest.mark.parametrize("name", [(), *((name,) for name in sorted(COMMANDS))])
-    def test_one_letter_asks_for_the_page_too(self, command, name):
-        assert command(*name, "-h") == command(*name, "--help")
-
-    def test_the_page_of_eval_names_all_suites_sensors_tracks_and_levels(self, command):
-        page = "".join(command("eval", "--help")[1].split())
-        assert all(f"{name}," in page.partition("--suite")[2].partition("--out")[0] for name in SUITES)
-        assert f"--sensors<{'|'.join(SENSORS)}>" in page
-        assert f"--track<{'|'.join(TRACKS)}>" in page
-        assert f"Levelofthetrack,{LEVELS[0]}to{LEVELS[-1]}" in page
-
-    def test_the_page_of_train_names_the_learning_agents(self, command):
-        assert f"A learning agent: {', '.join(learning_agents())} or another" in " ".join(
-            command("train", "--help")[1].split()
-        )
 
     def test_the_version_is_printed(self, command):
         assert command("--version") == (0, f"{__version__}\n", "")
@@ -343,16 +205,6 @@ class TestGenerate:
         drawn, read = (tmp_path / out / "rooms-13-0-000.txt" for out in ("drawn", "read"))
         assert read.read_text() == drawn.read_text()
 
-    def test_a_rectangular_plan_is_padded_and_a_line_says_so_once(self, command, tmp_path):
-        (tmp_path / "hall.txt").write_text("#######\n#.....#\n#.###.#\n#.....#\n#######\n")
-        said = "mazebench: hall: 5 x 7 cells, padded with wall at the bottom to 7 x 7\n"
-        assert command("generate", "--from-image", "hall.txt", "--out", "read")[::2] == (0, said)
-        assert (tmp_path / "read" / "hall.txt").read_text().endswith("#######\n#######\n#######\n")
-        for out, workers in (("here", "0"), ("there", "2")):
-            status, _, errors = command(*TINY, "--maps", "hall.txt", "--workers", workers, "--out", out)
-            assert (status, errors.count(said)) == (0, 1)
-        assert command("render", "--maps", "hall.txt", "--view", "map", "--out", "x.png")[2] == said
-
     def test_a_ros_map_is_written_and_read(self, command, tmp_path):
         options = ("--format", "txt,ros", "--cell-size", "0.5")
         assert command("generate", "--size", "9", *options, "--out", "ours")[0] == 0
@@ -365,11 +217,6 @@ class TestGenerate:
         assert read_maze(tmp_path / source).cell_size == 0.5
         said = one_line(command("generate", "--from-image", source, "--format", "ros", "--out", "ours"))
         assert "dfs-9-0-000.yaml: would overwrite the map that the maze is read from" in said
-
-    def test_one_maze_of_13_cells_is_made_by_default(self, command, tmp_path):
-        assert command("generate")[0] == 0
-        expected = {f"dfs-13-0-000.{suffix}" for suffix in ("txt", "xml", "png", "glb")}
-        assert {path.name for path in (tmp_path / "mazes").iterdir()} == expected
 
 
 class TestEval:
@@ -396,14 +243,6 @@ class TestEval:
         for word in ("distance", "success rate", "paper", "SPL", "SPL by grid", "all"):
             assert word in output
 
-    @pytest.mark.parametrize("width", [30, 80])
-    def test_a_terminal_shows_all_digits_of_the_progress(self, command, monkeypatch, width):
-        monkeypatch.setenv("COLUMNS", str(width))
-        monkeypatch.setenv("FORCE_COLOR", "1")  # by which a stream counts as a terminal
-        _, _, errors = command(*TINY, "--out", "run")
-        shown = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", errors)  # without colours and movements
-        assert re.search(r" 40/40 0:\d\d:\d\d 0:\d\d:\d\d", shown)
-
     def test_resume_goes_on_or_starts_anew_and_says_so(self, command, tmp_path):
         status, output, _ = command(*TINY, "--out", "run", "--resume")
         assert status == 0
@@ -413,13 +252,6 @@ class TestEval:
         assert (status, errors) == (0, "random, local: 40 of 40 episodes\n")
         assert "resuming run\n" in output
         assert files_of(tmp_path) == before
-
-    def test_mazes_of_ones_own_are_evaluated(self, command, tmp_path):
-        (tmp_path / "plan.txt").write_text(PLAN)
-        status, output, _ = command(*TINY, "--maps", "plan.txt", "--record", "--out", "run")
-        assert status == 0
-        assert "random: local, custom mazes 5 x 5" in output
-        assert {path.name for path in (tmp_path / "run").iterdir()} == RECORDED
 
     def test_a_suite_is_run_and_compared(self, command, tmp_path, monkeypatch):
         monkeypatch.setenv("COLUMNS", "80")
@@ -458,12 +290,6 @@ class TestEval:
 class TestRender:
     ARGUMENTS = ("render", "--agent", "planner", "--distances", "2", "--pixels", "96")
 
-    def test_a_picture_of_the_map_needs_no_rendering(self, command, tmp_path):
-        status, output, errors = command(*self.ARGUMENTS, "--view", "map", "--out", "new/map.png")
-        assert (status, errors) == (0, "")
-        assert output.startswith("new/map.png: planner reached the goal after ")
-        assert cv2.imread(str(tmp_path / "new" / "map.png")).shape == (96, 96, 3)
-
     def test_a_picture_is_the_last_moment_of_the_film_with_the_whole_path(self, command, tmp_path):
         for name in ("x.png", "x.mp4"):
             assert command(*self.ARGUMENTS, "--view", "map", "--out", name)[0] == 0
@@ -497,10 +323,6 @@ class TestRender:
         blue_on_floor = (rays[..., 0] > rays[..., 2] + 20) & (without.min(axis=2) > 250)
         assert 0 < blue_on_floor.mean() < 0.5
 
-    def test_a_view_of_a_sensor_that_the_task_lacks_is_refused(self, command):
-        said = one_line(command(*self.ARGUMENTS, "--view", "lidar", "--out", "x.png"))
-        assert said == "mazebench: view 'lidar': expected a task with this sensor; add --sensors lidar\n"
-
     @pytest.mark.parametrize(("suffix", "magic"), [("gif", b"GIF89a"), ("mp4", b"ftyp")])
     def test_films_are_gif_or_mp4(self, command, tmp_path, suffix, magic):
         assert command(*self.ARGUMENTS, "--view", "map", "--out", f"film.{suffix}")[0] == 0
@@ -509,13 +331,8 @@ class TestRender:
         assert frames.read()[1].shape == (96, 96, 3)
 
     def test_views_are_rendered_without_a_display(self, tmp_path):
-        run = subprocess.run(
-            [sys.executable, "-m", "mazebench", *self.ARGUMENTS, "--out", "x.png"],
-            cwd=tmp_path,
-            env={**os.environ, "MUJOCO_GL": "egl"},
-            capture_output=True,
-            text=True,
-        )
+        arguments = ("-m", "mazebench", *self.ARGUMENTS, "--out", "x.png")
+        run = run_python(*arguments, status=None, variables={"MUJOCO_GL": "egl"}, cwd=tmp_path)
         if "can't open a rendering context" in run.stderr:
             pytest.skip("no EGL here")
         assert (run.returncode, run.stderr) == (0, "")

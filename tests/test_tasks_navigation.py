@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 
 import dm_env
-import gymnasium
 import numpy as np
 import pytest
 from absl.testing import absltest
@@ -18,7 +17,6 @@ from mazebench.envs.dm_control import Environment
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.episode import Episode
-from mazebench.testing import ConformanceError, check_environment
 from mazebench.world.mjcf import TURN_RATE
 
 FORWARD, BACKWARD, STRAFE_LEFT, STRAFE_RIGHT, LOOK_LEFT, LOOK_RIGHT = range(6)
@@ -344,55 +342,3 @@ assert all(picture.shape == (64, 96, 3) and picture.dtype == np.uint8 for pictur
 assert all(picture.std() > 5 for picture in pictures)
 assert not np.array_equal(pictures[0], pictures[2])
 """)
-
-
-class TestConformance:
-    @pytest.mark.parametrize("task", ["local", "hierarchical"])
-    def test_check_when_environment_is_ours(self, task):
-        check_environment(mazebench.load(task, maps=dfs_mazes(), seed=0))
-
-    def test_check_when_it_is_of_gymnasium(self):
-        with pytest.raises(ConformanceError, match="expected a dm_env environment, found OrderEnforcing"):
-            check_environment(gymnasium.make("mazebench/Local-13-v1"))
-
-    @pytest.mark.parametrize(
-        ("broken", "message"),
-        [
-            (lambda step: step._replace(reward=0.0), r"expected reward -1\.0, found 0\.0"),
-            (lambda step: step._replace(discount=0.9), r"expected discount 1\.0, found 0\.9"),
-            (lambda step: with_observation(step, state=np.zeros(11, np.float32)), r"expected a state of 12 float32"),
-            (lambda step: with_observation(step, state=np.zeros(12)), r"12 float32, found \(12,\) float64"),
-            (lambda step: with_observation(step, state=np.full(12, np.nan, np.float32)), r"expected a finite state"),
-            (
-                lambda step: with_observation(step, context=np.zeros((3, 9, 9), np.float32)),
-                r"found \(3, 9, 9\) float32",
-            ),
-            (
-                lambda step: with_observation(step, context=1 - step.observation["context"]),
-                r"expected the context to stay the same until is_first",
-            ),
-        ],
-    )
-    def test_check_when_environment_is_broken(self, broken, message):
-        with pytest.raises(ConformanceError, match=message):
-            check_environment(Broken(mazebench.load(maps=dfs_mazes(), seed=0), broken))
-
-    def test_check_when_episode_never_ends(self):
-        env = mazebench.load(maps=dfs_mazes(), distances=[5], time_limit=10_000, seed=0)
-        with pytest.raises(ConformanceError, match="expected the episode to end within 10 steps, found it going on"):
-            check_environment(env, max_steps=10)
-
-
-class Broken:
-    """An environment in which something is wrong with every step but the first."""
-
-    def __init__(self, env: Environment, change):
-        self._env, self._change = env, change
-        self.action_spec, self.reset = env.action_spec, env.reset
-
-    def step(self, action: int) -> dm_env.TimeStep:
-        return self._change(self._env.step(action))
-
-
-def with_observation(time_step: dm_env.TimeStep, **changes: np.ndarray) -> dm_env.TimeStep:
-    return time_step._replace(observation=time_step.observation | changes)

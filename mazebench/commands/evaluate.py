@@ -13,18 +13,14 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import has_camera, load_mujoco
-from mazebench.commands.options import NO_CAMERA, chosen, refuse_ignored, refuse_ignored_by_task, takes_options
+from mazebench.commands.options import chosen, takes_options
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.options import EvalOptions, RunOptions
 from mazebench.options import options_of
 
-# A suite has values of its own for them.
-_OF_ONE_EVALUATION = tuple(name for name in options_of(EvalOptions) if name not in ("checkpoint", "seed"))
-
 
 @takes_options(RunOptions, EvalOptions)
 def evaluate(
-    context: typer.Context,
     agents: Annotated[
         list[str],
         typer.Option(
@@ -53,19 +49,15 @@ def evaluate(
 
     if suite is None and len(agents) > 1:
         raise InputError(f"expected one --agent without --suite, found {len(agents)}")
+    if suite is not None:
+        for name, option in options_of(EvalOptions).items():
+            if name not in ("checkpoint", "seed") and values[name] != option.default:
+                raise InputError(f"the suite {suite!r} has evaluations of its own; found --{name.replace('_', '-')}")
     run = chosen(RunOptions, values)
-    refuse_ignored(
-        context,
-        (suite is not None, f"the suite {suite!r} has evaluations of its own", _OF_ONE_EVALUATION),
-        (bool(run.workers or run.cluster), "the agent acts in other processes", ("show_traceback",)),
-    )
-    refuse_ignored_by_task(context, values)
     if run.resume and out is None:
         raise InputError("--resume needs --out, the folder of the run to go on with")
     options = chosen(EvalOptions, values, agent=agents[0])
-    renders = has_camera(options.task.sensors)
-    refuse_ignored(context, (not renders, *NO_CAMERA))
-    load_mujoco(renders=renders)
+    load_mujoco(renders=has_camera(options.task.sensors))
 
     what = options.task.track or options.task.task
     folder = out or _new_folder(suite or f"{agents[0].replace(':', '-')}-{what}")

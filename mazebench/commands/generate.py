@@ -9,13 +9,12 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.options import refuse_ignored, takes_options
+from mazebench.commands.options import takes_options
 from mazebench.maps.options import MapOptions
 
 
 @takes_options(MapOptions)
 def generate(
-    context: typer.Context,
     values: dict[str, Any],
     size: Annotated[
         int | None,
@@ -45,7 +44,6 @@ def generate(
     from mazebench.storage.locks import FolderLock
     from mazebench.world.formats import make_mazes, parse_formats, write_maze
 
-    refuse_ignored(context, (from_image is not None, "the map shows one maze", ("count", "seed", "kind")))
     mazes = make_mazes(size, count, seed, kind, from_image, MapOptions(**values))
     chosen = parse_formats(formats)
     with ExitStack() as opened:

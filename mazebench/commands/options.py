@@ -19,16 +19,6 @@ from mazebench.tasks.options import EVAL_DISTANCES, TaskOptions, is_own
 
 Chosen = TypeVar("Chosen")
 
-# Options that another one leaves without effect, and why.
-LOCAL_ONLY = ("distances", "episodes_per_distance")
-HIERARCHICAL = ("the hierarchical task leads from corner to corner", LOCAL_ONLY)
-LOCAL = ("the local task has no landmarks", ("landmark_distance",))
-OWN_MAPS = ("with --maps the mazes are your own", ("split",))
-OWN_ENDS = ("with --start and --goal the distance is given", ("distances",))
-NO_CAMERA = ("no camera is among the --sensors", ("camera_size", "textures"))
-NO_TRACK = ("a level belongs to a track", ("level",))
-TRACK = ("a track has its own time limit", ("time_limit",))
-FROZEN_TRACK = ("a track's eval episodes are frozen", ("episodes_per_distance",))
 _WORTH_WATCHING = 10  # cells from start to goal
 
 
@@ -73,38 +63,6 @@ def chosen(options_class: type[Chosen], values: Mapping[str, Any], **others: Any
     """
     names = options_of(options_class)
     return from_names(options_class, {name: value for name, value in values.items() if name in names}, **others)
-
-
-def refuse_ignored(context: typer.Context, *rules: tuple[bool, str, tuple[str, ...]]) -> None:
-    """Refuses options that were given and would make no difference.
-
-    Args:
-      context: of the command.
-      *rules: whether it applies, the reason, and the options' names.
-
-    Raises:
-      InputError: naming the first such option.
-    """
-    for applies, reason, names in rules:
-        for name in names if applies else ():
-            source = context.get_parameter_source(name)
-            if source is not None and source.name != "DEFAULT":
-                (option,) = (parameter.opts[0] for parameter in context.command.params if parameter.name == name)
-                raise InputError(f"{reason}; found {option}, which would be ignored")
-
-
-def refuse_ignored_by_task(context: typer.Context, values: dict[str, Any]) -> None:
-    """Refuses options without effect in the task, or on the maps, that `values` name."""
-    refuse_ignored(
-        context,
-        (values["task"] == "hierarchical", *HIERARCHICAL),
-        (values["task"] == "local", *LOCAL),
-        (values["maps"] is not None, *OWN_MAPS),
-        (values["start"] is not None and values["goal"] is not None, *OWN_ENDS),
-        (values["track"] is None, *NO_TRACK),
-        (values["track"] is not None, *TRACK),
-        (values["track"] is not None and values["maps"] is None and values["split"] == "eval", *FROZEN_TRACK),
-    )
 
 
 def watched(task: TaskOptions, mazes: MazeOptions) -> TaskOptions:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.options import chosen, refuse_ignored_by_task, takes_options, watched
+from mazebench.commands.options import chosen, takes_options, watched
 from mazebench.errors import InputError
 from mazebench.evaluation.options import EvalOptions
 from mazebench.maps.options import MazeOptions
@@ -17,12 +17,10 @@ from mazebench.world.backend import has_display
 
 @takes_options(EvalOptions, without=["episodes_per_distance", "camera_size", "textures", "checkpoint", "seed"])
 def play(
-    context: typer.Context,
     values: dict[str, Any],
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode and those after it.")] = 0,
 ) -> None:
     """Drive yourself, with the keyboard, in a window."""
-    refuse_ignored_by_task(context, values)
     mazes = chosen(MazeOptions, values)
     task = watched(chosen(TaskOptions, values), mazes)
     load_mujoco(renders=has_display())

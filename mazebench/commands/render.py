@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.options import chosen, refuse_ignored_by_task, takes_options, watched
+from mazebench.commands.options import chosen, takes_options, watched
 from mazebench.evaluation.options import EvalOptions
 
 _DRAWN = ("map", "lidar")  # views that need no rendering
@@ -17,7 +17,6 @@ _DRAWN = ("map", "lidar")  # views that need no rendering
 
 @takes_options(EvalOptions, without=["episodes_per_distance"])
 def render(
-    context: typer.Context,
     out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
     values: dict[str, Any],
     agent: Annotated[str, typer.Option(help="Who drives.")] = "planner-closed-loop",
@@ -31,7 +30,6 @@ def render(
     pixels: Annotated[int, typer.Option(min=64, max=1280, help="Side of a view.")] = 360,
 ) -> None:
     """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
-    refuse_ignored_by_task(context, values)
     options = chosen(EvalOptions, values, agent=agent)
     options = dataclasses.replace(options, task=watched(options.task, options.mazes))
     load_mujoco(renders=view not in _DRAWN)

@@ -10,7 +10,7 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import has_camera, load_mujoco
-from mazebench.commands.options import NO_CAMERA, NO_TRACK, TRACK, chosen, refuse_ignored, takes_options
+from mazebench.commands.options import chosen, takes_options
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import SIZES
 from mazebench.training.options import FIXED, TrainOptions
@@ -18,7 +18,6 @@ from mazebench.training.options import FIXED, TrainOptions
 
 @takes_options(TrainOptions, without=FIXED)
 def train(
-    context: typer.Context,
     agent: Annotated[
         str,
         typer.Option(help="A learning agent: dqn, mah, mah-paper, mmn or another installed one, or module:Class."),
@@ -38,13 +37,6 @@ def train(
     load_mujoco(renders=has_camera(values["sensors"]))
     from mazebench.training import loop, run_folder
 
-    refuse_ignored(
-        context,
-        (not values["workers"], "without --workers this process collects by itself", ("ray_address",)),
-        (values["track"] is None, *NO_TRACK),
-        (values["track"] is not None, *TRACK),
-        (not has_camera(values["sensors"]), *NO_CAMERA),
-    )
     options = chosen(TrainOptions, values, agent=agent, overrides=tuple(map(_parse_override, overrides or [])))
     folder = out or pathlib.Path("runs") / _folder_name(options)
 
