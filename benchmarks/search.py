@@ -30,15 +30,15 @@ import torch
 from mazebench_agents.common import kernels
 from mazebench_agents.common.actor import one_torch_thread
 from mazebench_agents.mmn.kernel_layers import Linear, add_product, kernel, linear, normalize, rectify
-from mazebench_agents.muzero.search import KernelModel, Root, gumbel_muzero_policy, muzero_policy
-from mazebench_agents.muzero.tree import ROOT, Evaluation, backward, empty_evaluation, expand, simulate
+from mazebench_agents.muzero.search import KernelModel, Root, gumbel_muzero_policy, run_simulations
+from mazebench_agents.muzero.tree import ROOT, Evaluation, empty_evaluation
 
 NUM_ACTIONS = 6
 LATENT = 64
 HIDDEN = 128
 NUM_BINS = 65  # of values in [-64, 0]
 NUM_SIMULATIONS = 16
-_CASES = (("gumbel", 1), ("gumbel", 64), ("gumbel", 256), ("puct", 64))  # policy, roots
+_NUM_ROOTS = (1, 64, 256)
 _ROUNDS = 7
 _ANSWER = "--answer-for-mctx"  # asks this script for the rates of mctx, in a process of their own
 # XLA would use a thread a core.
@@ -49,7 +49,7 @@ _ONE_THREAD = {
 }
 
 Search = Callable[[], Any]  # runs all simulations from all roots
-Rate = Callable[[str, int, float], float]  # of a policy, a number of roots, and seconds
+Rate = Callable[[int, float], float]  # of a number of roots, and seconds
 
 
 def main() -> None:
@@ -57,15 +57,15 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=3.0, help="of each figure")
     seconds = parser.parse_args().seconds / _ROUNDS
     print(f"{NUM_SIMULATIONS} simulations, one thread; simulations in a second of processor time\n")
-    print("| policy, roots | search | mctx | search / mctx |\n|---|---|---|---|")
+    print("| roots | search | mctx | search / mctx |\n|---|---|---|---|")
     with one_torch_thread(), kernels.one_thread(), mctx_rate() as theirs:
-        for policy, num_roots in _CASES:
-            search, pairs = our_search(policy, num_roots), []
+        for num_roots in _NUM_ROOTS:
+            search, pairs = our_search(num_roots), []
             for _ in range(_ROUNDS):
-                pairs.append((rate(search, num_roots, seconds), theirs(policy, num_roots, seconds)))
+                pairs.append((rate(search, num_roots, seconds), theirs(num_roots, seconds)))
             ours, others = (statistics.median(side) for side in zip(*pairs, strict=True))
             ratio = statistics.median(one / other for one, other in pairs)
-            print(f"| {policy}, {num_roots} | {ours:,.0f} | {others:,.0f} | {ratio:.2f} |", flush=True)
+            print(f"| {num_roots} | {ours:,.0f} | {others:,.0f} | {ratio:.2f} |", flush=True)
 
 
 def rate(search: Search, num_roots: int, seconds: float) -> float:
@@ -106,7 +106,7 @@ class StandIn(NamedTuple):
     outputs: Linear
 
 
-def our_search(policy: str, num_roots: int) -> Search:
+def our_search(num_roots: int) -> Search:
     """Returns a search of ours, by kernels."""
     # Tensors are aligned in memory, as those of a network are.
     weights = {name: torch.tensor(weight).numpy() for name, weight in random_weights(num_roots).items()}
@@ -118,40 +118,33 @@ def our_search(policy: str, num_roots: int) -> Search:
     latent, evaluation = random_latents(num_roots), empty_evaluation(num_roots, NUM_ACTIONS)
     predict(model, latent, evaluation)
     root = Root(evaluation.prior_logits, evaluation.value, torch.from_numpy(latent))
-    rng = np.random.default_rng(0)
-    gumbel = rng.gumbel(size=(num_roots, NUM_ACTIONS)).astype(np.float32)
-    if policy == "gumbel":
-        return lambda: gumbel_muzero_policy(root, KernelModel(search_kernel, model), NUM_SIMULATIONS, gumbel)
-    noise = rng.dirichlet(np.full(NUM_ACTIONS, 0.3), num_roots).astype(np.float32)
-    return lambda: muzero_policy(root, KernelModel(search_kernel, model), NUM_SIMULATIONS, noise, gumbel)
+    gumbel = np.random.default_rng(0).gumbel(size=(num_roots, NUM_ACTIONS))
+    return lambda: gumbel_muzero_policy(root, KernelModel(search_kernel, model), NUM_SIMULATIONS, gumbel)
 
 
 @functools.partial(kernel, nogil=True)
 def search_kernel(model, first, tree, gumbel, visits, settings, roots):
     """Runs all simulations from neighbouring roots, as `KernelModel` says."""
-    num_trees, num_nodes = tree.shape
-    actions, parents = np.empty(num_trees, np.int64), np.empty(num_trees, np.int64)
-    evaluation = empty_evaluation(num_trees, NUM_ACTIONS)
-    states = np.empty((num_trees, num_nodes, LATENT), np.float32)
-    latent, hidden = np.empty((num_trees, LATENT), np.float32), np.empty((num_trees, LATENT), np.float32)
+    states = np.empty((*tree.shape, LATENT), np.float32)
     states[:, ROOT] = roots
-    for index in range(1, num_nodes):
-        simulate(tree, index, gumbel, visits[index - 1], settings, actions, parents)
+    run_simulations(step, model, first, tree, gumbel, visits, settings, states)
 
-        # A residual layer with an input for each action.
-        for b in range(num_trees):
-            weights = model.transition_1[first + b]
-            latent[b] = states[b, parents[b]]
-            hidden[b] = weights[LATENT + actions[b]]
-            add_product(latent[b : b + 1], weights[:LATENT], hidden[b : b + 1])
-            rectify(hidden[b])
-            add_product(hidden[b : b + 1], model.transition_2[first + b], latent[b : b + 1])
-            normalize(latent[b])
-            states[b, index] = latent[b]
-        predict(model, latent, evaluation)
 
-        expand(tree, index, evaluation)
-        backward(tree, index)
+@kernel
+def step(model, first, states, parents, actions, index, evaluation):
+    """Takes a step, as `run_simulations` says: a residual layer with an input for each action."""
+    num_trees = len(states)
+    latent, hidden = np.empty((num_trees, LATENT), np.float32), np.empty((num_trees, LATENT), np.float32)
+    for b in range(num_trees):
+        weights = model.transition_1[first + b]
+        latent[b] = states[b, parents[b]]
+        hidden[b] = weights[LATENT + actions[b]]
+        add_product(latent[b : b + 1], weights[:LATENT], hidden[b : b + 1])
+        rectify(hidden[b])
+        add_product(hidden[b : b + 1], model.transition_2[first + b], latent[b : b + 1])
+        normalize(latent[b])
+        states[b, index] = latent[b]
+    predict(model, latent, evaluation)
 
 
 @kernel
@@ -184,7 +177,7 @@ def mctx_rate() -> Iterator[Rate]:
     """Yields a function that measures mctx in another process; it answers NaN where mctx is not installed."""
     if not all(importlib.util.find_spec(name) for name in ("jax", "mctx")):
         print("mctx is not measured: the extra `peers`, which brings it, is not installed", file=sys.stderr)
-        yield lambda policy, num_roots, seconds: float("nan")
+        yield lambda num_roots, seconds: float("nan")
         return
     with subprocess.Popen(
         [sys.executable, __file__, _ANSWER],
@@ -194,8 +187,8 @@ def mctx_rate() -> Iterator[Rate]:
         text=True,
     ) as process:
 
-        def ask(policy: str, num_roots: int, seconds: float) -> float:
-            process.stdin.write(json.dumps([policy, num_roots, seconds]) + "\n")
+        def ask(num_roots: int, seconds: float) -> float:
+            process.stdin.write(json.dumps([num_roots, seconds]) + "\n")
             process.stdin.flush()
             return json.loads(process.stdout.readline())
 
@@ -206,14 +199,14 @@ def mctx_rate() -> Iterator[Rate]:
 
 
 def answer_for_mctx() -> None:
-    """Writes a rate for each line of standard input, a list of policy, number of roots and seconds, until it ends."""
+    """Writes a rate for each line of standard input, a list of the number of roots and seconds, until it ends."""
     search_of = functools.cache(mctx_search)
     for line in sys.stdin:
-        policy, num_roots, seconds = json.loads(line)
-        print(json.dumps(rate(search_of(policy, num_roots), num_roots, seconds)), flush=True)
+        num_roots, seconds = json.loads(line)
+        print(json.dumps(rate(search_of(num_roots), num_roots, seconds)), flush=True)
 
 
-def mctx_search(policy: str, num_roots: int) -> Search:
+def mctx_search(num_roots: int) -> Search:
     """Returns a search of mctx."""
     import jax
     import jax.numpy as jnp
@@ -238,8 +231,8 @@ def mctx_search(policy: str, num_roots: int) -> Search:
     def search(weights, key, latent):
         prior_logits, value, _ = predict(weights, latent)
         root = mctx.RootFnOutput(prior_logits=prior_logits, value=value, embedding=latent)
-        policy_fn = mctx.gumbel_muzero_policy if policy == "gumbel" else mctx.muzero_policy
-        output = policy_fn(weights, key, root, recurrent_fn, NUM_SIMULATIONS)
+        transform = functools.partial(mctx.qtransform_completed_by_mix_value, rescale_values=False)
+        output = mctx.gumbel_muzero_policy(weights, key, root, recurrent_fn, NUM_SIMULATIONS, qtransform=transform)
         summary = output.search_tree.summary()
         return output.action, output.action_weights, summary.visit_counts, summary.qvalues, summary.value
 

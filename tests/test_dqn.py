@@ -1,17 +1,13 @@
 """The DQN agents: targets, network, config, and that they learn."""
 
 import numpy as np
-import pytest
 import torch
 from acting import inputs_of
 from mazebench_agents.dqn import DQN
-from mazebench_agents.dqn.config import DQNConfig
 from mazebench_agents.dqn.learner import double_q_target
 from mazebench_agents.mah import MAH, MAHPaper
 from mazebench_agents.mah.network import ReadingQNetwork
 from small_world import learn
-
-from mazebench.errors import InputError
 
 
 def test_double_q_target_by_hand():
@@ -56,8 +52,6 @@ def test_network_without_context_does_not_depend_on_it():
         for context in contexts
     )
     np.testing.assert_array_equal(one, other)
-    with pytest.raises(InputError, match="expected use_context False, found True; agent 'mah' gets the context"):
-        DQN(DQNConfig(use_context=True), 13)
 
 
 def test_mah_paper_reads_one_code_of_the_context_and_codes_of_the_estimated_position():

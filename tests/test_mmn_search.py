@@ -66,7 +66,7 @@ def test_search_by_kernels_finds_what_the_search_by_pytorch_finds(name):
     with torch.no_grad():
         latent, code = network.encode(3 * torch.randn(5, 3, 9)), code_of(network, a_context(batch=5))
         found, expected = (
-            gumbel_muzero_policy(*prepare(network, latent, code), 6, np.zeros((15, 6)), rescale_values=False)
+            gumbel_muzero_policy(*prepare(network, latent, code), 6, np.zeros((15, 6)))
             for prepare in (kernel_model, torch_model)
         )
     np.testing.assert_array_equal(found.visit_counts, expected.visit_counts)

@@ -9,7 +9,7 @@ from mazebench_agents.mmn.batches import Batch
 from mazebench_agents.mmn.config import MMNConfig
 from mazebench_agents.mmn.losses import cross_entropy, q_losses, two_hot, unrolled_losses
 from mazebench_agents.mmn.network import MMNNetwork
-from mazebench_agents.mmn.targets import Targets, n_step_returns, tree_backup_returns
+from mazebench_agents.mmn.targets import Targets, n_step_returns
 
 NEVER = torch.zeros(4, dtype=torch.bool)
 ALL = torch.ones(4, dtype=torch.bool)
@@ -39,22 +39,6 @@ def test_n_step_returns_bootstrap_where_the_trajectory_was_cut_short():
     value = torch.tensor([-9.0, -7.0, -20.0, -3.0])
     exists = torch.tensor([True, True, False, False])
     assert n_step_returns(value, NEVER, exists, 3).tolist()[:2] == [-8.0, -7.0]
-
-
-def test_tree_backup_returns_replace_what_was_taken():
-    qvalues = torch.tensor([[-2.0, -6.0], [-4.0, -8.0], [-1.0, -3.0]])
-    policy = torch.tensor([[0.5, 0.5], [0.25, 0.75], [0.5, 0.5]])
-    action = torch.tensor([1, 0])
-    exists, never = torch.ones(3, dtype=torch.bool), torch.zeros(3, dtype=torch.bool)
-    # State 2 believes -2. State 1 took action 0: 0.25 * (-1 - 2) + 0.75 * -8 = -6.75.
-    # State 0 took action 1: 0.5 * -2 + 0.5 * (-1 - 6.75) = -4.875.
-    assert tree_backup_returns(qvalues, policy, action, never, exists).tolist() == [-4.875, -6.75, -2.0]
-    # Reaching the goal in state 2 costs nothing more: state 1 has 0.25 * 0 + 0.75 * -8 = -6.
-    reached = torch.tensor([False, False, True])
-    assert tree_backup_returns(qvalues, policy, action, reached, exists).tolist()[1] == -6.0
-    # Cut short after state 1: what it believes, 0.25 * -4 + 0.75 * -8 = -7.
-    cut = torch.tensor([True, True, False])
-    assert tree_backup_returns(qvalues, policy, action, never, cut).tolist()[1] == -7.0
 
 
 def test_two_hot_weighs_the_two_whole_numbers_beside():
@@ -92,7 +76,6 @@ def make_batch(at_goal_step=None):
         context=context,
         anchor=torch.tensor([3.0, 2.0]).expand(2, 2),
         maze=torch.arange(2),
-        relabelled=torch.ones(2, dtype=torch.bool),
         features=features,
         action=torch.zeros(2, 1, SMALL.sequence_steps, dtype=torch.long),
         exists=exists,

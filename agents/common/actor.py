@@ -20,7 +20,7 @@ from mazebench.training.protocol import Learner, LearningAgent
 
 from .bounds import bounded
 from .checkpoint import check_shapes, load_agent, load_checkpoint, load_into, save_checkpoint
-from .overrides import override
+from .config_values import override
 
 
 @contextlib.contextmanager

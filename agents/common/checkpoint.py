@@ -16,7 +16,7 @@ from mazebench.maps.maze import MAX_SIZE
 from mazebench.storage.files import open_whole, read_at_most
 from mazebench.storage.json_files import parse_json
 
-from .overrides import Config, override
+from .config_values import Config, override
 
 FORMAT = "mazebench-agent-1"
 AGENT_FILE = "agent.safetensors"

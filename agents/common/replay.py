@@ -68,7 +68,6 @@ class SequenceSample(NamedTuple):
     maze: np.ndarray  # [G] int
     start: np.ndarray  # [G] int, cell
     goal: np.ndarray  # [G] int, cell
-    relabelled: np.ndarray  # [G] bool, whether the goal was relabelled
     anchor: np.ndarray  # [G] int, the cell where `origin` was observed
     origin: np.ndarray  # [G, 2] float32, x and y observed where the context's leg started, or the trajectory
     state: np.ndarray  # [G, S, L + 1, 12] float32
@@ -98,7 +97,6 @@ class _Groups(NamedTuple):
     maze: np.ndarray  # [G]
     start: np.ndarray  # [G]
     goal: np.ndarray  # [G]
-    relabelled: np.ndarray  # [G] bool
     anchor: np.ndarray  # [G]
     origin: np.ndarray  # [G, 2]
 
@@ -318,7 +316,6 @@ class Replay:
             maze=group.maze,
             start=group.start,
             goal=group.goal,
-            relabelled=group.relabelled,
             anchor=group.anchor,
             origin=group.origin,
             state=self._state[env, steps],
@@ -361,7 +358,6 @@ class Replay:
             maze=self._maze[env, index].astype(np.int64),
             start=start,
             goal=goal,
-            relabelled=relabelled,
             anchor=anchor,
             origin=origin,
         )

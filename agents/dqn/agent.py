@@ -1,4 +1,4 @@
-"""How DQN and MAH act, and the paper's DQN-dagger: Ape-X DQN with hindsight that gets no task context.
+"""The acting of DQN and MAH, and the paper's DQN-dagger: Ape-X DQN with hindsight that gets no task context.
 
 docs/agents/dqn.md describes the training, and how it differs from the paper.
 """
@@ -13,7 +13,6 @@ import torch
 
 from mazebench.agent import Inputs
 from mazebench.constants import NUM_ACTIONS
-from mazebench.errors import InputError
 
 from ..common.actor import NetworkAgent, acting
 from ..common.layers import in_batches, state_features
@@ -48,7 +47,7 @@ class QAgent(NetworkAgent):
         observed = inputs.observation["state"]
         new = np.flatnonzero(inputs.new_context)
         state.origin[new] = observed[new, :2]
-        if len(new) and self.config.use_context:
+        if len(new) and self.network.reads_context:
             contexts = torch.from_numpy(inputs.observation["context"][new])
             code = in_batches(self.network.encode, CONTEXTS_AT_ONCE, contexts)
             if state.code is None:
@@ -66,15 +65,9 @@ class DQN(QAgent):
     """The Ape-X DQN of the paper, whose Q-network gets no context."""
 
     name: ClassVar[str] = "dqn"
-    default_config: ClassVar[DQNConfig] = DQNConfig(use_context=False)
+    default_config: ClassVar[DQNConfig] = DQNConfig()
 
     @classmethod
     def make_network(cls, config: DQNConfig, context_size: int) -> QNetwork:
-        """Returns a new network.
-
-        Raises:
-          InputError: if the config wants the context.
-        """
-        if config.use_context:
-            raise InputError("agent 'dqn': expected use_context False, found True; agent 'mah' gets the context")
+        """Returns a new network."""
         return QNetwork(config.hidden)

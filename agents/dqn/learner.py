@@ -52,7 +52,7 @@ class DQNLearner(HindsightLearner):
 
         # Their contexts, encoded by both networks; none without context.
         code = target_code = None
-        if config.use_context:
+        if network.reads_context:
             contexts = self.maps.contexts(sample, turned)
             code = network.encode(contexts)
             with torch.no_grad():

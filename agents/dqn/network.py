@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import torch
 from torch import nn
 
@@ -20,6 +22,8 @@ STATES_AT_ONCE = 64
 
 class QNetwork(nn.Module):
     """Dueling action values (Wang et al. 2016) of the state alone; subclasses add what they read of a context."""
+
+    reads_context: ClassVar[bool] = False
 
     def __init__(self, hidden: int, num_read: int = 0):
         """`num_read` is the number of inputs from a context."""

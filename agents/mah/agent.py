@@ -21,16 +21,14 @@ class _MapAgent(QAgent):
     @classmethod
     def make_network(cls, config: DQNConfig, context_size: int) -> QNetwork:
         """Returns a new network."""
-        if not config.use_context:
-            return QNetwork(config.hidden)
         if config.reading:
             return ReadingQNetwork(config.hidden, config.channels)
         return JoinedQNetwork(config.hidden, config.channels, context_size)
 
     @classmethod
     def serves_any_size(cls, config: DQNConfig) -> bool:
-        """Returns whether the network reads the context at a position, or not at all."""
-        return config.reading or not config.use_context
+        """Returns whether the network reads the context at a position."""
+        return config.reading
 
 
 class MAH(_MapAgent):

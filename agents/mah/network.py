@@ -34,6 +34,8 @@ _SCALE_RATE = 5.0  # how much faster the scale is learned than weights of order 
 class ReadingQNetwork(QNetwork):
     """Reads features of the map at the estimated position: the start plus a learned linear map of the displacement."""
 
+    reads_context = True
+
     def __init__(self, hidden: int, channels: int):
         super().__init__(hidden, channels + 2 + NUM_WAVES)
         self.channels = channels
@@ -64,6 +66,8 @@ class ReadingQNetwork(QNetwork):
 
 class JoinedQNetwork(QNetwork):
     """Joins the state with one code of the whole context, of a fixed size, and with codes of the estimated position."""
+
+    reads_context = True
 
     def __init__(self, hidden: int, channels: int, context_size: int):
         super().__init__(hidden, _CODE + NUM_PLACE + NUM_TO_GOAL)

@@ -27,7 +27,7 @@ from .planning import plan
 class ActorState:
     """The state of acting in B environments.
 
-    Displacements are measured from the anchor, the place where the first leg of an episode began, or each leg did.
+    Displacements are measured from the anchor, the place where the episode began.
     """
 
     origin: np.ndarray  # [B, 2] float32, m, the position that was observed at the anchor
@@ -62,11 +62,10 @@ class MMN(NetworkAgent):
     @acting
     def act(self, inputs: Inputs, state: ActorState, explore: bool = False) -> tuple[np.ndarray, ActorState]:
         """Returns actions `[B]`; the hypermodel runs only where a context is new."""
-        # What the hypermodel makes of new contexts.
+        # Codes of the new contexts.
         new = np.flatnonzero(inputs.new_context)
         if len(new):
-            new_anchor = inputs.new_episode[new] if self.config.keep_anchor else np.ones(len(new), dtype=bool)
-            self._encode(inputs.observation, new, new_anchor, state)
+            self._encode(inputs.observation, new, inputs.new_episode[new], state)
         assert state.code is not None, "new_context must be set in an environment's first step"
 
         # Latent states of the environments that are active.

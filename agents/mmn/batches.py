@@ -1,4 +1,4 @@
-"""What MMN learns from: a sample of sequences as tensors.
+"""A sample of sequences as tensors, from which MMN learns.
 
 `G` is the number of contexts in a batch, `S` of sequences in each, `L` of steps of a sequence, so L + 1 of states.
 """
@@ -22,7 +22,6 @@ class Batch(NamedTuple):
     context: torch.Tensor  # [G, 4, M, M]
     anchor: torch.Tensor  # [G, 2], the position (row, column) from which displacements are measured
     maze: torch.Tensor  # [G], the index of the maze
-    relabelled: torch.Tensor  # [G] bool
     features: torch.Tensor  # [G, S, L + 1, 9]
     action: torch.Tensor  # [G, S, L]
     exists: torch.Tensor  # [G, S, L + 1] bool, whether the sequence goes as far without reaching the goal before
@@ -38,7 +37,6 @@ def make_batch(sample: SequenceSample, *, maps: TrainingMaps, turned: int, devic
         context=maps.contexts(sample, turned),
         anchor=maps.marks(sample.anchor, turned),
         maze=torch.from_numpy(sample.maze),
-        relabelled=torch.from_numpy(sample.relabelled),
         features=symmetry.turn_features(features, turned),
         action=torch.from_numpy(symmetry.turn_actions(sample.action, turned)),
         exists=torch.from_numpy(sample.exists & not_before),

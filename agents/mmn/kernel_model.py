@@ -18,20 +18,9 @@ import torch
 from mazebench.constants import NUM_ACTIONS
 
 from ..common.layers import DISPLACEMENT_UNIT, NUM_PLACE, NUM_TO_GOAL, PERIODS, WAY_UNIT, WIDTHS, steepness
-from ..muzero.search import KernelModel, Root
-from ..muzero.tree import ROOT, Evaluation, Settings, backward, empty_evaluation, expand, simulate
-from .kernel_layers import (
-    ONE,
-    ZERO,
-    Linear,
-    add_product,
-    inlined,
-    kernel,
-    linear,
-    linear_of,
-    normalize,
-    rectify,
-)
+from ..muzero.search import KernelModel, Root, run_simulations
+from ..muzero.tree import ROOT, Evaluation, Settings, empty_evaluation
+from .kernel_layers import ONE, ZERO, Linear, add_product, inlined, kernel, linear, linear_of, normalize, rectify
 from .network import NUM_BODY, NUM_CHANGES, NUM_FREE, NUM_POSE, SCALE_RATE, Code, MMNNetwork
 from .reading import REACH
 
@@ -135,21 +124,9 @@ def search(
     roots: np.ndarray,
 ) -> None:
     """Runs all simulations from neighbouring roots, of which `first` is the index of the first one."""
-    num_trees, num_nodes = tree.shape
-    actions, parents = np.empty(num_trees, np.int64), np.empty(num_trees, np.int64)
-    evaluation = empty_evaluation(num_trees, gumbel.shape[1])
-    states = np.empty((num_trees, num_nodes, roots.shape[1]), np.float32)
+    states = np.empty((*tree.shape, roots.shape[1]), np.float32)
     states[:, ROOT] = roots
-    for index in range(1, num_nodes):
-        # Descend from each root to an action that was not visited yet.
-        simulate(tree, index, gumbel, visits[index - 1], settings, actions, parents)
-
-        # Take these actions in the model.
-        step(model, first, states, parents, actions, index, evaluation)
-
-        # Expand the nodes that they lead to, and update the values on the paths to the roots.
-        expand(tree, index, evaluation)
-        backward(tree, index)
+    run_simulations(step, model, first, tree, gumbel, visits, settings, states)
 
 
 @kernel

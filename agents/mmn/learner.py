@@ -32,7 +32,7 @@ class MMNLearner(HindsightLearner):
             target_rate=config.target_rate,
             constant_steps=config.constant_updates,
         )
-        super().__init__(actor, task, seed, descent, keep_anchor=config.keep_anchor)
+        super().__init__(actor, task, seed, descent, keep_anchor=True)
 
     @one_torch_thread()
     def update(self) -> dict[str, float]:

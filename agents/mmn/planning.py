@@ -10,14 +10,11 @@ import torch
 
 from mazebench.constants import NUM_ACTIONS
 
-from ..muzero.search import RecurrentFn, Root, SearchResult, gumbel_muzero_policy, muzero_policy
+from ..muzero.search import RecurrentFn, Root, SearchResult, gumbel_muzero_policy
 from ..muzero.tree import Evaluation
 from .config import MMNConfig
 from .kernel_model import kernel_model
 from .network import Code, MMNNetwork, Predictions, reward_and_discount
-
-_DIRICHLET_ALPHA = 0.3  # MuZero's, in its board games with the fewest actions
-_DIRICHLET_FRACTION = 0.25  # MuZero's
 
 
 @torch.no_grad()
@@ -32,32 +29,18 @@ def plan(
 ) -> SearchResult:
     """Searches from all latent states `[G, K, D]`; the results are in the order of B.
 
-    If `rng` is given, the search has noise. The noise of "gumbel" is multiplied by `noise_scale`, a number or `[B]`.
+    If `rng` is given, the search has Gumbel noise, multiplied by `noise_scale`, a number or `[B]`.
     """
     size = latent.shape[0] * latent.shape[1], NUM_ACTIONS
-    root, model = (kernel_model if latent.is_cpu else torch_model)(network, latent, code)
     gumbel = np.zeros(size) if rng is None else rng.gumbel(size=size)
-    if config.search == "gumbel":
-        scaled = gumbel * np.broadcast_to(noise_scale, size[:1])[:, None]
-        return gumbel_muzero_policy(
-            root,
-            model,
-            num_simulations,
-            scaled,
-            value_scale=config.value_scale,
-            maxvisit_init=config.maxvisit_init,
-            rescale_values=False,  # values are in steps: their differences mean the same everywhere
-        )
-    exploring = rng is not None
-    noise = np.zeros(size) if rng is None else rng.dirichlet([_DIRICHLET_ALPHA] * NUM_ACTIONS, size[0])
-    return muzero_policy(
+    root, model = (kernel_model if latent.is_cpu else torch_model)(network, latent, code)
+    return gumbel_muzero_policy(
         root,
         model,
         num_simulations,
-        noise,
-        gumbel,
-        dirichlet_fraction=_DIRICHLET_FRACTION * exploring,
-        temperature=float(exploring),
+        gumbel * np.broadcast_to(noise_scale, size[:1])[:, None],
+        value_scale=config.value_scale,
+        maxvisit_init=config.maxvisit_init,
     )
 
 

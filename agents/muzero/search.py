@@ -1,10 +1,8 @@
-"""Batched tree search in a learned model: Gumbel MuZero (Danihelka et al. 2022), MuZero (Schrittwieser et al. 2020).
+"""Batched tree search in a learned model: Gumbel MuZero (Danihelka et al. 2022).
 
 `B` is the number of roots, `N` = num_simulations + 1 the number of nodes of a tree, `A` the number of actions and `D`
-the size of an embedding. In each simulation a kernel descends all trees, the model evaluates one batch of B states, and
-a kernel expands and backs up; a model that consists of kernels does all simulations in one call. The search draws no
-random numbers: noise is an argument. Of actions with equal scores the first is taken, where mctx's MuZero adds a tiny
-noise.
+the size of an embedding. The search draws no random numbers: noise is an argument. Of actions with equal scores the
+first is taken.
 """
 
 from __future__ import annotations
@@ -16,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
+from numba.extending import register_jitable
 
 from ..common import kernels
 from . import tree as trees
@@ -38,7 +37,7 @@ class SearchResult(NamedTuple):
     action: np.ndarray  # [B] int64
     action_weights: np.ndarray  # [B, A] float32, the policy to learn
     visit_counts: np.ndarray  # [B, A] int32
-    qvalues: np.ndarray  # [B, A] float32, those of actions not visited completed as the policy does
+    qvalues: np.ndarray  # [B, A] float32; actions not visited have the mixed value
     value: np.ndarray  # [B] float32, the mean over the root's visits
 
 
@@ -48,12 +47,10 @@ RecurrentFn = Callable[[torch.Tensor, np.ndarray], tuple[Evaluation, torch.Tenso
 
 
 class KernelModel(NamedTuple):
-    """A model that consists of kernels, which run the simulations themselves.
+    """A model that consists of kernels.
 
-    `search(model, first, tree, gumbel, visits, settings, embeddings)` runs those of some neighbouring roots, of which
-    `first` is the index of the first one. Their trees `[n, N]` have expanded roots; `gumbel` `[n, A]` float32 is added
-    to the scores of the roots' actions; `visits` `[N - 1]` int64 are the visits of the actions that each simulation
-    considers at the roots; `embeddings` `[n, D]` float32 are the roots'.
+    `search(model, first, tree, gumbel, visits, settings, embeddings)` is a kernel that calls `run_simulations` for some
+    neighbouring roots, of which `first` is the index of the first one and `embeddings` `[n, D]` float32 are theirs.
     """
 
     search: Callable[..., None]
@@ -69,83 +66,39 @@ def gumbel_muzero_policy(
     num_simulations: int,
     gumbel: np.ndarray,
     *,
-    max_num_considered_actions: int = 16,
     value_scale: float = 0.1,
     maxvisit_init: float = 50.0,
-    rescale_values: bool = True,
-    use_mixed_value: bool = True,
 ) -> SearchResult:
     """Searches by sequential halving at the root, deterministic visits in proportion to the improved policy below it.
 
+    All actions are considered at the root. Values are not rescaled: their differences mean the same in all nodes.
+
     Args:
       root: the states to search from.
-      model: predicts steps; a function is called once a simulation.
+      model: predicts steps; a function is called once per simulation.
       num_simulations: 0 acts by the prior.
       gumbel: `[B, A]`, standard Gumbel noise, scaled as wanted; zeros to act without noise.
-      max_num_considered_actions: at the root.
       value_scale: of completed q-values, beside logits.
       maxvisit_init: added to the visits of the most visited action, which scale q-values too.
-      rescale_values: whether a node's q-values are brought to [0, 1] before they are scaled.
-      use_mixed_value: whether q-values of actions not visited are completed by the mixed value, not the network's.
     """
     batch_size, num_actions = root.prior_logits.shape
-    noise = np.empty((batch_size, num_actions), np.float32)
-    noise[:] = gumbel
-    settings = Settings(
-        puct=False,
-        value_scale=np.float32(value_scale),
-        maxvisit_init=np.float32(maxvisit_init),
-        rescale_values=rescale_values,
-        use_mixed_value=use_mixed_value,
-    )
-    visits = considered_visits(min(max_num_considered_actions, num_actions), num_simulations)
-    tree = _search(root, model, num_simulations, noise, visits, settings)
+    noise = np.ascontiguousarray(gumbel, np.float32)
+    settings = Settings(np.float32(value_scale), np.float32(maxvisit_init))
+    visits = np.array(considered_visits(num_actions, num_simulations), np.int64)
+    tree = np.empty((batch_size, num_simulations + 1), trees.node_type(num_actions))
+    trees.plant(tree, *map(np.ascontiguousarray, (root.prior_logits, root.value)))
+    if isinstance(model, KernelModel):
+        _search_by_kernels(tree, model, noise, visits, settings, root.embedding.numpy())
+    else:
+        _search_by_function(tree, model, noise, visits, settings, root.embedding)
+
     action = np.empty(batch_size, np.int64)
     action_weights = np.empty((batch_size, num_actions), np.float32)
     qvalues = np.empty((batch_size, num_actions), np.float32)
-    trees.gumbel_decision(tree, noise, settings, action, action_weights, qvalues)
+    trees.decide(tree, noise, settings, action, action_weights, qvalues)
     return SearchResult(
         action, action_weights, tree["child_visits"][:, ROOT].copy(), qvalues, tree["value"][:, ROOT].copy()
     )
-
-
-def muzero_policy(
-    root: Root,
-    model: Model,
-    num_simulations: int,
-    dirichlet_noise: np.ndarray,
-    action_noise: np.ndarray,
-    *,
-    dirichlet_fraction: float = 0.25,
-    pb_c_init: float = 1.25,
-    pb_c_base: float = 19652.0,
-    temperature: float = 1.0,
-) -> SearchResult:
-    """Searches by upper confidence bounds (PUCT) everywhere; acts in proportion to visits ** (1 / temperature).
-
-    Args:
-      root: the states to search from.
-      model: predicts steps; a function is called once a simulation.
-      num_simulations: 0 acts by the prior with its noise.
-      dirichlet_noise: `[B, A]`, a distribution over actions a root.
-      action_noise: `[B, A]`, standard Gumbel noise, by which the action is drawn; zeros to take the most visited.
-      dirichlet_fraction: of the noise in the roots' priors.
-      pb_c_init: the exploration constant c1.
-      pb_c_base: the exploration constant c2.
-      temperature: 0 takes the most visited action.
-    """
-    prior = (1 - dirichlet_fraction) * _softmax(root.prior_logits) + dirichlet_fraction * dirichlet_noise
-    noisy_root = root._replace(prior_logits=_log(prior.astype(np.float32)))
-    settings = Settings(puct=True, pb_c_init=np.float32(pb_c_init), pb_c_base=np.float32(pb_c_base))
-    none = np.zeros(root.prior_logits.shape, np.float32)
-    tree = _search(noisy_root, model, num_simulations, none, [0] * num_simulations, settings)
-    visit_counts = tree["child_visits"][:, ROOT].copy()
-    action_weights = visit_counts.astype(np.float32) / np.float32(num_simulations) if num_simulations else prior
-    action_weights = action_weights.astype(np.float32)
-    qvalues = np.empty_like(action_weights)
-    trees.puct_qvalues(tree, qvalues)
-    action = np.argmax(action_noise + _tempered(action_weights, temperature), axis=-1)
-    return SearchResult(action, action_weights, visit_counts, qvalues, tree["value"][:, ROOT].copy())
 
 
 def considered_visits(num_considered: int, num_simulations: int) -> list[int]:
@@ -168,33 +121,66 @@ def considered_visits(num_considered: int, num_simulations: int) -> list[int]:
     return sequence[:num_simulations]
 
 
-@torch.inference_mode()
-def _search(
-    root: Root, model: Model, num_simulations: int, gumbel: np.ndarray, visits: list[int], settings: Settings
-) -> np.ndarray:
-    """Returns trees `[B, N]` after `num_simulations` simulations; `gumbel` and `visits` are as in `KernelModel`."""
-    batch_size, num_actions = root.prior_logits.shape
-    tree = np.empty((batch_size, num_simulations + 1), trees.node_type(num_actions))
-    trees.plant(tree, *map(np.ascontiguousarray, (root.prior_logits, root.value)))
-    if isinstance(model, KernelModel):
-        _search_by_kernels(tree, model, gumbel, np.array(visits, np.int64), settings, root.embedding.numpy())
-        return tree
-    actions, parents = np.empty((2, batch_size), np.int64)
-    embeddings = root.embedding.new_empty((num_simulations + 1, *root.embedding.shape))  # [N, B, D]
-    embeddings[ROOT] = root.embedding
-    for index in range(1, num_simulations + 1):
+@register_jitable
+def run_simulations(
+    step: Callable[..., None],
+    model: Any,
+    first: int,
+    tree: np.ndarray,
+    gumbel: np.ndarray,
+    visits: np.ndarray,
+    settings: Settings,
+    states: Any,
+) -> None:
+    """Runs all simulations of a search: in kernels, or as a function of Python.
+
+    Args:
+      step: `step(model, first, states, parents, actions, index, evaluation)` takes the actions `[n]` in the states of
+        the nodes `parents` `[n]`; writes the states of the nodes `index`, and the evaluation of the step.
+      model: for `step`.
+      first: for `step`, the index of the first of the roots.
+      tree: `[n, N]`, with expanded roots.
+      gumbel: `[n, A]` float32, added to the scores of the roots' actions.
+      visits: `[N - 1]` int64, the visits of the actions that each simulation considers at the roots.
+      settings: of the selection.
+      states: for `step`, those of all nodes; the roots have theirs.
+    """
+    num_trees, num_nodes = tree.shape
+    actions, parents = np.empty(num_trees, np.int64), np.empty(num_trees, np.int64)
+    evaluation = trees.empty_evaluation(num_trees, gumbel.shape[1])
+    for index in range(1, num_nodes):
         # Descend from each root to an action that was not visited yet.
         trees.simulate(tree, index, gumbel, visits[index - 1], settings, actions, parents)
 
         # Take these actions in the model.
-        rows = torch.from_numpy(parents * batch_size + np.arange(batch_size)).to(embeddings.device)
-        parent_embeddings = embeddings.flatten(0, 1).index_select(0, rows)  # [B, D]
-        evaluation, embeddings[index] = model(parent_embeddings, actions)
+        step(model, first, states, parents, actions, index, evaluation)
 
         # Expand the nodes that they lead to, and update the values on the paths to the roots.
-        trees.expand(tree, index, Evaluation(*map(np.ascontiguousarray, evaluation)))
+        trees.expand(tree, index, evaluation)
         trees.backward(tree, index)
-    return tree
+
+
+@torch.inference_mode()
+def _search_by_function(
+    tree: np.ndarray,
+    model: RecurrentFn,
+    gumbel: np.ndarray,
+    visits: np.ndarray,
+    settings: Settings,
+    roots: torch.Tensor,
+) -> None:
+    """Runs the simulations of all trees together, the model on the device of the `roots` `[B, D]`."""
+
+    def step(model, first, embeddings, parents, actions, index, evaluation):
+        before = embeddings[torch.from_numpy(parents).to(roots.device), every]
+        found, embeddings[index] = model(before, actions)
+        for part, values in zip(evaluation, found, strict=True):
+            part[:] = values
+
+    every = torch.arange(len(tree), device=roots.device)
+    embeddings = roots.new_empty((tree.shape[1], *roots.shape))  # [N, B, D]
+    embeddings[ROOT] = roots
+    run_simulations(step, model, 0, tree, gumbel, visits, settings, embeddings)
 
 
 def _search_by_kernels(
@@ -220,20 +206,3 @@ def _search_by_kernels(
     with ThreadPoolExecutor(num_threads) as threads:
         for ended in [threads.submit(search_from, first) for first in firsts]:
             ended.result()
-
-
-def _softmax(logits: np.ndarray) -> np.ndarray:
-    exponentials = np.exp(logits - logits.max(axis=-1, keepdims=True))
-    return exponentials / exponentials.sum(axis=-1, keepdims=True)
-
-
-def _log(probs: np.ndarray) -> np.ndarray:
-    return np.log(np.maximum(probs, np.finfo(probs.dtype).tiny))
-
-
-def _tempered(probs: np.ndarray, temperature: float) -> np.ndarray:
-    """Returns the logits of `probs ** (1 / temperature)`, up to a constant."""
-    logits = _log(probs)
-    logits -= logits.max(axis=-1, keepdims=True)
-    with np.errstate(over="ignore"):
-        return logits / np.float32(max(float(np.finfo(np.float32).tiny), temperature))

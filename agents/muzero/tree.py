@@ -24,7 +24,6 @@ _ZERO = np.float32(0.0)
 _ONE = np.float32(1.0)
 _MINUS_INFINITY = np.float32(-np.inf)
 _TINY = np.finfo(np.float32).tiny
-_LEAST_RANGE = np.float32(1e-8)  # of values that are rescaled to [0, 1]
 _LEAST_SCORE = np.float32(-1e9)  # of an action that may be visited: above that of one that may not
 
 
@@ -60,15 +59,10 @@ class Evaluation(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """How actions are selected: by Gumbel MuZero or, with `puct`, by MuZero's bounds."""
+    """The weight of completed q-values, beside logits, in the selection of actions."""
 
-    puct: bool
-    value_scale: np.float32 = np.float32(0.0)  # Gumbel MuZero's; of completed q-values, beside logits
-    maxvisit_init: np.float32 = np.float32(0.0)
-    rescale_values: bool = False
-    use_mixed_value: bool = False
-    pb_c_init: np.float32 = np.float32(0.0)  # MuZero's c1 and c2 (Schrittwieser et al. 2020, appendix B)
-    pb_c_base: np.float32 = np.float32(0.0)
+    value_scale: np.float32
+    maxvisit_init: np.float32
 
 
 @inlined
@@ -104,8 +98,8 @@ def simulate(
     Args:
       tree: `[B, N]`.
       index: of the new nodes, which are not expanded yet.
-      gumbel: `[B, A]` float32, added to the scores of the roots' actions; not with `puct`.
-      considered_visit: only actions visited so many times are considered at the roots; not with `puct`.
+      gumbel: `[B, A]` float32, added to the scores of the roots' actions.
+      considered_visit: only actions visited so many times are considered at the roots.
       settings: of the selection.
       actions: `[B]`, output: the actions.
       parents: `[B]`, output: the nodes that they leave.
@@ -113,17 +107,13 @@ def simulate(
     scores = np.empty(gumbel.shape[1], np.float32)
     for b in range(len(tree)):
         parent = ROOT
-        if settings.puct:
-            action = _puct_action(tree[b, ROOT], settings)
-        else:
-            action = _gumbel_root_action(tree[b, ROOT], gumbel[b], considered_visit, settings, scores)
+        action = _root_action(tree[b, ROOT], gumbel[b], considered_visit, settings, scores)
         while tree[b, parent].children[action] != UNVISITED:
             parent = tree[b, parent].children[action]
-            if settings.puct:
-                action = _puct_action(tree[b, parent], settings)
-            else:
-                action = _gumbel_interior_action(tree[b, parent], settings, scores)
-        _attach(tree, b, index, parent, action)
+            action = _interior_action(tree[b, parent], settings, scores)
+        tree[b, parent].children[action] = index
+        tree[b, index].parent = parent
+        tree[b, index].parent_action = action
         actions[b], parents[b] = action, parent
 
 
@@ -154,7 +144,7 @@ def backward(tree: np.ndarray, index: int) -> None:
 
 
 @compiled
-def gumbel_decision(
+def decide(
     tree: np.ndarray,
     gumbel: np.ndarray,
     settings: Settings,
@@ -169,28 +159,11 @@ def gumbel_decision(
     scores = np.empty(gumbel.shape[1], np.float32)
     for b in range(len(tree)):
         root = tree[b, ROOT]
-        actions[b] = _gumbel_root_action(root, gumbel[b], _most_visits(root), settings, scores)
+        actions[b] = _root_action(root, gumbel[b], _most_visits(root), settings, scores)
         for a in range(len(scores)):
             scores[a] += root.prior_logits[a]
         _softmax(scores, action_weights[b])
-        _complete(root, settings, qvalues[b])
-
-
-@compiled
-def puct_qvalues(tree: np.ndarray, qvalues: np.ndarray) -> None:
-    """Writes the roots' `qvalues` `[B, A]`; as in PUCT, actions not visited have the lowest value."""
-    for b in range(len(tree)):
-        root = tree[b, ROOT]
-        lowest, _ = _value_range(root)
-        for a in range(len(root.qvalues)):
-            qvalues[b, a] = root.qvalues[a] if root.child_visits[a] > 0 else lowest
-
-
-@inlined
-def _attach(tree: np.ndarray, b: int, index: int, parent: int, action: int) -> None:
-    tree[b, parent].children[action] = index
-    tree[b, index].parent = parent
-    tree[b, index].parent_action = action
+        _complete(root, qvalues[b])
 
 
 @inlined
@@ -231,11 +204,8 @@ def _most_visits(node: Any) -> int:
 
 
 @inlined
-def _gumbel_root_action(
-    root: Any, gumbel: np.ndarray, considered_visit: int, settings: Settings, scores: np.ndarray
-) -> int:
+def _root_action(root: Any, gumbel: np.ndarray, considered_visit: int, settings: Settings, scores: np.ndarray) -> int:
     """Returns the best action by gumbel + logit + transformed q-value, and writes the last into `scores` `[A]`."""
-    _complete(root, settings, scores)
     _transform(root, settings, scores)
     highest = _highest(root.prior_logits)
     best, best_score = 0, _MINUS_INFINITY
@@ -247,9 +217,8 @@ def _gumbel_root_action(
 
 
 @inlined
-def _gumbel_interior_action(node: Any, settings: Settings, scores: np.ndarray) -> int:
+def _interior_action(node: Any, settings: Settings, scores: np.ndarray) -> int:
     """Returns the action whose visits fall most short of the improved policy (Danihelka et al. 2022, section 5)."""
-    _complete(node, settings, scores)
     _transform(node, settings, scores)
     for a in range(len(node.children)):
         scores[a] += node.prior_logits[a]
@@ -263,9 +232,9 @@ def _gumbel_interior_action(node: Any, settings: Settings, scores: np.ndarray) -
 
 
 @inlined
-def _complete(node: Any, settings: Settings, qvalues: np.ndarray) -> None:
-    """Writes the node's `qvalues` `[A]`; actions not visited get the node's value."""
-    value = _mixed_value(node) if settings.use_mixed_value else node.raw_value
+def _complete(node: Any, qvalues: np.ndarray) -> None:
+    """Writes the node's `qvalues` `[A]`; actions not visited get the mixed value."""
+    value = _mixed_value(node)
     for a in range(len(node.qvalues)):
         qvalues[a] = node.qvalues[a] if node.child_visits[a] > 0 else value
 
@@ -286,49 +255,8 @@ def _mixed_value(node: Any) -> np.float32:
 
 @inlined
 def _transform(node: Any, settings: Settings, qvalues: np.ndarray) -> None:
-    """Scales completed `qvalues` `[A]` in place by the visits of the most visited action."""
-    if settings.rescale_values:
-        _rescale(qvalues)
+    """Writes completed `qvalues` `[A]`, scaled by the visits of the most visited action."""
+    _complete(node, qvalues)
     scale = (settings.maxvisit_init + np.float32(_most_visits(node))) * settings.value_scale
     for a in range(len(node.qvalues)):
         qvalues[a] *= scale
-
-
-@inlined
-def _rescale(values: np.ndarray) -> None:
-    """Rescales `values` `[A]` to [0, 1] in place."""
-    lowest = highest = values[0]
-    for a in range(1, len(values)):
-        lowest, highest = min(lowest, values[a]), max(highest, values[a])
-    span = max(highest - lowest, _LEAST_RANGE)
-    for a in range(len(values)):
-        values[a] = (values[a] - lowest) / span
-
-
-@inlined
-def _puct_action(node: Any, settings: Settings) -> int:
-    """Returns the action of the highest upper confidence bound (Schrittwieser et al. 2020, appendix B)."""
-    lowest, highest = _value_range(node)
-    span = max(highest - lowest, _LEAST_RANGE)
-    count = np.float32(node.visits)
-    pb_c = settings.pb_c_init + math.log((count + settings.pb_c_base + _ONE) / settings.pb_c_base)
-    scale = math.sqrt(count) * pb_c
-    best, best_score = 0, _MINUS_INFINITY
-    for a in range(len(node.children)):
-        score = scale * node.prior_probs[a] / (np.float32(node.child_visits[a]) + _ONE)
-        if node.child_visits[a] > 0:
-            score = (node.qvalues[a] - lowest) / span + score
-        if score > best_score:
-            best, best_score = a, score
-    return best
-
-
-@inlined
-def _value_range(node: Any) -> tuple[np.float32, np.float32]:
-    """Returns the lowest and the highest among the node's value and those of its visited actions."""
-    lowest = highest = node.value
-    for a in range(len(node.qvalues)):
-        if node.child_visits[a] > 0:
-            lowest = min(lowest, node.qvalues[a])
-            highest = max(highest, node.qvalues[a])
-    return lowest, highest

@@ -1,13 +1,14 @@
-"""Writes search.npz: what mctx, the reference implementation of MuZero's search in JAX, answers on random problems.
+"""Writes search.npz: answers on random problems by mctx, the reference implementation of MuZero's search in JAX.
 
     pip install -e '.[agents,peers]' && python tests/golden/make_search_golden.py
 
-A problem is a table: what the model predicts of each action in each of S states. A case is a search in it from B
+A problem is a table of the model's predictions for each action in each of S states. A case is a search in it from B
 states, with the random numbers that mctx drew for it. No two actions tie, so mctx's noise against ties has no effect.
 """
 
 from __future__ import annotations
 
+import functools
 import json
 import pathlib
 from typing import Any
@@ -18,7 +19,6 @@ import mctx
 import numpy as np
 
 _FILE = pathlib.Path(__file__).parent / "search.npz"
-_DIRICHLET_ALPHA = 0.3
 
 # States, actions, and how rewards and discounts are drawn.
 _PROBLEMS = {
@@ -28,32 +28,18 @@ _PROBLEMS = {
     "many": (32, 18, "steps"),
 }
 
-_STEPWISE = {"value_scale": 0.03, "rescale_values": False}  # logits of 1.5 and more a step
-_GUMBEL_CASES = [
+_STEPWISE = {"value_scale": 0.03}  # logits of 1.5 and more per step
+_CASES = [
     *[("random", 8, num_simulations, 1.0, {}) for num_simulations in (1, 2, 4, 8, 16, 32)],
     *[("steps", 8, num_simulations, 1.0, _STEPWISE) for num_simulations in (1, 2, 4, 8, 16, 32)],
     ("random", 8, 16, 0.0, {}),
     ("steps", 8, 16, 0.0, _STEPWISE),
     ("steps", 1, 16, 1.0, {}),
-    ("random", 33, 16, 1.0, {"value_scale": 1.0, "maxvisit_init": 10.0, "rescale_values": False}),
-    ("random", 8, 16, 1.0, {"use_mixed_value": False}),
-    ("steps", 8, 16, 1.0, {**_STEPWISE, "use_mixed_value": False}),
-    ("random", 8, 16, 1.0, {"max_num_considered_actions": 1}),
-    ("random", 8, 16, 1.0, {"max_num_considered_actions": 3}),
-    ("steps", 8, 32, 1.0, {"max_num_considered_actions": 4, "maxvisit_init": 5.0}),
+    ("random", 33, 16, 1.0, {"value_scale": 1.0, "maxvisit_init": 10.0}),
+    ("steps", 8, 32, 1.0, {"maxvisit_init": 5.0}),
     ("two", 8, 16, 1.0, {}),
     ("many", 8, 32, 1.0, {}),
-    ("many", 8, 50, 1.0, {"value_scale": 0.02, "rescale_values": False}),
-]
-_PUCT_CASES = [
-    *[("random", 8, num_simulations, {}) for num_simulations in (1, 2, 4, 8, 16, 32)],
-    *[("steps", 8, num_simulations, {}) for num_simulations in (1, 2, 4, 8, 16, 32)],
-    ("steps", 1, 16, {}),
-    ("random", 33, 16, {"temperature": 0.0}),
-    ("random", 8, 16, {"temperature": 0.25, "dirichlet_fraction": 0.0}),
-    ("steps", 8, 32, {"pb_c_init": 2.5, "pb_c_base": 50.0, "dirichlet_fraction": 0.5}),
-    ("two", 8, 16, {}),
-    ("many", 8, 32, {}),
+    ("many", 8, 50, 1.0, {"value_scale": 0.02}),
 ]
 
 
@@ -62,18 +48,12 @@ def main() -> None:
     problems = {name: _problem(rng, *sizes) for name, sizes in _PROBLEMS.items()}
     arrays = {f"problem/{name}/{key}": table for name, tables in problems.items() for key, table in tables.items()}
     cases = []
-    for seed, (problem, batch_size, num_simulations, scale, options) in enumerate(_GUMBEL_CASES):
+    for seed, (problem, batch_size, num_simulations, scale, options) in enumerate(_CASES):
         states = rng.integers(len(problems[problem]["value"]), size=batch_size)
-        answer = _gumbel(problems[problem], states, num_simulations, scale, options, jax.random.PRNGKey(seed))
-        case = {"policy": "gumbel_muzero_policy", "problem": problem, "sims": num_simulations, "options": options}
-        cases.append({"name": _name("gumbel", problem, batch_size, num_simulations, scale, options), **case})
-        arrays |= {f"{cases[-1]['name']}/{key}": np.asarray(value) for key, value in answer.items()}
-    for seed, (problem, batch_size, num_simulations, options) in enumerate(_PUCT_CASES, start=100):
-        states = rng.integers(len(problems[problem]["value"]), size=batch_size)
-        answer = _puct(problems[problem], states, num_simulations, options, jax.random.PRNGKey(seed))
-        case = {"policy": "muzero_policy", "problem": problem, "sims": num_simulations, "options": options}
-        cases.append({"name": _name("puct", problem, batch_size, num_simulations, options), **case})
-        arrays |= {f"{cases[-1]['name']}/{key}": np.asarray(value) for key, value in answer.items()}
+        answer = _answer(problems[problem], states, num_simulations, scale, options, jax.random.PRNGKey(seed))
+        name = _name(problem, batch_size, num_simulations, scale, options)
+        cases.append({"name": name, "problem": problem, "sims": num_simulations, "options": options})
+        arrays |= {f"{name}/{key}": np.asarray(value) for key, value in answer.items()}
     np.savez_compressed(_FILE, cases=np.array(json.dumps(cases)), **arrays)
     print(f"{_FILE.name}: {len(cases)} cases, {_FILE.stat().st_size / 1024:.0f} KiB")
 
@@ -122,61 +102,29 @@ def _root_and_model(tables: dict[str, np.ndarray], states: np.ndarray) -> tuple[
     return root, recurrent_fn
 
 
-def _gumbel(tables, states, num_simulations, scale, options, key) -> dict[str, Any]:
+def _answer(tables, states, num_simulations, scale, options, key) -> dict[str, Any]:
     root, recurrent_fn = _root_and_model(tables, states)
-    options = dict(options)
-    considered = options.pop("max_num_considered_actions", 16)
+    transform = functools.partial(mctx.qtransform_completed_by_mix_value, rescale_values=False)
     output = mctx.gumbel_muzero_policy(
         params=(),
         rng_key=key,
         root=root,
         recurrent_fn=recurrent_fn,
         num_simulations=num_simulations,
-        qtransform=lambda tree, node: mctx.qtransform_completed_by_mix_value(tree, node, **options),
-        max_num_considered_actions=considered,
+        qtransform=functools.partial(transform, **options),
+        max_num_considered_actions=root.prior_logits.shape[1],
         gumbel_scale=scale,
     )
+
     # Where its maxvisit_init is 1 - max(visits) and its scale 1, the transformation only completes.
-    unscaled = {"value_scale": 1.0, "rescale_values": False, "use_mixed_value": options.get("use_mixed_value", True)}
-
     def complete(tree):
-        most = tree.children_visits[0].max()
-        return mctx.qtransform_completed_by_mix_value(tree, 0, maxvisit_init=1 - most, **unscaled)
+        return transform(tree, 0, value_scale=1.0, maxvisit_init=1 - tree.children_visits[0].max())
 
-    answer = {"gumbel": output.search_tree.extra_data.root_gumbel, "qvalues": jax.vmap(complete)(output.search_tree)}
-    return {"states": states, **answer, **_answer(output)}
-
-
-def _puct(tables, states, num_simulations, options, key) -> dict[str, Any]:
-    root, recurrent_fn = _root_and_model(tables, states)
-    output = mctx.muzero_policy(
-        params=(),
-        rng_key=key,
-        root=root,
-        recurrent_fn=recurrent_fn,
-        num_simulations=num_simulations,
-        dirichlet_alpha=_DIRICHLET_ALPHA,
-        **options,
-    )
-    # As it draws them itself.
-    action_key, dirichlet_key, _ = jax.random.split(key, 3)
-    shape = root.prior_logits.shape
-    noise = jax.random.dirichlet(dirichlet_key, jnp.full(shape[1:], _DIRICHLET_ALPHA), shape[:1])
-    summary = output.search_tree.summary()
-    value = summary.value[:, None]
-    visited = summary.visit_counts > 0
-    lowest = jnp.minimum(value, jnp.min(jnp.where(visited, summary.qvalues, value), axis=-1, keepdims=True))
-    answer = {
-        "dirichlet_noise": noise,
-        "action_noise": jax.random.gumbel(action_key, shape, root.prior_logits.dtype),
-        "qvalues": jnp.where(visited, summary.qvalues, lowest),
-    }
-    return {"states": states, **answer, **_answer(output)}
-
-
-def _answer(output: mctx.PolicyOutput) -> dict[str, Any]:
     summary = output.search_tree.summary()
     return {
+        "states": states,
+        "gumbel": output.search_tree.extra_data.root_gumbel,
+        "qvalues": jax.vmap(complete)(output.search_tree),
         "action": output.action,
         "action_weights": output.action_weights,
         "visit_counts": summary.visit_counts.astype(jnp.int32),

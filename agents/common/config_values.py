@@ -1,15 +1,21 @@
-"""Config values that are given as text."""
+"""Values of configs: the ranges that they share, and values that are given as text."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import pydantic
+from annotated_types import Ge, Interval
 
 from mazebench.errors import InputError, unknown
 from mazebench.options import fields_of
+
+Count = Annotated[int, Ge(1)]
+FromOne = Annotated[float, Ge(1.0)]
+Factor = Annotated[float, Ge(0.0)]
+Share = Annotated[float, Interval(ge=0.0, le=1.0)]
 
 Config = TypeVar("Config")
 
@@ -39,3 +45,14 @@ def override(config: Config, values: Mapping[str, Any]) -> Config:
         return dataclasses.replace(config, **typed)  # type: ignore[type-var]
     except InputError as error:
         raise InputError(f"config: {error}") from error
+
+
+def check_rows(config: Any) -> None:
+    """Checks that the replay can hold as many rows as learning waits for.
+
+    Raises:
+      InputError: if it can't.
+    """
+    rows = config.replay_capacity // config.num_envs * config.num_envs
+    if rows < config.min_rows:
+        raise InputError(f"expected a replay_capacity of at least min_rows {config.min_rows}, found one of {rows} rows")
