@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import signal
+from mazebench import stopping
 
 
 def main() -> None:
-    """Runs a command, as `mazebench.cli.main` does; an interrupt while modules are imported ends it without a word."""
-    is_heeded = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # in the background it is ignored
-    if is_heeded:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-    from mazebench import cli
+    """Runs a command, as `mazebench.cli.main` does. SIGINT and SIGTERM end it with one line."""
+    with stopping.listening(), stopping.stoppable(lambda: ("run it again",)):
+        from mazebench import cli  # takes a second
 
-    if is_heeded:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    cli.main()
+        cli.main()
 
 
 if __name__ == "__main__":

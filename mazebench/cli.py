@@ -14,7 +14,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from mazebench import __version__, stopping
+from mazebench import __version__
 from mazebench.commands.bench import bench
 from mazebench.commands.compare import compare
 from mazebench.commands.evaluate import evaluate
@@ -52,22 +52,16 @@ app.command("list", short_help="List tasks, agents, sizes and kinds of mazes.")(
 def main() -> None:
     """Runs a command: exit status 0 done, 1 a run failed, 2 bad input, which gets one line and no traceback.
 
-    An interrupt ends it with 130 and SIGTERM with 143, and one line that says how to go on.
+    `mazebench.__main__.main` handles SIGINT and SIGTERM.
     """
     sys.argv[0] = "mazebench"  # as users type it: provenance keeps the command
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names of files need not be legal Unicode
     try:
-        with _remarks_as_lines(), stopping.listening(), stopping.stoppable(lambda: ("run it again",)):
-            try:
-                _refuse_empty_values(sys.argv)
-                status = app(sys.argv[1:] or ["--help"], prog_name="mazebench", standalone_mode=False) or 0
-            except typer.Abort:
-                status = 130
-            if status == 130:  # typer's, of an interrupt
-                raise KeyboardInterrupt
-            sys.exit(status)
+        with _remarks_as_lines():
+            _refuse_empty_values(sys.argv)
+            sys.exit(app(sys.argv[1:] or ["--help"], prog_name="mazebench", standalone_mode=False) or 0)
     except _ClickException as error:
         _fail(error.format_message().replace("Value error, ", ""), 2)  # with which pydantic begins, through typer
     except InputError as error:

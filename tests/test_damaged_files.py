@@ -12,7 +12,6 @@ import sys
 
 import pytest
 from faults import TRAIN, said
-from run_folders import RECORDED
 
 from mazebench import cli
 
@@ -103,21 +102,3 @@ def test_a_damaged_file_is_named_in_one_line(folders, kind, file, words, damage)
     path = shutil.copytree(folders[kind], "run") / pathlib.Path(file)
     path.write_bytes(damage(path.read_bytes()))
     assert (path.stem if kind == "map" else path.name) in refusal(*words)
-
-
-@damaged
-@pytest.mark.parametrize("name", ["summary.json", "episodes.jsonl", "trajectories.npz"])
-def test_a_finished_run_with_a_damaged_file_is_mended_by_deleting_that(folders, tmp_path, name, damage):
-    result = folders["result"]
-    folder = shutil.copytree(result, tmp_path / "run")
-    path = folder / name
-    path.write_bytes(damage(path.read_bytes()))
-    for record in ([], ["--record"]):
-        line = refusal(*EVAL, *record, "--out", folder, "--resume")
-        assert name in line
-        assert "delete the damaged file, and --resume runs the episodes again" in line
-    path.unlink()
-    assert run(*EVAL, "--record", "--out", folder, "--resume") == (0, [])
-    assert {file.name for file in folder.iterdir()} == RECORDED
-    assert (folder / "trajectories.npz").read_bytes() == (result / "trajectories.npz").read_bytes()
-    assert (folder / "episodes.jsonl").read_bytes() == (result / "episodes.jsonl").read_bytes()

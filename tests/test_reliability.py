@@ -132,17 +132,6 @@ class TestKill:
         assert run(*LEARN, "--out", folder, "--resume")[0] == 0
         assert learned_in(folder) == learned_in(unbroken("learn"))
 
-    def test_no_half_written_maze_is_left(self, tmp_path):
-        words = ["generate", "--count", "200", "--format", "txt,png"]
-        process = start(*words, "--out", tmp_path / "killed")
-        wait_until(lambda: len(list(tmp_path.glob("killed/*"))) > 100, process)
-        process.kill()
-        process.communicate()
-        assert run(*words, "--out", tmp_path / "unbroken")[0] == 0
-        killed, whole = files_of(tmp_path / "killed"), files_of(tmp_path / "unbroken")
-        assert 100 < len(killed) < len(whole) == 400
-        assert {name: whole[name] for name in killed if not name.endswith(".tmp")}.items() <= killed.items()
-
 
 class TestRay:
     """Ray prints lines of its own among a command's errors, so these tests only look for ours."""
@@ -280,31 +269,6 @@ class TestReadOnly:
         assert run("compare", disk.path / "whole", disk.path / "whole")[0] == 0
         assert run("report", disk.path / "whole", "--out", tmp_path / "report")[0] == 0
         assert files_of(disk.path) == before
-
-
-class TestTwoProcesses:
-    @pytest.mark.parametrize("name", ["short", *(pytest.param(name, marks=slow) for name in ("suite", "learn"))])
-    def test_a_second_process_in_a_folder_is_refused(self, unbroken, tmp_path, name):
-        words, folder = RUNS[name], tmp_path / "run"
-        first = start(*words, "--out", folder)
-        wait_until(lambda: num_bytes(folder) > 0, first)
-        first.kill()
-        first.communicate()
-        second = start(*words, "--out", folder, "--resume")  # the lock of the first is gone
-        wait_until(lambda: is_locked(folder), second)
-        second.send_signal(signal.SIGSTOP)  # so that it does not end before the third begins
-        status, _, errors = run(*words, "--out", folder, "--resume")
-        assert (status, said(errors)) == (2, [f"mazebench: {folder}: is in use by another process"])
-        second.send_signal(signal.SIGCONT)
-        _, errors = second.communicate(timeout=PATIENCE)
-        assert (second.returncode, said(errors)) == (0, [])
-        kept_in = learned_in if name == "learn" else results_of
-        assert kept_in(folder) == kept_in(unbroken(name))
-
-
-def is_locked(folder: pathlib.Path) -> bool:
-    """Whether some process has a lock on a folder."""
-    return f":{folder.stat().st_ino} " in pathlib.Path("/proc/locks").read_text()
 
 
 def stop(process: subprocess.Popen, number: signal.Signals) -> str:

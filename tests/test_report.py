@@ -29,7 +29,6 @@ from mazebench.report.results import read_results
 from mazebench.report.table import Cell, Column, Table, escape_latex, escape_markdown, to_csv, to_latex, to_markdown
 from mazebench.report.tables import build_tables, maze_sets
 from mazebench.storage.json_files import write_json
-from mazebench.storage.locks import FolderLock
 
 AGENTS = ("mah", "random")
 
@@ -407,10 +406,6 @@ class TestFiles:
         write_report([tmp_path / "b"], tmp_path / "out")
         assert {path.stem for path in (tmp_path / "out" / "tables").glob("*.md")} == {"hierarchical-13", "all"}
         assert list((tmp_path / "out").rglob("*.tmp")) == []
-
-    def test_a_folder_that_another_process_writes_to_is_refused(self, results, tmp_path):
-        with FolderLock(tmp_path), pytest.raises(InputError, match="is in use by another process"):
-            write_report([results], tmp_path)
 
     def test_a_folder_with_something_else_is_refused_and_left_as_it_is(self, results, tmp_path):
         (tmp_path / "diary.txt").touch()

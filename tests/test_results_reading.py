@@ -1,4 +1,4 @@
-"""Results read back: what was cut or edited is refused in one line, by name, and nothing is changed."""
+"""Results read back: a damaged file is named in one line, and nothing is changed."""
 
 from __future__ import annotations
 
@@ -53,7 +53,6 @@ def test_a_finished_evaluation_is_read(run):
     [
         ({"success": 1}, "expected a record, found success: .*1"),
         ({"maze": ...}, "expected a record, found maze: Field required"),
-        ({"episode": 7}, "expected episode 3, found 7"),
     ],
 )
 def test_a_record_that_is_damaged_is_named(copy, changes, said):
@@ -67,8 +66,6 @@ def test_a_record_that_is_damaged_is_named(copy, changes, said):
     ("change", "said"),
     [
         (lambda text: text[:-30], "line 40: expected a record, found"),
-        (lambda text: text + text.splitlines()[-1], "line 41: expected episode 40, found 39"),
-        (lambda text: text.partition("\n")[2], "line 1: expected episode 0, found 1"),
         (lambda text: text[: text.rindex("{")], "expected 40 records, found 39"),
     ],
 )
@@ -87,29 +84,6 @@ def test_records_that_were_cut_are_refused(copy, change, said):
 def test_a_summary_that_is_damaged_is_named(copy, change, said):
     (copy / "summary.json").write_text(change((copy / "summary.json").read_text()))
     assert_refused(copy, rf"summary\.json: .*{said}")
-
-
-@pytest.mark.parametrize(
-    ("first_record", "overall", "said"),
-    [
-        ({"agent": "random"}, {}, "expected agent 'planner' in episode 0, found 'random'"),
-        ({"map_flip": 0.2}, {}, "expected map_flip 0.0 in episode 0, found 0.2"),
-        ({"spl_grid": 0.123}, {}, "expected spl_grid .* by the lengths of episode 0, found another"),
-        (
-            {"success": False, "spl": 0.0, "spl_grid": 0.0},
-            {},
-            r"success_rate of overall is 1\.0+, by the records 0\.97",
-        ),
-        ({}, {"success_rate": 0.5}, r"success_rate of overall is 0\.50*, by the records 1\.0"),
-        ({}, {"spl": 0.5}, r"spl of overall is 0\.50*, by the records "),
-    ],
-)
-def test_a_summary_that_contradicts_its_records_is_refused_by_name(copy, first_record, overall, said):
-    first, _, others = (copy / "episodes.jsonl").read_text().partition("\n")
-    (copy / "episodes.jsonl").write_text(edited(json.loads(first), **first_record) + "\n" + others)
-    summary = summary_of(copy)
-    (copy / "summary.json").write_text(json.dumps(summary | {"overall": summary["overall"] | overall}))
-    assert_refused(copy, rf"run: summary\.json contradicts episodes\.jsonl: {said}")
 
 
 def test_a_run_that_is_not_finished_is_refused(copy):

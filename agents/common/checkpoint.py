@@ -14,7 +14,6 @@ import torch
 from mazebench.errors import InputError
 from mazebench.maps.maze import MAX_SIZE
 from mazebench.storage.files import open_whole, read_at_most
-from mazebench.storage.json_files import parse_json
 
 from .config_values import Config, override
 
@@ -110,4 +109,4 @@ def _kind(tensor: torch.Tensor) -> str:
 def _metadata(content: bytes) -> Any:
     """Returns the metadata of a whole safetensors file: the header is JSON, after eight bytes with its length."""
     header_bytes = int.from_bytes(content[:8], "little")
-    return parse_json(parse_json(content[8 : 8 + header_bytes])["__metadata__"][FORMAT])
+    return json.loads(json.loads(content[8 : 8 + header_bytes])["__metadata__"][FORMAT])

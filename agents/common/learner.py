@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.constants import ACTIONS
 from mazebench.errors import InputError
 from mazebench.storage.json_files import read_json
 from mazebench.tasks.spec import TaskSpec
@@ -107,9 +106,6 @@ class HindsightLearner:
         path = folder / _REPLAY_FILE
         if path.exists():
             self.replay.load(path)
-            num_mazes = len(self.maps.mazes)
-            if not self.replay.fits(num_mazes, self.maps.size**2, len(ACTIONS)):
-                raise InputError(f"{path}: expected the replay of these {num_mazes} mazes, found another")
 
     def _load_random(self, path: pathlib.Path) -> None:
         try:

@@ -9,14 +9,11 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from mazebench.errors import InputError
 from mazebench.storage.arrays import read_arrays
-from mazebench.storage.files import open_file
 from mazebench.tasks.context import GLOBAL_MAP
 from mazebench.training.experience import Experience
 
@@ -38,9 +35,6 @@ _ROW_FIELDS = (
 _ENV_FIELDS = ("next", "current", "current_leg", "leg_origin", "current_anchor", "current_anchor_origin", "maps")
 _NO_ACTION = -1  # in the row after a trajectory's last step
 _STATE_SIZE = 12
-_PRIORITY_TYPE = np.dtype(np.float64)
-_MAX_PRIORITY = 1e30  # so that sums stay finite
-_MAX_WRITTEN = 2**62  # rows, so that counting on does not overflow
 
 
 class Sample(NamedTuple):
@@ -158,43 +152,17 @@ class Replay:
         """Restores what `save` wrote.
 
         Raises:
-          InputError: if the file is damaged or of another shape; the replay is then unchanged.
+          InputError: if the file is damaged.
         """
-        own = {name: getattr(self, f"_{name}") for name in (*_ROW_FIELDS, *_ENV_FIELDS)}
-        dtypes = {name: array.dtype for name, array in own.items()}
-        dtypes |= {"priorities": _PRIORITY_TYPE, "largest_priority": _PRIORITY_TYPE}
-        most = sum(array.nbytes for array in own.values()) + self._action.size * _PRIORITY_TYPE.itemsize
-        with open_file(path, "replay") as file:
-            try:
-                loaded = read_arrays(file, dtypes, most)
-            except ValueError as error:
-                raise InputError(f"{path}: expected a replay, found a damaged one: {error}") from error
-        used = min(self._length, max(0, int(loaded["next"].max(initial=0))))
-        shapes = {name: (self._num_envs, used, *own[name].shape[2:]) for name in _ROW_FIELDS}
-        shapes |= {name: own[name].shape for name in _ENV_FIELDS}
-        shapes |= {"priorities": (self._num_envs, used), "largest_priority": ()}
-        for name, shape in shapes.items():
-            if loaded[name].shape != shape:
-                raise InputError(f"{path}: expected {name} of shape {shape}, found {loaded[name].shape}")
-        fault = _fault(loaded)
-        if fault:
-            raise InputError(f"{path}: expected {fault}, found others")
+        loaded = read_arrays(path, "replay")
+        used = loaded["priorities"].shape[1]
         for name in _ROW_FIELDS:
-            own[name][:, :used] = loaded[name]
+            getattr(self, f"_{name}")[:, :used] = loaded[name]
         for name in _ENV_FIELDS:
-            own[name][:] = loaded[name]
+            getattr(self, f"_{name}")[:] = loaded[name]
         items = np.arange(self._num_envs * self._length).reshape(self._num_envs, -1)[:, :used]
         self._tree.set(items.ravel(), loaded["priorities"].ravel())
         self._largest_priority = float(loaded["largest_priority"])
-
-    def fits(self, num_mazes: int, num_cells: int, num_actions: int) -> bool:
-        """Returns whether all mazes, cells and actions in it are below these numbers."""
-        cells = (self._cell, self._start, self._anchor, self._goal)
-        return (
-            int(self._maze.max()) < num_mazes
-            and int(self._action.max()) < num_actions
-            and all(int(cell.max()) < num_cells for cell in cells)
-        )
 
     @property
     def num_bytes(self) -> int:
@@ -452,19 +420,3 @@ class Replay:
         newest = index == (self._next[env] - 1) % self._length
         same = self._trajectory[env, after] == self._trajectory[env, index]
         return (self._action[env, index] != _NO_ACTION) & ~newest & same
-
-
-def _fault(arrays: Mapping[str, np.ndarray]) -> str | None:
-    """Returns what was expected of a replay's arrays, in words; None if they are right."""
-    for name, array in arrays.items():
-        if np.issubdtype(array.dtype, np.floating) and not np.isfinite(array).all():
-            return f"finite numbers in {name}"
-    for name, lowest, highest in (
-        ("action", _NO_ACTION, np.inf),
-        ("next", 0, _MAX_WRITTEN),
-        ("priorities", 0, _MAX_PRIORITY),
-        ("largest_priority", 0, _MAX_PRIORITY),
-    ):
-        if arrays[name].size and not lowest <= arrays[name].min() <= arrays[name].max() <= highest:
-            return f"{name} from {lowest} to {highest:g}"
-    return None

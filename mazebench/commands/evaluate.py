@@ -72,7 +72,7 @@ def evaluate(
         return (f"{kept} in {folder}; go on", *(() if out else ("--out", str(folder))), "--resume")
 
     try:
-        with stopping.stoppable(how_to_go_on):
+        with stopping.stoppable(how_to_go_on, waits=True):
             if suite is None:
                 _evaluate_one(options, folder, run, kept)
             else:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pathlib
-from contextlib import ExitStack
 from typing import Annotated, Any
 
 import typer
@@ -41,20 +40,17 @@ def generate(
     """Make mazes: MJCF for MuJoCo, text, picture, ROS map, mesh."""
     load_mujoco(renders=False)
     from mazebench.storage.files import make_folder
-    from mazebench.storage.locks import FolderLock
     from mazebench.world.formats import make_mazes, parse_formats, write_maze
 
     mazes = make_mazes(size, count, seed, kind, from_image, MapOptions(**values))
     chosen = parse_formats(formats)
-    with ExitStack() as opened:
-        for index, placed in enumerate(mazes):
-            if index == 0:  # nothing is made for bad input
-                make_folder(out)
-                opened.enter_context(FolderLock(out))
-            for path in write_maze(placed, out, chosen, from_image):
-                print(path)
-            if index == 0:
-                _preview(placed.maze)
+    for index, placed in enumerate(mazes):
+        if index == 0:  # nothing is made for bad input
+            make_folder(out)
+        for path in write_maze(placed, out, chosen, from_image):
+            print(path)
+        if index == 0:
+            _preview(placed.maze)
 
 
 def _preview(maze: Any) -> None:

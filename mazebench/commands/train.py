@@ -47,7 +47,7 @@ def train(
         again = "" if options.minutes is None else f" for another {options.minutes:g} minutes"
         return (f"the checkpoint at {int(last.name):,} steps is kept in {folder}; go on{again}", "--resume")
 
-    with stopping.stoppable(how_to_go_on), progress.training() as show:
+    with stopping.stoppable(how_to_go_on, waits=True), progress.training() as show:
         loop.train(options, folder, resume, show)
     print(f"run in {folder}; evaluate it by: mazebench eval --agent {agent} --checkpoint {folder}")
 

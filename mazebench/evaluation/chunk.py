@@ -28,6 +28,8 @@ from mazebench.tasks.shown_map import is_blocked, show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.trials import Trial
 
+PATIENCE = 0.5  # seconds that a pool waits for a chunk to end before it lets the caller look for signals
+
 
 @dataclasses.dataclass(frozen=True)
 class Chunk:
@@ -60,7 +62,7 @@ class Outcome:
 
 
 def run_chunk(chunk: Chunk) -> Iterator[list[Ended]]:
-    """Yields the episodes that ended, step by step; each once, in no fixed order."""
+    """Yields the episodes that ended, after each step; each once, in no fixed order."""
     plan = chunk.plan
     trials = [(index, plan.trials[index]) for index in chunk.episodes]
     agent = plan.build_agent()
@@ -74,8 +76,7 @@ def run_chunk(chunk: Chunk) -> Iterator[list[Ended]]:
         needs_truth=plan.agent_class.needs_truth,
         record=chunk.record,
     ):
-        if outcomes:
-            yield [Ended(_to_record(plan, outcome), outcome.trajectory) for outcome in outcomes]
+        yield [Ended(_to_record(plan, outcome), outcome.trajectory) for outcome in outcomes]
 
 
 def run_whole_chunk(chunk: Chunk) -> list[Ended]:

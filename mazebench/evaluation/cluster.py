@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import signal
 import socket
-import threading
 import urllib.parse
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from mazebench import stopping
 from mazebench.errors import InputError, RunError, shortened
-from mazebench.evaluation.chunk import Chunk, Ended, run_whole_chunk
+from mazebench.evaluation.chunk import PATIENCE, Chunk, Ended, run_whole_chunk
 
 try:
     import ray
@@ -18,7 +18,7 @@ except ModuleNotFoundError as error:
     raise InputError("--ray needs Ray, which the extra [ray] brings (docs/start.md)") from error
 
 _MAX_RETRIES = 5  # of a chunk whose worker died
-_PATIENCE = 10  # seconds for a host to answer; Ray itself tries for a quarter of an hour
+_SECONDS_TO_ANSWER = 10  # of a host; Ray itself tries for a quarter of an hour
 
 
 class Cluster:
@@ -38,7 +38,7 @@ class Cluster:
         self.num_workers = workers or max(1, int(ray.cluster_resources().get("CPU", 0)))
 
     def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Ended]]:
-        """Yields the episodes of each chunk when it has ended; Ray runs the chunk of a worker that died again.
+        """Yields the episodes of each chunk that has ended; Ray runs the chunk of a worker that died again.
 
         Raises:
           InputError, RunError: what a chunk raised.
@@ -50,9 +50,9 @@ class Cluster:
         while waiting or running:
             while waiting and len(running) < self.num_workers:
                 running.append(task.remote(waiting.pop(0)))
-            (ended,), running = ray.wait(running, num_returns=1)
+            ended, running = ray.wait(running, num_returns=1, timeout=PATIENCE)
             try:
-                yield ray.get(ended)
+                yield [episode for chunk in ray.get(ended) for episode in chunk]
             except ray.exceptions.RayTaskError as error:
                 cause = error.cause
                 if isinstance(cause, (InputError, RunError)):
@@ -75,29 +75,25 @@ def connect(address: str) -> None:
     Raises:
       InputError: if there is none.
     """
-    handler, terminated = signal.getsignal(signal.SIGTERM), False
+    handler, is_terminated = signal.getsignal(signal.SIGTERM), False
     try:
-        _check_answers(address)
+        parts = urllib.parse.urlsplit(address if "://" in address else f"//{address}")
+        if parts.port is not None:
+            socket.create_connection((parts.hostname or "", parts.port), _SECONDS_TO_ANSWER).close()
         ray.init(address=address, log_to_driver=False, include_dashboard=False)
     except SystemExit:  # Ray's answer to SIGTERM
         ray.shutdown()
-        terminated = True
+        is_terminated = True
     except (OSError, ValueError, RuntimeError) as error:
         reason = shortened(str(error), 200)
         raise InputError(f"can't reach a Ray cluster at {address!r}: {reason}") from error
     finally:
-        if threading.current_thread() is threading.main_thread():
+        if signal.getsignal(signal.SIGTERM) is not handler:
             signal.signal(signal.SIGTERM, handler)  # Ray replaces the handler
-    if terminated:
+    if is_terminated:
         signal.raise_signal(signal.SIGTERM)
-
-
-def _check_answers(address: str) -> None:
-    """Raises `OSError` if nothing answers at an `address` that has a port."""
-    parts = urllib.parse.urlsplit(address if "://" in address else f"//{address}")
-    if parts.port is not None:
-        socket.create_connection((parts.hostname or "", parts.port), _PATIENCE).close()
+        stopping.check()
 
 
 def _first_line(error: object) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0]
+    return (str(error) or type(error).__name__).splitlines()[0]

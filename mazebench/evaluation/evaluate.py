@@ -17,8 +17,9 @@ from mazebench.evaluation.options import NUM_ENVS, EvalOptions, RunOptions
 from mazebench.evaluation.oracle import ORACLE, measure_oracle_steps
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import Pool, open_pool
-from mazebench.evaluation.store import Store, check_same_run, is_finished, load_finished
+from mazebench.evaluation.store import Store, check_same_run, is_finished
 from mazebench.results import metrics
+from mazebench.results.reading import load_result
 from mazebench.results.records import Summary
 
 _CHUNKS_PER_WORKER = 4  # so that no worker waits long for the last one,
@@ -114,7 +115,7 @@ def run_plan(
     num_trials, record = len(plan.trials), bool(run.record)
     if run.resume and is_finished(folder, record):
         check_same_run(folder, plan)
-        summary = load_finished(folder)
+        summary = load_result(folder).summary
         progress(num_trials, num_trials)
         return summary
     with Store(folder, plan, resume=run.resume, record=record) as store:
@@ -123,9 +124,10 @@ def run_plan(
         if store.oracle_steps is None and (plan.oracle_steps or not is_oracle):
             _keep_oracle_steps(plan, store, run.num_envs)
         for ended in pool.run(_cut(plan, store, pool, run.num_envs)):
+            if ended:
+                store.append(ended)
+                progress(store.num_ended, num_trials)
             stopping.check()
-            store.append(ended)
-            progress(store.num_ended, num_trials)
         if store.oracle_steps is None and is_oracle:
             store.keep_oracle_steps([each.steps if each.success else None for each in store.records])
         overall, by_distance = metrics.summarize(store.records, store.oracle_steps)

@@ -13,9 +13,8 @@ import threading
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
-from mazebench import stopping
 from mazebench.errors import RunError
-from mazebench.evaluation.chunk import Chunk, Ended, run_chunk, run_whole_chunk
+from mazebench.evaluation.chunk import PATIENCE, Chunk, Ended, run_chunk, run_whole_chunk
 from mazebench.evaluation.options import RunOptions
 
 
@@ -26,7 +25,7 @@ class Pool(Protocol):
     num_threads: int  # of a chunk's simulation; 0 for all cores
 
     def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Ended]]:
-        """Yields the episodes that ended, in any order.
+        """Yields the episodes that ended, in any order; now and then none.
 
         Raises:
           InputError, RunError: what a chunk raised.
@@ -72,33 +71,29 @@ class _Processes:
         # Not forked: threads of the simulation may be running in this process.
         context = multiprocessing.get_context("spawn")
         self._executor = concurrent.futures.ProcessPoolExecutor(workers, context, initializer=_begin_worker)
-        self._processes: list[multiprocessing.process.BaseProcess] = []
+        self._processes: set[multiprocessing.process.BaseProcess] = set()
 
     def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Ended]]:
-        before = multiprocessing.active_children()
+        # Workers start here. They inherit that SIGINT is blocked, and so leave Ctrl-C to this process. The tracker,
+        # which would start with the first of them, undoes the mask.
+        multiprocessing.resource_tracker.ensure_running()
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        before = set(multiprocessing.active_children())
         try:
-            # Submitting starts the processes that are needed; stopped midway, they would end noisily. A signal that
-            # this thread blocks may still arrive in one of NumPy's threads, and would then be handled here.
-            with stopping.postponing(), _interrupts_blocked():
-                futures = [self._executor.submit(run_whole_chunk, chunk) for chunk in chunks]
-                self._processes += [child for child in multiprocessing.active_children() if child not in before]
-            stopping.check()
+            waiting = {self._executor.submit(run_whole_chunk, chunk) for chunk in chunks}
         except OSError as error:
             raise RunError(f"can't start {self.num_workers} worker processes: {error.strerror}") from error
-        try:
-            for future in concurrent.futures.as_completed(futures):
-                yield future.result()
-        except concurrent.futures.process.BrokenProcessPool as error:
-            raise RunError(f"{self._name_the_dead()}; go on with --resume") from error
-
-    def _name_the_dead(self) -> str:
-        self._executor.shutdown()  # ends the others by SIGTERM, and knows how each ended
-        statuses = {process.pid: process.exitcode for process in self._processes if process.exitcode is not None}
-        dead = {pid: status for pid, status in statuses.items() if status != -signal.SIGTERM} or statuses
-        if not dead:
-            return "a worker process ended abruptly"
-        pid, status = next(iter(dead.items()))
-        return f"worker process {pid} ended with exit status {status}"
+        finally:
+            self._processes |= set(multiprocessing.active_children()) - before
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        while waiting:
+            ended, waiting = concurrent.futures.wait(waiting, PATIENCE, concurrent.futures.FIRST_COMPLETED)
+            try:
+                for future in ended:
+                    yield future.result()
+                yield []
+            except concurrent.futures.process.BrokenProcessPool as error:
+                raise RunError("a worker process ended abruptly; go on with --resume") from error
 
     def __enter__(self) -> _Processes:
         return self
@@ -110,25 +105,14 @@ class _Processes:
         self._executor.shutdown(cancel_futures=True)
 
 
-@contextlib.contextmanager
-def _interrupts_blocked() -> Iterator[None]:
-    """Holds SIGINT back while worker processes start: they inherit that, and leave Ctrl-C to this process."""
-    multiprocessing.resource_tracker.ensure_running()  # which would start with the first worker and undo the mask
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-
-
 def _begin_worker() -> None:
-    """Leaves this worker one core, and makes it end when its parent is killed and can't end it."""
+    """Leaves this worker one core, and makes it end with its parent."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # PyTorch reads it when it is imported, our kernels when they run
+    threading.Thread(target=_end_with_parent, daemon=True).start()
 
-    def wait() -> None:
-        parent = multiprocessing.parent_process()
-        assert parent is not None
-        parent.join()
-        os._exit(1)
 
-    threading.Thread(target=wait, daemon=True).start()
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)

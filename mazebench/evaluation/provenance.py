@@ -23,7 +23,6 @@ from mazebench.maps.benchmark import manifest_hash
 from mazebench.options import by_name
 from mazebench.results.records import Provenance
 from mazebench.storage.files import open_file
-from mazebench.storage.json_files import parse_json
 from mazebench.tasks.options import Variants
 from mazebench.tasks.spec import TaskSpec
 
@@ -132,8 +131,9 @@ def checkpoint_metadata(path: str | None) -> dict[str, Any] | None:
         length = struct.unpack("<Q", start)[0] if len(start) == 8 else 0
         header = file.read(length) if length <= _MAX_HEADER_BYTES else b""
     try:
-        texts = parse_json(header)["__metadata__"]
-        return {key: parse_json(text) for key, text in texts.items()}
+        found = {key: json.loads(text) for key, text in json.loads(header)["__metadata__"].items()}
+        json.dumps(found, allow_nan=False)  # as a summary will hold it
+        return found
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
 

@@ -1,8 +1,7 @@
 """The folder of an evaluation while it runs. What has ended survives a kill at any moment.
 
-`config.json` identifies the run, and `oracle.json` holds the oracle's steps, as soon as they are known. An episode that
-ends becomes a line of `journal.jsonl`, in any order. When all have ended, `episodes.jsonl`, `trajectories.npz` and last
-`summary.json` are written, each whole, and the journal is removed.
+An episode that ends becomes a line of `journal.jsonl`, in any order. When all have ended, `episodes.jsonl`,
+`trajectories.npz` and last `summary.json` are written, and the journal is removed.
 """
 
 from __future__ import annotations
@@ -13,25 +12,15 @@ import pathlib
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-import pydantic
-
-from mazebench.errors import InputError, RunError, describe_fault
+from mazebench.errors import InputError, RunError
 from mazebench.evaluation.chunk import Ended
 from mazebench.evaluation.plan import Plan
 from mazebench.results.metrics import Steps
-from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, ORACLE, SUMMARY, load_result, read_oracle_steps
+from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, ORACLE, SUMMARY, read_oracle_steps
 from mazebench.results.records import Record, Summary
-from mazebench.results.trajectories import (
-    TRAJECTORIES,
-    from_json,
-    load_trajectories,
-    pack_trajectories,
-    save_trajectories,
-    to_json,
-)
-from mazebench.storage.files import make_folder, open_to_write, open_whole, writing_to
-from mazebench.storage.json_files import read_json, repair_and_read_lines, write_json
-from mazebench.storage.locks import FolderLock
+from mazebench.results.trajectories import TRAJECTORIES, from_json, pack_trajectories, save_trajectories, to_json
+from mazebench.storage.files import make_folder, open_whole, writing_to
+from mazebench.storage.json_files import read_json, to_line, write_json
 
 
 def is_finished(folder: pathlib.Path, record: bool = False) -> bool:
@@ -41,37 +30,21 @@ def is_finished(folder: pathlib.Path, record: bool = False) -> bool:
     return all((folder / name).exists() for name in names) and not (folder / JOURNAL).exists()
 
 
-def load_finished(folder: pathlib.Path) -> Summary:
-    """Returns the summary of the finished evaluation in `folder`, whose files are all read.
-
-    Raises:
-      InputError: if one of them is damaged; the message says how to mend that.
-    """
-    try:
-        result = load_result(folder)
-        if (folder / TRAJECTORIES).exists():
-            load_trajectories(folder / TRAJECTORIES, len(result.records))
-    except InputError as error:
-        advice = "delete the damaged file, and --resume runs the episodes again, for trajectories with --record"
-        raise InputError(f"{error}; {advice}") from error
-    return result.summary
-
-
 def check_same_run(folder: pathlib.Path, plan: Plan) -> None:
     """Raises `InputError` unless `folder` holds the run of `plan`; the message names the first difference."""
     before = read_json(folder / CONFIG)
     for key, value in json.loads(json.dumps(plan.identity)).items():
-        found = before.get(key) if isinstance(before, dict) else before
+        found = before.get(key)
         if found == value:
             continue
         if key == "agent_code_sha256" and found and value:
-            what = "file" if ":" in str(before.get("agent")) else "package"
+            what = "file" if ":" in plan.options.agent else "package"
             raise InputError(f"{folder}: holds another run: its agent's {what} was changed since; name another folder")
         raise InputError(f"{folder}: holds another run: its {key} is {str(found)[:200]}, this one's {value}")
 
 
 class Store:
-    """What has ended of one evaluation, on disk and in memory; a context manager, alone in its folder."""
+    """The episodes that have ended of one evaluation, on disk and in memory; a context manager."""
 
     def __init__(self, folder: pathlib.Path, plan: Plan, *, resume: bool, record: bool):
         """Makes the folder ready and reads what has ended.
@@ -79,20 +52,28 @@ class Store:
         A run that began with trajectories goes on with them, whatever `record` says.
 
         Raises:
-          InputError: if the folder can't be written, is in use, holds another run or is damaged.
+          InputError: if the folder can't be written, or holds another run or anything else.
         """
         self.folder, self._plan = folder, plan
-        self._made_folder = not folder.exists()
         make_folder(folder)
-        with contextlib.ExitStack() as opened, writing_to(folder):
-            opened.enter_context(FolderLock(folder))
-            _prepare(folder, plan, resume)
-            self.oracle_steps = read_oracle_steps(folder, len(plan.trials))  # None if they are not known yet
-            ended = _read_journal(folder / JOURNAL, plan)
-            self.record = record or any(trajectory is not None for _, trajectory in ended)
-            self._ended = {each.record.episode: each for each in ended if each.trajectory or not self.record}
-            self._journal = opened.enter_context(contextlib.closing(open_to_write(folder / JOURNAL, "a")))
-            self._opened = opened.pop_all()
+        found = {path.name for path in folder.iterdir() if path.suffix != ".tmp"}
+        self._is_new = CONFIG not in found
+        if not self._is_new and resume:
+            check_same_run(folder, plan)
+        elif not self._is_new:
+            raise InputError(f"{folder}: holds a run already; go on with --resume or name another folder")
+        elif found - {JOURNAL}:
+            raise InputError(f"{folder}: expected an empty folder or an evaluation's, found {min(found)!r} in it")
+        ended = _read_journal(folder / JOURNAL, plan)
+        self.record = record or any(each.trajectory for each in ended)
+        self._ended = {each.record.episode: each for each in ended if each.trajectory or not self.record}
+        with writing_to(folder):
+            # Of two processes that begin a run, the second one fails here.
+            self._journal = (folder / JOURNAL).open("a" if resume else "x", encoding="utf-8")
+            self._journal.write("\n")  # ends a line that a kill cut short
+            if self._is_new:
+                write_json(folder / CONFIG, plan.identity)
+        self.oracle_steps = read_oracle_steps(folder, len(plan.trials))  # None if they are not known yet
 
     @property
     def num_ended(self) -> int:
@@ -144,7 +125,7 @@ class Store:
                 trajectories = [each.trajectory for each in ended if each.trajectory]
                 save_trajectories(self.folder / TRAJECTORIES, pack_trajectories(trajectories))
             write_json(self.folder / SUMMARY, summary.to_dict())
-            (self.folder / JOURNAL).unlink()
+            (self.folder / JOURNAL).unlink(missing_ok=True)
 
     @contextlib.contextmanager
     def _keeping_what_is_written(self) -> Iterator[None]:
@@ -158,49 +139,25 @@ class Store:
     def __enter__(self) -> Store:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *exception: object) -> None:
-        if self._made_folder and not self._ended and kind is not None and issubclass(kind, InputError):
-            self._clear()
+    def __exit__(self, *exception: object) -> None:
         with contextlib.suppress(OSError):  # of a line that could not be written, which was reported
-            self._opened.close()
-
-    def _clear(self) -> None:
-        """Removes what a run left that was refused before an episode ended, such as one that its agent can't play."""
-        with contextlib.suppress(OSError):  # the refusal matters more
-            (self.folder / JOURNAL).unlink()
-            (self.folder / ORACLE).unlink(missing_ok=True)
-            (self.folder / CONFIG).unlink()
-            self.folder.rmdir()
-
-
-def _prepare(folder: pathlib.Path, plan: Plan, resume: bool) -> None:
-    """Makes `folder` ready to hold the run of `plan`, or refuses."""
-    found = {path.name for path in folder.iterdir() if path.suffix != ".tmp"}
-    journal = folder / JOURNAL
-    if found <= {CONFIG, ORACLE, JOURNAL} and not (journal.exists() and journal.stat().st_size):  # no episode has ended
-        (folder / ORACLE).unlink(missing_ok=True)  # it may be of another run
-        write_json(folder / CONFIG, plan.identity)
-        return
-    if CONFIG not in found:
-        raise InputError(f"{folder}: expected an empty folder or an evaluation's, found {min(found)!r} in it")
-    if not resume:
-        raise InputError(f"{folder}: holds a run already; go on with --resume or name another folder")
-    check_same_run(folder, plan)
+            self._journal.close()
+        if self._is_new and not self._ended:  # such as a run that the agent can't play
+            with contextlib.suppress(OSError):
+                for name in (JOURNAL, ORACLE, CONFIG):
+                    (self.folder / name).unlink(missing_ok=True)
+                self.folder.rmdir()
 
 
 def _read_journal(path: pathlib.Path, plan: Plan) -> list[Ended]:
-    """Returns the episodes in a journal; a last line that a kill cut short is removed.
-
-    Raises:
-      InputError: if a whole line is damaged or of another run.
-    """
+    """Returns the episodes in a journal. A line that is not whole is passed over: its episode is run again."""
     ended = []
-    for number, content in enumerate(repair_and_read_lines(path), 1):
-        try:
-            ended.append(_from_json(content, plan))
-        except ValueError as error:
-            fault = describe_fault(error) if isinstance(error, pydantic.ValidationError) else str(error)
-            raise InputError(f"{path}: expected an episode of this run in line {number}, found {fault}") from error
+    for line in path.read_bytes().splitlines() if path.exists() else ():
+        with contextlib.suppress(ValueError):
+            content = json.loads(line)
+            record = Record.model_validate_json(json.dumps(content["record"]))
+            trajectory = content.get("trajectory")
+            ended.append(Ended(record, None if trajectory is None else from_json(trajectory, plan.task.size)))
     return ended
 
 
@@ -208,17 +165,4 @@ def _to_line(ended: Ended) -> str:
     content: dict[str, Any] = {"record": ended.record.model_dump()}
     if ended.trajectory:
         content["trajectory"] = to_json(ended.trajectory)
-    return json.dumps(content, separators=(",", ":"), allow_nan=False) + "\n"
-
-
-def _from_json(content: dict[str, Any], plan: Plan) -> Ended:
-    """Raises `ValueError` if `content` is no episode of `plan`."""
-    record = Record.model_validate_json(json.dumps(content.get("record")))
-    if record.episode >= len(plan.trials):
-        raise ValueError(f"episode {record.episode} of {len(plan.trials)}")
-    episode = plan.trials[record.episode].episode
-    found, expected = [record.start, record.goal, record.seed], [episode.start, episode.goal, episode.seed]
-    if found != expected:
-        raise ValueError(f"episode {record.episode} with start, goal and seed {found} in place of {expected}")
-    trajectory = content.get("trajectory")
-    return Ended(record, None if trajectory is None else from_json(trajectory, plan.task.size))
+    return to_line(content)

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import pathlib
 from collections.abc import Sequence
@@ -23,7 +22,6 @@ from mazebench.results.reading import CONFIG, SUITE, Suite, read_suite
 from mazebench.results.records import Summary
 from mazebench.storage.files import make_folder, writing_to
 from mazebench.storage.json_files import write_json
-from mazebench.storage.locks import FolderLock
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 
@@ -121,10 +119,8 @@ def run_suite(
         for part in SUITES[suite]
     }
     plans = _playable(plans, out, suite)
-    with contextlib.ExitStack() as stack:
-        pool = stack.enter_context(open_pool(run))  # first: if it is refused, no folder is made
+    with open_pool(run) as pool:
         make_folder(out)
-        stack.enter_context(FolderLock(out))
         _prepare(out, suite, agents, seed, plans, run.resume)
         total = sum(len(plan.trials) for plan in plans.values())
         summaries, before = [], 0

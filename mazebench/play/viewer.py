@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import queue
 import types
 import warnings
@@ -28,7 +27,7 @@ _WITHOUT = "`mazebench render` films episodes without a window"
 
 
 def play(game: Game) -> None:
-    """Plays until Escape or Ctrl-C, or until the window is closed.
+    """Plays until Escape, or until the window is closed.
 
     Raises:
       InputError: if no window can be opened.
@@ -42,7 +41,7 @@ def play(game: Game) -> None:
         )
     except RuntimeError as error:  # macOS without mjpython
         raise InputError(f"can't open MuJoCo's viewer: {error}; {_WITHOUT}") from error
-    with contextlib.suppress(KeyboardInterrupt), viewer:
+    with viewer:
         viewer.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
         viewer.cam.fixedcamid = model.camera("chase").id
         # Some of these letters toggle flags of the viewer too: the flags are reset all the time.

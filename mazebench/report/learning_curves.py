@@ -15,7 +15,7 @@ from mazebench.report.figures.figure import Figure, Panel, Point, Series
 from mazebench.report.looks import all_looks
 from mazebench.report.report import new_report, write_text
 from mazebench.report.table import escape_markdown
-from mazebench.storage.json_files import parse_json, read_json, read_lines
+from mazebench.storage.json_files import read_json, read_lines
 from mazebench.training.run_folder import CHECKPOINTS, CONFIG, METRICS
 
 _STEPS = "env_steps"
@@ -103,12 +103,8 @@ def _names(folders: Sequence[pathlib.Path]) -> list[str]:
     return [str(folder.relative_to(common)) for folder in whole]
 
 
-def _parse(line: bytes) -> dict[str, float]:
+def _parse(found: Any) -> dict[str, float]:
     """Returns the numbers of a line; nothing if it has no steps."""
-    try:
-        found = parse_json(line)
-    except ValueError:
-        return {}
     if not isinstance(found, dict):
         return {}
     values = {name: value for name, value in found.items() if type(value) in (int, float) and abs(value) < 1e300}

@@ -19,7 +19,6 @@ from mazebench.report.results import ReportedResult, read_results
 from mazebench.report.table import latex_name, to_csv, to_latex, to_markdown
 from mazebench.report.tables import build_tables
 from mazebench.storage.files import make_folder, open_whole, writing_to
-from mazebench.storage.locks import FolderLock
 
 TABLES = "tables"
 _FORMS = {".md": to_markdown, ".csv": to_csv}
@@ -108,13 +107,13 @@ def _rank(label: str) -> tuple[int, str]:
 
 @contextlib.contextmanager
 def new_report(out: pathlib.Path) -> Iterator[None]:
-    """Makes the folder of a report, which this process alone writes to in the block, without an earlier report's files.
+    """Makes the folder of a report, without an earlier report's files.
 
     Raises:
-      InputError: if it holds something else, can't be written, or another process uses it.
+      InputError: if it holds something else, or can't be written in the block.
     """
     make_folder(out)
-    with FolderLock(out), writing_to(out):
+    with writing_to(out):
         _prepare(out)
         yield
 

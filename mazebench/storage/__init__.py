@@ -1,1 +1,1 @@
-"""Files that are written whole, folder locks, JSON and arrays."""
+"""Files that are written whole, JSON and arrays."""

@@ -1,4 +1,4 @@
-"""Files that are read up to a limit of size, and files that are written whole or not at all."""
+"""Files of users, which are read up to a limit of size, and files that are written whole or not at all."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import io
 import os
 import pathlib
 from collections.abc import Iterator
-from typing import IO, Any
+from typing import IO
 
 from mazebench.errors import InputError
 
@@ -39,18 +39,6 @@ def read_at_most(path: str | pathlib.Path, num_bytes: int, kind: str) -> bytes:
     if len(content) > num_bytes:
         raise InputError(f"{path}: expected a {kind} of at most {num_bytes} bytes, found more")
     return content
-
-
-def open_to_write(path: pathlib.Path, mode: str) -> IO[Any]:
-    """Opens a file to write or append to; text is UTF-8.
-
-    Raises:
-      WriteError: if it can't be opened.
-    """
-    try:
-        return open(path, mode, encoding=None if "b" in mode else "utf-8")
-    except OSError as error:
-        raise WriteError(f"{path}: can't write: {error.strerror}") from error
 
 
 @contextlib.contextmanager

@@ -54,8 +54,8 @@ def train(
 ) -> None:
     """Trains an agent in the run folder `out`; from its last checkpoint if `resume`.
 
-    The logger "mazebench.training" says what happens. Under `mazebench.stopping.listening`, the first signal saves a
-    savepoint and ends the training.
+    The logger "mazebench.training" says what happens. In a block of `mazebench.stopping.stoppable` that waits, a signal
+    saves a savepoint and ends the training.
 
     Args:
       options: what is trained, in which task, and for how long.
@@ -75,7 +75,8 @@ def train(
     learner = agent_class.build_learner(task, seed=options.seed, overrides=overrides)
     held_out = HeldOutEvaluation(task, options.eval_mazes, options.task.distances)
     # The source comes first: if the cluster can't be reached, no run is begun.
-    with open_source(options, task, learner) as source, RunFolder(out) as folder:
+    with open_source(options, task, learner) as source:
+        folder = RunFolder(out)
         counters = _begin_or_resume(options, folder, learner, task, resume)
         if options.env_steps is not None and counters.env_steps >= options.env_steps and counters.is_milestone:
             _logger.info("%s: the run is finished, at %s steps", out, f"{counters.env_steps:,}")
@@ -85,8 +86,7 @@ def train(
         elif resume:
             _logger.info("nothing to resume in %s; starting a new run", out)
         _logger.info("%s: %s", options.agent, learner.description())
-        with stopping.postponing():
-            TrainingLoop(options, folder, learner, task, source, held_out, counters, progress).run()
+        TrainingLoop(options, folder, learner, task, source, held_out, counters, progress).run()
 
 
 class TrainingLoop:

@@ -1,11 +1,10 @@
-"""The folder of a training run: its config, metrics and checkpoints, written by one process at a time.
+"""The folder of a training run: its config, metrics and checkpoints.
 
 A checkpoint is a milestone, where the agent is evaluated, or a savepoint, from which a run that was stopped goes on.
 """
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import pathlib
@@ -17,9 +16,8 @@ from typing import Any
 import pydantic
 
 from mazebench.errors import InputError, RunError, describe_fault
-from mazebench.storage.files import WriteError, make_folder, open_to_write, open_whole, writing_to
-from mazebench.storage.json_files import read_json, repair_and_read_lines, to_line, write_json
-from mazebench.storage.locks import FolderLock
+from mazebench.storage.files import make_folder, open_whole, writing_to
+from mazebench.storage.json_files import read_json, read_lines, to_line, write_json
 from mazebench.training.counters import Counters
 from mazebench.training.tensorboard import Board
 
@@ -32,23 +30,17 @@ _CHECKPOINT_NAME = re.compile(r"[0-9]{12,}")  # agent steps; older checkpoints a
 
 
 class RunFolder:
-    """A folder that this process alone writes to; a context manager."""
+    """The folder of a run."""
 
     def __init__(self, path: pathlib.Path):
-        """Makes and locks the folder.
+        """Makes the folder.
 
         Raises:
-          InputError: if it can't be written, or another process uses it.
+          InputError: if it can't be written, or holds something else.
         """
         self.path = path
         self._board: Board | None = None
         make_folder(path)
-        with contextlib.ExitStack() as opened:
-            opened.enter_context(FolderLock(path))
-            self._prepare()
-            self._opened = opened.pop_all()
-
-    def _prepare(self) -> None:
         found = sorted(item.name for item in self.path.iterdir())
         if CONFIG not in found and set(found) - {f"{CONFIG}.tmp", CHECKPOINTS}:
             raise InputError(f"{self.path}: expected an empty folder or a training run's, found {found[0]!r} in it")
@@ -75,8 +67,6 @@ class RunFolder:
             temporary.mkdir()
             save(temporary)
             write_json(temporary / _COUNTERS, counters.model_dump())
-            for path in temporary.iterdir():
-                _sync(path)
             os.replace(temporary, final)
         except OSError as error:
             shutil.rmtree(temporary, ignore_errors=True)
@@ -106,20 +96,20 @@ class RunFolder:
         """
         values = {"env_steps": counters.env_steps, "updates": counters.updates, **metrics}
         try:
-            with open_to_write(self.path / METRICS, "a") as file:
+            with (self.path / METRICS).open("a", encoding="utf-8") as file:
                 file.write(to_line(values))
             if self._board is None:
-                make_folder(self.path / _BOARD)
+                (self.path / _BOARD).mkdir(exist_ok=True)
                 self._board = Board(self.path / _BOARD, counters.env_steps)
             self._board.add(values, counters.env_steps)
-        except (OSError, WriteError) as error:
+        except OSError as error:
             raise self._cannot("write", self.path, error) from error
 
     def forget_metrics_after(self, counters: Counters) -> None:
         """Removes the metrics that a run writes again when it is resumed from the checkpoint at `counters`."""
         path = self.path / METRICS
         with writing_to(self.path):
-            kept = [line for line in repair_and_read_lines(path) if line.get("env_steps", 0) <= counters.logged_steps]
+            kept = [line for line in read_lines(path) if line["env_steps"] <= counters.logged_steps]
             with open_whole(path) as file:
                 file.write("".join(map(to_line, kept)).encode("utf-8"))
 
@@ -143,16 +133,9 @@ class RunFolder:
     def _checkpoint(self, counters: Counters) -> pathlib.Path:
         return self.path / CHECKPOINTS / f"{counters.env_steps:012d}"
 
-    def __enter__(self) -> RunFolder:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self._opened.close()
-
-    def _cannot(self, do: str, what: pathlib.Path, error: OSError | WriteError) -> RunError:
+    def _cannot(self, do: str, what: pathlib.Path, error: OSError) -> RunError:
         last = next(reversed(self.checkpoints()), "none yet")
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        return RunError(f"{what}: can't {do}: {reason}; last checkpoint: {last}; go on with --resume")
+        return RunError(f"{what}: can't {do}: {error.strerror}; last checkpoint: {last}; go on with --resume")
 
 
 def checkpoints(path: pathlib.Path) -> list[pathlib.Path]:
@@ -175,8 +158,3 @@ def read_counters(checkpoint: pathlib.Path) -> Counters:
     if counters.env_steps != int(checkpoint.name):
         raise InputError(f"{path}: expected env_steps {int(checkpoint.name)}, found {counters.env_steps}")
     return counters
-
-
-def _sync(path: pathlib.Path) -> None:
-    with path.open("rb") as file:
-        os.fsync(file.fileno())
