@@ -138,7 +138,7 @@ class TestTracking:
         for cell in maze.free_cells[rng.integers(len(maze.free_cells), size=10)]:
             pose = np.array([*cell_to_point(cell, 13), rng.uniform(-math.pi, math.pi)])
             ranges = scan(maze, pose, TURTLEBOT3, rng)
-            found = aligned(Occupancy.unseen(25).seen_walls(), 12.5, 12.5, ranges, beams.beams_of(TURTLEBOT3, 1.0))
+            found = aligned(25, ranges, beams.beams_of(TURTLEBOT3, 1.0))
             assert abs(math.remainder(found[2] - pose[2], math.pi / 2)) < math.radians(2)
 
     @pytest.mark.parametrize("kind", ["dfs", "house"])
@@ -157,7 +157,7 @@ class TestTracking:
                 error(state)
             odometry, ranges = state[[0, 1, 5]], scan(maze, pose, TURTLEBOT3, rng)
             if tracker is None:
-                tracker = Tracker(aligned(occupancy.seen_walls(), 30.5, 30.5, ranges, model), odometry, noise)
+                tracker = Tracker(aligned(61, ranges, model), odometry, noise)
                 turned = round((tracker.pose[2] - pose[2]) / (math.pi / 2)) * math.pi / 2
             else:
                 # The command is followed up to an error, in the grid's frame.

@@ -87,14 +87,15 @@ def log_likelihoods(
     """
     result = np.zeros(len(poses))
     for h in range(len(poses)):
-        result[h] = _log_likelihood(walls, poses[h, 0], poses[h, 1], poses[h, 2], ranges, beams, deviation)
+        result[h] = log_likelihood(walls, poses[h, 0], poses[h, 1], poses[h, 2], ranges, beams, deviation)
     return result
 
 
 @inlined
-def _log_likelihood(
+def log_likelihood(
     walls: np.ndarray, x: float, y: float, yaw: float, ranges: np.ndarray, beams: Beams, deviation: float
 ) -> float:
+    """Returns the log likelihood of a scan from one pose."""
     total, size, num_rays = 0.0, len(walls), len(ranges)
     turn_cosine, turn_sine = math.cos(2 * math.pi / num_rays), math.sin(2 * math.pi / num_rays)
     along_x, along_y = math.cos(yaw), math.sin(yaw)

@@ -17,7 +17,7 @@ _STOPPED = 0.25  # m/s along an axis that the body is slower than it would be in
 _SLACK = 0.04  # m from which a wall pushes more than the model says, for errors of both
 _GIVE = 0.06  # m that a wall lets the body come into its reach, at most; a body that is deeper was stopped by a corner
 _CLEAR = 0.36  # cells aside from the middle of a cell, at most, where the body touches no corner of a wall
-SURELY, PERHAPS = 4.0, 1.0  # log odds of a wall: where no other one can have stopped the body, and where one can
+_SURELY, _PERHAPS = 4.0, 1.0  # log odds of a wall: where no other one can have stopped the body, and where one can
 
 
 def felt_walls(
@@ -50,5 +50,5 @@ def felt_walls(
             row = size - 1 - level - (sign if axis == 1 else 0)
             cell = row, column + (sign if axis == 0 else 0)
             if min(cell) >= 0 and max(cell) < size:
-                found.append((cell, SURELY if off_aside < _CLEAR else PERHAPS))
+                found.append((cell, _SURELY if off_aside < _CLEAR else _PERHAPS))
     return found

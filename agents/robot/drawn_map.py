@@ -83,7 +83,6 @@ class Registration:
     points: np.ndarray  # [P, Q, 2] float, at the pixels' centres
     deviations: np.ndarray  # [P, Q, 2] float, of the points along rows and columns, in cells
     corner: Cell  # pixel of the whole picture at which the part begins
-    thickening: float  # cells
     residual: float  # root mean square difference of picture and expectation
 
     def marked(self, pixel: Cell) -> np.ndarray:
@@ -232,7 +231,6 @@ class _Fit:
             points=self.points(),
             deviations=np.sqrt(self._variances()),
             corner=self.corner,
-            thickening=float(self.parameters[-1]),
             residual=residual,
         )
 

@@ -54,7 +54,7 @@ class Occupancy:
 
     def walls(self, prior: np.ndarray) -> np.ndarray:
         """Returns `[L, L]` float: the probability of a wall, by what was seen and a prior that may prove wrong."""
-        return posterior(prior, self.evidence, _BINS, _PRIOR_CELLS)
+        return posterior(prior, self.evidence)
 
     def is_seen(self) -> np.ndarray:
         """Returns `[L, L]` bool: the cells of which is known what they are."""
@@ -62,22 +62,20 @@ class Occupancy:
 
 
 @compiled
-def posterior(prior: np.ndarray, evidence: np.ndarray, bins: np.ndarray, prior_cells: float) -> np.ndarray:
+def posterior(prior: np.ndarray, evidence: np.ndarray) -> np.ndarray:
     """Returns `[L, L]` float: the probability of a wall, by evidence and a prior as reliable as it has proved to be.
 
     Where a cell was seen, evidence alone counts: what was seen is no longer tried, however right the map has been.
 
     Among cells of similar prior probability, the share of walls is estimated from those that were seen: the mean of a
-    beta distribution. Its prior counts weigh as much as `prior_cells` seen cells.
+    beta distribution. Its prior counts weigh as much as `_PRIOR_CELLS` seen cells.
 
     Args:
       prior: `[L, L]` float; 1 for walls that are certain.
       evidence: `[L, L]` float, log odds.
-      bins: the probabilities between which priors are similar, ascending.
-      prior_cells: see above.
     """
-    bin_of = np.searchsorted(bins, prior.ravel(), side="right").reshape(prior.shape)
-    num_seen, num_walls = np.zeros(len(bins) + 1), np.zeros(len(bins) + 1)
+    bin_of = np.searchsorted(_BINS, prior.ravel(), side="right").reshape(prior.shape)
+    num_seen, num_walls = np.zeros(len(_BINS) + 1), np.zeros(len(_BINS) + 1)
     for row in range(len(prior)):
         for column in range(len(prior)):
             if abs(evidence[row, column]) >= SURE and prior[row, column] < 1:
@@ -88,8 +86,8 @@ def posterior(prior: np.ndarray, evidence: np.ndarray, bins: np.ndarray, prior_c
         for column in range(len(prior)):
             if prior[row, column] < 1:
                 similar = bin_of[row, column]
-                wall = prior_cells * prior[row, column] + num_walls[similar]
-                free = prior_cells * (1 - prior[row, column]) + num_seen[similar] - num_walls[similar]
+                wall = _PRIOR_CELLS * prior[row, column] + num_walls[similar]
+                free = _PRIOR_CELLS * (1 - prior[row, column]) + num_seen[similar] - num_walls[similar]
                 odds_free = math.exp(-evidence[row, column])
                 if abs(evidence[row, column]) < SURE:
                     odds_free *= max(free, _LEAST) / max(wall, _LEAST)

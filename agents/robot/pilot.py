@@ -25,14 +25,14 @@ _DRIVES = (
 )
 
 
-def steer(body: Body, aim: Point, largest_misalignment: float = _LARGEST_MISALIGNMENT) -> int:
-    """Returns the drive nearest to the direction of `aim`, or a turn if it is off by more than that angle (rad)."""
+def steer(body: Body, aim: Point) -> int:
+    """Returns the drive nearest to the direction of `aim`, or a turn if even that one is far off."""
     # Aimed from where the body would come to rest: aimed from where it is, it would overshoot and turn back.
     x, y = body.rest()
     bearing = math.atan2(aim[1] - y, aim[0] - x) - body.yaw
     drive, heading = min(_DRIVES, key=lambda drive: abs(wrap_angle(bearing - drive[1])))
     misalignment = wrap_angle(bearing - heading)
-    if abs(misalignment) <= largest_misalignment:
+    if abs(misalignment) <= _LARGEST_MISALIGNMENT:
         return drive
     return LOOK_LEFT if misalignment > 0 else LOOK_RIGHT
 

@@ -18,8 +18,9 @@ import numpy as np
 from mazebench.constants import STEP_TIME
 
 from ..common.kernels import compiled, inlined
-from .beams import Beams, _log_likelihood, log_likelihoods
+from .beams import Beams, log_likelihood, log_likelihoods
 from .body import Body
+from .occupancy import Occupancy
 
 _DEVIATION = 0.03  # cells, of a position that was matched
 _TEMPER = 0.5  # weight of a scan against the odometry: rays share errors
@@ -99,10 +100,13 @@ class Tracker:
         return Body(x, y, yaw, forward, left)
 
 
-def aligned(walls: np.ndarray, x: float, y: float, ranges: np.ndarray, beams: Beams) -> np.ndarray:
-    """Returns a pose `[3]` at (x, y) whose heading, in [0, pi / 2), lays the scan on the grid's lines."""
-    poses = np.empty((_NUM_HEADINGS, 3))
-    poses[:, :2] = x, y
+def aligned(size: int, ranges: np.ndarray, beams: Beams) -> np.ndarray:
+    """Returns a pose `[3]` in the middle of a grid of `size` cells a side on which nothing was seen.
+
+    Its heading, in [0, pi / 2), lays the scan on the grid's lines.
+    """
+    walls, poses = Occupancy.unseen(size).seen_walls(), np.empty((_NUM_HEADINGS, 3))
+    poses[:, :2] = size / 2
     poses[:, 2] = np.arange(_NUM_HEADINGS) * (math.pi / 2 / _NUM_HEADINGS)
     best = poses[log_likelihoods(walls, poses, ranges, beams, _DEVIATION).argmax()]
     return best_pose(walls, best, _SHIFT, math.pi / 2 / _NUM_HEADINGS, ranges, beams)
@@ -147,7 +151,7 @@ def _score(
 ) -> float:  # fmt: skip
     off = ((pose[0] - predicted[0]) ** 2 + (pose[1] - predicted[1]) ** 2) / deviation**2
     off += ((pose[2] - predicted[2]) / turn_deviation) ** 2
-    return _TEMPER * _log_likelihood(walls, pose[0], pose[1], pose[2], ranges, beams, smooth) - off / 2
+    return _TEMPER * log_likelihood(walls, pose[0], pose[1], pose[2], ranges, beams, smooth) - off / 2
 
 
 @compiled
