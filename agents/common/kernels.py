@@ -21,6 +21,7 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core.event import Listener, register
+from numba.extending import register_jitable
 
 
 class _Announcement(Listener):
@@ -78,6 +79,11 @@ def one_thread() -> Iterator[None]:
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     """Returns `function` compiled into its callers, where LLVM might decide otherwise."""
     return compiled(function, inline=True)
+
+
+def compiled_by_callers(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Returns `function` as it is, for Python; kernels that call it compile it into themselves."""
+    return register_jitable(function)
 
 
 def _options(fused: bool) -> dict[str, Any]:

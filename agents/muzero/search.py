@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from numba.extending import register_jitable
 
 from ..common import kernels
 from . import tree as trees
@@ -121,7 +120,7 @@ def considered_visits(num_considered: int, num_simulations: int) -> list[int]:
     return sequence[:num_simulations]
 
 
-@register_jitable
+@kernels.compiled_by_callers
 def run_simulations(
     step: Callable[..., None],
     model: Any,
