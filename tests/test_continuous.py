@@ -18,7 +18,6 @@ from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.maze import Maze, cell_to_point
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import Episode
-from mazebench.testing import check_environment
 from mazebench.world.mjcf import BODY_RADIUS, TURN_RATE, action_controls, velocity_controls
 
 MIDDLE = Episode(0, (20, 20), (35, 35), 0.0, 0)
@@ -112,7 +111,6 @@ class TestEnvironments:
     @pytest.mark.filterwarnings("ignore::UserWarning")
     def test_continuous_environments_pass_the_checks(self):
         env_checker.check_env(MazeEnv(make_spec(continuous=True)), skip_render_check=True)
-        check_environment(Environment(make_spec("hierarchical", continuous=True, time_limit=10), seed=0))
 
     def test_velocities_are_clipped(self, field):
         np.testing.assert_array_equal(cruise(field, [2, 0, -7], 3), cruise(field, [1, 0, -1], 3))
