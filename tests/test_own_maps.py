@@ -30,8 +30,8 @@ from mazebench.maps.pictures import draw_maze
 from mazebench.maps.text import format_maze
 from mazebench.play.film import film_episode
 from mazebench.play.game import Game
+from mazebench.report.episodes import read_results
 from mazebench.report.report import write_report
-from mazebench.report.results import read_results
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.build import make_spec

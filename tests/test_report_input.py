@@ -12,8 +12,8 @@ from made_results import edit_records, edit_summary, make_result, of_own_mazes, 
 
 from mazebench import cli
 from mazebench.errors import InputError, Remark
+from mazebench.report.episodes import read_results
 from mazebench.report.report import write_report
-from mazebench.report.results import read_results
 from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY
 from mazebench.results.trajectories import TRAJECTORIES
 
@@ -116,7 +116,7 @@ class TestLabels:
         make_result(tmp_path / "c", "random", num_mazes=1, seed=0)
         make_result(tmp_path / "d", "random", num_mazes=1, seed=1)
         make_result(tmp_path / "e", "dqn", num_mazes=1)
-        assert read(tmp_path) == (["mah aa11bb", "mah cc33dd", "random seed 0", "random seed 1", "dqn"], [])
+        assert read(tmp_path) == (["mah aa11bb", "mah cc33dd", "dqn", "random seed 0", "random seed 1"], [])
 
     def test_names_replace_those_of_agents_everywhere(self, run, tmp_path):
         make_result(run / "other", "lab.agents:Bold", num_mazes=2)
@@ -145,7 +145,7 @@ class TestLabels:
 
     def test_privileged_agents_are_marked_in_tables_and_on_the_page(self, run, tmp_path):
         make_result(run / "oracle", "oracle", num_mazes=2, privileged=True)
-        assert read(run) == (["mah", "oracle (privileged)"], [])
+        assert read(run) == (["oracle (privileged)", "mah"], [])
         write_report([run], tmp_path / "out")
         assert "| oracle (privileged) | mah |" in (tmp_path / "out" / "tables" / "local-13.md").read_text()
         assert '"label":"oracle (privileged)"' in (tmp_path / "out" / "report.html").read_text()

@@ -14,7 +14,7 @@ import mazebench
 from benchmarks.results.kept import Kept, keep, read_kept
 from benchmarks.results.pages import PAGES, RECORDS, ROOT, with_tables
 from benchmarks.results.tables import make_table
-from mazebench.report.learning_curves import Run
+from mazebench.report.curves import Run
 from mazebench.results.reading import load_result
 
 NOTHING = Kept({}, {}, pd.DataFrame(), {}, {})
@@ -80,7 +80,7 @@ class TestTrainingRuns:
         # Of .6, .6 and .65: 4.303 times the standard error .0167 to either side. One run has no interval.
         lines = [{"env_steps": 4e5, "success_rate_2": rate} for rate in (0.6, 0.6, 0.65)]
         metrics = [line | {f"success_rate_{distance}": 1.0 for distance in (4, 6, 8, 10)} for line in lines]
-        runs = [Run(str(seed), {}, (line,)) for seed, line in enumerate(metrics)]
+        runs = [Run(str(seed), {}, pd.DataFrame([line])) for seed, line in enumerate(metrics)]
         names = ("mmn", "mmn-5-mazes", "mmn-100-mazes", "mmn-fresh", "mmn-fixed", "mmn-one-goal")
         kept = dataclasses.replace(NOTHING, training={**dict.fromkeys(names, runs), "mmn-one-goal": runs[2:]})
         _, _, first, *_, last = make_table(kept, "mmn-regimes").splitlines()
@@ -91,7 +91,9 @@ class TestTrainingRuns:
         first = ({"env_steps": 200_064, "success_rate_2": 0.1}, {"env_steps": 300_000, "td_loss": 1.0})
         last = ({"env_steps": 6_600_000, "success_rate_2": 0.8}, {"env_steps": 6_648_448, "success_rate_2": 0.9})
         second = ({"env_steps": 200_128, "success_rate_2": 0.3},)
-        kept = dataclasses.replace(NOTHING, training={"a": [Run("0", {}, (*first, *last)), Run("1", {}, second)]})
+        kept = dataclasses.replace(
+            NOTHING, training={"a": [Run("0", {}, pd.DataFrame([*first, *last])), Run("1", {}, pd.DataFrame(second))]}
+        )
         assert kept.success_rates("a", 2) == {0.2: [0.1, 0.3]}
         alone = dataclasses.replace(kept, training={"a": kept.training["a"][:1]})
         assert alone.success_rates("a", 2) == {0.2: [0.1], 6.6: [0.9]}

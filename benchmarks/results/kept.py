@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import pathlib
 import tarfile
 import tempfile
@@ -14,9 +15,8 @@ import pandas as pd
 from mazebench_agents.common.checkpoint import AGENT_FILE
 
 from mazebench.errors import InputError
-from mazebench.report.frame import join_episodes
-from mazebench.report.learning_curves import SUCCESS, Run, read_run
-from mazebench.report.report import read_in_order
+from mazebench.report.curves import SUCCESS, Run, read_run
+from mazebench.report.episodes import join_episodes, read_results
 from mazebench.report.table import Table
 from mazebench.report.tables import build_tables
 from mazebench.results.comparison import check_pairs
@@ -78,29 +78,26 @@ class Kept:
             raise InputError(f"expected training runs {name} among the records, found none")
         return self.training[name]
 
-    def milestones(self, name: str) -> dict[float, list[dict[str, float]]]:
+    def milestones(self, name: str) -> pd.DataFrame:
         """Returns what an archive's training runs logged at the milestones that all of them reached, a line each.
 
-        Keys are millions of agent steps, rounded to a tenth.
+        The index has millions of agent steps, rounded to a tenth.
 
         Raises:
           InputError: if the archive is not kept.
         """
-        runs = [
-            {
-                round(line["env_steps"] / 1e6, 1): line
-                for line in run.lines
-                if any(metric.startswith(SUCCESS) for metric in line)
-            }
-            for run in self.curves(name)
-        ]
-        return {steps: [run[steps] for run in runs] for steps in runs[0] if all(steps in run for run in runs)}
+        runs = []
+        for run in self.curves(name):
+            lines = run.lines[run.lines.filter(like=SUCCESS).notna().any(axis=1)]
+            lines = lines.set_index((lines.env_steps / 1e6).round(1))
+            runs.append(lines[~lines.index.duplicated(keep="last")])
+        common = functools.reduce(pd.Index.intersection, (run.index for run in runs))
+        return pd.concat([run.loc[common] for run in runs])
 
     def success_rates(self, name: str, distance: int) -> dict[float, list[float]]:
-        """Returns the success rates on watched mazes in the lines of `milestones`."""
-        return {
-            steps: [line[f"{SUCCESS}{distance}"] for line in lines] for steps, lines in self.milestones(name).items()
-        }
+        """Returns the success rates on watched mazes at the `milestones`."""
+        rates = self.milestones(name)[f"{SUCCESS}{distance}"]
+        return {steps: of_runs.tolist() for steps, of_runs in rates.groupby(level=0)}
 
     def result(self, row: str, part: str) -> Result:
         """Returns the evaluation of an agent on a part of a suite.
@@ -156,7 +153,7 @@ def read_kept(folder: pathlib.Path) -> Kept:
         paper = [result.folder for result in results.values() if result.summary.suite == PAPER]
         if not paper:
             raise InputError(f"{folder}: expected records of the suite {PAPER!r}, found none")
-        episodes = join_episodes(*read_in_order(paper))
+        episodes = join_episodes(read_results(paper))
     return Kept(results, {table.name: table for table in build_tables(episodes)}, episodes, runs, training)
 
 

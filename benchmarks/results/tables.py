@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy import stats
 
 from benchmarks.results.kept import (
@@ -26,10 +26,9 @@ from benchmarks.results.kept import (
 )
 from mazebench.errors import InputError
 from mazebench.maps.kinds import KNOWN, NOVEL
-from mazebench.report.learning_curves import SUCCESS
-from mazebench.report.looks import PAPER_MARKERS
+from mazebench.report.curves import SUCCESS
 from mazebench.report.settings import DEFAULT_LANDMARK_DISTANCE
-from mazebench.report.table import METRICS, Cell, Table, escape_markdown
+from mazebench.report.table import METRICS, to_markdown
 from mazebench.results.comparison import compare_results
 from mazebench.results.intervals import CONFIDENCE, Estimate, runs_interval
 from mazebench.results.metrics import ON_TIME_METRICS
@@ -138,37 +137,29 @@ def make_table(kept: Kept, name: str) -> str:
 def report_table(kept: Kept, name: str, metric: str) -> str:
     """Returns a metric of a table of the report of the suite `paper`; a sentence has the agents that saturate it."""
     table = kept.report[name]
-    lowest = {  # of the intervals of agents that are at 1 in every row
-        each.label: min(cell.low for cell in each.cells[metric])
-        for each in table.columns_of(metric)
-        if all(cell is not None and cell.value == 1 and cell.low is not None for cell in each.cells[metric])
-    }
-    columns = tuple(each for each in table.columns if each.label not in lowest)
-    header, *rows = dataclasses.replace(table, columns=columns).lines(metric, escape_markdown)
-    text = _table(header, rows)
-    if not lowest:
+    values = table.values[table.values.metric == metric]
+    highest = values.groupby("column", observed=True).filter(
+        lambda own: len(own) == values.row.nunique() and own.value.eq(1).all() and own.low95.notna().all()
+    )
+    text = to_markdown(table.wide(metric).drop(columns=highest.column.unique()))
+    if highest.empty:
         return text
-    low, labels = _number(min(lowest.values())), ", ".join(lowest)
-    return f"{text}\n{SATURATED}{low}, 1.00] in every row, and so not in the table: {labels}.\n"
+    labels = ", ".join(highest.column.unique())
+    return (
+        f"{text}\n{SATURATED}{_number(highest.low95.min())}, 1.00] in every row, and so not in the table: {labels}.\n"
+    )
 
 
 def paper_table(kept: Kept) -> str:
     """Returns success rates by distance and in the hierarchical task, a row for each agent, and the paper's MMN."""
-    local, routes = (kept.report[name] for name in (LOCAL, "hierarchical-13"))
-    chosen = [(local, str(distance)) for distance in _PRINTED_DISTANCES] + [(routes, str(DEFAULT_LANDMARK_DISTANCE))]
-    labels = {column.label for column in local.columns}
-    if unnamed := labels - _PAPER_ROWS.keys() - PAPER_MARKERS.keys():
+    local, routes = (kept.report[name].wide("success_rate") for name in (LOCAL, "hierarchical-13"))
+    if unnamed := set(local) - _PAPER_ROWS.keys():
         raise InputError(f"expected results of {', '.join(_PAPER_ROWS)}, found those of {', '.join(sorted(unnamed))}")
-
-    def cell(label: str, table: Table, row: str) -> Cell | str | None:
-        values = next((each.cells["success_rate"] for each in table.columns if each.label == label), None)
-        return values and values[table.rows.index(row)]
-
     header = ["agent", *map(str, _PRINTED_DISTANCES), "hierarchical"]
     rows = [
-        [description, *(str(cell(label, *each) or "") for each in chosen)]
+        [description, *local.loc[map(str, _PRINTED_DISTANCES), label], routes.at[str(DEFAULT_LANDMARK_DISTANCE), label]]
         for label, description in _PAPER_ROWS.items()
-        if label in labels
+        if label in local
     ]
     return _table(header, rows)
 
@@ -209,10 +200,11 @@ def short_runs(rows: Mapping[str, str], metrics: Mapping[str, str], kept: Kept) 
     """
     lines = []
     for name, description in rows.items():
-        runs = kept.milestones(name)[_SHORT]
-        rates = [_over_values([run[f"{SUCCESS}{distance}"] for run in runs]) for distance in _PRINTED_DISTANCES]
+        runs = kept.milestones(name).loc[[_SHORT]]
+        rates = [_over_values(runs[f"{SUCCESS}{distance}"].tolist()) for distance in _PRINTED_DISTANCES]
         logged = [
-            ", ".join(format(run[metric], form) for run in runs if metric in run) for metric, form in metrics.items()
+            ", ".join(format(value, form) for value in runs.get(metric, pd.Series(dtype=float)).dropna())
+            for metric, form in metrics.items()
         ]
         lines.append([description, str(len(runs)), *rates, *logged])
     logs = (name.replace("_", " ") for name in metrics)
@@ -221,9 +213,7 @@ def short_runs(rows: Mapping[str, str], metrics: Mapping[str, str], kept: Kept) 
 
 def mmn_runs(kept: Kept) -> str:
     """Returns mmn's mean success rates over its training runs, and the paper's."""
-    local = kept.report[LOCAL]
-    (printed,) = [each.cells["success_rate"] for each in local.columns if each.label == _PAPERS_MMN]
-    paper = [str(printed[local.rows.index(str(distance))]) for distance in _PRINTED_DISTANCES]
+    paper = kept.report[LOCAL].wide("success_rate").loc[map(str, _PRINTED_DISTANCES), _PAPERS_MMN]
     runs = kept.training_runs("mmn")
     rows = [
         [_code("mmn"), str(len(runs)), *_over_runs(kept, _values(runs, "success"))],

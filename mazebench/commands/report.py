@@ -29,10 +29,10 @@ def report(
     Of training runs, make figures of what they learned over their steps.
     """
     try:
-        from mazebench.report.document import DOCUMENT, PAGE, counted
-        from mazebench.report.learning_curves import find_runs, write_learning_curves
-        from mazebench.report.report import write_report
-        from mazebench.report.results import folders_below
+        from mazebench.report.curves import find_runs, write_learning_curves
+        from mazebench.report.episodes import folders_below
+        from mazebench.report.files import DOCUMENT, PAGE
+        from mazebench.report.report import counted, write_report
     except ImportError as error:
         raise InputError(f"the report needs {error.name}, which the extra [report] installs (docs/start.md)") from error
     names = [_parse_name(text) for text in name or ()]

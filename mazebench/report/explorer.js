@@ -13,8 +13,7 @@ function element(tag, attributes = {}, ...children) {
 
 const byId = (id) => document.getElementById(id);
 const inCells = (count) => `${count} ${count === 1 ? "cell" : "cells"}`;
-const trials = new Map(); // promises by number
-const drives = new Map();
+const unpacked = new Map(); // promises by the number of a result
 const view = { result: -1, episode: -1, time: 0, timer: 0, packed: null };
 
 function bytesOfBase64(text) {
@@ -24,40 +23,26 @@ function bytesOfBase64(text) {
   return bytes;
 }
 
-// Columns of numbers, and the bytes behind them.
-async function inflate(id) {
-  const bytes = bytesOfBase64(byId(id).textContent);
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const content = new Uint8Array(await new Response(stream).arrayBuffer());
-  const length = new DataView(content.buffer).getUint32(0, true);
-  return [JSON.parse(new TextDecoder().decode(content.subarray(4, 4 + length))), content.subarray(4 + length)];
-}
-
-function once(known, key, make) {
-  if (!known.has(key)) known.set(key, make());
-  return known.get(key);
-}
-
-// The episodes of a result in columns, and its poses. What all agents share, the trials, is packed once for all.
+// The episodes of a result by columns, and its poses.
 function unpack(number) {
-  return once(drives, number, async () => {
-    const result = data.results[number];
-    const [trial, maps] = await once(trials, result.trials, () => inflate(`trials-${result.trials}`));
-    const [drive, bytes] = await inflate(`drives-${number}`);
-    const columns = { ...trial, ...drive };
-    const changes = new Int16Array(bytes.slice().buffer);
-    const observed = result.odometry ? unpackPoses(changes.subarray(3 * result.poses), result.poses) : null;
-    return { columns, maps, path: unpackPoses(changes, result.poses), observed };
-  });
+  if (!unpacked.has(number)) unpacked.set(number, inflate(`episodes-${number}`));
+  return unpacked.get(number);
 }
 
-// All x, all y and all yaw, each as its change from the pose before.
-function unpackPoses(changes, poses) {
-  const sums = (axis) => {
+async function inflate(id) {
+  const stream = new Blob([bytesOfBase64(byId(id).textContent)]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const columns = await new Response(stream).json();
+  const maps = bytesOfBase64(columns.maps || "");
+  return { columns, maps, path: posesOf(columns.path), observed: columns.observed && posesOf(columns.observed) };
+}
+
+// All x, all y and all yaw from the change of each from the pose before.
+function posesOf(changes = [[], [], []]) {
+  const [x, y, yaw] = changes.map((axis) => {
     let sum = 0;
-    return Int32Array.from(changes.subarray(axis * poses, (axis + 1) * poses), (change) => (sum += change));
-  };
-  return { x: sums(0), y: sums(1), yaw: sums(2) };
+    return axis.map((change) => (sum += change));
+  });
+  return { x, y, yaw };
 }
 
 function wallsOf(bytes, size) {
@@ -65,13 +50,7 @@ function wallsOf(bytes, size) {
 }
 
 function partOf(path, first, count) {
-  return { x: path.x.subarray(first, first + count), y: path.y.subarray(first, first + count), yaw: path.yaw.subarray(first, first + count) };
-}
-
-function sumBefore(counts, index) {
-  let sum = 0;
-  for (let other = 0; other < index; other++) sum += counts[other];
-  return sum;
+  return { x: path.x.slice(first, first + count), y: path.y.slice(first, first + count), yaw: path.yaw.slice(first, first + count) };
 }
 
 // Everything about one episode, by names.
@@ -80,8 +59,7 @@ function episodeOf(packed, number, index) {
   const { columns } = packed;
   const maze = data.mazes[result.mazes[columns.maze[index]]];
   const first = columns.steps.slice(0, index).reduce((sum, steps) => sum + steps + 1, 0);
-  const poses = result.poses ? columns.steps[index] + 1 : 0;
-  const firstLandmark = sumBefore(columns.landmarkCounts, index);
+  const poses = columns.path ? columns.steps[index] + 1 : 0;
   const real = maze.walls ? wallsOf(bytesOfBase64(maze.walls), result.size) : null;
   return {
     size: result.size,
@@ -92,7 +70,7 @@ function episodeOf(packed, number, index) {
     ...shownMap(packed, result, index, real),
     start: columns.start[index],
     goal: columns.goal[index],
-    landmarks: columns.landmarks.slice(firstLandmark, firstLandmark + (columns.landmarkCounts[index] || 0)),
+    landmarks: columns.landmarks ? columns.landmarks[index] : [],
     path: partOf(packed.path, first, poses),
     observed: packed.observed && partOf(packed.observed, first, poses),
     lidar: result.lidar > 0 && real !== null,
@@ -279,8 +257,7 @@ async function writeOthers() {
   for (const number of resultsOf(data.results[result].setting)) {
     const { columns } = await unpack(number);
     if (view.result !== result || view.episode !== episode) return;
-    const isSame = data.results[number].trials === data.results[result].trials;
-    const index = isSame ? episode : columns.success.findIndex((_, other) => keyOf(columns, other, data.results[number].mazes) === wanted);
+    const index = columns.success.findIndex((_, other) => keyOf(columns, other, data.results[number].mazes) === wanted);
     if (index >= 0) rows.push(otherRow(number, index, columns));
   }
   const names = ["agent", "outcome", "steps", "SPL"].map((name) => element("th", { scope: "col" }, name));

@@ -8,7 +8,7 @@ import numpy as np
 
 from mazebench.maps.benchmark import load_kind_mazes, load_mazes
 from mazebench.maps.maze import Cell, Maze
-from mazebench.report.results import ReportedResult
+from mazebench.report.episodes import ReportedResult
 from mazebench.report.settings import known_levels
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import Episode

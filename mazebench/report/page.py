@@ -9,69 +9,72 @@ import base64
 import hashlib
 import html
 import json
-from collections.abc import Iterator, Mapping, Sequence
+import math
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import resources
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+import pandas as pd
 
 from mazebench.constants import STEP_TIME
 from mazebench.maps import colors
-from mazebench.report.document import PROVENANCE_HEAD, Picture, benchmark_versions, counted, provenance_rows
-from mazebench.report.figures.trajectories import CELL_COLORS, TIME_COLORS
-from mazebench.report.mazes import real_walls
-from mazebench.report.packed_episodes import POSITION_UNITS, YAW_UNITS, pack_drives, pack_trials, to_base64
-from mazebench.report.results import ReportedResult
+from mazebench.maps.maze import Cell
+from mazebench.report.episodes import ReportedResult
+from mazebench.report.figures import Drawn, to_svg
+from mazebench.report.mazes import real_walls, shown_ends
 from mazebench.report.settings import Setting
-from mazebench.report.table import Table
+from mazebench.report.table import METRICS, Table
+from mazebench.report.trajectories import CELL_COLORS, TIME_COLORS
 from mazebench.results.paper import citation, reference
+from mazebench.results.trajectories import Trajectories
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.options import TaskOptions
 from mazebench.world.lidar import NUM_RAYS
 from mazebench.world.mjcf import BODY_RADIUS
 
 _NUM_TIME_COLORS = 32
+_POSITION_UNITS = 32  # a cell; one unit is about a pixel on the screen
+_YAW_UNITS = 256  # a turn
 
 
 def build_page(
     results: Sequence[ReportedResult],
-    labels: Sequence[str],
+    head: str,
     tables: Sequence[Table],
-    figures: Mapping[Picture, str],
+    figures: Sequence[Drawn],
+    provenance: pd.DataFrame,
     warnings: Sequence[str],
 ) -> str:
     """Returns the page as HTML; text from results is escaped in it, or stands in it as JSON and base64.
 
     Args:
       results: all results.
-      labels: of the agents, in the order in which they are listed.
+      head: what the results are, in a line.
       tables: all tables.
-      figures: the SVG of each figure.
+      figures: of these tables and others.
+      provenance: where the results come from.
       warnings: lines about the results.
     """
-    count = sum(len(result.episodes) for result in results)
     style = f":root {{ {' '.join(f'--{name}: {color};' for name, color in _colors().items())} }}\n{_read('page.css')}"
     script = "".join(map(_read, ("drawing.js", "explorer.js")))
-    trials = [pack_trials(result, results) for result in results]
-    packed_trials = list(dict.fromkeys(trials))
-    packed = [_block(f"trials-{number}", text) for number, text in enumerate(packed_trials)]
-    packed += [_block(f"drives-{number}", pack_drives(result)) for number, result in enumerate(results)]
+    packed = (_pack(_columns(result, results)) for result in results)
     parts = {
         # Figures have attributes `style`.
         "POLICY": f"default-src 'none'; style-src '{_hash(style)}'; style-src-attr 'unsafe-inline'; "
         f"script-src '{_hash(script)}'",
         "STYLE": style,
-        "SUBTITLE": html.escape(
-            f"Benchmark {benchmark_versions(results)}; {', '.join(labels)}; {counted(count, 'episode')} in "
-            f"{counted(len(results), 'result')}."
-        ),
+        "SUBTITLE": html.escape(head),
         "NOTES": _notes(warnings),
         "CITATION": html.escape(f"{citation()}. {reference()['note']}"),
         "FIGURES": "\n".join(_sections(tables, figures)),
-        "PROVENANCE": _to_html([PROVENANCE_HEAD, *provenance_rows(results)]),
-        "DATA": _json(_explorer_data(results, [packed_trials.index(each) for each in trials])),
-        "EPISODES": "\n".join(packed),
+        "PROVENANCE": provenance.to_html(index=False, border=0),
+        "DATA": _json(_explorer_data(results)),
+        "EPISODES": "\n".join(
+            f'<script type="text/plain" id="episodes-{number}">{text}</script>' for number, text in enumerate(packed)
+        ),
         "SCRIPT": script,
     }
     pieces = _read("page.html").split("@")  # names of parts stand between the odd and even @
@@ -82,8 +85,21 @@ def _colors() -> dict[str, str]:
     return {"start": colors.to_hex(colors.START), "goal": colors.to_hex(colors.GOAL), **CELL_COLORS}
 
 
-def _block(name: str, text: str) -> str:
-    return f'<script type="text/plain" id="{name}">{text}</script>'
+def _read(name: str) -> str:
+    return resources.files("mazebench.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _hash(text: str) -> str:
+    return f"sha256-{_base64(hashlib.sha256(text.encode('utf-8')).digest())}"
+
+
+def _json(content: Any) -> str:
+    """Returns JSON for a script element: no text in it can end the element or open a comment."""
+    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def _base64(content: bytes) -> str:
+    return base64.b64encode(content).decode("ascii")
 
 
 def _notes(warnings: Sequence[str]) -> str:
@@ -95,67 +111,108 @@ def _notes(warnings: Sequence[str]) -> str:
     )
 
 
-def _sections(tables: Sequence[Table], figures: Mapping[Picture, str]) -> Iterator[str]:
+def _sections(tables: Sequence[Table], figures: Sequence[Drawn]) -> Iterator[str]:
     """Yields each figure with the table of its name, then the tables that have no figure."""
     by_name = {table.name: table for table in tables}
-    for picture, svg in figures.items():
-        yield _section(picture.title, picture.note, svg, by_name.pop(picture.name, None), is_open=False)
+    for drawn in figures:
+        yield _section(drawn.title, drawn.note, by_name.pop(drawn.name, None), to_svg(drawn))
     for table in by_name.values():
-        yield _section(table.title, table.note, "", table, is_open=True)
+        yield _section(table.title, table.note, table)
 
 
-def _section(title: str, note: str, svg: str, table: Table | None, is_open: bool) -> str:
-    hidden = ' class="hidden"' if svg else ""  # the figure has its title
-    parts = [f"<h3{hidden}>{html.escape(title)}</h3>", svg]
+def _section(title: str, note: str, table: Table | None, svg: str = "") -> str:
+    parts = [f"<h3{' class=hidden' * bool(svg)}>{html.escape(title)}</h3>", svg]  # a figure has its title
     if note:
         parts.append(f'<p class="note">{html.escape(note)}</p>')
     if table is not None:
-        forms = "".join(f'<div class="scroll">{_to_html(table.lines(metric))}</div>' for metric in table.metrics)
-        parts.append(f"<details{' open' * is_open}><summary>The values as a table</summary>{forms}</details>")
+        forms = [table.wide(metric).rename_axis(None).to_html(border=0) for metric in table.metrics]
+        named = "".join(
+            f'<h4>{html.escape(METRICS[metric])}, by {html.escape(table.row_name)}</h4><div class="scroll">{form}</div>'
+            for metric, form in zip(table.metrics, forms, strict=True)
+        )
+        parts.append(f"<details{' open' * (not svg)}><summary>The values as a table</summary>{named}</details>")
     return f'<section class="figure">{"".join(parts)}</section>'
 
 
-def _to_html(lines: Sequence[Sequence[str]]) -> str:
-    """Returns the table of lines of texts, the head first."""
-    head, *body = ([html.escape(text) for text in line] for line in lines)
-    rows = "".join(f"<tr><td>{'</td><td>'.join(line)}</td></tr>" for line in body)
-    return f"<table><thead><tr><th>{'</th><th>'.join(head)}</th></tr></thead><tbody>{rows}</tbody></table>"
-
-
-def _explorer_data(results: Sequence[ReportedResult], trials: Sequence[int]) -> dict[str, Any]:
+def _explorer_data(results: Sequence[ReportedResult]) -> dict[str, Any]:
+    """Returns what explorer.js knows of all results before it unpacks the episodes of one."""
     settings = sorted({result.setting for result in results})
     mazes, places = _mazes(results)
-    listed = [
-        {
-            **_describe(result),
-            "setting": settings.index(result.setting),
-            "mazes": here,
-            "trials": of_result,
-        }
-        for result, here, of_result in zip(results, places, trials, strict=True)
-    ]
     return {
         "settings": [_names(setting) for setting in settings],
         "rays": NUM_RAYS,
-        "units": {"position": POSITION_UNITS, "yaw": YAW_UNITS, "step": STEP_TIME, "body": BODY_RADIUS},
+        "units": {"position": _POSITION_UNITS, "yaw": _YAW_UNITS, "step": STEP_TIME, "body": BODY_RADIUS},
         "timeColors": [mpl.colors.to_hex(TIME_COLORS(n / (_NUM_TIME_COLORS - 1))) for n in range(_NUM_TIME_COLORS)],
         "mazes": mazes,
-        "results": listed,
+        "results": [
+            {**_describe(result), "setting": settings.index(result.setting), "mazes": here}
+            for result, here in zip(results, places, strict=True)
+        ],
         "first": _first(results),
     }
 
 
-def _read(name: str) -> str:
-    return resources.files("mazebench.report").joinpath(name).read_text(encoding="utf-8")
+def _columns(result: ReportedResult, results: Sequence[ReportedResult]) -> dict[str, Any]:
+    """Returns the episodes of a result by columns, the paths, and the shown maps where they need not be the mazes."""
+    episodes, trajectories, size = result.episodes, result.trajectories, result.setting.size
+    columns: dict[str, Any] = {
+        "maze": pd.factorize(episodes.maze)[0].tolist(),
+        "start": _indices(episodes.start, size),
+        "goal": _indices(episodes.goal, size),
+        "distance": episodes.distance.tolist(),
+        "shortest": episodes.shortest_path.round(2).tolist(),
+        "seed": episodes.seed.tolist(),
+        "success": episodes.success.astype(int).tolist(),
+        "steps": episodes.steps.tolist(),
+        "driven": episodes.path_length.round(2).tolist(),
+        "spl": episodes.spl.round(2).tolist(),
+        "splGrid": episodes.spl_grid.round(2).tolist(),
+        "groups": {fact: episodes[fact].astype(int).tolist() for fact in result.facts},
+    }
+    shown = shown_ends(result, results)
+    if shown is not None:
+        columns["shownStart"], columns["shownGoal"] = (_indices(cells, size) for cells in shown)
+    if trajectories is None:
+        return columns
+    scale = [result.setting.cell_size] * 2 + [1.0]
+    columns["path"] = _changes(trajectories.pose / scale)
+    if trajectories.observed is not None:
+        columns["observed"] = _changes(lay_on_first_poses(trajectories) / scale)
+    columns["landmarks"] = [trajectories[number].landmarks[:-1].tolist() for number in range(len(episodes))]
+    if trajectories.marks is not None:
+        columns["shownStart"], columns["shownGoal"] = trajectories.marks.T.tolist()
+    if not result.setting.is_exact:
+        maps = trajectories.shown if trajectories.picture is None else trajectories.picture
+        columns["maps"] = _base64(maps.tobytes())
+    return columns
 
 
-def _hash(text: str) -> str:
-    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode('utf-8')).digest()).decode('ascii')}"
+def lay_on_first_poses(trajectories: Trajectories) -> np.ndarray:
+    """Returns `[sum(length), 3]` float64: the observed paths, each turned and moved to begin in the true pose."""
+    assert trajectories.observed is not None
+    true, observed = trajectories.pose.astype(np.float64), trajectories.observed.astype(np.float64)
+    first = np.repeat(np.cumsum(trajectories.length) - trajectories.length, trajectories.length)
+    turn = true[first, 2] - observed[first, 2]
+    x, y = (observed - observed[first])[:, :2].T
+    moved = np.column_stack([np.cos(turn) * x - np.sin(turn) * y, np.sin(turn) * x + np.cos(turn) * y])
+    return np.column_stack([true[first, :2] + moved, observed[:, 2] + turn])
 
 
-def _json(content: Any) -> str:
-    """Returns JSON for a script element: no text in it can end the element or open a comment."""
-    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+def _changes(poses: np.ndarray) -> list[list[int]]:
+    """Returns all x, all y and all yaw of poses in cells and rad, each as its change from the pose before, in units."""
+    units = np.round(poses * (_POSITION_UNITS, _POSITION_UNITS, _YAW_UNITS / (2 * math.pi)))
+    changes = np.diff(units, axis=0, prepend=0).astype(int)
+    changes[:, 2] = (changes[:, 2] + _YAW_UNITS // 2) % _YAW_UNITS - _YAW_UNITS // 2  # the shorter way around
+    return changes.T.tolist()
+
+
+def _pack(columns: Mapping[str, Any]) -> str:
+    """Returns columns as JSON, deflated, in base64."""
+    return _base64(zlib.compress(json.dumps(columns, separators=(",", ":")).encode("ascii"), 9))
+
+
+def _indices(cells: Iterable[Cell], size: int) -> list[int]:
+    return [int(row * size + column) for row, column in cells]
 
 
 def _mazes(results: Sequence[ReportedResult]) -> tuple[list[dict[str, Any]], list[list[int]]]:
@@ -171,9 +228,7 @@ def _mazes(results: Sequence[ReportedResult]) -> tuple[list[dict[str, Any]], lis
             if key not in index:
                 index[key] = len(mazes)
                 walls = real_walls(result, name, results)
-                mazes.append(
-                    {"name": name, "walls": None if walls is None else to_base64(np.packbits(walls).tobytes())}
-                )
+                mazes.append({"name": name, "walls": None if walls is None else _base64(np.packbits(walls).tobytes())})
             here.append(index[key])
         places.append(here)
     return mazes, places
@@ -201,11 +256,9 @@ def _describe(result: ReportedResult) -> dict[str, Any]:
         "size": setting.size,
         "cellSize": setting.cell_size,
         "episodes": len(result.episodes),
-        "poses": 0 if trajectories is None else len(trajectories.pose),
         "exact": setting.is_exact,
         "context": min(context_size, side) if isinstance(context_size, int) else 0,  # 0 if it is not known
         "picture": 0 if picture is None else picture.shape[-1],
-        "odometry": trajectories is not None and trajectories.observed is not None,
         "lidar": lidar.max_range if setting.track or "lidar" in sensors else 0,  # m
         "groups": result.facts,
     }

@@ -3,38 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import pathlib
 from collections.abc import Iterator, Sequence
 
-from mazebench.errors import InputError, held_remarks, remark
-from mazebench.report.document import DOCUMENT, FIGURES, PAGE, Picture, build_document
-from mazebench.report.figures.describe import describe_distributions, describe_several_tables, describe_table
-from mazebench.report.figures.draw import draw_figure
-from mazebench.report.figures.galleries import build_galleries
-from mazebench.report.figures.trajectories import draw_gallery
-from mazebench.report.frame import join_episodes
-from mazebench.report.looks import all_looks
-from mazebench.report.page import build_page
-from mazebench.report.results import ReportedResult, read_results
-from mazebench.report.table import latex_name, to_csv, to_latex, to_markdown
-from mazebench.report.tables import build_tables
-from mazebench.storage.files import make_folder, open_whole, writing_to
+import pandas as pd
 
-TABLES = "tables"
-_FORMS = {".md": to_markdown, ".csv": to_csv}
-_SUFFIXES = {TABLES: (*_FORMS, ".tex"), FIGURES: (".png", ".pdf")}
-# Where well-known agents stand among others.
-_AGENT_ORDER = (
-    "oracle",
-    "navigator",
-    "mmn",
-    "mah",
-    "mah-paper",
-    "dqn",
-    "planner-closed-loop",
-    "planner",
-    "random",
-)
+from mazebench.errors import held_remarks, remark
+from mazebench.report.episodes import ReportedResult, join_episodes, read_results
+from mazebench.report.figures import Drawn, draw_distributions, draw_several_tables, draw_table, save
+from mazebench.report.files import DOCUMENT, FIGURES, PAGE, TABLES, new_report, write_text
+from mazebench.report.page import build_page
+from mazebench.report.table import Table, escape_markdown, latex_name, to_csv, to_latex, to_markdown
+from mazebench.report.tables import build_tables
+from mazebench.report.trajectories import draw_trajectories
+from mazebench.results.paper import citation, reference
+
+_PACKAGES = ("mazebench-mujoco", "mujoco", "numpy", "torch")  # in provenance
 
 
 def write_report(
@@ -53,39 +38,101 @@ def write_report(
       InputError: if there is nothing to report, results are of another benchmark, or `out` can't be used.
     """
     with _noting_remarks() as notes:
-        results, labels = read_in_order(paths, names)
-    episodes, looks = join_episodes(results, labels), all_looks(labels)
+        results = read_results(paths, names)
+    episodes = join_episodes(results)
+    labels = list(episodes.label.cat.categories)
     tables = build_tables(episodes)
-    figures = [describe_table(table, looks) for table in tables if table.x]
-    figures += [*describe_several_tables(tables, looks), *describe_distributions(episodes, looks)]
-    galleries = build_galleries(episodes)
-    pictures = [Picture(each.name, each.title, each.note) for each in figures]
-    pictures += [Picture(each.name, each.title, each.note) for each in galleries]
+    figures = [draw_table(table, labels) for table in tables if table.x]
+    figures += [*draw_several_tables(tables, labels), *draw_distributions(episodes)]
+    benchmarks = " and ".join(sorted({result.summary.benchmark for result in results}))
+    head = (
+        f"Benchmark {benchmarks}; {', '.join(labels)}; {counted(len(episodes), 'episode')} in "
+        f"{counted(len(results), 'result')}."
+    )
+    provenance = provenance_of(results)
     with new_report(out):
         for table in tables:
-            for suffix, form in _FORMS.items():
-                write_text(out / TABLES / (table.name + suffix), form(table))
+            text = "\n".join(to_markdown(table.wide(metric)) for metric in table.metrics)
+            write_text(out / TABLES / f"{table.name}.md", text)
+            write_text(out / TABLES / f"{table.name}.csv", to_csv(table))
             for metric in table.metrics:
                 write_text(out / TABLES / f"{latex_name(table, metric)}.tex", to_latex(table, metric))
-        drawn = {
-            Picture(figure.name, figure.title, figure.note): draw_figure(figure, out / FIGURES / figure.name)
-            for figure in figures
-        }
-        for gallery in galleries:
-            draw_gallery(gallery, looks, out / FIGURES / gallery.name)
-        write_text(out / DOCUMENT, build_document(results, labels, tables, pictures, notes))
-        write_text(out / PAGE, build_page(results, labels, tables, drawn, notes))
+        trajectories = list(draw_trajectories(episodes))
+        for drawn in (*figures, *trajectories):
+            save(drawn.figure, out / FIGURES / drawn.name)
+        document = _document(head, tables, [*figures, *trajectories], provenance, notes)
+        write_text(out / DOCUMENT, document)
+        write_text(out / PAGE, build_page(results, head, tables, figures, provenance, notes))
     return results
 
 
-def read_in_order(
-    paths: Sequence[pathlib.Path], names: Sequence[tuple[str, str]] = ()
-) -> tuple[list[ReportedResult], list[str]]:
-    """Returns the results as `read_results` does, in a report's order, and the agents' labels in theirs."""
-    results = read_results(paths, names)
-    labels = sorted({result.label for result in results}, key=_rank)
-    results.sort(key=lambda result: (result.setting, labels.index(result.label)))
-    return results, labels
+def counted(count: int, noun: str) -> str:
+    """Returns "1 result" or "2 results"."""
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def provenance_of(results: Sequence[ReportedResult]) -> pd.DataFrame:
+    """Returns where results come from, as texts; results that differ only in what was evaluated share a row."""
+    origins = pd.DataFrame(map(_origin, results))
+    said = [name for name in origins if name not in ("results", "episodes", "in")]
+    rows = origins.groupby(said, sort=False, as_index=False).agg(
+        {"results": "sum", "episodes": "sum", "in": lambda folders: _common_folder(list(folders))}
+    )
+    return rows[list(origins)].astype(str)
+
+
+def _origin(result: ReportedResult) -> dict[str, str | int]:
+    """Returns a result's line of provenance, with empty texts for what it does not say."""
+    provenance = result.summary.provenance
+    said = provenance.model_extra or {}
+    machine, command = said.get("machine"), said.get("command")
+    versions = [f"{name} {provenance.packages[name]}" for name in _PACKAGES if provenance.packages.get(name)]
+    return {
+        "agent": result.label,
+        "results": 1,
+        "episodes": len(result.episodes),
+        "in": str(result.folder),
+        "checkpoint": result.checkpoint[:12] if result.checkpoint else "none",
+        "seed": str(result.seed),
+        "versions": ", ".join([*versions, *([f"Python {said['python']}"] if "python" in said else [])]),
+        "machine": ", ".join(f"{key} {value}" for key, value in machine.items()) if isinstance(machine, dict) else "",
+        "command": " ".join(map(str, command)) if isinstance(command, list) else "",
+    }
+
+
+def _common_folder(paths: Sequence[str]) -> str:
+    try:
+        return os.path.commonpath(paths) or "."
+    except ValueError:  # some are absolute, some are not
+        return os.path.commonpath([os.path.abspath(path) for path in paths])
+
+
+def _document(
+    head: str, tables: Sequence[Table], figures: Sequence[Drawn], provenance: pd.DataFrame, warnings: Sequence[str]
+) -> str:
+    """Returns tables and figures below one another, what was skipped, and where the results came from."""
+    lines = [
+        "# mazebench report",
+        f"{escape_markdown(head)} [{PAGE}]({PAGE}) has every episode.",
+        "Means with 95 % intervals, which allow for the likeness of episodes in one maze. Columns marked (paper) are "
+        f"the values printed in {escape_markdown(citation())}. {reference()['note']}",
+        *(f"- {escape_markdown(warning)}" for warning in warnings),
+    ]
+    left = {drawn.name: drawn for drawn in figures}
+    for table in tables:
+        lines += [f"## {escape_markdown(table.title)}", escape_markdown(table.note)]
+        lines += [to_markdown(table.wide(metric)) for metric in table.metrics]
+        if table.name in left:
+            lines.append(_show(left.pop(table.name)))
+    for drawn in left.values():
+        lines += [f"## {escape_markdown(drawn.title)}", escape_markdown(drawn.note), _show(drawn)]
+    cells = provenance.set_index("agent").map(escape_markdown)
+    lines += ["## Results and provenance", to_markdown(cells)]
+    return "\n\n".join(line.rstrip("\n") for line in lines if line) + "\n"
+
+
+def _show(drawn: Drawn) -> str:
+    return f"![{escape_markdown(drawn.title)}]({FIGURES}/{drawn.name}.png)"
 
 
 @contextlib.contextmanager
@@ -98,41 +145,3 @@ def _noting_remarks() -> Iterator[list[str]]:
     finally:
         for note in notes:
             remark(note)
-
-
-def _rank(label: str) -> tuple[int, str]:
-    name = label.partition(" ")[0]
-    return (_AGENT_ORDER.index(name) if name in _AGENT_ORDER else len(_AGENT_ORDER), label)
-
-
-@contextlib.contextmanager
-def new_report(out: pathlib.Path) -> Iterator[None]:
-    """Makes the folder of a report, without an earlier report's files.
-
-    Raises:
-      InputError: if it holds something else, or can't be written in the block.
-    """
-    make_folder(out)
-    with writing_to(out):
-        _prepare(out)
-        yield
-
-
-def _prepare(out: pathlib.Path) -> None:
-    """Removes the page, tables and figures of an earlier report, also those that a killed process left half-written."""
-    ours = {DOCUMENT, PAGE, TABLES, FIGURES}
-    others = sorted(path.name for path in out.iterdir() if path.name.removesuffix(".tmp") not in ours)
-    if others:
-        raise InputError(f"{out}: expected an empty folder or a report's, found {others[0]!r} in it")
-    (out / PAGE).unlink(missing_ok=True)
-    for folder, suffixes in _SUFFIXES.items():
-        make_folder(out / folder)
-        for path in (out / folder).iterdir():
-            if path.name.removesuffix(".tmp").endswith(suffixes):
-                path.unlink()
-
-
-def write_text(path: pathlib.Path, text: str) -> None:
-    """Writes a file of a report. Names of folders and words of commands need not be legal Unicode."""
-    with open_whole(path) as file:
-        file.write(text.encode("utf-8", errors="replace"))

@@ -1,15 +1,15 @@
-"""Tables of measured and printed values with their intervals, and their forms as text: Markdown, CSV and LaTeX."""
+"""Tables of measured and printed values with their intervals, and their forms as text: Markdown, CSV, LaTeX, HTML."""
 
 from __future__ import annotations
 
-import csv
 import dataclasses
-import io
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import pandas as pd
 
 from mazebench.errors import one_line
-from mazebench.report.looks import wrap
 from mazebench.results.metrics import ON_TIME_METRICS
 
 METRICS = {  # of each episode, with their names
@@ -18,51 +18,13 @@ METRICS = {  # of each episode, with their names
     "spl": "SPL",
     "spl_grid": "SPL by grid distance",
 }
-UNTRAINED_MARK = "*"
-UNTRAINED_NOTE = f"{UNTRAINED_MARK} The agent was never trained on maps of this scale."
+UNTRAINED_NOTE = "* The agent was never trained on maps of this scale."
+# Of `Table.values`; `column` is an agent, `source` is "measured" or "paper", `runs` are training runs that are pooled,
+# `mark` is "*" if the agent learned, but never on maps of this scale.
+COLUMNS = ["metric", "row", "column", "source", "episodes", "value", "low95", "high95", "runs", "mark"]
 
-_WIDE = 240  # characters
-_CELL = len("0.50 [0.25, 0.75]")
-_CSV_COLUMNS = ("table", "metric", "row", "column", "source", "episodes", "value", "low95", "high95", "runs", "mark")
-# Of a table in LaTeX, with as many columns of numbers beside one another, and as many characters in a line of text.
-_LATEX_COLUMNS, _LATEX_HEAD, _LATEX_ROW = 6, 18, 30
-_LATEX = {
-    **{character: f"\\{character}" for character in "&%$#_{}"},
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "×": r"$\times$",
-    "<": r"\textless{}",
-    ">": r"\textgreater{}",
-    "|": r"\textbar{}",
-    "–": "--",
-}
-
-
-@dataclasses.dataclass(frozen=True)
-class Cell:
-    """A value; those of the paper come without interval and count."""
-
-    value: float
-    low: float | None = None  # of the 95 % interval
-    high: float | None = None
-    episodes: int | None = None
-    runs: int | None = None  # of training, where several are pooled
-    is_untrained_scale: bool = False  # whether the agent learned, but never on maps of this scale
-
-    def __str__(self) -> str:
-        mark = UNTRAINED_MARK if self.is_untrained_scale else ""
-        interval = "" if self.low is None else f" [{self.low:.2f}, {self.high:.2f}]"
-        return f"{self.value:.2f}{mark}{interval}{'' if self.runs is None else f', {self.runs} runs'}"
-
-
-@dataclasses.dataclass(frozen=True)
-class Column:
-    """The values of one agent, measured or printed in the paper."""
-
-    label: str
-    is_paper: bool
-    cells: dict[str, tuple[Cell | None, ...]]  # by metric, one for each row
+# As wide as it is, but no wider than the text.
+_RESIZED = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,79 +35,68 @@ class Table:
     title: str
     note: str
     row_name: str  # of what the rows differ in
-    rows: tuple[str, ...]
-    x: tuple[float, ...]  # where the first rows lie on an axis; the rows behind are no points of a curve
-    columns: tuple[Column, ...]
+    values: pd.DataFrame  # a line for each value with `COLUMNS`; `row` and `column` are ordered categories
+    x: Mapping[str, float] = dataclasses.field(default_factory=dict)  # where rows lie on an axis
 
     @property
-    def metrics(self) -> dict[str, str]:
-        """The metrics that the table has values of, with their names."""
-        return {metric: name for metric, name in METRICS.items() if self.columns_of(metric)}
+    def metrics(self) -> list[str]:
+        """The metrics of which there are values."""
+        return [metric for metric in METRICS if (self.values.metric == metric).any()]
 
-    @property
-    def is_turned(self) -> bool:
-        """Whether columns are shown as rows: where a table is wide and narrower that way, as with long names."""
-        labels = [column.label for column in self.columns]
-        return _width(labels, self.rows) < _width(self.rows, labels) > _WIDE
-
-    def columns_of(self, metric: str) -> list[Column]:
-        """Returns the columns that have a value of a metric."""
-        return [column for column in self.columns if any(column.cells.get(metric, ()))]
-
-    def lines(self, metric: str, escape: Callable[[str], str] = str) -> list[list[str]]:
-        """Returns the texts of the table of a metric line by line, the head first; labels are escaped."""
-        columns = self.columns_of(metric)
-        lines = [[f"{METRICS[metric]}, by {self.row_name}", *(escape(column.label) for column in columns)]]
-        for index, row in enumerate(self.rows):
-            lines.append([row, *(_text(column.cells[metric][index]) for column in columns)])
-        return [list(line) for line in zip(*lines, strict=True)] if self.is_turned else lines
+    def wide(self, metric: str) -> pd.DataFrame:
+        """Returns a metric's values with their intervals as texts, by row and column."""
+        values = self.values[self.values.metric == metric]
+        texts = pd.Series([format_value(**value) for value in values.to_dict("records")], [values.row, values.column])
+        wide = texts.unstack(fill_value="").reindex(values.row.cat.categories, fill_value="")
+        return wide.rename_axis(f"{METRICS[metric]}, by {self.row_name}").rename_axis(None, axis=1)
 
 
-def to_markdown(table: Table) -> str:
-    """Returns a table for each metric, without the title."""
-    parts = []
-    for metric in table.metrics:
-        head, *body = table.lines(metric, escape_markdown)
-        lines = [head, ["---"] * len(head), *body]
-        parts.append("".join(f"| {' | '.join(line)} |\n" for line in lines))
-    return "\n".join(parts)
+def make_values(lines: Iterable[Mapping[str, Any]], rows: Iterable[str], columns: Iterable[str]) -> pd.DataFrame:
+    """Returns the `Table.values` of lines, in the order of rows and columns."""
+    values = pd.DataFrame(lines, columns=COLUMNS)
+    values["row"] = pd.Categorical(values.row, list(rows), ordered=True)
+    values["column"] = pd.Categorical(values.column, list(columns), ordered=True)
+    values["mark"] = values["mark"].astype(object).fillna("")
+    values[["episodes", "runs"]] = values[["episodes", "runs"]].astype("Int64")
+    return values.sort_values(["metric", "row", "column"], kind="stable", ignore_index=True)
+
+
+def format_value(value: float, low95: float, high95: float, runs: Any, mark: str, **_: Any) -> str:
+    """Returns a value with its interval, as "0.50 [0.25, 0.75]"."""
+    interval = "" if pd.isna(low95) else f" [{low95:.2f}, {high95:.2f}]"
+    return f"{value:.2f}{mark}{interval}{'' if pd.isna(runs) else f', {runs} runs'}"
+
+
+def to_markdown(frame: pd.DataFrame) -> str:
+    """Returns a frame of texts as a table in Markdown; names of rows and columns are escaped."""
+    head = [escape_markdown(str(name)) for name in (frame.index.name or "", *frame.columns)]
+    rows = ([escape_markdown(str(row)), *map(str, cells)] for row, *cells in frame.itertuples())
+    return "".join(f"| {' | '.join(line)} |\n" for line in (head, ["---"] * len(head), *rows))
 
 
 def to_csv(table: Table) -> str:
     """Returns a line for each value, with more digits than the other forms."""
-    file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(_CSV_COLUMNS)
-    for metric in METRICS:
-        for index, row in enumerate(table.rows):
-            for column in table.columns_of(metric):
-                cell = column.cells[metric][index]
-                if cell is not None:
-                    source = "paper" if column.is_paper else "measured"
-                    figures = [_digits(value) for value in (cell.value, cell.low, cell.high)]
-                    mark = UNTRAINED_MARK if cell.is_untrained_scale else ""
-                    values = [cell.episodes, *figures, cell.runs, mark]
-                    names = [table.name, metric, one_line(row), one_line(column.label)]
-                    writer.writerow([*names, source, *values])
-    return file.getvalue()
+    values = table.values.assign(row=table.values.row.map(one_line), column=table.values.column.map(one_line))
+    values.insert(0, "table", table.name)
+    return values.to_csv(index=False, float_format="%.6g", lineterminator="\n")
 
 
 def to_latex(table: Table, metric: str) -> str:
-    """Returns a `table` environment of one metric, no wider than the text; it needs booktabs and graphicx.
-
-    Many columns stand in several blocks below one another.
-    """
-    columns = table.columns_of(metric)
-    num_blocks = -(-len(columns) // _LATEX_COLUMNS)
-    blocks = (columns[len(columns) * n // num_blocks : len(columns) * (n + 1) // num_blocks] for n in range(num_blocks))
-    caption = f"{table.title}: {METRICS[metric]}. {table.note}".strip()
-    if any(cell and cell.low is not None for column in columns for cell in column.cells[metric]):
-        caption += " The brackets are 95 % intervals."
-    return (
-        f"\\begin{{table}}\n\\centering\n\\caption{{{escape_latex(caption)}}}\n"
-        f"\\label{{tab:{latex_name(table, metric)}}}\n"
-        + "\\par\\medskip\n".join(_latex_block(table, metric, block) for block in blocks)
-        + "\\end{table}\n"
+    """Returns a `table` environment of one metric, no wider than the text; it needs booktabs and graphicx."""
+    caption = f"{table.title}: {METRICS[metric]}. {table.note}".strip() + " Brackets are 95 % intervals."
+    caption = re.sub(r"([&%$#_{}])", r"\\\1", caption)
+    wide = table.wide(metric)
+    wide = wide.rename_axis(index=None, columns=wide.index.name)  # in one line with the names of columns
+    style = wide.style.format(escape="latex").format_index(escape="latex").format_index(escape="latex", axis=1)
+    latex = style.to_latex(
+        caption=caption,
+        label=f"tab:{latex_name(table, metric)}",
+        column_format="l" + "r" * len(wide.columns),
+        hrules=True,
+        position_float="centering",
+    )
+    return latex.replace(r"\begin{tabular}", f"{_RESIZED}\n\\begin{{tabular}}").replace(
+        r"\end{tabular}", r"\end{tabular}}"
     )
 
 
@@ -157,42 +108,3 @@ def latex_name(table: Table, metric: str) -> str:
 def escape_markdown(text: str) -> str:
     """Returns the Markdown that shows `text` as it is."""
     return re.sub(r"([\\`*_{}\[\]|<>~&$])", r"\\\1", " ".join(text.split()))
-
-
-def escape_latex(text: str) -> str:
-    """Returns the LaTeX that typesets `text` as it is."""
-    return "".join(_LATEX.get(character, character) for character in text)
-
-
-def _latex_block(table: Table, metric: str, columns: Sequence[Column]) -> str:
-    lines = [
-        [_latex_lines(table.row_name, _LATEX_ROW, "l"), *(_latex_lines(c.label, _LATEX_HEAD, "r") for c in columns)]
-    ]
-    for index, row in enumerate(table.rows):
-        lines.append([_latex_lines(row, _LATEX_ROW, "l"), *(_text(column.cells[metric][index]) for column in columns)])
-    head, *body = (" & ".join(line) + " \\\\\n" for line in lines)
-    return (
-        "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{%\n"
-        f"\\begin{{tabular}}{{l{'r' * len(columns)}}}\n\\toprule\n"
-        f"{head}\\midrule\n{''.join(body)}\\bottomrule\n\\end{{tabular}}}}\n"
-    )
-
-
-def _latex_lines(text: str, width: int, side: str) -> str:
-    """Returns the LaTeX of a cell: a text that is longer than `width` as lines one below the other."""
-    lines = [escape_latex(line) for line in wrap(text, width).split("\n")]
-    stacked = " \\\\{} ".join(lines)  # without the braces, a line that begins with [ would be an option
-    return lines[0] if len(lines) == 1 else f"\\begin{{tabular}}[b]{{@{{}}{side}@{{}}}}{stacked}\\end{{tabular}}"
-
-
-def _text(cell: Cell | None) -> str:
-    return "" if cell is None else str(cell)
-
-
-def _digits(value: float | None) -> str:
-    return "" if value is None else f"{value:.6g}"
-
-
-def _width(rows: Sequence[str], columns: Sequence[str]) -> int:
-    """Returns the characters in a line of a table with such names of rows and columns."""
-    return max(map(len, rows)) + sum(max(len(name), _CELL) for name in columns)

@@ -10,7 +10,7 @@ from made_results import make_result
 
 from mazebench import cli
 from mazebench.errors import InputError, Remark
-from mazebench.report.learning_curves import find_runs, write_learning_curves
+from mazebench.report.curves import find_runs, write_learning_curves
 
 LINES = (
     {"env_steps": 500, "updates": 1, "td_loss": 3.0},  # between milestones: no success rates

@@ -1,4 +1,4 @@
-"""Finished evaluations as a report reads them: their episodes in a table, the setting, and a label for each agent."""
+"""Finished evaluations as a report reads them, and all their episodes in one table."""
 
 from __future__ import annotations
 
@@ -23,6 +23,9 @@ _OF_RECORDS = [
     *("maze", "start", "goal", "distance", "success", "steps", "path_length", "shortest_path", "spl", "spl_grid"),
     "seed",
 ]
+_OF_SETTING = ("task", "size", "split", "landmark_distance", "track", "level")
+# Where well-known agents stand among others.
+_AGENT_ORDER = ("oracle", "navigator", "mmn", "mah", "mah-paper", "dqn", "planner-closed-loop", "planner", "random")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -64,7 +67,7 @@ class ReportedResult:
 
 
 def read_results(paths: Iterable[pathlib.Path], names: Sequence[tuple[str, str]] = ()) -> list[ReportedResult]:
-    """Returns all results at or below `paths`, one for each agent and setting, with labels; at least one.
+    """Returns all results at or below `paths`, one for each setting and agent, in this order; at least one.
 
     It warns with a `Remark` of each thing that is skipped.
 
@@ -85,7 +88,66 @@ def read_results(paths: Iterable[pathlib.Path], names: Sequence[tuple[str, str]]
         where = ", ".join(map(str, paths))
         raise InputError(f"expected results of `mazebench eval` or `mazebench train` in {where}, found none to report")
     _require_installed_benchmark(results)
-    return _drop_repeats(_label(_rename(results, names)))
+    results = _drop_repeats(_label(_rename(results, names)))
+    return sorted(results, key=lambda result: (result.setting, _rank(result.label)))
+
+
+def join_episodes(results: Sequence[ReportedResult]) -> pd.DataFrame:
+    """Returns the episodes of all results below one another, in the order of `results`.
+
+    It adds columns to those of `ReportedResult.episodes`: the `result` and the `number` of the episode in it; the
+    agent's `label` (ordered), `agent` (its name), `run` and `run_seed`; the `setting` (ordered) and its fields; and
+    numbers of the maze and of the `trial`: episodes with one maze, start, goal and seed are one trial.
+    """
+    labels = sorted({result.label for result in results}, key=_rank)
+    settings = sorted({result.setting for result in results})
+    episodes = pd.concat(
+        [
+            result.episodes.assign(
+                result=result,
+                number=range(len(result.episodes)),
+                label=pd.Categorical([result.label] * len(result.episodes), labels, ordered=True),
+                agent=result.name,
+                run=result.run,
+                run_seed=result.seed,
+                is_untrained=result.summary.untrained_scale,
+                setting=pd.Categorical([result.setting] * len(result.episodes), settings, ordered=True),
+                is_exact=result.setting.is_exact,
+                **{name: getattr(result.setting, name) for name in _OF_SETTING},
+            )
+            for result in results
+        ],
+        ignore_index=True,
+    )
+    episodes["maze_index"] = pd.factorize(episodes.maze)[0]
+    episodes["trial"] = episodes.groupby(["maze", "start", "goal", "seed"], sort=False).ngroup()
+    for fact in facts_of(episodes):
+        episodes[fact] = episodes[fact].eq(True)  # no value where a result doesn't tell it
+    return episodes
+
+
+def facts_of(episodes: pd.DataFrame) -> list[str]:
+    """Returns the columns that are facts of a track."""
+    return list(dict.fromkeys(fact for result in episodes.result.unique() for fact in result.facts))
+
+
+def settings_of(episodes: pd.DataFrame) -> list[Setting]:
+    """Returns the settings of which there are episodes, sorted."""
+    return sorted(episodes.setting.unique())
+
+
+def common_distances(episodes: pd.DataFrame) -> list[int]:
+    """Returns the distances from start to goal that every result has, in cells; none for the hierarchical task."""
+    if episodes.task.eq("hierarchical").any():
+        return []
+    num_results = episodes.groupby("distance").result.nunique()
+    return num_results.index[num_results == episodes.result.nunique()].tolist()
+
+
+def at_common_distances(episodes: pd.DataFrame) -> pd.DataFrame:
+    """Returns the episodes at the distances that every result has; all episodes if there are no such distances."""
+    common = common_distances(episodes)
+    return episodes[episodes.distance.isin(common)] if common else episodes
 
 
 def folders_below(path: pathlib.Path) -> list[pathlib.Path]:
@@ -108,6 +170,11 @@ def _find_folders(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
         for folder in folders:
             found.setdefault(folder.resolve(), folder)
     return list(found.values())
+
+
+def _rank(label: str) -> tuple[int, str]:
+    name = label.partition(" ")[0]
+    return (_AGENT_ORDER.index(name) if name in _AGENT_ORDER else len(_AGENT_ORDER), label)
 
 
 def _describe(path: pathlib.Path) -> str:

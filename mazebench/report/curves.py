@@ -2,39 +2,30 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import pathlib
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
+
+import pandas as pd
 
 from mazebench.errors import InputError, remark
-from mazebench.report.document import DOCUMENT, FIGURES, Picture, show_picture
-from mazebench.report.figures.draw import draw_figure
-from mazebench.report.figures.figure import Figure, Panel, Point, Series
-from mazebench.report.looks import all_looks
-from mazebench.report.report import new_report, write_text
-from mazebench.report.table import escape_markdown
+from mazebench.report.figures import Panel, draw_panels, save
+from mazebench.report.files import DOCUMENT, FIGURES, new_report, write_text
+from mazebench.report.table import escape_markdown, to_markdown
 from mazebench.storage.json_files import read_json, read_lines
 from mazebench.training.run_folder import CHECKPOINTS, CONFIG, METRICS
 
-_STEPS = "env_steps"
 SUCCESS, _LOSS = "success_rate_", "_loss"  # how the names of such metrics begin, and end
-_MARKS = 12  # on a curve
+_STEPS = "env_steps"
 
 
-@dataclasses.dataclass(frozen=True)
-class Run:
+class Run(NamedTuple):
     """What a training run logged."""
 
     name: str
     config: dict[str, Any]
-    lines: tuple[dict[str, float], ...]  # metrics by name; success rates are in the lines of milestones only
-
-    def last(self, metric: str) -> str:
-        """Returns the last value of a metric in words; nothing if there is none."""
-        values = [line[metric] for line in self.lines if metric in line]
-        return f"{values[-1]:.3f}" if values else ""
+    lines: pd.DataFrame  # metrics by name, with their steps; success rates are in the lines of milestones only
 
 
 def find_runs(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
@@ -63,21 +54,20 @@ def write_learning_curves(folders: Sequence[pathlib.Path], out: pathlib.Path) ->
     runs = [run for folder, name in zip(folders, _names(folders), strict=True) if (run := read_run(folder, name))]
     if not runs:
         raise InputError("expected training runs with metrics, found none to report")
-    looks = all_looks([run.name for run in runs])
-    metrics = list(dict.fromkeys(metric for run in runs for line in run.lines for metric in line))
+    metrics = list(dict.fromkeys(metric for run in runs for metric in run.lines))
     rates = sorted((metric for metric in metrics if metric.startswith(SUCCESS)), key=lambda rate: (len(rate), rate))
     losses = [metric for metric in metrics if metric.endswith(_LOSS)]
-    of_rates = tuple(_panel(runs, rate, f"distance {rate.removeprefix(SUCCESS)}") for rate in rates)
-    of_losses = tuple(_panel(runs, loss, loss.replace("_", " ")) for loss in losses)
-    lines = ["# Learning curves", _table(runs, rates)]
+    of_rates = [_panel(runs, rate, f"distance {rate.removeprefix(SUCCESS)}") for rate in rates]
+    of_losses = [_panel(runs, loss, loss.replace("_", " "))._replace(y_range=None) for loss in losses]
+    lines = ["# Learning curves", to_markdown(_overview(runs, rates)).rstrip()]
     with new_report(out):
         for name, title, note, panels in (
             ("success", "Success rate by distance", "On held-out mazes, at each milestone.", of_rates),
             ("losses", "Losses", f"Of the training, as {METRICS} has them.", of_losses),
         ):
             if panels:
-                draw_figure(Figure(name, title, note, panels, looks, panel_height=1.9), out / FIGURES / name)
-                lines += [f"## {title}", note, show_picture(Picture(name, title, note))]
+                save(draw_panels(title, panels, [run.name for run in runs], height=1.9), out / FIGURES / name)
+                lines += [f"## {title}", note, f"![{title}]({FIGURES}/{name}.png)"]
         write_text(out / DOCUMENT, "\n\n".join(lines) + "\n")
     return runs
 
@@ -86,14 +76,14 @@ def read_run(folder: pathlib.Path, name: str) -> Run | None:
     """Returns what a run logged, but for a line that is written just now; nothing if it logged nothing yet."""
     try:
         config = read_json(folder / CONFIG)
-        lines = tuple(filter(None, map(_parse, read_lines(folder / METRICS))))
+        lines = list(filter(None, map(_parse, read_lines(folder / METRICS))))
     except InputError as error:
         remark(f"{error}; skipped")
         return None
     if not lines or not isinstance(config, dict):
         remark(f"{folder}: expected a training run with metrics, found none yet; skipped")
         return None
-    return Run(name, config, lines)
+    return Run(name, config, pd.DataFrame(lines))
 
 
 def _names(folders: Sequence[pathlib.Path]) -> list[str]:
@@ -111,21 +101,24 @@ def _parse(found: Any) -> dict[str, float]:
     return values if _STEPS in values else {}
 
 
-def _table(runs: Sequence[Run], rates: Sequence[str]) -> str:
-    head = ("run", "agent", "seed", "agent steps", "updates", *(f"success, {rate[len(SUCCESS) :]}" for rate in rates))
-    lines = [head, ("---",) * len(head)]
+def _overview(runs: Sequence[Run], rates: Sequence[str]) -> pd.DataFrame:
+    """Returns a row for each run: whose it is, its steps and updates, and its last success rates."""
+    rows = {}
     for run in runs:
-        of_config = [escape_markdown(str(run.config.get(key, ""))) for key in ("agent", "seed")]
-        counts = [f"{run.lines[-1].get(name, 0):,}" for name in (_STEPS, "updates")]
-        lines.append((escape_markdown(run.name), *of_config, *counts, *map(run.last, rates)))
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines).rstrip()
+        rows[run.name] = {key: escape_markdown(str(run.config.get(key, ""))) for key in ("agent", "seed")}
+        for metric, name in ((_STEPS, "agent steps"), ("updates", "updates")):
+            rows[run.name][name] = f"{run.lines.get(metric, pd.Series([0])).iloc[-1]:,.0f}"
+        for rate in rates:
+            found = run.lines.get(rate, pd.Series(dtype=float)).dropna()
+            rows[run.name][f"success, {rate.removeprefix(SUCCESS)}"] = f"{found.iloc[-1]:.3f}" if len(found) else ""
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("run")
 
 
 def _panel(runs: Sequence[Run], metric: str, title: str) -> Panel:
     """Returns a curve for each run."""
-    series = []
-    for run in runs:
-        points = tuple(Point(line[_STEPS], line[metric]) for line in run.lines if metric in line)
-        series.append(Series(run.name, points, mark_every=-(-len(points) // _MARKS) or 1))
-    is_rate = metric.startswith(SUCCESS)
-    return Panel(title, "agent steps", tuple(series), y_range=(-0.05, 1.05) if is_rate else None)
+    curves = [
+        pd.DataFrame({"column": run.name, "x": run.lines[_STEPS], "value": run.lines[metric]}).dropna()
+        for run in runs
+        if metric in run.lines
+    ]
+    return Panel(title, "agent steps", pd.concat(curves, ignore_index=True))

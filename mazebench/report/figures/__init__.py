@@ -1,1 +1,0 @@
-"""The report's figures: described as values, and drawn."""

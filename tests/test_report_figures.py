@@ -1,0 +1,93 @@
+"""The report's figures: what they show, in which colours, and that names fit."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+from made_results import edit_summary, make_result, of_own_mazes
+from matplotlib.colors import to_hex
+from matplotlib.image import imread
+
+from mazebench.maps import colors
+from mazebench.report.episodes import join_episodes, read_results
+from mazebench.report.figures import Panel, draw_distributions, draw_panels, draw_table, save
+from mazebench.report.tables import build_tables
+from mazebench.report.trajectories import draw_trajectories
+
+LONG = [f"mylab.navigation.experiments.variant_{number}.agents:PlannerWithRecurrentMemory" for number in range(9)]
+TWELVE = ["mmn", "planner", "random", *LONG]
+
+
+def episodes_of(folder):
+    return join_episodes(read_results([folder]))
+
+
+def draw(folder, name):
+    """The figure of a table."""
+    episodes = episodes_of(folder)
+    [table] = [table for table in build_tables(episodes) if table.name == name]
+    return draw_table(table, list(episodes.label.cat.categories)).figure
+
+
+def test_no_two_of_twelve_agents_look_alike_and_the_legend_fits(tmp_path):
+    points = pd.DataFrame({"column": label, "x": [0, 1], "value": [0, 1]} for label in TWELVE).explode(["x", "value"])
+    figure = draw_panels("A title", [Panel("One", "x", points), Panel("Two", "x", points)], TWELVE)
+    lines = figure.axes[0].get_lines()
+    assert len({(line.get_color(), line.get_marker()) for line in lines}) == 12
+    save(figure, tmp_path / "figure")
+    [legend] = figure.legends
+    assert [text.get_text().replace("\n", "") for text in legend.get_texts()] == TWELVE
+    axes, box = figure.axes[0].get_window_extent(), legend.get_window_extent()
+    assert (box.x0 >= 0, box.x1 <= figure.bbox.x1, 0 <= box.y0 < box.y1 <= axes.y0) == (True, True, True)
+    assert axes.height > 0.5 * 2.0 * figure.dpi  # the figure grows, the axes do not shrink
+
+
+def test_what_the_paper_printed_looks_like_no_agent(tmp_path):
+    labels = ["mmn", "mah", "dqn", "random"]
+    for agent in labels:
+        make_result(tmp_path / agent, agent, "hierarchical", num_mazes=1, record=False)
+    lines = [line for line in draw(tmp_path, "hierarchical-13").axes[-1].get_lines() if len(line.get_label()) > 2]
+    looks = {line.get_label(): (line.get_color(), line.get_marker()) for line in lines}
+    assert list(looks) == [*labels, *(f"{agent} (paper)" for agent in ("MMN", "MAH", "DQN", "Random"))]
+    assert len(set(looks.values())) == 8
+
+
+@pytest.mark.parametrize(("distances", "is_band"), [((2, 4), False), ((2, 4, 6, 8), True)])
+def test_many_distances_have_bands_and_few_have_bars_beside_one_another(tmp_path, distances, is_band):
+    for agent in ("mah", "mmn"):
+        make_result(tmp_path / agent, agent, skill=1.0, num_mazes=3, distances=distances, record=False)
+    axes = draw(tmp_path, "local-13").axes[0]
+    mmn, mah = axes.get_lines()[:2]
+    assert (mah.get_xdata() == mmn.get_xdata()).all() == is_band
+    assert {type(each).__name__ for each in axes.collections} == {
+        "FillBetweenPolyCollection" if is_band else "LineCollection"
+    }
+
+
+def test_a_scale_that_an_agent_was_never_trained_on_has_a_star(tmp_path):
+    folder = make_result(tmp_path / "mah", "mah", track="adrift", num_mazes=2, record=False)
+    edit_summary(folder, untrained_scale=True)
+    assert [text.get_text() for text in draw(tmp_path, "track-adrift").axes[0].texts] == ["*"]
+
+
+def test_violins_show_the_scores_of_each_level_and_their_mean(tmp_path):
+    make_result(tmp_path / "plain", "mah", num_mazes=3, record=False)
+    make_result(tmp_path / "noise", "mah", num_mazes=3, record=False, position_noise=0.5)
+    episodes = episodes_of(tmp_path)
+    [drawn] = draw_distributions(episodes)
+    [axes] = drawn.figure.axes
+    assert (axes.get_title("left"), [text.get_text() for text in axes.get_xticklabels()]) == ("mah", ["0", "0.5"])
+    assert [line.get_ydata()[0] for line in axes.get_lines()] == episodes.groupby("setting").spl.mean().tolist()
+
+
+def test_trajectories_have_a_row_for_each_agent_and_the_colours_of_the_world(tmp_path):
+    for agent in ("mah", "mmn"):
+        make_result(tmp_path / agent, agent, num_mazes=2)
+    of_own_mazes(make_result(tmp_path / "own", "mah", num_mazes=1), "office")
+    local, own = draw_trajectories(episodes_of(tmp_path))
+    assert (local.name, own.name) == ("trajectories-local-13", "trajectories-custom-1-local-13")
+    assert [axes.get_ylabel() for axes in local.figure.axes if axes.get_ylabel()] == ["mmn", "mah"]
+    save(local.figure, tmp_path / "figure")
+    pixels = imread(tmp_path / "figure.png")[..., :3]
+    for color in (colors.START, colors.GOAL):
+        assert (abs(pixels - color).max(axis=-1) < 0.01).sum() > 50, to_hex(color)
