@@ -63,7 +63,7 @@ def play(env: Environment, actions: list[Any]) -> list[dm_env.TimeStep]:
 
 def in_the_middle(options: dict[str, Any], seed: int) -> tuple[Environment, list[Any]]:
     """An environment in the middle of an episode, and actions for it."""
-    env = mazebench.load(size=13, seed=seed, **options)
+    env = mazebench.load(seed=seed, **options)
     env.reset()
     actions = actions_of(env, seed)
     play(env, actions[: 20 + 7 * seed])
@@ -166,7 +166,7 @@ class TestStates:
     def test_another_environment_of_the_task_goes_on_from_a_pickled_state(self, options, seed):
         env, actions = in_the_middle(options, seed)
         state = pickle.dumps(env.get_state())
-        other = mazebench.load(size=13, seed=99, **options)
+        other = mazebench.load(seed=99, **options)
         play(other, actions[:31])
         other.set_state(pickle.loads(state))  # noqa: S301
         assert_equal(play(env, actions), play(other, actions))
