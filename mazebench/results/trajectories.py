@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from mazebench.errors import InputError
-from mazebench.storage.arrays import read_arrays
-from mazebench.storage.files import open_whole
+from mazebench.storage.arrays import unpack_arrays
+from mazebench.storage.files import open_file, open_whole
 
 TRAJECTORIES = "trajectories.npz"
 FORMAT = "mazebench-trajectories-1"
@@ -100,15 +100,34 @@ def load_trajectories(path: pathlib.Path, num_episodes: int) -> Trajectories:
     """Returns the trajectories of an evaluation of `num_episodes` episodes.
 
     Raises:
-      InputError: if the file can't be read, is damaged, too large or of other episodes.
+      InputError: if the file can't be read, is damaged, of another format or of other episodes.
     """
-    arrays = read_arrays(path, "trajectories")
-    arrays.pop("format")
-    trajectories = Trajectories(**arrays)
+    with open_file(path, "trajectories") as file:
+        try:
+            trajectories = Trajectories(**_known_arrays(unpack_arrays(file)))
+        except ValueError as error:
+            raise InputError(f"{path}: expected trajectories ({FORMAT}), found a damaged file: {error}") from error
     fault = _fault(trajectories, num_episodes)
     if fault:
         raise InputError(f"{path}: {fault}")
     return trajectories
+
+
+def _known_arrays(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Returns the fields of `Trajectories` in a file's arrays.
+
+    Raises:
+      ValueError: if one is missing or of another type, or the file has another format.
+    """
+    if str(arrays.get("format")) != FORMAT:
+        raise ValueError("another format")
+    dtypes = _DTYPES | {name: dtype for name, dtype in _OPTIONAL_DTYPES.items() if name in arrays}
+    for name, dtype in dtypes.items():
+        if name not in arrays:
+            raise ValueError(f"no {name}")
+        if arrays[name].dtype != dtype:
+            raise ValueError(f"{name} of type {arrays[name].dtype}, not {dtype}")
+    return {name: arrays[name] for name in dtypes}
 
 
 def save_trajectories(path: pathlib.Path, trajectories: Trajectories) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pathlib
 import zipfile
 import zlib
+from typing import BinaryIO
 
 import numpy as np
 
@@ -20,7 +21,19 @@ def read_arrays(path: pathlib.Path, kind: str) -> dict[str, np.ndarray]:
     """
     with open_file(path, kind) as file:
         try:
-            with np.load(file, allow_pickle=False) as arrays:
-                return dict(arrays)
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+            return unpack_arrays(file)
+        except ValueError as error:
             raise InputError(f"{path}: expected a {kind}, found a damaged file: {error}") from error
+
+
+def unpack_arrays(file: BinaryIO) -> dict[str, np.ndarray]:
+    """Returns the arrays of an open .npz file by name; nothing in it is unpickled.
+
+    Raises:
+      ValueError: if it is damaged.
+    """
+    try:
+        with np.load(file, allow_pickle=False) as arrays:
+            return dict(arrays)
+    except (OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise ValueError(str(error)) from error
