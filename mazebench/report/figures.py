@@ -20,7 +20,8 @@ from matplotlib.ticker import EngFormatter
 from mazebench.report.episodes import at_common_distances
 from mazebench.report.settings import level_help, level_name, short_name
 from mazebench.report.table import METRICS, UNTRAINED_NOTE, Table
-from mazebench.report.tables import measure, note_on_distances, perturbed_groups
+from mazebench.report.tables import note_on_distances, perturbed_groups
+from mazebench.results.intervals import mean_interval
 from mazebench.results.metrics import ON_TIME_METRICS
 from mazebench.storage.files import open_whole
 
@@ -249,7 +250,7 @@ def _draw_violin(axes: Axes, x: int, episodes: pd.DataFrame) -> None:
     half = _WIDEST * density(episodes.spl.to_numpy())
     is_there = half > _THINNEST * _WIDEST
     axes.fill_betweenx(_GRID, x - half, x + half, is_there, color=_PALETTE[0], alpha=0.35, linewidth=0.7)
-    mean = measure(episodes)["spl"]
+    mean = mean_interval(episodes.spl.to_numpy(), episodes.maze_index.to_numpy())
     axes.plot(x, mean.value, "o", color="black", markersize=3)
     axes.vlines(x, mean.low, mean.high, color="black", linewidth=0.9)
 
