@@ -14,7 +14,7 @@ from mazebench.errors import InputError
         (DQNConfig, {"colour": "red"}, "unknown config key 'colour'; available: channels"),
         (DQNConfig, {"hidden": "many"}, "config key 'hidden': expected int, found 'many'"),
         (DQNConfig, {"symmetries": "perhaps"}, "config key 'symmetries': expected bool"),
-        (DQNConfig, {"num_envs": "0"}, "config: expected num_envs of at least 1, found 0"),
+        (DQNConfig, {"num_envs": "0"}, "config: expected num_envs from 1 to 65536, found 0"),
         (DQNConfig, {"learning_rate": "nan"}, "config: expected learning_rate as a finite number, found nan"),
         (DQNConfig, {"replay_capacity": "1000"}, "expected a replay_capacity of at least min_rows 20000"),
         (MMNConfig, {"num_distances": "2"}, "unknown config key 'num_distances'"),

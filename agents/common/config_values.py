@@ -12,9 +12,16 @@ from annotated_types import Ge, Interval
 from mazebench.errors import InputError, unknown
 from mazebench.options import fields_of
 
-Count = Annotated[int, Ge(1)]
-FromOne = Annotated[float, Ge(1.0)]
-Factor = Annotated[float, Ge(0.0)]
+# What is larger than any of them is a slip of the hand.
+Size = Annotated[int, Interval(ge=1, le=4096)]  # numbers of a layer or of a code
+Count = Annotated[int, Interval(ge=1, le=65_536)]  # of what is computed or played side by side
+Steps = Annotated[int, Interval(ge=1, le=1_000_000)]  # of the environment
+Length = Annotated[int, Interval(ge=1, le=1000)]  # steps of a sequence, or of a return
+Rows = Annotated[int, Interval(ge=1, le=100_000_000)]  # of the replay
+Updates = Annotated[int, Interval(ge=1, le=1_000_000_000)]
+Factor = Annotated[float, Ge(0.0)]  # weights of losses, learning rates
+Exponent = Annotated[float, Interval(ge=0.0, le=10.0)]
+Ahead = Annotated[float, Interval(ge=1.0, le=1e6)]  # a number of steps that need not be whole
 Share = Annotated[float, Interval(ge=0.0, le=1.0)]
 
 Config = TypeVar("Config")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from annotated_types import Ge
+from annotated_types import Interval
 
 from mazebench.errors import InputError
 from mazebench.options import options
 
-from ..common.config_values import Count, Factor, FromOne, Share, check_rows
+from ..common.config_values import Ahead, Count, Factor, Length, Rows, Share, Size, Steps, Updates, check_rows
 
 
 @options
@@ -27,50 +27,50 @@ class MMNConfig:
     hypermodel: bool = True  # False, an ablation: the code of the context is an input of an ordinary transition
     rows: bool = True  # generates the first layer's weights of a position with convolutions, for each cell
     reading: bool = True  # the heads, the paper's g(s, c), read convolutions of the context at the estimated position
-    embedding: Count = 64  # numbers of the code of a context, from which the other weights are generated
-    task_code: Count = 64  # numbers of that code for the heads
-    latent: Count = 32  # numbers of a latent state that are learned
-    hidden: Count = 64  # units of encoder and transition; all weights of the transition are generated
-    head_hidden: Count = 256  # units of the two layers of policy and value
-    longest_value: Count = 100  # values lie in [-this, 0]; bounds the values of goals out of reach by a timeout
+    embedding: Size = 64  # numbers of the code of a context, from which the other weights are generated
+    task_code: Size = 64  # numbers of that code for the heads
+    latent: Size = 32  # numbers of a latent state that are learned
+    hidden: Size = 64  # units of encoder and transition; all weights of the transition are generated
+    head_hidden: Size = 256  # units of the two layers of policy and value
+    longest_value: Length = 100  # values lie in [-this, 0]; bounds the values of goals out of reach by a timeout
 
     # Search
-    num_simulations: Annotated[int, Ge(0)] = 8  # in training
-    num_eval_simulations: Annotated[int, Ge(0)] = 64  # in evaluation; search improves on the policy
+    num_simulations: Annotated[int, Interval(ge=0, le=1000)] = 8  # in training
+    num_eval_simulations: Annotated[int, Interval(ge=0, le=1000)] = 64  # in evaluation; search improves on the policy
     value_scale: Factor = 0.1  # Gumbel's c_scale: with maxvisit_init, values weigh one to two nats a step
     maxvisit_init: Factor = 10.0  # Gumbel's c_visit
 
     # Exploration: besides the noise in the choice of actions, environment i takes a random action at
     # base ** (1 + alpha i / (B - 1)).
     epsilon_base: Share = 0.4  # Ape-X's
-    epsilon_alpha: Factor = 7.0  # Ape-X's
+    epsilon_alpha: Annotated[float, Interval(ge=0.0, le=1000.0)] = 7.0  # Ape-X's
 
     # Experience
     num_envs: Count = 128  # side by side
-    num_goals: Count = 4  # per episode, without a reset between: beyond the paper, whose episodes end at the goal
-    replay_capacity: Count = 1_000_000  # rows of some 100 bytes
-    min_rows: Count = 20_000  # before learning begins
+    num_goals: Steps = 4  # per episode, without a reset between: beyond the paper, whose episodes end at the goal
+    replay_capacity: Rows = 1_000_000  # rows of some 100 bytes
+    min_rows: Rows = 20_000  # before learning begins
     hindsight_ratio: Share = 0.8  # HER's four relabelled samples for each original one
-    hindsight_mean_offset: FromOne = 24.0  # steps; about twelve cells of the path driven
-    hindsight_window: Count = 100  # steps; how far ahead a goal may lie, long enough for far ones
+    hindsight_mean_offset: Ahead = 24.0  # steps; about twelve cells of the path driven
+    hindsight_window: Steps = 100  # steps; how far ahead a goal may lie, long enough for far ones
     relabel_start: bool = False  # as in the paper
     symmetries: bool = True  # beyond the paper: rotations and mirror images as training data
 
     # Learning
     groups: Count = 32  # contexts in a batch; the hypermodel runs once for each
     sequences: Count = 3  # sequences for each context
-    sequence_steps: Count = 10  # of a sequence: unrolled from its first step and every `unroll` steps on, so twice
-    unroll: Count = 5  # steps of the model, K; as many as n_step
-    n_step: Count = 5  # of values, as in the paper
+    sequence_steps: Length = 10  # of a sequence: unrolled from its first step and every `unroll` steps on, so twice
+    unroll: Length = 5  # steps of the model, K; as many as n_step
+    n_step: Length = 5  # of values, as in the paper
     # Environment steps; fixed, so that scores do not depend on the speed of workers. An update is costly: time is
     # short, not experience.
-    steps_per_update: Count = 128
+    steps_per_update: Steps = 128
     learning_rate: Factor = 3e-3  # AdamW's
     # Times the learning rate, for the weights of the layer that generates weights: a step of Adam moves each generated
     # weight by the L1 norm of the code.
     hyper_rate: Factor = 0.1
     scale_rate: Factor = 2.0  # times the learning rate, for the map's scale
-    constant_updates: Count = 2500  # before the learning rate falls, as one over the number of updates
+    constant_updates: Updates = 2500  # before the learning rate falls, as one over the number of updates
     weight_decay: Factor = 1e-4  # AdamW's
     max_gradient_norm: Factor = 10.0  # against the steep slopes while values are still far off
     target_rate: Share = 0.01  # of the target network's moving average
