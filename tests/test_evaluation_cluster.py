@@ -80,5 +80,5 @@ def test_a_lost_task_is_run_again(folder, tmp_path):
 
 
 def test_an_agents_error_is_one_line(folder):
-    with pytest.raises(RunError, match=r"^agent 'cluster_at_hand:Wrong': expected act\(\) to return integer act"):
+    with pytest.raises(RunError, match=r"^agent 'cluster_at_hand:Wrong': expected 10 integer actions from act\(\), "):
         evaluate("cluster_at_hand:Wrong", workers=1, ray_address="local", **FEW)
