@@ -106,12 +106,12 @@ for action in (0, 0, 2, 2, 4, 0, 0):
     def test_sb3_tracks(self, tmp_path, agent, options):
         needs("stable_baselines3", "sb3_contrib")
         output = run(EXAMPLES / "sb3_tracks.py", *PPO_BUDGET, *options, folder=tmp_path)
-        assert output.startswith("context: [4, 13, 13]\nlidar: [32]\nstate: [12]\n")
+        assert output.startswith("context: [4, 31, 31]\nlidar: [32]\nstate: [12]\n")
         # The policy is an agent, also where contexts are larger than those that it was trained on.
         shutil.copy(EXAMPLES / "sb3_agent.py", tmp_path)
         which = ("--agent", f"sb3_agent:{agent}", "--checkpoint", "ppo.zip", "--distances", "15")
         run("-m", "mazebench", "eval", *which, "--track", "rough", "--out", "results", folder=tmp_path)
-        assert json.loads((tmp_path / "results" / "summary.json").read_text())["episodes"] == 11
+        assert json.loads((tmp_path / "results" / "summary.json").read_text())["episodes"] == 10
         check = (
             "from mazebench.agent import Interface\n"
             "from mazebench.testing import check_agent\n"
