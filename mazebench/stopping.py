@@ -61,7 +61,7 @@ def check() -> None:
 
 @contextlib.contextmanager
 def stoppable(how_to_go_on: Callable[[], tuple[str, ...]], waits: bool = False) -> Iterator[None]:
-    """Ends the command with one line if a signal stops the block.
+    """Ends the command with one line if a signal stops the block, also where something else fails because of it.
 
     Args:
       how_to_go_on: returns what is kept, in words, and the options with which the same command goes on.
@@ -71,8 +71,9 @@ def stoppable(how_to_go_on: Callable[[], tuple[str, ...]], waits: bool = False) 
     before, _waits = _waits, waits
     try:
         yield
-    except Stopped:
-        assert _asked is not None
+    except (Stopped, Exception):
+        if _asked is None:
+            raise
         kept, *options = how_to_go_on()
         words = ["mazebench", *sys.argv[1:], *(option for option in options if option not in sys.argv)]
         event = "interrupted" if _asked == signal.SIGINT else "terminated"
