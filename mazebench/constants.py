@@ -8,6 +8,7 @@ BENCHMARK_SIZES = (13, 15, 17, 19, 21)  # cells on a side of benchmark v1's maze
 # The version of what an episode is. Gymnasium's ids end with it, and docs/release.md says when it grows.
 TASK_VERSION = 1
 TRACKS_VERSION = 3  # of the tracks
+TRACK_NAMES = ("building", "rebuilt", "adrift", "rough")
 
 ON_TIME = (1.25, 2)  # an episode is on time if it takes at most so many times the oracle's steps
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import sys
 import warnings
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
@@ -37,11 +36,8 @@ class Remark(UserWarning):
 
 
 def remark(line: str) -> None:
-    """Warns of something with a `Remark`, at the line of the user's code that led here."""
-    frame, level = sys._getframe(1), 2
-    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in ("mazebench", "mazebench_agents"):
-        frame, level = frame.f_back, level + 1
-    warnings.warn(line, Remark, stacklevel=level)
+    """Warns of something with a `Remark`."""
+    warnings.warn(line, Remark, stacklevel=2)
 
 
 @contextlib.contextmanager

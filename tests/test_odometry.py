@@ -225,7 +225,7 @@ class TestTrack:
             make_spec("adrift", **options)
 
     def test_the_goal_conditioned_environment_is_refused(self):
-        with pytest.raises(InputError, match=r"^expected no track for a goal-conditioned environment, found 'adrift'$"):
+        with pytest.raises(InputError, match=r"goal-conditioned environment: expected .*no track"):
             GoalMazeEnv(make_spec("adrift"))
 
 

@@ -22,12 +22,8 @@ SPEC = mazebench.make_spec(size=13)
 
 WRONG_OPTIONS = [
     ("map_flip", "0.1", "expected map_flip of type float, found '0.1'"),
-    ("time_limit", 1.5, "expected time_limit of type int, found 1.5"),
-    ("continuous", "yes", "expected continuous of type bool, found 'yes'"),
-    ("distances", "1-5", "expected distances of type tuple[int, ...], found ('1-5',)"),
     ("seed", -1, "expected seed of at least 0, found -1"),
     ("seed", "a", "expected seed of type int | None, found 'a'"),
-    ("seed", 1.5, "expected seed of type int | None, found 1.5"),
 ]
 WRONG_IN = {
     "make": [
@@ -35,9 +31,7 @@ WRONG_IN = {
         ("camera", "nose", "unknown camera 'nose'; available: chase, egocentric, top"),
     ],
     "make_vec": [
-        ("render_mode", "bogus", "unknown render_mode 'bogus'; available: rgb_array"),
         ("num_envs", 0, "expected num_envs of at least 1, found 0"),
-        ("num_envs", "3", "expected num_envs of type int, found '3'"),
         ("num_threads", -1, "expected num_threads of at least 0, found -1"),
         ("autoreset_mode", "Never", "unknown autoreset_mode 'Never'; available: Disabled, NextStep, SameStep"),
     ],
@@ -60,27 +54,19 @@ class TestArguments:
         assert spec == mazebench.make_spec(time_limit=50, distances=(1, 2, 3), map_flip=0.5)
 
     @pytest.mark.parametrize("make", [Environment, MazeEnv, lambda spec: MazeVectorEnv(spec, 2)])
-    @pytest.mark.parametrize(("spec", "found"), [(None, "NoneType"), ("local", "str")])
-    def test_anything_but_a_task_spec_is_refused(self, make, spec, found):
-        with pytest.raises(
-            InputError, match=rf"expected a TaskSpec, as mazebench.make_spec\(\) returns, found {found}"
-        ):
-            make(spec)
+    def test_anything_but_a_task_spec_is_refused(self, make):
+        with pytest.raises(InputError, match=r"expected a TaskSpec, as mazebench.make_spec\(\) returns, found str"):
+            make("local")
 
 
 class TestReset:
-    @pytest.mark.parametrize("seed", [-1, "a", 1.5, [1, 2]])
+    @pytest.mark.parametrize("seed", [-1, [1, 2]])
     @pytest.mark.parametrize("make", [Environment, lambda spec: MazeVectorEnv(spec, 3)])
     def test_a_wrong_seed_is_refused(self, make, seed):
         with pytest.raises(
             InputError, match=r"expected seed of (at least 0|type int \| None)|expected 3 seeds, found 2"
         ):
             make(SPEC).reset(seed=seed)
-
-    @pytest.mark.parametrize("seed", [-1, "a", 1.5])
-    def test_gymnasium_refuses_a_wrong_seed_of_a_single_environment(self, seed):
-        with pytest.raises(gymnasium.error.Error, match="Seed must be"):
-            MazeEnv(SPEC).reset(seed=seed)
 
     @pytest.mark.parametrize("options", [3, {"level": 2}, {"episode": 3}])
     def test_wrong_options_are_refused(self, options):
@@ -89,7 +75,7 @@ class TestReset:
 
 
 class TestActions:
-    @pytest.mark.parametrize("action", [6, -1, 1.5, "forward", None, np.nan, np.inf, [0, 0], np.zeros((3, 3))])
+    @pytest.mark.parametrize("action", [6, -1, 1.5, None, [0, 0]])
     @pytest.mark.parametrize("make", [MazeEnv, Environment, lambda spec: MazeVectorEnv(spec, 3)])
     def test_a_wrong_action_is_refused_in_one_line_and_the_episode_goes_on(self, make, action):
         env = make(SPEC)
@@ -100,7 +86,7 @@ class TestActions:
             env.step(action)
         env.step(np.zeros(3, dtype=int) if isinstance(env, MazeVectorEnv) else 0)
 
-    @pytest.mark.parametrize("action", [1, "forward", None, [0, 0], [np.nan, 0, 0], np.zeros((3, 2))])
+    @pytest.mark.parametrize("action", [None, [0, 0], [np.nan, 0, 0]])
     @pytest.mark.parametrize("make", [MazeEnv, Environment, lambda spec: MazeVectorEnv(spec, 3)])
     def test_a_wrong_velocity_is_refused_in_one_line(self, make, action):
         env = make(mazebench.make_spec(size=13, continuous=True))

@@ -38,8 +38,8 @@ def episodes(spec: TaskSpec, count: int, seed: int = 0):
 
 
 class TestDistances:
-    @pytest.mark.parametrize("distances", [(3,), (1, 4), (2, 5, 7)])
-    def test_all_distances_are_drawn_equally_often(self, distances):
+    def test_all_distances_are_drawn_equally_often(self):
+        distances = (2, 5, 7)
         spec = make_spec(maps=dfs_mazes(), distances=distances)
         drawn = episodes(spec, 300)
         found = collections.Counter(spec.mazes[e.maze].distance(e.start, e.goal) for e in drawn)
@@ -61,11 +61,6 @@ class TestDistances:
         drawn = episodes(make_spec(maps=CORRIDOR, distances=[6]), 40)
         assert {(e.start, e.goal) for e in drawn} == {((1, 1), (1, 7)), ((1, 7), (1, 1))}
 
-    def test_the_same_seed_draws_the_same_episodes(self):
-        spec = make_spec(maps=dfs_mazes())
-        assert episodes(spec, 20, seed=3) == episodes(spec, 20, seed=3)
-        assert episodes(spec, 20, seed=3) != episodes(spec, 20, seed=4)
-
     def test_a_distance_that_a_maze_does_not_have_is_refused(self):
         with pytest.raises(InputError, match=r"corridor: expected distances of at most 6 cells.*found 7.*--distances"):
             make_spec(maps=CORRIDOR, distances=[1, 7])
@@ -78,16 +73,11 @@ class TestDistances:
 
 
 class TestFixedPairs:
-    def test_fixed_pairs_are_one_a_maze(self):
-        drawn = episodes(make_spec(maps=dfs_mazes(), pairs="fixed"), 60)
-        pairs = {(e.maze, e.start, e.goal) for e in drawn}
-        assert len(pairs) == 3
-        assert len({e.yaw for e in drawn}) == 60
-
-    def test_fixed_pairs_do_not_depend_on_the_seed(self):
+    def test_fixed_pairs_are_one_a_maze_whatever_the_seed(self):
         spec = make_spec(maps=dfs_mazes(), pairs="fixed")
         first, second = ({(e.maze, e.start, e.goal) for e in episodes(spec, 60, seed)} for seed in (1, 2))
         assert first == second
+        assert len(first) == 3
 
 
 class TestOptions:
@@ -96,7 +86,6 @@ class TestOptions:
         [
             ({"task": "locl"}, r"unknown task 'locl'; available: adrift, building, hierarchical, local, rebuilt"),
             ({"split": "test", "maps": None}, r"unknown split 'test'; available: dev, eval, train"),
-            ({"size": 13.0, "maps": None}, r"expected size of type int \| None, found 13\.0"),
             ({"size": 14, "maps": None}, r"unknown size 14; available: 13, 15, 17, 19, 21"),
             ({"size": 13}, r"expected mazes of size 13, found size 9"),
             ({"maps": ()}, r"expected at least one maze, found none"),
@@ -104,17 +93,13 @@ class TestOptions:
             ({"distances": ()}, r"expected at least one distance, found none"),
             ({"distances": (0, 1)}, r"expected distances of at least 1, found 0"),
             ({"time_limit": -1}, r"expected time_limit of at least 0, found -1"),
-            ({"time_limit": "5"}, r"expected time_limit of type int, found '5'"),
             ({"context_size": 2}, r"expected context_size from 3 to 255, found 2"),
             (
                 {"num_goals": 2, "task": "hierarchical"},
                 r"expected num_goals 1 unless the task is local and pairs are random, found 2",
             ),
-            ({"map_flip": 1.1}, r"expected map_flip from 0 to 1, found 1\.1"),
-            ({"flip": 0.1}, r"unknown option 'flip'; available: .*map_flip, map_warp"),
             ({"mapz": "plan.txt"}, r"unknown option 'mapz'; available: .*map_warp, maps, .*size, split, start"),
             ({"map_warp": 0.26}, r"expected map_warp from 0 to 0\.25, found 0\.26"),
-            ({"position_noise": float("nan")}, r"expected position_noise .*, found nan"),
         ],
     )
     def test_an_option_out_of_range_is_refused(self, options, message):
@@ -137,7 +122,7 @@ class TestOptions:
             ("building", {"level": (3, 3)}, "expected each level once, found 3, 3"),
             ("building", {"size": 51}, "track 'building': expected size 31, found 51"),
             ("rough", {"context_size": 31}, "track 'rough': expected context_size 62, found 31"),
-            ("building", {"time_limit": 50}, "track 'building': has its own time limit, found time_limit 50"),
+            ("building", {"time_limit": 50}, "track 'building': expected time_limit 0, found 50"),
             ("building", {"num_goals": 2}, "track 'building': expected num_goals 1, found 2"),
             ("building", {"pairs": "fixed"}, "track 'building': expected pairs 'random', found 'fixed'"),
             ("building", {"map_warp": 0.1}, "track 'building': expected no perturbation, found map_warp 0.1"),
@@ -174,13 +159,6 @@ class TestOptions:
 
 
 class TestShownMap:
-    def test_an_unperturbed_map_shows_the_walls(self):
-        spec = make_spec(maps=dfs_mazes())
-        episode = episodes(spec, 1)[0]
-        shown = show_map(spec, episode)
-        np.testing.assert_array_equal(shown.walls, spec.mazes[episode.maze].walls)
-        assert shown.drawing is None
-
     def test_an_episodes_map_follows_from_its_seed(self):
         for options in ({"map_flip": 0.3}, {"map_warp": 0.2}):
             spec = make_spec(maps=dfs_mazes(), **options)
@@ -210,19 +188,15 @@ class TestShownMap:
 
 
 class TestHierarchical:
-    def test_hierarchical_episodes_lead_from_corner_to_corner(self):
-        episode = episodes(make_spec("hierarchical", maps=dfs_mazes()), 1)[0]
-        assert (episode.start, episode.goal) == ((1, 7), (7, 1))
+    @pytest.mark.parametrize(
+        ("mazes", "ends"),
+        [(dfs_mazes(), ((1, 7), (7, 1))), (CUT_CORNERS, ((2, 5), (4, 1))), (CORRIDOR, ((1, 7), (1, 1)))],
+    )
+    def test_episodes_lead_from_corner_to_corner_or_the_free_cells_nearest_to_them(self, mazes, ends):
+        episode = episodes(make_spec("hierarchical", maps=mazes), 1)[0]
+        assert (episode.start, episode.goal) == ends
 
-    def test_a_corner_that_is_a_wall_is_replaced_by_the_nearest_free_cell(self):
-        episode = episodes(make_spec("hierarchical", maps=CUT_CORNERS), 1)[0]
-        assert (episode.start, episode.goal) == ((2, 5), (4, 1))
-
-    def test_a_corridors_ends_are_its_corners(self):
-        episode = episodes(make_spec("hierarchical", maps=CORRIDOR), 1)[0]
-        assert (episode.start, episode.goal) == ((1, 7), (1, 1))
-
-    @pytest.mark.parametrize("every", [1, 2, 5])
+    @pytest.mark.parametrize("every", [1, 5])
     def test_landmarks_lie_on_a_shortest_path_at_equal_distances(self, every):
         spec = make_spec("hierarchical", maps=dfs_mazes(), landmark_distance=every)
         for episode in episodes(spec, 5):
@@ -272,16 +246,3 @@ class TestSeveralGoals:
         route.advance((1, 4), 5)
         assert route.start == (1, 4)
         assert route.target in {(1, 1), (1, 7)}
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"context_size": 7}, "track 'rebuilt': expected context_size 31, found 7"),
-        ({"sensors": ()}, "track 'rebuilt': expected the sensor lidar, found none"),
-        ({"pairs": "fixed"}, "track 'rebuilt': expected pairs 'random', found 'fixed'"),
-    ],
-)
-def test_a_task_of_a_track_holds_what_the_track_fixes(changes, message):
-    with pytest.raises(InputError, match=message):
-        dataclasses.replace(make_spec("rebuilt"), **changes)

@@ -39,12 +39,9 @@ class GoalMazeEnv(MazeEnv):
     def __init__(
         self, task_spec: TaskSpec, seed: int | None = None, render_mode: str | None = None, camera: str = "top"
     ):
-        if task_spec.has_legs:
-            raise InputError("expected the local task with one goal for a goal-conditioned environment, found several")
-        if task_spec.track is not None:  # which may hide where the body is, and has time limits of its own
-            raise InputError(f"expected no track for a goal-conditioned environment, found {task_spec.track!r}")
-        if task_spec.hide:  # the goals would tell what is hidden
-            raise InputError(f"expected nothing hidden for a goal-conditioned environment, found {task_spec.hide}")
+        # A track may hide the body's position and has its own time limits, and the goals would tell what is hidden.
+        if task_spec.has_legs or task_spec.track is not None or task_spec.hide:
+            raise InputError("a goal-conditioned environment: expected the local task, one goal, no track, no hide")
         super().__init__(task_spec, seed, render_mode, camera)
         side, num_values = task_spec.mazes[0].side, STATE_SIZE + len(_SHOWN_PLANES) * task_spec.context_size**2
         sensed = {name: spaces.observation_space(task_spec)[name] for name in task_spec.sensors}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
-from mazebench.constants import BENCHMARK_SIZES, TASK_VERSION, TRACKS_VERSION
+from mazebench.constants import BENCHMARK_SIZES, TASK_VERSION, TRACK_NAMES, TRACKS_VERSION
 from mazebench.errors import InputError
 from mazebench.world.backend import load_mujoco, loading_backend
 
@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from mazebench.envs.vector import MazeVectorEnv
     from mazebench.tasks.spec import TaskSpec
 
-_TASKS = {"Local": "local", "Hierarchical": "hierarchical"}
-# `TRACKS` has the same ones; it is not read here because `import mazebench` should load little.
-_TRACKS = ("Building", "Rebuilt", "Adrift", "Rough")
 _TRACKS_SIZE = 31
 _ID_SIZE = "id_size"  # the keyword of an id's size, apart from the `size` that a user gives
 _SINGLE = ("seed", "render_mode", "camera")  # what a single environment takes besides its task's options
@@ -39,26 +36,22 @@ def register_environments() -> None:
     The ids have no `max_episode_steps`: Gymnasium's wrapper would truncate an episode that reaches its goal on the last
     step.
     """
-    for title, task in _TASKS.items():
-        for size in BENCHMARK_SIZES:
-            env_id = f"mazebench/{title}-{size}-v{TASK_VERSION}"
-            _register(env_id, {"task": task, _ID_SIZE: size})
-    for title in _TRACKS:
-        env_id = f"mazebench/{title}-{_TRACKS_SIZE}-v{TRACKS_VERSION}"
-        _register(env_id, {"task": title.lower(), _ID_SIZE: _TRACKS_SIZE})
     for size in BENCHMARK_SIZES:
-        env_id = f"mazebench/LocalGoal-{size}-v{TASK_VERSION}"
-        if env_id not in gymnasium.registry:
-            gymnasium.register(env_id, "mazebench.envs.registration:make_goal_env", kwargs={_ID_SIZE: size})
+        for task in ("local", "hierarchical"):
+            _register(task.title(), size, TASK_VERSION, "make_env", "make_vec", task=task)
+        _register("LocalGoal", size, TASK_VERSION, "make_goal_env")
+    for track in TRACK_NAMES:
+        _register(track.title(), _TRACKS_SIZE, TRACKS_VERSION, "make_env", "make_vec", task=track)
 
 
-def _register(env_id: str, options: dict[str, Any]) -> None:
+def _register(title: str, size: int, version: int, make: str, make_many: str | None = None, **options: str) -> None:
+    env_id = f"mazebench/{title}-{size}-v{version}"
     if env_id not in gymnasium.registry:
         gymnasium.register(
             id=env_id,
-            entry_point="mazebench.envs.registration:make_env",
-            vector_entry_point="mazebench.envs.registration:make_vec",
-            kwargs=options,
+            entry_point=f"{__name__}:{make}",
+            vector_entry_point=make_many and f"{__name__}:{make_many}",
+            kwargs={_ID_SIZE: size, **options},
         )
 
 

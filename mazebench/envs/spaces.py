@@ -25,7 +25,7 @@ def _box(array: specs.Array) -> spaces.Box:
 
 
 def action_space(spec: TaskSpec) -> spaces.Discrete | spaces.Box:
-    """Returns the space of the six actions, in the order of `mazebench.world.mjcf.ACTIONS`, or of velocities."""
+    """Returns the space of the six actions, in the order of `mazebench.constants.ACTIONS`, or of velocities."""
     if spec.continuous:
         return spaces.Box(-1.0, 1.0, (VELOCITY_SIZE,), np.float32)
     return spaces.Discrete(len(ACTIONS))

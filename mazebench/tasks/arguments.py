@@ -5,18 +5,11 @@ from __future__ import annotations
 from typing import Annotated
 
 from annotated_types import Ge
-from pydantic import BeforeValidator
 
 from mazebench.errors import InputError
 from mazebench.options import OneOf, options
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.rendering import CAMERAS
-
-
-def _refuse_window(render_mode: object) -> object:
-    if render_mode == "human":
-        raise InputError("expected render_mode 'rgb_array', found 'human'; `mazebench play` opens a window")
-    return render_mode
 
 
 @options
@@ -28,7 +21,7 @@ class Arguments:
     """
 
     seed: Annotated[int | None, Ge(0)] = None  # of the first reset
-    render_mode: Annotated[str | None, BeforeValidator(_refuse_window), OneOf("rgb_array")] = None  # of `render`
+    render_mode: Annotated[str | None, OneOf("rgb_array")] = None  # of `render`
     camera: Annotated[str, OneOf(*CAMERAS)] = "top"  # whose pictures `render` returns
     num_envs: Annotated[int, Ge(1)] = 1  # environments side by side
     num_threads: Annotated[int, Ge(0)] = 0  # of the simulation; 0 uses all cores

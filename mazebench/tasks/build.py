@@ -101,8 +101,7 @@ def build_task(
     variants = variants or Variants()
     chosen = load_task_mazes(task, mazes)
     fits_mazes = is_own(task, mazes)
-    if fits_mazes:
-        check_mazes(task, chosen)
+    check_mazes(task, chosen)
 
     # Distances: the given ones, else those that fit the mazes.
     if task.ends_given == 2 and task.distances:

@@ -13,7 +13,7 @@ from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.drawn import FreshMazes, Mazes
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.spec import TaskSpec, check_mazes
 from mazebench.tasks.trials import draw_trials
 
 _SEED = 20_000  # of mazes that are drawn like the benchmark's, and in none of its splits
@@ -77,7 +77,7 @@ def _draw_maze(task: TaskSpec, kind: str, name: str, stream: np.random.SeedSeque
     for draw in range(_MAX_DRAWS):
         maze = generate(kind, task.size, rng, name)
         try:
-            dataclasses.replace(task, mazes=(maze,))
+            check_mazes(dataclasses.replace(task, mazes=(maze,)), (maze,))
         except InputError:
             if draw == _MAX_DRAWS - 1:
                 raise

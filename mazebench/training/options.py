@@ -53,8 +53,6 @@ class TrainOptions:
             value, default = values[name], declared[name].default
             if value != default:
                 raise InputError(f"expected {name} {default!r} in a training, found {value!r}")
-        if not isinstance(self.mazes.maps, str | None):
-            raise InputError(f"expected maps as a path in a training, found {type(self.mazes.maps).__name__}")
         if self.minutes is None and self.env_steps is None:
             raise InputError("expected --minutes or --env-steps, found neither")
         if self.ray_address is not None and not self.workers:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from mazebench.constants import TRACK_NAMES
 from mazebench.tasks.tracks.adrift import Adrift
 from mazebench.tasks.tracks.base import Track
 from mazebench.tasks.tracks.building import Building
 from mazebench.tasks.tracks.rebuilt import Rebuilt
 from mazebench.tasks.tracks.rough import Rough
 
-TRACKS: dict[str, Track] = {"building": Building(), "rebuilt": Rebuilt(), "adrift": Adrift(), "rough": Rough()}
+TRACKS: dict[str, Track] = dict(zip(TRACK_NAMES, (Building(), Rebuilt(), Adrift(), Rough()), strict=True))
