@@ -1,1 +1,1 @@
-"""Readers of other people's maps: pictures, photographs, line drawings, arrays, ROS maps."""
+"""Readers of other people's maps: pictures, line drawings, arrays, ROS maps."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from mazebench.maps.maze import MAX_SIZE
 
-# Of a cell: logarithm of width by height. Perspective makes 0.1 or 0.2 of it, the same for all multiples of a grid.
+# Of a cell: logarithm of width by height. A stretched picture has the same for all multiples of a grid.
 _MAX_STRETCH, _SAME_STRETCH = 0.3, 0.02
 CORE = 0.5  # share of a cell's side: the middle of a cell, which decides whether it is wall
 

@@ -1,4 +1,4 @@
-"""Mazes in pictures: drawings of this package, pixel maps, photographs.
+"""Mazes in pictures: drawings of this package, pixel maps, plans.
 
 `H` and `W` are the numbers of rows and columns of a picture, `N` of cells along a side of the maze. Row 0 is on top.
 """
@@ -15,17 +15,17 @@ from mazebench.maps.file_kinds import kind_of
 from mazebench.maps.grids import square_maze
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, Maze, MazeError
 from mazebench.maps.pictures import MAX_SIDE
+from mazebench.maps.readers.filled_plan import MIN_SIDE, read_plan
 from mazebench.maps.readers.line_drawing import read_lines
-from mazebench.maps.readers.photograph import MIN_SIDE, read_plan
 from mazebench.storage.files import read_at_most
 
 _MAX_BYTES = 2**27  # of a picture's file; _MAX_PIXELS gray pixels take half of it
-_MAX_PIXELS = MAX_SIDE**2  # of a picture that is read: every drawing, and more than the 50 megapixels of a telephone
+_MAX_PIXELS = MAX_SIDE**2  # of a picture that is read: every drawing of this package
 _PNG_START = b"\x89PNG\r\n\x1a\n"
 _MIN_DARK = 0.3  # share of the pixels of a picture of light walls on a dark ground
 _MARK_SATURATION = 90  # of 255, between the strongest and the weakest channel of a mark
 _MAX_MARK_SHARE = 0.15  # of the picture, and of its dark pixels; if more are coloured, the paper or the walls are
-_MAX_MAP_SHADES = 8  # of a map of one pixel a cell: walls, floor, marks; a photograph has more
+_MAX_MAP_SHADES = 8  # of a map of one pixel a cell: walls, floor, marks; a scan has more
 
 
 def read_image_maze(path: str | pathlib.Path, size: int | None = None, walls: str = "filled") -> Maze:
@@ -63,9 +63,8 @@ def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maz
     is not square is padded with wall, see `square_maze`. Marks in colour on a plan with gray walls are floor.
 
     * A pixel map, in which each cell is a block of k x k pixels, k >= 1. It is read exactly.
-    * A scan or photograph of a drawn or printed plan, on paper or cut out along its outer walls. It may be turned by
-      less than 45 degrees, in perspective and unevenly lit. The outer walls must form a closed rectangle, the cells a
-      regular grid.
+    * A drawn, printed or scanned plan, on paper or cut out along its outer walls. The outer walls must form a closed,
+      upright rectangle, the cells a regular grid. A photograph must be cropped, straightened and thresholded first.
 
     With `walls="lines"`, a plan of R x C rooms is read whose walls are lines between the rooms. It becomes a maze of
     2 R + 1 by 2 C + 1 cells. Light walls on dark paper are refused.
@@ -78,7 +77,7 @@ def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maz
 
     Raises:
       InputError: if `size` is out of range.
-      MazeError: if no legal maze is found. Nothing is repaired, except that the outer cells of a photographed plan are
+      MazeError: if no legal maze is found. Nothing is repaired, except that the outer cells of a plan on paper are
         always walls.
     """
     if size is not None and not MIN_SIZE <= size <= MAX_SIZE:
@@ -98,7 +97,7 @@ def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maz
 
 def _decode(content: bytes) -> np.ndarray | None:
     """Returns the picture in a file's bytes, as `maze_from_image` takes it; None if OpenCV can't decode it."""
-    # Only PNG may have opacity. A photograph is turned as its camera was held, which IMREAD_UNCHANGED would not do.
+    # Only PNG may have opacity. A JPEG is turned as its camera was held, which IMREAD_UNCHANGED would not do.
     flags = cv2.IMREAD_UNCHANGED if content.startswith(_PNG_START) else cv2.IMREAD_COLOR
     log_level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:

@@ -11,7 +11,7 @@ import numpy as np
 from mazebench.maps.maze import MAX_SIZE, MazeError
 from mazebench.maps.options import THIN_WALLS
 from mazebench.maps.readers.cell_grid import CORE, core_bounds, fit_grid
-from mazebench.maps.readers.drawing import WORKING_SIDE, deskew, flatten, frames, ink_of
+from mazebench.maps.readers.drawing import STRAIGHTEN, WORKING_SIDE, enlarged, ink_of, on_white, outer_walls
 
 _NEARLY_BEST = 0.9  # share of the best fit
 _MIN_CLARITY = 0.2  # between the share of a boundary that is line, and a half
@@ -31,50 +31,51 @@ def read_lines(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
     Raises:
       MazeError: if no such plan is found.
     """
-    # The ink, with the gaps in the outer line closed.
-    scale = WORKING_SIDE / max(gray.shape)  # thin lines are lost at smaller sizes
-    paper, _ = flatten(cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA))
+    problem = MazeError(
+        f"{name}: expected rooms in an upright square grid with lines as walls between them, found none; "
+        f"{STRAIGHTEN}; {THIN_WALLS}"
+    )
+
+    # The ink, with the gaps in the outer line closed. Thin lines are lost at smaller sizes.
+    paper = cv2.medianBlur(on_white(gray, WORKING_SIDE), 3)
     reach = max(paper.shape) // 4 | 1  # wider than a gap in the outer line
     filled = cv2.copyMakeBorder(ink_of(paper), *(reach,) * 4, cv2.BORDER_CONSTANT, value=0)
     filled = cv2.morphologyEx(filled, cv2.MORPH_CLOSE, np.ones((reach, reach), np.uint8))[reach:-reach, reach:-reach]
 
-    for corners in frames(filled):
-        # The lines, from the middle of the outer line on.
-        lines = ink_of(deskew(paper, corners)) > 0
-        if lines.mean() > 0.5:
-            break
-        depths = cv2.distanceTransform(lines.astype(np.uint8), cv2.DIST_L2, 5)
-        edge = round(float(np.percentile(depths[lines], 90)))  # half the width of a line
-        lines = lines[edge : len(lines) - edge, edge : lines.shape[1] - edge]
+    # The lines, from the middle of the outer line on.
+    crop = outer_walls(filled)
+    if crop is None:
+        raise problem
+    lines = ink_of(enlarged(paper[crop])) > 0
+    if lines.mean() > 0.5:
+        raise problem
+    depths = cv2.distanceTransform(lines.astype(np.uint8), cv2.DIST_L2, 5)
+    edge = round(float(np.percentile(depths[lines], 90)))  # half the width of a line
+    lines = lines[edge : len(lines) - edge, edge : lines.shape[1] - edge]
 
-        # The grid of rooms, and how much of the boundaries to the right and below each room is line.
-        shape, _ = fit_grid(
-            lines.mean(axis=1),
-            lines.mean(axis=0),
-            pixels=lines.shape,
-            shortest=2,
-            longest=(2, (MAX_SIZE - 1) // 2),
-            size=None if size is None else (size - 1) // 2,
-            nearly_best=_NEARLY_BEST,
-        )
-        right, below = _line_shares(lines, shape), _line_shares(lines.T, shape[::-1]).T
-        shares = np.concatenate([right.ravel(), below.ravel()])
-        if np.abs(shares - 0.5).min() < _MIN_CLARITY:
-            break
-
-        # Rooms are free, boundaries wall where a line is, corners wall where a boundary next to them is.
-        rows, columns = shape
-        walls = np.ones((2 * rows + 1, 2 * columns + 1), dtype=bool)
-        walls[1::2, 1::2] = False
-        walls[1::2, 2:-1:2] = right > 0.5
-        walls[2:-1:2, 1::2] = below > 0.5
-        walls[2:-1:2, 2:-1:2] = (
-            walls[1:-2:2, 2:-1:2] | walls[3::2, 2:-1:2] | walls[2:-1:2, 1:-2:2] | walls[2:-1:2, 3::2]
-        )
-        return walls
-    raise MazeError(
-        f"{name}: expected rooms in a square grid with lines as walls between them, found none; {THIN_WALLS}"
+    # The grid of rooms, and how much of the boundaries to the right and below each room is line.
+    shape, _ = fit_grid(
+        lines.mean(axis=1),
+        lines.mean(axis=0),
+        pixels=lines.shape,
+        shortest=2,
+        longest=(2, (MAX_SIZE - 1) // 2),
+        size=None if size is None else (size - 1) // 2,
+        nearly_best=_NEARLY_BEST,
     )
+    right, below = _line_shares(lines, shape), _line_shares(lines.T, shape[::-1]).T
+    shares = np.concatenate([right.ravel(), below.ravel()])
+    if np.abs(shares - 0.5).min() < _MIN_CLARITY:
+        raise problem
+
+    # Rooms are free, boundaries wall where a line is, corners wall where a boundary next to them is.
+    rows, columns = shape
+    walls = np.ones((2 * rows + 1, 2 * columns + 1), dtype=bool)
+    walls[1::2, 1::2] = False
+    walls[1::2, 2:-1:2] = right > 0.5
+    walls[2:-1:2, 1::2] = below > 0.5
+    walls[2:-1:2, 2:-1:2] = walls[1:-2:2, 2:-1:2] | walls[3::2, 2:-1:2] | walls[2:-1:2, 1:-2:2] | walls[2:-1:2, 3::2]
+    return walls
 
 
 def _line_shares(lines: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

@@ -1,7 +1,7 @@
-"""The maze in a scan or photograph of a plan whose walls are filled.
+"""The maze in a picture of a plan whose walls are filled.
 
-The drawing is found, and its cells are counted by the edges of its walls. `R` and `C` are the numbers of rows and
-columns of cells, `H` and `W` of pixels.
+The drawing is cut out along its outer walls, and its cells are counted by the edges of its walls. `R` and `C` are the
+numbers of rows and columns of cells, `H` and `W` of pixels.
 """
 
 from __future__ import annotations
@@ -10,13 +10,20 @@ import cv2
 import numpy as np
 
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, MazeError, require_connected
-from mazebench.maps.options import THIN_WALLS
 from mazebench.maps.readers.cell_grid import core_bounds, fit_grid
-from mazebench.maps.readers.drawing import dark_and_light, deskew, flatten, frames, ink_of
+from mazebench.maps.readers.drawing import (
+    READ_LINES,
+    STRAIGHTEN,
+    WORKING_SIDE,
+    dark_and_light,
+    enlarged,
+    ink_of,
+    on_white,
+    outer_walls,
+)
 
-_READ_LINES = f"read them with --walls lines; {THIN_WALLS}"
 MIN_SIDE = 3  # cells on the shorter side of a plan: wall, floor, wall
-# On synthetic photographs of 13 and 21 cells the true N had a fit of 0.6 to 0.95, any other N at most 0.39.
+# In synthetic pictures of 13 and 21 cells the true N had a fit of 0.6 to 0.95, any other N at most 0.39.
 _MIN_FIT = 0.4
 _NEARLY_BEST = 0.97  # share of the best fit
 _MIN_INK = 0.25  # share of a plan with filled walls; line drawings have less
@@ -27,7 +34,7 @@ _MIN_CLARITY = 0.1  # share of the contrast, between a core's shade and the midd
 
 
 def read_plan(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
-    """Returns the walls, `[R, C]` bool, that `gray` (`[H, W]` uint8, dark is wall) shows.
+    """Returns the walls, `[R, C]` bool, that `gray` (`[H, W]` uint8, dark is wall) shows. The outermost are walls.
 
     Args:
       gray: the picture.
@@ -37,27 +44,21 @@ def read_plan(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
     Raises:
       MazeError: if no legal maze is found.
     """
-    paper, fine = flatten(gray)
+    # The drawing without noise, and as it is.
+    fine = on_white(gray, min(WORKING_SIDE, max(gray.shape)))
+    paper = cv2.medianBlur(fine, 3)
     dark, light = dark_and_light(paper)
     if light - dark < _MIN_CONTRAST or gray.min() == gray.max():
         raise MazeError(f"{name}: expected dark walls on light paper, found a page of one shade")
     ink = ink_of(paper)
-    problem = (
-        f"{name}: expected a drawing whose dark outer walls form a closed rectangle, found none ({_advice(ink, size)})"
-    )
-    for corners in frames(ink):
-        try:
-            return _read_rectangle(deskew(paper, corners), deskew(fine, corners), size, name)
-        except MazeError as error:
-            problem = str(error)
-    raise MazeError(problem)
+    crop = outer_walls(ink)
+    if crop is None:
+        raise MazeError(
+            f"{name}: expected a drawing whose dark outer walls form a closed, upright rectangle, found none "
+            f"({_advice(ink, size)})"
+        )
+    drawing, fine = enlarged(paper[crop]), enlarged(fine[crop])
 
-
-def _read_rectangle(drawing: np.ndarray, fine: np.ndarray, size: int | None, name: str) -> np.ndarray:
-    """Returns the walls, `[R, C]` bool, of a deskewed drawing; `fine` is the drawing with its noise.
-
-    The outermost cells are walls.
-    """
     # The grid of cells.
     ink = ink_of(drawing)
     advice = _advice(ink, size)
@@ -71,7 +72,7 @@ def _read_rectangle(drawing: np.ndarray, fine: np.ndarray, size: int | None, nam
     in_words = f"{shape[0]} x {shape[1]} cells"
     if light - dark < _MIN_CONTRAST:
         raise MazeError(
-            f"{name}: expected filled walls as thick as a cell, found only lines between {in_words}; {_READ_LINES}"
+            f"{name}: expected filled walls as thick as a cell, found only lines between {in_words}; {READ_LINES}"
         )
     clarity = np.abs(cores - (dark + light) / 2) / (light - dark)
     clarity[[0, -1], :] = clarity[:, [0, -1]] = 1
@@ -98,10 +99,10 @@ def _read_rectangle(drawing: np.ndarray, fine: np.ndarray, size: int | None, nam
 def _advice(ink: np.ndarray, size: int | None) -> str:
     """Returns what to try with a drawing that is not read."""
     if size is not None:
-        return f"are there {size} cells a side?"
+        return f"are there {size} cells a side? {STRAIGHTEN}"
     if np.count_nonzero(ink) < _MIN_INK * ink.size:
-        return f"are the walls lines? {_READ_LINES}"
-    return "give the number of cells on the longer side"
+        return f"are the walls lines? {READ_LINES}; {STRAIGHTEN}"
+    return f"give the number of cells on the longer side; {STRAIGHTEN}"
 
 
 def _lines_in_floor(fine: np.ndarray, walls: np.ndarray, contrast: float) -> np.ndarray:
