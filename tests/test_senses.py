@@ -23,7 +23,7 @@ from mazebench.errors import InputError
 from mazebench.evaluation.evaluate import run_evaluation
 from mazebench.evaluation.options import EvalOptions, RunOptions
 from mazebench.evaluation.plan import make_plan
-from mazebench.report.scoreboard import check
+from mazebench.report.leaderboard import read_entries
 from mazebench.report.settings import make_setting
 from mazebench.results.comparison import compare_folders
 from mazebench.results.paper import printed_mmn
@@ -406,9 +406,9 @@ class TestResults:
         edit_summary(noisy, odometry_noise=0.2)
         assert "planner (odometry noise 0.2) in" in compare_folders(plain, noisy).title
 
-    def test_the_scoreboard_refuses_them(self, tmp_path):
+    def test_the_leaderboard_refuses_them(self, tmp_path):
         folder = make_result(tmp_path / "noisy", track="rebuilt")
         edit_records(folder, lambda record: record | {"lidar_noise": "0,0"})
         edit_summary(folder, lidar_noise="0,0")
-        with pytest.raises(InputError, match=r"expected the senses of the track, found lidar noise 0,0$"):
-            check(folder)
+        with pytest.raises(InputError, match=r"a track, with its senses, found eval rebuilt 1 lidar noise 0,0$"):
+            read_entries([folder])

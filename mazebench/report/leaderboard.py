@@ -1,0 +1,176 @@
+"""The leaderboard of the tracks: two tables of agents, made from an entry per agent.
+
+`python -m mazebench.report.leaderboard RESULTS... docs/leaderboard.md` writes an entry of each agent in RESULTS into
+the folder docs/leaderboard, one JSON file each, and the tables of all entries there into the page, between two
+comments.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import pathlib
+import re
+import sys
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import pandas as pd
+import pydantic
+
+from mazebench.constants import ON_TIME
+from mazebench.errors import InputError
+from mazebench.maps.benchmark import load_kind_mazes, manifest_hash
+from mazebench.report.table import escape_markdown, to_markdown
+from mazebench.results.intervals import mean_interval
+from mazebench.results.metrics import is_on_time
+from mazebench.results.oracle import frozen_oracle_steps
+from mazebench.results.reading import SUITE, Result, find_parts, load_result, read_suite
+from mazebench.results.records import Name, Share, column
+from mazebench.storage.files import make_folder, open_file
+from mazebench.storage.json_files import write_json
+from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.trials import frozen_trials
+
+BEGIN, END = "<!-- leaderboard begins -->\n", "<!-- leaderboard ends -->\n"
+PARTS = [f"{track} {level}" for track in TRACKS for level in LEVELS]
+
+_MAP_FREE = "navigator without map"  # the agent over which gains are measured
+
+
+class Entry(pydantic.BaseModel):
+    """The results of one agent on all parts of the tracks."""
+
+    agent: Name
+    privileged: bool
+    code: tuple[str, ...]  # package and version, or "file", and the SHA-256 of the code
+    checkpoints: tuple[str, ...]  # SHA-256
+    on_time: tuple[Share, Share, Share]  # of all episodes, with its 95 % interval
+    success: Share  # of all episodes
+    parts: dict[str, tuple[Share, Share]]  # on time, and success, by track and level, as "rebuilt 1"
+
+    @property
+    def file_name(self) -> str:
+        """A name that entries of the same agent, code and checkpoints share."""
+        identity = hashlib.sha256("\n".join([self.agent, *self.code, *self.checkpoints]).encode()).hexdigest()
+        return f"{re.sub(r'[^A-Za-z0-9_]+', '-', self.agent)}-{identity[:8]}.json"
+
+
+def read_entries(paths: Iterable[pathlib.Path]) -> list[Entry]:
+    """Returns the entries of runs of the suite `v3`, of agents' folders in them, or of folders with its parts.
+
+    Raises:
+      InputError: if an agent's folder holds anything else than its results of all parts, each once.
+    """
+    folders = []
+    for path in paths:
+        in_suite = read_suite(path).folders.values() if (path / SUITE).is_file() else ()
+        folders += [path / name for name in in_suite] or [path]
+    return [_make_entry(folder) for folder in folders]
+
+
+def kept_entries(page: pathlib.Path) -> list[Entry]:
+    """Returns the entries that are kept next to a page, the highest on-time rate first; of equals, by success."""
+    entries = [Entry.model_validate_json(path.read_bytes()) for path in page.with_suffix("").glob("*.json")]
+    return sorted(entries, key=lambda entry: (-entry.on_time[0], -entry.success, entry.agent))
+
+
+def make_tables(entries: Sequence[Entry]) -> str:
+    """Returns the leaderboard in Markdown: a table of all episodes, and one of the parts."""
+    floor = next((entry.on_time[0] for entry in entries if entry.agent == _MAP_FREE), np.nan)
+    names = [escape_markdown(entry.agent) + " (privileged)" * entry.privileged for entry in entries]
+    overall = {
+        "agent": names,
+        "on time": [f"{mean:.2f} [{low:.2f}, {high:.2f}]" for mean, low, high in (entry.on_time for entry in entries)],
+        "gain": [f"{entry.on_time[0] - floor:+.2f}".replace("+nan", "") for entry in entries],
+        "success": [f"{entry.success:.2f}" for entry in entries],
+        "code": [escape_markdown(", ".join(each[:-56] for each in entry.code)) for entry in entries],  # 8 of 64 letters
+    }
+    parts = {"agent": names} | {
+        part: ["{:.2f}, {:.2f}".format(*entry.parts[part]) for entry in entries] for part in PARTS
+    }
+    ranks = pd.RangeIndex(1, len(entries) + 1, name="rank")
+    return "\n".join(to_markdown(pd.DataFrame(table, index=ranks)) for table in (overall, parts))
+
+
+def write_leaderboard(entries: Iterable[Entry], page: pathlib.Path) -> None:
+    """Keeps `entries` next to `page`, and replaces the tables in it by those of all that are kept.
+
+    Raises:
+      InputError: if the page can't be read, or has no place for the tables; no entry is kept then.
+    """
+    with open_file(page, "page") as file:
+        text = file.read().decode()
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise InputError(f"{page}: expected the lines {BEGIN.strip()} and {END.strip()}, found no such lines")
+    make_folder(page.with_suffix(""))
+    for entry in entries:
+        write_json(page.with_suffix("") / entry.file_name, entry.model_dump())
+    page.write_text(f"{before}{begin}{make_tables(kept_entries(page))}{end}{after}", encoding="utf-8")
+
+
+def _make_entry(folder: pathlib.Path) -> Entry:
+    results = [load_result(part) for part in find_parts(folder).values()]
+    summaries = [result.summary for result in results]
+    if len(agents := sorted({summary.row for summary in summaries})) > 1:
+        raise InputError(f"{folder}: expected results of one agent, found those of {', '.join(agents)}")
+    episodes = pd.concat(map(_read_episodes, results))
+    if (missing := [part for part in PARTS if part not in set(episodes.part)]) or len(results) > len(PARTS):
+        found = f"none of {', '.join(missing)}" if missing else f"{len(results)} results"
+        raise InputError(f"{folder}: expected one result of each of the {len(PARTS)} parts, found {found}")
+
+    mean = mean_interval(episodes.on_time.to_numpy(float), episodes.maze.to_numpy())
+    parts = episodes.groupby("part")[["on_time", "success"]].mean()
+    origins = [summary.provenance for summary in summaries]
+    return Entry(
+        agent=agents[0],
+        privileged=any(summary.privileged for summary in summaries),
+        code=tuple(sorted({f"{origin.agent_package or 'file'} {origin.agent_code_sha256}" for origin in origins})),
+        checkpoints=tuple(sorted({origin.checkpoint_sha256 for origin in origins if origin.checkpoint_sha256})),
+        on_time=(mean.value, mean.low, mean.high),
+        success=episodes.success.mean(),
+        parts={part: tuple(parts.loc[part]) for part in PARTS},
+    )
+
+
+def _read_episodes(result: Result) -> pd.DataFrame:
+    """Returns the `part`, `maze`, `success` and `on_time` of all frozen episodes of a part; refuses other episodes."""
+    summary, records = result.summary, result.records
+    part = f"{summary.track or summary.task} {summary.level or ''}".strip()
+    if part not in PARTS or summary.split != "eval" or summary.senses:
+        found = " ".join([summary.split, part, *summary.senses])
+        raise InputError(f"{result.folder}: expected eval episodes of a track, with its senses, found {found}")
+    if summary.provenance.benchmark_manifest_sha256 != manifest_hash(summary.benchmark):
+        raise InputError(f"{result.folder}: expected results of the installed benchmark, found those of another one")
+    if summary.provenance.agent_code_sha256 is None:
+        raise InputError(f"{result.folder}: expected the hash of the agent's code, found none; evaluate it again")
+    mazes, trials = load_kind_mazes("eval"), frozen_trials("local", summary.size, summary.benchmark, "eval")
+    episodes = [trial.episode for trial in trials]
+    frozen = [(mazes[episode.maze].name, episode.start, episode.goal, episode.seed) for episode in episodes]
+    if [(record.maze, record.start, record.goal, record.seed) for record in records] != frozen:
+        raise InputError(f"{result.folder}: expected the {len(frozen)} frozen episodes, found others")
+
+    steps = frozen_oracle_steps(summary.benchmark, "local", summary.size, "eval", trials)
+    assert steps is not None, "the oracle's steps are frozen with the episodes"
+    success, on_time = column(records, "success"), is_on_time(records, steps, ON_TIME[0])
+    return pd.DataFrame({"part": part, "maze": column(records, "maze"), "success": success, "on_time": on_time})
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Runs the command; bad input ends it with one line and status 2."""
+    parser = argparse.ArgumentParser(prog="python -m mazebench.report.leaderboard")
+    parser.add_argument("results", nargs="*", type=pathlib.Path, metavar="RESULTS", help="runs of the suite `v3`")
+    parser.add_argument("page", type=pathlib.Path, metavar="PAGE.md")
+    options = parser.parse_args(arguments)
+    try:
+        write_leaderboard(read_entries(options.results), options.page)
+    except InputError as error:
+        print(f"mazebench: {error}", file=sys.stderr)
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,161 @@
+"""The leaderboard of the tracks: its tables from made-up results, its place in a page, what it refuses."""
+
+from __future__ import annotations
+
+import pathlib
+import subprocess
+import sys
+
+import pytest
+from made_results import edit_records, edit_summary, make_result, read_summary
+
+from mazebench.errors import InputError
+from mazebench.maps.benchmark import KINDS_VERSION
+from mazebench.report.leaderboard import (
+    BEGIN,
+    END,
+    PARTS,
+    Entry,
+    kept_entries,
+    make_tables,
+    read_entries,
+    write_leaderboard,
+)
+from mazebench.results.reading import SUITE
+from mazebench.storage.json_files import write_json
+
+PAGE = pathlib.Path(__file__).parent.parent / "docs" / "leaderboard.md"
+
+
+def make_part(folder, agent, track="adrift", level=1, successes=240, code="c" * 64, num_mazes=48, **options):
+    """Writes the result of an agent that reaches the first `successes` of the 240 goals."""
+    part = make_result(
+        folder / f"{track}-{level}", agent, track=track, level=level, record=False, num_mazes=num_mazes, **options
+    )
+    origin = {"agent_package": "made-up 1.0", "agent_code_sha256": code}
+    edit_summary(part, provenance=read_summary(part)["provenance"] | origin)
+
+    def edit(record):
+        success = record["episode"] < successes
+        lengths = {"path_length": 1.0, "shortest_path": 1.0, "steps": 1}
+        return record | lengths | {"success": success, "spl": float(success), "spl_grid": float(success)}
+
+    return edit_records(part, edit)
+
+
+def make_entry(agent, success=1.0, on_time=0.5, checkpoints=()):
+    means = {"on_time": (on_time, 0.0, 1.0), "success": success}
+    code = (f"made-up 1.0 {'c' * 64}",)
+    return Entry(agent=agent, privileged=False, code=code, checkpoints=checkpoints, parts={}, **means)
+
+
+def rows(entries):
+    """The cells of each line of the first table."""
+    first, _, _ = make_tables(entries).partition("\n\n")
+    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in first.splitlines()[2:]]
+
+
+@pytest.fixture
+def page(tmp_path):
+    """A page without entries."""
+    (tmp_path / "page.md").write_text(f"before\n{BEGIN}old\n{END}after\n")
+    return tmp_path / "page.md"
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory):
+    """A run of the suite with an agent, of which half of the goals are reached at level 3, and all at the others."""
+    folder = tmp_path_factory.mktemp("suite")
+    for part in PARTS:
+        track, level = part.split()
+        make_part(folder / "x", "x", track, int(level), 120 if level == "3" else 240, privileged=True)
+    content = {"suite": "v3", "parts": [part.replace(" ", "-") for part in PARTS], "benchmark": KINDS_VERSION}
+    content |= {"benchmark_manifest_sha256": "0" * 64, "seed": 0, "agents": ["x"]}
+    write_json(folder / SUITE, content | {"folders": {"x": "x"}})
+    return folder
+
+
+class TestTables:
+    def test_a_run_of_the_suite_gives_a_row_in_each_table(self, suite, page):
+        entries = read_entries([suite])
+        assert read_entries([suite / "x"]) == entries
+        write_leaderboard(entries, page)
+        [row] = rows(kept_entries(page))
+        # In 8 of 12 parts all goals are reached, in 4 half of them.
+        assert row[2].startswith("0.83 [0.")
+        assert row[:2] + row[3:] == ["1", "x (privileged)", "", "0.83", "made-up 1.0 cccccccc"]
+        assert f"| 1 | x (privileged) |{' 1.00, 1.00 | 1.00, 1.00 | 0.50, 0.50 |' * 4}" in page.read_text()
+
+    def test_the_rank_is_by_time_then_success_and_the_gain_over_the_navigator_without_the_map(self, page):
+        entries = [make_entry("slow", 0.9, 0.1), make_entry("never", 0.0, 0.1), make_entry("quick", 0.6, 0.5)]
+        parts = dict.fromkeys(PARTS, (0.5, 0.5))
+        entries.append(make_entry("navigator without map", 0.7, 0.3))
+        write_leaderboard([entry.model_copy(update={"parts": parts}) for entry in entries], page)
+        found = [(row[0], row[1], row[3]) for row in rows(kept_entries(page))]
+        names = ["quick", "navigator without map", "slow", "never"]
+        assert found == list(zip("1234", names, ["+0.20", "+0.00", "-0.20", "-0.20"], strict=True))
+
+
+class TestPage:
+    def test_an_entry_replaces_one_of_the_same_agent_code_and_checkpoints_only(self, suite, page):
+        [entry] = read_entries([suite])
+        for changes in ({}, {"checkpoints": ("a" * 64,)}, {"success": 0.25}):
+            write_leaderboard([entry.model_copy(update=changes)], page)
+        assert sorted(kept.success for kept in kept_entries(page)) == [0.25, entry.success]
+        assert page.read_text() == f"before\n{BEGIN}{make_tables(kept_entries(page))}{END}after\n"
+
+    def test_the_page_of_the_docs_is_made_from_the_kept_entries(self):
+        assert f"{BEGIN}{make_tables(kept_entries(PAGE))}{END}" in PAGE.read_text(encoding="utf-8")
+
+    def test_a_page_without_the_comments_is_left_as_it_is(self, tmp_path):
+        page = tmp_path / "page.md"
+        page.write_text("nothing\n")
+        with pytest.raises(InputError, match=r"page\.md: expected the lines <!-- leaderboard begins --> and "):
+            write_leaderboard([make_entry("x")], page)
+        assert [path.name for path in tmp_path.iterdir()] == ["page.md"]
+        assert page.read_text() == "nothing\n"
+
+    def test_bad_input_ends_the_command_with_one_line_and_status_2(self, tmp_path):
+        command = [sys.executable, "-m", "mazebench.report.leaderboard", str(tmp_path / "none"), "page.md"]
+        run = subprocess.run(command, capture_output=True, text=True)
+        said = f"mazebench: {tmp_path}/none: expected a finished evaluation, found nothing there\n"
+        assert (run.returncode, run.stderr) == (2, said)
+
+
+class TestRefused:
+    @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            ({}, r"one result of each of the 12 parts, found none of building 1, .*, adrift 2, adrift 3, rough 1"),
+            ({"code": None}, "the hash of the agent's code, found none"),
+            ({"split": "train"}, "eval episodes of a track, with its senses, found train adrift 1"),
+            ({"num_mazes": 3}, "the 240 frozen episodes, found others"),
+        ],
+    )
+    def test_a_result_of_other_episodes_than_all_frozen_ones(self, tmp_path, options, message):
+        make_part(tmp_path, "x", **options)
+        with pytest.raises(InputError, match=f"expected {message}"):
+            read_entries([tmp_path])
+
+    def test_a_result_with_another_seed(self, tmp_path):
+        part = make_part(tmp_path, "x")
+        edit_records(part, lambda record: record | {"seed": record["seed"] + (record["episode"] == 7)})
+        with pytest.raises(InputError, match="adrift-1: expected the 240 frozen episodes, found others"):
+            read_entries([tmp_path])
+
+    def test_a_result_that_is_not_of_a_track(self, tmp_path):
+        make_result(tmp_path / "run", record=False)
+        with pytest.raises(InputError, match=r"run: expected eval episodes of a track, .*, found eval local"):
+            read_entries([tmp_path / "run"])
+
+    def test_a_result_of_another_benchmark(self, tmp_path):
+        part = make_part(tmp_path, "x")
+        edit_summary(part, provenance=read_summary(part)["provenance"] | {"benchmark_manifest_sha256": "0" * 64})
+        with pytest.raises(InputError, match=r"adrift-1: expected results of the installed benchmark, found those of"):
+            read_entries([tmp_path])
+
+    def test_a_folder_with_two_agents_results(self, tmp_path):
+        make_part(tmp_path, "x")
+        make_part(tmp_path, "y", level=2)
+        with pytest.raises(InputError, match="expected results of one agent, found those of x, y"):
+            read_entries([tmp_path])
