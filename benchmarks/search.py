@@ -27,7 +27,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from mazebench_agents.common import kernels
 from mazebench_agents.common.actor import one_torch_thread
 from mazebench_agents.mmn.kernel_layers import Linear, add_product, kernel, linear, normalize, rectify
 from mazebench_agents.muzero.search import KernelModel, Root, gumbel_muzero_policy, run_simulations
@@ -58,7 +57,8 @@ def main() -> None:
     seconds = parser.parse_args().seconds / _ROUNDS
     print(f"{NUM_SIMULATIONS} simulations, one thread; simulations in a second of processor time\n")
     print("| roots | search | mctx | search / mctx |\n|---|---|---|---|")
-    with one_torch_thread(), kernels.one_thread(), mctx_rate() as theirs:
+    os.environ["OMP_NUM_THREADS"] = "1"  # of kernels
+    with one_torch_thread(), mctx_rate() as theirs:
         for num_roots in _NUM_ROOTS:
             search, pairs = our_search(num_roots), []
             for _ in range(_ROUNDS):

@@ -54,24 +54,13 @@ def test_saved_and_loaded_agent_acts_identically(tmp_path):
     assert len(set(actions[0].tolist())) > 1
 
 
-@pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_checkpoint_with_a_weight_that_is_not_finite_is_refused(tmp_path, value):
-    path = saved(tmp_path)
-    network = MAH.build(INTERFACE, checkpoint=path).network
-    with torch.no_grad():
-        network.value.bias[0] = value
-    save_checkpoint(path, network.state_dict(), {"agent": "mah", "config": {}, "context_size": 13})
-    with pytest.raises(InputError, match=r"expected finite numbers in value\.bias, found others"):
-        MAH.build(INTERFACE, checkpoint=path)
-
-
 def test_another_agents_checkpoint_is_refused(tmp_path):
     with pytest.raises(InputError, match="expected a checkpoint of agent 'dqn', found one of 'mah'"):
         DQN.build(INTERFACE, checkpoint=saved(tmp_path))
 
 
-def test_checkpoint_of_another_network_is_refused_by_its_first_wrong_tensor(tmp_path):
-    with pytest.raises(InputError, match=r"expected advantage.weight \(6, 32\), found \(6, 256\)"):
+def test_checkpoint_of_another_network_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"size mismatch for body\.0\.weight"):
         MAH.build(INTERFACE, checkpoint=saved(tmp_path, config={"hidden": 32}))
 
 

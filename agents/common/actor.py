@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import functools
 import pathlib
 from collections.abc import Callable, Iterator, Mapping
 from importlib import resources
@@ -13,13 +12,12 @@ from typing import Any, ClassVar, Self, TypeVar
 import numpy as np
 import torch
 
-from mazebench.agent import Inputs, Interface
+from mazebench.agent import Interface
 from mazebench.errors import UnplayableError
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.protocol import Learner, LearningAgent
 
-from .bounds import bounded
-from .checkpoint import check_shapes, load_agent, load_checkpoint, load_into, save_checkpoint
+from .checkpoint import load_agent, load_checkpoint, load_into, save_checkpoint
 from .config_values import override
 
 
@@ -41,14 +39,8 @@ _Act = TypeVar("_Act", bound=Callable[..., Any])
 
 
 def acting(act: _Act) -> _Act:
-    """Decorates `act` of an agent with a network: numbers are bounded, and PyTorch keeps no gradients in one thread."""
-
-    @functools.wraps(act)
-    def bounded_act(self: Any, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, Any]:
-        with torch.no_grad(), one_torch_thread():
-            return act(self, bounded(inputs), state, explore)
-
-    return bounded_act  # type: ignore[return-value]
+    """Decorates `act` of an agent with a network: PyTorch keeps no gradients, in one thread."""
+    return torch.no_grad()(one_torch_thread()(act))
 
 
 class NetworkAgent(LearningAgent):
@@ -107,7 +99,6 @@ class NetworkAgent(LearningAgent):
         if size != trained_size and not cls.serves_any_size(config):
             expected = f"its checkpoint reads maps of {trained_size} x {trained_size} only, found {size} x {size}"
             raise UnplayableError(f"agent {cls.name!r}: {expected}; mah reads maps of any size")
-        check_shapes(path, lambda: cls.make_network(config, trained_size), tensors)
         agent = cls(config, trained_size, seed)
         load_into(path, agent.network, tensors)
         return agent

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import json
 import pathlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import safetensors
 import safetensors.torch
 import torch
 
-from mazebench.errors import InputError
-from mazebench.maps.maze import MAX_SIZE
+from mazebench.errors import InputError, shortened
 from mazebench.storage.files import open_whole, read_at_most
 
 from .config_values import Config, override
@@ -59,51 +58,22 @@ def load_agent(path: pathlib.Path, agent: str, default: Config) -> tuple[dict[st
     """
     tensors, metadata = load_checkpoint(path, agent)
     try:
-        config = override(default, metadata["config"])
-        context_size = metadata["context_size"]
-        if type(context_size) is not int or not 3 <= context_size <= MAX_SIZE:
-            raise ValueError(f"context_size {str(context_size)[:80]}")
+        config, context_size = override(default, metadata["config"]), int(metadata["context_size"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{path}: expected metadata with config and context_size, found {error}") from error
     return tensors, config, context_size
-
-
-def check_shapes(path: pathlib.Path, make: Callable[[], torch.nn.Module], tensors: Mapping[str, torch.Tensor]) -> None:
-    """Checks that `tensors` are those of the network that `make` makes, without memory for the network.
-
-    Raises:
-      InputError: if a name or a shape differs; the message names the first.
-    """
-    with torch.random.fork_rng(devices=[]), torch.device("meta"):
-        wanted = make().state_dict()
-    _check_kinds(path, wanted, tensors)
 
 
 def load_into(path: pathlib.Path, module: torch.nn.Module, tensors: Mapping[str, torch.Tensor]) -> None:
     """Copies `tensors` into `module`.
 
     Raises:
-      InputError: if a name, a shape or a type differs, or a number is not finite; the message names the first.
+      InputError: if a name or a shape differs.
     """
-    _check_kinds(path, module.state_dict(), tensors)
-    for name, tensor in tensors.items():
-        if not torch.isfinite(tensor).all():
-            raise InputError(f"{path}: expected finite numbers in {name}, found others")
-    module.load_state_dict(dict(tensors))
-
-
-def _check_kinds(path: pathlib.Path, wanted: Mapping[str, torch.Tensor], tensors: Mapping[str, torch.Tensor]) -> None:
-    for name in sorted(set(wanted) | set(tensors)):
-        expected = _kind(wanted[name]) if name in wanted else "no such tensor"
-        found = _kind(tensors[name]) if name in tensors else "no such tensor"
-        if expected != found:
-            raise InputError(f"{path}: expected {name} {expected}, found {found}")
-
-
-def _kind(tensor: torch.Tensor) -> str:
-    """Returns the shape of `tensor`, and its type unless that is float32, as text."""
-    kind = "" if tensor.dtype == torch.float32 else f" {tensor.dtype}"
-    return f"{tuple(tensor.shape)}{kind}"
+    try:
+        module.load_state_dict(dict(tensors))
+    except RuntimeError as error:
+        raise InputError(f"{path}: {shortened(str(error))}") from error
 
 
 def _metadata(content: bytes) -> Any:

@@ -3,18 +3,10 @@
 from __future__ import annotations
 
 import copy
-import pathlib
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 import torch
-
-from mazebench.errors import InputError
-
-from .checkpoint import load_into
-
-_MOMENTS = {"step", "exp_avg", "exp_avg_sq"}  # Adam's
 
 
 class Descent:
@@ -44,13 +36,13 @@ class Descent:
         self._optimizer = optimizer
         self._max_gradient_norm, self._target_rate = max_gradient_norm, target_rate
         self._constant_steps = constant_steps
-        self._num_steps = np.zeros(1, dtype=np.int64)
+        self._num_steps = 0
 
     def step(self, loss: torch.Tensor) -> torch.Tensor:
         """Takes one step of the optimizer, moves the target network along, and returns the gradient's norm."""
         self._num_steps += 1
         if self._constant_steps is not None:
-            falling = min(1.0, self._constant_steps / int(self._num_steps[0]))
+            falling = min(1.0, self._constant_steps / self._num_steps)
             for group in self._optimizer.param_groups:
                 group["lr"] = group["rate"] * self._optimizer.defaults["lr"] * falling
 
@@ -68,46 +60,22 @@ class Descent:
         """Returns what `load` restores, by name: all but the network."""
         tensors = {f"target.{name}": value for name, value in self.target.state_dict().items()}
         if self._constant_steps is not None:
-            tensors["array.num_updates"] = torch.from_numpy(self._num_steps)
+            tensors["num_updates"] = torch.tensor(self._num_steps)
         for index, moments in self._optimizer.state_dict()["state"].items():
             tensors |= {f"optimizer.{index}.{name}": torch.as_tensor(value) for name, value in moments.items()}
         return tensors
 
-    def load(self, path: pathlib.Path, tensors: Mapping[str, torch.Tensor]) -> None:
-        """Restores `tensors` of the file `path`.
-
-        Raises:
-          InputError: if a tensor is missing, unknown, of another shape or not finite.
-        """
-        load_into(path, self.target, _below("target.", tensors))
+    def load(self, tensors: Mapping[str, torch.Tensor]) -> None:
+        """Restores `tensors`."""
+        self.target.load_state_dict(_below("target.", tensors))
         if self._constant_steps is not None:
-            found = _below("array.", tensors).get("num_updates", torch.zeros(0))
-            if found.shape != self._num_steps.shape or found.dtype != torch.int64:
-                raise InputError(f"{path}: expected num_updates {self._num_steps.shape}, found {tuple(found.shape)}")
-            self._num_steps[...] = found.numpy()
+            self._num_steps = int(tensors["num_updates"])
+        state: dict[int, dict[str, torch.Tensor]] = {}
+        for name, value in _below("optimizer.", tensors).items():
+            index, moment = name.split(".")
+            state.setdefault(int(index), {})[moment] = value
         groups = self._optimizer.state_dict()["param_groups"]
-        state = self._checked_moments(path, _below("optimizer.", tensors))
         self._optimizer.load_state_dict({"state": state, "param_groups": groups})
-
-    def _checked_moments(
-        self, path: pathlib.Path, tensors: Mapping[str, torch.Tensor]
-    ) -> dict[int, dict[str, torch.Tensor]]:
-        """Returns the optimizer's moments by parameter."""
-        moments: dict[int, dict[str, torch.Tensor]] = {}
-        shapes = [parameter.shape for group in self._optimizer.param_groups for parameter in group["params"]]
-        for name, value in tensors.items():
-            index, _, moment = name.partition(".")
-            is_known = index.isdecimal() and int(index) < len(shapes)
-            if not is_known or value.shape != (() if moment == "step" else shapes[int(index)]):
-                found = f"{name} {tuple(value.shape)}"
-                raise InputError(f"{path}: expected moments of {len(shapes)} parameters, found {found}")
-            is_finite = value.dtype == torch.float32 and bool(torch.isfinite(value).all())
-            if not is_finite or (moment == "step" and value.min() < 1):
-                raise InputError(f"{path}: expected finite moments after some steps, found others in {name}")
-            moments.setdefault(int(index), {})[moment] = value
-        if any(names.keys() != _MOMENTS for names in moments.values()):
-            raise InputError(f"{path}: expected {', '.join(sorted(_MOMENTS))} of each parameter, found others")
-        return moments
 
 
 def in_numbers(scalars: Mapping[str, torch.Tensor]) -> dict[str, Any]:

@@ -1,27 +1,27 @@
 """Compilation of kernels to machine code, which is kept on disk.
 
-Numba notices when a kernel's file changes, but not when a module does that the kernel uses. So the kernels of a file
-are kept in a folder that is named after the contents of the file and of the modules of this package that it uses, and
-after the numbers that these hold, imported ones too.
+Numba notices when a kernel's file changes, but not when a module does that the kernel uses. So kernels are kept in a
+folder that is named after the contents of all files of the packages with kernels, and of mazebench's constants.
 """
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import hashlib
-import inspect
 import multiprocessing
 import os
 import pathlib
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numba
-import numpy as np
 from numba.core.event import Listener, register
 from numba.extending import register_jitable
+
+from mazebench import constants
+
+_WITH_KERNELS = ("mmn", "muzero", "robot")
 
 
 class _Announcement(Listener):
@@ -63,27 +63,17 @@ def num_threads() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-@contextlib.contextmanager
-def one_thread() -> Iterator[None]:
-    """Lets kernels run in one thread in the block, as a measurement of speed wants."""
-    given = os.environ.get("OMP_NUM_THREADS")
-    os.environ["OMP_NUM_THREADS"] = "1"
-    try:
-        yield
-    finally:
-        del os.environ["OMP_NUM_THREADS"]
-        if given is not None:
-            os.environ["OMP_NUM_THREADS"] = given
-
-
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     """Returns `function` compiled into its callers, where LLVM might decide otherwise."""
     return compiled(function, inline=True)
 
 
 def compiled_by_callers(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Returns `function` as it is, for Python; kernels that call it compile it into themselves."""
-    return register_jitable(function)
+    """Returns `function` as it is, for Python; kernels that call it compile it into themselves.
+
+    It is inlined, because numba does not keep kernels that give functions to other kernels.
+    """
+    return register_jitable(inline="always")(function)
 
 
 def _options(fused: bool) -> dict[str, Any]:
@@ -105,29 +95,14 @@ def _cached(compile_with: Callable[..., Any], function: Callable[..., Any], **op
 def _cache_folder(function: Callable[..., Any], given: str) -> pathlib.Path:
     """Returns a folder below the `given` one, or else beside Python's own compiled files."""
     parent = pathlib.Path(given) if given else pathlib.Path(function.__code__.co_filename).parent / "__pycache__"
-    return parent / f"kernels-{_digest(function.__module__)}"
+    return parent / f"kernels-{_digest()}"
 
 
 @functools.cache
-def _digest(module: str) -> str:
-    digest = hashlib.sha256(module.encode())  # kept kernels import their module by its name
-    for name in sorted(_used_by(module)):
-        digest.update(pathlib.Path(str(sys.modules[name].__file__)).read_bytes())
-        for value in vars(sys.modules[name]).values():
-            values = value if isinstance(value, tuple) else (value,)
-            if all(isinstance(each, int | float | np.number | np.ndarray) for each in values):  # kernels keep them
-                digest.update(b"".join(np.asarray(each).tobytes() for each in values))
-    return digest.hexdigest()[:16]
-
-
-def _used_by(module: str) -> set[str]:
-    """Returns the names of a module and of those of this package that it uses, directly or not."""
-    package = __name__.partition(".")[0]
-    found, left = {module}, [module]
-    while left:
-        for value in vars(sys.modules[left.pop()]).values():
-            name = value.__name__ if inspect.ismodule(value) else getattr(value, "__module__", None)
-            if isinstance(name, str) and name.startswith(f"{package}.") and name not in found:
-                found.add(name)
-                left.append(name)
-    return found
+def _digest() -> str:
+    agents = pathlib.Path(__file__).parent.parent
+    files = [
+        pathlib.Path(constants.__file__),
+        *(path for name in _WITH_KERNELS for path in agents.glob(f"{name}/*.py")),
+    ]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(files))).hexdigest()[:16]

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.errors import InputError
 from mazebench.storage.json_files import read_json
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.experience import Experience
@@ -101,16 +100,8 @@ class HindsightLearner:
         """
         self.actor.load(folder / AGENT_FILE)
         tensors, _ = load_checkpoint(folder / _TRAINING_FILE, self.actor.name)
-        self.descent.load(folder / _TRAINING_FILE, tensors)
-        self._load_random(folder / _RANDOM_FILE)
+        self.descent.load(tensors)
+        self.rng.bit_generator.state = read_json(folder / _RANDOM_FILE)
         path = folder / _REPLAY_FILE
         if path.exists():
             self.replay.load(path)
-
-    def _load_random(self, path: pathlib.Path) -> None:
-        try:
-            self.rng.bit_generator.state = read_json(path)
-        except (TypeError, ValueError, KeyError, OverflowError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{path}: expected the state of a random stream, found {str(error)[:120]}") from error

@@ -19,22 +19,23 @@ from mazebench.training.experience import Experience
 
 from .sum_tree import SumTree
 
-_ROW_FIELDS = (
-    "state",
-    "origin",
-    "anchor_origin",
-    "action",
-    "cell",
-    "start",
-    "anchor",
-    "goal",
-    "maze",
-    "trajectory",
-    "leg",
-)
-_ENV_FIELDS = ("next", "current", "current_leg", "leg_origin", "current_anchor", "current_anchor_origin", "maps")
 _NO_ACTION = -1  # in the row after a trajectory's last step
-_STATE_SIZE = 12
+_ROW = np.dtype(
+    [
+        ("trajectory", np.int64),  # a number that no two trajectories of a ring share
+        ("leg", np.int64),  # likewise, of the leg to one goal
+        ("state", np.float32, 12),
+        ("origin", np.float32, 2),  # x and y observed where the leg started
+        ("anchor_origin", np.float32, 2),  # likewise, the trajectory
+        ("maze", np.uint32),
+        ("cell", np.uint16),
+        ("start", np.uint16),  # the cell where the leg started
+        ("anchor", np.uint16),  # the cell where the trajectory started
+        ("goal", np.uint16),
+        ("action", np.int8),
+    ],
+    align=True,
+)
 
 
 class Sample(NamedTuple):
@@ -109,25 +110,10 @@ class Replay:
         """
         self._length = max(2, capacity // num_envs)  # rows of one environment
         self._num_envs = num_envs
-        shape = (num_envs, self._length)
-        self._state = np.zeros((*shape, _STATE_SIZE), dtype=np.float32)
-        self._origin = np.zeros((*shape, 2), dtype=np.float32)
-        self._anchor_origin = np.zeros((*shape, 2), dtype=np.float32)
-        self._action = np.full(shape, _NO_ACTION, dtype=np.int8)
-        self._cell = np.zeros(shape, dtype=np.uint16)
-        self._start = np.zeros(shape, dtype=np.uint16)
-        self._anchor = np.zeros(shape, dtype=np.uint16)
-        self._goal = np.zeros(shape, dtype=np.uint16)
-        self._maze = np.zeros(shape, dtype=np.uint32)
-        self._trajectory = np.full(shape, -1, dtype=np.int64)  # numbers that no two trajectories of a ring share
-        self._leg = np.full(shape, -1, dtype=np.int64)  # likewise, of the leg to one goal
-        # The row that each environment writes next, counted without wrapping.
-        self._next = np.zeros(num_envs, dtype=np.int64)
-        self._current = np.zeros(num_envs, dtype=np.int64)  # the trajectory each environment is in
-        self._current_leg = np.zeros(num_envs, dtype=np.int64)
-        self._leg_origin = np.zeros((num_envs, 2), dtype=np.float32)
-        self._current_anchor = np.zeros(num_envs, dtype=np.int64)  # the cell where its trajectory started
-        self._current_anchor_origin = np.zeros((num_envs, 2), dtype=np.float32)
+        self._rows = np.zeros((num_envs, self._length), _ROW)
+        self._rows["action"] = self._rows["trajectory"] = self._rows["leg"] = -1
+        self._next = np.zeros(num_envs, dtype=np.int64)  # the row each environment writes next, without wrapping
+        self._current = np.zeros(num_envs, _ROW)  # the leg and the trajectory each environment is in
         self._tree = SumTree(num_envs * self._length)
         self._map_size = map_size
         # Bits of the maps, by trajectory; no more trajectories are stored than rows.
@@ -143,10 +129,16 @@ class Replay:
     def save(self, path: pathlib.Path) -> None:
         """Writes the rows in use and everything that sampling depends on."""
         used = slice(0, min(self._length, int(self._next.max())))
-        rows = {name: getattr(self, f"_{name}")[:, used] for name in _ROW_FIELDS}
         leaves = self._tree.priorities(np.arange(self._num_envs * self._length)).reshape(self._num_envs, -1)[:, used]
-        envs = {name: getattr(self, f"_{name}") for name in _ENV_FIELDS}
-        np.savez(path, **rows, **envs, priorities=leaves, largest_priority=self._largest_priority)
+        np.savez(
+            path,
+            rows=self._rows[:, used],
+            next=self._next,
+            current=self._current,
+            maps=self._maps,
+            priorities=leaves,
+            largest_priority=self._largest_priority,
+        )
 
     def load(self, path: pathlib.Path) -> None:
         """Restores what `save` wrote.
@@ -155,11 +147,9 @@ class Replay:
           InputError: if the file is damaged.
         """
         loaded = read_arrays(path, "replay")
-        used = loaded["priorities"].shape[1]
-        for name in _ROW_FIELDS:
-            getattr(self, f"_{name}")[:, :used] = loaded[name]
-        for name in _ENV_FIELDS:
-            getattr(self, f"_{name}")[:] = loaded[name]
+        used = loaded["rows"].shape[1]
+        self._rows[:, :used] = loaded["rows"]
+        self._next, self._current, self._maps = loaded["next"], loaded["current"], loaded["maps"]
         items = np.arange(self._num_envs * self._length).reshape(self._num_envs, -1)[:, :used]
         self._tree.set(items.ravel(), loaded["priorities"].ravel())
         self._largest_priority = float(loaded["largest_priority"])
@@ -167,52 +157,35 @@ class Replay:
     @property
     def num_bytes(self) -> int:
         """The memory of all rows, used or not, and of maps."""
-        arrays = [getattr(self, f"_{name}") for name in (*_ROW_FIELDS, "maps")]
-        return sum(array.nbytes for array in arrays)
+        return self._rows.nbytes + self._maps.nbytes
 
     def add(self, experience: Experience, first_env: int = 0) -> None:
         """Stores one step of each of the environments from `first_env` on."""
-        columns = np.arange(len(experience.action))
-        envs = first_env + columns
-        self._current[envs] += experience.new_episode
-        self._current_leg[envs] += experience.new_context
-        self._leg_origin[envs[experience.new_context]] = experience.state[experience.new_context, :2]
-        begins = experience.new_episode
+        envs = first_env + np.arange(len(experience.action))
+        begins, begins_leg = experience.new_episode, experience.new_context
+        current = self._current[envs]
+        current["trajectory"] += begins
+        current["leg"] += begins_leg
+        current["origin"][begins_leg] = experience.state[begins_leg, :2]
+        current["anchor_origin"][begins] = experience.state[begins, :2]
+        current["anchor"][begins] = experience.start[begins]
+        for name in ("start", "goal", "maze"):
+            current[name] = getattr(experience, name)
+        self._current[envs] = current
         if self._map_size:
             walls = experience.context[begins, GLOBAL_MAP].reshape(-1, self._map_size**2) > 0.5
-            self._maps[envs[begins], self._current[envs[begins]] % self._length] = np.packbits(walls, axis=-1)
-        self._current_anchor[envs[begins]] = experience.start[begins]
-        self._current_anchor_origin[envs[begins]] = experience.state[begins, :2]
-        self._write(envs, columns, experience, experience.state, experience.cell, experience.action)
-        ended = np.flatnonzero(experience.ended)
-        if len(ended):
-            no_action = np.full(len(columns), _NO_ACTION)
-            self._write(envs[ended], ended, experience, experience.final_state, experience.final_cell, no_action)
+            self._maps[envs[begins], current["trajectory"][begins] % self._length] = np.packbits(walls, axis=-1)
+        self._write(envs, experience.state, experience.cell, experience.action)
+        if (ended := experience.ended).any():
+            no_action = np.full(ended.sum(), _NO_ACTION)
+            self._write(envs[ended], experience.final_state[ended], experience.final_cell[ended], no_action)
 
-    def _write(
-        self,
-        envs: np.ndarray,
-        columns: np.ndarray,
-        experience: Experience,
-        state: np.ndarray,
-        cell: np.ndarray,
-        action: np.ndarray,
-    ) -> None:
-        """Writes a row for each of `envs`, from the `columns` of the experience."""
-        at = (envs, self._next[envs] % self._length)
-        self._state[at] = state[columns]
-        self._cell[at] = cell[columns]
-        self._action[at] = action[columns]
-        self._origin[at] = self._leg_origin[envs]
-        self._anchor[at] = self._current_anchor[envs]
-        self._anchor_origin[at] = self._current_anchor_origin[envs]
-        self._start[at] = experience.start[columns]
-        self._goal[at] = experience.goal[columns]
-        self._maze[at] = experience.maze[columns]
-        self._trajectory[at] = self._current[envs]
-        self._leg[at] = self._current_leg[envs]
-        priority = np.where(action[columns] == _NO_ACTION, 0.0, self._largest_priority)
-        self._tree.set(at[0] * self._length + at[1], priority)
+    def _write(self, envs: np.ndarray, state: np.ndarray, cell: np.ndarray, action: np.ndarray) -> None:
+        """Writes a row for each of `envs`."""
+        rows, index = self._current[envs], self._next[envs] % self._length
+        rows["state"], rows["cell"], rows["action"] = state, cell, action
+        self._rows[envs, index] = rows
+        self._tree.set(envs * self._length + index, np.where(action == _NO_ACTION, 0.0, self._largest_priority))
         self._next[envs] += 1
 
     def sample(
@@ -241,6 +214,7 @@ class Replay:
         group = self._draw_groups(num_groups, num_steps, hindsight, rng)
         env, steps, goal = group.env[:, None], group.steps, group.goal[:, None]
         reward, discount, last = self._returns(env, steps, goal, n)
+        rows = self._rows[env, steps]
         return Sample(
             row=group.row,
             weight=self._weights(group.row, beta),
@@ -248,13 +222,13 @@ class Replay:
             start=group.start,
             goal=group.goal,
             origin=group.origin,
-            cell=self._cell[env, steps].astype(np.int64),
-            state=self._state[env, steps],
-            action=self._action[env, steps].astype(np.int64),
+            cell=rows["cell"].astype(np.int64),
+            state=rows["state"],
+            action=rows["action"].astype(np.int64),
             reward=reward,
             discount=discount,
-            next_state=self._state[env, last],
-            valid=(self._cell[env, steps] != goal) & (last != steps),
+            next_state=self._rows["state"][env, last],
+            valid=(rows["cell"] != goal) & (last != steps),
             shown=self._shown_walls(group),
         )
 
@@ -279,16 +253,16 @@ class Replay:
             index = np.where(going, (index + 1) % self._length, index)
             indices.append(index)
             exists.append(going)
-        env, steps = env[..., None], np.stack(indices, axis=-1)
+        rows = self._rows[env[..., None], np.stack(indices, axis=-1)]
         return SequenceSample(
             maze=group.maze,
             start=group.start,
             goal=group.goal,
             anchor=group.anchor,
             origin=group.origin,
-            state=self._state[env, steps],
-            cell=self._cell[env, steps].astype(np.int64),
-            action=np.maximum(self._action[env, steps[..., :-1]], 0).astype(np.int64),
+            state=rows["state"],
+            cell=rows["cell"].astype(np.int64),
+            action=np.maximum(rows["action"][..., :-1], 0).astype(np.int64),
             exists=np.stack(exists, axis=-1),
             shown=self._shown_walls(group),
         )
@@ -297,43 +271,36 @@ class Replay:
         """Draws the rows of groups, and relabels a share of them."""
         row = self._tree.sample(num_groups, rng)
         env, index = np.divmod(row, self._length)
+        drawn = self._rows[env, index]
 
         # The goal: that of the leg, or the cell that the trajectory reached some steps later.
         offset = np.minimum(rng.geometric(1 / hindsight.mean_offset, size=num_groups), hindsight.window)
         reached = self._forward(env, index, offset)
         relabelled = rng.random(num_groups) < hindsight.ratio
-        goal = np.where(relabelled, self._cell[env, reached], self._goal[env, index]).astype(np.int64)
+        goal = np.where(relabelled, self._rows["cell"][env, reached], drawn["goal"]).astype(np.int64)
 
         # The steps: the drawn one, and others in a window before the goal is reached, or around the drawn one.
         end = np.where(relabelled, reached, self._forward(env, index, np.full_like(index, hindsight.window // 2)))
-        part = self._trajectory if hindsight.relabel_start else self._leg
+        part = self._rows["trajectory" if hindsight.relabel_start else "leg"]
         steps = self._draw_steps(env, index, end, part, num_steps, hindsight.window, rng)
 
         # Where the context starts, and from where displacements are measured.
-        start, origin = self._start[env, index].astype(np.int64), self._origin[env, index]
+        start, origin = drawn["start"].astype(np.int64), drawn["origin"]
         if hindsight.relabel_start:
             age = (self._next[env, None] - 1 - steps) % self._length
-            first = np.take_along_axis(steps, age.argmax(axis=1)[:, None], axis=1)[:, 0]  # each group's earliest step
-            start = np.where(relabelled, self._cell[env, first], start)
-            origin = np.where(relabelled[:, None], self._state[env, first, :2], origin)
+            first = np.take_along_axis(steps, age.argmax(axis=1)[:, None], axis=1)[:, 0]
+            earliest = self._rows[env, first]  # step of each group
+            start = np.where(relabelled, earliest["cell"], start)
+            origin = np.where(relabelled[:, None], earliest["state"][:, :2], origin)
         anchor = start
         if hindsight.keep_anchor:
-            anchor, origin = self._anchor[env, index].astype(np.int64), self._anchor_origin[env, index]
-        return _Groups(
-            row=row,
-            env=env,
-            steps=steps,
-            maze=self._maze[env, index].astype(np.int64),
-            start=start,
-            goal=goal,
-            anchor=anchor,
-            origin=origin,
-        )
+            anchor, origin = drawn["anchor"].astype(np.int64), drawn["anchor_origin"]
+        return _Groups(row, env, steps, drawn["maze"].astype(np.int64), start, goal, anchor, origin)
 
     def _shown_walls(self, group: _Groups) -> np.ndarray | None:
         if not self._map_size:
             return None
-        trajectory = self._trajectory.reshape(-1)[group.row]
+        trajectory = self._rows["trajectory"][group.env, group.row % self._length]
         maps = self._maps[group.env, trajectory % self._length]
         shape = (-1, self._map_size, self._map_size)
         return np.unpackbits(maps, axis=-1, count=self._map_size**2).reshape(shape).astype(bool)
@@ -344,7 +311,7 @@ class Replay:
             return
         priority = (np.abs(error) + 1e-3) ** self._exponent
         # Meanwhile a trajectory's last row, which must not be drawn, may have overwritten a row.
-        priority[self._action.reshape(-1)[row] == _NO_ACTION] = 0.0
+        priority[self._rows["action"][np.divmod(row, self._length)] == _NO_ACTION] = 0.0
         self._largest_priority = max(self._largest_priority, float(priority.max()))
         self._tree.set(row, priority)
 
@@ -354,13 +321,12 @@ class Replay:
 
     def _forward(self, env: np.ndarray, index: np.ndarray, offset: np.ndarray) -> np.ndarray:
         """Returns the index up to `offset` rows after `index` in its trajectory, found by jumps of halving length."""
-        trajectory = self._trajectory[env, index]
-        here = index
+        trajectories, here = self._rows["trajectory"], index
         jump = 1 << int(offset.max()).bit_length()
         left = offset.copy()
         while jump:
             there = (here + np.minimum(jump, left)) % self._length
-            ok = (self._trajectory[env, there] == trajectory) & self._is_later(env, here, there)
+            ok = (trajectories[env, there] == trajectories[env, index]) & self._is_later(env, here, there)
             moved = np.where(ok, np.minimum(jump, left), 0)
             here = (here + moved) % self._length
             left = left - moved
@@ -408,7 +374,7 @@ class Replay:
         for _ in range(n):
             going &= self._has_next(env, last)
             last = np.where(going, (last + 1) % self._length, last)
-            hit |= going & (self._cell[env, last] == goal)
+            hit |= going & (self._rows["cell"][env, last] == goal)
             reward -= going & ~hit
             going &= ~hit
         return reward, (~hit).astype(np.float32), last
@@ -418,5 +384,6 @@ class Replay:
         after = (index + 1) % self._length
         # The newest row has no next one yet; where collecting began anew, the next row is of another trajectory.
         newest = index == (self._next[env] - 1) % self._length
-        same = self._trajectory[env, after] == self._trajectory[env, index]
-        return (self._action[env, index] != _NO_ACTION) & ~newest & same
+        rows = self._rows[env, index]
+        same = self._rows["trajectory"][env, after] == rows["trajectory"]
+        return (rows["action"] != _NO_ACTION) & ~newest & same

@@ -73,9 +73,4 @@ def shows_other_maps(task: TaskSpec, agent: str) -> bool:
     if any(each.drawing is not None or each.hidden for each in shown):
         found = "map_warp" if task.track is None else f"track {task.track!r}"
         raise InputError(f"{name}: learns only on maps of one pixel a cell with start and goal marked; found {found}")
-    if task.context_size != task.size:
-        raise InputError(
-            f"{name}: learns on tracks and with perturbations from contexts of the maze's size {task.size}, "
-            f"found {task.context_size}"
-        )
     return True

@@ -18,7 +18,6 @@ from mazebench.maps.maze import Cell, cell_to_point
 from mazebench.tasks.context import START
 from mazebench.world.lidar import LidarModel
 
-from ..common.bounds import bounded
 from ..robot.beams import beams_of
 from ..robot.body import LOOK_LEFT, LOOK_RIGHT, TURN_STEP, Body, observed_body
 from ..robot.cells import marked_cell, nearest_cell
@@ -96,7 +95,6 @@ class Navigator(Agent):
         self, inputs: Inputs, state: list[Memory | None], explore: bool = False
     ) -> tuple[np.ndarray, list[Memory | None]]:
         """Returns actions `[B]`, for one environment after the other."""
-        inputs = bounded(inputs)
         actions = np.zeros(len(state), dtype=np.int64)
         for slot, memory in enumerate(state):
             if inputs.active is None or inputs.active[slot]:
