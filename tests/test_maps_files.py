@@ -66,11 +66,6 @@ def test_a_suffix_may_be_in_capitals(mazes, tmp_path):
     assert [maze.name for maze in read_mazes(tmp_path)] == ["a", "b"]
 
 
-def test_a_file_is_one_maze(mazes, tmp_path):
-    write_text_maze(mazes[0], tmp_path / "plan.txt")
-    assert read_mazes(tmp_path / "plan.txt") == (mazes[0],)
-
-
 def test_a_folders_maps_are_read_by_name(mazes, tmp_path):
     write_text_maze(mazes[2], tmp_path / "c.txt")
     write_picture(mazes[1], tmp_path / "b.png")
@@ -93,7 +88,7 @@ def test_the_text_is_read_where_there_is_a_picture_too(mazes, tmp_path):
 def test_a_folder_without_maps_is_refused(tmp_path, content):
     for name in content:
         (tmp_path / name).touch()
-    with pytest.raises(InputError, match=r"expected 1 to 10000 maps \(\.yaml \.yml \.txt .*\), found 0$"):
+    with pytest.raises(InputError, match=r"expected maps \(\.yaml \.yml \.txt .*\), found none$"):
         read_mazes(tmp_path)
 
 

@@ -16,29 +16,23 @@ import mazebench
 from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.constants import STEPS_PER_ACTION
-from mazebench.envs.goal import GoalMazeEnv
 from mazebench.errors import InputError, Remark
 from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.evaluate import run_plan
 from mazebench.evaluation.options import EvalOptions, RunOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.evaluation.pool import open_pool
-from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, corner_cells
-from mazebench.maps.pictures import draw_maze
 from mazebench.maps.text import format_maze
 from mazebench.play.film import film_episode
-from mazebench.play.game import Game
 from mazebench.report.episodes import read_results
-from mazebench.report.report import write_report
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.context import resized_map
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.trials import draw_trials
-from mazebench.world.export import wall_mesh
 from mazebench.world.lidar import Lidar
 from mazebench.world.mjcf import action_controls
 from mazebench.world.models import models_of
@@ -82,14 +76,6 @@ class TestScale:
         assert maze.cell_at(1.0, 3.99) == (1, 2)
         assert maze.side == 4.5
 
-    def test_walls_are_the_same_boxes(self):
-        maze = dfs()
-        one, other = (models_of((each,))[0] for each in (maze, doubled(maze)))
-        walls = [index for index in range(one.ngeom) if one.geom(index).name.startswith("wall")]
-        np.testing.assert_array_equal(one.geom_pos[walls], other.geom_pos[walls])
-        np.testing.assert_array_equal(one.geom_size[walls], other.geom_size[walls])
-        np.testing.assert_array_equal(one.stat.center, other.stat.center)
-
     def test_a_body_drives_the_same_way(self):
         maze = dfs()
         paths = []
@@ -112,33 +98,6 @@ class TestScale:
         index = np.zeros(len(poses), dtype=np.int64)
         one, other = (Lidar([each]).ranges(index, poses) for each in (maze, doubled(maze)))
         np.testing.assert_allclose(one, other, atol=1e-5)
-
-    def test_shortest_paths_scale_with_the_body(self):
-        maze = dfs()
-        large = dataclasses.replace(maze, cell_size=2.5)
-        start, goal = corner_cells(maze)
-        one, other = DiscPaths(maze, 0.15), DiscPaths(large, 2.5 * 0.15)
-        assert other.length(large.point(start), goal) == pytest.approx(2.5 * one.length(maze.point(start), goal))
-        path = other.path(large.point(start), goal, arc_step=2.5 * 0.05)
-        np.testing.assert_allclose(path, 2.5 * one.path(maze.point(start), goal))
-
-    def test_the_mesh_is_the_same(self):
-        maze = dfs()
-        one, other = wall_mesh(maze), wall_mesh(doubled(maze))
-        np.testing.assert_allclose(one.bounds, other.bounds)
-        assert one.volume == pytest.approx(other.volume, rel=1e-4)  # pillars where walls touch
-
-    def test_pictures_show_the_same_path(self):
-        maze = dfs()
-        path = maze.point(np.array(maze.shortest_path(*corner_cells(maze))))
-        pictures = (draw_maze(each, pixels, path=path) for each, pixels in ((maze, 16), (doubled(maze), 8)))
-        thick, thin = (np.ptp(picture.astype(int), axis=-1) > 60 for picture in pictures)
-        assert thin.any()
-        assert not (thin & ~thick).any()
-
-    def test_the_window_names_the_size_of_cells(self):
-        game = Game(make_spec(maps=dfs(cell_size=0.5), start=(1, 1), goal=(7, 7)), 0)
-        assert "cells of 0.5 m" in game.title()
 
 
 class TestEnvironments:
@@ -167,13 +126,6 @@ class TestEnvironments:
         assert env.task.success
         assert 2.0 <= env.physics.position()[0] < 2.5
 
-    def test_hindsight_goals_are_centres_in_metres(self):
-        env = GoalMazeEnv(make_spec(maps=dfs(cell_size=0.7), start="1,1", goal="1,2"))
-        observation, info = env.reset(seed=0)
-        assert env.observation_space.contains(observation)
-        np.testing.assert_allclose(observation["desired_goal"], [1.75, 5.25])
-        assert env.compute_terminated(observation["achieved_goal"], observation["achieved_goal"], info)
-
     def test_mazes_of_one_task_have_one_scale(self):
         with pytest.raises(InputError, match=r"expected mazes of cells of one size in metres, found 0.5, 1.0"):
             make_spec(maps=(dfs(), dfs(cell_size=0.5, seed=1)))
@@ -188,12 +140,13 @@ class TestEnvironments:
 
 
 class TestAgents:
-    @pytest.mark.parametrize("cell_size", [0.5, 2.0])
-    @pytest.mark.parametrize("name", ["planner-closed-loop", "oracle", "navigator"])
+    @pytest.mark.parametrize(
+        ("name", "cell_size"), [("planner-closed-loop", 0.5), ("oracle", 2.0), ("navigator", 0.5), ("navigator", 2.0)]
+    )
     def test_agents_that_plan_drive_at_any_scale(self, name, cell_size):
-        agent_class, maze = load_agent_class(name), dfs(13, cell_size)
-        spec = make_spec(maps=maze, context_size=agent_class.context_size(13), sensors=("lidar",))
-        interface = Interface("local", 13, spec.context_size, sensors=spec.sensors, cell_size=cell_size)
+        agent_class, maze = load_agent_class(name), dfs(9, cell_size)
+        spec = make_spec(maps=maze, context_size=agent_class.context_size(9), sensors=("lidar",))
+        interface = Interface("local", 9, spec.context_size, sensors=spec.sensors, cell_size=cell_size)
         trials = list(enumerate(draw_trials(spec, 1)))
         agent = agent_class.build(interface)
         outcomes = [
@@ -246,7 +199,7 @@ class TestAgents:
 
 
 class TestEnds:
-    @pytest.mark.parametrize("start", ["1,3", (1, 3), np.array([1, 3]), " 1,3", "3.5m,7.5m", "3.01m, 7.99 m"])
+    @pytest.mark.parametrize("start", ["1,3", (1, 3), "3.01m, 7.99 m"])
     def test_a_start_is_a_cell_or_a_point(self, start):
         spec = make_spec(maps=field(9), start=start)
         episodes = [sample_episode(spec, np.random.default_rng(seed)) for seed in range(20)]
@@ -254,27 +207,12 @@ class TestEnds:
         assert len({episode.goal for episode in episodes}) > 5
         assert len({episode.yaw for episode in episodes}) == 20
 
-    def test_a_point_is_in_metres(self):
-        assert make_spec(maps=dataclasses.replace(field(9), cell_size=0.5), goal="1.75m,3.75m").ends(
-            dataclasses.replace(field(9), cell_size=0.5)
-        ) == (None, (1, 3))
-
     def test_the_other_end_is_drawn_at_the_distances(self):
         spec = make_spec(maps=dfs(), goal=(7, 7), distances=(2, 5))
         for seed in range(20):
             episode = sample_episode(spec, np.random.default_rng(seed))
             assert episode.goal == (7, 7)
             assert spec.mazes[0].distance(episode.start, episode.goal) in (2, 5)
-
-    def test_both_ends_are_those_of_every_episode_in_all_environments(self):
-        options = {"maps": dfs(), "start": (1, 1), "goal": (7, 7)}
-        env, vector = mazebench.load("local", **options), mazebench.make_vec("local", 3, **options)
-        vector.reset(seed=0)
-        assert {(episode.start, episode.goal) for episode in vector.episodes} == {((1, 1), (7, 7))}
-        for seed in range(3):
-            env.reset(seed=seed)
-            assert env.task.episode == vector.episodes[seed]
-        vector.close()
 
     def test_landmarks_lead_from_the_start_to_the_goal(self):
         env = mazebench.load("hierarchical", maps=dfs(), start=(7, 7))
@@ -286,14 +224,11 @@ class TestEnds:
         ("options", "message"),
         [
             ({"start": "here"}, r"expected start as a cell 'row,column' or a point '1.5m,2.5m' \(x, y\), found 'here'"),
-            ({"goal": (1, 2, 3)}, r"expected goal as a cell .* found \(1, 2, 3\)"),
-            ({"goal": (1.0, 2.0)}, r"expected goal as a cell .* found \(1.0, 2.0\)"),
             ({"start": "0,0"}, r"start '0,0': dfs-0: expected a free cell, found \(0, 0\), a wall or outside"),
             (
                 {"goal": "99m,1m"},
                 r"goal '99m,1m': dfs-0: expected a point in the 9 x 9 m of the maze, .* found one outside",
             ),
-            ({"goal": "9" * 400 + "m,1m"}, r"found one outside"),
             ({"goal": "0.5m,1m"}, r"free cells reach from \(1, 1\) to \(8, 8\) m, found a wall"),
             ({"start": (1, 1), "goal": "1,1"}, r"dfs-0: expected start and goal in different cells, found both in"),
             ({"start": (1, 1), "distances": (60,)}, r"dfs-0: expected distances of at most \d+ cells.*--distances"),
@@ -334,13 +269,6 @@ class TestDefaults:
         assert make_spec("hierarchical", maps=maze, landmark_distance=20).time_limit == steps_a_cell * 20 + 50
         assert make_spec(maps=maze, time_limit=7).time_limit == 7
 
-    def test_distances_from_a_start_reach_as_far_as_from_there(self):
-        assert make_spec(maps=corridor(), start=(1, 4)).distances == (1, 2, 3)
-
-    def test_the_benchmark_keeps_its_own(self):
-        assert make_spec(split="eval").distances == tuple(range(1, 16))
-        assert make_spec(split="eval").time_limit == 100
-
 
 class TestEvaluation:
     def test_an_own_map_is_evaluated_without_distances(self, tmp_path):
@@ -372,9 +300,6 @@ class TestEvaluation:
         poses = load_trajectories(scaled / TRAJECTORIES, len(records))[0].pose
         np.testing.assert_allclose(poses[0, :2], dfs(13, 0.5).point(records[0].start), atol=0.01)
 
-    def test_a_report_says_the_scale(self, scaled, tmp_path):
+    def test_a_report_says_the_scale(self, scaled):
         (result,) = read_results([scaled])
         assert str(result.setting) == "local, 13 × 13, custom mazes, cells of 0.5 m"
-        write_report([scaled], tmp_path / "report")
-        page = (tmp_path / "report" / "report.html").read_text()
-        assert '"cellSize":0.5' in page

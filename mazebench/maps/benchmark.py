@@ -35,6 +35,7 @@ def mazes_file(size: int, split: str) -> str:
     return f"mazes-{size}-{split}.txt"
 
 
+@functools.cache
 def load_mazes(size: int, split: str) -> tuple[Maze, ...]:
     """Returns the 20 mazes of one size and split of v1.
 
@@ -47,16 +48,12 @@ def load_mazes(size: int, split: str) -> tuple[Maze, ...]:
         raise unknown("size", size, SIZES)
     if split not in SPLITS:
         raise unknown("split", split, SPLITS)
-    return _load_mazes(size, split)
-
-
-@functools.cache
-def _load_mazes(size: int, split: str) -> tuple[Maze, ...]:
     blocks = read_asset(mazes_file(size, split)).split("\n\n")
     mazes = (parse_maze(block, f"{size}-{split}-{index:02d}") for index, block in enumerate(blocks))
     return tuple(dataclasses.replace(maze, kind="dfs") for maze in mazes)
 
 
+@functools.cache
 def load_kind_mazes(split: str) -> tuple[Maze, ...]:
     """Returns the mazes of one split of v3, kind by kind.
 
@@ -65,11 +62,6 @@ def load_kind_mazes(split: str) -> tuple[Maze, ...]:
     """
     if split not in ALL_SPLITS:
         raise unknown("split", split, ALL_SPLITS)
-    return _load_kind_mazes(split)
-
-
-@functools.cache
-def _load_kind_mazes(split: str) -> tuple[Maze, ...]:
     mazes: list[Maze] = []
     for kind in manifest(KINDS_VERSION)["generator"]["kinds"][split]:
         blocks = read_asset(kind_mazes_file(kind, split), KINDS_VERSION).split("\n\n")

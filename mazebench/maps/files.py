@@ -9,7 +9,7 @@ import numpy as np
 
 from mazebench.errors import InputError, held_remarks, remark
 from mazebench.maps.maze import Maze, resized
-from mazebench.maps.options import OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions
+from mazebench.maps.options import MapOptions
 from mazebench.maps.readers.arrays import read_array_maze
 from mazebench.maps.readers.image import read_image_maze
 from mazebench.maps.readers.occupancy import LocatedMaze
@@ -24,7 +24,6 @@ TEXT_SUFFIXES = (".txt", ".map")
 ARRAY_SUFFIXES = (".npy",)
 # In the order in which they are read if a folder holds one map in several: those come first that say the cells' size.
 SUFFIXES = (*ROS_SUFFIXES, *TEXT_SUFFIXES, *ARRAY_SUFFIXES, *IMAGE_SUFFIXES)
-MAX_FILES = 10_000
 # Of a floor plan that is read as a picture of cells: cells a side, and the free share of them. Mazes have more walls.
 _MANY_CELLS, _MOSTLY_FREE = 100, 0.8
 
@@ -38,7 +37,7 @@ def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any)
       **options: those of `mazebench.maps.options.MapOptions`.
 
     Raises:
-      InputError: if the file can't be read or holds no legal maze, or an option does not belong to such files.
+      InputError: if the file can't be read or holds no legal maze.
     """
     return read_located(pathlib.Path(path), size, MapOptions(**options)).maze
 
@@ -54,7 +53,7 @@ def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
       **options: those of `mazebench.maps.options.MapOptions`.
 
     Raises:
-      InputError: if there is no map, one can't be read, or a folder holds more than 10,000.
+      InputError: if there is no map or one can't be read.
     """
     return read_all(pathlib.Path(path), MapOptions(**options))
 
@@ -64,41 +63,34 @@ def read_all(path: pathlib.Path, options: MapOptions) -> tuple[Maze, ...]:
     if not path.is_dir():
         return (read_located(path, None, options).maze,)
     files = _map_files(path)
-    if len(files) == 1:
-        return (read_located(files[0], None, options).maze,)
     mazes, remarks = [], []
     for file in files:
         with held_remarks() as lines:
             mazes.append(read_located(file, None, options).maze)
         remarks.extend(lines[:1])
     if remarks:
-        line = f"{len(remarks)} of {len(mazes)} maps have remarks, such as {remarks[0]}"
-        remark(line)
+        remark(f"{len(remarks)} of {len(mazes)} maps have remarks, such as {remarks[0]}")
     return tuple(mazes)
 
 
 def read_located(path: pathlib.Path, size: int | None, options: MapOptions) -> LocatedMaze:
     """Reads the maze in one file, as `read_maze` does, and its place in the frame of a ROS map."""
     suffix = path.suffix.lower()
-    if suffix not in IMAGE_SUFFIXES:
-        options.require_defaults(PICTURE_OPTIONS, "pictures", f"{path}")
-    elif (ros_map := map_of_picture(path)) is not None:
+    if suffix in IMAGE_SUFFIXES and (ros_map := map_of_picture(path)) is not None:
         raise InputError(f"{path}: expected a maze, found the picture of a ROS map; give {ros_map}")
     if suffix in ROS_SUFFIXES:
         located = locate_ros_maze(path, options)
     elif suffix in ARRAY_SUFFIXES:
         located = LocatedMaze(read_array_maze(path, options))
+    elif suffix not in IMAGE_SUFFIXES:
+        located = LocatedMaze(resized(read_text_maze(path), options.cell_size))
     elif options.pixel_size is not None:
         located = locate_floor_plan(path, options.pixel_size, options)
-    elif suffix in IMAGE_SUFFIXES:
-        options.require_defaults(OCCUPANCY_OPTIONS, "ROS maps, arrays and pictures with a pixel_size", f"{path}")
+    else:
         maze = read_image_maze(path, size, options.walls)
         if options.cell_size is None:
             _remark_on_thin_walls(maze)
         located = LocatedMaze(resized(maze, options.cell_size))
-    else:
-        options.require_defaults(OCCUPANCY_OPTIONS, "ROS maps and arrays", f"{path}")
-        located = LocatedMaze(resized(read_text_maze(path), options.cell_size))
     if size not in (None, located.maze.size):
         raise InputError(f"{path}: expected a maze of size {size}, found size {located.maze.size}")
     return located
@@ -110,11 +102,10 @@ def _remark_on_thin_walls(maze: Maze) -> None:
     inside = free[np.ix_(free.any(axis=1), free.any(axis=0))]
     rows, columns = np.add(inside.shape, 2)  # with the outer walls
     if max(rows, columns) > _MANY_CELLS and inside.mean() > _MOSTLY_FREE:
-        line = (
+        remark(
             f"{maze.name}: read as {columns} m wide and {rows} m high, with a cell of 1 m for the width of a wall; "
             "if it is a floor plan, --pixel-size sets its scale"
         )
-        remark(line)
 
 
 def _map_files(folder: pathlib.Path) -> list[pathlib.Path]:
@@ -130,6 +121,6 @@ def _map_files(folder: pathlib.Path) -> list[pathlib.Path]:
             pictures.add(picture_of(file))
         if file not in pictures:
             by_stem.setdefault(file.stem, file)
-    if not 0 < len(by_stem) <= MAX_FILES:
-        raise InputError(f"{folder}: expected 1 to {MAX_FILES} maps ({' '.join(SUFFIXES)}), found {len(by_stem)}")
+    if not by_stem:
+        raise InputError(f"{folder}: expected maps ({' '.join(SUFFIXES)}), found none")
     return [by_stem[stem] for stem in sorted(by_stem)]

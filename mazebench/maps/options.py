@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Annotated, Any
 
 from annotated_types import Ge, Interval
@@ -60,27 +59,7 @@ class MapOptions:
         ),
     ] = 0.0
 
-    def __post_init__(self) -> None:
-        if self.pixel_size is not None:
-            self.require_defaults(("walls",), "pictures without a pixel_size", f"pixel_size {self.pixel_size:g}")
 
-    def require_defaults(self, names: Iterable[str], expected: str, found: str) -> None:
-        """Raises `InputError` if one of the options `names` has another value than its default.
-
-        Args:
-          names: of fields.
-          expected: what the options belong to, for the message.
-          found: what there is instead.
-        """
-        for name in names:
-            if getattr(self, name) != fields_of(MapOptions)[name].default:
-                raise InputError(f"{name} belongs to {expected}, found {found}")
-
-
-# Those for which a map must say what is unknown, or have pixels smaller than cells.
-OCCUPANCY_OPTIONS = ("unknown", "inflate")
-PICTURE_OPTIONS = ("walls", "pixel_size")
-MAP_OPTIONS = tuple(fields_of(MapOptions))
 THIN_WALLS = "a floor plan with thin walls needs --pixel-size, its metres a pixel"  # of plans that can't be read
 
 Size = Annotated[
@@ -147,7 +126,9 @@ class MazeOptions(MapOptions, DrawnOptions):
     maps: Annotated[Any, Doc("Mazes of your own: a text, picture, array or ROS map, or a folder of them.")] = None
 
     def __post_init__(self) -> None:
-        MapOptions.__post_init__(self)
         DrawnOptions.__post_init__(self)
         if self.is_drawn and self.maps is not None:
             raise InputError("expected maps of your own or mazes that are drawn, found both")
+        for name, field in fields_of(MapOptions).items():
+            if self.maps is None and getattr(self, name) != field.default:
+                raise InputError(f"expected maps of your own with {name}, found none")

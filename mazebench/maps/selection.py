@@ -12,7 +12,7 @@ from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
 from mazebench.maps.files import read_all
 from mazebench.maps.maze import Maze, resized
-from mazebench.maps.options import MAP_OPTIONS, OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions, MazeOptions
+from mazebench.maps.options import MapOptions, MazeOptions
 from mazebench.maps.readers.arrays import read_array
 
 _NUM_MAZES = 20  # of a kind, unless another number is asked for
@@ -33,11 +33,10 @@ def load_mazes_of(options: MazeOptions, default_size: int = 13) -> Mazes:
       default_size: N, unless options name it.
 
     Raises:
-      InputError: if there are no such mazes, a map can't be read, or a map option is given without `maps`.
+      InputError: if there are no such mazes, or a map can't be read.
     """
     size = options.size
     if options.maps is None:
-        options.require_defaults(MAP_OPTIONS, "maps of your own", "the benchmark's mazes")
         size = default_size if size is None else size
         if options.fresh:
             return FreshMazes(options.drawn_kinds, size)
@@ -63,11 +62,9 @@ def _own_mazes(maps: Maps, options: MapOptions) -> tuple[Maze, ...]:
 
 
 def _own_maze(item: object, name: str, options: MapOptions) -> Maze:
-    options.require_defaults(PICTURE_OPTIONS, "pictures", type(item).__name__)
     if isinstance(item, np.ndarray):
         return read_array(item, name, options)
     if not isinstance(item, Maze):
         hint = "; wrap rows of numbers in np.array" if isinstance(item, list) else ""
         raise InputError(f"expected a Maze or an array in maps, found {type(item).__name__}{hint}")
-    options.require_defaults(OCCUPANCY_OPTIONS, "ROS maps and arrays", f"the maze {item.name!r}")
     return resized(item, options.cell_size)

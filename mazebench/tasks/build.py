@@ -10,7 +10,7 @@ import numpy as np
 from mazebench.errors import InputError, unknown
 from mazebench.maps.benchmark import KINDS_SIZE, load_kind_mazes
 from mazebench.maps.drawn import FreshMazes, Mazes
-from mazebench.maps.options import MAP_OPTIONS, MazeOptions
+from mazebench.maps.options import MazeOptions
 from mazebench.maps.selection import Maps, load_mazes_of
 from mazebench.options import by_name, from_names, options_of
 from mazebench.tasks.context import default_context_size
@@ -143,7 +143,6 @@ def load_task_mazes(task: TaskOptions, mazes: MazeOptions) -> Mazes:
         return load_mazes_of(mazes)
     if mazes.maps is not None or mazes.is_drawn:
         return load_mazes_of(mazes, default_size=KINDS_SIZE)
-    mazes.require_defaults(MAP_OPTIONS, "maps of your own", f"the track {task.track!r}")
     if mazes.size not in (None, KINDS_SIZE):
         raise InputError(f"track {task.track!r}: expected size {KINDS_SIZE}, found {mazes.size}")
     return load_kind_mazes(mazes.split)

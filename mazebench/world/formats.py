@@ -13,7 +13,7 @@ from mazebench.errors import InputError, unknown
 from mazebench.maps.files import read_located
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, resized
-from mazebench.maps.options import OCCUPANCY_OPTIONS, PICTURE_OPTIONS, MapOptions
+from mazebench.maps.options import MapOptions
 from mazebench.maps.pictures import draw_maze, write_image
 from mazebench.maps.readers.occupancy import LocatedMaze
 from mazebench.maps.readers.ros import write_ros_map
@@ -40,7 +40,6 @@ def make_mazes(
     if source is not None:
         yield read_located(source, size, options)
         return
-    options.require_defaults((*OCCUPANCY_OPTIONS, *PICTURE_OPTIONS), "maps", "a generated maze")
     size = _DEFAULT_SIZE if size is None else size
     for index in range(count):
         name = f"{kind}-{size}-{seed}-{index:03d}"

@@ -13,7 +13,7 @@ from mazebench.errors import InputError
 from mazebench.maps.file_kinds import kind_of
 from mazebench.maps.grids import square_maze
 from mazebench.maps.maze import MIN_CELL_SIZE, Maze, MazeError
-from mazebench.maps.options import OCCUPANCY_OPTIONS, MapOptions
+from mazebench.maps.options import MapOptions
 from mazebench.maps.readers.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, locate_maze
 from mazebench.storage.files import read_at_most
 
@@ -43,7 +43,6 @@ def read_array(array: np.ndarray, name: str, options: MapOptions) -> Maze:
         raise MazeError(f"{name}: expected a two-dimensional array of numbers, found shape {array.shape} {array.dtype}")
     cell_size = 1.0 if options.cell_size is None else options.cell_size
     if array.dtype == bool or np.isin(array, (0, 1)).all():
-        options.require_defaults(OCCUPANCY_OPTIONS, "an occupancy grid of -1 to 100", "an array of walls")
         return square_maze(array == 1, name, cell_size)
     if array.dtype.kind == "f" or array.min() < UNKNOWN or array.max() > OCCUPIED:
         raise MazeError(
