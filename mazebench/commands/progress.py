@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-from mazebench.training.sitting import Progress, Status, in_words
+from mazebench.training.status import Progress, Status, in_words
 
 _SECONDS_BETWEEN_LINES = 20  # so that there are two a minute even if steps take seconds
 
@@ -160,7 +160,7 @@ class StatusLines:
 
 def describe(status: Status, now: datetime.datetime) -> str:
     """Returns a status in words; `now` is the local time."""
-    parts = [f"{status.share:.0%} of {'this sitting' if status.is_timed else 'the run'} done"]
+    parts = [f"{status.share:.0%} done"]
     if status.seconds_left is not None:
         end = now + datetime.timedelta(seconds=status.seconds_left)
         day = "" if end.date() == now.date() else f"{end:%Y-%m-%d} "
@@ -171,8 +171,8 @@ def describe(status: Status, now: datetime.datetime) -> str:
         parts.append(f"evaluating: {ended:,} of {of:,} held-out episodes")
     elif status.losses:
         parts.append(in_words(status.losses))
-    else:
-        parts.append("collecting before learning begins" if not status.updates else "no update in the last minute")
+    elif not status.updates:
+        parts.append("collecting before learning begins")
     return "; ".join(parts)
 
 

@@ -28,14 +28,14 @@ from mazebench.options import fields_of, from_names
 from mazebench.tasks.build import build_task
 from mazebench.tasks.options import TaskOptions, Variants
 from mazebench.tasks.spec import TaskSpec
-from mazebench.training.counters import BEGINNING, Counters
+from mazebench.training.counters import Counters
 from mazebench.training.experience import Experience
 from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.options import TrainOptions
 from mazebench.training.protocol import Learner, LearningAgent
 from mazebench.training.run_folder import RunFolder, read_counters
-from mazebench.training.sitting import Progress, Sitting, in_words
 from mazebench.training.sources import InProcessSource, Source
+from mazebench.training.status import Progress, Timer, in_words
 
 # As many steps take less than a minute on two cores. They are counted, not timed, so that the same run writes the same
 # lines.
@@ -89,26 +89,22 @@ def train(
         TrainingLoop(options, folder, learner, task, source, held_out, counters, progress).run()
 
 
+@dataclasses.dataclass
 class TrainingLoop:
-    """One sitting of a run."""
+    """Goes on from the checkpoint at the counters, with a learner that is as it was there."""
 
-    def __init__(
-        self,
-        options: TrainOptions,
-        folder: RunFolder,
-        learner: Learner,
-        task: TaskSpec,
-        source: Source,
-        held_out: HeldOutEvaluation,
-        counters: Counters,
-        progress: Progress,
-    ):
-        """Goes on from the checkpoint at `counters`, with a `learner` that is as it was there."""
-        self._options, self._folder, self._learner, self._task, self._source = options, folder, learner, task, source
-        self._held_out, self._progress = held_out, progress
-        self._counters = counters
-        self._sitting = Sitting(options.minutes, options.env_steps, counters)
-        self._saved_steps, self._saved_time = counters.env_steps, time.monotonic()
+    _options: TrainOptions
+    _folder: RunFolder
+    _learner: Learner
+    _task: TaskSpec
+    _source: Source
+    _held_out: HeldOutEvaluation
+    _counters: Counters
+    _progress: Progress
+
+    def __post_init__(self) -> None:
+        self._timer = Timer(self._options.minutes, self._options.env_steps, self._counters)
+        self._saved_steps, self._saved_time = self._counters.env_steps, time.monotonic()
 
     def run(self) -> None:
         """Trains until the time or the steps are up; the last step is a milestone."""
@@ -128,7 +124,7 @@ class TrainingLoop:
                 self._folder.log(self._counters, self._counters.mean_losses())
                 self._counters = self._counters.after_line()
             self._learn_from(next(source))
-            self._progress(self._sitting.status(self._counters))
+            self._progress(self._timer.status(self._counters))
             if self._is_savepoint_due():
                 self._save()
             stopping.check()
@@ -150,10 +146,9 @@ class TrainingLoop:
                 raise TrainingError(
                     f"{name} became {value} at update {self._counters.updates}; last good checkpoint: {last}"
                 )
-        self._sitting.add_update(losses)
 
     def _is_over(self) -> bool:
-        return self._sitting.share_done(self._counters) >= 1.0
+        return self._timer.share_done(self._counters) >= 1.0
 
     def _is_savepoint_due(self) -> bool:
         seconds = 60 * self._options.checkpoint_minutes
@@ -167,7 +162,7 @@ class TrainingLoop:
 
     def _reach_milestone(self) -> None:
         """Saves, evaluates, and logs; a run that is stopped in the evaluation repeats it when it is resumed."""
-        counters, status = self._counters, self._sitting.status(self._counters)
+        counters, status = self._counters, self._timer.status(self._counters)
         self._save()
         rates = self._held_out.success_rates(self._learner.actor, self._show_evaluation)
         metrics = counters.mean_losses() | {f"success_rate_{distance}": rate for distance, rate in rates.items()}
@@ -177,7 +172,7 @@ class TrainingLoop:
 
     def _show_evaluation(self, ended: int, of: int) -> None:
         stopping.check()
-        self._progress(self._sitting.status(self._counters, evaluated=(ended, of)))
+        self._progress(self._timer.status(self._counters, evaluated=(ended, of)))
 
 
 def num_updates_due(learner: Learner, env_steps: int) -> int:
@@ -247,8 +242,8 @@ def _begin_or_resume(
         raise InputError(f"{folder.path}: holds a run already; go on with --resume or name another folder")
     folder.check_config(config)
     if not checkpoints:
-        _save(options, folder, learner, task, BEGINNING)
-        return BEGINNING
+        _save(options, folder, learner, task, Counters())
+        return Counters()
     counters = read_counters(checkpoints[-1])
     learner.load(checkpoints[-1])
     folder.forget_metrics_after(counters)

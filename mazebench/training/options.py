@@ -27,8 +27,10 @@ class TrainOptions:
 
     agent: str = dataclasses.field(kw_only=False)
     overrides: tuple[tuple[str, str], ...] = ()  # values of the agent's config, by name
-    minutes: Annotated[float | None, Interval(ge=0.01, le=_LONGEST_MINUTES), Doc("How long this sitting lasts.")] = None
-    env_steps: Annotated[int | None, Ge(1), Doc("Agent steps of the run, all sittings together.")] = None
+    minutes: Annotated[float | None, Interval(ge=0.01, le=_LONGEST_MINUTES), Doc("How long this command trains.")] = (
+        None
+    )
+    env_steps: Annotated[int | None, Ge(1), Doc("Agent steps of the run, of all commands together.")] = None
     seed: Annotated[int, Interval(ge=0, le=2**63 - 1), Doc("Seed of everything that is drawn.")] = 0
     checkpoint_steps: Annotated[
         int,

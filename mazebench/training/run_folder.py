@@ -5,6 +5,7 @@ A checkpoint is a milestone, where the agent is evaluated, or a savepoint, from 
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import pathlib
@@ -13,9 +14,7 @@ import shutil
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import pydantic
-
-from mazebench.errors import InputError, RunError, describe_fault
+from mazebench.errors import InputError, RunError
 from mazebench.storage.files import make_folder, open_whole, writing_to
 from mazebench.storage.json_files import read_json, read_lines, to_line, write_json
 from mazebench.training.counters import Counters
@@ -48,8 +47,6 @@ class RunFolder:
         for half_written in (self.path / CHECKPOINTS).glob("*.tmp"):
             if _CHECKPOINT_NAME.fullmatch(half_written.stem):
                 shutil.rmtree(half_written, ignore_errors=True)
-        if CONFIG not in found and self.checkpoints():
-            raise InputError(f"{self.path}: expected {CONFIG} beside the checkpoints, found none")
 
     def checkpoints(self) -> list[pathlib.Path]:
         """Returns the complete checkpoints, oldest first."""
@@ -66,7 +63,7 @@ class RunFolder:
         try:
             temporary.mkdir()
             save(temporary)
-            write_json(temporary / _COUNTERS, counters.model_dump())
+            write_json(temporary / _COUNTERS, dataclasses.asdict(counters))
             os.replace(temporary, final)
         except OSError as error:
             shutil.rmtree(temporary, ignore_errors=True)
@@ -84,7 +81,7 @@ class RunFolder:
         self.log(counters, metrics)
         path = self._checkpoint(counters) / _COUNTERS
         try:
-            write_json(path, counters.at_milestone().model_dump())
+            write_json(path, dataclasses.asdict(counters.at_milestone()))
         except OSError as error:
             raise self._cannot("save", path, error) from error
 
@@ -144,17 +141,9 @@ def checkpoints(path: pathlib.Path) -> list[pathlib.Path]:
 
 
 def read_counters(checkpoint: pathlib.Path) -> Counters:
-    """Returns the counters of a checkpoint, whose folder is named after its steps.
+    """Returns the counters of a checkpoint.
 
     Raises:
       InputError: if they can't be read.
     """
-    path = checkpoint / _COUNTERS
-    found = read_json(path)
-    try:
-        counters = Counters.model_validate(found)
-    except pydantic.ValidationError as error:
-        raise InputError(f"{path}: expected the counters of a run, found {describe_fault(error)}") from error
-    if counters.env_steps != int(checkpoint.name):
-        raise InputError(f"{path}: expected env_steps {int(checkpoint.name)}, found {counters.env_steps}")
-    return counters
+    return Counters(**read_json(checkpoint / _COUNTERS))

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 
 class Board:
-    """Writes scalars of one sitting.
+    """Writes scalars of a run.
 
     It uses tensorboardX's inner writer, since the outer one writes in a thread whose errors reach nobody.
     """
@@ -19,7 +19,7 @@ class Board:
         from tensorboardX.event_file_writer import EventsWriter
         from tensorboardX.proto.event_pb2 import Event, SessionLog
 
-        # Two sittings may begin in one second, so the process's id is in the name.
+        # Two commands may begin in one second, so the process's id is in the name.
         self._writer = EventsWriter(str(folder / "events"), f".{os.getpid()}")
         self._writer.write_event(Event(step=step, session_log=SessionLog(status=SessionLog.START)))
 
