@@ -17,8 +17,10 @@ import mazebench
 from mazebench.maps.benchmark import load_kind_mazes
 from mazebench.maps.maze import Cell, Maze
 from mazebench.maps.pictures import draw_grid
+from mazebench.results.played import Shown, shown_of, task_of
 from mazebench.results.reading import load_result
-from mazebench.results.trajectories import TRAJECTORIES, Trajectory, load_trajectories
+from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
+from mazebench.tasks.episode import Episode
 from mazebench.tasks.tracks.base import LEVELS
 
 PATH = pathlib.Path(__file__).parent.parent / "docs" / "images" / "tracks-v3.png"
@@ -35,38 +37,37 @@ def main() -> None:
         for axes in row:
             axes.set_axis_off()
         for level in LEVELS:
-            maze, trajectory = play(track, level)
-            _show(row[level], _shown_map(trajectory), f"{track} {level}")
+            maze, goal, pose, shown = play(track, level)
+            _show(row[level], _shown_map(shown), f"{track} {level}")
             if track == "rebuilt":
-                _mark_moved_doors(row[level], maze, trajectory)
-        _show(row[0], _true_maze(maze, trajectory), "the maze, and a path")
+                _mark_moved_doors(row[level], maze, shown)
+        _show(row[0], _true_maze(maze, goal, pose), "the maze, and a path")
     figure.savefig(PATH, dpi=110, metadata={"Software": None})
     print(PATH)
 
 
-def play(track: str, level: int) -> tuple[Maze, Trajectory]:
-    """Returns the train maze and what was recorded of an episode in it."""
+def play(track: str, level: int) -> tuple[Maze, Cell, np.ndarray, Shown]:
+    """Returns the train maze, and the goal, the poses and the shown map of an episode in it."""
     options = {"track": track, "level": level, "split": "train", "distances": DISTANCE}
     maze = load_kind_mazes("train")[HOUSE]
     with tempfile.TemporaryDirectory() as folder:
         mazebench.evaluate("oracle", folder, record=True, episodes_per_distance=1, **options)
-        records = load_result(pathlib.Path(folder)).records
-        recorded = load_trajectories(pathlib.Path(folder) / TRAJECTORIES, len(records))
-        return maze, recorded[[record.maze for record in records].index(maze.name)]
+        result = load_result(pathlib.Path(folder))
+        [number] = [record.episode for record in result.records if record.maze == maze.name]
+        record = result.records[number]
+        shown = shown_of(task_of(result.summary), Episode(HOUSE, record.start, record.goal, 0.0, record.seed))
+        pose = load_trajectories(pathlib.Path(folder) / TRAJECTORIES)[number].pose.astype(float)
+        return maze, record.goal, pose, shown
 
 
-def _true_maze(maze: Maze, trajectory: Trajectory) -> np.ndarray:
-    goal = divmod(int(trajectory.landmarks[-1]), maze.size)
-    x, y = trajectory.pose[0, :2].astype(float)
-    return draw_grid(
-        maze.walls, PANEL // maze.size, (int(maze.size - y), int(x)), goal, trajectory.pose[:, :2].astype(float)
-    )
+def _true_maze(maze: Maze, goal: Cell, pose: np.ndarray) -> np.ndarray:
+    x, y = pose[0, :2]
+    return draw_grid(maze.walls, PANEL // maze.size, (int(maze.size - y), int(x)), goal, pose[:, :2])
 
 
-def _shown_map(trajectory: Trajectory) -> np.ndarray:
-    pixels = trajectory.shown if trajectory.picture is None else trajectory.picture / 255
-    assert trajectory.marks is not None
-    start, goal = (_cell(mark, len(pixels)) for mark in trajectory.marks.tolist())
+def _shown_map(shown: Shown) -> np.ndarray:
+    pixels = shown.walls if shown.are_cells else shown.walls / 255
+    start, goal = (_cell(mark, len(pixels)) for mark in (shown.start, shown.goal))
     return draw_grid(pixels, PANEL // len(pixels), start, goal)
 
 
@@ -74,10 +75,10 @@ def _cell(mark: int, size: int) -> Cell | None:
     return None if mark < 0 else divmod(mark, size)
 
 
-def _mark_moved_doors(axes: Axes, maze: Maze, trajectory: Trajectory) -> None:
+def _mark_moved_doors(axes: Axes, maze: Maze, shown: Shown) -> None:
     """Frames the cells in which the map differs from the maze."""
     pixels = PANEL // maze.size
-    for row, column in np.argwhere(trajectory.shown != maze.walls):
+    for row, column in np.argwhere(shown.walls != maze.walls):
         corner = (column * pixels, row * pixels)
         axes.add_patch(Rectangle(corner, pixels, pixels, fill=False, edgecolor="#e8871e", linewidth=1.5))
 

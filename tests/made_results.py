@@ -8,18 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.evaluation.recorder import Recorder
-from mazebench.maps.benchmark import KINDS_VERSION, VERSION, manifest_hash
+from mazebench.evaluation.options import EvalOptions
+from mazebench.maps.benchmark import KINDS_VERSION, VERSION, load_mazes, manifest_hash
 from mazebench.maps.maze import cell_to_point, path_through_walls
+from mazebench.options import by_name
 from mazebench.results.metrics import spl, summarize, summarize_facts
+from mazebench.results.played import mazes_hash
 from mazebench.results.reading import EPISODES, SUMMARY
 from mazebench.results.records import Record
-from mazebench.results.trajectories import TRAJECTORIES, Trajectory, pack_trajectories, save_trajectories
+from mazebench.results.trajectories import TRAJECTORIES, Trajectory, save_trajectories
 from mazebench.storage.json_files import write_json
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.build import build_task, make_spec
 from mazebench.tasks.observation import state_errors
 from mazebench.tasks.perturbations import perturbation_levels
-from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.trials import Trial, select_trials
 
@@ -67,14 +68,20 @@ def make_result(
 
     On a track, all frozen episodes of the first `num_mazes` mazes are played.
     """
+    played: dict[str, Any] = {"split": split, "episodes_per_distance": episodes_per_distance, "seed": seed}
     if track is not None:
-        spec = make_spec(track, split=split, level=level)
-        size, version, labels = spec.size, KINDS_VERSION, {"track": track, "level": level}
-        trials = select_trials(spec, split if split == "eval" else None, episodes_per_distance)
+        version, labels, played = (
+            KINDS_VERSION,
+            {"track": track, "level": level},
+            played | {"track": track, "level": level},
+        )
     else:
         version, labels = VERSION, {}
-        spec = make_spec(task, size, split, distances=distances, landmark_distance=landmark_distance, **levels)
-        trials = select_trials(spec, split if split == "eval" else None, episodes_per_distance)
+        played |= {"task": task, "size": size, "distances": distances, "landmark_distance": landmark_distance, **levels}
+    options = EvalOptions.of(agent, **played)
+    spec = build_task(options.task, options.mazes)
+    trials = select_trials(spec, split if split == "eval" else None, episodes_per_distance)
+    size = spec.size
     rng = np.random.default_rng([len(agent), size, landmark_distance, seed])
     labels = {"agent": agent, "task": task, "size": size, "split": split} | labels
     records, drives = [], []
@@ -87,11 +94,12 @@ def make_result(
     folder.mkdir(parents=True)
     (folder / EPISODES).write_text("".join(each.to_line() for each in records))
     if record:
-        save_trajectories(folder / TRAJECTORIES, pack_trajectories(drives))
+        save_trajectories(folder / TRAJECTORIES, drives)
     provenance = {
         "benchmark_manifest_sha256": manifest_hash(version),
         "checkpoint_sha256": checkpoint,
-        "options": {"landmark_distance": landmark_distance, "seed": seed},
+        "mazes_sha256": mazes_hash(spec),
+        "options": by_name(options),
         "command": ["mazebench", "eval", "--agent", agent],
         "packages": {"mazebench-mujoco": "0.1.0", "numpy": np.__version__},
     }
@@ -120,9 +128,21 @@ def edit_records(folder: pathlib.Path, edit: Any) -> pathlib.Path:
 
 
 def of_own_mazes(folder: pathlib.Path, name: str) -> pathlib.Path:
-    """Makes the result one of mazes that are not the benchmark's, called `name`-00 and so on."""
-    edit_records(folder, lambda record: record | {"split": "custom", "maze": f"{name}{record['maze'][-3:]}"})
-    return edit_summary(folder, split="custom")
+    """Makes the result one of mazes that are not the benchmark's, called `name`-00 and so on, with files of them."""
+    summary, used = read_summary(folder), set()
+    edit_records(
+        folder,
+        lambda record: record | {"split": "custom", "maze": used.add(record["maze"]) or f"{name}{record['maze'][-3:]}"},
+    )
+    maps = folder / "maps"
+    maps.mkdir()
+    for maze in load_mazes(summary["size"], "eval"):
+        if maze.name in used:
+            rows = ("".join("#" if wall else "." for wall in row) for row in maze.walls)
+            (maps / f"{name}{maze.name[-3:]}.txt").write_text("\n".join(rows) + "\n")
+    provenance = summary["provenance"] | {"mazes_sha256": mazes_hash(make_spec(maps=maps))}
+    provenance["options"] |= {"maps": str(maps), "size": None}
+    return edit_summary(folder, split="custom", provenance=provenance)
 
 
 def _set_means(folder: pathlib.Path, records: list[Record]) -> pathlib.Path:
@@ -144,16 +164,15 @@ def _drive(spec: TaskSpec, trial: Trial, success: bool, rng: np.random.Generator
     if not success:
         place = np.concatenate([place, place[-1] + rng.normal(0, 0.05, (100, 2))])
     heading = np.arctan2(*np.diff(place, axis=0, prepend=place[:1] - [[1e-3, 0]]).T[::-1])
-    states = np.zeros((len(place), 12))
-    states[:, [0, 1, 5]] = np.column_stack([place, heading])
-    for error in state_errors(spec, episode):
-        for state in states:
-            error(state)
-    recorder = Recorder(spec, 1)
-    for at, yaw, state in zip(place[:-1, None], heading[:-1, None], states[:-1, None], strict=True):
-        recorder.add(at, yaw, state, np.array([True]))
-    context = leg_context(spec, show_map(spec, episode), episode.start, episode.goal)
-    return recorder.take(0, place[-1], heading[-1], {"state": states[-1], "context": context}, episode)
+    observed = None
+    if spec.track is not None and (errors := state_errors(spec, episode)):
+        states = np.zeros((len(place), 12))
+        states[:, [0, 1, 5]] = np.column_stack([place, heading])
+        for error in errors:
+            for state in states:
+                error(state)
+        observed = states[:, [0, 1, 5]].astype(np.float16)
+    return Trajectory(np.column_stack([place, heading]).astype(np.float16), observed)
 
 
 def _outcome(number: int, trial: Trial, spec: TaskSpec, success: bool, drive: Trajectory) -> dict[str, Any]:

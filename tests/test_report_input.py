@@ -8,7 +8,7 @@ import sys
 import warnings
 
 import pytest
-from made_results import edit_records, edit_summary, make_result, of_own_mazes, read_summary
+from made_results import edit_summary, make_result, of_own_mazes, read_summary
 
 from mazebench import cli
 from mazebench.errors import InputError, Remark
@@ -43,21 +43,16 @@ def unfinish(folder):
     (folder / EPISODES).rename(folder / JOURNAL)
 
 
-def rename_split(folder):
-    edit_records(folder, lambda record: record | {"split": "test"})
-    edit_summary(folder, split="test")
-
-
-def raise_level(folder):
-    edit_records(folder, lambda record: record | {"track": "adrift", "level": 4})
-    edit_summary(folder, track="adrift", level=4)
+def change_options(folder, **options):
+    provenance = read_summary(folder)["provenance"]
+    edit_summary(folder, provenance=provenance | {"options": provenance["options"] | options})
 
 
 FAULTS = {
-    "expected level from 1 to 3, found 4": raise_level,
+    "expected level from 1 to 3, found 4": lambda folder: change_options(folder, track="adrift", level=[4]),
     "line 4": cut_records,
     "expected a finished evaluation": unfinish,
-    "unknown split 'test'; available: custom, dev, eval, train": rename_split,
+    "unknown split 'test'; available: ": lambda folder: change_options(folder, split="test"),
 }
 
 

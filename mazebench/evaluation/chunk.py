@@ -24,6 +24,7 @@ from mazebench.results.metrics import spl
 from mazebench.results.records import Record
 from mazebench.results.trajectories import Trajectory
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.observation import state_errors
 from mazebench.tasks.shown_map import is_blocked, show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.trials import Trial
@@ -130,7 +131,7 @@ def run_trials(
     state = agent.initial_state(num_envs)
     active = new_episode = np.ones(num_envs, dtype=bool)
     seeds = np.zeros(num_envs, dtype=np.int64)
-    recorder = Recorder(task, num_envs) if record else None
+    recorder = Recorder(num_envs) if record else None
     env = MazeVectorEnv(task, num_envs, num_threads=num_threads, episode_source=next_episode)
     with contextlib.closing(env):
         observation, info = env.reset()
@@ -158,7 +159,10 @@ def run_trials(
             active = np.array([numbered is not None for numbered in slots])
             new_episode = ended & active
 
-            yield [_outcome(*_present(running[slot]), info, slot, recorder) for slot in np.flatnonzero(ended).tolist()]
+            yield [
+                _outcome(task, *_present(running[slot]), info, slot, recorder)
+                for slot in np.flatnonzero(ended).tolist()
+            ]
 
 
 def _present(numbered: tuple[int, Trial] | None) -> tuple[int, Trial]:
@@ -166,11 +170,15 @@ def _present(numbered: tuple[int, Trial] | None) -> tuple[int, Trial]:
     return numbered
 
 
-def _outcome(index: int, trial: Trial, info: dict[str, Any], slot: int, recorder: Recorder | None) -> Outcome:
+def _outcome(
+    task: TaskSpec, index: int, trial: Trial, info: dict[str, Any], slot: int, recorder: Recorder | None
+) -> Outcome:
     final, trajectory = info["final_info"], None
     if recorder:
-        pose = final["position"][slot], final["yaw"][slot]
-        trajectory = recorder.take(slot, *pose, info["final_obs"][slot], trial.episode)
+        last = final["position"][slot], final["yaw"][slot], info["final_obs"][slot]["state"]
+        pose, observed = recorder.take(slot, *last)
+        is_wrong = task.track is not None and state_errors(task, trial.episode)
+        trajectory = Trajectory(pose, observed if is_wrong else None)
     success, steps = bool(final["success"][slot]), int(final["steps"][slot])
     return Outcome(index, trial, success, steps, float(final["path_length"][slot]), trajectory)
 

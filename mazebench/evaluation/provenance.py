@@ -21,6 +21,7 @@ from mazebench.errors import InputError
 from mazebench.evaluation.options import EvalOptions
 from mazebench.maps.benchmark import manifest_hash
 from mazebench.options import by_name
+from mazebench.results.played import mazes_hash
 from mazebench.results.records import Provenance
 from mazebench.storage.files import open_file
 from mazebench.tasks.options import Variants
@@ -72,13 +73,6 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
 def _told_checkpoint(path: str | None, agent_class: type[Agent]) -> str | None:
     """Returns the path of a checkpoint as given; a file that ships is told by its name alone."""
     return pathlib.Path(path).name if path and path == str(agent_class.default_checkpoint()) else path
-
-
-def mazes_hash(task: TaskSpec) -> str:
-    """Returns a SHA-256 of the mazes; 1 m, the width of the benchmark's cells, does not change it."""
-    scale = "" if task.cell_size == 1 else repr(task.cell_size)
-    walls = b"".join(maze.walls.tobytes() for maze in task.fixed_mazes)
-    return hashlib.sha256(walls + scale.encode("ascii")).hexdigest()
 
 
 def code_hash(agent: str, agent_class: type[Agent]) -> str | None:

@@ -12,15 +12,17 @@ import pathlib
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.chunk import Ended
 from mazebench.evaluation.plan import Plan
 from mazebench.results.metrics import Steps
 from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, ORACLE, SUMMARY, read_oracle_steps
 from mazebench.results.records import Record, Summary
-from mazebench.results.trajectories import TRAJECTORIES, from_json, pack_trajectories, save_trajectories, to_json
+from mazebench.results.trajectories import TRAJECTORIES, Trajectory, save_trajectories
 from mazebench.storage.files import make_folder, open_whole, writing_to
-from mazebench.storage.json_files import read_json, to_line, write_json
+from mazebench.storage.json_files import read_json, read_lines, to_line, write_json
 
 
 def is_finished(folder: pathlib.Path, record: bool = False) -> bool:
@@ -64,7 +66,8 @@ class Store:
             raise InputError(f"{folder}: holds a run already; go on with --resume or name another folder")
         elif found - {JOURNAL}:
             raise InputError(f"{folder}: expected an empty folder or an evaluation's, found {min(found)!r} in it")
-        ended = _read_journal(folder / JOURNAL, plan)
+        # A line that a kill cut short is passed over: its episode is run again.
+        ended = [_from_line(line) for line in read_lines(folder / JOURNAL)]
         self.record = record or any(each.trajectory for each in ended)
         self._ended = {each.record.episode: each for each in ended if each.trajectory or not self.record}
         with writing_to(folder):
@@ -122,8 +125,7 @@ class Store:
             with open_whole(self.folder / EPISODES) as file:
                 file.write("".join(each.record.to_line() for each in ended).encode("utf-8"))
             if self.record:
-                trajectories = [each.trajectory for each in ended if each.trajectory]
-                save_trajectories(self.folder / TRAJECTORIES, pack_trajectories(trajectories))
+                save_trajectories(self.folder / TRAJECTORIES, [each.trajectory for each in ended if each.trajectory])
             write_json(self.folder / SUMMARY, summary.to_dict())
             (self.folder / JOURNAL).unlink(missing_ok=True)
 
@@ -149,20 +151,12 @@ class Store:
                 self.folder.rmdir()
 
 
-def _read_journal(path: pathlib.Path, plan: Plan) -> list[Ended]:
-    """Returns the episodes in a journal. A line that is not whole is passed over: its episode is run again."""
-    ended = []
-    for line in path.read_bytes().splitlines() if path.exists() else ():
-        with contextlib.suppress(ValueError):
-            content = json.loads(line)
-            record = Record.model_validate_json(json.dumps(content["record"]))
-            trajectory = content.get("trajectory")
-            ended.append(Ended(record, None if trajectory is None else from_json(trajectory, plan.task.size)))
-    return ended
+def _from_line(line: dict[str, Any]) -> Ended:
+    record = Record.model_validate_json(json.dumps(line["record"]))  # lists are tuples in JSON only
+    poses = [None if each is None else np.array(each, dtype=np.float16) for each in line["trajectory"]]
+    return Ended(record, Trajectory(*poses) if poses else None)
 
 
 def _to_line(ended: Ended) -> str:
-    content: dict[str, Any] = {"record": ended.record.model_dump()}
-    if ended.trajectory:
-        content["trajectory"] = to_json(ended.trajectory)
-    return to_line(content)
+    trajectory = [None if poses is None else poses.tolist() for poses in ended.trajectory or ()]
+    return to_line({"record": ended.record.model_dump(), "trajectory": trajectory})

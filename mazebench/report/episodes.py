@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import os
 import pathlib
 from collections.abc import Iterable, Sequence
@@ -12,11 +13,14 @@ import pandas as pd
 
 from mazebench.errors import InputError, remark, unknown
 from mazebench.maps.benchmark import KINDS_VERSION, VERSION, manifest_hash
-from mazebench.report.settings import Setting, make_setting
+from mazebench.report.settings import CUSTOM, Setting, make_setting
 from mazebench.results.metrics import ON_TIME_METRICS, by_fact, scores
+from mazebench.results.played import Shown, shown_of, task_of
 from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, Result, load_result
 from mazebench.results.records import Summary
-from mazebench.results.trajectories import TRAJECTORIES, Trajectories, load_trajectories
+from mazebench.results.trajectories import TRAJECTORIES, Trajectory, load_trajectories
+from mazebench.tasks.episode import Episode
+from mazebench.tasks.spec import TaskSpec
 
 # What `ReportedResult.episodes` says of each episode: fields of its record. Facts of a track are further columns.
 _OF_RECORDS = [
@@ -38,7 +42,8 @@ class ReportedResult:
     setting: Setting
     episodes: pd.DataFrame  # a row for each episode in protocol order; the metrics are columns
     facts: tuple[str, ...]  # columns of bools: what a track says of episodes, as "blocked" and "not blocked"
-    trajectories: Trajectories | None  # None if none were recorded
+    task: TaskSpec | None  # None if its mazes are gone
+    trajectories: list[Trajectory] | None  # None if none were recorded, or the task is not known
 
     @property
     def name(self) -> str:
@@ -64,6 +69,26 @@ class ReportedResult:
     def benchmark(self) -> tuple[str, str]:
         """The benchmark's version and the SHA-256 of its manifest."""
         return self.summary.benchmark, self.summary.provenance.benchmark_manifest_sha256 or ""
+
+    @functools.cached_property
+    def mazes(self) -> dict[str, int]:
+        """The indices of the task's mazes by their names; none if the task is not known."""
+        return {maze.name: index for index, maze in enumerate(self.task.fixed_mazes)} if self.task else {}
+
+    @functools.cached_property
+    def shown(self) -> list[Shown]:
+        """What the agent was shown in each episode; nothing if the task is not known."""
+        if self.task is None:
+            return []
+        columns = (self.episodes[name] for name in ("maze", "start", "goal", "seed"))
+        return [
+            shown_of(self.task, Episode(self.mazes[maze], start, goal, 0.0, seed))
+            for maze, start, goal, seed in zip(*columns, strict=True)
+        ]
+
+    def walls(self, maze: str) -> np.ndarray | None:
+        """Returns `[N, N]` bool, a maze; None if the task is not known."""
+        return self.task.mazes[self.mazes[maze]].walls if self.task else None
 
 
 def read_results(paths: Iterable[pathlib.Path], names: Sequence[tuple[str, str]] = ()) -> list[ReportedResult]:
@@ -185,14 +210,17 @@ def _describe(path: pathlib.Path) -> str:
 
 def _read_result(folder: pathlib.Path) -> ReportedResult:
     result = load_result(folder)
-    summary = result.summary
+    summary, task = result.summary, None
     try:
-        setting = make_setting(summary, result.records)
+        task = task_of(summary)
     except InputError as error:
-        raise InputError(f"{folder}: {error}") from error
+        if summary.split != CUSTOM:
+            raise InputError(f"{folder}: {error}") from error
+        remark(f"{folder}: {error}; reported without mazes and paths")
     episodes, facts = _to_table(result)
-    trajectories = _read_trajectories(folder, episodes, setting)
-    return ReportedResult(folder, summary, summary.agent, setting, episodes, facts, trajectories)
+    trajectories = _read_trajectories(folder, episodes) if task else None
+    setting = make_setting(summary, result.records)
+    return ReportedResult(folder, summary, summary.agent, setting, episodes, facts, task, trajectories)
 
 
 def _to_table(result: Result) -> tuple[pd.DataFrame, tuple[str, ...]]:
@@ -205,17 +233,17 @@ def _to_table(result: Result) -> tuple[pd.DataFrame, tuple[str, ...]]:
     return episodes.assign(**metrics, **facts), tuple(facts)
 
 
-def _read_trajectories(folder: pathlib.Path, episodes: pd.DataFrame, setting: Setting) -> Trajectories | None:
+def _read_trajectories(folder: pathlib.Path, episodes: pd.DataFrame) -> list[Trajectory] | None:
     """Returns the trajectories if the folder has some that fit the records."""
     path = folder / TRAJECTORIES
     if not path.exists():
         return None
     try:
-        trajectories = load_trajectories(path, len(episodes))
+        trajectories = load_trajectories(path)
     except InputError as error:
         remark(f"{error}; reported without paths")
         return None
-    if trajectories.size != setting.size or not np.array_equal(trajectories.length, episodes.steps + 1):
+    if [len(each.pose) for each in trajectories] != (episodes.steps + 1).tolist():
         remark(f"{path}: expected a pose for the start and for each step, found others; reported without paths")
         return None
     return trajectories

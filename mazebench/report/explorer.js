@@ -93,13 +93,12 @@ function shownMap({ columns, maps }, result, index, real) {
   const count = result.picture ? side * side : Math.ceil((side * side) / 8);
   const map = maps.subarray(index * count, (index + 1) * count);
   const recorded = () => (result.picture ? Array.from(map, (value) => value / 255) : wallsOf(map, side));
-  const isTrack = data.settings[result.setting].level > 0;
   return {
     side,
     shown: maps.length ? recorded() : result.exact ? real : null,
     shownStart: (columns.shownStart || columns.start)[index],
     shownGoal: (columns.shownGoal || columns.goal)[index],
-    isDrawn: isTrack ? result.picture > 0 : Boolean(columns.shownStart),
+    isDrawn: result.drawn,
     context: result.context,
   };
 }

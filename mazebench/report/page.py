@@ -24,12 +24,12 @@ from mazebench.maps import colors
 from mazebench.maps.maze import Cell
 from mazebench.report.episodes import ReportedResult
 from mazebench.report.figures import Drawn, to_svg
-from mazebench.report.mazes import real_walls, shown_ends
 from mazebench.report.settings import Setting
 from mazebench.report.table import METRICS, Table
 from mazebench.report.trajectories import CELL_COLORS, TIME_COLORS
 from mazebench.results.paper import citation, reference
-from mazebench.results.trajectories import Trajectories
+from mazebench.results.played import Shown
+from mazebench.results.trajectories import Trajectory
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.options import TaskOptions
 from mazebench.world.lidar import NUM_RAYS
@@ -60,7 +60,7 @@ def build_page(
     """
     style = f":root {{ {' '.join(f'--{name}: {color};' for name, color in _colors().items())} }}\n{_read('page.css')}"
     script = "".join(map(_read, ("drawing.js", "explorer.js")))
-    packed = (_pack(_columns(result, results)) for result in results)
+    packed = (_pack(_columns(result)) for result in results)
     parts = {
         # Figures have attributes `style`.
         "POLICY": f"default-src 'none'; style-src '{_hash(style)}'; style-src-attr 'unsafe-inline'; "
@@ -152,7 +152,7 @@ def _explorer_data(results: Sequence[ReportedResult]) -> dict[str, Any]:
     }
 
 
-def _columns(result: ReportedResult, results: Sequence[ReportedResult]) -> dict[str, Any]:
+def _columns(result: ReportedResult) -> dict[str, Any]:
     """Returns the episodes of a result by columns, the paths, and the shown maps where they need not be the mazes."""
     episodes, trajectories, size = result.episodes, result.trajectories, result.setting.size
     columns: dict[str, Any] = {
@@ -169,33 +169,38 @@ def _columns(result: ReportedResult, results: Sequence[ReportedResult]) -> dict[
         "splGrid": episodes.spl_grid.round(2).tolist(),
         "groups": {fact: episodes[fact].astype(int).tolist() for fact in result.facts},
     }
-    shown = shown_ends(result, results)
-    if shown is not None:
-        columns["shownStart"], columns["shownGoal"] = (_indices(cells, size) for cells in shown)
-    if trajectories is None:
-        return columns
-    scale = [result.setting.cell_size] * 2 + [1.0]
-    columns["path"] = _changes(trajectories.pose / scale)
-    if trajectories.observed is not None:
-        columns["observed"] = _changes(lay_on_first_poses(trajectories) / scale)
-    columns["landmarks"] = [trajectories[number].landmarks[:-1].tolist() for number in range(len(episodes))]
-    if trajectories.marks is not None:
-        columns["shownStart"], columns["shownGoal"] = trajectories.marks.T.tolist()
-    if not result.setting.is_exact:
-        maps = trajectories.shown if trajectories.picture is None else trajectories.picture
-        columns["maps"] = _base64(maps.tobytes())
+    if maps := _shown(result):
+        columns["shownStart"] = [shown.start for shown in maps]
+        columns["shownGoal"] = [shown.goal for shown in maps]
+    if trajectories:
+        scale = [result.setting.cell_size] * 2 + [1.0]
+        columns["path"] = _changes(np.concatenate([each.pose for each in trajectories]) / scale)
+        if trajectories[0].observed is not None:
+            columns["observed"] = _changes(np.concatenate([lay_on_first_pose(each) for each in trajectories]) / scale)
+        columns["landmarks"] = [shown.landmarks for shown in maps]
+        if not result.setting.is_exact:
+            pixels = (shown.walls if _is_picture(shown) else np.packbits(shown.walls) for shown in maps)
+            columns["maps"] = _base64(b"".join(map(np.ndarray.tobytes, pixels)))
     return columns
 
 
-def lay_on_first_poses(trajectories: Trajectories) -> np.ndarray:
-    """Returns `[sum(length), 3]` float64: the observed paths, each turned and moved to begin in the true pose."""
-    assert trajectories.observed is not None
-    true, observed = trajectories.pose.astype(np.float64), trajectories.observed.astype(np.float64)
-    first = np.repeat(np.cumsum(trajectories.length) - trajectories.length, trajectories.length)
-    turn = true[first, 2] - observed[first, 2]
-    x, y = (observed - observed[first])[:, :2].T
+def _shown(result: ReportedResult) -> list[Shown]:
+    """Returns what was shown in the episodes of a result with paths or perturbations; nothing for others."""
+    return result.shown if result.trajectories or result.setting.perturbations else []
+
+
+def lay_on_first_pose(trajectory: Trajectory) -> np.ndarray:
+    """Returns `[L, 3]` float64: the observed path, turned and moved to begin in the true pose."""
+    assert trajectory.observed is not None
+    first, observed = trajectory.pose[0].astype(np.float64), trajectory.observed.astype(np.float64)
+    turn = first[2] - observed[0, 2]
+    x, y = (observed - observed[0])[:, :2].T
     moved = np.column_stack([np.cos(turn) * x - np.sin(turn) * y, np.sin(turn) * x + np.cos(turn) * y])
-    return np.column_stack([true[first, :2] + moved, observed[:, 2] + turn])
+    return np.column_stack([first[:2] + moved, observed[:, 2] + turn])
+
+
+def _is_picture(shown: Shown) -> bool:
+    return shown.walls.dtype == np.uint8
 
 
 def _changes(poses: np.ndarray) -> list[list[int]]:
@@ -227,7 +232,7 @@ def _mazes(results: Sequence[ReportedResult]) -> tuple[list[dict[str, Any]], lis
             key = (setting.split, setting.mazes, setting.size, name)
             if key not in index:
                 index[key] = len(mazes)
-                walls = real_walls(result, name, results)
+                walls = result.walls(name)
                 mazes.append({"name": name, "walls": None if walls is None else _base64(np.packbits(walls).tobytes())})
             here.append(index[key])
         places.append(here)
@@ -241,13 +246,12 @@ def _names(setting: Setting) -> dict[str, Any]:
 
 
 def _describe(result: ReportedResult) -> dict[str, Any]:
-    setting, trajectories = result.setting, result.trajectories
-    picture = None if trajectories is None else trajectories.picture
+    setting, shown = result.setting, _shown(result)
     provenance = result.summary.provenance
     sensors = (provenance.options.model_extra or {}).get("sensors", ())
     lidar = TaskOptions(track=setting.track or None, lidar_noise=result.summary.lidar_noise).lidar
     # Cells a side of the agent's map: those of the shown map, unless it is large and the agent asks for fewer.
-    side = setting.size if picture is None else picture.shape[-1]
+    side = len(shown[0].walls) if shown and result.trajectories else setting.size
     context_size = (provenance.model_extra or {}).get("context_size")  # results of earlier versions do not say it
     if setting.track or side == default_context_size(side):
         context_size = side
@@ -258,7 +262,8 @@ def _describe(result: ReportedResult) -> dict[str, Any]:
         "episodes": len(result.episodes),
         "exact": setting.is_exact,
         "context": min(context_size, side) if isinstance(context_size, int) else 0,  # 0 if it is not known
-        "picture": 0 if picture is None else picture.shape[-1],
+        "picture": side if shown and _is_picture(shown[0]) else 0,
+        "drawn": any(not each.are_cells for each in shown),
         "lidar": lidar.max_range if setting.track or "lidar" in sensors else 0,  # m
         "groups": result.facts,
     }

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Any
 
-from mazebench.errors import unknown
-from mazebench.maps.benchmark import ALL_SPLITS, KINDS_SIZE, SIZES
 from mazebench.options import options_of
 from mazebench.results.records import Record, Summary
-from mazebench.tasks.options import ENDS, TaskOptions
+from mazebench.tasks.options import ENDS
 from mazebench.tasks.perturbations import Perturbations
 
 DEFAULT_LANDMARK_DISTANCE = 5  # cells; the paper's choice wherever it varies something else
-_CUSTOM = "custom"  # the split of mazes that are not the benchmark's
+CUSTOM = "custom"  # the split of mazes that are not the benchmark's
 
 
 @dataclasses.dataclass(frozen=True, order=True)
@@ -78,37 +74,21 @@ class Setting:
 
 
 def make_setting(summary: Summary, records: tuple[Record, ...]) -> Setting:
-    """Returns the setting of an evaluation.
-
-    Raises:
-      InputError: if this version of the benchmark has no such task, track, size, split or level.
-    """
-    name, level = summary.track or "", (summary.level or 0) if summary.track else 0
-    track: dict[str, Any] = {"track": name, "level": (level,)} if name else {}
-    TaskOptions(task=summary.task, **track, **known_levels(summary.perturbation))  # raises if one is not allowed
-    sizes = (KINDS_SIZE,) if name else SIZES
-    if summary.split not in (*ALL_SPLITS, _CUSTOM):
-        raise unknown("split", summary.split, (*ALL_SPLITS, _CUSTOM))
-    if summary.split in ALL_SPLITS and summary.size not in sizes:
-        raise unknown("size", summary.size, sizes)
+    """Returns the setting of an evaluation."""
+    options = summary.provenance.options
     return Setting(
         task=summary.task,
         size=summary.size,
         split=summary.split,
-        landmark_distance=summary.provenance.options.landmark_distance if summary.task == "hierarchical" else 0,
+        landmark_distance=options.landmark_distance if summary.task == "hierarchical" else 0,
         perturbations=tuple(sorted((name, level) for name, level in summary.perturbation.items() if level)),
-        mazes=tuple(sorted({record.maze for record in records})) if summary.split == _CUSTOM else (),
-        track=name,
-        level=level,
+        mazes=tuple(sorted({record.maze for record in records})) if summary.split == CUSTOM else (),
+        track=summary.track or "",
+        level=summary.level or 0,
         cell_size=summary.cell_size or 1.0,
-        ends=(summary.provenance.options.start or "", summary.provenance.options.goal or ""),
+        ends=(options.start or "", options.goal or ""),
         senses=summary.senses,
     )
-
-
-def known_levels(levels: Mapping[str, float]) -> dict[str, Any]:
-    """Returns the levels of those perturbations that this version of the package has."""
-    return {name: level for name, level in levels.items() if name in options_of(Perturbations)}
 
 
 def level_name(perturbation: str) -> str:
@@ -122,6 +102,5 @@ def short_name(perturbation: str) -> str:
 
 
 def level_help(perturbation: str) -> str:
-    """Returns in a sentence what a level means; nothing for a perturbation that this version does not have."""
-    found = options_of(Perturbations).get(perturbation)
-    return "" if found is None else found.help
+    """Returns in a sentence what a level means."""
+    return options_of(Perturbations)[perturbation].help

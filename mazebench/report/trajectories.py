@@ -19,7 +19,6 @@ from mazebench.maps import colors
 from mazebench.maps.maze import cell_to_point
 from mazebench.report.episodes import ReportedResult, settings_of
 from mazebench.report.figures import WIDTH, Drawn
-from mazebench.report.mazes import real_walls, shown_ends
 from mazebench.report.settings import Setting
 from mazebench.report.tables import maze_sets, perturbed_groups
 from mazebench.tasks.tracks import TRACKS
@@ -56,7 +55,7 @@ def draw_trajectories(episodes: pd.DataFrame) -> Iterator[Drawn]:
             chosen = _pick_trials(own[own.label.isin(labels)])
             if chosen:
                 title = f"Trajectories: {setting}"
-                figure = _draw(title, own[own.trial.isin(chosen)], labels, episodes.result.unique())
+                figure = _draw(title, own[own.trial.isin(chosen)], labels)
                 yield Drawn(f"trajectories-{prefix}{setting.name}", title, _NOTE, figure)
 
 
@@ -84,8 +83,8 @@ def _pick_trials(episodes: pd.DataFrame) -> list[int]:
     return sorted(turn.sort_values(kind="stable").index[:_MAX_COLUMNS])
 
 
-def _draw(title: str, episodes: pd.DataFrame, labels: Sequence[str], results: Sequence[ReportedResult]) -> Figure:
-    """Draws a row for each agent; any of `results` may tell the true walls of a maze."""
+def _draw(title: str, episodes: pd.DataFrame, labels: Sequence[str]) -> Figure:
+    """Draws a row for each agent."""
     trials = sorted(episodes.trial.unique())
     width = max(len(trials), 3) * WIDTH / _MAX_COLUMNS
     figure = Figure(figsize=(width, 0.8 + len(labels) * (WIDTH / _MAX_COLUMNS + 0.2)), layout="constrained")
@@ -93,10 +92,8 @@ def _draw(title: str, episodes: pd.DataFrame, labels: Sequence[str], results: Se
     grid = figure.subplots(len(labels), len(trials), squeeze=False)
     for label, row in zip(labels, grid, strict=True):
         own = episodes[episodes.label == label].set_index("trial")
-        # A drawn map has another frame than the maze, so that its cells are not compared.
-        is_drawn = shown_ends(own.result.iloc[0], results) is not None
         for trial, axes in zip(trials, row, strict=True):
-            _draw_episode(axes, own.loc[trial], results, is_drawn)
+            _draw_episode(axes, own.loc[trial])
         row[0].set_ylabel(textwrap.fill(label, 20), fontsize=8)
     for trial, axes in zip(trials, grid[0], strict=True):
         maze = episodes.maze[episodes.trial == trial].iloc[0]
@@ -112,21 +109,21 @@ def _draw(title: str, episodes: pd.DataFrame, labels: Sequence[str], results: Se
     return figure
 
 
-def _draw_episode(axes: Axes, episode: pd.Series, results: Sequence[ReportedResult], is_drawn: bool) -> None:
+def _draw_episode(axes: Axes, episode: pd.Series) -> None:
     """Draws the maze, the cells in which its map differs, landmarks, start, goal, and the path."""
     result: ReportedResult = episode.result
+    walls = result.walls(episode.maze)
     assert result.trajectories is not None
-    size = result.setting.size
-    trajectory = result.trajectories[episode.number]
-    walls = real_walls(result, episode.maze, results)
-    walls = trajectory.shown if walls is None else walls
+    assert walls is not None
+    size, shown = result.setting.size, result.shown[episode.number]
     cells = walls.astype(int)
-    if not is_drawn:
-        cells[trajectory.shown & ~walls] = 2
-        cells[~trajectory.shown & walls] = 3
-    cells[np.divmod(trajectory.landmarks[:-1], size)] = 4
+    if shown.are_cells:  # another frame than the maze's would make the comparison meaningless
+        cells[shown.walls & ~walls] = 2
+        cells[~shown.walls & walls] = 3
+    for landmark in shown.landmarks:
+        cells[divmod(landmark, size)] = 4
     axes.imshow(cells, cmap=_CELL_COLORS, vmin=0, vmax=4, extent=(0, size, 0, size), interpolation="none")
-    points = trajectory.pose[:, :2].astype(np.float64) / result.setting.cell_size
+    points = result.trajectories[episode.number].pose[:, :2].astype(np.float64) / result.setting.cell_size
     segments = np.stack([points[:-1], points[1:]], axis=1)
     path = LineCollection(list(segments), cmap=TIME_COLORS, linewidths=1.3, capstyle="round", zorder=3)
     path.set_array(np.linspace(0, 1, len(segments)))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pathlib
 import zipfile
 import zlib
-from typing import BinaryIO
 
 import numpy as np
 
@@ -21,19 +20,7 @@ def read_arrays(path: pathlib.Path, kind: str) -> dict[str, np.ndarray]:
     """
     with open_file(path, kind) as file:
         try:
-            return unpack_arrays(file)
-        except ValueError as error:
+            with np.load(file, allow_pickle=False) as arrays:
+                return dict(arrays)
+        except (OSError, EOFError, ValueError, zipfile.BadZipFile, zlib.error) as error:
             raise InputError(f"{path}: expected a {kind}, found a damaged file: {error}") from error
-
-
-def unpack_arrays(file: BinaryIO) -> dict[str, np.ndarray]:
-    """Returns the arrays of an open .npz file by name; nothing in it is unpickled.
-
-    Raises:
-      ValueError: if it is damaged.
-    """
-    try:
-        with np.load(file, allow_pickle=False) as arrays:
-            return dict(arrays)
-    except (OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise ValueError(str(error)) from error

@@ -22,9 +22,10 @@ from mazebench import stopping
 from mazebench.agent_loading import learning_agents, load_agent_class
 from mazebench.errors import InputError, RunError, unknown
 from mazebench.evaluation.checked_agent import context_size_of
-from mazebench.evaluation.provenance import code_hash, mazes_hash
+from mazebench.evaluation.provenance import code_hash
 from mazebench.maps.options import DrawnOptions
 from mazebench.options import fields_of, from_names
+from mazebench.results.played import mazes_hash
 from mazebench.tasks.build import build_task
 from mazebench.tasks.options import TaskOptions, Variants
 from mazebench.tasks.spec import TaskSpec

@@ -1,0 +1,74 @@
+"""What was played in a finished evaluation, as far as it follows from options and seeds: the task and the maps shown.
+
+`N` is the number of cells on a side of the mazes, `M` the number of pixels on a side of the agent's maps.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import NamedTuple
+
+import numpy as np
+
+from mazebench.errors import InputError
+from mazebench.options import from_names, options_of
+from mazebench.results.records import Summary
+from mazebench.tasks.build import build_task
+from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
+from mazebench.tasks.episode import Episode
+from mazebench.tasks.options import EnvironmentOptions
+from mazebench.tasks.route import plan_route
+from mazebench.tasks.shown_map import leg_context, show_map
+from mazebench.tasks.spec import TaskSpec
+
+# Options that change nothing of what is shown. A summary has the chosen values, which options may not allow.
+_UNSEEN = ("distances", "time_limit", "context_size")
+
+
+class Shown(NamedTuple):
+    """The map that the agent was shown in an episode, and the cells that it was sent to."""
+
+    walls: np.ndarray  # [N, N] bool, or on tracks where a pixel is no cell [M, M] uint8, 255 is wall
+    are_cells: bool  # whether its pixels are the maze's cells
+    start: int  # pixel of the map as row * side + column; -1 if it is not marked
+    goal: int  # as `start`
+    landmarks: list[int]  # cells of the maze as row * N + column, in order, without the goal
+
+
+def task_of(summary: Summary) -> TaskSpec:
+    """Returns the task of an evaluation, with the default distances, time limit and context size.
+
+    Raises:
+      InputError: if this version has no such task, or its mazes are gone or were changed.
+    """
+    names = set(options_of(EnvironmentOptions)) - set(_UNSEEN)
+    told = summary.provenance.options.model_dump()
+    chosen = from_names(EnvironmentOptions, {name: value for name, value in told.items() if name in names})
+    task = build_task(chosen.task, chosen.mazes, chosen.variants)
+    if mazes_hash(task) != summary.provenance.mazes_sha256:
+        raise InputError("expected the mazes that were played, found others")
+    return task
+
+
+def mazes_hash(task: TaskSpec) -> str:
+    """Returns a SHA-256 of the mazes; 1 m, the width of the benchmark's cells, does not change it."""
+    scale = "" if task.cell_size == 1 else repr(task.cell_size)
+    walls = b"".join(maze.walls.tobytes() for maze in task.fixed_mazes)
+    return hashlib.sha256(walls + scale.encode("ascii")).hexdigest()
+
+
+def shown_of(task: TaskSpec, episode: Episode) -> Shown:
+    """Returns what the agent was shown in an episode."""
+    shown = show_map(task, episode)
+    cells = plan_route(task, episode, shown).cells[1:-1]
+    landmarks = [row * task.size + column for row, column in cells]
+    if task.track is None:
+        walls = shown.seen_walls()
+        ends = (shown.seen_cell(cell) for cell in (episode.start, episode.goal))
+        start, goal = (row * len(walls) + column for row, column in ends)
+        return Shown(walls, shown.drawing is None, start, goal, landmarks)
+    context = leg_context(task, shown, episode.start, episode.goal)
+    are_cells = shown.drawing is None and task.context_size == task.size
+    walls = shown.walls if are_cells else np.rint(context[GLOBAL_MAP] * 255).astype(np.uint8)
+    start, goal = (int(plane.argmax()) if plane.any() else -1 for plane in context[[START, GOAL]])
+    return Shown(walls, are_cells, start, goal, landmarks)
