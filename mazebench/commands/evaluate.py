@@ -19,7 +19,7 @@ from mazebench.evaluation.options import EvalOptions, RunOptions
 from mazebench.options import options_of
 
 
-@takes_options(RunOptions, EvalOptions)
+@takes_options(RunOptions, EvalOptions, without=["fresh"])
 def evaluate(
     agents: Annotated[
         list[str],
@@ -51,7 +51,7 @@ def evaluate(
         raise InputError(f"expected one --agent without --suite, found {len(agents)}")
     if suite is not None:
         for name, option in options_of(EvalOptions).items():
-            if name not in ("checkpoint", "seed") and values[name] != option.default:
+            if name not in ("checkpoint", "seed") and values.get(name, option.default) != option.default:
                 raise InputError(f"the suite {suite!r} has evaluations of its own; found --{name.replace('_', '-')}")
     run = chosen(RunOptions, values)
     if run.resume and out is None:

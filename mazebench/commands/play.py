@@ -15,7 +15,7 @@ from mazebench.tasks.options import TaskOptions
 from mazebench.world.backend import has_display
 
 
-@takes_options(EvalOptions, without=["episodes_per_distance", "camera_size", "textures", "checkpoint", "seed"])
+@takes_options(EvalOptions, without=["episodes_per_distance", "fresh", "camera_size", "textures", "checkpoint", "seed"])
 def play(
     values: dict[str, Any],
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode and those after it.")] = 0,

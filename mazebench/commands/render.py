@@ -15,7 +15,7 @@ from mazebench.evaluation.options import EvalOptions
 _DRAWN = ("map", "lidar")  # views that need no rendering
 
 
-@takes_options(EvalOptions, without=["episodes_per_distance"])
+@takes_options(EvalOptions, without=["episodes_per_distance", "fresh"])
 def render(
     out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
     values: dict[str, Any],
