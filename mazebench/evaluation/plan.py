@@ -14,33 +14,29 @@ from mazebench.errors import InputError, RunError, UnplayableError, held_remarks
 from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of, only_context_size
 from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.provenance import provenance
-from mazebench.maps.options import DrawnOptions
-from mazebench.options import fields_of
 from mazebench.results.metrics import Steps
 from mazebench.results.oracle import frozen_oracle_steps
 from mazebench.results.records import Provenance
 from mazebench.tasks.build import build_task
 from mazebench.tasks.context import default_context_size
-from mazebench.tasks.options import EVAL_DISTANCES, HIDEABLE, Variants
+from mazebench.tasks.options import EVAL_DISTANCES, HIDEABLE
 from mazebench.tasks.perturbations import perturbation_levels
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.trials import Trial, select_trials
 from mazebench.world.mjcf import maze_spec
 
-_FORMAT = 2  # of a folder of results while the run goes on
-# Of a provenance: what must be the same in all sittings of a run.
+# Of a provenance: what must be the same in all sittings of a run, besides the options.
 _IDENTIFYING = (
-    *("task_version", "benchmark_manifest_sha256", "mazes_sha256"),
-    *("agent_package", "agent_code_sha256", "checkpoint_sha256"),
+    "task_version",
+    "benchmark_manifest_sha256",
+    "mazes_sha256",
+    "agent_package",
+    "agent_code_sha256",
+    "checkpoint_sha256",
 )
+_PATHS = ("maps", "checkpoint")  # options that may change, for the hashes tell what they lead to
 # Options of which records and summaries tell where a user sets them.
 _SENSES = ("lidar_noise", "odometry_noise")
-# Options that the rest of an identity covers, or that have one value in all evaluations.
-_COVERED = (
-    *("agent", "task", "track", "level", "size", "split", "maps", "checkpoint"),
-    *fields_of(DrawnOptions),
-    *fields_of(Variants),
-)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -179,12 +175,11 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
     levels = perturbation_levels(task)
     origin = provenance(options, agent_class, task)
     identity = {
-        "format": _FORMAT,
+        **{name: value for name, value in origin.options.model_dump().items() if name not in _PATHS},
         **labels,
         **{name: getattr(origin, name) for name in _IDENTIFYING},
         "mujoco": origin.packages.get("mujoco"),
         "world_sha256": hashlib.sha256(maze_spec(task.mazes[0]).to_xml().encode("utf-8")).hexdigest(),
-        **{name: value for name, value in origin.options.model_dump().items() if name not in _COVERED},
     }
     return Plan(
         options=options,
