@@ -99,6 +99,7 @@ def make_result(
         "benchmark_manifest_sha256": manifest_hash(version),
         "checkpoint_sha256": checkpoint,
         "mazes_sha256": mazes_hash(spec),
+        "context_size": spec.context_size,
         "options": by_name(options),
         "command": ["mazebench", "eval", "--agent", agent],
         "packages": {"mazebench-mujoco": "0.1.0", "numpy": np.__version__},

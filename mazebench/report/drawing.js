@@ -41,25 +41,6 @@ function drawMap(pen, map, side, color) {
   pen.globalAlpha = 1;
 }
 
-const resizedPlace = (place, side, across) => Math.floor((place * across) / side);
-
-// A map of side x side pixels with fewer ones, across x across, each the share of wall in it.
-function resizedMap(map, side, across) {
-  if (across === side) return map;
-  const step = side / across;
-  const overlap = (from, pixel) => Math.min(from + step, pixel + 1) - Math.max(from, pixel);
-  return Array.from({ length: across * across }, (_, index) => {
-    const [top, left] = [step * Math.floor(index / across), step * (index % across)];
-    let share = 0;
-    for (let row = Math.floor(top); row < Math.min(top + step, side); row++) {
-      for (let column = Math.floor(left); column < Math.min(left + step, side); column++) {
-        share += overlap(top, row) * overlap(left, column) * map[row * side + column];
-      }
-    }
-    return Math.min(1, Math.max(0, share / step ** 2));
-  });
-}
-
 // A disc; nothing where the map marks no cell, -1.
 function drawStart(pen, cell, side, radius, color) {
   if (cell < 0) return;

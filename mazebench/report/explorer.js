@@ -25,15 +25,20 @@ function bytesOfBase64(text) {
 
 // The episodes of a result by columns, and its poses.
 function unpack(number) {
-  if (!unpacked.has(number)) unpacked.set(number, inflate(`episodes-${number}`));
+  if (!unpacked.has(number)) unpacked.set(number, join(number));
   return unpacked.get(number);
 }
 
-async function inflate(id) {
-  const stream = new Blob([bytesOfBase64(byId(id).textContent)]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const columns = await new Response(stream).json();
+async function join(number) {
+  const [trials, outcomes] = await Promise.all(data.results[number].columns.map(inflate));
+  const columns = { ...trials, ...outcomes };
   const maps = bytesOfBase64(columns.maps || "");
   return { columns, maps, path: posesOf(columns.path), observed: columns.observed && posesOf(columns.observed) };
+}
+
+function inflate(number) {
+  const bytes = bytesOfBase64(byId(`columns-${number}`).textContent);
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"))).json();
 }
 
 // All x, all y and all yaw from the change of each from the pose before.
@@ -87,7 +92,7 @@ function episodeOf(packed, number, index) {
 }
 
 // The map as the agent was shown it: the share of wall in each of `side` x `side` pixels, where start and goal are marked
-// (-1: not marked), whether the pixels are not the maze's cells, and the cells on a side of the agent's map (0: unknown).
+// (-1: not marked), and whether the pixels are not the maze's cells.
 function shownMap({ columns, maps }, result, index, real) {
   const side = result.picture || result.size;
   const count = result.picture ? side * side : Math.ceil((side * side) / 8);
@@ -98,8 +103,7 @@ function shownMap({ columns, maps }, result, index, real) {
     shown: maps.length ? recorded() : result.exact ? real : null,
     shownStart: (columns.shownStart || columns.start)[index],
     shownGoal: (columns.shownGoal || columns.goal)[index],
-    isDrawn: result.drawn,
-    context: result.context,
+    isDrawn: result.picture > 0,
   };
 }
 
@@ -308,14 +312,12 @@ function draw() {
 
 function drawShown(current, color) {
   const { side } = current;
-  const across = current.context || side;
-  const place = (cell) => (cell < 0 ? cell : resizedPlace(Math.floor(cell / side), side, across) * across + resizedPlace(cell % side, side, across));
-  const pen = prepare(byId("shown"), across);
-  drawMap(pen, current.shown && resizedMap(current.shown, side, across), across, color);
-  if (!current.isDrawn) current.landmarks.forEach((cell) => fillCell(pen, place(cell), across, color("landmark")));
-  const radius = (0.36 * thickness(current.size) * across) / current.size;
-  drawStart(pen, place(current.shownStart), across, radius, color);
-  drawGoal(pen, place(current.shownGoal), across, radius, color);
+  const pen = prepare(byId("shown"), side);
+  drawMap(pen, current.shown, side, color);
+  if (!current.isDrawn) current.landmarks.forEach((cell) => fillCell(pen, cell, side, color("landmark")));
+  const radius = (0.36 * thickness(current.size) * side) / current.size;
+  drawStart(pen, current.shownStart, side, radius, color);
+  drawGoal(pen, current.shownGoal, side, radius, color);
 }
 
 function drawDriven(current, ranges, color) {
@@ -364,12 +366,11 @@ function markDifferences(pen, current, color) {
 
 function describe() {
   const { current } = view;
-  const told = current.context ? "The map that the agent was shown" : "The map, which the agent may have been shown with fewer cells";
-  byId("shown-caption").textContent = current.shown ? told : "The map that the agent was shown was not recorded";
+  byId("shown-caption").textContent = current.shown ? "The map that the agent was shown" : "The map that the agent was shown was not recorded";
   byId("driven-caption").textContent = !current.path.x.length
     ? "The maze; the path was not recorded (eval --record)"
     : current.real ? "The maze, and the path driven in it" : "The true maze is not in the results; the path driven, on the map";
-  byId("shown").setAttribute("aria-label", `Map of ${current.context || current.side} by ${current.context || current.side} pixels as shown to the agent`);
+  byId("shown").setAttribute("aria-label", `Map of ${current.side} by ${current.side} pixels as shown to the agent`);
   byId("odometry").setAttribute("aria-label", `The path by the agent's odometry up to step ${view.time} of ${current.steps}`);
   byId("driven").setAttribute("aria-label", `Maze ${current.maze} with the path driven up to step ${view.time} of ${current.steps}`);
 }

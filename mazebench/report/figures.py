@@ -172,6 +172,9 @@ def to_svg(drawn: Drawn) -> str:
     svg = content.getvalue()
     svg = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", svg[svg.index("<svg") :], count=1, flags=re.DOTALL)
     svg = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{drawn.name}-", svg)
+    # Hundredths of a point are fine enough.
+    svg = re.sub(r"<[^>]+>", lambda tag: re.sub(r"(\.\d\d)\d+", r"\1", tag[0]), svg)
+    svg = re.sub(r"\n\s+", "\n", svg)
     return svg.replace("<svg", f'<svg role="img" aria-label="{html.escape(drawn.title)}"', 1)
 
 

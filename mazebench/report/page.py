@@ -30,7 +30,6 @@ from mazebench.report.trajectories import CELL_COLORS, TIME_COLORS
 from mazebench.results.paper import citation, reference
 from mazebench.results.played import Shown
 from mazebench.results.trajectories import Trajectory
-from mazebench.tasks.context import default_context_size
 from mazebench.tasks.options import TaskOptions
 from mazebench.world.lidar import NUM_RAYS
 from mazebench.world.mjcf import BODY_RADIUS
@@ -60,7 +59,11 @@ def build_page(
     """
     style = f":root {{ {' '.join(f'--{name}: {color};' for name, color in _colors().items())} }}\n{_read('page.css')}"
     script = "".join(map(_read, ("drawing.js", "explorer.js")))
-    packed = (_pack(_columns(result)) for result in results)
+    columns: dict[str, int] = {}  # packed, with their numbers
+    used = [
+        [columns.setdefault(_pack(part), len(columns)) for part in (_trials(result), _outcomes(result))]
+        for result in results
+    ]
     parts = {
         # Figures have attributes `style`.
         "POLICY": f"default-src 'none'; style-src '{_hash(style)}'; style-src-attr 'unsafe-inline'; "
@@ -71,9 +74,9 @@ def build_page(
         "CITATION": html.escape(f"{citation()}. {reference()['note']}"),
         "FIGURES": "\n".join(_sections(tables, figures)),
         "PROVENANCE": provenance.to_html(index=False, border=0),
-        "DATA": _json(_explorer_data(results)),
+        "DATA": _json(_explorer_data(results, used)),
         "EPISODES": "\n".join(
-            f'<script type="text/plain" id="episodes-{number}">{text}</script>' for number, text in enumerate(packed)
+            f'<script type="text/plain" id="columns-{number}">{text}</script>' for text, number in columns.items()
         ),
         "SCRIPT": script,
     }
@@ -134,8 +137,8 @@ def _section(title: str, note: str, table: Table | None, svg: str = "") -> str:
     return f'<section class="figure">{"".join(parts)}</section>'
 
 
-def _explorer_data(results: Sequence[ReportedResult]) -> dict[str, Any]:
-    """Returns what explorer.js knows of all results before it unpacks the episodes of one."""
+def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int]]) -> dict[str, Any]:
+    """Returns what explorer.js knows of all results before it unpacks the episodes of one, `columns` of each."""
     settings = sorted({result.setting for result in results})
     mazes, places = _mazes(results)
     return {
@@ -145,16 +148,16 @@ def _explorer_data(results: Sequence[ReportedResult]) -> dict[str, Any]:
         "timeColors": [mpl.colors.to_hex(TIME_COLORS(n / (_NUM_TIME_COLORS - 1))) for n in range(_NUM_TIME_COLORS)],
         "mazes": mazes,
         "results": [
-            {**_describe(result), "setting": settings.index(result.setting), "mazes": here}
-            for result, here in zip(results, places, strict=True)
+            {**_describe(result), "setting": settings.index(result.setting), "mazes": here, "columns": used}
+            for result, here, used in zip(results, places, columns, strict=True)
         ],
         "first": _first(results),
     }
 
 
-def _columns(result: ReportedResult) -> dict[str, Any]:
-    """Returns the episodes of a result by columns, the paths, and the shown maps where they need not be the mazes."""
-    episodes, trajectories, size = result.episodes, result.trajectories, result.setting.size
+def _trials(result: ReportedResult) -> dict[str, Any]:
+    """Returns by columns what results of one task have in common, and the shown maps where they are not the mazes."""
+    episodes, size = result.episodes, result.setting.size
     columns: dict[str, Any] = {
         "maze": pd.factorize(episodes.maze)[0].tolist(),
         "start": _indices(episodes.start, size),
@@ -162,25 +165,34 @@ def _columns(result: ReportedResult) -> dict[str, Any]:
         "distance": episodes.distance.tolist(),
         "shortest": episodes.shortest_path.round(2).tolist(),
         "seed": episodes.seed.tolist(),
-        "success": episodes.success.astype(int).tolist(),
-        "steps": episodes.steps.tolist(),
-        "driven": episodes.path_length.round(2).tolist(),
-        "spl": episodes.spl.round(2).tolist(),
-        "splGrid": episodes.spl_grid.round(2).tolist(),
         "groups": {fact: episodes[fact].astype(int).tolist() for fact in result.facts},
     }
     if maps := _shown(result):
         columns["shownStart"] = [shown.start for shown in maps]
         columns["shownGoal"] = [shown.goal for shown in maps]
+    if result.trajectories:
+        columns["landmarks"] = [shown.landmarks for shown in maps]
+        if not (result.setting.is_exact and maps[0].are_cells):
+            pixels = (np.packbits(shown.walls) if shown.are_cells else shown.walls for shown in maps)
+            columns["maps"] = _base64(b"".join(map(np.ndarray.tobytes, pixels)))
+    return columns
+
+
+def _outcomes(result: ReportedResult) -> dict[str, Any]:
+    """Returns by columns what came of the episodes, and the paths."""
+    episodes, trajectories = result.episodes, result.trajectories
+    columns: dict[str, Any] = {
+        "success": episodes.success.astype(int).tolist(),
+        "steps": episodes.steps.tolist(),
+        "driven": episodes.path_length.round(2).tolist(),
+        "spl": episodes.spl.round(2).tolist(),
+        "splGrid": episodes.spl_grid.round(2).tolist(),
+    }
     if trajectories:
         scale = [result.setting.cell_size] * 2 + [1.0]
         columns["path"] = _changes(np.concatenate([each.pose for each in trajectories]) / scale)
         if trajectories[0].observed is not None:
             columns["observed"] = _changes(np.concatenate([lay_on_first_pose(each) for each in trajectories]) / scale)
-        columns["landmarks"] = [shown.landmarks for shown in maps]
-        if not result.setting.is_exact:
-            pixels = (shown.walls if _is_picture(shown) else np.packbits(shown.walls) for shown in maps)
-            columns["maps"] = _base64(b"".join(map(np.ndarray.tobytes, pixels)))
     return columns
 
 
@@ -197,10 +209,6 @@ def lay_on_first_pose(trajectory: Trajectory) -> np.ndarray:
     x, y = (observed - observed[0])[:, :2].T
     moved = np.column_stack([np.cos(turn) * x - np.sin(turn) * y, np.sin(turn) * x + np.cos(turn) * y])
     return np.column_stack([first[:2] + moved, observed[:, 2] + turn])
-
-
-def _is_picture(shown: Shown) -> bool:
-    return shown.walls.dtype == np.uint8
 
 
 def _changes(poses: np.ndarray) -> list[list[int]]:
@@ -246,24 +254,19 @@ def _names(setting: Setting) -> dict[str, Any]:
 
 
 def _describe(result: ReportedResult) -> dict[str, Any]:
-    setting, shown = result.setting, _shown(result)
+    setting, maps = result.setting, _shown(result)
     provenance = result.summary.provenance
     sensors = (provenance.options.model_extra or {}).get("sensors", ())
     lidar = TaskOptions(track=setting.track or None, lidar_noise=result.summary.lidar_noise).lidar
-    # Cells a side of the agent's map: those of the shown map, unless it is large and the agent asks for fewer.
-    side = len(shown[0].walls) if shown and result.trajectories else setting.size
-    context_size = (provenance.model_extra or {}).get("context_size")  # results of earlier versions do not say it
-    if setting.track or side == default_context_size(side):
-        context_size = side
     return {
         "label": result.label,
         "size": setting.size,
         "cellSize": setting.cell_size,
         "episodes": len(result.episodes),
         "exact": setting.is_exact,
-        "context": min(context_size, side) if isinstance(context_size, int) else 0,  # 0 if it is not known
-        "picture": side if shown and _is_picture(shown[0]) else 0,
-        "drawn": any(not each.are_cells for each in shown),
+        "picture": 0
+        if not maps or maps[0].are_cells
+        else len(maps[0].walls),  # pixels on a side, where they are no cells
         "lidar": lidar.max_range if setting.track or "lidar" in sensors else 0,  # m
         "groups": result.facts,
     }

@@ -22,27 +22,31 @@ from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 
 # Options that change nothing of what is shown. A summary has the chosen values, which options may not allow.
-_UNSEEN = ("distances", "time_limit", "context_size")
+_UNSEEN = ("distances", "time_limit")
 
 
 class Shown(NamedTuple):
     """The map that the agent was shown in an episode, and the cells that it was sent to."""
 
-    walls: np.ndarray  # [N, N] bool, or on tracks where a pixel is no cell [M, M] uint8, 255 is wall
-    are_cells: bool  # whether its pixels are the maze's cells
+    walls: np.ndarray  # [N, N] bool where the pixels are the maze's cells; else [M, M] uint8, 255 is wall
     start: int  # pixel of the map as row * side + column; -1 if it is not marked
     goal: int  # as `start`
     landmarks: list[int]  # cells of the maze as row * N + column, in order, without the goal
 
+    @property
+    def are_cells(self) -> bool:
+        """Whether the pixels are the maze's cells."""
+        return self.walls.dtype == bool
+
 
 def task_of(summary: Summary) -> TaskSpec:
-    """Returns the task of an evaluation, with the default distances, time limit and context size.
+    """Returns the task of an evaluation, with the default distances and time limit.
 
     Raises:
       InputError: if this version has no such task, or its mazes are gone or were changed.
     """
     names = set(options_of(EnvironmentOptions)) - set(_UNSEEN)
-    told = summary.provenance.options.model_dump()
+    told = summary.provenance.options.model_dump() | {"context_size": summary.provenance.context_size}
     chosen = from_names(EnvironmentOptions, {name: value for name, value in told.items() if name in names})
     task = build_task(chosen.task, chosen.mazes, chosen.variants)
     if mazes_hash(task) != summary.provenance.mazes_sha256:
@@ -62,13 +66,8 @@ def shown_of(task: TaskSpec, episode: Episode) -> Shown:
     shown = show_map(task, episode)
     cells = plan_route(task, episode, shown).cells[1:-1]
     landmarks = [row * task.size + column for row, column in cells]
-    if task.track is None:
-        walls = shown.seen_walls()
-        ends = (shown.seen_cell(cell) for cell in (episode.start, episode.goal))
-        start, goal = (row * len(walls) + column for row, column in ends)
-        return Shown(walls, shown.drawing is None, start, goal, landmarks)
     context = leg_context(task, shown, episode.start, episode.goal)
     are_cells = shown.drawing is None and task.context_size == task.size
     walls = shown.walls if are_cells else np.rint(context[GLOBAL_MAP] * 255).astype(np.uint8)
     start, goal = (int(plane.argmax()) if plane.any() else -1 for plane in context[[START, GOAL]])
-    return Shown(walls, are_cells, start, goal, landmarks)
+    return Shown(walls, start, goal, landmarks)

@@ -93,6 +93,7 @@ class Provenance(_Stored):
     options: TaskProvenance
     task_version: int | None = None
     benchmark_manifest_sha256: str | None = None
+    context_size: int = 0  # M
     mazes_sha256: str | None = None
     checkpoint_sha256: str | None = None
     agent_class: str | None = None  # as module:Class
