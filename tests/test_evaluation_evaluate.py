@@ -15,7 +15,6 @@ from processes import run_python
 from run_folders import FEW, FILES, IMPORTS, RECORDED, Killed, files_of, kill_after, records_of, results_of, summary_of
 
 from mazebench.agent import Agent, SingleAgent
-from mazebench.agent_loading import load_agent_class
 from mazebench.errors import InputError, UnplayableError
 from mazebench.evaluation.chunk import Chunk, run_chunk
 from mazebench.evaluation.evaluate import evaluate
@@ -113,28 +112,12 @@ class TestResults:
             expected |= {"distance": trial.distance, "shortest_path": trial.shortest_path}
             assert expected.items() <= record.items()
 
-    @pytest.mark.parametrize("run", ["random_run", "planner_run"])
-    def test_spl_follows_from_the_lengths_in_a_record(self, run, request):
-        for record in records_of(request.getfixturevalue(run)):
-            for key, shortest in (("spl", record["shortest_path"]), ("spl_grid", record["distance"])):
-                expected = record["success"] * shortest / max(shortest, record["path_length"])
-                assert record[key] == pytest.approx(expected, abs=1e-12)
-            # Nobody is faster than 3.2 m/s, 0.16 s a step, and only success ends an episode early.
-            assert record["path_length"] <= 0.512 * record["steps"] + 1e-6
-            assert record["success"] or record["steps"] == 100
-            assert not record["success"] or record["path_length"] >= record["shortest_path"] - 1e-6
-
     def test_hierarchical_episodes_lead_from_corner_to_corner(self, tmp_path):
         summary = evaluate("planner", tmp_path, task="hierarchical")
         assert (summary.task, summary.episodes, summary.overall.success_rate) == ("hierarchical", 20, 1.0)
         records = records_of(tmp_path)
         assert {tuple(record["start"] + record["goal"]) for record in records} == {(1, 11, 11, 1)}
         assert max(record["steps"] for record in records) > 100  # each landmark restarts the clock
-
-    def test_training_mazes_are_evaluated_if_asked_for(self, tmp_path):
-        summary = evaluate("planner", tmp_path, split="train", distances=(3,))
-        assert (summary.split, summary.episodes, summary.overall.success_rate) == ("train", 100, 1.0)
-        assert records_of(tmp_path)[0]["maze"] == "13-train-00"
 
 
 class TestAgents:
@@ -231,7 +214,7 @@ class TestSeeds:
 
 
 class TestResume:
-    @pytest.mark.parametrize("seed", range(6))
+    @pytest.mark.parametrize("seed", range(2))
     def test_a_run_goes_on_wherever_it_was_killed(self, random_run, tmp_path, seed):
         rng = np.random.default_rng(seed)
         for _ in range(2):
@@ -246,32 +229,25 @@ class TestResume:
         assert results_of(tmp_path) == results_of(random_run)
         assert summary_of(tmp_path)["overall"] == summary_of(random_run)["overall"]
 
-    @pytest.mark.parametrize("record", [False, True])
     @pytest.mark.parametrize("num_files", range(4))
-    def test_a_run_goes_on_wherever_its_end_was_killed(self, random_run, tmp_path, record, num_files):
-        evaluate("random", tmp_path / "whole", record=record, **FEW)
+    def test_a_run_goes_on_wherever_its_end_was_killed(self, tmp_path, num_files):
+        evaluate("random", tmp_path / "whole", record=True, **FEW)
         out = tmp_path / "out"
         with pytest.raises(Killed):
-            evaluate("random", out, record=record, progress=kill_after(40), **FEW)
+            evaluate("random", out, record=True, progress=kill_after(40), **FEW)
         for name in ("episodes.jsonl", "trajectories.npz", "summary.json")[:num_files]:
-            if (tmp_path / "whole" / name).exists():
-                shutil.copy(tmp_path / "whole" / name, out)
+            shutil.copy(tmp_path / "whole" / name, out)
         (out / "summary.json.tmp").write_text('{"agent')
         calls = []
         evaluate("random", out, resume=True, progress=lambda ended, of: calls.append((ended, of)), **FEW)
         assert calls == [(40, 40)]
         assert results_of(out) == results_of(tmp_path / "whole")
-        assert {path.name for path in out.iterdir()} == (RECORDED if record else FILES)
+        assert {path.name for path in out.iterdir()} == RECORDED
 
     def test_a_finished_run_is_not_run_again(self, random_run):
         before = files_of(random_run)
         evaluate("random", random_run, resume=True, **FEW)
         assert files_of(random_run) == before
-
-    def test_a_run_without_episodes_begins(self, random_run, tmp_path):
-        (tmp_path / "config.json.tmp").write_text('{"rec')
-        evaluate("random", tmp_path, resume=True, **FEW)
-        assert results_of(tmp_path) == results_of(random_run)
 
     def test_trajectories_that_are_wanted_later_are_recorded(self, random_run, tmp_path):
         shutil.copytree(random_run, tmp_path / "out")
@@ -331,25 +307,17 @@ class TestRefused:
             evaluate("random", random_run, **FEW)
         assert files_of(random_run) == before
 
-    @pytest.mark.parametrize("unfinished", [False, True])
     @pytest.mark.parametrize(
         ("agent", "changes", "named"),
         [
             ("planner", {}, "agent"),
             ("random", {"size": 15}, "size"),
-            ("random", {"split": "train"}, "split"),
-            ("random", {"task": "hierarchical"}, "task"),
-            *(("random", level, next(iter(level))) for level in LEVELS),
-            ("random", {"distances": (1, 2, 3)}, "distances"),
-            ("random", {"episodes_per_distance": 2}, "episodes_per_distance"),
-            ("random", {"time_limit": 50}, "time_limit"),
+            ("random", {"map_flip": 0.3}, "map_flip"),
             ("random", {"seed": 1}, "seed"),
         ],
     )
-    def test_a_folder_that_holds_another_run_is_refused(self, random_run, tmp_path, agent, changes, named, unfinished):
+    def test_a_folder_that_holds_another_run_is_refused(self, random_run, tmp_path, agent, changes, named):
         shutil.copytree(random_run, tmp_path / "run")
-        if unfinished:
-            (tmp_path / "run" / "summary.json").unlink()
         before = files_of(tmp_path)
         with pytest.raises(InputError, match=rf"run: holds another run: its {named} is .*, this one's "):
             evaluate(agent, tmp_path / "run", resume=True, **FEW | changes)
@@ -377,9 +345,6 @@ class TestRefused:
             ({"pairs": "fixed"}, "expected pairs 'random' in an evaluation, found 'fixed'"),
             ({"speed": 2}, "unknown option 'speed'; available: .*distances.*map_flip"),
             ({"num_envs": 0}, "expected num_envs of at least 1, found 0"),
-            ({"num_envs": "3"}, "expected num_envs of type int, found '3'"),
-            ({"record": "yes"}, r"expected record of type bool \| None, found 'yes'"),
-            ({"workers": -1}, "expected workers of at least 0, found -1"),
         ],
     )
     def test_options_that_cannot_be_met_are_refused_and_nothing_is_written(self, tmp_path, options, message):
@@ -392,25 +357,6 @@ class TestRefused:
         with pytest.raises(UnplayableError, match="its checkpoint reads maps of 13 x 13 only, found 15 x 15"):
             evaluate("mmn", tmp_path / "out", size=15, **FEW)
         assert list(tmp_path.iterdir()) == []
-
-    @pytest.mark.parametrize("finished", [True, False])
-    def test_a_refused_resumption_leaves_what_was_written(self, random_run, tmp_path, monkeypatch, finished):
-        folder = shutil.copytree(random_run, tmp_path / "run")
-        if not finished:
-            journal = [json.dumps({"record": record}) for record in records_of(folder)]
-            (folder / "journal.jsonl").write_text("\n".join(journal) + "\n")
-            for name in ("episodes.jsonl", "summary.json"):
-                (folder / name).unlink()
-        before = files_of(folder)
-
-        def refuse(*arguments, **options):
-            raise InputError("no")
-
-        monkeypatch.setattr(load_agent_class("random"), "build", classmethod(refuse))
-        with pytest.raises(InputError, match=r"^no$"):
-            evaluate("random", folder, resume=True, record=True, **FEW)
-        after = {name: content.rstrip(b"\n") for name, content in files_of(folder).items()}
-        assert {name: content.rstrip(b"\n") for name, content in before.items()}.items() <= after.items()
 
     def test_an_object_in_place_of_a_class_is_refused(self):
         with pytest.raises(InputError, match="expected the name of an agent or its class, found an object of Ahead"):

@@ -71,7 +71,7 @@ def test_episodes_that_end_in_any_order_are_written_in_the_protocols(plan, episo
     assert files_of(tmp_path / "run") == files_of(unbroken)
 
 
-@hypothesis.settings(max_examples=40, deadline=None)
+@hypothesis.settings(max_examples=12, deadline=None)
 @hypothesis.given(strategies.integers(0, 2**32 - 1))
 def test_a_journal_that_was_cut_anywhere_is_gone_on_with(plan, episodes, summary, unbroken, tmp_path_factory, seed):
     rng = np.random.default_rng(seed)

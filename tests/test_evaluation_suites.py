@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 import pathlib
-import shutil
 
 import pytest
 from run_folders import IMPORTS, RECORDED, Killed, files_of, kill_after, results_of, summary_of
 
 from mazebench.errors import InputError, Remark, RunError, UnplayableError
 from mazebench.evaluation.options import EvalOptions, RunOptions
-from mazebench.evaluation.plan import make_plan
 from mazebench.evaluation.suites import SUITES, Part, run_suite
 from mazebench.maps.benchmark import SIZES
 from mazebench.results.comparison import compare_folders
@@ -62,10 +60,6 @@ class TestParts:
         assert (paper["warp-0.1"].task.distances, paper["warp-0.1"].task.map_warp) == ((2, 4, 6, 8, 10), 0.1)
         assert (paper["noise-1.0"].task.distances, paper["noise-1.0"].task.position_noise) == ((2, 4, 6, 8, 10), 1.0)
 
-    def test_the_suite_quick_has_420_episodes(self):
-        plans = [make_plan(EvalOptions.of("random", **part.changes)) for part in SUITES["quick"]]
-        assert sum(len(plan.trials) for plan in plans) == 420
-
 
 class TestRun:
     def test_the_folder_tells_what_is_in_it(self, tiny_run):
@@ -79,10 +73,11 @@ class TestRun:
                 expected = {"agent": agent, "suite": "tiny", "part": part}
                 assert expected.items() <= summary_of(tiny_run / agent / part).items()
 
-    @pytest.mark.parametrize("running", [{"num_envs": 7}, {"workers": 2, "num_envs": 16}], ids=["envs", "workers"])
-    def test_the_bytes_do_not_depend_on_how_it_is_run(self, tiny_run, tmp_path, running):
+    def test_the_bytes_do_not_depend_on_how_it_is_run(self, tiny_run, tmp_path):
         calls = []
-        summaries = run_suite("tiny", BOTH, tmp_path, RunOptions(**running), lambda *call: calls.append(call))
+        summaries = run_suite(
+            "tiny", BOTH, tmp_path, RunOptions(workers=2, num_envs=16), lambda *call: calls.append(call)
+        )
         assert results_of(tmp_path) == results_of(tiny_run)
         assert (calls[0], calls[-1]) == ((0, 160), (160, 160))
         assert calls == sorted(calls)
@@ -90,18 +85,11 @@ class TestRun:
             (agent, part) for agent in BOTH for part in PARTS
         ]
 
-    def test_trajectories_are_left_out_if_asked_for(self, tiny_run, tmp_path):
-        run_suite("tiny", ["random"], tmp_path, RunOptions(record=False))
-        assert not list(tmp_path.rglob("trajectories.npz"))
-        records = "random/near/episodes.jsonl"
-        assert (tmp_path / records).read_bytes() == (tiny_run / records).read_bytes()
-
 
 class TestResume:
-    @pytest.mark.parametrize("num_episodes", [10, 70, 160])
-    def test_a_suite_goes_on_wherever_it_was_killed(self, tiny_run, tmp_path, num_episodes):
+    def test_a_suite_goes_on_wherever_it_was_killed(self, tiny_run, tmp_path):
         with pytest.raises(Killed):
-            run_suite("tiny", BOTH, tmp_path, RunOptions(num_envs=16), kill_after(num_episodes))
+            run_suite("tiny", BOTH, tmp_path, RunOptions(num_envs=16), kill_after(70))
         finished = {path: path.read_bytes() for path in tmp_path.rglob("summary.json")}
         run_suite("tiny", BOTH, tmp_path, RunOptions(resume=True))
         assert results_of(tmp_path) == results_of(tiny_run)
@@ -160,11 +148,10 @@ class TestPartsThatCannotBePlayed:
         monkeypatch.syspath_prepend(tmp_path)
         return f"partial_{largest}:Partial"
 
-    @pytest.mark.parametrize("workers", [0, 1])
-    def test_they_are_left_out_and_named(self, mixed, tmp_path, monkeypatch, workers):
+    def test_they_are_left_out_and_named(self, mixed, tmp_path, monkeypatch):
         agent = self.write_agent(tmp_path, monkeypatch, 13)
         with pytest.warns(Remark) as warned:
-            summaries = run_suite("mixed", [agent, "random"], tmp_path / "out", RunOptions(workers=workers))
+            summaries = run_suite("mixed", [agent, "random"], tmp_path / "out", RunOptions(workers=1))
         assert [str(each.message) for each in warned] == [
             "agent 'Partial': plays local goals only, found hierarchical; left out: corners, flips"
         ]
@@ -211,8 +198,6 @@ class TestRefused:
         ("content", "said"),
         [
             (None, r"expected an empty folder or a suite's, found 'thesis\.tex' in it"),
-            ({"parts": ["../x"]}, r"suite\.json: expected a suite's parts and folders, found parts\.0: "),
-            ({"folders": {"x": "/etc"}}, r"suite\.json: expected a suite's parts and folders, found folders\.x: "),
             ({"benchmark": "v0"}, "holds another run: its benchmark is v0, this one's v1"),
         ],
     )
@@ -234,23 +219,13 @@ class TestComparison:
         assert found.title == f"A is planner in {tiny_run / 'planner'}, B is random in {tiny_run / 'random'}"
         assert found.notes == []
 
-    def test_parts_that_one_of_them_lacks_are_named_and_left_out(self, tiny_run, tmp_path):
-        shutil.copytree(tiny_run / "random", tmp_path / "b" / "random")
-        (tmp_path / "b" / "random" / "near" / "summary.json").unlink()
-        found = compare_folders(tiny_run / "random", tmp_path / "b" / "random")
-        assert list(found.parts) == ["noise-0.5", "warp-0.2"]
-        assert found.notes == [f"{tiny_run / 'random'}: near not in the other folder; left out"]
-
     def test_folders_without_results_are_refused(self, tiny_run, tmp_path):
         agent = tiny_run / "random"
-        (tmp_path / "empty").mkdir()
         (tmp_path / "other").mkdir()
         (tmp_path / "other" / "thesis.tex").touch()
         for folder, said in [
             (tmp_path / "none", "expected a finished evaluation, found nothing there"),
-            (tmp_path / "empty", "expected a finished evaluation, found an empty folder"),
             (tmp_path / "other", r"expected a finished evaluation, found 'thesis\.tex' in it"),
-            (tmp_path / "other" / "thesis.tex", "expected a finished evaluation, found a file"),
         ]:
             with pytest.raises(InputError, match=said):
                 compare_folders(agent, folder)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 import pathlib
-import resource
 import shutil
 import signal
 import subprocess
@@ -122,16 +121,6 @@ class TestKill:
         assert (status, errors) == (0, "")
         assert learned_in(folder) == learned_in(unbroken("learn"))
 
-    def test_half_a_checkpoint_is_ignored(self, unbroken, tmp_path):
-        folder = shutil.copytree(unbroken("learn"), tmp_path / "run")
-        half = folder / "checkpoints" / f"{STEPS + 800:012d}.tmp"
-        half.mkdir()
-        (half / "agent.safetensors").touch()
-        words = ["eval", "--agent", "mah", "--distances", "1", "--episodes-per-distance", "1"]
-        assert run(*words, "--checkpoint", folder, "--out", tmp_path / "evaluation")[0] == 0
-        assert run(*LEARN, "--out", folder, "--resume")[0] == 0
-        assert learned_in(folder) == learned_in(unbroken("learn"))
-
 
 class TestRay:
     """Ray prints lines of its own among a command's errors, so these tests only look for ours."""
@@ -178,17 +167,14 @@ def busy_actors(process: subprocess.Popen) -> list[int]:
 
 
 class TestFullDisk:
-    @pytest.mark.parametrize(("kilobytes", "exit_status"), [(0, 2), (40, 1)], ids=["at the start", "on the way"])
-    def test_an_evaluation_on_a_full_disk_goes_on_when_there_is_room(
-        self, disk: Disk, unbroken, kilobytes, exit_status
-    ):
-        disk.leave(kilobytes)
+    def test_an_evaluation_on_a_full_disk_goes_on_when_there_is_room(self, disk: Disk, unbroken):
+        disk.leave(40)
         status, _, errors = run(*SHORT, "--out", disk.path / "run")
         (line,) = said(errors)
-        assert status == exit_status
+        assert status == 1
         assert line.startswith(f"mazebench: {disk.path / 'run'}")
         assert "No space left on device" in line
-        assert ("--resume" in line) == (status == 1)
+        assert "--resume" in line
         disk.make_room()
         assert run(*SHORT, "--out", disk.path / "run", "--resume")[0] == 0
         assert results_of(disk.path / "run") == results_of(unbroken("short"))
@@ -203,29 +189,8 @@ class TestFullDisk:
         assert run(*LEARN, "--out", disk.path / "run", "--resume")[0] == 0
         assert learned_in(disk.path / "run") == learned_in(unbroken("learn"))
 
-    def test_a_training_that_cannot_save_names_its_last_checkpoint(self, tmp_path):
-        def limit() -> None:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
-
-        status, _, errors = run(*LEARN, "--out", tmp_path / "run", preexec_fn=limit)
-        assert (status, len(errors.splitlines())) == (1, 1)
-        assert "can't save: File too large; last checkpoint: " in errors
-        assert [path.name for path in (tmp_path / "run" / "checkpoints").iterdir()] == [12 * "0"]
-
-    def test_mazes_written_before_the_disk_filled_are_whole(self, disk: Disk, tmp_path):
-        words = ["generate", "--format", "txt,mjcf,png", "--out"]
-        assert run(*words, tmp_path / "whole")[0] == 0
-        disk.leave(28)
-        status, _, errors = run(*words, disk.path / "mazes")
-        assert (status, len(errors.splitlines())) == (2, 1)
-        assert "can't write the picture: No space left on device" in errors
-        written = files_of(disk.path / "mazes")
-        assert len(written) == 2
-        assert written.items() <= files_of(tmp_path / "whole").items()
-
-    @pytest.mark.parametrize("suffix", ["mp4", "gif"])
-    def test_the_film_from_before_is_kept_when_the_disk_fills(self, disk: Disk, suffix):
-        film = disk.path / f"film.{suffix}"
+    def test_the_film_from_before_is_kept_when_the_disk_fills(self, disk: Disk):
+        film = disk.path / "film.mp4"
         film.write_bytes(b"an earlier film")
         disk.leave(4)
         words = ["render", "--agent", "planner", "--distances", "2", "--view", "map", "--pixels", "100"]
@@ -235,16 +200,11 @@ class TestFullDisk:
         assert sorted(path.name for path in disk.path.iterdir()) == ["filler", film.name]
         assert film.read_bytes() == b"an earlier film"
 
-    def test_a_full_disk_ends_a_report_with_one_line(self, disk: Disk, unbroken):
-        disk.leave(20)
-        status, _, errors = run("report", unbroken("short"), "--out", disk.path / "report")
-        assert (status, len(errors.splitlines())) == (2, 1)
-
 
 class TestReadOnly:
     @pytest.mark.parametrize(
         "words",
-        [SHORT, SUITE, LEARN, ["generate"]],
+        [SHORT, LEARN, ["generate"]],
         ids=lambda words: " ".join(words[:2]),
     )
     def test_a_read_only_folder_is_named_in_one_line(self, disk: Disk, words):
@@ -316,15 +276,6 @@ class TestStop:
         wait_for_ends(started)
 
     @slow
-    def test_a_stopped_suite_goes_on_with_the_command_it_prints(self, unbroken, tmp_path):
-        process = start(*SUITE, "--workers", "2", "--out", "run", cwd=tmp_path)
-        wait_until(lambda: num_bytes(tmp_path) > 80_000, process)
-        line = stop(process, signal.SIGTERM)
-        assert " of 420 episodes are kept in run; go on with: " in line
-        go_on(line, tmp_path)
-        assert results_of(tmp_path / "run") == results_of(unbroken("suite"))
-
-    @slow
     def test_a_stopped_training_goes_on_with_the_command_it_prints(self, tmp_path):
         process = start(*LEARN, cwd=tmp_path)
         wait_until(lambda: num_metrics(tmp_path) > 1, process)
@@ -337,11 +288,3 @@ class TestStop:
         go_on(line, tmp_path)
         assert [line["env_steps"] for line in metrics_of(folder)] == list(range(800, STEPS + 1, 800))
         assert metrics_of(folder)[-1]["updates"] == (STEPS - 400) // 32
-
-    def test_a_stopped_report_says_that_it_is_not_whole(self, unbroken, tmp_path):
-        process = start("report", unbroken("short"), "--out", "report", cwd=tmp_path)
-        wait_until(lambda: list(tmp_path.glob("report/figures/*")), process)
-        line = stop(process, signal.SIGTERM)
-        assert "; the report in report is not whole; make it again with: " in line
-        go_on(line, tmp_path)
-        assert (tmp_path / "report" / "report.html").exists()

@@ -127,13 +127,6 @@ class TestValues:
         assert noise.note.endswith("in metres. Distances 4.")
         assert column(noise, "spl", "mah", "episodes") == {"0": 2, "0.5": 2}
 
-    def test_a_perturbation_that_this_version_does_not_have_gets_a_table(self, tmp_path):
-        make_result(tmp_path / "a", "mah", num_mazes=2, record=False)
-        folder = make_result(tmp_path / "b", "mah", num_mazes=2, record=False)
-        edit_records(folder, lambda record: record | {"glare": 3.0})
-        edit_summary(folder, perturbation=read_summary(folder)["perturbation"] | {"glare": 3.0})
-        assert column(tables_of(tmp_path)["glare-local-13"], "spl", "mah", "episodes") == {"0": 4, "3": 4}
-
     def test_training_and_eval_mazes_are_compared_where_an_agent_has_both(self, tmp_path):
         make_result(tmp_path / "a", "mah", distances=(2, 4), num_mazes=2, record=False)
         make_result(tmp_path / "b", "mah", distances=(4, 6), num_mazes=3, record=False, split="train")
