@@ -76,11 +76,11 @@ def read_run(folder: pathlib.Path, name: str) -> Run | None:
     """Returns what a run logged, but for a line that is written just now; nothing if it logged nothing yet."""
     try:
         config = read_json(folder / CONFIG)
-        lines = list(filter(None, map(_parse, read_lines(folder / METRICS))))
+        lines = read_lines(folder / METRICS)
     except InputError as error:
         remark(f"{error}; skipped")
         return None
-    if not lines or not isinstance(config, dict):
+    if not lines:
         remark(f"{folder}: expected a training run with metrics, found none yet; skipped")
         return None
     return Run(name, config, pd.DataFrame(lines))
@@ -91,14 +91,6 @@ def _names(folders: Sequence[pathlib.Path]) -> list[str]:
     whole = [folder.resolve() for folder in folders]
     common = whole[0].parent if len(whole) == 1 else os.path.commonpath(whole)
     return [str(folder.relative_to(common)) for folder in whole]
-
-
-def _parse(found: Any) -> dict[str, float]:
-    """Returns the numbers of a line; nothing if it has no steps."""
-    if not isinstance(found, dict):
-        return {}
-    values = {name: value for name, value in found.items() if type(value) in (int, float) and abs(value) < 1e300}
-    return values if _STEPS in values else {}
 
 
 def _overview(runs: Sequence[Run], rates: Sequence[str]) -> pd.DataFrame:

@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 
 from mazebench.errors import InputError, remark, unknown
-from mazebench.maps.benchmark import KINDS_VERSION, VERSION, manifest_hash
 from mazebench.report.settings import CUSTOM, Setting, make_setting
 from mazebench.results.metrics import ON_TIME_METRICS, by_fact, scores
 from mazebench.results.played import Shown, shown_of, task_of
@@ -65,11 +64,6 @@ class ReportedResult:
         """What tells training runs of one agent apart: the checkpoint, or the seed where there is none."""
         return self.checkpoint or f"seed {self.seed}"
 
-    @property
-    def benchmark(self) -> tuple[str, str]:
-        """The benchmark's version and the SHA-256 of its manifest."""
-        return self.summary.benchmark, self.summary.provenance.benchmark_manifest_sha256 or ""
-
     @functools.cached_property
     def mazes(self) -> dict[str, int]:
         """The indices of the task's mazes by their names; none if the task is not known."""
@@ -101,7 +95,7 @@ def read_results(paths: Iterable[pathlib.Path], names: Sequence[tuple[str, str]]
       names: what agents are called in the report: pairs of a name and an agent, or the folder of an agent's results.
 
     Raises:
-      InputError: if there is no result, some are not of the installed benchmark, or a name fits no agent.
+      InputError: if there is no result, or a name fits no agent.
     """
     results = []
     for folder in _find_folders(paths):
@@ -112,7 +106,6 @@ def read_results(paths: Iterable[pathlib.Path], names: Sequence[tuple[str, str]]
     if not results:
         where = ", ".join(map(str, paths))
         raise InputError(f"expected results of `mazebench eval` or `mazebench train` in {where}, found none to report")
-    _require_installed_benchmark(results)
     results = _drop_repeats(_label(_rename(results, names)))
     return sorted(results, key=lambda result: (result.setting, _rank(result.label)))
 
@@ -191,7 +184,7 @@ def _find_folders(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
     for path in paths:
         folders = folders_below(path)
         if not folders:
-            remark(f"{path}: expected results of `mazebench eval`, found {_describe(path)}; skipped")
+            remark(f"{path}: expected results of `mazebench eval`, found none; skipped")
         for folder in folders:
             found.setdefault(folder.resolve(), folder)
     return list(found.values())
@@ -200,12 +193,6 @@ def _find_folders(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
 def _rank(label: str) -> tuple[int, str]:
     name = label.partition(" ")[0]
     return (_AGENT_ORDER.index(name) if name in _AGENT_ORDER else len(_AGENT_ORDER), label)
-
-
-def _describe(path: pathlib.Path) -> str:
-    if path.is_dir():
-        return "a folder without any" if any(path.iterdir()) else "an empty folder"
-    return "a file" if path.exists() else "nothing there"
 
 
 def _read_result(folder: pathlib.Path) -> ReportedResult:
@@ -296,22 +283,3 @@ def _drop_repeats(results: list[ReportedResult]) -> list[ReportedResult]:
         remark(f"{less.folder}: {less.label}, {less.setting} again, as in {more.folder}; skipped")
         kept[result.label, result.setting] = more
     return list(kept.values())
-
-
-def _require_installed_benchmark(results: list[ReportedResult]) -> None:
-    installed = [(version, manifest_hash(version)) for version in (VERSION, KINDS_VERSION)]
-    folders: dict[tuple[str, str], list[str]] = {}
-    for result in results:
-        folders.setdefault(result.benchmark, []).append(str(result.folder))
-    if set(folders) <= set(installed):
-        return
-    which = "; ".join(f"{_name(benchmark)} in {_some(folders[benchmark])}" for benchmark in sorted(folders))
-    raise InputError(f"expected results of benchmark {' or '.join(map(_name, installed))}, found {which}")
-
-
-def _name(benchmark: tuple[str, str]) -> str:
-    return f"{benchmark[0][:40]!r} (manifest {benchmark[1][:8] or 'unknown'})"
-
-
-def _some(names: list[str], most: int = 5) -> str:
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

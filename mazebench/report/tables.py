@@ -38,7 +38,7 @@ def build_tables(episodes: pd.DataFrame) -> list[Table]:
             dataclasses.replace(table, name=prefix + table.name, title=table.title + suffix)
             for table in (*_tables_of(here), *_pooled_tables(here))
         ]
-    return [*tables, *_split_tables(episodes), _overview(episodes)]
+    return [*tables, _overview(episodes)]
 
 
 def make_table(
@@ -206,22 +206,6 @@ def _track_tables(episodes: pd.DataFrame) -> Iterator[Table]:
         yield make_table(
             f"track-{name}", f"Track {name}", note, "level", levels[name] | of_facts, _positions(levels[name])
         )
-
-
-def _split_tables(episodes: pd.DataFrame) -> Iterator[Table]:
-    """Yields a table of training against eval mazes for each unperturbed setting in which an agent has both."""
-    pairs: dict[Setting, list[Setting]] = {}
-    for setting in settings_of(episodes):
-        if setting.split in ("train", "eval") and not (setting.perturbations or setting.senses):
-            pairs.setdefault(dataclasses.replace(setting, split="eval"), []).append(setting)
-    for base in sorted(pairs):
-        group = episodes[episodes.setting.isin(pairs[base])]
-        group = group[group.groupby("label", observed=True).split.transform("nunique") == 2]
-        if len(group):
-            by_split = _rows_by(group, "split")
-            rows = {"train": by_split["train"], "eval": by_split["eval"]}
-            name, title = f"splits-{base.place}", f"Training against eval mazes: {base}"
-            yield make_table(name, title, note_on_distances(group), "split", rows, {"train": 0.0, "eval": 1.0})
 
 
 def _overview(episodes: pd.DataFrame) -> Table:

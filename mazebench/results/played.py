@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, unknown
+from mazebench.maps.benchmark import KINDS_VERSION, VERSION, manifest_hash
 from mazebench.options import from_names, options_of
 from mazebench.results.records import Summary
 from mazebench.tasks.build import build_task
@@ -21,6 +22,7 @@ from mazebench.tasks.route import plan_route
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 
+VERSIONS = (VERSION, KINDS_VERSION)
 # Options that change nothing of what is shown. A summary has the chosen values, which options may not allow.
 _UNSEEN = ("distances", "time_limit")
 
@@ -43,13 +45,21 @@ def task_of(summary: Summary) -> TaskSpec:
     """Returns the task of an evaluation, with the default distances and time limit.
 
     Raises:
-      InputError: if this version has no such task, or its mazes are gone or were changed.
+      InputError: if this version of the benchmark has no such task, or the mazes are gone or were changed.
     """
+    provenance = summary.provenance
+    if summary.benchmark not in VERSIONS:
+        raise unknown("benchmark", summary.benchmark, VERSIONS)
+    installed, found = manifest_hash(summary.benchmark), provenance.benchmark_manifest_sha256 or "unknown"
+    if installed != found:
+        raise InputError(
+            f"expected results of benchmark {summary.benchmark!r}, manifest {installed[:8]}, found manifest {found[:8]}"
+        )
     names = set(options_of(EnvironmentOptions)) - set(_UNSEEN)
-    told = summary.provenance.options.model_dump() | {"context_size": summary.provenance.context_size}
+    told = provenance.options.model_dump() | {"context_size": provenance.context_size}
     chosen = from_names(EnvironmentOptions, {name: value for name, value in told.items() if name in names})
     task = build_task(chosen.task, chosen.mazes, chosen.variants)
-    if mazes_hash(task) != summary.provenance.mazes_sha256:
+    if mazes_hash(task) != provenance.mazes_sha256:
         raise InputError("expected the mazes that were played, found others")
     return task
 
