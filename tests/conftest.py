@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import pathlib
 import warnings
 from collections.abc import Callable, Iterator
 
 import pytest
+from made_results import make_results
 
 from mazebench.errors import Remark
 
@@ -22,3 +24,19 @@ def remarks() -> Iterator[Callable[[], list[str]]]:
             return lines
 
         yield since_last_call
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory) -> pathlib.Path:
+    """The folder of the results that `make_results` makes."""
+    return make_results(tmp_path_factory.mktemp("made") / "results")
+
+
+@pytest.fixture(scope="session")
+def report(made, tmp_path_factory) -> pathlib.Path:
+    """The report over them."""
+    from mazebench.report.report import write_report  # matplotlib takes a while to load
+
+    out = tmp_path_factory.mktemp("report")
+    write_report([made], out)
+    return out

@@ -24,6 +24,8 @@ from mazebench.tasks.perturbations import perturbation_levels
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.trials import Trial, select_trials
 
+NASTY = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=1>"
+MADE_AGENTS = ("mah", "random", NASTY)
 _STEP = 0.3  # m
 
 
@@ -107,6 +109,19 @@ def make_result(
     content = {"benchmark": version, "episodes": len(records), "perturbation": perturbation_levels(spec)}
     write_json(folder / SUMMARY, labels | content | {"provenance": provenance, "privileged": privileged})
     return _set_means(folder, records)
+
+
+def make_results(folder: pathlib.Path) -> pathlib.Path:
+    """Writes a few results of three agents, of which one has a name like an attack."""
+    for number, agent in enumerate(MADE_AGENTS):
+        here, few = folder / str(number), {"skill": 0.9, "num_mazes": 2}
+        make_result(here / "local", agent, skill=0.5, num_mazes=4, episodes_per_distance=2)
+        make_result(here / "local-15", agent, size=15, record=False, **few)
+        make_result(here / "routes", agent, "hierarchical", **few)
+        make_result(here / "flip", agent, "hierarchical", map_flip=0.2, **few)
+        make_result(here / "warp", agent, map_warp=0.2, **few)
+        make_result(here / "noise", agent, position_noise=0.5, record=False, **few)
+    return folder
 
 
 def read_summary(folder: pathlib.Path) -> dict[str, Any]:

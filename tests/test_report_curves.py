@@ -34,15 +34,6 @@ def report(out, *paths):
     return (out / "report.md").read_text()
 
 
-@pytest.mark.parametrize("line", ['{"env_steps":"x"}', '{"env_steps":1' + "0" * 400 + "}", "[1]", "{"])
-def test_a_damaged_line_is_left_out(tmp_path, line):
-    run = make_run(tmp_path / "mah-3")
-    expected = report(tmp_path / "before", run)
-    with (run / "metrics.jsonl").open("a") as file:
-        file.write(f"{line}\n")
-    assert report(tmp_path / "after", run) == expected
-
-
 def test_a_run_has_figures_and_a_row(tmp_path):
     text = report(tmp_path / "out", make_run(tmp_path / "mah-3"))
     head, _, row = (line for line in text.splitlines() if line.startswith("|"))
@@ -58,11 +49,6 @@ def test_several_runs_below_a_folder_stand_side_by_side(tmp_path):
         make_run(tmp_path / "runs" / name)
     text = report(tmp_path / "out", tmp_path / "runs", tmp_path / "runs" / "seed-0")
     assert [line.split(" | ")[0] for line in text.splitlines()[4:6]] == ["| more/seed-1", "| seed-0"]
-
-
-def test_a_run_without_success_rates_has_its_losses(tmp_path):
-    report(tmp_path / "out", make_run(tmp_path / "run", LINES[:1]))
-    assert {path.stem for path in (tmp_path / "out" / "figures").iterdir()} == {"losses"}
 
 
 def test_a_line_that_is_being_written_is_left_out(tmp_path):

@@ -154,7 +154,7 @@ class TestRefused:
         assert status == 0
         assert output == f"1 result of mah: {tmp_path / 'out' / 'report.html'}, {tmp_path / 'out' / 'report.md'}\n"
         assert errors == (
-            f"mazebench: {tmp_path / 'none'}: expected results of `mazebench eval`, found nothing there; skipped\n"
+            f"mazebench: {tmp_path / 'none'}: expected results of `mazebench eval`, found none; skipped\n"
         )
 
 

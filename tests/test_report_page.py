@@ -8,31 +8,18 @@ import re
 import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
-from made_results import edit_records, make_result
+from made_results import MADE_AGENTS, NASTY, edit_records, make_result
 
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.maps import colors
 from mazebench.maps.benchmark import load_kind_mazes
 from mazebench.report.report import write_report
 from mazebench.tasks.context import resized_map
 from mazebench.world.lidar import Lidar
 
-NASTY = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=1>"
-
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory):
-    """The page over a few results, one of an agent with a name like an attack."""
-    folder = tmp_path_factory.mktemp("page")
-    for number, agent in enumerate(("mah", "random", NASTY)):
-        here = folder / "results" / str(number)
-        make_result(here / "local", agent, skill=0.5, num_mazes=4, episodes_per_distance=2)
-        make_result(here / "routes", agent, "hierarchical", skill=0.9, num_mazes=3)
-        make_result(here / "flip", agent, "hierarchical", skill=0.9, num_mazes=3, map_flip=0.2)
-        make_result(here / "warp", agent, skill=0.9, num_mazes=2, map_warp=0.2)
-        make_result(here / "noise", agent, skill=0.9, num_mazes=2, position_noise=0.5, record=False)
-    write_report([folder / "results"], folder / "report")
-    return folder / "report" / "report.html"
+def page(report):
+    return report / "report.html"
 
 
 def data_of(page):
@@ -50,13 +37,6 @@ class TestContent:
         ids = re.findall(r' id="([^"]+)"', page.read_text())
         assert len(set(ids)) == len(ids) > 100
 
-    def test_every_figure_has_the_values_as_a_table(self, page):
-        figure = re.search(r'<section class="figure">.*?Local navigation, 13 × 13.*?</section>', page.read_text(), re.S)
-        assert "<svg" in figure[0]
-        assert re.search(
-            r"<h4>success rate, by distance</h4>.*<th>mah</th>.*<th>2</th>\s*<td>\d\.\d\d \[", figure[0], re.S
-        )
-
     def test_an_agent_named_like_a_script_is_shown_as_text(self, page):
         text = page.read_text()
         assert "window.hacked=1</script>" not in text
@@ -64,10 +44,6 @@ class TestContent:
         assert NASTY in [result["label"] for result in data_of(page)["results"]]
         for path in (page.parent / "tables").glob("*.md"):
             assert not re.search(r"(?<!\\)<", path.read_text())
-
-    def test_start_and_goal_have_the_colours_of_the_world(self, page):
-        start, goal = map(colors.to_hex, (colors.START, colors.GOAL))
-        assert f"<style>:root {{ --start: {start}; --goal: {goal}; " in page.read_text()
 
 
 @pytest.fixture(scope="module")
@@ -200,12 +176,11 @@ class TestTracks:
         choose_setting(on_tracks, "local, 13 × 13")
         on_tracks.wait_for(f"!{is_seen('lidar')} && !{is_seen('level')} && !{is_seen('group')}")
 
-    @pytest.mark.parametrize("width", [360, 1200])
-    def test_it_fits_narrow_and_wide_windows(self, on_tracks, width):
+    def test_it_fits_a_narrow_window(self, on_tracks):
         choose_setting(on_tracks, "track adrift")
-        on_tracks.resize(width, 800)
-        on_tracks.wait_for(f"document.documentElement.clientWidth === {width}")
-        assert on_tracks.run("document.documentElement.scrollWidth") <= width
+        on_tracks.resize(360, 800)
+        on_tracks.wait_for("document.documentElement.clientWidth === 360")
+        assert on_tracks.run("document.documentElement.scrollWidth") <= 360
 
 
 class TestOwnMaps:
@@ -266,16 +241,17 @@ class TestReading:
     def test_the_same_episode_of_another_agent_is_one_click_away(self, opened):
         opened.wait_for("document.getElementById('others').tBodies[0].rows.length === 3")
         names = opened.run("[...document.querySelectorAll('#others button')].map(b => b.textContent)")
-        assert names == ["mah", "random", NASTY]
+        assert names == list(MADE_AGENTS)
         opened.run("document.querySelectorAll('#others button')[2].click()")
         opened.wait_for("document.getElementById('outcome').textContent.startsWith('</script>')")
 
     def test_an_address_can_name_an_episode(self, browser, page):
-        browser.open(page, "#episode=1-2")
-        browser.wait_for("document.getElementById('episodes').value === '2'")
-        assert browser.run("location.hash") == "#episode=1-2"
+        browser.open(page, "#episode=1-1")
+        browser.wait_for("document.getElementById('episodes').value === '1'")
+        assert browser.run("location.hash") == "#episode=1-1"
 
     def test_a_figure_fills_its_section_and_is_dark_on_white_in_either_scheme(self, opened):
+        opened.resize(1200, 800)
         assert opened.run("document.querySelectorAll('#figures svg[role=img]').length") >= 5
         for scheme in ("light", "dark"):
             opened.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
@@ -284,12 +260,6 @@ class TestReading:
             assert opened.run(f"getComputedStyle({svg}.querySelector('text')).fill") == "rgb(0, 0, 0)"
             assert opened.run(f"{svg}.getBoundingClientRect().width") > 600
         opened.call("Emulation.setEmulatedMedia", features=[])
-
-    @pytest.mark.parametrize("width", [360, 1200])
-    def test_the_page_fits_narrow_and_wide_windows(self, opened, width):
-        opened.resize(width, 800)
-        opened.wait_for(f"document.documentElement.clientWidth === {width}")
-        assert opened.run("document.documentElement.scrollWidth") <= width
 
     def test_every_control_has_a_name_for_screen_readers(self, opened):
         unnamed = opened.run(

@@ -91,8 +91,6 @@ class TestResults:
             ({"benchmark": "v0"}, "expected results of one benchmark to compare, found v1 in .* and v0 in"),
             ({"manifest": "1e"}, "results of one benchmark_manifest_sha256 to compare, found 0f in .* and 1e in"),
             ({"task": "hierarchical"}, "results of one task to compare, found local in .* and hierarchical in"),
-            ({"size": 15}, "results of one size to compare, found 13 in .* and 15 in"),
-            ({"split": "train"}, "results of one split to compare, found eval in .* and train in"),
         ],
     )
     def test_comparison_when_results_do_not_pair(self, tmp_path, changes, said):

@@ -49,20 +49,6 @@ def test_a_finished_evaluation_is_read(run):
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"success": 1}, "expected a record, found success: .*1"),
-        ({"maze": ...}, "expected a record, found maze: Field required"),
-    ],
-)
-def test_a_record_that_is_damaged_is_named(copy, changes, said):
-    lines = (copy / "episodes.jsonl").read_text().splitlines()
-    lines[3] = edited(json.loads(lines[3]), **changes)
-    (copy / "episodes.jsonl").write_text("\n".join(lines) + "\n")
-    assert_refused(copy, rf"episodes\.jsonl: line 4: {said}")
-
-
-@pytest.mark.parametrize(
     ("change", "said"),
     [
         (lambda text: text[:-30], "line 40: expected a record, found"),
@@ -89,8 +75,3 @@ def test_a_summary_that_is_damaged_is_named(copy, change, said):
 def test_a_run_that_is_not_finished_is_refused(copy):
     (copy / "summary.json").unlink()
     assert_refused(copy, "expected a finished evaluation, found one that is not finished; go on with .* --resume")
-
-
-def test_missing_records_are_named(copy):
-    (copy / "episodes.jsonl").unlink()
-    assert_refused(copy, r"episodes\.jsonl: can't read the records: No such file")
