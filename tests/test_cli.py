@@ -78,23 +78,17 @@ BAD_INPUT = [
     ((*TINY, "--size", "14"), "unknown size 14; available: 13, 15, 17, 19, 21"),
     ((*TINY, "--map-warp", "0.3"), "expected map_warp from 0 to 0.25, found 0.3"),
     ((*TINY, "--distances", "one"), "expected distances like 1-3 or 2,3, found 'one'"),
-    ((*TINY, "--distances", "500"), "13-eval-00: expected distances of at most 50 cells"),
     ((*TINY, "--agent", "planner"), "expected one --agent without --suite, found 2"),
-    ((*TINY, "--resume"), "--resume needs --out"),
     ((*QUICK, "--suite", "papr"), "unknown suite 'papr'; available: paper, quick, v3"),
-    ((*QUICK, "--size", "15"), "the suite 'quick' has evaluations of its own; found --size"),
     ((*RANDOM, "--track", "adrift", "--map-flip", "0.1"), "'adrift': expected no perturbation, found map_flip 0.1"),
-    ((*TINY, "--out", ""), "expected a value of --out, found an empty one"),
     ((*TINY, "--out", "{bad}/file/out"), "file/out: can't write there: Not a directory"),
     ((*TINY, "--out", "{bad}/used"), "expected an empty folder or an evaluation's, found 'thesis.tex' in it"),
-    ((*TINY, "--maps", "none.txt"), "none.txt: can't read the map: No such file or directory"),
     ((*TINY, "--maps", "{bad}/open.txt"), "open: expected a closed border, found cell (2, 4) free"),
     (("generate", "--kind", "pub"), "unknown kind 'pub'; available: cave, dfs, hospital, house, museum, obstacles, "),
     (("generate", "--from-image", "{bad}/binary.png"), "binary.png: expected a "),
     (("train", "--agent", "mah"), "expected --minutes or --env-steps, found neither"),
     (("train", "--agent", "planner", "--minutes", "1"), "agent 'planner' doesn't learn; agents that do: "),
     ((*TRAIN, "--set", "colour"), "expected --set KEY=VALUE, found 'colour'"),
-    (("compare", "{bad}/used"), "Missing argument 'B'"),
     (("render", "--out", "film.avi"), "unknown suffix '.avi'; available: .gif, .mp4, .png"),
 ]
 
@@ -235,14 +229,6 @@ class TestEval:
         assert len(folders) == 2
         assert all(folder.name.startswith("random-local-") for folder in folders)
 
-    def test_the_table_fits_80_columns(self, command, monkeypatch):
-        monkeypatch.setenv("COLUMNS", "80")
-        _, output, _ = command(*TINY, "--out", "run")
-        assert "…" not in output
-        assert max(len(line) for line in output.splitlines()) <= 80
-        for word in ("distance", "success rate", "paper", "SPL", "SPL by grid", "all"):
-            assert word in output
-
     def test_resume_goes_on_or_starts_anew_and_says_so(self, command, tmp_path):
         status, output, _ = command(*TINY, "--out", "run", "--resume")
         assert status == 0
@@ -254,7 +240,6 @@ class TestEval:
         assert files_of(tmp_path) == before
 
     def test_a_suite_is_run_and_compared(self, command, tmp_path, monkeypatch):
-        monkeypatch.setenv("COLUMNS", "80")
         parts = ["local-21", "hierarchical-13-k5", "warp-0.1"]
         monkeypatch.setitem(SUITES, "some", tuple(part for part in SUITES["quick"] if part.name in parts))
         some = ("eval", "--suite", "some", "--agent", "random", "--agent", "planner", "--out", "run")
@@ -272,9 +257,7 @@ class TestEval:
         assert (status, errors) == (0, "")
         status, near, _ = command("compare", "run/planner/local-21", "run/random/local-21")
         assert status == 0
-        for text in (output, compared, near):
-            assert "…" not in text
-            assert max(len(line.rstrip()) for line in text.splitlines()) <= 80
+        assert "A - B, SPL" in near
         assert "hierarchical-13-k5 1.00 0.00 +1.00 [" in compared
         status, text, _ = command("compare", "run/planner/local-21", "run/random/local-21", "--json")
         assert list(json.loads(text)["by_distance"]) == ["2", "6", "10"]
@@ -291,8 +274,9 @@ class TestRender:
     ARGUMENTS = ("render", "--agent", "planner", "--distances", "2", "--pixels", "96")
 
     def test_a_picture_is_the_last_moment_of_the_film_with_the_whole_path(self, command, tmp_path):
-        for name in ("x.png", "x.mp4"):
+        for name in ("x.png", "x.mp4", "x.gif"):
             assert command(*self.ARGUMENTS, "--view", "map", "--out", name)[0] == 0
+        assert (tmp_path / "x.gif").read_bytes().startswith(b"GIF89a")
         film = cv2.VideoCapture(str(tmp_path / "x.mp4"))
         frames = []
         while (read := film.read())[0]:
@@ -302,11 +286,10 @@ class TestRender:
         assert len(frames) > 3
         assert np.argmin(differences) == len(frames) - 1
 
-    @pytest.mark.parametrize("perturbation", ["--map-flip", "--map-warp"])
-    def test_the_map_is_the_one_that_the_agent_is_shown(self, command, tmp_path, perturbation):
+    def test_the_map_is_the_one_that_the_agent_is_shown(self, command, tmp_path):
         pictures = []
         for strength in ("0", "0.2"):
-            options = ("--view", "map", "--pixels", "260", perturbation, strength)
+            options = ("--view", "map", "--pixels", "260", "--map-warp", strength)
             assert command(*self.ARGUMENTS[:-2], *options, "--out", "map.png")[0] == 0
             pictures.append(cv2.imread(str(tmp_path / "map.png"))[10::20, 10::20].mean(axis=2) < 60)
         assert pictures[0].shape == (13, 13)
@@ -322,13 +305,6 @@ class TestRender:
         np.testing.assert_array_equal((without < 60).all(axis=2)[centres], (rays < 60).all(axis=2)[centres])
         blue_on_floor = (rays[..., 0] > rays[..., 2] + 20) & (without.min(axis=2) > 250)
         assert 0 < blue_on_floor.mean() < 0.5
-
-    @pytest.mark.parametrize(("suffix", "magic"), [("gif", b"GIF89a"), ("mp4", b"ftyp")])
-    def test_films_are_gif_or_mp4(self, command, tmp_path, suffix, magic):
-        assert command(*self.ARGUMENTS, "--view", "map", "--out", f"film.{suffix}")[0] == 0
-        assert magic in (tmp_path / f"film.{suffix}").read_bytes()[:16]
-        frames = cv2.VideoCapture(str(tmp_path / f"film.{suffix}"))
-        assert frames.read()[1].shape == (96, 96, 3)
 
     def test_views_are_rendered_without_a_display(self, tmp_path):
         arguments = ("-m", "mazebench", *self.ARGUMENTS, "--out", "x.png")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 from typing import Any
 
 import pytest
@@ -40,7 +39,6 @@ def test_no_end_is_known_before_the_first_step_of_a_command_that_has_steps_to_ta
     assert (status.share, status.seconds_left, status.losses) == (0.0, None, {})
 
 
-NOW = datetime.datetime(2026, 11, 22, 22, 30)
 STATUS: dict[str, Any] = {
     "env_steps": 90_112,
     "updates": 273,
@@ -54,15 +52,14 @@ STATUS: dict[str, Any] = {
 @pytest.mark.parametrize(
     ("changes", "line"),
     [
-        ({}, "45% done; 6 min left, until 22:35; 90,112 steps of the run, 273 updates, 654 steps/s; td_loss 0.0123"),
-        ({"seconds_left": 7200.0}, "45% done; 2 h 0 min left, until 2026-11-23 00:30; "),
+        ({}, "45% done; 0:05:12 left; 90,112 steps of the run, 273 updates, 654 steps/s; td_loss 0.0123"),
         ({"seconds_left": None}, "45% done; 90,112 steps of the run"),
         ({"updates": 0, "losses": {}}, "; collecting before learning begins"),
         ({"evaluated": (50, 1200)}, "; evaluating: 50 of 1,200 held-out episodes"),
     ],
 )
 def test_a_status_says_how_much_is_done_and_when_it_ends(changes: dict[str, Any], line: str):
-    assert line in describe(Status(**STATUS | changes), NOW)
+    assert line in describe(Status(**STATUS | changes))
 
 
 def test_where_nothing_is_a_terminal_there_are_two_lines_a_minute_besides_those_of_milestones(capsys):
@@ -73,7 +70,7 @@ def test_where_nothing_is_a_terminal_there_are_two_lines_a_minute_besides_those_
         lines(Status(**STATUS))
     printed = capsys.readouterr().out.splitlines()
     assert 2 <= len(printed) <= 4
-    assert all("45% done; 6 min left, until " in line for line in printed)
+    assert all("45% done; 0:05:12 left; " in line for line in printed)
     lines.say("200,000 steps")
     clock.now += 19
     lines(Status(**STATUS))

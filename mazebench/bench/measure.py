@@ -6,13 +6,11 @@ Each ratio is the median over rounds in which the two sides take turns, so that 
 from __future__ import annotations
 
 import dataclasses
-import math
 import os
-import resource
 import statistics
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import timeit
+from collections.abc import Callable
 from importlib.util import find_spec
 from typing import Any
 
@@ -39,12 +37,10 @@ from mazebench.world.models import models_of
 _SIZES = (13, 21, 51, 101)
 _NUM_ENVS = (1, 16, 256, 1024, 4096)
 _LIDAR_NUM_ENVS = (1, 16, 256)
-_NOISE = "turtlebot3"
 _MAZES_PER_SIZE = 8
 _PICTURE_ENVS = 16
 _TITLES = {
     "environments": "agent steps a second, beside the bare simulation's",
-    "gymnasium": "where a step of the Gymnasium environment goes",
     "training": "training, and where its time goes",
     "resets": "resets",
     "pictures": "pictures as observations, 64 pixels a side",
@@ -78,8 +74,6 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
     if find_spec("dm_control"):
         row = _ratio("dm_control, 1 environment", 1, *_dm_control_pair(spec), seconds, rounds)
         results["environments"].append(row)
-    say("a step of the Gymnasium environment")
-    results["gymnasium"] = _gym_rows(spec, seconds * rounds)
     say("training")
     results["training"] = _training_rows(spec, seconds * rounds)
     say("resets")
@@ -87,14 +81,12 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
     say("pictures")
     results["pictures"] = _picture_rows(spec, seconds * rounds)
     say("the range sensor")
-    results["lidar"] = [
-        _lidar_row(spec, num_envs, noise, seconds, rounds)
-        for num_envs, noise in [*((num_envs, None) for num_envs in _LIDAR_NUM_ENVS), (_LIDAR_NUM_ENVS[-1], _NOISE)]
-    ]
+    sensing = dataclasses.replace(spec, sensors=("lidar",))
+    results["lidar"] = [_vector_row(sensing, num_envs, seconds, rounds) for num_envs in _LIDAR_NUM_ENVS]
     say("cost against size")
     results["sizes"] = [_size_row(size, seconds, rounds) for size in _SIZES]
     say("cost against the number of environments")
-    results["num_envs"] = [_num_envs_row(spec, num_envs, seconds, rounds) for num_envs in _NUM_ENVS]
+    results["num_envs"] = [_vector_row(spec, num_envs, seconds, rounds) for num_envs in _NUM_ENVS]
     return results
 
 
@@ -193,57 +185,17 @@ def _gym_pair(spec: TaskSpec) -> tuple[Step, Step]:
     return step, _bare_loop(spec, actions)
 
 
-def _gym_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
-    """Returns where the time of a step of the Gymnasium environment goes, resets included."""
-    actions = _random_actions(1)[:, 0].tolist()
-    env = MazeEnv(spec, 0)
-    env.reset()
-    task, simulation = env.task, env.simulation
-    times = dict.fromkeys(("simulation", "task", "observation", "info", "resets"), 0.0)
-    count = 0
-    while sum(times.values()) < seconds:
-        marks = [time.perf_counter()]
-        task.before_step(actions[count % len(actions)], simulation)
-        marks.append(time.perf_counter())
-        simulation.step(STEPS_PER_ACTION)
-        marks.append(time.perf_counter())
-        task.after_step(simulation)
-        ended = task.get_termination(simulation) is not None
-        marks.append(time.perf_counter())
-        env._observation()
-        marks.append(time.perf_counter())
-        env._info()
-        marks.append(time.perf_counter())
-        if ended:
-            env.reset()
-        marks.append(time.perf_counter())
-        parts = ("task", "simulation", "task", "observation", "info", "resets")
-        for part, begin, end in zip(parts, marks, marks[1:], strict=False):
-            times[part] += end - begin
-        count += 1
-    total = sum(times.values())
-    return [
-        {"what": part, "us a step": 1e6 * value / count, "% of the step": 100 * value / total}
-        for part, value in times.items()
-    ]
-
-
 def _training_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
-    """Returns where a learner's time goes, for each installed learning agent, in 256 environments where it can."""
-    return [
-        _training_row(name, agent_class, spec, seconds)
-        for name, agent_class in _installed_agents()
-        if issubclass(agent_class, LearningAgent)
-    ]
-
-
-def _installed_agents() -> Iterator[tuple[str, Any]]:
-    """Yields the names and classes of the agents whose dependencies are installed."""
+    """Returns the speed of each installed agent that learns, in 256 environments where it can."""
+    rows = []
     for name in agent_names():
         try:
-            yield name, load_agent_class(name)
-        except InputError:
+            agent_class: Any = load_agent_class(name)
+        except InputError:  # what it needs is not installed
             continue
+        if issubclass(agent_class, LearningAgent):
+            rows.append(_training_row(name, agent_class, spec, seconds))
+    return rows
 
 
 def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -> dict[str, Any]:
@@ -255,46 +207,29 @@ def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -
     collector = Collector(spec, learner.num_envs, seed=0)
     learner.actor.explore_from(0, learner.num_envs, seed=0)
     state = learner.actor.initial_state(learner.num_envs)
-    times = {"act": 0.0, "step": 0.0, "store": 0.0}
-    count = 0
-    while sum(times.values()) < seconds or learner.num_rows < learner.min_rows:  # until it may learn
-        marks = [time.perf_counter()]
+    count, begin = 0, time.perf_counter()
+    while (collecting := time.perf_counter() - begin) < seconds or learner.num_rows < learner.min_rows:
         actions, state = learner.actor.act(collector.inputs, state, explore=True)
-        marks.append(time.perf_counter())
-        experience = collector.step(actions)
-        marks.append(time.perf_counter())
-        learner.observe(experience)
-        marks.append(time.perf_counter())
-        for part, begin, end in zip(times, marks, marks[1:], strict=False):
-            times[part] += end - begin
-        count += 1
-    updates, begin = 0, time.perf_counter()
-    while (elapsed := time.perf_counter() - begin) < seconds:
-        learner.update()
-        updates += 1
-    collecting = sum(times.values()) / (count * learner.num_envs)  # seconds a step
-    learning = elapsed / updates / learner.steps_per_update
-    total = collecting + learning
+        learner.observe(collector.step(actions))
+        count += learner.num_envs
+    collecting /= count  # seconds a step
+    learning = 1 / (_rate(lambda _: learner.update(), 1, seconds) * learner.steps_per_update)
     return {
         "what": f"{name}, {learner.num_envs} envs",
         "collected steps/s": round(1 / collecting),
-        "updates/s": updates / elapsed,
-        "trained steps/s": round(1 / total),
-        **{f"% {part}": 100 * value / sum(times.values()) * collecting / total for part, value in times.items()},
-        "% update": 100 * learning / total,
+        "updates/s": 1 / (learning * learner.steps_per_update),
+        "trained steps/s": round(1 / (collecting + learning)),
+        "% update": 100 * learning / (collecting + learning),
     }
 
 
 def _resets(spec: TaskSpec, count: int) -> list[dict[str, Any]]:
     """Milliseconds a reset; models are compiled before, as after the first episodes of a run."""
     _compile(spec)
-    env = MazeEnv(spec, 0)
-    one_maze = MazeEnv(dataclasses.replace(spec, mazes=spec.fixed_mazes[:1]), 0)
-    envs = MazeVectorEnv(spec, 256, seed=0)
+    env, envs = MazeEnv(spec, 0), MazeVectorEnv(spec, 256, seed=0)
     rows = [
-        ("Gymnasium, another maze", _milliseconds(lambda: env.reset(), count)),
-        ("Gymnasium, the same maze", _milliseconds(lambda: one_maze.reset(), count)),
-        ("vector of 256, an environment, another maze", _milliseconds(lambda: envs.reset(), max(3, count // 20)) / 256),
+        ("Gymnasium", _milliseconds(env.reset, count)),
+        ("vector of 256, an environment", _milliseconds(envs.reset, max(3, count // 20)) / 256),
     ]
     return [{"what": what, "ms": value} for what, value in rows]
 
@@ -309,41 +244,26 @@ def _compile(spec: TaskSpec) -> None:
 def _picture_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
     """Returns the cost of a step of the vector environment with each camera, and with none."""
     rows = []
-    for cameras, textures in (
-        ((), False),
-        (("egocentric",), False),
-        (("egocentric",), True),
-        (("top",), False),
-        (("egocentric", "top"), False),
-    ):
-        seeing = dataclasses.replace(spec, sensors=cameras, textures=textures)
-        env = MazeVectorEnv(seeing, _PICTURE_ENVS, seed=0)
+    for cameras in ((), ("egocentric",), ("top",), ("egocentric", "top")):
+        env = MazeVectorEnv(dataclasses.replace(spec, sensors=cameras), _PICTURE_ENVS, seed=0)
         try:
             env.reset()
         except RenderingError:
             return []
         rate = _rate(_stepping(env), _PICTURE_ENVS, seconds)
         env.close()
-        what = (" and ".join(cameras) or "no camera") + (", textures" if textures else "")
-        rows.append({"what": what, "steps/s": round(rate), "ms a step": 1e3 / rate})
+        rows.append({"what": " and ".join(cameras) or "no camera", "steps/s": round(rate), "ms a step": 1e3 / rate})
     return rows
 
 
-def _lidar_row(spec: TaskSpec, num_envs: int, noise: str | None, seconds: float, rounds: int) -> dict[str, Any]:
-    """Returns the speed of the vector environment with the range sensor, beside a simulation that observes nothing."""
-    sensing = dataclasses.replace(spec, sensors=("lidar",), lidar_noise=noise)
-    what = f"{num_envs} environments" + ("" if noise is None else f", noise of {noise}")
-    return _ratio(what, num_envs, *_vector_pair(sensing, num_envs, 0), seconds, rounds)
+def _vector_row(spec: TaskSpec, num_envs: int, seconds: float, rounds: int) -> dict[str, Any]:
+    """Returns the speed of the vector environment in a task, next to a simulation that observes nothing."""
+    return _ratio(f"{num_envs} environments", num_envs, *_vector_pair(spec, num_envs, 0), seconds, rounds)
 
 
 def _milliseconds(call: Callable[[], Any], count: int) -> float:
     call()
-    times = []
-    for _ in range(count):
-        begin = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - begin)
-    return 1e3 * statistics.median(times)
+    return 1e3 * statistics.median(timeit.repeat(call, number=1, repeat=count))
 
 
 def _size_row(size: int, seconds: float, rounds: int) -> dict[str, Any]:
@@ -356,29 +276,3 @@ def _size_row(size: int, seconds: float, rounds: int) -> dict[str, Any]:
     row = _ratio(f"{size} x {size}", 256, *_vector_pair(spec, 256, 0), seconds, rounds)
     # Padding included; floor and body are the two other geoms.
     return {**row, "compile ms": 1e3 * compiled, "walls": models_of(spec.mazes)[0].ngeom - 2}
-
-
-def _num_envs_row(spec: TaskSpec, num_envs: int, seconds: float, rounds: int) -> dict[str, Any]:
-    with _memory_growth() as grown:
-        env = MazeVectorEnv(spec, num_envs, seed=0)
-        observation = env.reset()
-    del env, observation
-    row = _ratio(f"{num_envs} environments", num_envs, *_vector_pair(spec, num_envs, 0), seconds, rounds)
-    return {**row, "KiB an environment": grown[0] / num_envs}
-
-
-@contextmanager
-def _memory_growth() -> Iterator[list[float]]:
-    """Yields a list whose only element becomes the growth, in KiB, of the memory that the process holds (on Linux)."""
-    grown = [0.0]
-    before = _resident_kib()
-    yield grown
-    grown[0] = _resident_kib() - before
-
-
-def _resident_kib() -> float:
-    try:
-        with open("/proc/self/statm", encoding="ascii") as file:
-            return int(file.read().split()[1]) * resource.getpagesize() / 1024
-    except OSError:
-        return math.nan

@@ -30,49 +30,28 @@ class Kept:
 @contextmanager
 def evaluating(title: str, kept: Kept) -> Iterator[Callable[[int, int], None]]:
     """Yields a function (ended, of) that updates `kept` and shows it."""
-    with _episodes_shown(title) as show:
-
-        def advance(ended: int, of: int) -> None:
-            kept.ended, kept.of = ended, of
-            show(ended, of)
-
-        yield advance
-
-
-@contextmanager
-def _episodes_shown(title: str) -> Iterator[Callable[[int, int], None]]:
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-    from rich.table import Column
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
-    if not console.is_terminal:
-        tenths_seen = [-1]
+    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task(title, total=None)
+        tenths_seen = -1
 
-        def say(done: int, of: int) -> None:
-            tenth = 10 * done // max(of, 1)
-            if tenth > tenths_seen[0]:
-                tenths_seen[0] = tenth
+        def advance(ended: int, of: int) -> None:
+            nonlocal tenths_seen
+            kept.ended, kept.of = ended, of
+            bar.update(task, completed=ended, total=of)
+            tenth = 10 * ended // max(of, 1)
+            if not console.is_terminal and tenth > tenths_seen:
+                tenths_seen = tenth
                 with suppress(OSError):  # nobody reads it any more
-                    print(f"{title}: {done:,} of {of:,} episodes", file=sys.stderr, flush=True)
+                    print(f"{title}: {ended:,} of {of:,} episodes", file=sys.stderr, flush=True)
 
-        yield say
-        return
-    console.print(title, markup=False, highlight=False)  # names of agents would leave the bar no room in its line
-    whole = Column(no_wrap=True)  # where the terminal is narrow, the bar is cut, not the numbers
-    columns = (
-        BarColumn(None, table_column=Column(ratio=1)),
-        *(column(table_column=whole) for column in (MofNCompleteColumn, TimeElapsedColumn, TimeRemainingColumn)),
-    )
-    with Progress(*columns, console=console, expand=True) as bar:
-        task = bar.add_task("", total=None)
-        yield lambda done, of: bar.update(task, completed=done, total=of)
+        if console.is_terminal:
+            console.print(title, markup=False, highlight=False)  # names of agents would leave the bar no room
+        yield advance
 
 
 @contextmanager
@@ -101,7 +80,7 @@ def training() -> Iterator[Progress]:
         def show(status: Status) -> None:
             shown = Table.grid()
             shown.add_row(ProgressBar(total=1.0, completed=status.share))
-            shown.add_row(Text(describe(status, datetime.datetime.now())))
+            shown.add_row(Text(describe(status)))
             live.update(shown)
 
         with _logged("mazebench.training", say):
@@ -149,8 +128,7 @@ class StatusLines:
     def __call__(self, status: Status) -> None:
         """Prints the status, if it is time."""
         if self._clock() >= self._printed + _SECONDS_BETWEEN_LINES:
-            now = datetime.datetime.now()
-            self.say(f"{now:%H:%M:%S} {describe(status, now)}")
+            self.say(f"{datetime.datetime.now():%H:%M:%S} {describe(status)}")
 
     def say(self, line: str) -> None:
         """Prints a line at once."""
@@ -158,13 +136,11 @@ class StatusLines:
         self._printed = self._clock()
 
 
-def describe(status: Status, now: datetime.datetime) -> str:
-    """Returns a status in words; `now` is the local time."""
+def describe(status: Status) -> str:
+    """Returns a status in words."""
     parts = [f"{status.share:.0%} done"]
     if status.seconds_left is not None:
-        end = now + datetime.timedelta(seconds=status.seconds_left)
-        day = "" if end.date() == now.date() else f"{end:%Y-%m-%d} "
-        parts.append(f"{_duration(status.seconds_left)} left, until {day}{end:%H:%M}")
+        parts.append(f"{datetime.timedelta(seconds=math.ceil(status.seconds_left))} left")
     parts.append(status.summary)
     if status.evaluated is not None:
         ended, of = status.evaluated
@@ -174,10 +150,3 @@ def describe(status: Status, now: datetime.datetime) -> str:
     elif not status.updates:
         parts.append("collecting before learning begins")
     return "; ".join(parts)
-
-
-def _duration(seconds: float) -> str:
-    minutes = math.ceil(seconds / 60)
-    if minutes <= 1:
-        return f"{math.ceil(seconds)} s"
-    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"

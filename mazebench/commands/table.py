@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from rich import box
 from rich.console import Console
-from rich.measure import Measurement
 from rich.table import Table
 
 from mazebench.constants import ON_TIME
@@ -15,8 +14,7 @@ from mazebench.results.metrics import ON_TIME_METRICS
 from mazebench.results.paper import printed_mmn
 from mazebench.results.records import Figures, Summary
 
-_NAME_CHARACTERS = 12  # in a line, at least, before a name is wrapped
-_ANY_WIDTH = 10_000
+_ANY_WIDTH = 10_000  # characters
 _HEAD = ("n", "success rate", "on time", "SPL", "SPL by grid")
 _NOTE = f"on time: within {' and '.join(f'{k:g}' for k in ON_TIME)} times the oracle's steps"
 _ON_TIME, _NAME_OF_ON_TIME = next((metric, f"on time {k:g}") for metric, k in ON_TIME_METRICS.items())
@@ -43,7 +41,7 @@ def print_summary(summary: Summary) -> None:
         ]
     else:
         rows = [_with_paper(summary.overall, paper, summary.provenance.options.landmark_distance)]
-    print_table(f"{title}{', ' + perturbed if perturbed else ''}", head, rows, totals, narrow=True)
+    print_table(f"{title}{', ' + perturbed if perturbed else ''}", head, rows, totals)
     print(_NOTE)
     if paper:
         print("paper: success rate of the paper's MMN, in DeepMind Lab")
@@ -53,7 +51,7 @@ def print_suite(summaries: Sequence[Summary]) -> None:
     """Prints the overall figures of a suite's parts, one table an agent."""
     for agent in dict.fromkeys(summary.who for summary in summaries):
         rows = [[str(summary.part), *_cells(summary.overall)] for summary in summaries if summary.who == agent]
-        print_table(f"{agent}: suite {summaries[0].suite}", ("part", *_HEAD), rows, narrow=True)
+        print_table(f"{agent}: suite {summaries[0].suite}", ("part", *_HEAD), rows)
     print(_NOTE)
 
 
@@ -63,47 +61,27 @@ def print_comparison(title: str, name: str, rows: Mapping[str, Row]) -> None:
     metrics = {"success_rate": "success rate", **({_ON_TIME: _NAME_OF_ON_TIME} if has_on_time else {}), "spl": "SPL"}
     head = (name, "A", "B", *(f"A - B, {metric}" for metric in metrics.values()), "A wins")
     cells = [[key, *_comparison_cells(row, metrics)] for key, row in rows.items()]
-    print_table(title, head, cells, narrow=True)
+    print_table(title, head, cells)
 
 
 def print_table(
-    title: str,
-    head: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    totals: Sequence[Sequence[str]] = (),
-    narrow: bool = False,
+    title: str, head: Sequence[str], rows: Sequence[Sequence[str]], totals: Sequence[Sequence[str]] = ()
 ) -> None:
     """Prints a table whose first column names the rows; `totals` are the rows below a line.
 
-    On a terminal that is too narrow, the other columns stand in several tables below one another, and names are
-    wrapped: no number is cut. A `narrow` table has less space between its columns.
+    On a terminal that is too narrow, cells are wrapped; elsewhere, lines are as long as they need to be.
     """
-    console = Console(markup=False)
+    console = Console(markup=False, emoji=False)
+    if not console.is_terminal:
+        console = Console(markup=False, emoji=False, width=_ANY_WIDTH)
     console.print(title, style="italic", highlight=False)
-    first = 1
-    while first < len(head):
-        for last in range(len(head), first, -1):
-            (names, *body) = ([line[0], *line[first:last]] for line in (head, *rows, *totals))
-            table = _table(names, body, len(totals), narrow, max(_NAME_CHARACTERS, console.width // 3))
-            width = Measurement.get(console, console.options.update(max_width=_ANY_WIDTH), table).maximum
-            if width <= console.width:
-                break
-        Console(markup=False, width=max(width, console.width)).print(table)
-        first = last
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]], num_totals: int, narrow: bool, most: int) -> Table:
-    """Returns a table with a first column of at most `most` characters, and a line above the last rows."""
-    padding = (0, 0 if narrow else 1, 0, 0)
-    table = Table(box=box.SIMPLE, pad_edge=False, padding=padding, show_edge=not narrow)
-    last = len(rows) - num_totals
-    is_number = all(row[0].isdigit() for row in rows[:last])
-    table.add_column(head[0], justify="right" if is_number else "left", overflow="fold", max_width=most)
-    for name in head[1:]:
-        table.add_column(name, justify="right", no_wrap=True)
-    for number, row in enumerate(rows, 1):
-        table.add_row(*row, end_section=number == last)
-    return table
+    table = Table(box=box.SIMPLE, pad_edge=False, padding=0, show_edge=False)
+    for name in head:
+        table.add_column(name, justify="right", overflow="fold")
+    table.columns[0].justify = "right" if all(row[0].isdigit() for row in rows) else "left"
+    for number, row in enumerate([*rows, *totals], 1):
+        table.add_row(*row, end_section=number == len(rows))
+    console.print(table)
 
 
 def _comparison_cells(row: Row, metrics: Iterable[str]) -> list[str]:

@@ -22,7 +22,6 @@ from mazebench.evaluation.plan import make_plan
 from mazebench.maps.pictures import draw_grid, draw_rays, write_image
 from mazebench.storage.files import open_whole, writing_to
 from mazebench.tasks.context import resized_map
-from mazebench.tasks.spec import TaskSpec
 from mazebench.world.lidar import ray_ends
 from mazebench.world.models import models_of
 from mazebench.world.rendering import CAMERAS, Cameras
@@ -64,7 +63,9 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
 def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[list[np.ndarray], str]:
     """Runs the episode; returns a picture of each of its moments, or of the last one alone, and what came of it."""
     plan = make_plan(options)
-    views = _views(view, plan.task)
+    if view == LIDAR and LIDAR not in plan.task.sensors:
+        raise InputError(f"view {LIDAR!r}: expected a task with this sensor; add --sensors {LIDAR}")
+    views = (MAP, *CAMERAS, *([LIDAR] if LIDAR in plan.task.sensors else [])) if view == "all" else (view,)
     number = options.seed % len(plan.trials)
     trial = plan.trials[number]
     episode = trial.episode
@@ -104,19 +105,6 @@ def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[l
     )
 
 
-def _views(view: str, task_spec: TaskSpec) -> tuple[str, ...]:
-    """Returns the views that `view` stands for.
-
-    Raises:
-      InputError: if the task lacks the sensor that it shows.
-    """
-    if view == LIDAR and LIDAR not in task_spec.sensors:
-        raise InputError(f"view {LIDAR!r}: expected a task with this sensor; add --sensors {LIDAR}")
-    if view != "all":
-        return (view,)
-    return (MAP, *CAMERAS, *([LIDAR] if LIDAR in task_spec.sensors else []))
-
-
 @dataclasses.dataclass
 class _Scene:
     """The views of a running episode, side by side in one picture."""
@@ -140,17 +128,16 @@ class _Scene:
 
         The shown map, and the maze in the view of the range sensor, have the path driven up to now.
         """
-        pictures = {} if self._cameras is None else self._take(self._cameras)
+        pictures = {}
+        if self._cameras is not None:
+            data = self.env.simulation.data
+            pictures = self._cameras.take(self.env.task.maze, data.qpos, data.mocap_pos[0])
         pictures |= {view: self._drawing(view, observation) for view in self.views if view not in pictures}
         return np.concatenate([pictures[view] for view in self.views], axis=1)
 
     def close(self) -> None:
         if self._cameras is not None:
             self._cameras.close()
-
-    def _take(self, cameras: Cameras) -> dict[str, np.ndarray]:
-        data = self.env.simulation.data
-        return cameras.take(self.env.task.maze, data.qpos, data.mocap_pos[0])
 
     def _drawing(self, view: str, observation: Mapping[str, np.ndarray]) -> np.ndarray:
         picture = self._map() if view == MAP else self._rays(observation[LIDAR])

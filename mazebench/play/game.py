@@ -28,26 +28,19 @@ class Game:
         self.env = MazeEnv(task_spec, seed)
         self.num_episodes = 0
         self.num_reached = 0
-        self.next_episode()
+        self.begin()
 
     def press(self, key: str) -> None:
         """Does what a key stands for: a letter, or an arrow by its name. Other keys do nothing."""
         if key == RESTART:
-            self.restart()
+            self.begin(self.env.task.episode)
         elif key == NEXT:
-            self.next_episode()
+            self.begin()
         elif key in LETTERS or key in ARROWS:
             self.act({**LETTERS, **ARROWS}[key])
 
-    def next_episode(self) -> None:
-        """Begins another episode."""
-        self._begin()
-
-    def restart(self) -> None:
-        """Begins the same episode again."""
-        self._begin(self.env.task.episode)
-
-    def _begin(self, episode: Episode | None = None) -> None:
+    def begin(self, episode: Episode | None = None) -> None:
+        """Begins an episode, or the next one of the seed."""
         self.observation, _ = self.env.reset(options={"episode": episode})
         self.ended = False
         self.num_episodes += 1
