@@ -83,13 +83,6 @@ for slot, seed in enumerate((5, 6)):
     np.testing.assert_array_equal(info["final_obs"][slot]["egocentric"], expected)
 """)
 
-    def test_the_goal_conditioned_environment_has_pictures(self):
-        run_with_egl("""
-env = gymnasium.make("mazebench/LocalGoal-13-v1", sensors=["top"], camera_size=48)
-observation, _ = env.reset(seed=0)
-assert observation["top"].shape == (48, 48, 3) and observation["observation"].shape == (12 + 3 * 13 * 13,)
-""")
-
     def test_gymnasium_records_a_film_of_an_episode(self, tmp_path):
         pytest.importorskip("moviepy")
         run_with_egl(f"""

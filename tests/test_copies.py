@@ -33,7 +33,7 @@ TASKS: dict[str, dict[str, Any]] = {
     "adrift": {"task": "adrift", "level": 3},
     "rough": {"task": "rough", "level": (1, 2, 3)},
 }
-SEEDS = range(3)
+SEEDS = range(1)
 EVERYWHERE = pytest.mark.parametrize("seed", SEEDS)
 OF_ALL_TASKS = pytest.mark.parametrize("options", TASKS.values(), ids=TASKS)
 
@@ -91,24 +91,6 @@ class TestCopies:
         # What follows after another seed is the same, too.
         assert_equal([env.reset(seed=7)], [copied.reset(seed=7)])
         assert_equal(play(env, actions[:9]), play(copied, actions[:9]))
-
-    @DUPLICATE
-    def test_original_and_copy_do_not_disturb_each_other(self, duplicate):
-        env, actions = in_the_middle(TASKS["several goals"], seed=0)
-        alone, copied = duplicate(env), duplicate(env)
-        expected = play(alone, actions)
-        found = []
-        for action in actions:
-            found.append(env.step(action))
-            copied.step(5 - action)
-        assert_equal(expected, found)
-
-    def test_a_copy_of_the_physics_in_motion_steps_as_the_original_does(self):
-        env, _ = in_the_middle(TASKS["local"], seed=0)
-        copied = env.physics.copy()
-        for physics in (env.physics, copied):
-            physics.step(20)
-        np.testing.assert_array_equal(env.physics.full_state(), copied.full_state())
 
     @DUPLICATE
     @pytest.mark.parametrize("name", ["mazebench/Local-13-v1", "mazebench/LocalGoal-13-v1"])
@@ -170,16 +152,6 @@ class TestStates:
         play(other, actions[:31])
         other.set_state(pickle.loads(state))  # noqa: S301
         assert_equal(play(env, actions), play(other, actions))
-
-    def test_going_back_to_an_earlier_episode_brings_back_its_maze(self):
-        env, actions = in_the_middle(TASKS["local"], seed=0)
-        state, maze = env.get_state(), env.task.episode.maze
-        expected = play(env, actions)
-        while env.task.episode.maze == maze:
-            env.reset()
-        env.set_state(state)
-        assert env.task.episode.maze == maze
-        assert_equal(expected, play(env, actions))
 
     @pytest.mark.parametrize("moment", ["before the first reset", "at the first step", "after the end"])
     def test_states_at_the_edges_of_an_episode(self, moment):

@@ -33,10 +33,6 @@ def needs(*modules: str) -> None:
 
 
 class TestScripts:
-    def test_scripts_when_counted(self):
-        source = pathlib.Path(__file__).read_text(encoding="utf-8")
-        assert [path.name for path in EXAMPLES.glob("*.py") if f'"{path.name}"' not in source] == []
-
     @pytest.mark.parametrize(
         ("module", "script", "options", "printed"),
         [

@@ -84,12 +84,6 @@ def test_drawing_is_read_back_for_any_maze_and_scale(seed, size, cell_pixels):
     assert maze_from_image(image, size) == drawn
 
 
-@pytest.mark.parametrize("cell_pixels", [1, 2, 16])
-def test_drawing_is_read_back_when_every_cell_is_doubled(maze, cell_pixels):
-    doubled = Maze(maze.walls.repeat(2, axis=0).repeat(2, axis=1))
-    assert maze_from_image(draw_maze(doubled, cell_pixels)) == doubled
-
-
 def test_drawing_marks_start_goal_and_path_when_given(maze):
     path = np.array([[1.5, 11.5], [1.5, 10.5], [11.5, 10.5], [11.5, 1.5]])
     image = draw_maze(maze, 16, start=(1, 1), goal=(11, 11), path=path).astype(int)
@@ -157,15 +151,6 @@ def test_map_is_read_when_pixels_are_gray_deep_or_transparent(maze):
         assert read_bytes(encode(image)) == maze
 
 
-def test_map_is_read_in_the_size_given(maze):
-    assert maze_from_image(blocks(maze.walls, 8), 26) == Maze(maze.walls.repeat(2, axis=0).repeat(2, axis=1))
-    assert maze_from_image(blocks(maze.walls, 1), 13) == maze
-
-
-def test_map_is_read_when_paper_surrounds_it(maze):
-    assert maze_from_image(np.pad(blocks(maze.walls, 16), 16, constant_values=255)) == maze
-
-
 def rectangle(rows: int, columns: int, num_bars: int, rng: np.random.Generator) -> np.ndarray:
     """A hall with bars of wall in it: `[rows, columns]` bool."""
     walls = np.ones((rows, columns), dtype=bool)
@@ -221,12 +206,6 @@ def test_cells_in_colour_are_floor(maze, shade, margin):
     assert maze_from_image(np.pad(image, ((margin,) * 2, (margin,) * 2, (0, 0)), constant_values=255)) == maze
 
 
-def test_walls_in_colour_are_walls(maze):
-    image = np.dstack([blocks(maze.walls, 20)] * 3)
-    image[image[..., 0] == 0] = (20, 30, 160)
-    assert maze_from_image(image) == maze
-
-
 def test_a_drawing_with_marks_is_read(maze):
     path = np.array([[1.5, 11.5], [1.5, 9.5]])
     assert maze_from_image(draw_maze(maze, 16, maze.free_cells[0], maze.free_cells[-1], path)) == maze
@@ -241,9 +220,8 @@ def scan(walls: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_GRAYSCALE)
 
 
-@pytest.mark.parametrize(("rows", "columns"), [(9, 15), (21, 13), (13, 13), (21, 21)])
-@pytest.mark.parametrize("kind", ["dfs", "obstacles"])
-def test_a_scan_of_a_maze_is_read_with_and_without_the_size(rows, columns, kind):
+@pytest.mark.parametrize(("kind", "rows", "columns"), [("dfs", 9, 15), ("obstacles", 21, 13), ("dfs", 21, 21)])
+def test_a_scan_of_a_maze_is_read_with_and_without_the_size(kind, rows, columns):
     rng = np.random.default_rng(rows)
     walls = generate(kind, max(rows, columns), rng).walls[:rows, :columns].copy()
     walls[[0, -1]] = walls[:, [0, -1]] = True
@@ -253,7 +231,7 @@ def test_a_scan_of_a_maze_is_read_with_and_without_the_size(rows, columns, kind)
     assert maze_from_image(image, max(rows, columns)) == padded(walls)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_photograph_is_refused_with_the_way_out(maze, seed):
     with pytest.raises(MazeError, match="crop, straighten and threshold a photograph first"):
         maze_from_image(photograph(maze.walls, np.random.default_rng(seed)))
@@ -305,7 +283,7 @@ def line_drawing(walls: np.ndarray, room_pixels: int, line: int, has_gaps: bool)
 
 
 @hypothesis.given(SEEDS, st.integers(4, 14), st.integers(4, 14), st.integers(14, 40), st.booleans())
-@hypothesis.settings(max_examples=5, deadline=None)
+@hypothesis.settings(max_examples=3, deadline=None)
 def test_a_maze_of_lines_between_rooms_is_read_when_asked_for(seed, rows, columns, room_pixels, has_gaps):
     hypothesis.assume(max(rows, columns) <= 2 * min(rows, columns))
     rng = np.random.default_rng(seed)
@@ -373,17 +351,15 @@ def with_line_across_the_floor() -> np.ndarray:
     ("image", "options", "message"),
     [
         (np.zeros((50, 50), np.uint8), {}, PAGE),
-        (np.full((50, 80), 255, np.uint8), {}, PAGE),
         (255 - blocks(MAZE.walls, 16), {}, INVERTED),
         (255 - np.pad(blocks(MAZE.walls, 16), 40, constant_values=255), {}, INVERTED),
         (NOISE, {}, "expected"),
         (255 - cv2.circle(np.zeros((200, 200), np.uint8), (100, 100), 80, 255, -1), {}, "expected"),
-        (np.zeros((5, 3000), np.uint8), {}, "expected"),
         (with_open_border(), {}, r"expected a closed border, found cell \(0, 3\) free"),
         (blocks(MAZE.walls, 1), {"size": 9}, "are there 9 cells a side"),
         *(
             (scan(MAZE.walls, np.random.default_rng(0)), {"size": size}, f"are there {size} cells a side")
-            for size in (11, 12, 14, 15)
+            for size in (12, 14)
         ),
         *((blocks(MAZE.walls, 8), {"size": size}, f"size of 5 to 255 cells, found {size}") for size in (4, 256)),
         (with_pocket(), {}, r"cell \(\d+, \d+\) cannot be reached from \(1, 1\) \(give the number of cells"),
@@ -403,9 +379,7 @@ def with_line_across_the_floor() -> np.ndarray:
             {},
             r"\(are the walls lines\? read them with --walls lines; a floor plan with thin walls needs --pixel-size",
         ),
-        *((thin_line_plan(8, 24, 1, 8, blur), {}, "expected") for blur in (0, 1.2)),
-        *((thin_line_plan(8, 40, 2, 20, blur), {}, "expected") for blur in (0, 1.2)),
-        (np.full((200, 200), 255, np.uint8), {"walls": "lines"}, LINES),
+        (thin_line_plan(8, 24, 1, 8, 1.2), {}, "expected"),
         (NOISE, {"walls": "lines"}, LINES),
     ],
 )
@@ -440,8 +414,3 @@ def test_a_file_that_is_no_picture_is_named_in_one_line(content, message, capfd)
 def test_a_picture_of_too_many_pixels_is_refused():
     with pytest.raises(InputError, match=r"plan\.png: expected at most 67108864 pixels, found 8192 x 8193$"):
         read_bytes(encode(np.zeros((8193, 8192), np.uint8)))
-
-
-def test_a_picture_that_is_missing_is_refused(tmp_path):
-    with pytest.raises(InputError, match="can't read the picture: No such file"):
-        read_image_maze(tmp_path / "missing.png")

@@ -62,14 +62,6 @@ def scaled(tmp_path_factory):
 class TestScale:
     """A world does not depend on how many cells it is cut into."""
 
-    def test_points_and_cells_are_converted(self):
-        maze = dataclasses.replace(corridor(), cell_size=0.5)
-        np.testing.assert_array_equal(maze.point((1, 1)), [0.75, 3.75])
-        np.testing.assert_array_equal(maze.point(np.array([[1, 1], [8, 0]])), [[0.75, 3.75], [0.25, 0.25]])
-        np.testing.assert_array_equal(maze.cell(np.array([0.99, 3.5])), [1, 1])
-        assert maze.cell_at(1.0, 3.99) == (1, 2)
-        assert maze.side == 4.5
-
     def test_a_body_drives_the_same_way(self):
         maze = dfs()
         paths = []

@@ -37,31 +37,11 @@ class TestWallFaces:
                 assert maze.is_free(tuple(point_to_cell(point + 0.1 * normal, maze.size)))
                 assert not maze.is_free(tuple(point_to_cell(point - 0.1 * normal, maze.size)))
 
-    def test_a_cell_sees_one_surface(self, maze):
-        surfaces: dict[tuple[int, int], set[int]] = {}
-        for face in wall_faces(maze):
-            normal = facing(face)
-            for part in np.arange(0.5 - face.half_length, face.half_length):
-                point = np.array([face.x, face.y]) + part * np.array([normal[1], -normal[0]]) + 0.1 * normal
-                surfaces.setdefault(tuple(point_to_cell(point, maze.size).tolist()), set()).add(face.surface)
-        assert all(len(seen) == 1 for seen in surfaces.values())
-
-    def test_faces_scale_with_the_cells(self, maze):
-        large = wall_faces(Maze(maze.walls, cell_size=2.0))
-        for face, scaled in zip(wall_faces(maze), large, strict=True):
-            np.testing.assert_allclose([scaled.x, scaled.y], [2 * face.x, 2 * face.y], atol=0.01)
-            assert (scaled.half_length, scaled.yaw, scaled.surface) == (2 * face.half_length, face.yaw, face.surface)
-
 
 def test_the_look_depends_on_the_walls_alone():
     maze, other = load_mazes(13, "eval")[:2]
     assert wall_faces(Maze(maze.walls, "another name")) == wall_faces(maze)
     assert wall_faces(other) != wall_faces(maze)
-
-
-def test_the_corridors_of_a_maze_differ():
-    for maze in load_mazes(13, "eval"):
-        assert len({face.surface for face in wall_faces(maze)}) >= 8
 
 
 def test_a_surface_says_nothing_about_the_place_on_the_map():
@@ -88,19 +68,6 @@ class TestMjcf:
             np.testing.assert_allclose(outwards, (*facing(expected), 0), atol=1e-9)
             np.testing.assert_allclose(up, (0, 0, 1), atol=1e-9)
 
-    def test_the_body_drives_as_in_the_plain_file(self, tmp_path):
-        ends = []
-        for textures in (False, True):
-            write_mjcf(MAZES[0], tmp_path / "maze.xml", textures=textures)
-            model = mujoco.MjModel.from_xml_path(str(tmp_path / "maze.xml"))
-            data = mujoco.MjData(model)
-            mujoco.mj_resetDataKeyframe(model, data, 0)
-            for drive in (0, 2, 1, 3):
-                data.ctrl[:] = np.eye(5)[drive]
-                mujoco.mj_step(model, data, 150)
-            ends.append(data.qpos.copy())
-        np.testing.assert_array_equal(*ends)
-
 
 class TestPictures:
     def test_only_pictures_change(self):
@@ -126,19 +93,6 @@ for slot, seed in enumerate((3, 8, 9)):
     np.testing.assert_array_equal(dm.reset(seed=seed).observation["egocentric"], pictures[slot])
     alone = mazebench.load("local", **options, seed=seed)  # no maze was exchanged here
     np.testing.assert_array_equal(alone.reset().observation["egocentric"], pictures[slot])
-""")
-
-    def test_what_environments_render_is_textured_too(self):
-        run_with_egl("""
-def rendered(**options):
-    env = gymnasium.make("mazebench/Local-13-v1", render_mode="rgb_array", camera="chase", **options)
-    env.reset(seed=1)
-    envs = mazebench.make_vec("local", 1, size=13, render_mode="rgb_array", **options)
-    envs.reset(seed=1)
-    return env.render(), envs.render()[0]
-for plain, textured in zip(rendered(), rendered(textures=True)):
-    assert plain.shape == textured.shape == (480, 480, 3)
-    assert not np.array_equal(plain, textured)
 """)
 
     def test_the_goal_is_seen_in_red_from_four_cells_away(self):

@@ -21,7 +21,7 @@ CONTROLS = action_controls()
 DRIVES = ("forward", "backward", "strafe_left", "strafe_right")
 # Where a drive leads, as an angle from the heading.
 BEARINGS = {"forward": 0, "backward": np.pi, "strafe_left": np.pi / 2, "strafe_right": -np.pi / 2}
-YAWS = np.random.default_rng(0).uniform(-np.pi, np.pi, size=4)
+YAWS = np.random.default_rng(0).uniform(-np.pi, np.pi, size=2)
 TURN = np.deg2rad(2.112)  # a frame
 
 # DeepMind Lab's, 1 unit being 1 cm.
@@ -99,13 +99,6 @@ class TestDriving:
         assert np.hypot(*(steps[-1, :2] - MIDDLE)) == pytest.approx(LAB_STOPPING_DISTANCE, rel=0.1)
         assert np.hypot(*steps[-1, 3:5]) < 0.001
 
-    def test_speed_when_drive_is_reversed(self):
-        simulation = simulation_at(FIELD, MIDDLE)
-        trajectory(simulation, "forward", 150)
-        frames = trajectory(simulation, "backward", 100, STEPS_PER_FRAME)
-        assert np.all(np.diff(frames[:, 3]) <= ROUNDING)
-        assert frames[-1, 3] == pytest.approx(-LAB_TOP_SPEED, rel=0.001)
-
 
 class TestTurning:
     @pytest.mark.parametrize(("action", "sign"), [("look_left", 1), ("look_right", -1)])
@@ -116,14 +109,6 @@ class TestTurning:
         np.testing.assert_allclose(np.diff(frames[:, 2])[1:], sign * TURN, rtol=0.001)
         assert frames[1, 5] == pytest.approx(sign * TURN / 0.016, rel=0.02)  # the rate stands within a frame
         np.testing.assert_allclose(frames[:, :2] - MIDDLE, 0, atol=ROUNDING)
-
-    @pytest.mark.parametrize("action", ["look_left", "look_right"])
-    def test_yaw_when_let_go(self, action):
-        simulation = simulation_at(FIELD, MIDDLE)
-        trajectory(simulation, action, 20)
-        frames = trajectory(simulation, None, 10, STEPS_PER_FRAME)
-        assert abs(frames[1, 5]) < 0.02 * TURN / 0.016
-        assert abs(frames[-1, 2] - frames[0, 2]) < 0.1 * TURN
 
     def test_velocity_when_turning_at_speed(self):
         # Turning does not steer what is in motion: the body coasts on in the old direction.
@@ -150,11 +135,6 @@ class TestWalls:
         for x in np.linspace(1.25, 1.35, 21):
             steps = trajectory(simulation_at(FIELD, (x, 12.5), 0.0, velocity), None, 100)
             assert steps[:, 3].max() < 0.05 * abs(velocity[0])
-
-    @pytest.mark.parametrize("heading", np.deg2rad([100, 135, 180]))
-    def test_gap_when_pressed_against_a_wall(self, heading):
-        steps = trajectory(simulation_at(FIELD, (1.5, 12.5), heading), "forward", 150)
-        assert -0.01 <= steps[-1, 0] - BODY_RADIUS - 1 <= 0.03
 
     @pytest.mark.parametrize("heading", np.deg2rad([100, 120, 150]))
     def test_slide_when_boxes_meet_in_a_flat_wall(self, heading):
