@@ -20,6 +20,7 @@ from mazebench.training.experience import Experience
 from .sum_tree import SumTree
 
 _NO_ACTION = -1  # in the row after a trajectory's last step
+# Without gaps between the fields, whose bytes would be undefined in a file.
 _ROW = np.dtype(
     [
         ("trajectory", np.int64),  # a number that no two trajectories of a ring share
@@ -32,9 +33,8 @@ _ROW = np.dtype(
         ("start", np.uint16),  # the cell where the leg started
         ("anchor", np.uint16),  # the cell where the trajectory started
         ("goal", np.uint16),
-        ("action", np.int8),
-    ],
-    align=True,
+        ("action", np.int32),
+    ]
 )
 
 
