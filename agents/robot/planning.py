@@ -46,7 +46,7 @@ def plan(walls: np.ndarray, goal: np.ndarray, start: Cell) -> list[Cell]:
     possible = goal > _UNLIKELY * goal.max()
     end[possible] = _GOAL_DETOUR * (goal.max() / goal[possible] - 1)
 
-    following = cheapest_ways(entering, end).following
+    following = cheapest_ways(entering, end)
     width = walls.shape[1]
     index = start[0] * width + start[1]
     path = [index]
