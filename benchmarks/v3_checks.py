@@ -10,14 +10,10 @@ split.
 from __future__ import annotations
 
 import bisect
-import concurrent.futures
-import dataclasses
 import enum
 import functools
-import itertools
 import math
-import multiprocessing
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -114,16 +110,6 @@ def _blocked_share(cases: list[_Case], num_swaps: int) -> float:
 # Agents
 
 
-@dataclasses.dataclass(frozen=True)
-class Run:
-    """Episodes of an agent with right maps of one kind, for a process to play."""
-
-    kind: str
-    episodes: int
-    agent: str = "oracle"
-    hide: tuple[str, ...] = ()
-
-
 class Episodes(NamedTuple):
     """What came of the episodes of a run; `E` is their number."""
 
@@ -137,10 +123,10 @@ class Episodes(NamedTuple):
         return 1.0 * (np.isfinite(self.steps) & (self.steps <= ON_TIME[0] * self.oracle))
 
 
-def play(run: Run) -> Episodes:
-    """Plays the episodes of a run, which are the same ones for all agents."""
-    mazes = check_mazes(run.kind, -(-run.episodes // _PER_MAZE))
-    spec = make_spec(_TRACK, maps=mazes, level=1, distances=DISTANCES, hide=run.hide, sensors=("lidar",))
+def play(agent_name: str, kind: str, episodes: int, hide: tuple[str, ...] = ()) -> Episodes:
+    """Runs an agent with right maps of a kind, in episodes that are the same ones for all agents."""
+    mazes = check_mazes(kind, -(-episodes // _PER_MAZE))
+    spec = make_spec(_TRACK, maps=mazes, level=1, distances=DISTANCES, hide=hide, sensors=("lidar",))
     rng = np.random.default_rng(_SEED)
     trials = [
         make_trial(maze, index, sample_pair(maze, int(rng.choice(DISTANCES)), rng), rng)
@@ -156,7 +142,7 @@ def play(run: Run) -> Episodes:
         lidar=spec.lidar,
         odometry_noise=spec.odometry_noise_at(1),
     )
-    agent_class = load_agent_class(run.agent)
+    agent_class = load_agent_class(agent_name)
     agent = agent_class.build(interface)
     steps = np.full(len(trials), np.inf)
     numbered = list(enumerate(trials))
@@ -171,15 +157,13 @@ def play(run: Run) -> Episodes:
     )
 
 
-def check_worth(kinds: Sequence[str], episodes: int, workers: int) -> None:
+def check_worth(kinds: Sequence[str], episodes: int) -> None:
     """Prints what the oracle reaches, and what an exact map is worth to the navigator."""
     print(f"\nRight maps, {episodes} episodes of each kind; on time is within {ON_TIME[0]:g} oracle steps:\n")
     _print_head("kind", "oracle: success", "steps a cell", "navigator on time", "without map", "map worth")
-    navigators = {"agent": "navigator"}, {"agent": "navigator", "hide": ("map",)}
-    runs = [Run(kind, episodes, **options) for kind in kinds for options in ({}, *navigators)]
-    played = _played(runs, workers)
     for kind in kinds:
-        best, shown, hidden = itertools.islice(played, 3)
+        best, shown = play("oracle", kind, episodes), play("navigator", kind, episodes)
+        hidden = play("navigator", kind, episodes, hide=("map",))
         success = mean_interval(1.0 * np.isfinite(best.steps), best.mazes)
         with_map, without = shown.on_time(), hidden.on_time()
         _print_row(
@@ -190,15 +174,6 @@ def check_worth(kinds: Sequence[str], episodes: int, workers: int) -> None:
             f"{without.mean():.2f}",
             _show(difference_interval(with_map - without, shown.mazes)),
         )
-
-
-def _played(runs: Sequence[Run], workers: int) -> Iterator[Episodes]:
-    """Yields what came of the runs, in their order; worker processes play them, or this one without workers."""
-    if not workers:
-        yield from map(play, runs)
-        return
-    with concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
-        yield from pool.map(play, runs)
 
 
 def _show(estimate: Estimate) -> str:
@@ -225,13 +200,12 @@ def main(
     check: Annotated[Check, typer.Argument()],
     kinds: Annotated[str, typer.Option(help="Kinds of mazes.")] = ",".join(KINDS),
     episodes: Annotated[int, typer.Option(min=1, help="Of each kind.")] = 40,
-    workers: Annotated[int, typer.Option(help="Processes; 0 for this one.")] = 2,
 ) -> None:
     """Check benchmark v3."""
     if check is Check.SWAPS:
         check_swaps(kinds.split(","), episodes)
     else:
-        check_worth(kinds.split(","), episodes, workers)
+        check_worth(kinds.split(","), episodes)
 
 
 if __name__ == "__main__":
