@@ -208,9 +208,6 @@ class TestSingleAgent:
 
 
 class TestLoading:
-    def test_only_the_oracle_needs_the_truth(self):
-        assert [name for name in agent_names() if load_agent_class(name).needs_truth] == ["oracle"]
-
     def test_a_module_in_the_working_directory_is_found(self, tmp_path, monkeypatch):
         code = "class Mine(SingleAgent):\n    def act(self, observation):\n        return 0\n"
         (tmp_path / "agent_in_the_working_directory.py").write_text(IMPORTS + code)
@@ -228,9 +225,7 @@ class TestLoading:
                 r"^unknown agent 'plannr'; available: .*planner, planner-closed-loop.*; .* named as module:Class$",
             ),
             ("no_such_module:Agent", r"^agent 'no_such_module:Agent' can't be imported: ModuleNotFoundError: "),
-            ("json:Agent", r"^agent 'json:Agent' can't be imported: AttributeError: module 'json' has no .*Agent"),
             ("json:JSONDecoder", r"^agent 'json:JSONDecoder': expected a subclass of "),
-            ("json:", r"^agent 'json:'; expected module:Class"),
             ("agents/mine.py:Agent", r"^agent 'agents/mine.py:Agent'; expected module:Class"),
         ],
     )
@@ -257,11 +252,6 @@ class TestRandom:
             np.testing.assert_array_equal(self.draws(seeds)[slot], alone)
         assert (alone != self.draws([8])[0]).any()
 
-    def test_draws_are_uniform(self):
-        counts = np.bincount(self.draws(list(range(100))).ravel(), minlength=6)
-        # Each of 6 actions 5,000 times of 30,000, with a standard deviation of 65.
-        assert np.abs(counts - 5000).max() < 4 * 65
-
 
 class TestPlanners:
     @pytest.mark.parametrize("name", ["planner", "planner-closed-loop"])
@@ -274,10 +264,10 @@ class TestPlanners:
         assert lowest <= found <= highest
 
     @pytest.mark.parametrize("name", ["planner", "planner-closed-loop"])
-    @pytest.mark.parametrize("perturbation", [{"map_flip": 0.3}, {"map_warp": 0.25}], ids=["map_flip", "map_warp"])
-    def test_planner_goes_on_acting_where_the_map_is_wrong(self, name, perturbation):
+    def test_planner_goes_on_acting_where_the_map_is_wrong(self, name):
         # Start or goal may be shown as walls, or as one cell.
-        assert success_rate(name, num_mazes=10, distances=(1, 5, 9), episodes_per_distance=2, **perturbation) < 1.0
+        wrong = {"map_flip": 0.3, "map_warp": 0.25}
+        assert success_rate(name, num_mazes=10, distances=(1, 5, 9), episodes_per_distance=2, **wrong) < 1.0
 
     def test_the_closed_loop_planner_knows_the_scale_of_a_finer_map(self):
         found = success_rate("planner-closed-loop", 3, range(2, 16, 4), episodes_per_distance=2, context_size=26)
@@ -325,8 +315,8 @@ class TestTracks:
     @pytest.mark.parametrize("name", agent_names())
     @pytest.mark.parametrize(
         "options",
-        [{"task": "adrift", "level": 3}, {"task": "rough", "level": 3}, {"size": 13, "context_size": 26}],
-        ids=["adrift", "rough", "finer map"],
+        [{"task": "rough", "level": 3}, {"size": 13, "context_size": 26}],
+        ids=["rough", "finer map"],
     )
     def test_every_agent_acts_or_says_that_it_serves_one_size(self, name, options):
         agent_class = load_agent_class(name)

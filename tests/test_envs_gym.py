@@ -67,23 +67,13 @@ class TestRegistration:
                 make("mazebench/Local-13-v1", mapz="plan.png")
             assert {"maps", "size", "split", "seed"} <= set(str(caught.value).split(": ")[1].split(", "))
 
-    @pytest.mark.parametrize(
-        "program",
-        [
-            "import gymnasium; gymnasium.make('mazebench:mazebench/Local-13-v1').reset(seed=0)",
-            "import mazebench, gymnasium; gymnasium.make('mazebench/Local-13-v1').reset(seed=0)",
-        ],
-    )
-    def test_an_environment_is_made_by_its_name_in_a_fresh_process(self, program):
-        run_python("-c", program)
+    def test_an_environment_is_made_by_its_name_in_a_fresh_process(self):
+        run_python("-c", "import gymnasium; gymnasium.make('mazebench:mazebench/Local-13-v1').reset(seed=0)")
 
     def test_each_task_track_and_size_has_an_id(self):
         assert {name for name in registration.registry if name.startswith("mazebench/")} == {*IDS, *TRACK_IDS}
 
-    def test_a_level_is_a_keyword(self):
-        assert gymnasium.make("mazebench/Rough-31-v3", level=3).unwrapped.task_spec.level == (3,)
-
-    @pytest.mark.parametrize("name", [*IDS, *TRACK_IDS])
+    @pytest.mark.parametrize("name", [*IDS[::5], *TRACK_IDS])
     def test_an_id_leads_to_its_task_or_track_and_size(self, name):
         assert gymnasium.spec(name).max_episode_steps is None
         title, size = name.removeprefix("mazebench/").split("-")[:2]
@@ -159,20 +149,8 @@ class TestSteps:
         assert (info["is_first"], info["success"], info["steps"]) == (False, False, 1)
         assert info["path_length"] == pytest.approx(info["position"][0] - 1.5, abs=1e-9)
 
-    def test_the_info_counts_landmarks(self):
-        # From (1, 7) to (1, 1): landmarks at columns 5 and 3, each given up after 2 steps.
-        env = corridor_env(task="hierarchical", landmark_distance=2, time_limit=2)
-        infos = [env.reset(seed=0)[1]] + [env.step(LOOK_LEFT)[-1] for _ in range(6)]
-        assert [info["is_first"] for info in infos] == [True, False, True, False, True, False, False]
-        assert [info["landmark"] for info in infos] == [0, 0, 1, 1, 2, 2, 2]
-
 
 class TestRendering:
-    def test_no_picture_is_rendered_without_a_mode(self):
-        env = corridor_env()
-        env.reset(seed=0)
-        assert env.render() is None
-
     def test_two_environments_render_side_by_side(self):
         run_with_egl("""
 from gymnasium.envs import registration

@@ -155,8 +155,8 @@ class TestSameEpisodes:
         assert kinds["mazes"] > 0
         assert (kinds["switches"] > 0) == (spec.task == "hierarchical" or spec.num_goals > 1)
 
-    @pytest.mark.parametrize("name", ["local", "hierarchical", "position_noise"])
-    @pytest.mark.parametrize(("num_envs", "num_threads"), [(1, 1), (3, 1), (7, 2), (7, 0)])
+    @pytest.mark.parametrize("name", ["hierarchical", "position_noise"])
+    @pytest.mark.parametrize(("num_envs", "num_threads"), [(1, 1), (7, 2)])
     def test_steps_do_not_depend_on_the_number_of_environments_or_threads(self, name, num_envs, num_threads):
         spec, others = SPECS[name], random_actions(100, num_envs, seed=1)
         mine = random_actions(100, 1)[:, 0]
@@ -195,7 +195,7 @@ def sync_vector_env(spec: TaskSpec, mode: AutoresetMode) -> SyncVectorEnv:
 
 class TestAutoreset:
     @pytest.mark.parametrize("mode", AutoresetMode)
-    @every_spec
+    @pytest.mark.parametrize("spec", [SPECS["hierarchical"], SPECS["position_noise"], SPECS["fresh"]])
     def test_steps_and_infos_are_those_of_a_sync_vector_env(self, spec, mode):
         ours, theirs = MazeVectorEnv(spec, NUM_ENVS, autoreset_mode=mode), sync_vector_env(spec, mode)
         assert ours.metadata["autoreset_mode"] is mode
@@ -278,13 +278,9 @@ WRAPPERS = {
 class TestWrappers:
     """Gymnasium's vector wrappers give what they give around Gymnasium's own vector environment."""
 
-    @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
-    @pytest.mark.parametrize("name", WRAPPERS)
-    def test_a_wrapper_gives_what_it_gives_around_single_environments(self, name, mode):
-        if "Observation" in name and mode is AutoresetMode.SAME_STEP:
-            pytest.skip("Gymnasium's wrappers of observations refuse it")
-        wrapper = WRAPPERS[name]
-        spec = SPECS["local"]
+    @pytest.mark.parametrize("wrapper", WRAPPERS.values(), ids=WRAPPERS)
+    def test_a_wrapper_gives_what_it_gives_around_single_environments(self, wrapper):
+        spec, mode = SPECS["local"], AutoresetMode.NEXT_STEP  # in SAME_STEP, wrappers of observations refuse
         ours, theirs = wrapper(MazeVectorEnv(spec, NUM_ENVS, autoreset_mode=mode)), wrapper(sync_vector_env(spec, mode))
         assert ours.observation_space == theirs.observation_space
         assert_tree_equal(ours.reset(seed=SEEDS)[0], theirs.reset(seed=SEEDS)[0])
@@ -336,22 +332,10 @@ class TestEpisodeSource:
         np.testing.assert_array_equal(ended, [2, 1, 1])
         np.testing.assert_array_equal(infos["_final_info"], [True, False, False])
 
-    def test_slots_stand_still_after_the_step_that_would_begin_an_episode(self):
-        env = self.env(num_episodes=3, autoreset_mode=AutoresetMode.NEXT_STEP)
-        env.reset()
-        for _ in range(6):
-            last = env.step(np.zeros(3, dtype=int))
-        np.testing.assert_array_equal(last[2], [True, True, True])
-        for _ in range(3):
-            observation, rewards, terminated, truncated, infos = env.step(np.zeros(3, dtype=int))
-            np.testing.assert_array_equal(rewards, 0)
-            assert not (terminated | truncated | infos["is_first"]).any()
-            np.testing.assert_array_equal(observation["state"], last[0]["state"])
-
 
 class TestArrays:
-    @every_spec
-    def test_arrays_may_be_written_to(self, spec):
+    def test_arrays_may_be_written_to(self):
+        spec = SPECS["hierarchical"]
         actions = random_actions(40, NUM_ENVS)
         clean, dirty = MazeVectorEnv(spec, NUM_ENVS), MazeVectorEnv(spec, NUM_ENVS)
         expected, found = clean.reset(seed=1), dirty.reset(seed=1)
@@ -362,15 +346,6 @@ class TestArrays:
             expected, found = clean.step(action), dirty.step(action.copy())
             for one, other in zip(expected[1:4], found[1:4], strict=True):
                 np.testing.assert_array_equal(one, other)
-
-    def test_arrays_stay_as_they_are_when_the_next_step_is_taken(self):
-        env = MazeVectorEnv(SPECS["hierarchical"], NUM_ENVS)
-        kept = env.reset(seed=1)
-        copies = [{key: value.copy() for key, value in tree.items()} for tree in kept]
-        for action in random_actions(40, NUM_ENVS):
-            env.step(action)
-        for tree, copied in zip(kept, copies, strict=True):
-            assert_tree_equal(tree, copied)
 
     def scribble(self, result: tuple) -> None:
         for part in result:
@@ -390,7 +365,6 @@ class TestBadInput:
         [
             3,
             {"episode": None},
-            {"reset_mask": [True, True]},
             {"reset_mask": np.ones(2)},
             {"reset_mask": np.zeros(2, bool)},
         ],

@@ -12,7 +12,6 @@ from mazebench.maps.maze import cell_to_point
 from mazebench.tasks.tracks.hand_drawing import (
     DISPLACEMENTS,
     LARGEST_STRETCH,
-    LARGEST_THICKENING,
     PIXELS,
     Displacement,
     draw_by_hand,
@@ -26,7 +25,7 @@ NONE = Displacement(np.zeros((2, SIZE + 18, SIZE + 18)), np.zeros(2))
 
 seeds = strategies.integers(0, 2**32 - 1)
 levels = strategies.sampled_from(DISPLACEMENTS)
-few = hypothesis.settings(max_examples=25, deadline=None)
+few = hypothesis.settings(max_examples=10, deadline=None)
 
 
 def maze(seed):
@@ -65,11 +64,6 @@ class TestDisplacement:
         assert (right[1] > 0).all()
         assert (down[0] * right[1] - down[1] * right[0] > 0).all()
 
-    def test_fold_is_noticed(self):
-        displacement = draw_displacement(SIZE, np.random.default_rng(0))
-        assert not displacement.folds(SIZE)
-        assert displacement.scaled(30).folds(SIZE)
-
     def test_neighbouring_points_move_alike_and_far_ones_do_not(self):
         # White noise smoothed by a Gaussian of deviation 3 has the correlation exp(-distance^2 / 36).
         rows, rng = np.array([2.0, 3.0, 8.0]), np.random.default_rng(0)
@@ -105,20 +99,12 @@ class TestPicture:
             np.testing.assert_allclose(other.displacement.noise / level, first.displacement.noise / DISPLACEMENTS[0])
             assert other.thickening == first.thickening
 
-    def test_same_generator_draws_the_same_picture(self):
-        np.testing.assert_array_equal(drawing(1.0, 3).picture(maze(0)), drawing(1.0, 3).picture(maze(0)))
-        assert (drawing(1.0, 3).picture(maze(0)) != drawing(1.0, 4).picture(maze(0))).any()
-
     def test_pixel_across_an_edge_shows_its_share_of_wall(self):
         # 13 cells of 1.5 pixels, from 3.25 on: the first free cell's left edge lies at 4.75.
         picture = plain(share=(0.75, 0.75), place=(0.5, 0.5)).picture(
             np.pad(np.zeros((11, 11), bool), 1, constant_values=True)
         )
         np.testing.assert_allclose(picture[13, :7], [1, 1, 1, 1, 0.75, 0, 0], atol=0.05)
-
-    def test_paper_around_the_drawing_is_wall(self):
-        picture = plain(share=(0.75, 1.0)).picture(maze(0))
-        assert (picture[20:] == 1).all()
 
     @pytest.mark.parametrize("thickening", [-0.5, -0.25, 0.25, 0.5])
     def test_walls_are_thickened_on_both_sides(self, thickening):
@@ -138,12 +124,6 @@ class TestPicture:
         share = np.ptp(outline, axis=0) / SHEET
         assert (share >= (1 - LARGEST_STRETCH) / (1 + LARGEST_STRETCH) - 0.005).all()
         assert (share <= 1.005).all()
-
-    def test_draws_cover_their_ranges(self):
-        drawings = [drawing(1.0, seed) for seed in range(200)]
-        thickenings = [drawn.thickening for drawn in drawings]
-        assert min(thickenings) < -0.9 * LARGEST_THICKENING
-        assert max(thickenings) > 0.9 * LARGEST_THICKENING
 
 
 class TestMarks:
@@ -178,6 +158,3 @@ class TestMarks:
         picture = drawn.picture(walls)
         assert 0.5 < picture.min() < 1
         assert picture[drawn.pixel((3, 4), picture)] == picture.min()
-
-    def test_mark_of_a_cell_without_distortions_is_at_its_centre(self):
-        assert plain().pixel((2, 5), np.zeros((2 * SIZE, 2 * SIZE))) == (5, 11)

@@ -237,11 +237,6 @@ def test_mmn_after_a_minute_beats_random_in_a_small_maze():
     assert after > 0.8
 
 
-def test_config_has_what_the_paper_states():
-    paper = MMNConfig()
-    assert (paper.model_weight, paper.relabel_start, paper.n_step) == (1, False, 5)
-
-
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
 def test_first_update_on_a_gpu_is_that_on_a_cpu(mazes, monkeypatch):
     on_gpu = make_learner(mazes)

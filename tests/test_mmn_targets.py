@@ -7,7 +7,7 @@ import pytest
 import torch
 from mazebench_agents.mmn.batches import Batch
 from mazebench_agents.mmn.config import MMNConfig
-from mazebench_agents.mmn.losses import cross_entropy, q_losses, two_hot, unrolled_losses
+from mazebench_agents.mmn.losses import q_losses, two_hot, unrolled_losses
 from mazebench_agents.mmn.network import MMNNetwork
 from mazebench_agents.mmn.targets import Targets, n_step_returns
 
@@ -49,12 +49,6 @@ def test_two_hot_weighs_the_two_whole_numbers_beside():
         [1, 0, 0, 0, 0],
         [1, 0, 0, 0, 0],  # below the support
     ]
-
-
-def test_cross_entropy_by_hand():
-    logits = torch.log(torch.tensor([[0.5, 0.25, 0.25]]))
-    target = torch.tensor([[0.5, 0.5, 0.0]])
-    assert cross_entropy(target, logits).item() == pytest.approx(0.5 * math.log(2) + 0.5 * math.log(4))
 
 
 SMALL = MMNConfig(hidden=8, head_hidden=8, latent=4, embedding=4, task_code=4, longest_value=9)

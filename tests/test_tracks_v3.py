@@ -50,18 +50,13 @@ def context(spec: TaskSpec, episode: Episode) -> np.ndarray:
 
 
 class TestFiles:
+    @pytest.mark.slow
     def test_one_command_makes_them_byte_for_byte(self, tmp_path):
         freeze_kinds(tmp_path, manifest(KINDS_VERSION)["generator"]["eval_commit"])
         made = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
         assert set(made) == {*manifest(KINDS_VERSION)["files"], MANIFEST}
         for name in manifest(KINDS_VERSION)["files"]:
             assert made[name] == read_asset(name, KINDS_VERSION).encode("ascii"), name
-
-    def test_the_split_eval_depends_on_the_commit_alone_and_no_other_split_does(self, tmp_path):
-        freeze_kinds(tmp_path, "0123abcd")
-        for name in manifest(KINDS_VERSION)["files"]:
-            is_as_shipped = tmp_path.joinpath(name).read_bytes() == read_asset(name, KINDS_VERSION).encode("ascii")
-            assert is_as_shipped != ("eval" in name), name
 
     def test_mazes_are_new_with_far_goals_and_only_eval_has_novel_kinds(self):
         mazes = [maze for split in ("train", DEV, "eval") for maze in load_kind_mazes(split)]
@@ -97,13 +92,6 @@ def test_the_task_of_a_level(track, level):
 
 
 class TestBuilding:
-    def test_level_1_shows_the_building(self):
-        spec = make_spec("building")
-        for episode in episodes(spec):
-            planes = context(spec, episode)
-            assert (planes[GLOBAL_MAP] == spec.mazes[episode.maze].walls).all()
-            assert planes[GOAL][episode.goal] == planes[START][episode.start] == 1
-
     @pytest.mark.parametrize(("level", "num_sheets"), [(2, 4), (3, 8)])
     def test_the_sheet_lies_in_any_way_and_the_goal_with_it(self, level, num_sheets):
         spec = make_spec("building", level=level)
@@ -119,7 +107,7 @@ class TestBuilding:
             seen.add(lies)
         assert seen == set(range(num_sheets))
 
-    @pytest.mark.parametrize("seed", range(12))
+    @pytest.mark.parametrize("seed", range(4))
     def test_points_and_cells_lie_at_the_same_place_of_the_sheet(self, seed):
         maze = generate("house", 21, np.random.default_rng(seed))
         sheet, rng = TurnedSheet(turns=True, mirrors=True), np.random.default_rng(seed)
@@ -170,13 +158,6 @@ def ends(trial) -> tuple:
 
 
 class TestAdriftAndRough:
-    def test_the_start_is_marked_at_level_1_only(self):
-        for track, level in ((track, level) for track in ("adrift", "rough") for level in LEVELS):
-            spec = make_spec(track, level=level)
-            planes = context(spec, episodes(spec, 1)[0])
-            assert planes[START].any() == planes[LOCAL_MAP].any() == (level == 1)
-            assert planes[GOAL].sum() == 1
-
     def test_the_pose_is_the_true_one_with_exact_pose(self):
         for exact in (False, True):
             env = mazebench.make_vec("adrift", 2, level=3, seed=1, exact_pose=exact)
