@@ -179,19 +179,6 @@ class TestGenerate:
         assert format_maze(mazes[0]) in output  # the first is shown
         assert [read_maze(tmp_path / "mine" / f"dfs-9-3-{i:03d}.png") for i in range(2)] == mazes
 
-    def test_mazes_depend_on_seed_and_kind_and_not_on_their_number(self, command, tmp_path):
-        for out, *arguments in [
-            ("first",),
-            ("again", "--count", "3"),
-            ("seed", "--seed", "1"),
-            ("kind", "--kind", "rooms"),
-        ]:
-            assert command("generate", "--size", "11", "--format", "txt", "--out", out, *arguments)[0] == 0
-        texts = {path.parent.name + path.name: path.read_text() for path in tmp_path.rglob("*.txt")}
-        assert texts["firstdfs-11-0-000.txt"] == texts["againdfs-11-0-000.txt"]
-        assert len(texts) == 6
-        assert len(set(texts.values())) == 5
-
     def test_a_maze_is_read_off_its_picture(self, command, tmp_path):
         assert command("generate", "--kind", "rooms", "--format", "txt,png", "--out", "drawn")[0] == 0
         picture = "drawn/rooms-13-0-000.png"

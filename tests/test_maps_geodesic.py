@@ -96,12 +96,6 @@ def many(num_examples: int):
 
 
 class TestWorkedExamples:
-    def test_a_start_in_the_goal_is_0_away(self):
-        assert length(L_TURN, (1, 1), (1, 1)) == 0
-        paths = DiscPaths(parse(L_TURN), RADIUS)
-        assert paths.length(np.array([2.0, 3.5]), (1, 1)) == 0  # on the goal's right side
-        np.testing.assert_array_equal(paths.path(np.array([2.0, 3.5]), (1, 1)), [[2.0, 3.5]])
-
     @pytest.mark.parametrize("radius", RADII)
     def test_length_around_one_corner(self, radius):
         # From (1.5, 3.5) to the circle about (3, 3), over it to its rightmost point, 1 m down to the goal's upper side.

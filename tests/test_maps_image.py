@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from mazebench.errors import InputError
-from mazebench.maps import colors
 from mazebench.maps.files import read_maze
 from mazebench.maps.grids import largest_area
 from mazebench.maps.kinds import generate
@@ -98,19 +97,6 @@ def test_drawing_marks_start_goal_and_path_when_given(maze):
     assert (image[5, 5] == draw_maze(maze, 16)[5, 5]).all()
 
 
-@pytest.mark.parametrize(("size", "cell_pixels"), [(13, 40), (61, 6), (255, 2)])
-def test_marks_and_path_are_seen_in_mazes_of_all_sizes(size, cell_pixels):
-    walls = np.pad(np.zeros((size - 2, size - 2), dtype=bool), 1, constant_values=True)
-    row = size // 2
-    path = np.linspace([1.5, size / 2], [size - 1.5, size / 2], 100)
-    image = draw_maze(Maze(walls, "room"), cell_pixels, (row, size // 4), (row, size - size // 4), path).astype(int)
-    for color in (colors.START, colors.GOAL):
-        seen = np.argwhere(abs(image - colors.to_bytes(color)).max(axis=-1) < 20)
-        assert (np.ptp(seen, axis=0) + 1 >= 0.026 * len(image)).all()  # without the soft edge
-    path_rows = (image[:, len(image) // 2] < 230).any(axis=-1)[cell_pixels:-cell_pixels]
-    assert path_rows.sum() >= len(image) / 150
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -186,15 +172,6 @@ def test_rectangular_pixel_map_is_padded_and_never_distorted(rows, columns, num_
         image[row : row + cell_pixels, column : column + cell_pixels] = (220, 30, 30)
     # All cells may be doubled: then the pixels do not tell how many there are.
     assert maze_from_image(image, max(rows, columns)) == padded(walls)
-
-
-def test_rectangular_plan_of_9_x_15_cells_is_padded_and_one_line_says_so(remarks):
-    walls = np.ones((9, 15), dtype=bool)
-    walls[1:-1, 1:-1] = False
-    walls[4, 3:10] = True
-    for image in (blocks(walls, 20), np.pad(blocks(walls, 20), 30, constant_values=255)):
-        assert maze_from_image(image, name="plan") == padded(walls)
-        assert remarks() == ["plan: 9 x 15 cells, padded with wall at the bottom to 15 x 15"]
 
 
 @pytest.mark.parametrize("shade", [(255, 0, 0), (0, 0, 255), (0, 160, 0), (255, 200, 0)])

@@ -118,17 +118,6 @@ class TestValidation:
         with pytest.raises(MazeError, match=message):
             Maze(walls, "m")
 
-    @many(300)
-    @hypothesis.given(numpy_strategies.arrays(bool, (4, 4)))
-    def test_a_maze_is_legal_if_its_free_area_is_connected(self, inner):
-        walls = np.pad(inner, 1, constant_values=True)
-        num_areas = ndimage.label(~walls)[1]
-        if num_areas == 1:
-            np.testing.assert_array_equal(Maze(walls).walls, walls)
-        else:
-            with pytest.raises(MazeError, match="free"):
-                Maze(walls)
-
 
 class TestValue:
     def test_walls_stay_as_they_are(self):

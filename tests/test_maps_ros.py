@@ -120,13 +120,6 @@ class TestMapSaver:
             "the maze's lower left corner is (1, 1) m on the map, so its point (x, y) is (x - 1, y - 1) m in the maze",
         ]
 
-    @pytest.mark.parametrize("other", [100, 206, 255])
-    def test_a_picture_with_another_shade_follows_the_rules(self, other, tmp_path):
-        picture = drawn(BUILDING)
-        picture[3, 3] = other
-        path = write_map(tmp_path, picture, free_thresh=0.25)
-        assert (read_occupancy(path).states[0] == 0).all()
-
 
 SURROUNDED = "????????? ??#####?? ??#...#?? ??#.?.#?? ??#...#?? ??#####?? ?????????"
 
@@ -202,16 +195,6 @@ class TestMaze:
         assert lines[1:] == ["map: doors narrower than two cells (1 m) may close, try a smaller --cell-size"]
         read_maze(path)
         assert remarks()[1].endswith("doors narrower than two cells (0.8 m) may close")  # none is smaller
-
-    def test_unknown_cells_and_inflation_are_named_where_they_may_have_closed_rooms(self, tmp_path, remarks):
-        path = write_map(tmp_path, drawn("######### #...?...# #...#...# #...#...# #########"))
-        read_maze(path)
-        assert remarks()[1] == "map: unknown cells are wall, try --unknown free"
-        read_maze(path, unknown="free")
-        assert not any("closed" in line for line in remarks())
-        path = write_map(tmp_path, drawn("######### #...#...# #.......# #...#...# #########", pixels=3))
-        read_maze(path, inflate=2.0)
-        assert remarks()[1].endswith("walls are inflated, try a smaller --inflate")
 
     def test_walls_are_inflated_by_metres(self, tmp_path):
         picture = np.full((9, 9), 254, np.uint8)

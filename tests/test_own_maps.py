@@ -6,7 +6,6 @@ import dataclasses
 import json
 import warnings
 
-import cv2
 import gymnasium
 import numpy as np
 import pytest
@@ -23,12 +22,10 @@ from mazebench.evaluation.plan import make_plan
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, corner_cells
 from mazebench.maps.text import format_maze
-from mazebench.play.film import film_episode
 from mazebench.report.episodes import read_results
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.build import make_spec
-from mazebench.tasks.context import resized_map
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.trials import draw_trials
 from mazebench.world.lidar import Lidar
@@ -170,18 +167,6 @@ class TestAgents:
         )
         assert make_plan(EvalOptions.of("planner", maps=str(tmp_path / "large.txt"))).remark is None
         assert make_plan(EvalOptions.of("random", track="building")).remark is None
-
-    def test_a_film_has_the_map_as_it_is_shown(self, tmp_path):
-        maze = generate("dfs", 31, np.random.default_rng(0))
-        (tmp_path / "large.txt").write_text(format_maze(maze))
-        for agent, side in (("random", 21), ("planner", 31)):
-            options = EvalOptions.of(agent, maps=str(tmp_path / "large.txt"), distances=(1,))
-            film_episode(options, tmp_path / "x.png", "map", 10 * side)
-            picture = cv2.imread(str(tmp_path / "x.png"), cv2.IMREAD_GRAYSCALE)
-            centres = picture[5::10, 5::10]
-            assert centres.shape == (side, side)
-            # Dark where walls are, but for the marks and the path.
-            assert np.corrcoef(centres.ravel(), resized_map(maze.walls, side).ravel())[0, 1] < -0.95
 
 
 class TestEnds:

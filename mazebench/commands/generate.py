@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pathlib
+import shutil
 from typing import Annotated, Any
 
 import typer
@@ -39,6 +40,7 @@ def generate(
 ) -> None:
     """Make mazes: MJCF for MuJoCo, text, picture, ROS map, mesh."""
     load_mujoco(renders=False)
+    from mazebench.maps.text import format_maze
     from mazebench.storage.files import make_folder
     from mazebench.world.formats import make_mazes, parse_formats, write_maze
 
@@ -49,25 +51,5 @@ def generate(
             make_folder(out)
         for path in write_maze(placed, out, chosen, from_image):
             print(path)
-        if index == 0:
-            _preview(placed.maze)
-
-
-def _preview(maze: Any) -> None:
-    """Draws a maze that fits the terminal; where output is no terminal, in the text form of maps."""
-    from rich.console import Console
-    from rich.text import Text
-
-    from mazebench.maps.text import format_maze
-
-    console = Console()
-    if console.width < 2 * maze.size:
-        return
-    if not console.is_terminal:
-        print(format_maze(maze), end="")
-        return
-    for row in maze.walls:
-        line = Text()
-        for wall in row:
-            line.append("  ", style="on grey27" if wall else "on grey93")
-        console.print(line)
+        if index == 0 and 2 * placed.maze.size <= shutil.get_terminal_size().columns:  # the first is shown
+            print(format_maze(placed.maze), end="")

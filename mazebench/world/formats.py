@@ -21,12 +21,13 @@ from mazebench.maps.text import write_text_maze
 from mazebench.world.export import MESH_FORMATS, write_mesh, write_mjcf
 
 _DEFAULT_SIZE = 13
+_ROS = "ros"  # the format whose files have a frame of their own
 _PICTURE_PIXELS = 1024  # about the side of a maze's picture
 
 
 class _Format(NamedTuple):
     suffixes: tuple[str, ...]  # of the files that a maze is written to
-    write: Callable[[LocatedMaze, pathlib.Path], None]  # writes them all, given the path of the first
+    write: Callable[..., None]  # writes them all, given the path of the first
 
 
 def make_mazes(
@@ -80,7 +81,8 @@ def write_maze(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name in formats:
-            _FORMATS[name].write(located, paths_of[name][0])
+            frame = (located.origin,) if name == _ROS else ()
+            _FORMATS[name].write(located.maze, paths_of[name][0], *frame)
     except OSError as error:
         raise InputError(f"{folder}: can't write there: {error.strerror}") from error
     return paths
@@ -90,20 +92,11 @@ def _write_picture(maze: Maze, path: pathlib.Path) -> None:
     write_image(draw_maze(maze, max(1, _PICTURE_PIXELS // maze.size)), path)
 
 
-def _in_own_frame(write: Callable[[Maze, pathlib.Path], None]) -> Callable[[LocatedMaze, pathlib.Path], None]:
-    """Returns a writer of a format whose frame is the maze's."""
-    return lambda located, path: write(located.maze, path)
-
-
-def _write_ros_map(located: LocatedMaze, path: pathlib.Path) -> None:
-    write_ros_map(located.maze, path, located.origin)
-
-
 _FORMATS: dict[str, _Format] = {
-    "txt": _Format(("txt",), _in_own_frame(write_text_maze)),
-    "mjcf": _Format(("xml",), _in_own_frame(write_mjcf)),
-    "mjcf-textured": _Format(("textured.xml",), _in_own_frame(functools.partial(write_mjcf, textures=True))),
-    "png": _Format(("png",), _in_own_frame(_write_picture)),
-    "ros": _Format(("yaml", "pgm"), _write_ros_map),
-    **{name: _Format((name,), _in_own_frame(write_mesh)) for name in MESH_FORMATS},
+    "txt": _Format(("txt",), write_text_maze),
+    "mjcf": _Format(("xml",), write_mjcf),
+    "mjcf-textured": _Format(("textured.xml",), functools.partial(write_mjcf, textures=True)),
+    "png": _Format(("png",), _write_picture),
+    _ROS: _Format(("yaml", "pgm"), write_ros_map),  # which also takes the frame of the map
+    **{name: _Format((name,), write_mesh) for name in MESH_FORMATS},
 }
