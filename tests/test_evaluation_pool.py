@@ -27,10 +27,6 @@ class Mortal(Agent):
     def act(self, inputs, state, explore=False):
         return np.zeros(len(inputs.seed), dtype=int), state
 
-class Alone(SingleAgent):
-    def act(self, observation):
-        return 0
-
 class Failing(Agent):
     def act(self, inputs, state, explore=False):
         raise ValueError("several\\nlines")
@@ -43,21 +39,10 @@ def _agents_at_hand(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
 
 
-@pytest.fixture(scope="module")
-def reference(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("runs") / "random"
-    evaluate("random", folder, record=True, map_flip=0.1, **FEW)
-    return results_of(folder)
-
-
-@pytest.mark.parametrize(
-    "running",
-    [{"num_envs": 7}, {"workers": 2, "num_envs": 5}],
-    ids=str,
-)
-def test_the_bytes_do_not_depend_on_workers_or_environments(reference, tmp_path, running):
-    evaluate("random", tmp_path, record=True, map_flip=0.1, **running, **FEW)
-    assert results_of(tmp_path) == reference
+def test_the_bytes_do_not_depend_on_workers_or_environments(tmp_path):
+    for folder, running in (("one", {}), ("few", {"num_envs": 7}), ("workers", {"workers": 2, "num_envs": 5})):
+        evaluate("random", tmp_path / folder, record=True, map_flip=0.1, **running, **FEW)
+        assert results_of(tmp_path / folder) == results_of(tmp_path / "one")
 
 
 @pytest.mark.usefixtures("_agents_at_hand")
@@ -70,11 +55,6 @@ def test_a_killed_worker_is_named_and_what_ended_is_kept(tmp_path):
     assert calls[0] == (80, 160)
     evaluate("pool_at_hand:Mortal", tmp_path / "unbroken", **FEW)
     assert records_of(out) == records_of(tmp_path / "unbroken")
-
-
-@pytest.mark.usefixtures("_agents_at_hand")
-def test_a_single_agent_acts_in_workers_by_its_name():
-    assert evaluate("pool_at_hand:Alone", workers=1, **FEW).overall == evaluate("pool_at_hand:Alone", **FEW).overall
 
 
 @pytest.mark.usefixtures("_agents_at_hand")
