@@ -113,7 +113,7 @@ class TestLabels:
         for path in files:
             text = path.read_text()
             assert "ours" in text
-            assert text.count("lab.agents:Bold") == (path.name in ("report.md", "report.html"))  # in the command
+            assert text.count("lab.agents:Bold") == (path.name == "report.html")  # in the command
 
     def test_results_of_one_agent_get_names_by_their_folders(self, tmp_path):
         for name, checkpoint in (("a", "aa11bb22"), ("b", "cc33dd44")):
@@ -152,7 +152,7 @@ class TestRefused:
         assert not (tmp_path / "out").exists()
         status, output, errors = command(run, tmp_path / "none", "--out", tmp_path / "out")
         assert status == 0
-        assert output == f"1 result of mah: {tmp_path / 'out' / 'report.html'}, {tmp_path / 'out' / 'report.md'}\n"
+        assert output == f"1 result of mah: {tmp_path / 'out' / 'report.html'}\n"
         assert errors == (
             f"mazebench: {tmp_path / 'none'}: expected results of `mazebench eval`, found none; skipped\n"
         )

@@ -13,7 +13,6 @@ from mazebench.results.intervals import (
     interquartile_mean,
     mean_interval,
     pool_runs,
-    probability_of_improvement,
     runs_interval,
     wilson_interval,
 )
@@ -147,12 +146,6 @@ class TestRuns:
         # One run is better in all mazes, and this is not averaged away.
         mean, trimmed = pool_runs(np.array([[0.0] * 20, [1.0] * 20]))
         assert (mean.low, mean.high, trimmed.low, trimmed.high) == (0.0, 1.0, 0.0, 1.0)
-
-    def test_probability_of_improvement_by_hand(self):
-        # The example of docs/metrics.md: maze 1 has a tie, a loss and two wins, maze 2 two wins and two ties.
-        found = probability_of_improvement(np.array([[0.5, 1.0], [1.0, 1.0]]), np.array([[0.5, 0.9], [0.6, 1.0]]))
-        assert found.value == (2.5 / 4 + 3 / 4) / 2
-        assert 0 <= found.low < found.value < found.high <= 1
 
 
 class TestRunsAndMazes:

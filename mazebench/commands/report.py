@@ -48,7 +48,7 @@ def report(
             remark(f"{counted(len(runs), 'training run')} left out beside results; report them by themselves")
         reported = write_report(results, out, names)
     agents = sorted({result.label for result in reported})
-    print(f"{counted(len(reported), 'result')} of {', '.join(agents)}: {out / PAGE}, {out / DOCUMENT}")
+    print(f"{counted(len(reported), 'result')} of {', '.join(agents)}: {out / PAGE}")
 
 
 def _parse_name(text: str) -> tuple[str, str]:

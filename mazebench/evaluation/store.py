@@ -153,8 +153,11 @@ class Store:
 
 def _from_line(line: dict[str, Any]) -> Ended:
     record = Record.model_validate_json(json.dumps(line["record"]))  # lists are tuples in JSON only
-    poses = [None if each is None else np.array(each, dtype=np.float16) for each in line["trajectory"]]
-    return Ended(record, Trajectory(*poses) if poses else None)
+    if not line["trajectory"]:
+        return Ended(record, None)
+    pose, observed = (None if poses is None else np.array(poses, dtype=np.float16) for poses in line["trajectory"])
+    assert pose is not None
+    return Ended(record, Trajectory(pose, observed))
 
 
 def _to_line(ended: Ended) -> str:

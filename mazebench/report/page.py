@@ -30,7 +30,6 @@ from mazebench.report.trajectories import CELL_COLORS, TIME_COLORS
 from mazebench.results.paper import citation, reference
 from mazebench.results.played import Shown
 from mazebench.results.trajectories import Trajectory
-from mazebench.tasks.options import TaskOptions
 from mazebench.world.lidar import NUM_RAYS
 from mazebench.world.mjcf import BODY_RADIUS
 
@@ -254,10 +253,7 @@ def _names(setting: Setting) -> dict[str, Any]:
 
 
 def _describe(result: ReportedResult) -> dict[str, Any]:
-    setting, maps = result.setting, _shown(result)
-    provenance = result.summary.provenance
-    sensors = (provenance.options.model_extra or {}).get("sensors", ())
-    lidar = TaskOptions(track=setting.track or None, lidar_noise=result.summary.lidar_noise).lidar
+    setting, task, maps = result.setting, result.task, _shown(result)
     return {
         "label": result.label,
         "size": setting.size,
@@ -267,7 +263,7 @@ def _describe(result: ReportedResult) -> dict[str, Any]:
         "picture": 0
         if not maps or maps[0].are_cells
         else len(maps[0].walls),  # pixels on a side, where they are no cells
-        "lidar": lidar.max_range if setting.track or "lidar" in sensors else 0,  # m
+        "lidar": task.lidar.max_range if task and "lidar" in task.sensors else 0,  # m
         "groups": result.facts,
     }
 

@@ -1,4 +1,4 @@
-"""A report: the folder with tables, figures, a document of both, and the page."""
+"""A report: the folder with tables, figures and the page."""
 
 from __future__ import annotations
 
@@ -11,13 +11,12 @@ import pandas as pd
 
 from mazebench.errors import held_remarks, remark
 from mazebench.report.episodes import ReportedResult, join_episodes, read_results
-from mazebench.report.figures import Drawn, draw_distributions, draw_several_tables, draw_table, save
-from mazebench.report.files import DOCUMENT, FIGURES, PAGE, TABLES, new_report, write_text
+from mazebench.report.figures import draw_distributions, draw_several_tables, draw_table, save
+from mazebench.report.files import FIGURES, PAGE, TABLES, new_report, write_text
 from mazebench.report.page import build_page
-from mazebench.report.table import Table, escape_markdown, latex_name, to_csv, to_latex, to_markdown
+from mazebench.report.table import latex_name, to_csv, to_latex, to_markdown
 from mazebench.report.tables import build_tables
 from mazebench.report.trajectories import draw_trajectories
-from mazebench.results.paper import citation, reference
 
 _PACKAGES = ("mazebench-mujoco", "mujoco", "numpy", "torch")  # in provenance
 
@@ -35,7 +34,7 @@ def write_report(
       names: what agents are called, as `read_results` takes it.
 
     Raises:
-      InputError: if there is nothing to report, results are of another benchmark, or `out` can't be used.
+      InputError: if there is nothing to report, or `out` can't be used.
     """
     with _noting_remarks() as notes:
         results = read_results(paths, names)
@@ -57,11 +56,8 @@ def write_report(
             write_text(out / TABLES / f"{table.name}.csv", to_csv(table))
             for metric in table.metrics:
                 write_text(out / TABLES / f"{latex_name(table, metric)}.tex", to_latex(table, metric))
-        trajectories = list(draw_trajectories(episodes))
-        for drawn in (*figures, *trajectories):
+        for drawn in (*figures, *draw_trajectories(episodes)):
             save(drawn.figure, out / FIGURES / drawn.name)
-        document = _document(head, tables, [*figures, *trajectories], provenance, notes)
-        write_text(out / DOCUMENT, document)
         write_text(out / PAGE, build_page(results, head, tables, figures, provenance, notes))
     return results
 
@@ -84,8 +80,6 @@ def provenance_of(results: Sequence[ReportedResult]) -> pd.DataFrame:
 def _origin(result: ReportedResult) -> dict[str, str | int]:
     """Returns a result's line of provenance, with empty texts for what it does not say."""
     provenance = result.summary.provenance
-    said = provenance.model_extra or {}
-    machine, command = said.get("machine"), said.get("command")
     versions = [f"{name} {provenance.packages[name]}" for name in _PACKAGES if provenance.packages.get(name)]
     return {
         "agent": result.label,
@@ -94,9 +88,9 @@ def _origin(result: ReportedResult) -> dict[str, str | int]:
         "in": str(result.folder),
         "checkpoint": result.checkpoint[:12] if result.checkpoint else "none",
         "seed": str(result.seed),
-        "versions": ", ".join([*versions, *([f"Python {said['python']}"] if "python" in said else [])]),
-        "machine": ", ".join(f"{key} {value}" for key, value in machine.items()) if isinstance(machine, dict) else "",
-        "command": " ".join(map(str, command)) if isinstance(command, list) else "",
+        "versions": ", ".join([*versions, f"Python {provenance.python}"]),
+        "machine": ", ".join(f"{key} {value}" for key, value in provenance.machine.items()),
+        "command": " ".join(provenance.command),
     }
 
 
@@ -105,34 +99,6 @@ def _common_folder(paths: Sequence[str]) -> str:
         return os.path.commonpath(paths) or "."
     except ValueError:  # some are absolute, some are not
         return os.path.commonpath([os.path.abspath(path) for path in paths])
-
-
-def _document(
-    head: str, tables: Sequence[Table], figures: Sequence[Drawn], provenance: pd.DataFrame, warnings: Sequence[str]
-) -> str:
-    """Returns tables and figures below one another, what was skipped, and where the results came from."""
-    lines = [
-        "# mazebench report",
-        f"{escape_markdown(head)} [{PAGE}]({PAGE}) has every episode.",
-        "Means with 95 % intervals, which allow for the likeness of episodes in one maze. Columns marked (paper) are "
-        f"the values printed in {escape_markdown(citation())}. {reference()['note']}",
-        *(f"- {escape_markdown(warning)}" for warning in warnings),
-    ]
-    left = {drawn.name: drawn for drawn in figures}
-    for table in tables:
-        lines += [f"## {escape_markdown(table.title)}", escape_markdown(table.note)]
-        lines += [to_markdown(table.wide(metric)) for metric in table.metrics]
-        if table.name in left:
-            lines.append(_show(left.pop(table.name)))
-    for drawn in left.values():
-        lines += [f"## {escape_markdown(drawn.title)}", escape_markdown(drawn.note), _show(drawn)]
-    cells = provenance.set_index("agent").map(escape_markdown)
-    lines += ["## Results and provenance", to_markdown(cells)]
-    return "\n\n".join(line.rstrip("\n") for line in lines if line) + "\n"
-
-
-def _show(drawn: Drawn) -> str:
-    return f"![{escape_markdown(drawn.title)}]({FIGURES}/{drawn.name}.png)"
 
 
 @contextlib.contextmanager

@@ -6,7 +6,6 @@ import dataclasses
 
 from mazebench.options import options_of
 from mazebench.results.records import Record, Summary
-from mazebench.tasks.options import ENDS
 from mazebench.tasks.perturbations import Perturbations
 
 DEFAULT_LANDMARK_DISTANCE = 5  # cells; the paper's choice wherever it varies something else
@@ -26,8 +25,8 @@ class Setting:
     track: str = ""  # "" where the benchmark's first version is played
     level: int = 0  # of the track
     cell_size: float = 1.0  # m
-    ends: tuple[str, str] = ("", "")  # the start and the goal of all episodes, "" for one that was drawn
-    senses: tuple[str, ...] = ()  # the noise on the senses that a user set, in words
+    # What a user set beside the mazes, in words: the size of a cell, start and goal, the noise on the senses.
+    own: tuple[str, ...] = ()
 
     @property
     def is_exact(self) -> bool:
@@ -45,13 +44,6 @@ class Setting:
         """The name with an unusual landmark distance."""
         is_default = self.landmark_distance in (0, DEFAULT_LANDMARK_DISTANCE)
         return self.name + ("" if is_default else f"-k{self.landmark_distance}")
-
-    @property
-    def own(self) -> tuple[str, ...]:
-        """What is not the benchmark's beside the mazes, in words: the size of a cell, start and goal, the senses."""
-        scale = () if self.cell_size == 1 else (f"cells of {self.cell_size:g} m",)
-        ends = (f"{name} {place}" for name, place in zip(ENDS, self.ends, strict=True) if place)
-        return *scale, *ends, *self.senses
 
     def level_of(self, perturbation: str) -> float:
         """Returns the level of a perturbation; 0 if it is switched off."""
@@ -76,6 +68,8 @@ class Setting:
 def make_setting(summary: Summary, records: tuple[Record, ...]) -> Setting:
     """Returns the setting of an evaluation."""
     options = summary.provenance.options
+    scale = (f"cells of {summary.cell_size:g} m",) if summary.cell_size else ()
+    ends = (f"{name} {place}" for name, place in (("start", options.start), ("goal", options.goal)) if place)
     return Setting(
         task=summary.task,
         size=summary.size,
@@ -86,8 +80,7 @@ def make_setting(summary: Summary, records: tuple[Record, ...]) -> Setting:
         track=summary.track or "",
         level=summary.level or 0,
         cell_size=summary.cell_size or 1.0,
-        ends=(options.start or "", options.goal or ""),
-        senses=summary.senses,
+        own=(*scale, *ends, *summary.senses),
     )
 
 

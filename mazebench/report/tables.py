@@ -13,7 +13,7 @@ import pandas as pd
 from mazebench.report.episodes import at_common_distances, common_distances, facts_of, settings_of
 from mazebench.report.settings import DEFAULT_LANDMARK_DISTANCE, Setting, level_help, level_name, short_name
 from mazebench.report.table import METRICS, UNTRAINED_NOTE, Table, make_values
-from mazebench.results.intervals import Estimate, mean_interval, pool_runs, probability_of_improvement
+from mazebench.results.intervals import Estimate, mean_interval, pool_runs
 from mazebench.results.paper import printed
 from mazebench.tasks.tracks import TRACKS
 
@@ -23,10 +23,9 @@ _DISTANCES_NOTE = (
     "Means over all episodes. If results cover different distances, only the distances that all of them cover count."
 )
 _POOLED_NOTE = (
-    "Mean and interquartile mean (IQM) of the mazes' scores in all training runs; P(A > B) is the share of pairs of "
-    "runs in which A's score of a maze is higher, ties counting half. 95 % intervals by a bootstrap over whole runs: "
-    "they speak of other training runs on these mazes, and with fewer than 5 runs they are too narrow. Empty without "
-    "two runs of the same episodes."
+    "Mean and interquartile mean (IQM) of the mazes' scores in all training runs. 95 % intervals by a bootstrap over "
+    "whole runs: they are of other training runs on these mazes, and with fewer than 5 runs they are too narrow. Empty "
+    "without two runs of the same episodes."
 )
 
 
@@ -187,7 +186,7 @@ def _by_distance(name: str, title: str, episodes: pd.DataFrame, is_warped: bool 
 def _is_printed(episodes: pd.DataFrame) -> bool:
     """Returns whether the paper's values can stand beside those of episodes of one setting."""
     setting = episodes.setting.iloc[0]
-    return setting.split == "eval" and not setting.senses
+    return setting.split == "eval" and not setting.own
 
 
 def _track_tables(episodes: pd.DataFrame) -> Iterator[Table]:
@@ -264,23 +263,15 @@ def _kind(setting: Setting) -> Setting:
 
 
 def _pool(episodes: pd.DataFrame, metric: str, row: str) -> Iterator[dict[str, Any]]:
-    """Yields each agent's mean and interquartile mean over its training runs, then P(A > B) of each two agents."""
-    found = {}
+    """Yields each agent's mean and interquartile mean over its training runs."""
     for agent, own in episodes.groupby("agent", sort=False):
         by_run = own.pivot(index="run", columns=["maze_index", "trial"], values=metric).reindex(own.run.unique())
         # Without a value where runs are of other episodes, or the oracle's steps are not known.
         if len(by_run) > 1 and not by_run.isna().any(axis=None):
-            found[agent] = by_run
-    scores = {agent: by_run.T.groupby("maze_index").mean().T.to_numpy() for agent, by_run in found.items()}
-    for agent, of_runs in scores.items():
-        for name, estimate in zip(("mean", "IQM"), pool_runs(of_runs), strict=True):
-            line = _line(metric, row, f"{agent}, {name}", estimate, found[agent].size)
-            yield line | {"source": "measured", "runs": len(of_runs)}
-    for a, b in itertools.combinations(found, 2):
-        if found[a].columns.equals(found[b].columns):
-            estimate = probability_of_improvement(scores[a], scores[b])
-            line = _line(metric, row, f"P({a} > {b})", estimate, found[a].size + found[b].size)
-            yield line | {"source": "measured", "runs": len(scores[a]) + len(scores[b])}
+            scores = by_run.T.groupby("maze_index").mean().T.to_numpy()
+            for name, estimate in zip(("mean", "IQM"), pool_runs(scores), strict=True):
+                line = _line(metric, row, f"{agent}, {name}", estimate, by_run.size)
+                yield line | {"source": "measured", "runs": len(scores)}
 
 
 def _line(metric: str, row: str, column: str, mean: Estimate, num_episodes: int) -> dict[str, Any]:

@@ -145,23 +145,6 @@ def pool_runs(scores: np.ndarray) -> tuple[Estimate, Estimate]:
     return _percentiles(float(scores.mean()), means), _percentiles(interquartile_mean(scores), trimmed)
 
 
-def probability_of_improvement(a: np.ndarray, b: np.ndarray) -> Estimate:
-    """Returns P(A > B) over training runs (Agarwal et al. 2021) with a bootstrap interval over the runs of both.
-
-    In each maze it is the share of pairs of a run of A and a run of B in which A's score is higher, ties counting
-    half; the mean over mazes is returned.
-
-    Args:
-      a: `[R_a, T]`, scores of A's runs, R_a >= 2.
-      b: `[R_b, T]`, scores of B's runs on the same mazes, R_b >= 2.
-    """
-    wins = (np.sign(a[:, None] - b) / 2 + 0.5).mean(axis=2)  # [R_a, R_b]
-    rng = np.random.default_rng(_BOOTSTRAP_SEED)
-    ours, theirs = (rng.integers(len(wins_of), size=(_NUM_RESAMPLES, len(wins_of))) for wins_of in (a, b))
-    resampled = wins[ours[:, :, None], theirs[:, None, :]].mean(axis=(1, 2))
-    return _percentiles(float(wins.mean()), resampled)
-
-
 def _clusters(mazes: np.ndarray) -> np.ndarray:
     """Returns `[E]` int, which episodes hang together: those of a maze; none where there is only one maze."""
     _, clusters = np.unique(mazes, return_inverse=True)

@@ -100,6 +100,9 @@ class Provenance(_Stored):
     agent_package: str | None = None  # name and version; None for a `module:Class`
     agent_code_sha256: str | None = None  # of the package of an installed agent, of the file of a `module:Class`
     packages: dict[str, str | None] = {}
+    command: list[str] = []
+    python: str = "unknown"
+    machine: dict[str, Any] = {}
 
 
 class Summary(_Stored):
