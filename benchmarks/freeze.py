@@ -1,4 +1,4 @@
-"""Makes benchmark v1: `python -m benchmarks.freeze DIR` writes its files byte for byte as they ship."""
+"""Makes the benchmark `paper`: `python -m benchmarks.freeze DIR` writes its files byte for byte as they ship."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.maps.benchmark import MANIFEST, MAZES_PER_SPLIT, SIZES, SPLITS, VERSION, mazes_file
+from mazebench.constants import TASK_VERSION
+from mazebench.maps.benchmark import MANIFEST, MAZES_PER_SPLIT, PAPER_BENCHMARK, SIZES, SPLITS, mazes_file
 from mazebench.maps.kinds.dfs import DFS_OPENINGS, dfs_walls
 from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
@@ -21,7 +22,7 @@ from mazebench.tasks.options import EVAL_DISTANCES
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.trials import COLUMNS, Trial, benchmark_task_sizes, draw_trials, episodes_file
 
-_MAZE_SEED = 1  # of version v1; with the size it seeds the stream that all its mazes are drawn from
+_MAZE_SEED = 1  # with the size it seeds the stream that all its mazes are drawn from
 _EPISODE_SEED = 0
 
 
@@ -38,7 +39,7 @@ def freeze(folder: pathlib.Path) -> None:
         trials = draw_trials(_task(task, mazes[size][MAZES_PER_SPLIT:]), seed=_EPISODE_SEED)
         files[episodes_file(task, size)] = format_trials(trials)
     generator = {"style": "dfs", "openings": DFS_OPENINGS, "seed": _MAZE_SEED, "episode_seed": _EPISODE_SEED}
-    files[MANIFEST] = format_manifest(VERSION, generator, files)
+    files[MANIFEST] = format_manifest(PAPER_BENCHMARK, generator, files)
     for name, text in files.items():
         folder.joinpath(name).write_bytes(text.encode("ascii"))
 
@@ -71,10 +72,11 @@ def format_trials(trials: list[Trial]) -> str:
     return text.getvalue()
 
 
-def format_manifest(version: str, generator: dict[str, Any], files: dict[str, str]) -> str:
+def format_manifest(benchmark: str, generator: dict[str, Any], files: dict[str, str]) -> str:
     """Returns the text of a manifest."""
     content = {
-        "version": version,
+        "benchmark": benchmark,
+        "version": TASK_VERSION,
         "generator": generator,
         "files": {name: hashlib.sha256(text.encode("ascii")).hexdigest() for name, text in sorted(files.items())},
     }

@@ -1,9 +1,9 @@
-"""Makes benchmark v3, mazes of several kinds and episodes in them, byte for byte as they ship.
+"""Makes the benchmark `tracks`, mazes of several kinds and episodes in them, byte for byte as they ship.
 
 `python -m benchmarks.freeze_kinds DIR --commit HASH` writes the splits train, dev and eval. The seed of eval is the
 hash of the commit that holds all generators, tracks and agents, which nobody chooses; the manifest has it as
-`eval_commit`. benchmarks/v3_checks.py has the checks that came before, docs/eval_log.md a first draw that was thrown
-away.
+`eval_commit`. benchmarks/tracks_checks.py has the checks that came before. records/eval_log.md names a first draw that
+was not used.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from mazebench.maps.benchmark import (
     DEV,
     FROZEN_SPLITS,
     KINDS_SIZE,
-    KINDS_VERSION,
     MANIFEST,
+    TRACKS_BENCHMARK,
     kind_mazes_file,
 )
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
@@ -42,7 +42,7 @@ from mazebench.tasks.trials import Trial, episodes_file, make_trial
 
 KINDS = {"train": KNOWN, DEV: KNOWN, "eval": (*KNOWN, *NOVEL)}  # by split
 MAZES_PER_SPLIT = 48
-_SEED = 3  # of benchmark v3; each split adds one of its own
+_SEED = 3  # each split adds one of its own
 _EPISODES_PER_MAZE = 5
 
 
@@ -67,7 +67,7 @@ def freeze_kinds(folder: pathlib.Path, commit: str) -> None:
                 f"{track}-{level}": contexts_hash(track, level, mazes, trials)
                 for track, level in itertools.product(TRACKS, LEVELS)
             }
-    files[MANIFEST] = format_manifest(KINDS_VERSION, generator, files)
+    files[MANIFEST] = format_manifest(TRACKS_BENCHMARK, generator, files)
     for name, text in files.items():
         folder.joinpath(name).write_bytes(text.encode("ascii"))
 
@@ -122,7 +122,7 @@ def main(
     folder: pathlib.Path,
     commit: Annotated[str, typer.Option(help="The hash of the commit from which the split eval is drawn.")],
 ) -> None:
-    """Write the files of benchmark v3."""
+    """Write the files of the benchmark."""
     freeze_kinds(folder, commit)
 
 

@@ -50,7 +50,7 @@ TRAININGS = {
     "dqn": f"{SMALL} --set steps_per_update=32",
     "mmn": f"{SMALL} --set steps_per_update=80",
 }
-FROZEN = ("v1", "v3")  # folders of mazebench_assets
+FROZEN = ("paper_mazes", "tracks")  # folders of mazebench_assets
 
 
 def episodes() -> Iterator[tuple[str, str]]:

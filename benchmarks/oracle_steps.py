@@ -1,4 +1,4 @@
-"""Plays the oracle in the frozen episodes of v1 and writes its steps: `python benchmarks/oracle_steps.py FILE`.
+"""Writes the oracle's steps in the frozen episodes of the paper's protocol: `python benchmarks/oracle_steps.py FILE`.
 
 `assets/oracle/steps.json` was made this way; `mazebench/results/oracle.py` has its SHA-256.
 """

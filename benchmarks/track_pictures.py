@@ -1,6 +1,6 @@
 """Draws a maze and its shown map at each level of the tracks: `python benchmarks/track_pictures.py`.
 
-The picture is docs/images/tracks-v3.png. `oracle` is evaluated in train mazes.
+The picture is docs/images/tracks.png. `oracle` is evaluated in train mazes.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.tracks.base import LEVELS
 
-PATH = pathlib.Path(__file__).parent.parent / "docs" / "images" / "tracks-v3.png"
+PATH = pathlib.Path(__file__).parent.parent / "docs" / "images" / "tracks.png"
 PANEL = 520  # pixels a side, about
 HOUSE = 17  # index of the train maze
 DISTANCE = 40  # cells from start to goal

@@ -24,6 +24,7 @@ from mazebench.commands.play import play
 from mazebench.commands.render import render
 from mazebench.commands.report import report
 from mazebench.commands.train import train
+from mazebench.constants import TASK_VERSION
 from mazebench.errors import InputError, Remark, RunError, one_line, shortened
 
 _LONGEST = 2000  # characters of a message; an agent's InputError may be of any length
@@ -111,7 +112,7 @@ def _print_line(line: str) -> None:
 
 def _print_version(asked: bool) -> None:
     if asked:
-        print(__version__)
+        print(f"mazebench {__version__} (benchmarks paper and tracks, version {TASK_VERSION})")
         raise typer.Exit
 
 

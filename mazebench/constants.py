@@ -3,11 +3,11 @@
 This module imports nothing: `import mazebench` registers an environment for each size and must load no library.
 """
 
-BENCHMARK_SIZES = (13, 15, 17, 19, 21)  # cells on a side of benchmark v1's mazes
+BENCHMARK_SIZES = (13, 15, 17, 19, 21)  # cells on a side of the mazes of the paper's protocol
 
-# The version of what an episode is. Gymnasium's ids end with it, and docs/release.md says when it grows.
+# The version of the benchmarks and of what an episode is. Gymnasium's ids end with it. docs/release.md says when it
+# increases.
 TASK_VERSION = 1
-TRACKS_VERSION = 3  # of the tracks
 TRACK_NAMES = ("building", "rebuilt", "adrift", "rough")
 
 ON_TIME = (1.25, 2)  # an episode is on time if it takes at most so many times the oracle's steps

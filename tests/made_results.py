@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mazebench.evaluation.options import EvalOptions
-from mazebench.maps.benchmark import KINDS_VERSION, VERSION, load_mazes, manifest_hash
+from mazebench.maps.benchmark import PAPER_BENCHMARK, TRACKS_BENCHMARK, load_mazes, manifest_hash
 from mazebench.maps.maze import cell_to_point, path_through_walls
 from mazebench.options import by_name
 from mazebench.results.metrics import spl, summarize, summarize_facts
@@ -73,12 +73,12 @@ def make_result(
     played: dict[str, Any] = {"split": split, "episodes_per_distance": episodes_per_distance, "seed": seed}
     if track is not None:
         version, labels, played = (
-            KINDS_VERSION,
+            TRACKS_BENCHMARK,
             {"track": track, "level": level},
             played | {"track": track, "level": level},
         )
     else:
-        version, labels = VERSION, {}
+        version, labels = PAPER_BENCHMARK, {}
         played |= {"task": task, "size": size, "distances": distances, "landmark_distance": landmark_distance, **levels}
     options = EvalOptions.of(agent, **played)
     spec = build_task(options.task, options.mazes)

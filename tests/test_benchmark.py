@@ -1,4 +1,4 @@
-"""Benchmark v1 as shipped: what its manifest says, what its definition says, and made again byte for byte."""
+"""The benchmark `paper` as shipped: what its manifest says, what its definition says, and made again byte for byte."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ BODY_RADIUS = 0.15
 
 @pytest.fixture(scope="module")
 def shipped() -> pathlib.Path:
-    with resources.as_file(resources.files("mazebench_assets").joinpath("v1")) as folder:
+    with resources.as_file(resources.files("mazebench_assets").joinpath("paper_mazes")) as folder:
         yield folder
 
 
 def test_files_when_compared_with_manifest(shipped):
     manifest = json.loads((shipped / "manifest.json").read_text())
-    assert manifest["version"] == "v1"
+    assert (manifest["benchmark"], manifest["version"]) == ("paper", 1)
     names = {path.name for path in shipped.iterdir()} - {"__init__.py", "__pycache__", "manifest.json"}
     assert set(manifest["files"]) == names
     expected = {mazes_file(size, split) for size in SIZES for split in SPLITS}
@@ -116,12 +116,12 @@ def test_shortest_paths_when_computed_again(task, size, count):
 class TestRefusal:
     @pytest.mark.parametrize("name", [mazes_file(13, "eval"), episodes_file("local", 13)])
     def test_asset_when_tampered_with(self, shipped, tmp_path, monkeypatch, name):
-        copy = tmp_path / "v1"
+        copy = tmp_path / "paper_mazes"
         shutil.copytree(shipped, copy)
         monkeypatch.setattr(benchmark, "_folder", lambda version: copy)
         untouched = read_asset(name)
         (copy / name).write_text(untouched.replace("1", "2", 1).replace("#.", ".#", 1))
-        with pytest.raises(InputError, match=rf"^benchmark v1: {name} was changed: expected SHA-256 \w+, found \w+$"):
+        with pytest.raises(InputError, match=rf"^benchmark paper: {name} was changed: expected SHA-256 \w+, found \w+"):
             read_asset(name)
         (copy / name).write_text(untouched)
         assert read_asset(name) == untouched

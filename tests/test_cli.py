@@ -79,7 +79,7 @@ BAD_INPUT = [
     ((*TINY, "--map-warp", "0.3"), "expected map_warp from 0 to 0.25, found 0.3"),
     ((*TINY, "--distances", "one"), "expected distances like 1-3 or 2,3, found 'one'"),
     ((*TINY, "--agent", "planner"), "expected one --agent without --suite, found 2"),
-    ((*QUICK, "--suite", "papr"), "unknown suite 'papr'; available: paper, quick, v3"),
+    ((*QUICK, "--suite", "papr"), "unknown suite 'papr'; available: paper, quick, tracks"),
     ((*RANDOM, "--track", "adrift", "--map-flip", "0.1"), "'adrift': expected no perturbation, found map_flip 0.1"),
     ((*TINY, "--out", "{bad}/file/out"), "file/out: can't write there: Not a directory"),
     ((*TINY, "--out", "{bad}/used"), "expected an empty folder or an evaluation's, found 'thesis.tex' in it"),
@@ -155,12 +155,21 @@ class TestHelp:
         assert f" {name} [OPTIONS]" in output.splitlines()[0]
 
     def test_the_version_is_printed(self, command):
-        assert command("--version") == (0, f"{__version__}\n", "")
+        assert command("--version") == (0, f"mazebench {__version__} (benchmarks paper and tracks, version 1)\n", "")
 
     def test_everything_that_has_a_name_is_listed(self, command):
         status, output, errors = command("list")
         assert (status, errors) == (0, "")
-        for word in (*agent_names(), "local", "hierarchical", "dfs", "rooms", "obstacles", "13, 15, 17, 19, 21", "v1"):
+        for word in (
+            *agent_names(),
+            "local",
+            "hierarchical",
+            "dfs",
+            "rooms",
+            "obstacles",
+            "13, 15, 17, 19, 21",
+            "Local-13-v1",
+        ):
             assert word in output
 
 

@@ -81,7 +81,14 @@ class TestResults:
     def test_the_summary_tells_what_was_run_and_what_came_of_it(self, planner_run):
         summary = summary_of(planner_run)
         assert {path.name for path in planner_run.iterdir()} == FILES
-        expected = {"agent": "planner", "task": "local", "size": 13, "split": "eval", "benchmark": "v1", "episodes": 40}
+        expected = {
+            "agent": "planner",
+            "task": "local",
+            "size": 13,
+            "split": "eval",
+            "benchmark": "paper",
+            "episodes": 40,
+        }
         assert expected.items() <= summary.items()
         assert summary["perturbation"] == dict.fromkeys(PERTURBATIONS, 0.0)
         assert list(summary["by_distance"]) == ["1", "2"]
@@ -263,7 +270,7 @@ class TestOracle:
 
     def test_frozen_ones_are_copied(self, planner_run):
         trials = [trial for trial in frozen_trials("local", 13) if trial.distance <= 2][::5]
-        steps = frozen_oracle_steps("v1", "local", 13, "eval", trials)
+        steps = frozen_oracle_steps("paper", "local", 13, "eval", trials)
         result = load_result(planner_run)
         assert result.oracle_steps == steps
         on_time = [record.steps <= 2 * limit for record, limit in zip(result.records, steps, strict=True)]

@@ -33,7 +33,7 @@ def test_versions_options_and_machine_are_in_the_summary(tmp_path):
         *("checkpoint_metadata", "agent_class", "agent_package", "agent_code_sha256", "seed", "command", "python"),
         *("packages", "machine", "context_size"),
     }
-    assert (found["benchmark"], found["benchmark_manifest_sha256"]) == ("v1", manifest_hash())
+    assert (found["benchmark"], found["benchmark_manifest_sha256"]) == ("paper", manifest_hash())
     assert len(found["mazes_sha256"]) == 64
     assert found["context_size"] == 13
     assert (found["checkpoint_sha256"], found["checkpoint_metadata"]) == (None, None)

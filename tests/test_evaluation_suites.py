@@ -64,7 +64,7 @@ class TestParts:
 class TestRun:
     def test_the_folder_tells_what_is_in_it(self, tiny_run):
         content = json.loads((tiny_run / "suite.json").read_text())
-        expected = {"suite": "tiny", "parts": PARTS, "agents": BOTH, "benchmark": "v1", "seed": 0}
+        expected = {"suite": "tiny", "parts": PARTS, "agents": BOTH, "benchmark": "paper", "seed": 0}
         assert (expected | {"folders": dict(zip(BOTH, BOTH, strict=True))}).items() <= content.items()
         assert len(content["benchmark_manifest_sha256"]) == 64
         for agent in BOTH:
@@ -198,7 +198,7 @@ class TestRefused:
         ("content", "said"),
         [
             (None, r"expected an empty folder or a suite's, found 'thesis\.tex' in it"),
-            ({"benchmark": "v0"}, "holds another run: its benchmark is v0, this one's v1"),
+            ({"benchmark": "v0"}, "holds another run: its benchmark is v0, this one's paper"),
         ],
     )
     def test_a_folder_that_holds_something_else_is_refused(self, tiny_run, tmp_path, content, said):

@@ -61,7 +61,7 @@ class TestScripts:
         ("flags", "agent", "side", "options"),
         [
             ((), "HerAgent", 13, {}),
-            (("--v3",), "LidarHerAgent", 31, {"size": 31, "context_size": 31, "fresh": True, "sensors": "lidar"}),
+            (("--tracks",), "LidarHerAgent", 31, {"size": 31, "context_size": 31, "fresh": True, "sensors": "lidar"}),
         ],
     )
     def test_sb3_her(self, tmp_path, flags, agent, side, options):

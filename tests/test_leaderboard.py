@@ -10,7 +10,7 @@ import pytest
 from made_results import edit_records, edit_summary, make_result, read_summary
 
 from mazebench.errors import InputError
-from mazebench.maps.benchmark import KINDS_VERSION
+from mazebench.maps.benchmark import TRACKS_BENCHMARK
 from mazebench.report.leaderboard import (
     BEGIN,
     END,
@@ -69,7 +69,7 @@ def suite(tmp_path_factory):
     for part in PARTS:
         track, level = part.split()
         make_part(folder / "x", "x", track, int(level), 120 if level == "3" else 240, privileged=True)
-    content = {"suite": "v3", "parts": [part.replace(" ", "-") for part in PARTS], "benchmark": KINDS_VERSION}
+    content = {"suite": "tracks", "parts": [part.replace(" ", "-") for part in PARTS], "benchmark": TRACKS_BENCHMARK}
     content |= {"benchmark_manifest_sha256": "0" * 64, "seed": 0, "agents": ["x"]}
     write_json(folder / SUITE, content | {"folders": {"x": "x"}})
     return folder

@@ -109,7 +109,7 @@ class TestOracle:
     def test_frozen_steps_are_those_that_it_takes(self):
         trials = frozen_trials("local", 13)[::50]
         task = make_spec(size=13, split="eval")
-        assert oracle.frozen_oracle_steps("v1", "local", 13, "eval", trials) == measure_oracle_steps(task, trials)
+        assert oracle.frozen_oracle_steps("paper", "local", 13, "eval", trials) == measure_oracle_steps(task, trials)
 
     def test_frozen_steps_that_were_changed_are_refused(self, monkeypatch):
         monkeypatch.setattr(oracle, "_SHA256", "0" * 64)

@@ -128,7 +128,7 @@ class TestTracks:
     def test_a_row_for_each_track_and_level_and_a_column_for_each_agent(self, tmp_path):
         for agent in AGENTS:
             make_result(tmp_path / agent / "adrift-1", agent, track="adrift", level=1, num_mazes=2, record=False)
-            make_result(tmp_path / agent / "v1", agent, num_mazes=2, record=False)
+            make_result(tmp_path / agent / "paper", agent, num_mazes=2, record=False)
         for level in (1, 2):
             make_result(tmp_path / f"rebuilt-{level}", "mah", track="rebuilt", level=level, num_mazes=2, record=False)
         tables = tables_of(tmp_path)

@@ -55,7 +55,7 @@ FAULTS = {
     "expected level from 1 to 3, found 4": lambda folder: change_options(folder, track="adrift", level=[4]),
     "line 4": cut_records,
     "expected a finished evaluation": unfinish,
-    "of benchmark 'v1', manifest b2b2e5a6, found manifest 00": lambda folder: change_provenance(
+    "of benchmark 'paper', manifest 23359df5, found manifest 00": lambda folder: change_provenance(
         folder, benchmark_manifest_sha256="00"
     ),
     "unknown split 'test'; available: ": lambda folder: change_options(folder, split="test"),

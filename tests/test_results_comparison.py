@@ -27,7 +27,7 @@ def result(folder, records: list[Record], **changes) -> Result:
         "task": "local",
         "size": 13,
         "split": "eval",
-        "benchmark": "v1",
+        "benchmark": "paper",
         "perturbation": {},
         "episodes": len(records),
         "provenance": Provenance.model_validate(provenance | {"options": TaskProvenance(landmark_distance=5)}),
@@ -88,7 +88,7 @@ class TestResults:
     @pytest.mark.parametrize(
         ("changes", "said"),
         [
-            ({"benchmark": "v0"}, "expected results of one benchmark to compare, found v1 in .* and v0 in"),
+            ({"benchmark": "v0"}, "expected results of one benchmark to compare, found paper in .* and v0 in"),
             ({"manifest": "1e"}, "results of one benchmark_manifest_sha256 to compare, found 0f in .* and 1e in"),
             ({"task": "hierarchical"}, "results of one task to compare, found local in .* and hierarchical in"),
         ],

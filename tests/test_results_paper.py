@@ -10,7 +10,7 @@ from mazebench.results.records import Summary
 def a_summary(**values) -> Summary:
     figures = {"n": 4, "success_rate": 1.0, "spl": 0.9, "spl_grid": 0.95}
     figures |= {f"{name}_ci95": (0.5, 1.0) for name in ("success_rate", "spl", "spl_grid")}
-    defaults = {"agent": "mmn", "task": "local", "size": 13, "split": "eval", "benchmark": "v1", "episodes": 4}
+    defaults = {"agent": "mmn", "task": "local", "size": 13, "split": "eval", "benchmark": "paper", "episodes": 4}
     defaults |= {"perturbation": {"map_flip": 0.0}, "provenance": {"options": {"landmark_distance": 5}}}
     return Summary(**defaults | {"overall": figures, "by_distance": {"2": figures, "3": figures}} | values)
 

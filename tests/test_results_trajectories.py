@@ -16,7 +16,7 @@ from mazebench.results.trajectories import TRAJECTORIES, Trajectory, load_trajec
 POSES = np.arange(15, dtype=np.float16).reshape(5, 3)
 
 
-@pytest.mark.parametrize("observed", [None, -POSES], ids=["v1", "track"])
+@pytest.mark.parametrize("observed", [None, -POSES], ids=["paper", "track"])
 def test_what_is_read_is_what_was_written_and_numpy_alone_can_read_it(tmp_path, observed):
     parts = [slice(2), slice(2, 5)]
     save_trajectories(

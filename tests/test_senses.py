@@ -254,7 +254,7 @@ def test_dm_control_observes_the_same():
 def test_goal_conditioned_and_registered_environments_take_the_options():
     env = GoalMazeEnv(make_spec(**NOISE))
     assert env.observation_space.contains(env.reset(seed=0)[0])
-    made = gymnasium.make("mazebench/Adrift-31-v3", lidar_noise=".1,.1", odometry_noise=0.2)
+    made = gymnasium.make("mazebench/Adrift-v1", lidar_noise=".1,.1", odometry_noise=0.2)
     assert made.observation_space["lidar"].high.max() == 5.0
 
 

@@ -122,7 +122,7 @@ class TestOptions:
             ("building", {"level": (3, 3)}, "expected each level once, found 3, 3"),
             ("building", {"size": 51}, "track 'building': expected size 31, found 51"),
             ("rough", {"context_size": 31}, "track 'rough': expected context_size 62, found 31"),
-            ("building", {"time_limit": 50}, "track 'building': expected time_limit 0, found 50"),
+            ("building", {"time_limit": 50}, "track 'building': has its own time limit, found time_limit 50"),
             ("building", {"num_goals": 2}, "track 'building': expected num_goals 1, found 2"),
             ("building", {"pairs": "fixed"}, "track 'building': expected pairs 'random', found 'fixed'"),
             ("building", {"map_warp": 0.1}, "track 'building': expected no perturbation, found map_warp 0.1"),

@@ -1,4 +1,4 @@
-"""The acting of DQN and MAH, and the paper's DQN-dagger: Ape-X DQN with hindsight that gets no task context.
+"""The acting of DQN and MAH, and the paper's DQN†: Ape-X DQN with hindsight that gets no task context.
 
 docs/agents/dqn.md describes the training, and how it differs from the paper.
 """

@@ -1,1 +1,1 @@
-"""The steps of the agent `oracle` in the frozen eval episodes of v1, made by benchmarks/oracle_steps.py."""
+"""The steps of `oracle` in the eval episodes of the paper's protocol, made by benchmarks/oracle_steps.py."""

@@ -1,7 +1,7 @@
 """Writes the tables and figures of results into README.md and docs, from the records that are kept: `make results`.
 
-`records/` holds finished evaluations, an archive for each folder of results: `tar xf records/v3.tar.xz` gives a folder
-that `mazebench report` and `mazebench compare` read. `python -m benchmarks.results keep FOLDER...` adds some.
+`records/` holds finished evaluations, an archive for each folder of results: `tar xf records/tracks.tar.xz` gives a
+folder that `mazebench report` and `mazebench compare` read. `python -m benchmarks.results keep FOLDER...` adds some.
 """
 
 from __future__ import annotations

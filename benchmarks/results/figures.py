@@ -84,7 +84,7 @@ def what_fails(kept: Kept) -> Drawn:
 
 
 def learning(kept: Kept) -> Drawn:
-    """Returns success rates on wrong maps of v1, without a lidar."""
+    """Returns success rates on wrong maps of the paper's protocol, without a lidar."""
     rows = ("planner-closed-loop", "mah", "mmn", NAVIGATOR)
     tables = {"Hierarchical, share of cells flipped": _FLIPS, "Local, maps warped by": _WARPS}
     panels = {title: {row: _of_table(kept.report[name], row) for row in rows} for title, name in tables.items()}

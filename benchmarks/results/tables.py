@@ -231,7 +231,7 @@ def tracks_table(metric: str, kept: Kept) -> str:
     return _table(["agent", *map(_code, TRACKS)], rows)
 
 
-def v3_map_worth(kept: Kept) -> str:
+def tracks_map_worth(kept: Kept) -> str:
     """Returns the navigator's headline numbers with their intervals, and what the map is worth to it."""
     rows = []
     for track, level in _PARTS:
@@ -243,7 +243,7 @@ def v3_map_worth(kept: Kept) -> str:
     return _table(["part", "success", *names, f"without the map, {names[1]}", "map worth"], rows)
 
 
-def v3_novel_kinds(kept: Kept) -> str:
+def tracks_novel_kinds(kept: Kept) -> str:
     """Returns the navigator's numbers in the kinds of all splits, and in those that are in eval alone."""
     chosen = list(itertools.product(("success_rate", ON_TIME_125), (("known", KNOWN), ("novel", NOVEL))))
     rows = [
@@ -253,7 +253,7 @@ def v3_novel_kinds(kept: Kept) -> str:
     return _table(["track", *(f"{METRICS[metric]}, {name} kinds" for metric, (name, _) in chosen)], rows)
 
 
-def v3_blocked(kept: Kept) -> str:
+def tracks_blocked(kept: Kept) -> str:
     """Returns the navigator's share on time where the shortest path on the map is open, and where it is blocked."""
     rows = []
     for track, level in _PARTS:
@@ -264,14 +264,14 @@ def v3_blocked(kept: Kept) -> str:
     return _table(["part", *(f"{METRICS[ON_TIME_125]}, {name}" for name in PATHS)], rows)
 
 
-def v3_navigator(kept: Kept) -> str:
-    """Returns the navigator's numbers on v3."""
+def tracks_navigator(kept: Kept) -> str:
+    """Returns the navigator's numbers on the tracks."""
     metrics = ("success_rate", *ON_TIME_METRICS, "spl")
     rows = [[_code(track), *(_levels(kept, NAVIGATOR, track, metric) for metric in metrics)] for track in TRACKS]
     return _table(["track", *(METRICS[metric] for metric in metrics)], rows)
 
 
-def v3_navigator_kinds(kept: Kept) -> str:
+def tracks_navigator_kinds(kept: Kept) -> str:
     """Returns the navigator's share on time in each kind of maze."""
     kinds = (*KNOWN, *NOVEL)
     rows = [
@@ -290,14 +290,14 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "mah-curve": mah_curve,
     "mmn-ingredients": functools.partial(short_runs, _INGREDIENTS, {"model_error_1": ".3f", "map_ratio": ".1f"}),
     "mmn-regimes": functools.partial(short_runs, _REGIMES, {}),
-    "v3-success": functools.partial(tracks_table, "success_rate"),
-    "v3-on-time": functools.partial(tracks_table, ON_TIME_125),
-    "v3-on-time-2": functools.partial(tracks_table, ON_TIME_2),
-    "v3-map-worth": v3_map_worth,
-    "v3-novel-kinds": v3_novel_kinds,
-    "v3-blocked": v3_blocked,
-    "v3-navigator": v3_navigator,
-    "v3-navigator-kinds": v3_navigator_kinds,
+    "tracks-success": functools.partial(tracks_table, "success_rate"),
+    "tracks-on-time": functools.partial(tracks_table, ON_TIME_125),
+    "tracks-on-time-2": functools.partial(tracks_table, ON_TIME_2),
+    "tracks-map-worth": tracks_map_worth,
+    "tracks-novel-kinds": tracks_novel_kinds,
+    "tracks-blocked": tracks_blocked,
+    "tracks-navigator": tracks_navigator,
+    "tracks-navigator-kinds": tracks_navigator_kinds,
 }
 
 

@@ -1,7 +1,7 @@
 """Trains Stable-Baselines3's DQN with hindsight on the goal-conditioned environment, and saves the policy.
 
 python docs/examples/sb3_her.py --steps 100000 --out her.zip
-python docs/examples/sb3_her.py --v3 --distance 20 --steps 400000 --out her.zip
+python docs/examples/sb3_her.py --tracks --distance 20 --steps 400000 --out her.zip
 """
 
 import argparse
@@ -26,13 +26,13 @@ class EndingHerReplayBuffer(HerReplayBuffer):
 parser = argparse.ArgumentParser()
 parser.add_argument("--steps", type=int, default=100_000)
 parser.add_argument("--distance", type=int, default=3, help="cells from start to goal, at most")
-parser.add_argument("--v3", action="store_true", help="mazes of v3's size and known kinds, right maps, and its lidar")
+parser.add_argument("--tracks", action="store_true", help="right maps of the tracks' size and known kinds, and a lidar")
 parser.add_argument("--seed", type=int, default=0)
 parser.add_argument("--out", default="her.zip")
 arguments = parser.parse_args()
 
 options = {"distances": range(1, arguments.distance + 1), "time_limit": max(100, 10 * arguments.distance)}
-if arguments.v3:
+if arguments.tracks:
     options |= {"size": 31, "context_size": 31, "kinds": ("dfs", "house", "rooms"), "fresh": True}
     options |= {"sensors": "lidar", "lidar_noise": "turtlebot3"}
 model = DQN(
@@ -54,5 +54,5 @@ model = DQN(
 )
 model.learn(arguments.steps, log_interval=100)
 model.policy.save(arguments.out)
-agent = "LidarHerAgent" if arguments.v3 else "HerAgent"
+agent = "LidarHerAgent" if arguments.tracks else "HerAgent"
 print(f"saved {arguments.out}, which sb3_her_agent:{agent} plays")

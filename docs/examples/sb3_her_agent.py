@@ -84,6 +84,6 @@ class HerAgent(mazebench.Agent):
 
 
 class LidarHerAgent(HerAgent):
-    """The same with a lidar: the policy of `--v3`."""
+    """The same with a lidar: the policy of `--tracks`."""
 
     needs_sensors = ("lidar",)

@@ -56,7 +56,7 @@ class MazeVecEnv(VecEnv):
 
 
 parser = argparse.ArgumentParser()
-parser.add_argument("--track", default="mazebench/Rebuilt-31-v3", help="Gymnasium id of a track or a task")
+parser.add_argument("--track", default="mazebench/Rebuilt-v1", help="Gymnasium id of a track or a task")
 parser.add_argument("--level", type=int, nargs="+", default=[1, 2, 3], help="of a track; episodes draw one")
 parser.add_argument("--distances", type=int, nargs=2, default=[1, 6], help="cells from start to goal, from and to")
 parser.add_argument("--kinds", nargs="*", default=[], help="of a new maze in each episode, instead of the train mazes")

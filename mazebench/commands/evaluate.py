@@ -31,10 +31,9 @@ def evaluate(
     suite: Annotated[
         str | None,
         typer.Option(
-            help="Evaluations by name instead: paper, the whole protocol; quick, minutes of it; v3, every track at all "
-            "levels; v3-dev, in the mazes to choose agents by; or what these are measured "
-            "against: v3-no-map, hiding the map, v3-no-goal, the goal too, v3-true-pose, with the true pose where it "
-            "is lost."
+            help="Evaluations by name instead: paper, the paper's protocol; quick, minutes of it; tracks, every track "
+            "at all levels; tracks-dev, in the mazes to choose agents by; tracks-no-map, with the map hidden; "
+            "tracks-no-goal, with map and goal hidden; tracks-true-pose, with the true pose where it is lost."
         ),
     ] = None,
     out: Annotated[

@@ -6,8 +6,8 @@ from __future__ import annotations
 def list_() -> None:
     """List tasks, agents, sizes, kinds of mazes and Gymnasium ids."""
     from mazebench.agent_loading import agent_names
-    from mazebench.constants import TASK_VERSION, TRACKS_VERSION
-    from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS, VERSION
+    from mazebench.constants import TASK_VERSION
+    from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS
     from mazebench.maps.kinds import KINDS
     from mazebench.tasks.options import TASKS
     from mazebench.tasks.perturbations import PERTURBATIONS
@@ -19,12 +19,11 @@ def list_() -> None:
         "agents": ", ".join(agent_names()),
         "tasks": f"{', '.join(TASKS)} (version {TASK_VERSION})",
         "sizes": f"{', '.join(map(str, SIZES))} "
-        f"(benchmark {VERSION}, {MAZES_PER_SPLIT} mazes in each of {', '.join(SPLITS)})",
+        f"(the paper's protocol, {MAZES_PER_SPLIT} mazes in each of {', '.join(SPLITS)})",
         "kinds": ", ".join(KINDS),
         "perturbed": ", ".join(PERTURBATIONS),
         "sensors": ", ".join(SENSORS),
-        "Gymnasium": f"{', '.join(ids)} and the other sizes; "
-        f"mazebench/Rebuilt-31-v{TRACKS_VERSION} and the other tracks",
+        "Gymnasium": f"{', '.join(ids)} and the other sizes; mazebench/Rebuilt-v{TASK_VERSION} and the other tracks",
     }
     for name, text in rows.items():
         print(f"{name + ':':<12} {text}")

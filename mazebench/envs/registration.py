@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
-from mazebench.constants import BENCHMARK_SIZES, TASK_VERSION, TRACK_NAMES, TRACKS_VERSION
+from mazebench.constants import BENCHMARK_SIZES, TASK_VERSION, TRACK_NAMES
 from mazebench.errors import InputError
 from mazebench.world.backend import load_mujoco, loading_backend
 
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from mazebench.envs.vector import MazeVectorEnv
     from mazebench.tasks.spec import TaskSpec
 
-_TRACKS_SIZE = 31
-_ID_SIZE = "id_size"  # the keyword of an id's size, apart from the `size` that a user gives
 _SINGLE = ("seed", "render_mode", "camera")  # what a single environment takes besides its task's options
 _VECTOR = ("seed", "num_envs", "num_threads", "render_mode", "autoreset_mode")
 
@@ -38,20 +36,20 @@ def register_environments() -> None:
     """
     for size in BENCHMARK_SIZES:
         for task in ("local", "hierarchical"):
-            _register(task.title(), size, TASK_VERSION, "make_env", "make_vec", task=task)
-        _register("LocalGoal", size, TASK_VERSION, "make_goal_env")
+            _register(f"{task.title()}-{size}", "make_env", "make_vec", task=task, id_size=size)
+        _register(f"LocalGoal-{size}", "make_goal_env", id_size=size)
     for track in TRACK_NAMES:
-        _register(track.title(), _TRACKS_SIZE, TRACKS_VERSION, "make_env", "make_vec", task=track)
+        _register(track.title(), "make_env", "make_vec", task=track)
 
 
-def _register(title: str, size: int, version: int, make: str, make_many: str | None = None, **options: str) -> None:
-    env_id = f"mazebench/{title}-{size}-v{version}"
+def _register(name: str, make: str, make_many: str | None = None, **options: str | int) -> None:
+    env_id = f"mazebench/{name}-v{TASK_VERSION}"
     if env_id not in gymnasium.registry:
         gymnasium.register(
             id=env_id,
             entry_point=f"{__name__}:{make}",
             vector_entry_point=make_many and f"{__name__}:{make_many}",
-            kwargs={_ID_SIZE: size, **options},
+            kwargs=options,
         )
 
 
@@ -130,7 +128,7 @@ def _task_spec(task: str, options: dict[str, Any], arguments: Iterable[str]) -> 
     from mazebench.envs.env_spec import with_mazes
     from mazebench.tasks.build import check_names, make_spec
 
-    id_size = options.pop(_ID_SIZE, None)
+    id_size = options.pop("id_size", None)  # the size that an id names
     if options.get("maps") is None and options.get("size") is None:
         options["size"] = id_size
     check_names(options, arguments)

@@ -9,7 +9,7 @@ from annotated_types import Ge
 
 from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.errors import InputError
-from mazebench.maps.benchmark import FROZEN_SPLITS, KINDS_VERSION, VERSION
+from mazebench.maps.benchmark import FROZEN_SPLITS, PAPER_BENCHMARK, TRACKS_BENCHMARK
 from mazebench.maps.options import MazeOptions
 from mazebench.options import Doc, fields_of, from_names, options
 from mazebench.tasks.options import TaskOptions, Variants, is_own
@@ -59,7 +59,7 @@ class EvalOptions:
             raise InputError("expected no fresh mazes in an evaluation; num_mazes says how many of each kind are drawn")
         if len(level) > 1:
             found = ", ".join(map(str, level))
-            raise InputError(f"expected one level in an evaluation, found {found}; the suite 'v3' plays all levels")
+            raise InputError(f"expected one level in an evaluation, found {found}; the suite 'tracks' has all levels")
         other = ", ".join(str(distance) for distance in self.task.distances if distance not in DISTANCES)
         if track is not None and self.is_frozen and other:
             raise InputError(
@@ -79,8 +79,8 @@ class EvalOptions:
 
     @property
     def benchmark(self) -> str:
-        """The version of the benchmark that the evaluation belongs to."""
-        return VERSION if self.task.track is None else KINDS_VERSION
+        """The benchmark that the evaluation belongs to."""
+        return PAPER_BENCHMARK if self.task.track is None else TRACKS_BENCHMARK
 
 
 @options

@@ -17,6 +17,7 @@ from typing import Any
 
 from mazebench.agent import Agent
 from mazebench.agent_loading import package_of
+from mazebench.constants import TASK_VERSION
 from mazebench.errors import InputError
 from mazebench.evaluation.options import EvalOptions
 from mazebench.maps.benchmark import manifest_hash
@@ -40,7 +41,7 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
     content = {
         "benchmark": options.benchmark,
         "benchmark_manifest_sha256": manifest_hash(options.benchmark),
-        "task_version": task.version,
+        "task_version": TASK_VERSION,
         "context_size": task.context_size,  # which the agent chooses
         "checkpoint_sha256": file_hash(options.checkpoint),
         "checkpoint_metadata": checkpoint_metadata(options.checkpoint),

@@ -45,8 +45,8 @@ def _local(name: str, distances: tuple[int, ...] = _TABLE_DISTANCES, **changes: 
     return Part(name, {"task": "local", "distances": distances, **changes})
 
 
-_V3 = tuple(Part(f"{track}-{level}", {"track": track, "level": level}) for track in TRACKS for level in LEVELS)
-_V3_LOST = tuple(part for part in _V3 if TRACKS[part.changes["track"]].hides_pose)
+_EACH_LEVEL = tuple(Part(f"{track}-{level}", {"track": track, "level": level}) for track in TRACKS for level in LEVELS)
+_EACH_LOST_LEVEL = tuple(part for part in _EACH_LEVEL if TRACKS[part.changes["track"]].hides_pose)
 
 
 def _with(parts: tuple[Part, ...], **changes: Any) -> tuple[Part, ...]:
@@ -71,12 +71,12 @@ SUITES: dict[str, tuple[Part, ...]] = {
         _local("warp-0.1", (2, 6, 10), map_warp=0.1, episodes_per_distance=1),
         _local("noise-0.5", (2, 6, 10), position_noise=0.5, episodes_per_distance=1),
     ),
-    "v3": _V3,
-    "v3-dev": _with(_V3, split=DEV),  # to choose agents by
+    "tracks": _EACH_LEVEL,
+    "tracks-dev": _with(_EACH_LEVEL, split=DEV),  # to choose agents by
     # What agents are measured against: without the map, without map and goal, with the true pose.
-    "v3-no-map": _with(_V3, hide=("map",)),
-    "v3-no-goal": _with(_V3, hide=("map", "goal")),
-    "v3-true-pose": _with(_V3_LOST, exact_pose=True),
+    "tracks-no-map": _with(_EACH_LEVEL, hide=("map",)),
+    "tracks-no-goal": _with(_EACH_LEVEL, hide=("map", "goal")),
+    "tracks-true-pose": _with(_EACH_LOST_LEVEL, exact_pose=True),
 }
 
 

@@ -1,6 +1,6 @@
 """The frozen mazes of the benchmark: read from the package's assets and checked against their manifests.
 
-Version v1 is the paper's protocol. Version v3 holds the tracks' mazes of 31 x 31 cells of several kinds, in the splits
+There are two: `paper` is the paper's protocol. `tracks` has mazes of 31 x 31 cells of several kinds, in the splits
 train, dev and eval.
 """
 
@@ -18,12 +18,12 @@ from mazebench.errors import InputError, unknown
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 
-VERSION = "v1"
-KINDS_VERSION = "v3"
+PAPER_BENCHMARK, TRACKS_BENCHMARK = "paper", "tracks"
+_FOLDERS = {PAPER_BENCHMARK: "paper_mazes", TRACKS_BENCHMARK: "tracks"}  # of mazebench_assets
 SIZES = BENCHMARK_SIZES
 KINDS_SIZE = 31
 SPLITS = ("train", "eval")
-DEV = "dev"  # v3's split for choosing agents
+DEV = "dev"  # the tracks' split for choosing agents
 ALL_SPLITS = ("train", DEV, "eval")
 FROZEN_SPLITS = (DEV, "eval")  # those whose episodes are frozen
 MAZES_PER_SPLIT = 20
@@ -37,7 +37,7 @@ def mazes_file(size: int, split: str) -> str:
 
 @functools.cache
 def load_mazes(size: int, split: str) -> tuple[Maze, ...]:
-    """Returns the 20 mazes of one size and split of v1.
+    """Returns the 20 mazes of one size and split of the paper's protocol.
 
     Raises:
       InputError: if there is no such size or split.
@@ -55,7 +55,7 @@ def load_mazes(size: int, split: str) -> tuple[Maze, ...]:
 
 @functools.cache
 def load_kind_mazes(split: str) -> tuple[Maze, ...]:
-    """Returns the mazes of one split of v3, kind by kind.
+    """Returns the tracks' mazes of one split, kind by kind.
 
     Raises:
       InputError: if there is no such split.
@@ -63,41 +63,41 @@ def load_kind_mazes(split: str) -> tuple[Maze, ...]:
     if split not in ALL_SPLITS:
         raise unknown("split", split, ALL_SPLITS)
     mazes: list[Maze] = []
-    for kind in manifest(KINDS_VERSION)["generator"]["kinds"][split]:
-        blocks = read_asset(kind_mazes_file(kind, split), KINDS_VERSION).split("\n\n")
-        names = (f"{KINDS_VERSION}-{kind}-{split}-{index:02d}" for index in range(len(blocks)))
+    for kind in manifest(TRACKS_BENCHMARK)["generator"]["kinds"][split]:
+        blocks = read_asset(kind_mazes_file(kind, split), TRACKS_BENCHMARK).split("\n\n")
+        names = (f"{kind}-{split}-{index:02d}" for index in range(len(blocks)))
         mazes += [dataclasses.replace(parse_maze(*each), kind=kind) for each in zip(blocks, names, strict=True)]
     return tuple(mazes)
 
 
 def kind_mazes_file(kind: str, split: str) -> str:
-    """Returns the name of the file with v3's mazes of one kind and split."""
+    """Returns the name of the file with the tracks' mazes of one kind and split."""
     return f"mazes-{kind}-{split}.txt"
 
 
-def read_asset(name: str, version: str = VERSION) -> str:
-    """Returns the text of a file of the benchmark.
+def read_asset(name: str, benchmark: str = PAPER_BENCHMARK) -> str:
+    """Returns the text of a file of a benchmark.
 
     Raises:
       InputError: if its SHA-256 differs from the manifest's. A changed benchmark must be a new version.
     """
-    content = _folder(version).joinpath(name).read_bytes()
-    expected, found = manifest(version)["files"][name], hashlib.sha256(content).hexdigest()
+    content = _folder(benchmark).joinpath(name).read_bytes()
+    expected, found = manifest(benchmark)["files"][name], hashlib.sha256(content).hexdigest()
     if found != expected:
-        raise InputError(f"benchmark {version}: {name} was changed: expected SHA-256 {expected}, found {found}")
+        raise InputError(f"benchmark {benchmark}: {name} was changed: expected SHA-256 {expected}, found {found}")
     return content.decode("ascii")
 
 
 @functools.cache
-def manifest(version: str = VERSION) -> dict[str, Any]:
-    """Returns the manifest: the benchmark's version, how it was made, and the SHA-256 of each of its files."""
-    return json.loads(_folder(version).joinpath(MANIFEST).read_text(encoding="ascii"))
+def manifest(benchmark: str = PAPER_BENCHMARK) -> dict[str, Any]:
+    """Returns the manifest: a benchmark's name and version, how it was made, and the SHA-256 of each of its files."""
+    return json.loads(_folder(benchmark).joinpath(MANIFEST).read_text(encoding="ascii"))
 
 
-def manifest_hash(version: str = VERSION) -> str:
-    """Returns the SHA-256 of the manifest, which identifies the benchmark in results."""
-    return hashlib.sha256(_folder(version).joinpath(MANIFEST).read_bytes()).hexdigest()
+def manifest_hash(benchmark: str = PAPER_BENCHMARK) -> str:
+    """Returns the SHA-256 of a manifest, which identifies the benchmark in results."""
+    return hashlib.sha256(_folder(benchmark).joinpath(MANIFEST).read_bytes()).hexdigest()
 
 
-def _folder(version: str) -> resources.abc.Traversable:
-    return resources.files("mazebench_assets").joinpath(version)
+def _folder(benchmark: str) -> resources.abc.Traversable:
+    return resources.files("mazebench_assets").joinpath(_FOLDERS[benchmark])

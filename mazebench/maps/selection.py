@@ -25,9 +25,9 @@ def load_mazes_of(options: MazeOptions, default_size: int = 13) -> Mazes:
     """Returns the mazes that options name, but for those of tracks.
 
     Args:
-      options: `size` is N, the cells on a side of benchmark v1's mazes: 13 (the default), 15, 17, 19 or 21; with
-        `maps`, a size that they must have. `split` names mazes of benchmark v1. `maps` are mazes of your own instead: a
-        `Maze`, an array as `maze_from_array` takes it, several of these of one size, or the path of a file or of a
+      options: `size` is N, the cells on a side of the benchmark's mazes: 13 (the default), 15, 17, 19 or 21; with
+        `maps`, a size that they must have. `split` names mazes of the benchmark. `maps` are mazes of your own instead:
+        a `Maze`, an array as `maze_from_array` takes it, several of these of one size, or the path of a file or of a
         folder of files. With `kinds`, `num_mazes` or `fresh`, mazes are drawn, of any N that the kinds can make: those
         of the split "train", or others, "dev".
       default_size: N, unless options name it.

@@ -58,7 +58,7 @@ class Entry(pydantic.BaseModel):
 
 
 def read_entries(paths: Iterable[pathlib.Path]) -> list[Entry]:
-    """Returns the entries of runs of the suite `v3`, of agents' folders in them, or of folders with its parts.
+    """Returns the entries of runs of the suite `tracks`, of agents' folders in them, or of folders with its parts.
 
     Raises:
       InputError: if an agent's folder holds anything else than its results of all parts, each once.
@@ -162,7 +162,7 @@ def _read_episodes(result: Result) -> pd.DataFrame:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs the command; bad input ends it with one line and status 2."""
     parser = argparse.ArgumentParser(prog="python -m mazebench.report.leaderboard")
-    parser.add_argument("results", nargs="*", type=pathlib.Path, metavar="RESULTS", help="runs of the suite `v3`")
+    parser.add_argument("results", nargs="*", type=pathlib.Path, metavar="RESULTS", help="runs of the suite `tracks`")
     parser.add_argument("page", type=pathlib.Path, metavar="PAGE.md")
     options = parser.parse_args(arguments)
     try:

@@ -22,7 +22,7 @@ class Setting:
     landmark_distance: int  # cells; 0 in the local task
     perturbations: tuple[tuple[str, float], ...] = ()  # those that are switched on, with their levels
     mazes: tuple[str, ...] = ()  # names, of the split "custom"
-    track: str = ""  # "" where the benchmark's first version is played
+    track: str = ""  # "" in the paper's protocol
     level: int = 0  # of the track
     cell_size: float = 1.0  # m
     # What a user set beside the mazes, in words: the size of a cell, start and goal, the noise on the senses.

@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from importlib import resources
 
 from mazebench.errors import InputError
-from mazebench.maps.benchmark import VERSION, manifest, read_asset
+from mazebench.maps.benchmark import manifest, read_asset
 from mazebench.results.metrics import Steps
 from mazebench.tasks.trials import Trial, frozen_trials
 
-# Of steps.json, which holds those of v1. The manifest of v3 names files of its own.
-_SHA256 = "985cc2c63489ed9b02a0a4e92705722864c6477e2c6576576c253c723fd65832"
+# Of steps.json, which holds those of the paper's protocol. The manifest of the tracks names files of its own.
+_SHA256 = "de3d76f36e3ee498c6d15bea88dcf52d2c5f88d3df90d956691048694976f274"
 
 
 def frozen_oracle_steps(benchmark: str, task: str, size: int, split: str, trials: Sequence[Trial]) -> Steps | None:
@@ -30,8 +30,8 @@ def oracle_file(task: str, size: int, split: str) -> str:
 
 
 def oracle_key(task: str, size: int) -> str:
-    """Returns the name of the oracle's steps in the eval episodes of v1, in `assets/oracle/steps.json`."""
-    return f"{VERSION}-{task}-{size}"
+    """Returns the name in `assets/oracle/steps.json` of the steps in a task's eval episodes."""
+    return f"{task}-{size}"
 
 
 @functools.cache
@@ -48,7 +48,7 @@ def _steps_by_seed(benchmark: str, task: str, size: int, split: str) -> dict[int
 
 @functools.cache
 def _first_steps() -> dict[str, list[int | None]]:
-    """Returns the steps in the eval episodes of v1.
+    """Returns the steps in the eval episodes of the paper's protocol.
 
     Raises:
       InputError: if the file was changed.

@@ -39,8 +39,8 @@ def make_spec(
 
     Args:
       task: "local", "hierarchical" or the name of a track.
-      size: N, the cells on a side of benchmark v1's mazes: 13 (the default), 15, 17, 19 or 21; with `maps`, a size that
-        they must have. A track has its own.
+      size: N, the cells on a side of the benchmark's mazes: 13 (the default), 15, 17, 19 or 21; with `maps`, a size
+        that they must have. A track has its own.
       split: "train" or "eval" mazes of the benchmark.
       maps: mazes of your own instead: a `Maze`, an array as `maze_from_array` takes it, several of these of one size,
         or the path of a file or of a folder of files.

@@ -16,6 +16,7 @@ from mazebench.tasks.perturbations import Perturbations, perturbation_levels
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.base import SensorOptions
 from mazebench.tasks.start_goal import cell_of_end, end_text
+from mazebench.tasks.time_limit import track_time_limit
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.base import LEVELS
 from mazebench.world.lidar import TURTLEBOT3, LidarModel
@@ -193,7 +194,11 @@ class TaskOptions(Perturbations, SensorOptions):
 
     def _check_track(self, name: str) -> None:
         """Raises `InputError` if an option contradicts the track called `name`."""
-        for option_name, value in {"task": "local", "start": None, "goal": None, "time_limit": 0}.items():
+        # A summary has the limit of the farthest goals, and its options can be given again.
+        longest = track_time_limit(name, max(self.distances)) if self.distances else 0
+        if self.time_limit not in (0, longest):
+            raise InputError(f"track {name!r}: has its own time limit, found time_limit {self.time_limit}")
+        for option_name, value in {"task": "local", "start": None, "goal": None}.items():
             found = getattr(self, option_name)
             if found != value:
                 raise InputError(f"track {name!r}: expected {option_name} {value!r}, found {found!r}")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pydantic import InstanceOf
 
-from mazebench.constants import TASK_VERSION, TRACKS_VERSION
 from mazebench.errors import InputError
 from mazebench.maps.drawn import FreshMazes, Mazes
 from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, Maze, require_one_size
@@ -100,11 +99,6 @@ class TaskSpec(TaskOptions, Variants):
     def longest_time_limit(self) -> int:
         """The agent steps that a leg may take; on a track, those to the farthest goals."""
         return self.time_limit if self.track is None else track_time_limit(self.track, max(self.distances))
-
-    @property
-    def version(self) -> int:
-        """The version of what an episode is."""
-        return TASK_VERSION if self.track is None else TRACKS_VERSION
 
     @property
     def has_legs(self) -> bool:

@@ -6,7 +6,7 @@ import math
 
 from mazebench.tasks.tracks import TRACKS
 
-TIME_LIMIT = 100  # in the mazes of benchmark v1
+TIME_LIMIT = 100  # in the mazes of the paper's protocol
 
 # A metre takes 2 steps at the top speed, and a quarter turn in each cell 4.
 _STEPS_PER_METRE, _STEPS_PER_CELL = 2, 4

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mazebench.constants import EPISODES_PER_DISTANCE
-from mazebench.maps.benchmark import KINDS_VERSION, MAZES_PER_SPLIT, SIZES, VERSION, read_asset
+from mazebench.maps.benchmark import MAZES_PER_SPLIT, PAPER_BENCHMARK, SIZES, TRACKS_BENCHMARK, read_asset
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.episode import Episode, make_episode, sample_pair
@@ -37,12 +37,12 @@ def episodes_file(task: str, size: int, split: str = "eval") -> str:
     return f"episodes-{task}-{size}-{split}.csv"
 
 
-def frozen_trials(task: str, size: int, version: str = VERSION, split: str = "eval") -> tuple[Trial, ...]:
+def frozen_trials(task: str, size: int, benchmark: str = PAPER_BENCHMARK, split: str = "eval") -> tuple[Trial, ...]:
     """Returns the frozen episodes of one task, size and split.
 
-    v1 has 1,500 of the local task and 20 of the hierarchical one; v3 has 240, which tracks share.
+    The paper's protocol has 1,500 of the local task and 20 of the hierarchical one; the tracks share 240.
     """
-    rows = csv.DictReader(read_asset(episodes_file(task, size, split), version).splitlines())
+    rows = csv.DictReader(read_asset(episodes_file(task, size, split), benchmark).splitlines())
     return tuple(_trial_of_row(row) for row in rows)
 
 
@@ -65,7 +65,7 @@ def select_trials(
     Args:
       spec: the task; its distances are those of the pairs.
       frozen_split: the split of the benchmark that its mazes are, whose frozen episodes are then taken as far as they
-        go: of a track all of those distances, of v1 at most five for each maze and distance. None for other mazes.
+        go: of a track all of those distances, else at most five for each maze and distance. None for other mazes.
       episodes_per_distance: for each maze and distance.
       seed: of what is drawn.
 
@@ -73,7 +73,7 @@ def select_trials(
       InputError: if no two cells of a maze are a wanted distance apart.
     """
     if frozen_split is not None and spec.track is not None:
-        trials = frozen_trials("local", spec.size, KINDS_VERSION, frozen_split)
+        trials = frozen_trials("local", spec.size, TRACKS_BENCHMARK, frozen_split)
         return [trial for trial in trials if trial.distance in spec.distances]
     if frozen_split is not None and spec.task == "hierarchical":
         return list(frozen_trials(spec.task, spec.size))
@@ -142,6 +142,6 @@ def _disc_paths(maze: Maze) -> DiscPaths:
 
 
 def benchmark_task_sizes() -> list[tuple[str, int, int]]:
-    """Returns (task, size, number of frozen episodes) for all of benchmark v1."""
+    """Returns (task, size, number of frozen episodes) for all of the paper's protocol."""
     counts = {"local": MAZES_PER_SPLIT * len(EVAL_DISTANCES) * EPISODES_PER_DISTANCE, "hierarchical": MAZES_PER_SPLIT}
     return [(task, size, count) for size in SIZES for task, count in counts.items()]

@@ -16,7 +16,7 @@ from mazebench.tasks.streams import Stream
 from mazebench.tasks.tracks.base import Track
 
 # How many doors of a maze of 31 x 31 cells move, by kind, so that this share of the shortest paths on the map is
-# blocked in the maze (`python -m benchmarks.v3_checks swaps`). Mazes of no kind are taken for houses.
+# blocked in the maze (`python -m benchmarks.tracks_checks swaps`). Mazes of no kind are taken for houses.
 SWAPS: dict[str, dict[float, int]] = {
     "dfs": {0.45: 9, 0.7: 18, 0.85: 29},
     "house": {0.45: 3, 0.7: 7, 0.85: 12},

@@ -1,4 +1,4 @@
-"""Checks of benchmark v3: `python -m benchmarks.v3_checks CHECK`, whose tables are in docs/tracks.md.
+"""Checks of the tracks: `python -m benchmarks.tracks_checks CHECK`, whose tables are in docs/tracks.md.
 
   swaps: how many doors must move so that a share of the shortest paths on the map is blocked.
   worth: what the oracle reaches, and what a right map is worth to the navigator.
@@ -201,7 +201,7 @@ def main(
     kinds: Annotated[str, typer.Option(help="Kinds of mazes.")] = ",".join(KINDS),
     episodes: Annotated[int, typer.Option(min=1, help="Of each kind.")] = 40,
 ) -> None:
-    """Check benchmark v3."""
+    """Check the tracks."""
     if check is Check.SWAPS:
         check_swaps(kinds.split(","), episodes)
     else:

@@ -1,11 +1,11 @@
-"""The checks of benchmark v3, on a few mazes."""
+"""The checks of the tracks, on a few mazes."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from benchmarks import v3_checks
+from benchmarks import tracks_checks
 from mazebench.maps.doors import door_slots, swap_doors
 from mazebench.tasks.tracks.rebuilt import MovedDoors, num_swaps
 
@@ -17,23 +17,23 @@ def rows(text: str) -> list[list[str]]:
     return [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("|")][2:]
 
 
-@pytest.mark.parametrize("kind", v3_checks.KINDS)
+@pytest.mark.parametrize("kind", tracks_checks.KINDS)
 def test_as_many_doors_can_move_as_a_level_wants(kind):
-    for maze in v3_checks.check_mazes(kind, 1):
+    for maze in tracks_checks.check_mazes(kind, 1):
         MovedDoors().require(maze, 0.85)
         ends = tuple(map(tuple, maze.free_cells[[0, -1]].tolist()))
         swap_doors(maze.walls, door_slots(maze), num_swaps(maze, 0.85), ends, np.random.default_rng(0))
 
 
 def test_more_swaps_block_more_paths(capsys):
-    v3_checks.check_swaps(KINDS, EPISODES)
+    tracks_checks.check_swaps(KINDS, EPISODES)
     for row in rows(capsys.readouterr().out):
         shares = [float(cell.partition(": ")[2]) for cell in row[3:]]
         assert shares == sorted(shares)
 
 
 def test_the_oracle_reaches_all_goals(capsys):
-    v3_checks.check_worth(KINDS, EPISODES)
+    tracks_checks.check_worth(KINDS, EPISODES)
     table = rows(capsys.readouterr().out)
     assert [row[0] for row in table] == ["dfs", "office"]
     assert all(row[1].startswith("1.00") for row in table)

@@ -1,4 +1,4 @@
-"""The tracks of v3: what each shows, which senses they have, and that their files are frozen."""
+"""The tracks: what each shows, which senses they have, and that their files are frozen."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import (
     DEV,
-    KINDS_VERSION,
     MANIFEST,
+    TRACKS_BENCHMARK,
     load_kind_mazes,
     manifest,
     read_asset,
@@ -52,11 +52,11 @@ def context(spec: TaskSpec, episode: Episode) -> np.ndarray:
 class TestFiles:
     @pytest.mark.slow
     def test_one_command_makes_them_byte_for_byte(self, tmp_path):
-        freeze_kinds(tmp_path, manifest(KINDS_VERSION)["generator"]["eval_commit"])
+        freeze_kinds(tmp_path, manifest(TRACKS_BENCHMARK)["generator"]["eval_commit"])
         made = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-        assert set(made) == {*manifest(KINDS_VERSION)["files"], MANIFEST}
-        for name in manifest(KINDS_VERSION)["files"]:
-            assert made[name] == read_asset(name, KINDS_VERSION).encode("ascii"), name
+        assert set(made) == {*manifest(TRACKS_BENCHMARK)["files"], MANIFEST}
+        for name in manifest(TRACKS_BENCHMARK)["files"]:
+            assert made[name] == read_asset(name, TRACKS_BENCHMARK).encode("ascii"), name
 
     def test_mazes_are_new_with_far_goals_and_only_eval_has_novel_kinds(self):
         mazes = [maze for split in ("train", DEV, "eval") for maze in load_kind_mazes(split)]
@@ -66,14 +66,14 @@ class TestFiles:
 
     @pytest.mark.parametrize("split", [DEV, "eval"])
     def test_five_pairs_in_each_maze(self, split):
-        trials, mazes = frozen_trials("local", 31, KINDS_VERSION, split), load_kind_mazes(split)
+        trials, mazes = frozen_trials("local", 31, TRACKS_BENCHMARK, split), load_kind_mazes(split)
         assert collections.Counter(trial.episode.maze for trial in trials) == dict.fromkeys(range(48), 5)
         for trial in trials:
             maze = mazes[trial.episode.maze]
             assert maze.distance(trial.episode.start, trial.episode.goal) == trial.distance
         assert {trial.distance for trial in trials} == set(range(15, 41))
 
-    def test_the_split_dev_belongs_to_v3(self):
+    def test_the_split_dev_belongs_to_the_tracks(self):
         with pytest.raises(InputError, match="split"):
             make_spec(size=13, split="dev")
 
@@ -81,7 +81,7 @@ class TestFiles:
 @pytest.mark.parametrize(("track", "level"), PLAYED)
 def test_the_task_of_a_level(track, level):
     spec = make_spec(track, level=level)
-    assert (spec.size, spec.version, spec.lidar, spec.sensors) == (31, 3, TURTLEBOT3, ("lidar",))
+    assert (spec.size, spec.lidar, spec.sensors) == (31, TURTLEBOT3, ("lidar",))
     assert spec.context_size == (62 if track == "rough" else 31)
     is_lost = track in ("adrift", "rough")
     assert spec.odometry_noise_at(level) == ((0.01, 0.05, 0.2)[level - 1] if is_lost else 0.0)
@@ -185,4 +185,4 @@ def test_summaries_have_the_figures_of_each_kind_and_of_blocked_episodes(tmp_pat
     summary = evaluate("planner-closed-loop", tmp_path / "run", track="rebuilt", split=DEV, distances=(15,))
     assert list(summary.by_fact) == ["blocked", "not blocked", *KNOWN]
     assert sum(summary.by_fact[kind].n for kind in KNOWN) == summary.episodes
-    assert summary.benchmark == "v3"
+    assert summary.benchmark == "tracks"

@@ -1,0 +1,1 @@
+"""Frozen mazes and episodes of the benchmark `paper`."""

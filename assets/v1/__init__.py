@@ -1,1 +1,0 @@
-"""Frozen mazes and episodes of benchmark v1."""

@@ -1,1 +1,0 @@
-"""Benchmark v3: mazes of several kinds, in the splits train, dev and eval, and their frozen episodes."""
