@@ -45,7 +45,7 @@ def freeze(folder: pathlib.Path) -> None:
 
 
 def _task(task: str, mazes: list[Maze]) -> TaskSpec:
-    return make_spec(task, maps=mazes, distances=EVAL_DISTANCES if task == "local" else None)
+    return make_spec(task, mazes=mazes, distances=EVAL_DISTANCES if task == "local" else None)
 
 
 def draw_mazes(size: int) -> list[Maze]:

@@ -109,7 +109,7 @@ def contexts_hash(track: str, level: int, mazes: Sequence[Maze], trials: Sequenc
 
 
 def _task(track: str, level: int, mazes: Sequence[Maze]) -> TaskSpec:
-    return make_spec(track, maps=list(mazes), level=level, distances=DISTANCES)
+    return make_spec(track, mazes=list(mazes), level=level, distances=DISTANCES)
 
 
 def _shuffled_rounds(values: Sequence[int], rng: np.random.Generator) -> Iterator[int]:

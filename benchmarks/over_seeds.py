@@ -75,7 +75,7 @@ def _task(distance: int, given: argparse.Namespace) -> TaskSpec:
             maze = generate(given.kind, given.size, rng, f"held-out-{len(mazes)}")
             if maze.diameter >= distance:
                 mazes.append(maze)
-        return make_spec("local", maps=mazes, distances=(distance,))
+        return make_spec("local", mazes=mazes, distances=(distance,))
     drawn = {"kinds": (given.kind,), "num_mazes": given.trained_in} if given.trained_in else {}
     return make_spec("local", given.size, "train", distances=(distance,), **drawn)
 

@@ -111,7 +111,7 @@ def _blocked_share(cases: list[_Case], num_swaps: int) -> float:
 
 
 class Episodes(NamedTuple):
-    """What came of the episodes of a run; `E` is their number."""
+    """Results of the episodes of a run; `E` is their number."""
 
     mazes: np.ndarray  # [E] int
     steps: np.ndarray  # [E] float, until the goal was reached; infinite where it was not
@@ -126,7 +126,7 @@ class Episodes(NamedTuple):
 def play(agent_name: str, kind: str, episodes: int, hide: tuple[str, ...] = ()) -> Episodes:
     """Runs an agent with right maps of a kind, in episodes that are the same ones for all agents."""
     mazes = check_mazes(kind, -(-episodes // _PER_MAZE))
-    spec = make_spec(_TRACK, maps=mazes, level=1, distances=DISTANCES, hide=hide, sensors=("lidar",))
+    spec = make_spec(_TRACK, mazes=mazes, level=1, distances=DISTANCES, hide=hide, sensors=("lidar",))
     rng = np.random.default_rng(_SEED)
     trials = [
         make_trial(maze, index, sample_pair(maze, int(rng.choice(DISTANCES)), rng), rng)
@@ -190,7 +190,7 @@ def _print_row(*cells: str) -> None:
 
 
 class Check(enum.StrEnum):
-    """What is checked."""
+    """The checks by name."""
 
     SWAPS = "swaps"
     WORTH = "worth"

@@ -1,4 +1,4 @@
-"""What the site needs beside mkdocs.yml: fields explained by comments or `Doc`, intervals that stay on one line."""
+"""Additions to mkdocs.yml: fields explained by comments or `Doc`, intervals that stay on one line."""
 
 from __future__ import annotations
 

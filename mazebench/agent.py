@@ -56,7 +56,7 @@ class Inputs(NamedTuple):
 
 
 class _Declarations:
-    """What the class of an agent may declare; each declaration has a default."""
+    """Declarations that the class of an agent may make; each has a default."""
 
     needs_truth: ClassVar[bool] = False  # results of an agent that does are labelled as privileged
     needs_sensors: ClassVar[tuple[str, ...]] = ()  # an evaluation adds them to the sensors that it is given

@@ -1,4 +1,4 @@
-"""What the command line prints as one line: errors of bad input (exit status 2) and of failed runs (1), and remarks."""
+"""Errors of bad input (exit status 2) and of failed runs (1), and remarks: the command line prints each as one line."""
 
 from __future__ import annotations
 

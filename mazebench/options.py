@@ -1,7 +1,7 @@
 """Checked options: frozen dataclasses whose fields say in one place what they mean and which values they allow.
 
     @options
-    class MapOptions:
+    class ReadOptions:
         inflate: Annotated[float, Interval(ge=0, le=10), Doc("Metres by which walls are thickened.")] = 0.0
         unknown: Annotated[str, OneOf("wall", "free"), Doc("What unknown cells become.")] = "wall"
 
@@ -49,7 +49,7 @@ class OneOf:
 
 
 class Option(NamedTuple):
-    """What is known of one option; for a tuple, `lowest`, `highest` and `choices` are those of its elements."""
+    """A description of one option; for a tuple, `lowest`, `highest` and `choices` are those of its elements."""
 
     help: str
     default: Any

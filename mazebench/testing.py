@@ -120,7 +120,7 @@ class _Episodes:
         self._needs_truth = needs_truth
         self._task_spec: TaskSpec = make_spec(
             "hierarchical",
-            maps=tuple(dataclasses.replace(maze, cell_size=interface.cell_size) for maze in drawn),
+            mazes=tuple(dataclasses.replace(maze, cell_size=interface.cell_size) for maze in drawn),
             time_limit=_TIME_LIMIT,
             landmark_distance=3,
             context_size=interface.context_size,

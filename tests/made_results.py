@@ -81,7 +81,7 @@ def make_result(
         version, labels = PAPER_BENCHMARK, {}
         played |= {"task": task, "size": size, "distances": distances, "landmark_distance": landmark_distance, **levels}
     options = EvalOptions.of(agent, **played)
-    spec = build_task(options.task, options.mazes)
+    spec = build_task(options.task, options.maze_options)
     trials = select_trials(spec, split if split == "eval" else None, episodes_per_distance)
     size = spec.size
     rng = np.random.default_rng([len(agent), size, landmark_distance, seed])
@@ -156,8 +156,8 @@ def of_own_mazes(folder: pathlib.Path, name: str) -> pathlib.Path:
         if maze.name in used:
             rows = ("".join("#" if wall else "." for wall in row) for row in maze.walls)
             (maps / f"{name}{maze.name[-3:]}.txt").write_text("\n".join(rows) + "\n")
-    provenance = summary["provenance"] | {"mazes_sha256": mazes_hash(make_spec(maps=maps))}
-    provenance["options"] |= {"maps": str(maps), "size": None}
+    provenance = summary["provenance"] | {"mazes_sha256": mazes_hash(make_spec(mazes=maps))}
+    provenance["options"] |= {"mazes": str(maps), "size": None}
     return edit_summary(folder, split="custom", provenance=provenance)
 
 

@@ -25,7 +25,7 @@ class Block:
 
     @property
     def is_run(self) -> bool:
-        """Whether no comment before it says why it can't be run."""
+        """True unless a comment before it says why it can't be run."""
         return not _NOT_RUN.fullmatch(self.before)
 
     @property
@@ -36,7 +36,7 @@ class Block:
 
     @property
     def is_output(self) -> bool:
-        """Whether it shows what the block right before it prints."""
+        """True if it shows the output of the block right before it."""
         return self.language == "text" and self.before == "```"
 
     def commands(self) -> list[list[str]]:

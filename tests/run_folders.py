@@ -1,4 +1,4 @@
-"""What evaluations leave in their folders, and agents in modules of their own."""
+"""Files that evaluations leave in their folders, and agents in modules of their own."""
 
 from __future__ import annotations
 

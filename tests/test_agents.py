@@ -138,7 +138,7 @@ class TestConformance:
         if issubclass(agent_class, LearningAgent):
             # Untrained: the contract does not depend on what it learned.
             mazes = (generate("dfs", 7, np.random.default_rng(0), "m"),)
-            task = make_spec(maps=mazes, distances=(1, 2, 3), context_size=interface.context_size)
+            task = make_spec(mazes=mazes, distances=(1, 2, 3), context_size=interface.context_size)
             agent_class.build_learner(task).save(tmp_path, {})
             checkpoint = tmp_path / "agent.safetensors"
         check_agent(agent_class, interface, checkpoint)
@@ -349,7 +349,7 @@ def success_rate(
     name: str, num_mazes: int, distances, episodes_per_distance: int, context_size: int = 13, **perturbation: float
 ) -> float:
     agent_class = load_agent_class(name)
-    spec = make_spec("local", maps=load_mazes(13, "train")[:num_mazes], distances=distances, **perturbation)
+    spec = make_spec("local", mazes=load_mazes(13, "train")[:num_mazes], distances=distances, **perturbation)
     spec = dataclasses.replace(spec, context_size=context_size)
     trials = list(enumerate(draw_trials(spec, episodes_per_distance)))
     agent = agent_class.build(Interface("local", 13, spec.context_size))

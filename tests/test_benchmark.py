@@ -61,7 +61,7 @@ def test_freeze_when_compared_with_shipped_files(shipped, tmp_path):
 def test_trials_when_drawn_again_in_part():
     # The first episodes of a (maze, distance) don't depend on how many are drawn, nor those of a maze on the others.
     mazes = load_mazes(13, "eval")
-    drawn = draw_trials(make_spec(maps=mazes[:3], distances=[4, 9]), episodes_per_distance=2)
+    drawn = draw_trials(make_spec(mazes=mazes[:3], distances=[4, 9]), episodes_per_distance=2)
     chosen = select_trials(make_spec(split="eval", distances=[9, 4]), "eval", episodes_per_distance=2)[: len(drawn)]
     assert [trial.episode for trial in drawn] == [trial.episode for trial in chosen]
     assert [trial.distance for trial in chosen] == [4, 4, 9, 9] * 3

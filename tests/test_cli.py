@@ -83,9 +83,9 @@ BAD_INPUT = [
     ((*RANDOM, "--track", "adrift", "--map-flip", "0.1"), "'adrift': expected no perturbation, found map_flip 0.1"),
     ((*TINY, "--out", "{bad}/file/out"), "file/out: can't write there: Not a directory"),
     ((*TINY, "--out", "{bad}/used"), "expected an empty folder or an evaluation's, found 'thesis.tex' in it"),
-    ((*TINY, "--maps", "{bad}/open.txt"), "open: expected a closed border, found cell (2, 4) free"),
+    ((*TINY, "--mazes", "{bad}/open.txt"), "open: expected a closed border, found cell (2, 4) free"),
     (("generate", "--kind", "pub"), "unknown kind 'pub'; available: cave, dfs, hospital, house, museum, obstacles, "),
-    (("generate", "--from-image", "{bad}/binary.png"), "binary.png: expected a "),
+    (("generate", "--mazes", "{bad}/binary.png"), "binary.png: expected a "),
     (("train", "--agent", "mah"), "expected --minutes or --env-steps, found neither"),
     (("train", "--agent", "planner", "--minutes", "1"), "agent 'planner' doesn't learn; agents that do: "),
     ((*TRAIN, "--set", "colour"), "expected --set KEY=VALUE, found 'colour'"),
@@ -191,7 +191,7 @@ class TestGenerate:
     def test_a_maze_is_read_off_its_picture(self, command, tmp_path):
         assert command("generate", "--kind", "rooms", "--format", "txt,png", "--out", "drawn")[0] == 0
         picture = "drawn/rooms-13-0-000.png"
-        assert command("generate", "--from-image", picture, "--format", "txt", "--out", "read")[0] == 0
+        assert command("generate", "--mazes", picture, "--format", "txt", "--out", "read")[0] == 0
         drawn, read = (tmp_path / out / "rooms-13-0-000.txt" for out in ("drawn", "read"))
         assert read.read_text() == drawn.read_text()
 
@@ -200,12 +200,12 @@ class TestGenerate:
         assert command("generate", "--size", "9", *options, "--out", "ours")[0] == 0
         assert {path.suffix for path in (tmp_path / "ours").iterdir()} == {".txt", ".yaml", ".pgm"}
         source = "ours/dfs-9-0-000.yaml"
-        assert command("generate", "--from-image", source, "--format", "txt,ros", "--out", "again")[::2] == (0, "")
+        assert command("generate", "--mazes", source, "--format", "txt,ros", "--out", "again")[::2] == (0, "")
         for suffix in ("txt", "yaml", "pgm"):
             written, again = (tmp_path / out / f"dfs-9-0-000.{suffix}" for out in ("ours", "again"))
             assert again.read_bytes() == written.read_bytes()
         assert read_maze(tmp_path / source).cell_size == 0.5
-        said = one_line(command("generate", "--from-image", source, "--format", "ros", "--out", "ours"))
+        said = one_line(command("generate", "--mazes", source, "--format", "ros", "--out", "ours"))
         assert "dfs-9-0-000.yaml: would overwrite the map that the maze is read from" in said
 
 

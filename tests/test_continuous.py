@@ -27,7 +27,7 @@ UNIT_VELOCITIES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0,
 
 @pytest.fixture(scope="module")
 def field() -> Environment:
-    return Environment(make_spec(maps=simple_mazes.field(41), distances=[30], continuous=True))
+    return Environment(make_spec(mazes=simple_mazes.field(41), distances=[30], continuous=True))
 
 
 def cruise(field: Environment, velocity, num_steps: int = 12) -> np.ndarray:
@@ -71,7 +71,7 @@ class TestControls:
 
 
 def sunk_in(maze: Maze, position: np.ndarray) -> float:
-    """How deep in metres a body stands in a wall; negative if it stands free."""
+    """Returns the depth in metres of a body in a wall; negative if it stands free."""
     centres = cell_to_point(np.argwhere(maze.walls), maze.size)
     gaps = np.maximum(np.abs(centres - position) - 0.5, 0)
     return BODY_RADIUS - float(np.hypot(*gaps.T).min())
@@ -96,7 +96,7 @@ class TestEnvironments:
             assert expected[1:4] == found[1:4]
 
     def test_steps_are_the_same_in_all_environments(self):
-        spec = make_spec(maps=load_mazes(13, "train")[:2], continuous=True, time_limit=30)
+        spec = make_spec(mazes=load_mazes(13, "train")[:2], continuous=True, time_limit=30)
         actions = np.random.default_rng(0).uniform(-1, 1, size=(20, 2, 3)).astype(np.float32)
         envs = MazeVectorEnv(spec, 2)
         seen = [envs.reset(seed=[4, 9])[0]["state"]] + [envs.step(action)[0]["state"] for action in actions]

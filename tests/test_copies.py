@@ -183,7 +183,7 @@ class TestStates:
 
     def test_a_state_of_other_mazes_is_refused(self):
         mazes = [generate("dfs", 13, np.random.default_rng(seed), f"maze-{seed}") for seed in range(2)]
-        env, other = (mazebench.load(maps=maze, seed=0) for maze in mazes)
+        env, other = (mazebench.load(mazes=maze, seed=0) for maze in mazes)
         env.reset()
         with pytest.raises(InputError, match=r"^expected a state of .* with the same mazes, found one of maze-0$"):
             other.set_state(env.get_state())

@@ -88,7 +88,7 @@ RESUME = ["--out", "run", "--resume"]
 @pytest.mark.parametrize(
     ("kind", "file", "words"),
     [
-        ("map", "plan.txt", [*EVAL, "--maps", "run/plan.txt"]),
+        ("map", "plan.txt", [*EVAL, "--mazes", "run/plan.txt"]),
         ("result", "summary.json", ["compare", "run", "run"]),
         ("result", "episodes.jsonl", ["compare", "run", "run"]),
         ("suite", "suite.json", ["compare", "run", "run"]),

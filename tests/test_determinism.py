@@ -80,7 +80,7 @@ def run(name: str, folder: pathlib.Path, **running: Any) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory) -> dict[str, dict[str, bytes]]:
-    """What each setting gives as 256 environments side by side in this process."""
+    """Results of each setting with 256 environments side by side in this process."""
     return {name: run(name, tmp_path_factory.mktemp("reference")) for name in SETTINGS}
 
 

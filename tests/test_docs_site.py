@@ -19,7 +19,7 @@ LOADED = {("script", "src"), ("img", "src"), ("iframe", "src"), ("link", "href")
 
 
 class Page(html.parser.HTMLParser):
-    """What a page links to, what it loads, and the anchors that it has."""
+    """Links, loaded files and anchors of a page."""
 
     def __init__(self, path: pathlib.Path):
         super().__init__()

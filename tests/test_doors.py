@@ -45,7 +45,7 @@ def moved(maze: Maze, num_swaps: int, seed: int, keep=()) -> Maze:
 
 
 def num_rooms_by_doors(maze: Maze) -> np.ndarray:
-    """How many rooms of a maze of corridors have 0, 1, 2, 3 and 4 open doors."""
+    """Counts the rooms of a maze of corridors that have 0, 1, 2, 3 and 4 open doors."""
     free = (~maze.walls).astype(int)
     doors = free[:-2, 1:-1] + free[2:, 1:-1] + free[1:-1, :-2] + free[1:-1, 2:]
     return np.bincount(doors[::2, ::2].ravel(), minlength=5)
@@ -75,7 +75,7 @@ class TestSlots:
 
     @pytest.mark.parametrize("kind", [*NOVEL, "house"])
     def test_all_open_slots_of_a_building_are_its_doors(self, kind):
-        """When they are closed, what is left are rooms, or corridors of two cells: no cell is alone in its line."""
+        """Closed doors leave rooms, or corridors of two cells: no cell is alone in its line."""
         for seed in range(10):
             maze = generate(kind, 31, np.random.default_rng(seed))
             closed = maze.walls.copy()

@@ -18,7 +18,7 @@ FORWARD, LOOK_LEFT = 0, 4
 
 
 def corridor_spec(**options):
-    return make_spec(maps=corridor(), **options)
+    return make_spec(mazes=corridor(), **options)
 
 
 def drive(env: GoalMazeEnv, episode: Episode, num_steps: int, action: int = FORWARD):

@@ -41,7 +41,7 @@ def _registered():
 
 
 def corridor_env(**options) -> MazeEnv:
-    return MazeEnv(make_spec(maps=corridor(), **options))
+    return MazeEnv(make_spec(mazes=corridor(), **options))
 
 
 def test_it_steps_without_dm_control():
@@ -57,16 +57,16 @@ class TestRegistration:
     def test_the_size_of_an_id_yields_to_maps_and_to_a_size(self, name, size):
         name = f"mazebench/{name}-v1"
         maze = generate("dfs", 51, np.random.default_rng(0))
-        assert gymnasium.make(name, maps=maze, distances=[40]).unwrapped.task_spec.mazes == (maze,)
+        assert gymnasium.make(name, mazes=maze, distances=[40]).unwrapped.task_spec.mazes == (maze,)
         assert gymnasium.make(name).unwrapped.task_spec.size == size
         with pytest.raises(InputError, match="expected mazes of size 15, found size 51"):
-            gymnasium.make(name, maps=maze, size=15)
+            gymnasium.make(name, mazes=maze, size=15)
 
     def test_an_unknown_option_is_refused_with_all_there_are(self):
         for make, own in ((gymnasium.make, "camera, "), (gymnasium.make_vec, "num_envs, ")):
             with pytest.raises(InputError, match=f"unknown option 'mapz'; available: .*{own}") as caught:
                 make("mazebench/Local-13-v1", mapz="plan.png")
-            assert {"maps", "size", "split", "seed"} <= set(str(caught.value).split(": ")[1].split(", "))
+            assert {"mazes", "size", "split", "seed"} <= set(str(caught.value).split(": ")[1].split(", "))
 
     def test_an_environment_is_made_by_its_name_in_a_fresh_process(self):
         run_python("-c", "import gymnasium; gymnasium.make('mazebench:mazebench/Local-13-v1').reset(seed=0)")
@@ -197,8 +197,8 @@ class TestSpec:
 
     OPTIONS = (
         {"seed": np.int64(3), "distances": range(1, 4)},
-        {"maps": own_mazes(), "distances": np.array([1, 2])},
-        {"maps": own_mazes()[0], "sensors": ("lidar",)},
+        {"mazes": own_mazes(), "distances": np.array([1, 2])},
+        {"mazes": own_mazes()[0], "sensors": ("lidar",)},
     )
 
     @pytest.mark.parametrize("options", OPTIONS)
@@ -222,10 +222,10 @@ class TestSpec:
 
     def test_a_path_stays_a_path(self, tmp_path):
         write_text_maze(own_mazes()[0], tmp_path / "room.txt")
-        env = gymnasium.make("mazebench/Local-13-v1", maps=tmp_path / "room.txt", distances=[1])
-        assert env.spec.kwargs["maps"] == str(tmp_path / "room.txt")
+        env = gymnasium.make("mazebench/Local-13-v1", mazes=tmp_path / "room.txt", distances=[1])
+        assert env.spec.kwargs["mazes"] == str(tmp_path / "room.txt")
         assert gymnasium.make(EnvSpec.from_json(env.spec.to_json())).unwrapped.task_spec == env.unwrapped.task_spec
 
     def test_a_description_that_lacks_something_is_refused(self):
         with pytest.raises(InputError, match="expected a maze with name, rows and cell_size, found rows"):
-            gymnasium.make("mazebench/Local-13-v1", maps=[{"rows": ["#####"]}])
+            gymnasium.make("mazebench/Local-13-v1", mazes=[{"rows": ["#####"]}])

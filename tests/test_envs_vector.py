@@ -42,20 +42,20 @@ def small_mazes() -> list[Maze]:
 
 
 SPECS = {
-    "local": make_spec(maps=dfs_mazes(), distances=[1, 2], time_limit=25),
-    "hierarchical": make_spec("hierarchical", maps=small_mazes(), landmark_distance=2, time_limit=12),
-    "map_flip": make_spec("hierarchical", maps=small_mazes(), landmark_distance=2, time_limit=12, map_flip=0.2),
-    "map_warp": make_spec(maps=dfs_mazes(), distances=[1, 2], time_limit=25, map_warp=0.2),
-    "position_noise": make_spec(maps=dfs_mazes(), distances=[1, 2], time_limit=25, position_noise=0.4),
-    "context_size": make_spec(maps=dfs_mazes(), distances=[1, 2], time_limit=25, context_size=6),
-    "num_goals": make_spec(maps=dfs_mazes(), distances=[1, 2], time_limit=15, num_goals=3),
+    "local": make_spec(mazes=dfs_mazes(), distances=[1, 2], time_limit=25),
+    "hierarchical": make_spec("hierarchical", mazes=small_mazes(), landmark_distance=2, time_limit=12),
+    "map_flip": make_spec("hierarchical", mazes=small_mazes(), landmark_distance=2, time_limit=12, map_flip=0.2),
+    "map_warp": make_spec(mazes=dfs_mazes(), distances=[1, 2], time_limit=25, map_warp=0.2),
+    "position_noise": make_spec(mazes=dfs_mazes(), distances=[1, 2], time_limit=25, position_noise=0.4),
+    "context_size": make_spec(mazes=dfs_mazes(), distances=[1, 2], time_limit=25, context_size=6),
+    "num_goals": make_spec(mazes=dfs_mazes(), distances=[1, 2], time_limit=15, num_goals=3),
     "fresh": make_spec(kinds=("dfs", "obstacles"), size=13, fresh=True, distances=[1, 2], time_limit=25),
 }
 every_spec = pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
 
 
 class Step(NamedTuple):
-    """What one environment showed: after a step that ended an episode, the state before the next one began."""
+    """Outputs of one environment: after a step that ended an episode, the state before the next one began."""
 
     state: np.ndarray
     context: np.ndarray
@@ -96,7 +96,7 @@ def play_dm_env(spec: TaskSpec, seed: int, actions: np.ndarray) -> Iterator[Step
 
 
 def play_vector(env: MazeVectorEnv, actions: np.ndarray, seeds) -> list[list[Step]]:
-    """What each slot shows, in the order in which a single environment would."""
+    """Outputs of each slot, in the order in which a single environment would give them."""
     slots = range(env.num_envs)
 
     def seen(slot: int, observation: dict, infos: dict, reward: float | None = None, ends=(False, False)) -> Step:
@@ -233,7 +233,7 @@ class TestAutoreset:
             self.assert_same_infos(*resets)
 
     def test_a_step_is_refused_where_an_episode_ended_if_autoreset_is_disabled(self):
-        env = MazeVectorEnv(make_spec(maps=corridor(), time_limit=1), 3, autoreset_mode=AutoresetMode.DISABLED)
+        env = MazeVectorEnv(make_spec(mazes=corridor(), time_limit=1), 3, autoreset_mode=AutoresetMode.DISABLED)
         env.reset(seed=0)
         env.step(np.full(3, LOOK_LEFT))
         env.reset(options={"reset_mask": np.array([True, False, False])})
@@ -302,7 +302,7 @@ class TestEpisodeSource:
 
     def env(self, num_episodes: int, time_limit: int = 100, **arguments) -> MazeVectorEnv:
         waiting = collections.deque(Episode(0, (1, 1), (1, 4), 0.0, seed) for seed in range(num_episodes))
-        spec = make_spec(maps=corridor(), time_limit=time_limit)
+        spec = make_spec(mazes=corridor(), time_limit=time_limit)
         return MazeVectorEnv(spec, 3, episode_source=lambda slot: waiting.popleft() if waiting else None, **arguments)
 
     def test_slots_stand_still_when_episodes_run_out(self):

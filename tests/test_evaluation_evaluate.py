@@ -373,22 +373,22 @@ class TestRefused:
 class TestMaps:
     def test_mazes_of_ones_own_come_from_a_folder_or_a_file(self, map_folder, tmp_path):
         options = {"distances": (3, 9), "episodes_per_distance": 4}
-        summary = evaluate("planner", tmp_path / "out", maps=str(map_folder), **options)
+        summary = evaluate("planner", tmp_path / "out", mazes=str(map_folder), **options)
         assert (summary.split, summary.size, summary.episodes) == ("custom", 9, 16)
         assert summary.overall.success_rate == 1.0
         assert [record["maze"] for record in records_of(tmp_path / "out")] == ["a"] * 8 + ["b"] * 8
-        assert evaluate("planner", maps=str(map_folder / "b.txt"), size=9, **options).episodes == 8
+        assert evaluate("planner", mazes=str(map_folder / "b.txt"), size=9, **options).episodes == 8
 
     def test_a_run_does_not_go_on_in_mazes_that_were_changed(self, map_folder, tmp_path):
         maps = shutil.copytree(map_folder, tmp_path / "maps")
-        evaluate("random", tmp_path / "out", maps=str(maps), **FEW)
+        evaluate("random", tmp_path / "out", mazes=str(maps), **FEW)
         shutil.copy(maps / "a.txt", maps / "b.txt")
         with pytest.raises(InputError, match="holds another run: its mazes_sha256 is"):
-            evaluate("random", tmp_path / "out", maps=str(maps), resume=True, **FEW)
+            evaluate("random", tmp_path / "out", mazes=str(maps), resume=True, **FEW)
 
     def test_the_seed_draws_episodes_that_are_not_frozen(self, map_folder, tmp_path):
         for seed, name in ((0, "first"), (0, "again"), (1, "other")):
-            evaluate("planner", tmp_path / name, maps=str(map_folder), distances=(5,), seed=seed)
+            evaluate("planner", tmp_path / name, mazes=str(map_folder), distances=(5,), seed=seed)
         first, again, other = (records_of(tmp_path / name) for name in ("first", "again", "other"))
         assert first == again
         assert [record["start"] for record in first] != [record["start"] for record in other]

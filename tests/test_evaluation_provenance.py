@@ -50,7 +50,7 @@ def test_versions_options_and_machine_are_in_the_summary(tmp_path):
 def test_a_checkpoint_is_named_by_its_hash_and_tells_its_config(tmp_path):
     checkpoint = write_checkpoint(tmp_path / "x.safetensors", {"mine": json.dumps({"config": {"width": 8}})})
     options = EvalOptions.of("mah", checkpoint=checkpoint)
-    found = provenance(options, load_agent_class("mah"), build_task(options.task, options.mazes)).model_dump()
+    found = provenance(options, load_agent_class("mah"), build_task(options.task, options.maze_options)).model_dump()
     assert found["checkpoint_sha256"] == hashlib.sha256((tmp_path / "x.safetensors").read_bytes()).hexdigest()
     assert found["checkpoint_metadata"] == {"mine": {"config": {"width": 8}}}
     assert found["options"]["checkpoint"] == checkpoint
@@ -59,7 +59,7 @@ def test_a_checkpoint_is_named_by_its_hash_and_tells_its_config(tmp_path):
 def test_a_checkpoint_that_ships_is_told_without_the_path_to_it():
     agent_class = load_agent_class("mah")
     options = EvalOptions.of("mah", checkpoint=str(agent_class.default_checkpoint()))
-    found = provenance(options, agent_class, build_task(options.task, options.mazes)).model_dump()
+    found = provenance(options, agent_class, build_task(options.task, options.maze_options)).model_dump()
     assert found["options"]["checkpoint"] == "mah-13.safetensors"
 
 
@@ -69,7 +69,7 @@ def test_an_agent_at_hand_is_named_by_the_hash_of_its_file(tmp_path, monkeypatch
     monkeypatch.syspath_prepend(tmp_path)
     name = "provenance_at_hand:Mine"
     options = EvalOptions.of(name)
-    found = provenance(options, load_agent_class(name), build_task(options.task, options.mazes)).model_dump()
+    found = provenance(options, load_agent_class(name), build_task(options.task, options.maze_options)).model_dump()
     assert found["agent_code_sha256"] == hashlib.sha256(code.encode()).hexdigest()
     assert (found["agent_class"], found["agent_package"]) == (name, None)
 

@@ -1,4 +1,4 @@
-"""What docs/examples holds: each script runs with a small budget, and the package is built, installed and evaluated."""
+"""The examples of docs: each script runs with a small budget, and the package is built, installed and evaluated."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PPO_BUDGET = ("--steps", "512", "--num-envs", "4", "--out", "ppo.zip")
 
 
 def run(*arguments: str | pathlib.Path, folder: pathlib.Path, **variables: str) -> str:
-    """What a Python process prints on standard output; it must succeed."""
+    """Returns the standard output of a Python process, which must succeed."""
     return run_python(*arguments, cwd=folder, variables=SERIAL | {"TMPDIR": str(folder)} | variables).stdout
 
 
@@ -141,7 +141,7 @@ for action in (0, 0, 2, 2, 4, 0, 0):
         run(EXAMPLES / "own_maze.py", "--out", "mazes", folder=tmp_path)
         assert read_maze(tmp_path / "mazes" / "ring.txt").size == 7
         mujoco.MjModel.from_xml_path(str(tmp_path / "mazes" / "ring.xml"))
-        options = ("--maps", "mazes", "--distances", "1-6", "--out", "results")
+        options = ("--mazes", "mazes", "--distances", "1-6", "--out", "results")
         run("-m", "mazebench", "eval", "--agent", "planner", *options, folder=tmp_path)
         summary = json.loads((tmp_path / "results" / "summary.json").read_text())
         assert (summary["overall"]["n"], summary["overall"]["success_rate"]) == (30, 1.0)

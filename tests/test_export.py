@@ -1,4 +1,4 @@
-"""What other tools get: a watertight mesh of the walls, and a model that plain MuJoCo opens."""
+"""Exports for other tools: a watertight mesh of the walls, and a model that plain MuJoCo opens."""
 
 from __future__ import annotations
 

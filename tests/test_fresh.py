@@ -66,7 +66,7 @@ class TestDrawnMazes:
             ({"kinds": "dfs,dfs"}, "expected each kind once, found dfs, dfs"),
             ({"kinds": "dfs", "size": 14}, "kind 'dfs' makes mazes of odd sizes only, found size 14"),
             ({"kinds": "dfs", "split": "eval"}, "mazes that are drawn: expected split 'train' or 'dev', found 'eval'"),
-            ({"kinds": "dfs", "maps": "plan.txt"}, "expected maps of your own or mazes that are drawn, found both"),
+            ({"kinds": "dfs", "mazes": "plan.txt"}, "expected mazes of your own or mazes that are drawn, found both"),
             ({"fresh": True, "num_mazes": 5}, "expected no num_mazes beside fresh, found 5"),
             ({"fresh": True, "start": (1, 1)}, "fresh mazes: expected no start, which may be a wall"),
             ({"fresh": True, "textures": True}, "fresh mazes: expected no textures"),
@@ -110,7 +110,7 @@ class TestFreshMazes:
         env.reset()
         env.reset()  # in a model that is written
         episode = env.task.episode
-        compiled = MazeEnv(make_spec(maps=spec.mazes[episode.maze], distances=1, time_limit=300))
+        compiled = MazeEnv(make_spec(mazes=spec.mazes[episode.maze], distances=1, time_limit=300))
         compiled.reset(options={"episode": dataclasses.replace(episode, maze=0)})
         rng = np.random.default_rng(0)
         for _ in range(60):
@@ -209,6 +209,6 @@ class TestTraining:
     def test_maps_of_your_own_are_trained_and_evaluated_in(self, tmp_path):
         path = tmp_path / "plan.txt"
         path.write_text(format_maze(draw_mazes(("house",), 13, "dev", 1)[0]))
-        train(options(maps=str(path), kinds=(), fresh=False, env_steps=480), tmp_path / "run")
+        train(options(mazes=str(path), kinds=(), fresh=False, env_steps=480), tmp_path / "run")
         assert "sha256" in json.loads((tmp_path / "run" / "config.json").read_text())["mazes"]
-        assert HeldOutEvaluation(make_spec(maps=str(path)), 4).task.mazes[0].name == "plan"
+        assert HeldOutEvaluation(make_spec(mazes=str(path)), 4).task.mazes[0].name == "plan"

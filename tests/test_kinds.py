@@ -164,7 +164,7 @@ def test_dfs_opens_a_tenth_of_the_walls():
 
 def test_mazes_of_13_cells_mostly_have_3_to_6_landmarks():
     rng = np.random.default_rng(0)
-    spec = make_spec("hierarchical", maps=[generate("dfs", 13, rng) for _ in range(300)], landmark_distance=5)
+    spec = make_spec("hierarchical", mazes=[generate("dfs", 13, rng) for _ in range(300)], landmark_distance=5)
     num_landmarks = []
     for index, maze in enumerate(spec.mazes):
         episode = Episode(index, *corner_cells(maze), yaw=0.0, seed=0)

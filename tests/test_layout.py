@@ -102,7 +102,7 @@ def running(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def layer_of(dotted: str) -> str | None:
-    """`maps` for `mazebench.maps.maze`; None for other packages, and for what mazebench/__init__.py gives."""
+    """`mazes` for `mazebench.maps.maze`; None for other packages, and for what mazebench/__init__.py gives."""
     package, _, rest = dotted.partition(".")
     name = rest.partition(".")[0]
     return name if package == "mazebench" and name in modules() else None

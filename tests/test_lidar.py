@@ -34,7 +34,7 @@ def ranges_of(maze: Maze, x: float, y: float, yaw: float) -> np.ndarray:
 
 
 def mujoco_ranges(maze: Maze, pose: np.ndarray) -> np.ndarray:
-    """What MuJoCo's ray casts find from the height of the body's centre: `[K, 32]` m, at most `MAX_RANGE`."""
+    """Ranges of MuJoCo's ray casts from the height of the body's centre: `[K, 32]` m, at most `MAX_RANGE`."""
     model = maze_spec(maze).compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

@@ -87,19 +87,19 @@ class TestFile:
 
 class TestTasks:
     def test_an_array_is_a_task(self):
-        env = mazebench.load(maps=WALLS, distances=[2])
+        env = mazebench.load(mazes=WALLS, distances=[2])
         assert env.task.spec.mazes == (Maze(WALLS),)
 
     def test_several_arrays_are_a_task(self):
         other = WALLS.T.copy()
         for maps in ([WALLS, other], (Maze(WALLS), other), np.stack([WALLS, other])):
-            assert mazebench.make_spec(maps=maps, distances=[2]).mazes == (Maze(WALLS), Maze(other))
+            assert mazebench.make_spec(mazes=maps, distances=[2]).mazes == (Maze(WALLS), Maze(other))
 
     def test_rows_that_are_no_array_are_answered_with_how_to_make_one(self):
         with pytest.raises(InputError, match=r"found list; wrap rows of numbers in np\.array$"):
-            mazebench.make_spec(maps=WALLS.tolist())
+            mazebench.make_spec(mazes=WALLS.tolist())
 
     @pytest.mark.parametrize("maps", [5, [WALLS.tolist()], [None]])
     def test_what_is_no_map_is_refused(self, maps):
         with pytest.raises(InputError, match=r"expected .* in maps|expected maps as"):
-            mazebench.make_spec(maps=maps)
+            mazebench.make_spec(mazes=maps)

@@ -21,7 +21,7 @@ from mazebench.errors import InputError
 from mazebench.maps.files import read_located, read_maze, read_mazes
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, MazeError, cell_to_point
-from mazebench.maps.options import MapOptions
+from mazebench.maps.options import ReadOptions
 from mazebench.maps.pictures import draw_maze, write_image
 from mazebench.maps.readers.ros import read_occupancy, read_ros_maze, write_ros_map
 from mazebench.maps.text import parse_maze, write_text_maze
@@ -53,7 +53,7 @@ def drawn(text: str, pixels: int = 1) -> np.ndarray:
 
 
 def published(shade: float, opacity: float = 1.0, *, mode="trinary", negate=False, occupied=0.65, free=0.196) -> str:
-    """What map_server makes of a pixel: `shade` is the mean of its colours from 0 (black) to 1 (white)."""
+    """The state that map_server gives a pixel: `shade` is the mean of its colours from 0 (black) to 1 (white)."""
     if mode == "raw":
         per_cent = round(shade * 255)
         return "?" if per_cent > 100 else "#" if per_cent / 100 > occupied else "." if per_cent / 100 < free else "?"
@@ -247,7 +247,7 @@ class TestFrame:
 class TestRoundTrip:
     def test_the_command_keeps_the_frame(self, tmp_path):
         source = write_map(tmp_path, drawn(BUILDING), origin=[-7.35, -4.2, 0.0])
-        located = next(make_mazes(None, 1, 0, "dfs", source, MapOptions()))
+        located = next(make_mazes(None, 1, 0, "dfs", source, ReadOptions()))
         write_maze(located, tmp_path / "out", ["ros"])
         assert yaml.safe_load((tmp_path / "out" / "map.yaml").read_text())["origin"] == [-6.35, -3.2, 0.0]
 
@@ -291,7 +291,7 @@ class TestFloorPlan:
 
     def test_the_paper_around_a_plan_is_cut_off(self, tmp_path):
         path = self.write(tmp_path, two_rooms(margin=33))
-        located = read_located(path, None, MapOptions(pixel_size=0.02))
+        located = read_located(path, None, ReadOptions(pixel_size=0.02))
         assert located.maze == read_maze(self.write(tmp_path, two_rooms(), "cut.png"), pixel_size=0.02)
         assert located.origin == pytest.approx((0.66, 0.66 - 1.6, 0.0))
 
@@ -381,4 +381,4 @@ def test_a_folder_of_maps_reads_each_once(tmp_path):
     (tmp_path / "b.yaml").write_text(content.replace("b.pgm", "c.pgm"))
     found = read_mazes(tmp_path)
     assert [(maze.name, maze.cell_size) for maze in found] == [("a", 0.5), ("b", 0.5)]
-    assert mazebench.make_spec(maps=tmp_path, distances=[2]).mazes == found
+    assert mazebench.make_spec(mazes=tmp_path, distances=[2]).mazes == found

@@ -42,7 +42,7 @@ def a_context(seed=0, size=7, batch=1):
 
 
 def code_of(network, context):
-    """What the hypermodel makes of contexts, if displacements are measured from the marked start."""
+    """Outputs of the hypermodel for contexts, if displacements are measured from the marked start."""
     return network.hypermodel(context, marked_position(context[:, START]))
 
 
@@ -54,7 +54,7 @@ def an_observation(batch):
 def make_learner(mazes, config=SMALL, seed=0, steps=100):
     """A small learner that has seen some steps of random driving."""
     overrides = {name: str(value) for name, value in dataclasses.asdict(config).items()}
-    spec = make_spec(maps=mazes, distances=(1, 2, 3), num_goals=config.num_goals)
+    spec = make_spec(mazes=mazes, distances=(1, 2, 3), num_goals=config.num_goals)
     learner = MMN.build_learner(spec, seed=seed, overrides=overrides)
     collector = Collector(spec, learner.num_envs, seed=seed)
     rng = np.random.default_rng(seed)

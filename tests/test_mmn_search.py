@@ -53,7 +53,7 @@ def test_model_by_kernels_equals_the_model_by_pytorch(name):
 
 
 def evaluated(model, embedding, actions):
-    """What the kernels predict of actions `[B]` in states `[B, D + H]`, and the states that follow."""
+    """Predictions of the kernels for actions `[B]` in states `[B, D + H]`, and the states that follow."""
     states = np.repeat(embedding.numpy()[:, None], 2, axis=1)
     evaluation = empty_evaluation(len(states), 6)
     step(model, 0, states, np.zeros(len(states), np.int64), actions, 1, evaluation)

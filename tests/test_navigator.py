@@ -85,7 +85,7 @@ def success_rate(outcomes: list[Outcome]) -> float:
 
 def track_success_rate(track: str, level: int, distances: tuple[int, ...], num_mazes: int = 9, **options) -> float:
     mazes = load_kind_mazes("train")
-    spec = make_spec(track, maps=mazes[:: len(mazes) // num_mazes], level=level, distances=distances, **options)
+    spec = make_spec(track, mazes=mazes[:: len(mazes) // num_mazes], level=level, distances=distances, **options)
     return success_rate(play(spec, draw_trials(spec, 2)))
 
 
@@ -93,7 +93,7 @@ class TestNavigator:
     def test_goals_are_reached_where_the_map_is_true(self):
         mazes = load_mazes(13, "train")[:4]
         distances = tuple(range(1, 16))
-        spec = make_spec(maps=mazes, distances=distances, sensors=("lidar",), time_limit=100)
+        spec = make_spec(mazes=mazes, distances=distances, sensors=("lidar",), time_limit=100)
         assert success_rate(play(spec, draw_trials(spec, 2))) == 1.0
 
     @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ class TestNavigator:
 
     def test_near_goals_are_found_without_a_map_and_a_mark(self):
         mazes, hide = load_mazes(13, "train")[::2], ("map", "goal")
-        spec = make_spec(maps=mazes, distances=(3, 5), sensors=("lidar",), time_limit=200, hide=hide)
+        spec = make_spec(mazes=mazes, distances=(3, 5), sensors=("lidar",), time_limit=200, hide=hide)
         assert success_rate(play(spec, draw_trials(spec, 2))) >= 0.7
 
     def test_odometry_that_drifts_from_a_known_pose_is_corrected(self):
@@ -127,11 +127,11 @@ class TestNavigator:
     def test_a_landmark_in_a_wall_is_given_up(self):
         # Landmarks are planned on the shown map, and some of them lie in walls. The legs to them time out.
         mazes = load_mazes(13, "train")[:20]
-        spec = make_spec("hierarchical", maps=mazes, map_flip=0.1, sensors=("lidar",), time_limit=100)
+        spec = make_spec("hierarchical", mazes=mazes, map_flip=0.1, sensors=("lidar",), time_limit=100)
         assert success_rate(play(spec, draw_trials(spec))) >= 0.9
 
     @pytest.mark.parametrize("perturbation", [{"position_noise": 0.5}, {"map_warp": 0.1}], ids=["noise", "warp"])
     def test_goals_are_reached_where_positions_or_marks_are_off(self, perturbation):
         mazes = load_mazes(13, "train")[:5]
-        spec = make_spec(maps=mazes, distances=(5, 10), sensors=("lidar",), time_limit=100, **perturbation)
+        spec = make_spec(mazes=mazes, distances=(5, 10), sensors=("lidar",), time_limit=100, **perturbation)
         assert success_rate(play(spec, draw_trials(spec, 2))) >= 0.9

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pathlib
 import re
 
-from mazebench.maps.options import DrawnOptions, MapOptions
+from mazebench.maps.options import DrawnOptions, ReadOptions
 from mazebench.options import Option, options_of
 from mazebench.tasks.options import TaskOptions, Variants
 
@@ -15,7 +15,7 @@ DERIVED_TABLE = re.compile(r"\| option \| default \| values \| what \|\n(?:\|.*\
 
 def derived_tables() -> list[str]:
     """Returns the tables of the options of mazes and of tasks, in the order of the page."""
-    return [derived_table(DrawnOptions), derived_table(MapOptions), derived_table(TaskOptions, Variants)]
+    return [derived_table(DrawnOptions), derived_table(ReadOptions), derived_table(TaskOptions, Variants)]
 
 
 def derived_table(*classes: type) -> str:

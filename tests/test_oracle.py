@@ -33,7 +33,7 @@ def dfs(seed: int, size: int = 13, cell_size: float = 1.0) -> Maze:
 
 
 def play(agent: str, task, trials) -> list[Outcome]:
-    """What came of each trial."""
+    """The result of each trial."""
     interface = Interface(task.task, task.size, task.context_size, cell_size=task.cell_size)
     agent_class = load_agent_class(agent)
     steps = run_trials(
@@ -80,7 +80,7 @@ class TestQuickestDrive:
 
 class TestOracle:
     def test_nobody_else_is_quicker_and_its_paths_are_short(self):
-        task = make_spec(maps=[dfs(seed) for seed in range(4)], distances=(3, 8, 14))
+        task = make_spec(mazes=[dfs(seed) for seed in range(4)], distances=(3, 8, 14))
         trials = draw_trials(task, 3)
         ours, others = play("oracle", task, trials), play("planner-closed-loop", task, trials)
         assert all(outcome.success for outcome in ours)
@@ -91,19 +91,19 @@ class TestOracle:
 
     @pytest.mark.parametrize("cell_size", [0.4, 0.5, 2.0])
     def test_it_reaches_goals_in_cells_of_other_widths(self, cell_size):
-        task = make_spec(maps=dfs(3, cell_size=cell_size), distances=(5, 12))
+        task = make_spec(mazes=dfs(3, cell_size=cell_size), distances=(5, 12))
         steps = measure_oracle_steps(task, draw_trials(task, 4))
         assert all(each is not None and each < 60 for each in steps)
 
     def test_it_takes_no_detour_over_landmarks(self):
         maze = dfs(4)
-        local = make_spec(maps=maze, start=(1, 11), goal=(11, 1), time_limit=300)
+        local = make_spec(mazes=maze, start=(1, 11), goal=(11, 1), time_limit=300)
         [trial, *_] = draw_trials(local, 1)
-        over_landmarks = make_spec("hierarchical", maps=maze, landmark_distance=3)
+        over_landmarks = make_spec("hierarchical", mazes=maze, landmark_distance=3)
         assert measure_oracle_steps(over_landmarks, [trial]) == measure_oracle_steps(local, [trial])
 
     def test_a_goal_that_it_does_not_reach_in_time_has_no_steps(self):
-        task = make_spec(maps=dfs(5), distances=(14,), time_limit=10)
+        task = make_spec(mazes=dfs(5), distances=(14,), time_limit=10)
         assert measure_oracle_steps(task, draw_trials(task, 1)) == (None,)
 
     def test_frozen_steps_are_those_that_it_takes(self):

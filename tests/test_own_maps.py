@@ -1,4 +1,4 @@
-"""Maps of one's own: cells of any size, a start and a goal, and the distances and the time limit that fit."""
+"""Mazes of one's own: cells of any size, a start and a goal, and the distances and the time limit that fit."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def scaled(tmp_path_factory):
     """Results of an evaluation in cells of half a metre."""
     folder = tmp_path_factory.mktemp("scaled")
     (folder / "maze.txt").write_text(format_maze(dfs(13)))
-    options = {"maps": folder / "maze.txt", "cell_size": 0.5, "sensors": ("lidar",), "episodes_per_distance": 1}
+    options = {"mazes": folder / "maze.txt", "cell_size": 0.5, "sensors": ("lidar",), "episodes_per_distance": 1}
     mazebench.evaluate("oracle", folder / "oracle", record=True, **options)
     return folder / "oracle"
 
@@ -85,7 +85,7 @@ class TestScale:
 
 class TestEnvironments:
     def test_the_three_environments_play_the_same_episode(self):
-        options = {"maps": dfs(cell_size=0.6), "sensors": ("lidar",)}
+        options = {"mazes": dfs(cell_size=0.6), "sensors": ("lidar",)}
         single = mazebench.load("local", **options)
         gym = gymnasium.make("mazebench/Local-13-v1", **options)
         vector = mazebench.make_vec("local", 2, **options)
@@ -102,7 +102,7 @@ class TestEnvironments:
 
     def test_the_goal_is_reached_in_its_cell(self):
         maze = dataclasses.replace(corridor(), cell_size=0.5)
-        env = mazebench.load("local", maps=maze, distances=[3])
+        env = mazebench.load("local", mazes=maze, distances=[3])
         time_step = env.reset(episode=mazebench.Episode(0, (1, 1), (1, 4), 0.0, 0))
         while not time_step.last():
             time_step = env.step(0)
@@ -111,15 +111,15 @@ class TestEnvironments:
 
     def test_mazes_of_one_task_have_one_scale(self):
         with pytest.raises(InputError, match=r"expected mazes of cells of one size in metres, found 0.5, 1.0"):
-            make_spec(maps=(dfs(), dfs(cell_size=0.5, seed=1)))
+            make_spec(mazes=(dfs(), dfs(cell_size=0.5, seed=1)))
 
     def test_cells_through_which_no_body_passes_are_refused(self):
         with pytest.raises(InputError, match=r"dfs-0: expected cells of at least 0.4 m.*found 0.35 m"):
-            make_spec(maps=dfs(cell_size=0.35))
+            make_spec(mazes=dfs(cell_size=0.35))
 
     def test_tracks_keep_their_scale(self):
         with pytest.raises(InputError, match=r"track 'building': expected cells of 1 m, found 0.5 m"):
-            make_spec("building", maps=dfs(13, cell_size=0.5))
+            make_spec("building", mazes=dfs(13, cell_size=0.5))
 
 
 class TestAgents:
@@ -128,7 +128,7 @@ class TestAgents:
     )
     def test_agents_that_plan_drive_at_any_scale(self, name, cell_size):
         agent_class, maze = load_agent_class(name), dfs(9, cell_size)
-        spec = make_spec(maps=maze, context_size=agent_class.context_size(9), sensors=("lidar",))
+        spec = make_spec(mazes=maze, context_size=agent_class.context_size(9), sensors=("lidar",))
         interface = Interface("local", 9, spec.context_size, sensors=spec.sensors, cell_size=cell_size)
         trials = list(enumerate(draw_trials(spec, 1)))
         agent = agent_class.build(interface)
@@ -142,7 +142,7 @@ class TestAgents:
 
     def test_a_scale_on_which_an_agent_did_not_learn_is_remarked(self, tmp_path):
         (tmp_path / "fine.txt").write_text(format_maze(generate("dfs", 13, np.random.default_rng(0))))
-        options = {"maps": str(tmp_path / "fine.txt"), "cell_size": 2.0, "distances": (1,), "episodes_per_distance": 1}
+        options = {"mazes": str(tmp_path / "fine.txt"), "cell_size": 2.0, "distances": (1,), "episodes_per_distance": 1}
         with pytest.warns(Remark) as warned:
             assert mazebench.evaluate("mah", **options).untrained_scale
         assert [str(each.message) for each in warned] == [
@@ -156,37 +156,37 @@ class TestAgents:
     @pytest.mark.parametrize("name", ["mah", "dqn"])
     def test_learned_agents_that_read_any_map_get_one_of_the_mazes_own_cells(self, tmp_path, name):
         (tmp_path / "large.txt").write_text(format_maze(generate("dfs", 31, np.random.default_rng(0))))
-        plan = make_plan(EvalOptions.of(name, maps=str(tmp_path / "large.txt")))
+        plan = make_plan(EvalOptions.of(name, mazes=str(tmp_path / "large.txt")))
         assert (plan.task.context_size, plan.untrained_scale, plan.remark) == (31, False, None)
 
     def test_a_map_that_is_coarser_than_the_mazes_is_remarked(self, tmp_path):
         (tmp_path / "large.txt").write_text(format_maze(generate("dfs", 31, np.random.default_rng(0))))
-        assert make_plan(EvalOptions.of("random", maps=str(tmp_path / "large.txt"))).remark == (
+        assert make_plan(EvalOptions.of("random", mazes=str(tmp_path / "large.txt"))).remark == (
             "random is shown the 31 x 31 cells as a map of 21 x 21; context_size() of its class chooses another one "
             "(docs/agents.md)"
         )
-        assert make_plan(EvalOptions.of("planner", maps=str(tmp_path / "large.txt"))).remark is None
+        assert make_plan(EvalOptions.of("planner", mazes=str(tmp_path / "large.txt"))).remark is None
         assert make_plan(EvalOptions.of("random", track="building")).remark is None
 
 
 class TestEnds:
     @pytest.mark.parametrize("start", ["1,3", (1, 3), "3.01m, 7.99 m"])
     def test_a_start_is_a_cell_or_a_point(self, start):
-        spec = make_spec(maps=field(9), start=start)
+        spec = make_spec(mazes=field(9), start=start)
         episodes = [sample_episode(spec, np.random.default_rng(seed)) for seed in range(20)]
         assert {episode.start for episode in episodes} == {(1, 3)}
         assert len({episode.goal for episode in episodes}) > 5
         assert len({episode.yaw for episode in episodes}) == 20
 
     def test_the_other_end_is_drawn_at_the_distances(self):
-        spec = make_spec(maps=dfs(), goal=(7, 7), distances=(2, 5))
+        spec = make_spec(mazes=dfs(), goal=(7, 7), distances=(2, 5))
         for seed in range(20):
             episode = sample_episode(spec, np.random.default_rng(seed))
             assert episode.goal == (7, 7)
             assert spec.mazes[0].distance(episode.start, episode.goal) in (2, 5)
 
     def test_landmarks_lead_from_the_start_to_the_goal(self):
-        env = mazebench.load("hierarchical", maps=dfs(), start=(7, 7))
+        env = mazebench.load("hierarchical", mazes=dfs(), start=(7, 7))
         env.reset(seed=0)
         assert env.task.route.cells[0] == (7, 7)
         assert env.task.route.cells[-1] == corner_cells(dfs())[1]
@@ -211,7 +211,7 @@ class TestEnds:
     )
     def test_ends_that_contradict_are_refused_in_a_line(self, options, message):
         with pytest.raises(InputError, match=message) as caught:
-            make_spec(maps=dfs(), **options)
+            make_spec(mazes=dfs(), **options)
         assert "\n" not in str(caught.value)
 
 
@@ -225,7 +225,7 @@ class TestDefaults:
         ],
     )
     def test_distances_reach_as_far_as_the_map(self, maze, distances, time_limit):
-        spec = make_spec(maps=maze)
+        spec = make_spec(mazes=maze)
         if time_limit is None:
             assert (len(spec.distances), spec.distances[0], spec.distances[-1]) == (15, 3, 39)
             assert spec.time_limit == 6 * 39 + 50
@@ -235,16 +235,16 @@ class TestDefaults:
     @pytest.mark.parametrize(("cell_size", "steps_a_cell"), [(0.5, 5), (1.0, 6), (3.0, 10)])
     def test_the_time_limit_grows_with_the_way(self, cell_size, steps_a_cell):
         maze = dataclasses.replace(field(25), cell_size=cell_size)
-        assert make_spec(maps=maze, distances=(20, 40)).time_limit == steps_a_cell * 40 + 50
-        assert make_spec(maps=maze, start=(1, 1), goal=(1, 21)).time_limit == steps_a_cell * 20 + 50
-        assert make_spec("hierarchical", maps=maze, landmark_distance=20).time_limit == steps_a_cell * 20 + 50
-        assert make_spec(maps=maze, time_limit=7).time_limit == 7
+        assert make_spec(mazes=maze, distances=(20, 40)).time_limit == steps_a_cell * 40 + 50
+        assert make_spec(mazes=maze, start=(1, 1), goal=(1, 21)).time_limit == steps_a_cell * 20 + 50
+        assert make_spec("hierarchical", mazes=maze, landmark_distance=20).time_limit == steps_a_cell * 20 + 50
+        assert make_spec(mazes=maze, time_limit=7).time_limit == 7
 
 
 class TestEvaluation:
     def test_an_own_map_is_evaluated_without_distances(self, tmp_path):
         (tmp_path / "room.txt").write_text(ROOM)
-        summary = mazebench.evaluate("planner", maps=str(tmp_path / "room.txt"), episodes_per_distance=1)
+        summary = mazebench.evaluate("planner", mazes=str(tmp_path / "room.txt"), episodes_per_distance=1)
         assert list(summary.by_distance) == [str(distance) for distance in range(1, 9)]
         assert summary.overall.success_rate == 1.0
 

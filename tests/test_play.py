@@ -31,7 +31,7 @@ def corridor() -> Maze:
 @pytest.fixture
 def game(corridor) -> Game:
     """From (1, 1), where the body looks at the goal in (1, 3)."""
-    game = Game(make_spec(maps=corridor, distances=[2]), seed=0)
+    game = Game(make_spec(mazes=corridor, distances=[2]), seed=0)
     game.env.task.choose_episode(episode=Episode(0, (1, 1), (1, 3), 0.0, 0))
     game.begin()
     return game
@@ -61,7 +61,7 @@ class TestGame:
 
 class TestViewer:
     def test_rays_of_the_range_sensor_are_drawn_in_the_world(self, corridor):
-        game = Game(make_spec(maps=corridor, distances=[2], sensors="lidar"), seed=0)
+        game = Game(make_spec(mazes=corridor, distances=[2], sensors="lidar"), seed=0)
         np.testing.assert_allclose(np.hypot(*(game.rays - game.path[-1]).T), game.observation["lidar"])
         scene = mujoco.MjvScene(game.env.simulation.model, maxgeom=40)
         viewer._draw_rays(scene, game)

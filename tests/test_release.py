@@ -1,4 +1,4 @@
-"""What a release says of itself agrees: version, change log, citation. `.ci/release` builds one and tries it."""
+"""Version, change log and citation of a release agree. `.ci/release` builds one and tries it."""
 
 from __future__ import annotations
 

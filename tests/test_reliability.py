@@ -1,4 +1,4 @@
-"""What happens to a run that is killed, stopped, short of disk space or not alone in its folder.
+"""Runs that are killed, stopped, short of disk space or not alone in their folder.
 
 Each test starts the installed command as a process of its own. A disk that fills is a file system mounted in memory.
 docs/reliability.md has the promises.

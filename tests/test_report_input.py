@@ -1,4 +1,4 @@
-"""What the report does with bad input: one line names it, it is skipped or refused, and the rest is reported."""
+"""Bad input of reports: one line names it, it is skipped or refused, and the rest is reported."""
 
 from __future__ import annotations
 

@@ -187,7 +187,7 @@ class TestOwnMaps:
     def test_a_map_is_shown_with_the_cells_that_the_agent_was_given(self, browser, tmp_path):
         rows = ["#" * 30, *["#" + "." * 13 + "#" + "." * 14 + "#"] * 13, *["#" + "." * 28 + "#"] * 15, "#" * 30]
         (tmp_path / "hall.txt").write_text("\n".join(rows) + "\n")
-        hall = {"maps": str(tmp_path / "hall.txt"), "distances": [5], "episodes_per_distance": 1}
+        hall = {"mazes": str(tmp_path / "hall.txt"), "distances": [5], "episodes_per_distance": 1}
         evaluate("random", tmp_path / "results", record=True, **hall)
         write_report([tmp_path / "results"], tmp_path / "report")
         load_anew(browser, tmp_path / "report" / "report.html")

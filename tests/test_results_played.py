@@ -54,7 +54,7 @@ def test_on_a_track_it_is_what_the_agent_was_given(tmp_path, track, level):
 def test_of_maps_that_are_gone_a_report_has_no_paths(tmp_path, remarks):
     (tmp_path / "room.txt").write_text(ROOM)
     options = {"distances": (2,), "episodes_per_distance": 1, "record": True}
-    evaluate("random", tmp_path / "out", maps=tmp_path / "room.txt", **options)
+    evaluate("random", tmp_path / "out", mazes=tmp_path / "room.txt", **options)
     [result] = read_results([tmp_path / "out"])
     assert result.trajectories
     assert result.walls("room").sum() == 16

@@ -23,7 +23,7 @@ TURN = math.radians(21.12)  # of a look action
 
 
 def noisy(ranges: np.ndarray, model: LidarModel, rng: np.random.Generator) -> np.ndarray:
-    """What a sensor reads at distances `[R]` up to its range."""
+    """Readings of a sensor at distances `[R]` up to its range."""
     read = np.clip(ranges + rng.normal(0, model.sigma, ranges.shape), model.min_range, model.max_range)
     return np.where((ranges >= model.max_range) | (rng.random(ranges.shape) < model.lost), model.max_range, read)
 

@@ -71,7 +71,7 @@ def test_turned_experience_is_what_the_simulation_does_in_the_turned_maze(turned
 
 
 def drive(episode, actions):
-    env = Environment(make_spec(maps=field(13), distances=(1,), time_limit=1000))
+    env = Environment(make_spec(mazes=field(13), distances=(1,), time_limit=1000))
     states = [env.reset(episode=episode).observation["state"]]
     for action in actions:
         states.append(env.step(int(action)).observation["state"])

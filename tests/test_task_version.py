@@ -86,7 +86,7 @@ def test_version_when_environments_are_asked():
 @pytest.mark.parametrize("track", [None, "building"])
 def test_version_when_a_result_says_what_it_came_from(track):
     options = EvalOptions.of("random", track=track)
-    assert provenance(options, RandomAgent, build_task(options.task, options.mazes)).task_version == TASK_VERSION
+    assert provenance(options, RandomAgent, build_task(options.task, options.maze_options)).task_version == TASK_VERSION
 
 
 if __name__ == "__main__":

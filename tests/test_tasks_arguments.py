@@ -1,4 +1,4 @@
-"""What the constructors of environments refuse, each in one line."""
+"""Refusals of the constructors of environments, each in one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When the next landmark comes and when an episode ends, by hand."""
+"""The moments of the next landmark and of the end of an episode, by hand."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ class TestLandmarks:
         assert self.cells(1, (1, 1), (1, 7), task="local") == [(1, 1), (1, 7)]
 
     def cells(self, every: int, start, goal, task: str = "hierarchical") -> list[tuple[int, int]]:
-        spec = make_spec(task, maps=corridor(), landmark_distance=every)
+        spec = make_spec(task, mazes=corridor(), landmark_distance=every)
         episode = Episode(0, start, goal, 0.0, 0)
         return plan_route(spec, episode, show_map(spec, episode)).cells
 

@@ -65,23 +65,23 @@ def contexts(time_steps: list[dm_env.TimeStep]) -> list[np.ndarray]:
 
 class LocalContractTest(test_utils.EnvironmentTestMixin, absltest.TestCase):
     def make_object_under_test(self):
-        return mazebench.load("local", maps=dfs_mazes(), time_limit=8, seed=0)
+        return mazebench.load("local", mazes=dfs_mazes(), time_limit=8, seed=0)
 
 
 class HierarchicalContractTest(test_utils.EnvironmentTestMixin, absltest.TestCase):
     def make_object_under_test(self):
-        return mazebench.load("hierarchical", maps=corridor(), time_limit=4, seed=0)
+        return mazebench.load("hierarchical", mazes=corridor(), time_limit=4, seed=0)
 
 
 class PerturbedContractTest(test_utils.EnvironmentTestMixin, absltest.TestCase):
     def make_object_under_test(self):
         noise = {"map_flip": 0.1, "map_warp": 0.1, "position_noise": 0.3}
-        return mazebench.load("hierarchical", maps=dfs_mazes(), time_limit=4, context_size=7, seed=0, **noise)
+        return mazebench.load("hierarchical", mazes=dfs_mazes(), time_limit=4, context_size=7, seed=0, **noise)
 
 
 class TestRewardsAndEndings:
     def test_an_episode_ends_with_reward_0_when_the_goal_is_reached(self):
-        env = mazebench.load(maps=corridor())
+        env = mazebench.load(mazes=corridor())
         time_steps = play(env, [FORWARD] * 20, episode=eastwards())
         assert time_steps[0].step_type is dm_env.StepType.FIRST
         assert (time_steps[0].reward, time_steps[0].discount) == (None, None)
@@ -96,7 +96,7 @@ class TestRewardsAndEndings:
         assert env.task.steps == STEPS_TO_GOAL
 
     def test_an_episode_is_cut_short_when_time_is_out(self):
-        env = mazebench.load(maps=corridor(), time_limit=STEPS_TO_GOAL - 1)
+        env = mazebench.load(mazes=corridor(), time_limit=STEPS_TO_GOAL - 1)
         time_steps = play(env, [FORWARD] * 20, episode=eastwards())
         assert len(time_steps) == STEPS_TO_GOAL
         last = time_steps[-1]
@@ -104,19 +104,19 @@ class TestRewardsAndEndings:
         assert not env.task.success
 
     def test_a_goal_reached_on_the_last_step_counts(self):
-        env = mazebench.load(maps=corridor(), time_limit=STEPS_TO_GOAL)
+        env = mazebench.load(mazes=corridor(), time_limit=STEPS_TO_GOAL)
         last = play(env, [FORWARD] * 20, episode=eastwards())[-1]
         assert (last.step_type, last.reward, last.discount) == (dm_env.StepType.LAST, 0.0, 0.0)
 
     def test_a_step_after_the_end_begins_a_new_episode(self):
-        env = mazebench.load(maps=corridor(), time_limit=1)
+        env = mazebench.load(mazes=corridor(), time_limit=1)
         play(env, [FORWARD], episode=eastwards())
         assert env.needs_reset
         assert env.step(FORWARD).first()
         assert not env.needs_reset
 
     def test_the_path_length_is_that_of_the_whole_way(self):
-        env = mazebench.load(maps=field(SIZE))
+        env = mazebench.load(mazes=field(SIZE))
         env.reset(episode=Episode(0, (4, 2), (1, 1), EAST, 0))
         driven = 0.0
         for action in [FORWARD] * 4 + [BACKWARD] * 6:
@@ -130,7 +130,7 @@ class TestRewardsAndEndings:
 class TestState:
     def test_an_episode_begins_at_rest_in_the_middle_of_its_start(self):
         # The centre of (4, 3) of 9 x 9 is (3.5, 4.5).
-        state = play(mazebench.load(maps=field(SIZE)), [], episode=eastwards(start=3, yaw=0.5))[0].observation["state"]
+        state = play(mazebench.load(mazes=field(SIZE)), [], episode=eastwards(start=3, yaw=0.5))[0].observation["state"]
         assert state.dtype == np.float32
         np.testing.assert_allclose(state, [3.5, Y, 0.28, 0, 0, 0.5] + [0] * 6, atol=1e-6)
 
@@ -140,7 +140,7 @@ class TestState:
     )
     @pytest.mark.parametrize("yaw", [NORTH, 2.0])
     def test_velocities_are_given_in_the_bodys_frame(self, action, forward, left, yaw):
-        env = mazebench.load(maps=field(SIZE))
+        env = mazebench.load(mazes=field(SIZE))
         state = play(env, [action], episode=Episode(0, (4, 4), (1, 1), yaw, 0))[-1].observation["state"]
         speed = 3.0  # m/s after 10 frames
         np.testing.assert_allclose(state[6:9], [forward * speed, left * speed, 0], atol=0.05)
@@ -152,7 +152,7 @@ class TestState:
 
     @pytest.mark.parametrize(("action", "sign"), [(LOOK_LEFT, 1), (LOOK_RIGHT, -1)])
     def test_a_body_turns_on_the_spot(self, action, sign):
-        env = mazebench.load(maps=field(SIZE))
+        env = mazebench.load(mazes=field(SIZE))
         state = play(env, [action], episode=Episode(0, (4, 4), (1, 1), 0.0, 0))[-1].observation["state"]
         np.testing.assert_allclose(state[9:], [0, 0, sign * TURN_RATE], atol=1e-3)
         assert state[5] == pytest.approx(sign * np.deg2rad(21.12), rel=0.01)
@@ -161,7 +161,7 @@ class TestState:
 
 class TestContext:
     def test_the_context_shows_the_walls_the_goal_and_the_start(self):
-        context = contexts(play(mazebench.load(maps=corridor()), [], episode=eastwards()))[0]
+        context = contexts(play(mazebench.load(mazes=corridor()), [], episode=eastwards()))[0]
         assert context.shape == (4, SIZE, SIZE)
         assert context.dtype == np.float32
         np.testing.assert_array_equal(context[0], corridor().walls)
@@ -169,7 +169,7 @@ class TestContext:
         np.testing.assert_array_equal(np.argwhere(context[3]), [[ROW, 1]])
 
     def test_an_agent_may_write_to_its_observation(self):
-        env = mazebench.load(maps=corridor())
+        env = mazebench.load(mazes=corridor())
         first = env.reset(episode=eastwards())
         kept = {key: value.copy() for key, value in first.observation.items()}
         first.observation["context"][:] = 9
@@ -182,7 +182,7 @@ class TestContext:
 class TestPositionNoise:
     def test_noise_changes_the_observed_position_only(self):
         episode = Episode(0, (4, 4), (1, 1), 0.3, seed=11)
-        clean, noisy = (mazebench.load(maps=field(SIZE), position_noise=scale) for scale in (0.0, 0.5))
+        clean, noisy = (mazebench.load(mazes=field(SIZE), position_noise=scale) for scale in (0.0, 0.5))
         actions = np.random.default_rng(0).integers(6, size=90)
         clean_states, noisy_states = (self.states(env, actions, episode) for env in (clean, noisy))
         np.testing.assert_array_equal(noisy_states[:, 2:], clean_states[:, 2:])
@@ -195,7 +195,7 @@ class TestPositionNoise:
 
     def test_the_true_position_decides_whether_the_goal_is_reached(self):
         # Reward and end speak of the true position.
-        env = mazebench.load(maps=corridor(), position_noise=3.0)
+        env = mazebench.load(mazes=corridor(), position_noise=3.0)
         time_steps = play(env, [FORWARD] * 20, episode=eastwards())
         assert len(time_steps) == 1 + STEPS_TO_GOAL
         assert time_steps[-1].discount == 0.0
@@ -207,7 +207,7 @@ class TestPositionNoise:
 class TestHierarchical:
     def test_a_landmark_that_is_not_reached_in_time_is_given_up(self):
         # From (4, 7) to (4, 1), 6 cells: landmarks at columns 5 and 3, then the goal at 1.
-        env = mazebench.load("hierarchical", maps=corridor(), landmark_distance=2, time_limit=3)
+        env = mazebench.load("hierarchical", mazes=corridor(), landmark_distance=2, time_limit=3)
         time_steps = play(env, [LOOK_LEFT] * 20, seed=0)
         assert len(time_steps) == 1 + 9
         assert self.first_steps(time_steps) == [0, 3, 6]
@@ -219,7 +219,7 @@ class TestHierarchical:
         assert time_steps[-1].discount == 1.0
 
     def test_the_next_landmark_comes_when_one_is_reached(self):
-        env = mazebench.load("hierarchical", maps=corridor(), landmark_distance=2)
+        env = mazebench.load("hierarchical", mazes=corridor(), landmark_distance=2)
         time_steps = play(env, [FORWARD] * 50, episode=eastwards(start=7, goal=1, yaw=WEST))
         columns = [int(time_step.observation["state"][0]) for time_step in time_steps]
         first_in = [columns.index(column) for column in (7, 5, 3)]
@@ -230,7 +230,7 @@ class TestHierarchical:
         assert env.task.success
 
     def test_the_local_map_is_centred_on_the_legs_start(self):
-        env = mazebench.load("hierarchical", maps=corridor(), landmark_distance=2, time_limit=3)
+        env = mazebench.load("hierarchical", mazes=corridor(), landmark_distance=2, time_limit=3)
         for time_step in play(env, [LOOK_LEFT] * 20, seed=0):
             column = int(np.argwhere(time_step.observation["context"][3])[0, 1])
             local_map = time_step.observation["context"][1]
@@ -240,7 +240,7 @@ class TestHierarchical:
             assert local_map[[0, 1, 2, 3, 5, 6, 7, 8]].all()
 
     def test_the_context_changes_only_where_is_first_says_so(self):
-        env = mazebench.load("hierarchical", maps=dfs_mazes(), landmark_distance=1, time_limit=7, seed=0)
+        env = mazebench.load("hierarchical", mazes=dfs_mazes(), landmark_distance=1, time_limit=7, seed=0)
         rng = np.random.default_rng(1)
         time_steps = play(env, rng.integers(6, size=100))
         switches = 0
@@ -252,7 +252,7 @@ class TestHierarchical:
 
     def test_a_goal_entered_before_the_landmarks_ends_the_episode(self):
         # The landmarks lie along two sides of the room, the body drives along its diagonal.
-        env = mazebench.load("hierarchical", maps=field(SIZE), landmark_distance=5)
+        env = mazebench.load("hierarchical", mazes=field(SIZE), landmark_distance=5)
         time_steps = play(env, [FORWARD] * 50, episode=Episode(0, (1, 7), (7, 1), -3 * np.pi / 4, 0))
         assert env.task.route.cells == [(1, 7), (1, 2), (5, 1), (7, 1)]
         assert env.task.route.leg == 0
@@ -281,7 +281,7 @@ class TestSeeds:
 
     @OPTIONS
     def test_the_same_seed_gives_the_same_episode(self, options):
-        env = mazebench.load(maps=dfs_mazes(), seed=0, **options)
+        env = mazebench.load(mazes=dfs_mazes(), seed=0, **options)
         first = play(env, self.ACTIONS, seed=4)
         play(env, [FORWARD] * 7)  # breaks off in the middle
         play(env, [STRAFE_LEFT] * 200)
@@ -290,7 +290,7 @@ class TestSeeds:
     @OPTIONS
     def test_later_episodes_follow_from_the_seed_and_are_others(self, options):
         # The next episodes follow from the seed too, and are others.
-        first, second = (mazebench.load(maps=dfs_mazes(), seed=4, **options) for _ in range(2))
+        first, second = (mazebench.load(mazes=dfs_mazes(), seed=4, **options) for _ in range(2))
         episodes = []
         for _ in range(3):
             assert_equal(play(first, self.ACTIONS), play(second, self.ACTIONS))
@@ -300,7 +300,7 @@ class TestSeeds:
 
 class TestPhysics:
     def test_the_goals_marker_stands_in_the_goal(self):
-        env = mazebench.load(maps=corridor())
+        env = mazebench.load(mazes=corridor())
         env.reset(episode=eastwards(goal=6))
         np.testing.assert_allclose(env.physics.named.data.xpos["goal"], (6.5, Y, 0))
 

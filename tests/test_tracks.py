@@ -150,7 +150,7 @@ class TestRebuilt:
 
     def test_a_maze_with_too_few_doors_is_refused_in_a_line(self):
         with pytest.raises(InputError, match=r"expected \d doors that can move, found 0"):
-            make_spec("rebuilt", maps=field(9), distances=(2,))
+            make_spec("rebuilt", mazes=field(9), distances=(2,))
 
 
 def ends(trial) -> tuple:

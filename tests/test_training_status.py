@@ -1,4 +1,4 @@
-"""What a training run says of itself while it goes on: the share that is done, the speed, losses, and the end."""
+"""The status of a training run: the share that is done, the speed, losses, and the end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the agents that act by a network share: building and loading it, its parameters, and exploration."""
+"""Building and loading of a network, its parameters, and exploration: shared by the agents that act by one."""
 
 from __future__ import annotations
 

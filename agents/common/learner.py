@@ -1,4 +1,4 @@
-"""What all learners hold, and a learner's contract but for `update`, which each learner defines in its own file."""
+"""The parts that all learners hold, and their contract but for `update`, which each learner defines in its own file."""
 
 from __future__ import annotations
 

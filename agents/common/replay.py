@@ -74,7 +74,7 @@ class SequenceSample(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Hindsight:
-    """How the goals of a sample are relabelled."""
+    """Settings of the relabelling of goals in a sample."""
 
     ratio: float = 0.8  # share of relabelled groups
     mean_offset: float = 16.0  # steps ahead of the row at which the goal was reached; geometric

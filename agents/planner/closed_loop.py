@@ -21,7 +21,7 @@ _POSITION_GAIN = 0.1  # weight of an observed position against the one predicted
 
 @dataclasses.dataclass
 class _Drive:
-    """Where one environment's body is by estimation, and the pilot that drives it."""
+    """The estimated pose of one environment's body, and the pilot that drives it."""
 
     odometry: DeadReckoning
     pilot: Pilot

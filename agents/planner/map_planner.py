@@ -1,4 +1,4 @@
-"""What the planners on a map have in common: they know its scale, and plan shortest paths on it."""
+"""The base of the planners on a map: they know its scale, and plan shortest paths on it."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ _MAX_OFF = 0.1  # m from where the drive should be, before it is planned anew
 
 @dataclasses.dataclass
 class _Drive:
-    """What is left of a drive in one environment."""
+    """The rest of a drive in one environment."""
 
     course: Course
     actions: list[int] = dataclasses.field(default_factory=list)

@@ -19,7 +19,7 @@ Point = tuple[float, float]  # x, y
 
 
 class Body(NamedTuple):
-    """Where a body is, and how it moves in its own frame."""
+    """Pose and velocities of a body, the latter in its own frame."""
 
     x: float
     y: float

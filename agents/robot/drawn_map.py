@@ -56,7 +56,7 @@ _QUANTILES = np.array(list(itertools.product(special.ndtri(np.arange(0.1, 1, 0.2
 
 
 class _Schedule(NamedTuple):
-    """How coarse each step is."""
+    """The coarseness of each step."""
 
     noise: np.ndarray  # [S] standard deviation of grey values
     blur: np.ndarray  # [S] by how much the variance of points is overestimated, 0 for no blur
@@ -74,7 +74,7 @@ _SCHEDULES = (_schedule(0.8, 0.2, 12, 2.0), _schedule(0.8, 0.2, 24, 2.5), _sched
 
 @dataclasses.dataclass(frozen=True)
 class Registration:
-    """Where the pixels of a picture lie in a maze, and where that has walls."""
+    """The places in a maze of a picture's pixels, and its walls."""
 
     walls: np.ndarray  # [N, N] float, the probability that a cell is a wall
     picture: np.ndarray  # [P, Q] float, the part of the picture around the drawing

@@ -1,4 +1,4 @@
-"""How to get there: the quickest drive through the free cells around the next part of a path.
+"""The quickest drive through the free cells around the next part of a path.
 
 It is planned a few steps ahead with a model of the body's motion (a dynamic window: Fox, Burgard & Thrun 1997), by the
 same search as the oracle's, with a narrower beam.
@@ -28,7 +28,7 @@ _MOST_OFF = 0.08  # m from where the body should be, before the drive is planned
 
 @dataclasses.dataclass
 class Drive:
-    """What is left of a drive that was planned."""
+    """The rest of a drive that was planned."""
 
     actions: list[int] = dataclasses.field(default_factory=list)
     points: list[Point] = dataclasses.field(default_factory=list)  # where each action begins, m

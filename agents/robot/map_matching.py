@@ -1,4 +1,4 @@
-"""Where a sheet lies that shows a map: a belief over its placements on the grid of what was seen.
+"""A belief over the placements of the shown map on the grid of what was seen.
 
 What was seen from the start on is kept in one grid, which does not depend on the map (`tracking`, `occupancy`). A
 hypothesis lays the sheet on this grid: turned by quarter turns, perhaps mirrored, and shifted by whole cells. All that

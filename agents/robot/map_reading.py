@@ -1,4 +1,4 @@
-"""What a context tells of the maze before the body moves: where walls, start and goal probably are.
+"""Probabilities of walls, start and goal in each cell, as read from a context before the body moves.
 
 A map with a pixel for each cell shows the cells. One with more pixels is registered with the maze as a drawing
 (`drawn_map`). Planes that are zero tell nothing.

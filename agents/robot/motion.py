@@ -1,4 +1,4 @@
-"""How the body moves: one agent step of the world's physics, without MuJoCo.
+"""The body's motion: one agent step of the world's physics, without MuJoCo.
 
 The body has a mass of 1 kg. A drive pulls it in one direction, against damping. Walls push it off by MuJoCo's soft
 contacts, without friction. mazebench/world/mjcf.py has the constants. A map is `[N, N]` bool here, indexed by x and y.

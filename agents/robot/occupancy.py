@@ -1,4 +1,4 @@
-"""Where the walls are: a log-odds occupancy grid of what was seen by lidar or felt, with a map as its prior.
+"""A log-odds occupancy grid of walls seen by lidar or felt, with a map as its prior.
 
 Moravec & Elfes 1985; Thrun, Burgard & Fox 2005, Probabilistic Robotics, chapter 9. `beams` says what a scan tells.
 Lengths are in cells. `L` is the number of cells on a side.
@@ -26,7 +26,7 @@ _LEAST = 1e-6  # count of cells of a kind, instead of none
 
 @dataclasses.dataclass
 class Occupancy:
-    """What was seen of the walls on one grid."""
+    """The evidence of walls on one grid."""
 
     evidence: np.ndarray  # [L, L] float, log odds of a wall
 

@@ -1,4 +1,4 @@
-"""Where to go: the path of least expected cost over cells that may be walls, to a goal that may be one of several.
+"""The path of least expected cost over cells that may be walls, to a goal that may be one of several.
 
 Dijkstra's algorithm plans anew from the goals whenever the estimate changes. At these sizes that takes less than a
 millisecond, so D* Lite (Koenig & Likhachev 2002) would save nothing. `N` is the number of cells on a side.

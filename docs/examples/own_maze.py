@@ -1,7 +1,7 @@
 """Takes an array of one's own to a maze, an environment, and files for other tools.
 
 python docs/examples/own_maze.py --out own
-mazebench eval --agent planner --maps own --distances 1-6
+mazebench eval --agent planner --mazes own --distances 1-6
 """
 
 import argparse
@@ -31,7 +31,7 @@ grid = np.array(
 maze = mazebench.Maze(grid == 1, name="ring")  # True is wall; what is no legal maze is refused with the cell
 print(f"{len(maze.free_cells)} free cells, the farthest {maze.diameter} cells apart")
 
-environment = mazebench.load("local", maps=maze, distances=[6], seed=0)
+environment = mazebench.load("local", mazes=maze, distances=[6], seed=0)
 time_step = environment.reset()
 print(f"from {environment.task.episode.start} to {environment.task.episode.goal}, a map of {maze.size} x {maze.size}")
 

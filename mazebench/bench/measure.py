@@ -269,7 +269,7 @@ def _milliseconds(call: Callable[[], Any], count: int) -> float:
 def _size_row(size: int, seconds: float, rounds: int) -> dict[str, Any]:
     """Returns the speed of the vector environment in mazes of `size` cells a side; the context has the default size."""
     mazes = [generate("dfs", size, np.random.default_rng([size, index])) for index in range(_MAZES_PER_SIZE)]
-    spec = make_spec(maps=mazes, distances=TRAIN_DISTANCES)
+    spec = make_spec(mazes=mazes, distances=TRAIN_DISTANCES)
     begin = time.perf_counter()
     _compile(spec)
     compiled = (time.perf_counter() - begin) / len(mazes)

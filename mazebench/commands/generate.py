@@ -10,15 +10,15 @@ import typer
 
 from mazebench.commands.display import load_mujoco
 from mazebench.commands.options import takes_options
-from mazebench.maps.options import MapOptions
+from mazebench.maps.options import ReadOptions
 
 
-@takes_options(MapOptions)
+@takes_options(ReadOptions)
 def generate(
     values: dict[str, Any],
     size: Annotated[
         int | None,
-        typer.Option(help="Cells a side, 5 to 255; 13 if not given. With --from-image, what the map shows."),
+        typer.Option(help="Cells a side, 5 to 255; 13 if not given. With --mazes, the size that the file shows."),
     ] = None,
     count: Annotated[int, typer.Option(min=1, help="How many mazes.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same mazes.")] = 0,
@@ -33,9 +33,9 @@ def generate(
             help="Files to write: any of mjcf, mjcf-textured, txt, png, ros, glb, obj, stl, separated by commas.",
         ),
     ] = "txt,mjcf,png,glb",
-    from_image: Annotated[
+    mazes_file: Annotated[
         pathlib.Path | None,
-        typer.Option(help="Read the maze off a map instead: picture of a floor plan, text, array (.npy), ROS (.yaml)."),
+        typer.Option("--mazes", help="A maze of your own: a picture, text, array (.npy) or ROS map (.yaml)."),
     ] = None,
 ) -> None:
     """Make mazes: MJCF for MuJoCo, text, picture, ROS map, mesh."""
@@ -44,12 +44,12 @@ def generate(
     from mazebench.storage.files import make_folder
     from mazebench.world.formats import make_mazes, parse_formats, write_maze
 
-    mazes = make_mazes(size, count, seed, kind, from_image, MapOptions(**values))
+    mazes = make_mazes(size, count, seed, kind, mazes_file, ReadOptions(**values))
     chosen = parse_formats(formats)
     for index, placed in enumerate(mazes):
         if index == 0:  # nothing is made for bad input
             make_folder(out)
-        for path in write_maze(placed, out, chosen, from_image):
+        for path in write_maze(placed, out, chosen, mazes_file):
             print(path)
         if index == 0 and 2 * placed.maze.size <= shutil.get_terminal_size().columns:  # the first is shown
             print(format_maze(placed.maze), end="")

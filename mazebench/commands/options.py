@@ -77,7 +77,7 @@ def watched(task: TaskOptions, mazes: MazeOptions) -> TaskOptions:
     if is_own(task, mazes):
         from mazebench.tasks.build import build_task
 
-        with held_remarks():  # the command reads the maps again
+        with held_remarks():  # the command reads the files again
             distances = build_task(task, mazes, default_distances=EVAL_DISTANCES).distances
     nearest = min(distances, key=lambda distance: abs(distance - _WORTH_WATCHING))
     return dataclasses.replace(task, distances=(nearest,))

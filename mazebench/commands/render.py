@@ -31,7 +31,7 @@ def render(
 ) -> None:
     """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
     options = chosen(EvalOptions, values, agent=agent)
-    options = dataclasses.replace(options, task=watched(options.task, options.mazes))
+    options = dataclasses.replace(options, task=watched(options.task, options.maze_options))
     load_mujoco(renders=view not in _DRAWN)
     from mazebench.play import film
 

@@ -54,10 +54,10 @@ def train(
 
 def _folder_name(options: TrainOptions) -> str:
     track, level = options.task.track, options.task.level
-    mazes = options.mazes
+    mazes = options.maze_options
     parts = [options.agent.replace(":", "-"), *mazes.kinds, *(["fresh"] if mazes.fresh else [])]
-    if mazes.maps is not None:
-        parts.append(pathlib.Path(mazes.maps).stem)
+    if mazes.mazes is not None:
+        parts.append(pathlib.Path(mazes.mazes).stem)
     parts += [str(mazes.size or SIZES[0])] if track is None else [track, *map(str, level)]
     return "-".join([*parts, str(options.seed)])
 

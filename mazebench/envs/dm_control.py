@@ -79,7 +79,7 @@ class Environment(control.Environment):
 
     @property
     def needs_reset(self) -> bool:
-        """Whether no episode is under way; `step` would then start one."""
+        """True if no episode is under way; `step` would then start one."""
         return self._reset_next_step
 
     def get_state(self) -> EnvironmentState:

@@ -25,7 +25,7 @@ class JsonSpec:
 
     @property
     def spec(self) -> EnvSpec | None:
-        """How Gymnasium made the environment, in plain values; None if it did not."""
+        """Gymnasium's spec of the environment in plain values; None if Gymnasium did not make it."""
         return self._spec
 
     @spec.setter
@@ -33,8 +33,8 @@ class JsonSpec:
         """Takes over `spec` in plain values."""
         if spec is not None:
             kwargs = {name: _plain(value) for name, value in spec.kwargs.items()}
-            if not isinstance(kwargs.get("maps"), str | None):  # else a path, or none
-                kwargs["maps"] = [_describe(maze) for maze in self.task_spec.fixed_mazes]
+            if not isinstance(kwargs.get("mazes"), str | None):  # else a path, or none
+                kwargs["mazes"] = [_describe(maze) for maze in self.task_spec.fixed_mazes]
             spec = dataclasses.replace(spec, kwargs=kwargs)
         self._spec = spec
 
@@ -45,10 +45,10 @@ def with_mazes(options: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
       InputError: if a description is none of a `JsonSpec`, or of no legal maze.
     """
-    maps = options.get("maps")
-    if not (isinstance(maps, list) and maps and all(isinstance(described, dict) for described in maps)):
+    mazes = options.get("mazes")
+    if not (isinstance(mazes, list) and mazes and all(isinstance(described, dict) for described in mazes)):
         return dict(options)
-    return {**options, "maps": [_maze(described) for described in maps]}
+    return {**options, "mazes": [_maze(described) for described in mazes]}
 
 
 def _describe(maze: Maze) -> dict[str, Any]:

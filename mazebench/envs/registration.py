@@ -1,4 +1,4 @@
-"""What makes environments: `load`, `make_vec`, and the Gymnasium ids, such as `mazebench/Local-13-v1`.
+"""The makers of environments: `load`, `make_vec`, and the Gymnasium ids, such as `mazebench/Local-13-v1`.
 
 `import mazebench` registers the ids.
 """
@@ -120,7 +120,7 @@ def make_vec(
 def _task_spec(task: str, options: dict[str, Any], arguments: Iterable[str]) -> TaskSpec:
     """Returns the task of an environment that takes `arguments` besides `options`.
 
-    The size that an id names is the size of the mazes unless a size or maps are given.
+    The size that an id names is the size of the mazes unless a size or mazes are given.
 
     Raises:
       InputError: as `mazebench.make_spec`.
@@ -129,7 +129,7 @@ def _task_spec(task: str, options: dict[str, Any], arguments: Iterable[str]) -> 
     from mazebench.tasks.build import check_names, make_spec
 
     id_size = options.pop("id_size", None)  # the size that an id names
-    if options.get("maps") is None and options.get("size") is None:
+    if options.get("mazes") is None and options.get("size") is None:
         options["size"] = id_size
     check_names(options, arguments)
     return make_spec(task, **with_mazes(options))

@@ -1,4 +1,4 @@
-"""What agents get beside their observations: seeds of their own and, if they declare that they need it, the truth."""
+"""The inputs of agents besides observations: seeds of their own and, if they declare that they need it, the truth."""
 
 from __future__ import annotations
 

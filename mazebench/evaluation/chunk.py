@@ -52,7 +52,7 @@ class Ended(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """What came of a trial."""
+    """The result of a trial."""
 
     index: int  # of the trial
     trial: Trial

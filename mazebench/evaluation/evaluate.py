@@ -56,8 +56,7 @@ def evaluate(
       workers: processes; 0 runs in this one, on all cores.
       ray_address: of a Ray cluster to run the workers on; 0 of them then are as many as it has CPUs.
       progress: called as episodes end.
-      **options: those of `EvalOptions` by name: `task`, `size`, `split`, `maps`, `distances`, `map_flip`, `seed` and so
-        on.
+      **options: those of `EvalOptions` by name: `task`, `size`, `split`, `mazes`, `distances`, `map_flip`, `seed`, ...
 
     Raises:
       InputError: if an option can't be met, or `out` can't be written or holds another run.

@@ -1,4 +1,4 @@
-"""What is evaluated, and how it is run."""
+"""The options of an evaluation, and of its run."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NUM_ENVS = 256  # environments side by side in a process, unless another number 
 
 @options
 class EvalOptions:
-    """What is evaluated. Two runs with equal options give the same `episodes.jsonl`.
+    """Options of an evaluation. Two runs with equal options give the same `episodes.jsonl`.
 
     Raises:
       InputError: if a value is not allowed.
@@ -28,7 +28,7 @@ class EvalOptions:
 
     agent: str = dataclasses.field(kw_only=False)
     task: TaskOptions = TaskOptions()
-    mazes: MazeOptions = MazeOptions(split="eval")
+    maze_options: MazeOptions = MazeOptions(split="eval")
     episodes_per_distance: Annotated[int, Ge(1), Doc("Episodes for each maze and distance (local task).")] = (
         EPISODES_PER_DISTANCE
     )
@@ -53,9 +53,11 @@ class EvalOptions:
 
     def __post_init__(self) -> None:
         track, level = self.task.track, self.task.level
-        if not isinstance(self.mazes.maps, str | None):
-            raise InputError(f"expected maps as a path in an evaluation, found {type(self.mazes.maps).__name__}")
-        if self.mazes.fresh:
+        if not isinstance(self.maze_options.mazes, str | None):
+            raise InputError(
+                f"expected mazes as a path in an evaluation, found {type(self.maze_options.mazes).__name__}"
+            )
+        if self.maze_options.fresh:
             raise InputError("expected no fresh mazes in an evaluation; num_mazes says how many of each kind are drawn")
         if len(level) > 1:
             found = ", ".join(map(str, level))
@@ -69,13 +71,13 @@ class EvalOptions:
 
     @property
     def is_own(self) -> bool:
-        """Whether mazes, start or goal are not the benchmark's."""
-        return is_own(self.task, self.mazes) or self.mazes.is_drawn
+        """True if mazes, start or goal are not the benchmark's."""
+        return is_own(self.task, self.maze_options) or self.maze_options.is_drawn
 
     @property
     def is_frozen(self) -> bool:
-        """Whether mazes of the benchmark are asked for whose episodes are frozen."""
-        return not self.is_own and self.mazes.split in FROZEN_SPLITS
+        """True if mazes of the benchmark are asked for whose episodes are frozen."""
+        return not self.is_own and self.maze_options.split in FROZEN_SPLITS
 
     @property
     def benchmark(self) -> str:
@@ -85,7 +87,7 @@ class EvalOptions:
 
 @options
 class RunOptions:
-    """How an evaluation is run, which makes no difference to its results.
+    """Options of the run of an evaluation, which make no difference to its results.
 
     Raises:
       InputError: if a value is not allowed.

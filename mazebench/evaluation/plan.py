@@ -34,7 +34,7 @@ _IDENTIFYING = (
     "agent_code_sha256",
     "checkpoint_sha256",
 )
-_PATHS = ("maps", "checkpoint")  # options that may change, for the hashes tell what they lead to
+_PATHS = ("mazes", "checkpoint")  # options that may change, for the hashes tell what they lead to
 # Options of which records and summaries tell where a user sets them.
 _SENSES = ("lidar_noise", "odometry_noise")
 
@@ -59,12 +59,12 @@ class Plan:
 
     @property
     def untrained_scale(self) -> bool:
-        """Whether the agent learned on maps of another scale, in metres a cell of the context."""
+        """True if the agent learned on maps of another scale, in metres per cell of the context."""
         return self._learned_scale not in (None, self._scale)
 
     @property
     def remark(self) -> str | None:
-        """What a user should know before the evaluation, in a line; None if there is nothing."""
+        """A line of what a user should know before the evaluation; None if there is nothing."""
         task, agent, size = self.task, self.options.agent, _square(self.task.context_size)
         is_coarse = task.track is None and task.context_size < task.size
         way_out = "; context_size() of its class chooses another one (docs/agents.md)" if is_coarse else ""
@@ -73,7 +73,7 @@ class Plan:
                 f"{agent} learned on maps of {self._learned_scale:g} m a cell and may fail here: its map of {size} "
                 f"cells shows {_square(task.size)} cells of {task.cell_size:g} m, {self._scale:.3g} m a cell{way_out}"
             )
-        if self.options.mazes.maps is not None and is_coarse:
+        if self.options.maze_options.mazes is not None and is_coarse:
             return f"{agent} is shown the {_square(task.size)} cells as a map of {size}{way_out}"
         if task.track is not None:
             try:
@@ -153,9 +153,9 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
     options = _with_sensors(_with_checkpoint(options, agent_class), agent_class)
     choose_context_size = functools.partial(context_size_of, options.agent, agent_class)
     task = build_task(
-        options.task, options.mazes, default_distances=EVAL_DISTANCES, choose_context_size=choose_context_size
+        options.task, options.maze_options, default_distances=EVAL_DISTANCES, choose_context_size=choose_context_size
     )
-    split = "custom" if options.is_own else options.mazes.split
+    split = "custom" if options.is_own else options.maze_options.split
     labels = {"agent": options.agent, "task": task.task, "size": task.size, "split": split}
     if task.cell_size != 1:
         labels["cell_size"] = task.cell_size
@@ -167,7 +167,7 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
         conditions["hide"] = ",".join(name for name in HIDEABLE if name in task.hide)
     if task.exact_pose:
         conditions["exact_pose"] = True
-    frozen_split = options.mazes.split if options.is_frozen else None
+    frozen_split = options.maze_options.split if options.is_frozen else None
     trials = select_trials(task, frozen_split, options.episodes_per_distance, options.seed)
     oracle_steps = None
     if frozen_split is not None:

@@ -1,4 +1,4 @@
-"""Where chunks run: in this process, in worker processes, or on a Ray cluster."""
+"""Pools that run chunks: in this process, in worker processes, or on a Ray cluster."""
 
 from __future__ import annotations
 

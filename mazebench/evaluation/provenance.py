@@ -1,4 +1,4 @@
-"""Where a result came from: versions, benchmark, checkpoint, options, command and machine."""
+"""The provenance of a result: versions, benchmark, checkpoint, options, command and machine."""
 
 from __future__ import annotations
 

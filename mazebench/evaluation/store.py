@@ -80,7 +80,7 @@ class Store:
 
     @property
     def num_ended(self) -> int:
-        """How many episodes have ended."""
+        """The number of episodes that have ended."""
         return len(self._ended)
 
     @property

@@ -60,7 +60,7 @@ class FreshMazes:
 
     @property
     def max_boxes(self) -> int:
-        """How many boxes the walls of any of the mazes have at most."""
+        """The largest number of boxes that the walls of any of the mazes have."""
         return _max_boxes(self.kinds, self.size)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mazebench.errors import InputError, held_remarks, remark
 from mazebench.maps.maze import Maze, resized
-from mazebench.maps.options import MapOptions
+from mazebench.maps.options import ReadOptions
 from mazebench.maps.readers.arrays import read_array_maze
 from mazebench.maps.readers.image import read_image_maze
 from mazebench.maps.readers.occupancy import LocatedMaze
@@ -34,12 +34,12 @@ def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any)
     Args:
       path: of the file; of a ROS map, of its YAML file.
       size: N that the maze must have; for a picture whose cells can't be counted, the cells on its longer side.
-      **options: those of `mazebench.maps.options.MapOptions`.
+      **options: those of `mazebench.maps.options.ReadOptions`.
 
     Raises:
       InputError: if the file can't be read or holds no legal maze.
     """
-    return read_located(pathlib.Path(path), size, MapOptions(**options)).maze
+    return read_located(pathlib.Path(path), size, ReadOptions(**options)).maze
 
 
 def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
@@ -50,15 +50,15 @@ def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
 
     Args:
       path: of the file or folder.
-      **options: those of `mazebench.maps.options.MapOptions`.
+      **options: those of `mazebench.maps.options.ReadOptions`.
 
     Raises:
       InputError: if there is no map or one can't be read.
     """
-    return read_all(pathlib.Path(path), MapOptions(**options))
+    return read_all(pathlib.Path(path), ReadOptions(**options))
 
 
-def read_all(path: pathlib.Path, options: MapOptions) -> tuple[Maze, ...]:
+def read_all(path: pathlib.Path, options: ReadOptions) -> tuple[Maze, ...]:
     """Reads the maze in a file, or those in a folder, as `read_mazes` does."""
     if not path.is_dir():
         return (read_located(path, None, options).maze,)
@@ -73,7 +73,7 @@ def read_all(path: pathlib.Path, options: MapOptions) -> tuple[Maze, ...]:
     return tuple(mazes)
 
 
-def read_located(path: pathlib.Path, size: int | None, options: MapOptions) -> LocatedMaze:
+def read_located(path: pathlib.Path, size: int | None, options: ReadOptions) -> LocatedMaze:
     """Reads the maze in one file, as `read_maze` does, and its place in the frame of a ROS map."""
     suffix = path.suffix.lower()
     if suffix in IMAGE_SUFFIXES and (ros_map := map_of_picture(path)) is not None:

@@ -1,4 +1,4 @@
-"""The options of a task's mazes, and of how maps of one's own are read."""
+"""The options of a task's mazes, and of how mazes of one's own are read."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from mazebench.options import Doc, OneOf, fields_of, options
 
 
 @options
-class MapOptions:
-    """How maps of one's own are read.
+class ReadOptions:
+    """Options of reading mazes of one's own.
 
     Raises:
       InputError: if an option is not allowed.
@@ -25,7 +25,7 @@ class MapOptions:
         float | None,
         Interval(ge=0.01, le=100),
         Doc(
-            "Width of a cell of your own maps in metres. If not given, 1; for ROS maps and pictures with pixel_size, "
+            "Width of a cell of your own mazes in metres. If not given, 1; for ROS maps and pictures with pixel_size, "
             "which are coarsened to such cells, the smallest possible from 0.4."
         ),
     ] = None
@@ -81,7 +81,7 @@ def _refuse_novel(kinds: tuple[Any, ...]) -> tuple[Any, ...]:
 
 @options
 class DrawnOptions:
-    """Which mazes are drawn, instead of the benchmark's.
+    """Options of mazes that are drawn, instead of the benchmark's.
 
     Raises:
       InputError: if an option is not allowed.
@@ -103,7 +103,7 @@ class DrawnOptions:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether mazes are drawn."""
+        """True if mazes are drawn."""
         return bool(self.kinds or self.num_mazes or self.fresh)
 
     @property
@@ -113,8 +113,8 @@ class DrawnOptions:
 
 
 @options
-class MazeOptions(MapOptions, DrawnOptions):
-    """In which mazes a task is played."""
+class MazeOptions(ReadOptions, DrawnOptions):
+    """Options of the mazes of a task."""
 
     size: Size = None
     split: Annotated[
@@ -122,13 +122,13 @@ class MazeOptions(MapOptions, DrawnOptions):
         OneOf(*ALL_SPLITS),
         Doc("The benchmark's training mazes, unseen ones to choose agents on (tracks), or those for results."),
     ] = "train"
-    # A path, or in Python also mazes and arrays (`mazebench.maps.selection.Maps`).
-    maps: Annotated[Any, Doc("Mazes of your own: a text, picture, array or ROS map, or a folder of them.")] = None
+    # A path, or in Python also mazes and arrays (`mazebench.maps.selection.OwnMazes`).
+    mazes: Annotated[Any, Doc("Mazes of your own: a text, picture, array or ROS map, or a folder of them.")] = None
 
     def __post_init__(self) -> None:
         DrawnOptions.__post_init__(self)
-        if self.is_drawn and self.maps is not None:
-            raise InputError("expected maps of your own or mazes that are drawn, found both")
-        for name, field in fields_of(MapOptions).items():
-            if self.maps is None and getattr(self, name) != field.default:
-                raise InputError(f"expected maps of your own with {name}, found none")
+        if self.is_drawn and self.mazes is not None:
+            raise InputError("expected mazes of your own or mazes that are drawn, found both")
+        for name, field in fields_of(ReadOptions).items():
+            if self.mazes is None and getattr(self, name) != field.default:
+                raise InputError(f"expected mazes of your own with {name}, found none")

@@ -21,7 +21,7 @@ _STEPS = "env_steps"
 
 
 class Run(NamedTuple):
-    """What a training run logged."""
+    """The log of a training run."""
 
     name: str
     config: dict[str, Any]

@@ -61,7 +61,7 @@ class ReportedResult:
 
     @property
     def run(self) -> str:
-        """What tells training runs of one agent apart: the checkpoint, or the seed where there is none."""
+        """The key of a training run of an agent: the checkpoint, or the seed where there is none."""
         return self.checkpoint or f"seed {self.seed}"
 
     @functools.cached_property
@@ -71,7 +71,7 @@ class ReportedResult:
 
     @functools.cached_property
     def shown(self) -> list[Shown]:
-        """What the agent was shown in each episode; nothing if the task is not known."""
+        """The map shown to the agent in each episode; empty if the task is not known."""
         if self.task is None:
             return []
         columns = (self.episodes[name] for name in ("maze", "start", "goal", "seed"))

@@ -14,7 +14,7 @@ CUSTOM = "custom"  # the split of mazes that are not the benchmark's
 
 @dataclasses.dataclass(frozen=True, order=True)
 class Setting:
-    """What was played. Results of one setting are of episodes of the same kind."""
+    """The task of results. Results of one setting are of episodes of the same kind."""
 
     task: str
     size: int  # N
@@ -30,7 +30,7 @@ class Setting:
 
     @property
     def is_exact(self) -> bool:
-        """Whether nothing is wrong with the map and the observed states."""
+        """True if nothing is wrong with the map and the observed states."""
         return not self.perturbations and not self.track
 
     @property

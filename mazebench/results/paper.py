@@ -1,4 +1,4 @@
-"""What the paper printed, to stand beside our own figures."""
+"""The paper's printed numbers, to compare with measured ones."""
 
 from __future__ import annotations
 

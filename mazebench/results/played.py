@@ -1,4 +1,4 @@
-"""What was played in a finished evaluation, as far as it follows from options and seeds: the task and the maps shown.
+"""The task and the shown maps of a finished evaluation, computed from its options and seeds.
 
 `N` is the number of cells on a side of the mazes, `M` the number of pixels on a side of the agent's maps.
 """
@@ -37,7 +37,7 @@ class Shown(NamedTuple):
 
     @property
     def are_cells(self) -> bool:
-        """Whether the pixels are the maze's cells."""
+        """True if the pixels are the maze's cells."""
         return self.walls.dtype == bool
 
 
@@ -58,7 +58,7 @@ def task_of(summary: Summary) -> TaskSpec:
     names = set(options_of(EnvironmentOptions)) - set(_UNSEEN)
     told = provenance.options.model_dump() | {"context_size": provenance.context_size}
     chosen = from_names(EnvironmentOptions, {name: value for name, value in told.items() if name in names})
-    task = build_task(chosen.task, chosen.mazes, chosen.variants)
+    task = build_task(chosen.task, chosen.maze_options, chosen.variants)
     if mazes_hash(task) != provenance.mazes_sha256:
         raise InputError("expected the mazes that were played, found others")
     return task

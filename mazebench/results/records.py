@@ -28,7 +28,7 @@ class _Stored(pydantic.BaseModel):
 
 
 class Record(_Stored):
-    """What came of one episode.
+    """The result of one episode.
 
     The levels of the perturbations follow as further keys; on a track also `track`, `level` and its facts, such as
     `blocked`; in mazes whose cells are not 1 m wide also `cell_size`, in metres; where a user set them, `lidar_noise`
@@ -88,7 +88,7 @@ class TaskProvenance(_Stored):
 
 
 class Provenance(_Stored):
-    """Where a result came from: versions, checkpoint, options, command, machine."""
+    """The provenance of a result: versions, checkpoint, options, command, machine."""
 
     options: TaskProvenance
     task_version: int | None = None

@@ -1,4 +1,4 @@
-"""What the constructors of environments take beside a task, checked."""
+"""Checks of the arguments that the constructors of environments take besides a task."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from mazebench.errors import InputError, unknown
 from mazebench.maps.benchmark import KINDS_SIZE, load_kind_mazes
 from mazebench.maps.drawn import FreshMazes, Mazes
 from mazebench.maps.options import MazeOptions
-from mazebench.maps.selection import Maps, load_mazes_of
+from mazebench.maps.selection import OwnMazes, load_mazes_of
 from mazebench.options import by_name, from_names, options_of
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.options import (
@@ -33,19 +33,19 @@ _FARTHEST_SHARE = 0.9
 
 
 def make_spec(
-    task: str = "local", size: int | None = None, split: str = "train", *, maps: Maps | None = None, **options: Any
+    task: str = "local", size: int | None = None, split: str = "train", *, mazes: OwnMazes | None = None, **options: Any
 ) -> TaskSpec:
     """Returns a navigation task.
 
     Args:
       task: "local", "hierarchical" or the name of a track.
-      size: N, the cells on a side of the benchmark's mazes: 13 (the default), 15, 17, 19 or 21; with `maps`, a size
+      size: N, the cells on a side of the benchmark's mazes: 13 (the default), 15, 17, 19 or 21; with `mazes`, a size
         that they must have. A track has its own.
       split: "train" or "eval" mazes of the benchmark.
-      maps: mazes of your own instead: a `Maze`, an array as `maze_from_array` takes it, several of these of one size,
+      mazes: mazes of your own instead: a `Maze`, an array as `maze_from_array` takes it, several of these of one size,
         or the path of a file or of a folder of files.
       **options: those of `mazebench.tasks.options.TaskOptions` and `Variants`, of `mazebench.maps.options.MazeOptions`
-        and, with `maps`, of `MapOptions`, which docs/options.md lists; None stands for the default.
+        and, with `mazes`, of `ReadOptions`, which docs/options.md lists; None stands for the default.
 
     Raises:
       InputError: if an option is unknown or not allowed, or a map can't be read.
@@ -60,9 +60,9 @@ def make_spec(
         if values.setdefault("track", task) != task:
             raise InputError(f"expected one track, found {task!r} and {values['track']!r}")
         task = "local"
-    values |= {"task": task, "size": size, "split": split, "maps": maps}
+    values |= {"task": task, "size": size, "split": split, "mazes": mazes}
     chosen = from_names(EnvironmentOptions, values)
-    return build_task(chosen.task, chosen.mazes, chosen.variants)
+    return build_task(chosen.task, chosen.maze_options, chosen.variants)
 
 
 def check_names(options: Iterable[str], arguments: Iterable[str] = ()) -> None:
@@ -141,7 +141,7 @@ def load_task_mazes(task: TaskOptions, mazes: MazeOptions) -> Mazes:
     """
     if task.track is None:
         return load_mazes_of(mazes)
-    if mazes.maps is not None or mazes.is_drawn:
+    if mazes.mazes is not None or mazes.is_drawn:
         return load_mazes_of(mazes, default_size=KINDS_SIZE)
     if mazes.size not in (None, KINDS_SIZE):
         raise InputError(f"track {task.track!r}: expected size {KINDS_SIZE}, found {mazes.size}")

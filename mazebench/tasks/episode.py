@@ -22,7 +22,7 @@ _FIXED_PAIR_SEED = 20210  # of the pairs of the extremely-low-data regime; any n
 
 @dataclasses.dataclass(frozen=True)
 class Episode:
-    """What determines an episode of a given task."""
+    """The values that determine an episode of a given task."""
 
     maze: int  # index among the task's mazes
     start: Cell

@@ -1,4 +1,4 @@
-"""What is wrong in an episode: the perturbations that are switched on, or the track at its level."""
+"""The imperfections of an episode: the perturbations that are switched on, or the track at its level."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ class Navigation:
 
     @property
     def success(self) -> bool:
-        """Whether the goal has been reached."""
+        """True if the goal has been reached."""
         return self._event is Event.REACHED
 
     @property
@@ -112,7 +112,7 @@ class Navigation:
 
     @property
     def is_first(self) -> bool:
-        """Whether the context is new, which it is when an episode or a leg begins."""
+        """True if the context is new, which it is when an episode or a leg begins."""
         return self._is_first
 
     def initialize_episode(self, simulation: Simulation) -> None:

@@ -1,4 +1,4 @@
-"""What an agent observes: the specs of all observations, the errors of observed states, and the open sensors."""
+"""The observations of agents: their specs, the errors of observed states, and the open sensors."""
 
 from __future__ import annotations
 

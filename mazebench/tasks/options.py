@@ -42,7 +42,7 @@ Pairs = Annotated[
 
 @options
 class TaskOptions(Perturbations, SensorOptions):
-    """What is played, except the mazes.
+    """Options of a task, except the mazes.
 
     Raises:
       InputError: if an option is not allowed.
@@ -65,7 +65,7 @@ class TaskOptions(Perturbations, SensorOptions):
         tuple[Annotated[int, Ge(1)], ...],
         Doc(
             "Cells from start to goal, as 1-5,8,10 (local task); if none are given, 1-15 in evaluations and in the "
-            "benchmark's eval mazes, else 1-5; those of the track; or as far as maps of your own reach."
+            "benchmark's eval mazes, else 1-5; those of the track; or as far as mazes of your own reach."
         ),
     ] = ()
     start: Annotated[
@@ -138,7 +138,7 @@ class TaskOptions(Perturbations, SensorOptions):
 
     @property
     def ends_given(self) -> int:
-        """How many of start and goal are given."""
+        """The number of given ends: start and goal."""
         return (self.start is not None) + (self.goal is not None)
 
     @property
@@ -150,7 +150,7 @@ class TaskOptions(Perturbations, SensorOptions):
 
     @property
     def lidar(self) -> LidarModel:
-        """What the sensor `lidar` measures: as the option says, or the track."""
+        """The model of the sensor `lidar`: as the option says, or the track."""
         return TURTLEBOT3 if self.lidar_noise is None and self.track is not None else super().lidar
 
     def odometry_noise_at(self, level: int) -> float:
@@ -214,12 +214,12 @@ class TaskOptions(Perturbations, SensorOptions):
 
 def is_own(task: TaskOptions, mazes: MazeOptions) -> bool:
     """Returns whether mazes, start or goal are not the benchmark's."""
-    return mazes.maps is not None or task.ends_given > 0
+    return mazes.mazes is not None or task.ends_given > 0
 
 
 @options
 class Variants:
-    """What environments offer beyond the protocol of evaluations."""
+    """Options of environments beyond those of evaluations."""
 
     pairs: Pairs = "random"
     context_size: Annotated[
@@ -242,12 +242,12 @@ class Variants:
 
 @options
 class EnvironmentOptions:
-    """What an environment plays."""
+    """Options of an environment."""
 
     task: TaskOptions = TaskOptions()
-    mazes: MazeOptions = MazeOptions()
+    maze_options: MazeOptions = MazeOptions()
     variants: Variants = Variants()
 
     def __post_init__(self) -> None:
-        if self.mazes.is_drawn and self.mazes.split == "eval":
+        if self.maze_options.is_drawn and self.maze_options.split == "eval":
             raise InputError("mazes that are drawn: expected split 'train' or 'dev', found 'eval'")

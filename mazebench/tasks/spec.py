@@ -102,7 +102,7 @@ class TaskSpec(TaskOptions, Variants):
 
     @property
     def has_legs(self) -> bool:
-        """Whether the context may change within an episode: at landmarks, or where one goal follows another."""
+        """True if the context may change within an episode: at landmarks, or where one goal follows another."""
         return self.task == "hierarchical" or self.num_goals > 1
 
 

@@ -1,4 +1,4 @@
-"""How far a training run is."""
+"""The progress of a training run in steps and updates."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Self
 
 @dataclasses.dataclass(frozen=True)
 class Counters:
-    """How far a run is."""
+    """The progress of a run in steps and updates."""
 
     env_steps: int = 0
     updates: int = 0
@@ -20,7 +20,7 @@ class Counters:
 
     @property
     def is_milestone(self) -> bool:
-        """Whether the run is at a milestone."""
+        """True if the run is at a milestone."""
         return self.env_steps == self.milestone_steps
 
     def after_steps(self, num_steps: int) -> Self:

@@ -211,9 +211,9 @@ def _training_task(options: TrainOptions, agent_class: type[LearningAgent], defa
 
     choose_context_size = functools.partial(context_size_of, options.agent, agent_class)
     chosen = from_names(Variants, variants)
-    spec = build_task(task, options.mazes, chosen, choose_context_size=choose_context_size)
+    spec = build_task(task, options.maze_options, chosen, choose_context_size=choose_context_size)
     if spec.cell_size != 1:
-        raise InputError(f"expected maps with cells of 1 m in a training, found {spec.cell_size:g} m (--cell-size)")
+        raise InputError(f"expected mazes with cells of 1 m in a training, found {spec.cell_size:g} m (--cell-size)")
     return spec
 
 
@@ -265,9 +265,9 @@ def _origin(options: TrainOptions, task: TaskSpec) -> dict[str, Any]:
     """Returns what is trained, and in which task."""
     values = {name: getattr(task, name) for name in (*fields_of(TaskOptions), *fields_of(Variants))}
     origin = {"agent": options.agent, "size": task.size, "task": values, "seed": options.seed}
-    if options.mazes.is_drawn:
-        origin["mazes"] = {name: getattr(options.mazes, name) for name in fields_of(DrawnOptions)}
-    elif options.mazes.maps is not None:
+    if options.maze_options.is_drawn:
+        origin["mazes"] = {name: getattr(options.maze_options, name) for name in fields_of(DrawnOptions)}
+    elif options.maze_options.mazes is not None:
         origin["mazes"] = {"sha256": mazes_hash(task)}
     return origin
 

@@ -19,7 +19,7 @@ _LONGEST_MINUTES = 366 * 24 * 60  # a year
 
 @options
 class TrainOptions:
-    """What is trained, in which task, and for how long.
+    """Options of a training: the agent, its task, and the length of the run.
 
     Raises:
       InputError: if a value is not allowed, the options don't say when to stop, or they name a cluster for no workers.
@@ -46,11 +46,11 @@ class TrainOptions:
     workers: Annotated[int, Ge(0), Doc("Ray actors that collect; 0 collects in this process.")] = 0
     ray_address: Annotated[str | None, Doc("Address of a Ray cluster for the workers; local if not given.")] = None
     task: TaskOptions = TaskOptions()
-    mazes: MazeOptions = MazeOptions()
+    maze_options: MazeOptions = MazeOptions()
     pairs: Pairs = "random"
 
     def __post_init__(self) -> None:
-        values, declared = by_name(self.task) | by_name(self.mazes), options_of(TrainOptions)
+        values, declared = by_name(self.task) | by_name(self.maze_options), options_of(TrainOptions)
         for name in FIXED:
             value, default = values[name], declared[name].default
             if value != default:

@@ -69,7 +69,7 @@ class LearningAgent(Agent):
 
 
 class Learner(Protocol):
-    """What the training loop needs beside acting."""
+    """The contract of agents that learn, besides acting."""
 
     @property
     def num_envs(self) -> int:

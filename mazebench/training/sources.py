@@ -1,4 +1,4 @@
-"""Where the training loop gets its experience from."""
+"""Sources of the training loop's experience."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a training run is, how fast it goes, and how long the rest takes."""
+"""The progress of a training run, its speed, and the time that is left."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mazebench.training.counters import Counters
 
 @dataclasses.dataclass(frozen=True)
 class Status:
-    """How far a run is."""
+    """The progress of a run in steps and updates."""
 
     env_steps: int
     updates: int

@@ -13,7 +13,7 @@ from mazebench.errors import InputError, unknown
 from mazebench.maps.files import read_located
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, resized
-from mazebench.maps.options import MapOptions
+from mazebench.maps.options import ReadOptions
 from mazebench.maps.pictures import draw_maze, write_image
 from mazebench.maps.readers.occupancy import LocatedMaze
 from mazebench.maps.readers.ros import write_ros_map
@@ -31,7 +31,7 @@ class _Format(NamedTuple):
 
 
 def make_mazes(
-    size: int | None, count: int, seed: int, kind: str, source: pathlib.Path | None, options: MapOptions
+    size: int | None, count: int, seed: int, kind: str, source: pathlib.Path | None, options: ReadOptions
 ) -> Iterator[LocatedMaze]:
     """Yields `count` mazes of a kind, named after kind, size, seed and index; or the one maze in the map `source`.
 

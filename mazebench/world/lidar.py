@@ -30,7 +30,7 @@ _TURNED_AXES = np.array([[0, 1, 2, 3], [1, 2, 3, 0]])
 
 
 class LidarModel(NamedTuple):
-    """What a range sensor measures. The default is exact and sees as far as 5 m."""
+    """The model of a range sensor. The default is exact and sees as far as 5 m."""
 
     min_range: float = 0.0  # m
     max_range: float = MAX_RANGE  # m; what a ray reads that meets no wall this near
@@ -40,7 +40,7 @@ class LidarModel(NamedTuple):
 
     @property
     def is_random(self) -> bool:
-        """Whether readings of the same scene differ."""
+        """True if readings of the same scene differ."""
         return self.sigma > 0 or self.lost > 0
 
 

@@ -1,4 +1,4 @@
-"""What a kind of layouts is, and where its doors may be.
+"""The base of the kinds of layouts, and the places where their doors may be.
 
 `N` is the number of rows and of columns of a maze, `D` the number of its door slots.
 """

@@ -13,7 +13,7 @@ from mazebench.errors import InputError
 from mazebench.maps.file_kinds import kind_of
 from mazebench.maps.grids import square_maze
 from mazebench.maps.maze import MIN_CELL_SIZE, Maze, MazeError
-from mazebench.maps.options import MapOptions
+from mazebench.maps.options import ReadOptions
 from mazebench.maps.readers.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, locate_maze
 from mazebench.storage.files import read_at_most
 
@@ -28,16 +28,16 @@ def maze_from_array(array: np.ndarray, name: str = "maze", **options: Any) -> Ma
       array: `[R, C]`, either walls as bool or as 0 (free) and 1 (wall), which are padded to a square by `square_maze`;
         or occupancy as integers from 0 (free) to 100 (occupied) per cent, -1 where unknown, see `locate_maze`.
       name: of the maze.
-      **options: those of `MapOptions`.
+      **options: those of `ReadOptions`.
 
     Raises:
       InputError: if an option is not allowed.
       MazeError: if the array holds something else, or no legal maze.
     """
-    return read_array(np.asarray(array), name, MapOptions(**options))
+    return read_array(np.asarray(array), name, ReadOptions(**options))
 
 
-def read_array(array: np.ndarray, name: str, options: MapOptions) -> Maze:
+def read_array(array: np.ndarray, name: str, options: ReadOptions) -> Maze:
     """Returns the maze in an array, as `maze_from_array` does."""
     if array.ndim != 2 or array.dtype.kind not in "biuf":
         raise MazeError(f"{name}: expected a two-dimensional array of numbers, found shape {array.shape} {array.dtype}")
@@ -60,7 +60,7 @@ def read_array(array: np.ndarray, name: str, options: MapOptions) -> Maze:
     return locate_maze(OccupancyGrid(states, cell_size), dataclasses.replace(options, cell_size=cell_size), name).maze
 
 
-def read_array_maze(path: str | pathlib.Path, options: MapOptions) -> Maze:
+def read_array_maze(path: str | pathlib.Path, options: ReadOptions) -> Maze:
     """Reads the maze in a .npy file, as `maze_from_array` does, and names it after the file.
 
     Raises:

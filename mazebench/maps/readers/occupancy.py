@@ -17,7 +17,7 @@ from scipy import ndimage
 from mazebench.errors import InputError, remark
 from mazebench.maps.grids import largest_area, pad_to_square
 from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, MIN_SIZE, Maze, MazeError
-from mazebench.maps.options import MapOptions
+from mazebench.maps.options import ReadOptions
 
 Pose = tuple[float, float, float]  # x, y (m), yaw (rad)
 
@@ -29,7 +29,7 @@ _MANY_CLOSED = 0.05  # share of the free cells of which a user would miss rooms
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class OccupancyGrid:
-    """What is known of the pixels of a map."""
+    """States of the pixels of a map."""
 
     states: np.ndarray  # [H, W] int8: FREE, OCCUPIED or UNKNOWN
     resolution: float  # m, the side of a pixel
@@ -44,7 +44,7 @@ class LocatedMaze(NamedTuple):
     origin: Pose = (0.0, 0.0, 0.0)  # of the maze's lower left corner in the map's frame
 
 
-def locate_maze(grid: OccupancyGrid, options: MapOptions, name: str) -> LocatedMaze:
+def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> LocatedMaze:
     """Returns the largest connected free area of `grid` as a maze.
 
     Rows and columns around the grid of which nothing is known are cut off. A cell is wall if one of its pixels is. Free
@@ -149,7 +149,7 @@ def _fewest_pixels(resolution: float) -> int:
     return max(1, math.ceil(MIN_CELL_SIZE / resolution - _TOLERANCE))
 
 
-def _reasons_to_close(states: np.ndarray, pixels: int, resolution: float, options: MapOptions) -> Iterator[str]:
+def _reasons_to_close(states: np.ndarray, pixels: int, resolution: float, options: ReadOptions) -> Iterator[str]:
     """Yields what may have cut off free cells, in words, and what to try against it."""
     if pixels > 1:
         remedy = ", try a smaller --cell-size" if pixels > _fewest_pixels(resolution) else ""

@@ -17,7 +17,7 @@ from scipy import ndimage
 
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze, MazeError
-from mazebench.maps.options import MapOptions
+from mazebench.maps.options import ReadOptions
 from mazebench.maps.readers.image import read_picture, to_gray
 from mazebench.maps.readers.occupancy import FREE, OCCUPIED, UNKNOWN, LocatedMaze, OccupancyGrid, Pose, locate_maze
 from mazebench.storage.files import open_whole, read_at_most
@@ -52,21 +52,21 @@ def read_ros_maze(path: str | pathlib.Path, **options: Any) -> LocatedMaze:
 
     Args:
       path: of the YAML file.
-      **options: those of `MapOptions`.
+      **options: those of `ReadOptions`.
 
     Raises:
       InputError: if a file can't be read or an option is not allowed.
       MazeError: if there is no legal maze in the map.
     """
-    return locate_ros_maze(path, MapOptions(**options))
+    return locate_ros_maze(path, ReadOptions(**options))
 
 
-def locate_ros_maze(path: str | pathlib.Path, options: MapOptions) -> LocatedMaze:
+def locate_ros_maze(path: str | pathlib.Path, options: ReadOptions) -> LocatedMaze:
     """Reads a map of ROS as `read_ros_maze` does."""
     return locate_maze(read_occupancy(path), options, pathlib.Path(path).stem)
 
 
-def locate_floor_plan(path: pathlib.Path, pixel_size: float, options: MapOptions) -> LocatedMaze:
+def locate_floor_plan(path: pathlib.Path, pixel_size: float, options: ReadOptions) -> LocatedMaze:
     """Reads a picture of a floor plan as a map of ROS with pixels of `pixel_size` m and the usual thresholds.
 
     Marks in colour are floor. What lies outside of closed outer walls is unknown, and is cut off around the plan. The

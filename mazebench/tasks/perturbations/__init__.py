@@ -1,4 +1,4 @@
-"""What may be wrong with what the agent is shown: one file per perturbation, and the table of all of them."""
+"""Perturbations of what the agent is shown: one file per perturbation, and the table of all of them."""
 
 from __future__ import annotations
 

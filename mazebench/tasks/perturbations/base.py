@@ -21,7 +21,7 @@ StateError = Callable[[np.ndarray], None]
 
 
 class Drawing(abc.ABC):
-    """How a map of N x N cells is drawn: as a picture of P x P pixels, in which cells need not lie on a grid."""
+    """A drawing of a map of N x N cells: a picture of P x P pixels, in which cells need not lie on a grid."""
 
     @abc.abstractmethod
     def picture(self, walls: np.ndarray) -> np.ndarray:

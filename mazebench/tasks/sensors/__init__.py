@@ -1,4 +1,4 @@
-"""What may be observed besides the state and the map: one file a kind of sensor, and the table of all of them."""
+"""Sensors, observed besides the state and the map: one file per kind, and the table of all of them."""
 
 from __future__ import annotations
 

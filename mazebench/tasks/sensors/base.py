@@ -1,4 +1,4 @@
-"""What a sensor is: it says what it observes, and reads it off the true worlds of an environment."""
+"""The base of sensors: a sensor says what it observes, and reads it off the true worlds of an environment."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class SensorOptions:
 
     @property
     def lidar(self) -> LidarModel:
-        """What the sensor `lidar` measures."""
+        """The model of the sensor `lidar`."""
         return model_of(self.lidar_noise)
 
 

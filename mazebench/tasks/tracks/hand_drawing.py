@@ -84,7 +84,7 @@ def draw_displacement(size: int, rng: np.random.Generator) -> Displacement:
 
 @dataclasses.dataclass(frozen=True)
 class HandDrawing(Drawing):
-    """How a maze of N x N cells is drawn on a sheet of P x P pixels, P = 2 N.
+    """A hand drawing of a maze of N x N cells in a picture of P x P pixels, P = 2 N.
 
     A point (row, column) of the maze, in cells, is displaced, and is then drawn at `origin + scale * point`, in pixels.
     """
