@@ -13,7 +13,7 @@ import numpy as np
 import mazebench
 from mazebench.agent import Agent, Inputs
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.testing import check_agent
 
 

@@ -18,8 +18,8 @@ from mazebench.maps.kinds.dfs import DFS_OPENINGS, dfs_walls
 from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
 from mazebench.tasks.build import make_spec
-from mazebench.tasks.options import EVAL_DISTANCES
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task_options import EVAL_DISTANCES
 from mazebench.tasks.trials import COLUMNS, Trial, benchmark_task_sizes, draw_trials, episodes_file
 
 _MAZE_SEED = 1  # with the size it seeds the stream that all its mazes are drawn from

@@ -19,7 +19,7 @@ import numpy as np
 import typer
 
 from benchmarks.freeze import format_manifest, format_trials
-from mazebench.evaluation.oracle import measure_oracle_steps
+from mazebench.evaluation.measured_oracle import measure_oracle_steps
 from mazebench.maps.benchmark import (
     DEV,
     FROZEN_SPLITS,
@@ -31,13 +31,13 @@ from mazebench.maps.benchmark import (
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
-from mazebench.results.oracle import oracle_file
+from mazebench.results.frozen_oracle import oracle_file
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.base import DISTANCES, LEVELS
+from mazebench.tasks.tracks.track import DISTANCES, LEVELS
 from mazebench.tasks.trials import Trial, episodes_file, make_trial
 
 KINDS = {"train": KNOWN, DEV: KNOWN, "eval": (*KNOWN, *NOVEL)}  # by split

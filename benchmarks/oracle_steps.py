@@ -1,6 +1,6 @@
 """Writes the oracle's steps in the frozen episodes of the paper's protocol: `python benchmarks/oracle_steps.py FILE`.
 
-`assets/oracle/steps.json` was made this way; `mazebench/results/oracle.py` has its SHA-256.
+`assets/oracle/steps.json` was made this way; `mazebench/results/frozen_oracle.py` has its SHA-256.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import json
 import pathlib
 import sys
 
-from mazebench.evaluation.oracle import measure_oracle_steps
-from mazebench.results.oracle import oracle_key
+from mazebench.evaluation.measured_oracle import measure_oracle_steps
+from mazebench.results.frozen_oracle import oracle_key
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.trials import benchmark_task_sizes, frozen_trials
 

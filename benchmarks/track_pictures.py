@@ -21,7 +21,7 @@ from mazebench.results.played import Shown, shown_of, task_of
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.tracks.track import LEVELS
 
 PATH = pathlib.Path(__file__).parent.parent / "docs" / "images" / "tracks.png"
 PANEL = 520  # pixels a side, about

@@ -24,7 +24,7 @@ from mazebench.agent_loading import load_agent_class
 from mazebench.constants import ON_TIME
 from mazebench.errors import InputError
 from mazebench.evaluation.chunk import run_trials
-from mazebench.evaluation.oracle import measure_oracle_steps
+from mazebench.evaluation.measured_oracle import measure_oracle_steps
 from mazebench.maps.benchmark import KINDS_SIZE
 from mazebench.maps.doors import door_slots, num_swappable, swap_doors
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
@@ -33,8 +33,8 @@ from mazebench.results.intervals import Estimate, difference_interval, mean_inte
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.shown_map import is_blocked
-from mazebench.tasks.tracks.base import DISTANCES
 from mazebench.tasks.tracks.rebuilt import SWAPS
+from mazebench.tasks.tracks.track import DISTANCES
 from mazebench.tasks.trials import make_trial
 
 KINDS = (*KNOWN, *NOVEL)

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from mazebench.envs.registration import load, make_vec
     from mazebench.errors import InputError, UnplayableError
     from mazebench.evaluation.evaluate import evaluate
-    from mazebench.maps.files import read_maze, read_mazes
     from mazebench.maps.kinds import generate
     from mazebench.maps.maze import Maze, MazeError
+    from mazebench.maps.maze_files import read_maze, read_mazes
     from mazebench.maps.readers.arrays import maze_from_array
     from mazebench.tasks.build import make_spec
     from mazebench.tasks.episode import Episode
@@ -46,8 +46,8 @@ _HOMES = {
     "make_spec": "mazebench.tasks.build",
     "maze_from_array": "mazebench.maps.readers.arrays",
     "make_vec": "mazebench.envs.registration",
-    "read_maze": "mazebench.maps.files",
-    "read_mazes": "mazebench.maps.files",
+    "read_maze": "mazebench.maps.maze_files",
+    "read_mazes": "mazebench.maps.maze_files",
 }
 
 __all__ = [

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from mazebench.tasks.context import default_context_size
-from mazebench.world.lidar import LidarModel
+from mazebench.world.ray_casting import LidarModel
 
 Observation = dict[str, np.ndarray]  # "state" [B, 12] float32, "context" [B, 4, M, M] float32, sensors by name
 

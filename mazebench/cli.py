@@ -17,7 +17,7 @@ import typer
 from mazebench import __version__
 from mazebench.commands.bench import bench
 from mazebench.commands.compare import compare
-from mazebench.commands.evaluate import evaluate
+from mazebench.commands.eval import evaluate
 from mazebench.commands.generate import generate
 from mazebench.commands.list import list_
 from mazebench.commands.play import play

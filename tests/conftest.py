@@ -35,7 +35,7 @@ def made(tmp_path_factory) -> pathlib.Path:
 @pytest.fixture(scope="session")
 def report(made, tmp_path_factory) -> pathlib.Path:
     """The report over them."""
-    from mazebench.report.report import write_report  # matplotlib takes a while to load
+    from mazebench.report.write_report import write_report  # matplotlib takes a while to load
 
     out = tmp_path_factory.mktemp("report")
     write_report([made], out)

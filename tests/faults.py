@@ -122,17 +122,17 @@ def run_through_kills(
       kills_worker: whether one of its worker processes is killed instead of the command's own.
 
     Returns:
-      The standard error of each sitting that was killed.
+      The standard error of each process that was killed.
     """
     errors = []
-    for sitting in range(num_kills):
-        process = start(*words, "--out", folder, *(["--resume"] if sitting else []))
+    for attempt in range(num_kills):
+        process = start(*words, "--out", folder, *(["--resume"] if attempt else []))
         wanted = num_bytes(folder) + int(rng.integers(1, most_bytes + 1))
         wait_until(lambda wanted=wanted: num_bytes(folder) >= wanted, process)
         if process.poll() is None:
             os.kill(int(rng.choice(workers_of(process))) if kills_worker else process.pid, signal.SIGKILL)
         errors.append(process.communicate(timeout=PATIENCE)[1])
-        assert process.returncode != 0, f"it ended before kill {sitting}: give it more to do"
+        assert process.returncode != 0, f"it ended before kill {attempt}: give it more to do"
         assert "Traceback" not in errors[-1]
     status, _, last = run(*words, "--out", folder, "--resume")
     assert (status, said(last)) == (0, [])

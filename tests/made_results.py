@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.maps.benchmark import PAPER_BENCHMARK, TRACKS_BENCHMARK, load_mazes, manifest_hash
 from mazebench.maps.maze import cell_to_point, path_through_walls
 from mazebench.options import by_name

@@ -2,8 +2,8 @@
 
 import pytest
 from mazebench_agents.common.config_values import override
-from mazebench_agents.dqn.config import DQNConfig
-from mazebench_agents.mmn.config import MMNConfig
+from mazebench_agents.dqn.dqn_config import DQNConfig
+from mazebench_agents.mmn.mmn_config import MMNConfig
 
 from mazebench.errors import InputError
 

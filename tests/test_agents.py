@@ -18,7 +18,7 @@ from mazebench.errors import InputError, UnplayableError
 from mazebench.evaluation.agent_inputs import true_state
 from mazebench.evaluation.checked_agent import CheckedAgent
 from mazebench.evaluation.chunk import run_trials
-from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.kinds import generate

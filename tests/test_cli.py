@@ -15,10 +15,10 @@ from run_folders import FILES, IMPORTS, files_of, summary_of
 
 from mazebench import __version__, cli
 from mazebench.agent_loading import agent_names
-from mazebench.commands.options import parse_numbers
+from mazebench.commands.option_parameters import parse_numbers
 from mazebench.errors import InputError
 from mazebench.evaluation.suites import SUITES
-from mazebench.maps.files import read_maze
+from mazebench.maps.maze_files import read_maze
 from mazebench.maps.text import format_maze
 
 COMMANDS = typer.main.get_command(cli.app).commands

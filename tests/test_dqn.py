@@ -4,9 +4,9 @@ import numpy as np
 import torch
 from acting import inputs_of
 from mazebench_agents.dqn import DQN
-from mazebench_agents.dqn.learner import double_q_target
+from mazebench_agents.dqn.q_learner import double_q_target
 from mazebench_agents.mah import MAH, MAHPaper
-from mazebench_agents.mah.network import ReadingQNetwork
+from mazebench_agents.mah.map_q_network import ReadingQNetwork
 from small_world import learn
 
 

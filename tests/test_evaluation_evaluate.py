@@ -17,13 +17,13 @@ from run_folders import FEW, FILES, IMPORTS, RECORDED, Killed, files_of, kill_af
 from mazebench.agent import Agent, SingleAgent
 from mazebench.errors import InputError, UnplayableError
 from mazebench.evaluation.chunk import Chunk, run_chunk
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.kinds import generate
 from mazebench.maps.text import write_text_maze
-from mazebench.results.oracle import frozen_oracle_steps
+from mazebench.results.frozen_oracle import frozen_oracle_steps
 from mazebench.results.reading import load_result
 from mazebench.tasks.trials import frozen_trials
 

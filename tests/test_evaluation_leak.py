@@ -11,8 +11,8 @@ from run_folders import records_of
 
 from mazebench.agent import Agent
 from mazebench.evaluation.agent_inputs import agent_seed
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.episode import Episode

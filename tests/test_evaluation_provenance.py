@@ -11,8 +11,8 @@ from run_folders import FEW, IMPORTS, summary_of
 
 from mazebench import __version__
 from mazebench.agent_loading import load_agent_class
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.provenance import checkpoint_metadata, code_hash, provenance
 from mazebench.maps.benchmark import manifest_hash
 from mazebench.tasks.build import build_task

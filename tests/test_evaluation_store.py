@@ -16,8 +16,8 @@ from run_folders import FEW, files_of, results_of
 
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.chunk import Chunk, Ended, run_chunk
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.store import Store
 from mazebench.results.reading import load_result

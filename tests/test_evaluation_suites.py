@@ -9,7 +9,7 @@ import pytest
 from run_folders import IMPORTS, RECORDED, Killed, files_of, kill_after, results_of, summary_of
 
 from mazebench.errors import InputError, Remark, RunError, UnplayableError
-from mazebench.evaluation.options import EvalOptions, RunOptions
+from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.evaluation.suites import SUITES, Part, run_suite
 from mazebench.maps.benchmark import SIZES
 from mazebench.results.comparison import compare_folders

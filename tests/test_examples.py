@@ -13,7 +13,7 @@ import mujoco
 import pytest
 from processes import run_python
 
-from mazebench.maps.files import read_maze
+from mazebench.maps.maze_files import read_maze
 
 EXAMPLES = pathlib.Path(__file__).parent.parent / "docs" / "examples"
 # One thread: several slow each other down where other tests run at the same time.

@@ -18,7 +18,7 @@ from mazebench.envs.env_spec import JsonSpec
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps import drawn
 from mazebench.maps.drawn import FreshMazes, draw_mazes
@@ -28,10 +28,10 @@ from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import sample_episode
 from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.loop import train
-from mazebench.training.options import TrainOptions
-from mazebench.world.lidar import Lidar
+from mazebench.training.train_options import TrainOptions
 from mazebench.world.mjcf import action_controls
 from mazebench.world.models import MazeModels
+from mazebench.world.ray_casting import Lidar
 
 KINDS = ("dfs", "house")
 CONTROLS = action_controls()

@@ -11,8 +11,8 @@ import mazebench
 from mazebench.agent import SingleAgent
 from mazebench.envs.goal import GoalMazeEnv
 from mazebench.errors import InputError, UnplayableError
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, START

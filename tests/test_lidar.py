@@ -20,8 +20,8 @@ from mazebench.maps.kinds import KINDS, generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 from mazebench.tasks.build import make_spec
-from mazebench.world.lidar import MAX_RANGE, NUM_RAYS, Lidar, ray_ends
 from mazebench.world.mjcf import BODY_HEIGHT, maze_spec
+from mazebench.world.ray_casting import MAX_RANGE, NUM_RAYS, Lidar, ray_ends
 
 # Free are x from 1 to 3 m at y from 3 to 4 m, and below that x from 2 to 3 m down to y = 1 m.
 CORNER = parse_maze("#####\n#..##\n##.##\n##.##\n#####")

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import strategies
 
 from mazebench.errors import InputError
-from mazebench.maps.files import read_maze, read_mazes
 from mazebench.maps.kinds import KINDS, generate
+from mazebench.maps.maze_files import read_maze, read_mazes
 from mazebench.maps.pictures import draw_maze, write_image
 from mazebench.maps.readers.ros import write_ros_map
 from mazebench.maps.text import write_text_maze

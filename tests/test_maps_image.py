@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from mazebench.errors import InputError
-from mazebench.maps.files import read_maze
 from mazebench.maps.grids import largest_area
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, MazeError
+from mazebench.maps.maze_files import read_maze
 from mazebench.maps.pictures import draw_maze, write_image
 from mazebench.maps.readers.image import maze_from_image, read_image_maze
 

@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 
 import mazebench
 from mazebench.errors import InputError
-from mazebench.maps.files import read_located, read_maze, read_mazes
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, MazeError, cell_to_point
-from mazebench.maps.options import ReadOptions
+from mazebench.maps.maze_files import read_located, read_maze, read_mazes
+from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.pictures import draw_maze, write_image
 from mazebench.maps.readers.ros import read_occupancy, read_ros_maze, write_ros_map
 from mazebench.maps.text import parse_maze, write_text_maze

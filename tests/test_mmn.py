@@ -9,9 +9,9 @@ from acting import inputs_of
 from mazebench_agents.common.layers import marked_position
 from mazebench_agents.mmn import MMN
 from mazebench_agents.mmn.batches import make_batch
-from mazebench_agents.mmn.config import MMNConfig
+from mazebench_agents.mmn.hypermodel import MMNNetwork
 from mazebench_agents.mmn.losses import unrolled_losses
-from mazebench_agents.mmn.network import MMNNetwork
+from mazebench_agents.mmn.mmn_config import MMNConfig
 from mazebench_agents.mmn.targets import Targets
 from small_world import learn
 

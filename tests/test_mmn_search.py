@@ -7,9 +7,9 @@ import pytest
 import torch
 from mazebench_agents.common import kernels
 from mazebench_agents.mmn import MMN
+from mazebench_agents.mmn.hypermodel import rows_of
 from mazebench_agents.mmn.kernel_model import kernel_model, step, weights_of
-from mazebench_agents.mmn.network import rows_of
-from mazebench_agents.mmn.planning import torch_model
+from mazebench_agents.mmn.search_policy import torch_model
 from mazebench_agents.muzero.search import gumbel_muzero_policy
 from mazebench_agents.muzero.tree import empty_evaluation
 from test_mmn import CONFIGS, a_context, code_of, make_learner

@@ -186,7 +186,7 @@ def test_considered_visits_by_hand():
 
 @pytest.mark.slow
 def test_speed_of_the_search_is_measured_beside_that_of_mctx():
-    script = pathlib.Path(__file__).parent.parent / "benchmarks" / "search.py"
+    script = pathlib.Path(__file__).parent.parent / "benchmarks" / "search_and_mctx.py"
     said = run_python(script, "--seconds", "0.01").stdout
     rows = [line.split(" | ") for line in said.splitlines() if line.startswith("| ")][1:]
     assert [row[0] for row in rows] == ["| 1", "| 64", "| 256"]

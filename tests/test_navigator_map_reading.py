@@ -11,7 +11,7 @@ from mazebench_agents.robot.map_reading import read_map
 from mazebench.maps.kinds import generate
 from mazebench.tasks.context import START, build_context
 from mazebench.tasks.episode import sample_pair
-from mazebench.tasks.perturbations.base import ShownMap
+from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.tracks.hand_drawing import DISPLACEMENTS, draw_by_hand
 
 SIZE = 13

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pathlib
 import re
 
-from mazebench.maps.options import DrawnOptions, ReadOptions
+from mazebench.maps.maze_options import DrawnOptions, ReadOptions
 from mazebench.options import Option, options_of
-from mazebench.tasks.options import TaskOptions, Variants
+from mazebench.tasks.task_options import TaskOptions, Variants
 
 PAGE = pathlib.Path(__file__).parent.parent / "docs" / "options.md"
 DERIVED_TABLE = re.compile(r"\| option \| default \| values \| what \|\n(?:\|.*\n)+")

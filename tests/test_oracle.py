@@ -17,10 +17,10 @@ from mazebench.agent_loading import load_agent_class
 from mazebench.constants import NUM_ACTIONS, STEPS_PER_ACTION
 from mazebench.errors import InputError
 from mazebench.evaluation.chunk import Outcome, run_trials
-from mazebench.evaluation.oracle import measure_oracle_steps
+from mazebench.evaluation.measured_oracle import measure_oracle_steps
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
-from mazebench.results import oracle
+from mazebench.results import frozen_oracle
 from mazebench.tasks.actions import controls_of_action
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.trials import draw_trials, frozen_trials
@@ -109,9 +109,10 @@ class TestOracle:
     def test_frozen_steps_are_those_that_it_takes(self):
         trials = frozen_trials("local", 13)[::50]
         task = make_spec(size=13, split="eval")
-        assert oracle.frozen_oracle_steps("paper", "local", 13, "eval", trials) == measure_oracle_steps(task, trials)
+        frozen = frozen_oracle.frozen_oracle_steps("paper", "local", 13, "eval", trials)
+        assert frozen == measure_oracle_steps(task, trials)
 
     def test_frozen_steps_that_were_changed_are_refused(self, monkeypatch):
-        monkeypatch.setattr(oracle, "_SHA256", "0" * 64)
+        monkeypatch.setattr(frozen_oracle, "_SHA256", "0" * 64)
         with pytest.raises(InputError, match=r"^oracle/steps\.json was changed: expected SHA-256 0+, found "):
-            oracle._first_steps.__wrapped__()
+            frozen_oracle._first_steps.__wrapped__()

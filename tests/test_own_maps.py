@@ -17,7 +17,7 @@ from mazebench.agent_loading import load_agent_class
 from mazebench.constants import STEPS_PER_ACTION
 from mazebench.errors import InputError, Remark
 from mazebench.evaluation.chunk import run_trials
-from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, corner_cells
@@ -28,9 +28,9 @@ from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.trials import draw_trials
-from mazebench.world.lidar import Lidar
 from mazebench.world.mjcf import action_controls
 from mazebench.world.models import models_of
+from mazebench.world.ray_casting import Lidar
 from mazebench.world.simulation import MujocoSimulation
 
 ROOM = "#######\n#.....#\n#.....#\n#.....#\n#.....#\n#.....#\n#######\n"

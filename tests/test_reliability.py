@@ -111,8 +111,8 @@ class TestKill:
             lambda: num_metrics(folder) >= 2,
             lambda: list(folder.glob("checkpoints/*.tmp")),  # in the middle of saving
         )
-        for sitting, has_come in enumerate(moments):
-            process = start(*LEARN, "--out", folder, *(["--resume"] if sitting else []))
+        for attempt, has_come in enumerate(moments):
+            process = start(*LEARN, "--out", folder, *(["--resume"] if attempt else []))
             wait_until(has_come, process)
             process.kill()
             assert said(process.communicate()[1]) == []

@@ -11,9 +11,9 @@ from run_folders import files_of
 
 from mazebench.errors import InputError
 from mazebench.report.episodes import join_episodes, read_results
-from mazebench.report.report import provenance_of, write_report
 from mazebench.report.table import Table, escape_markdown, make_values, to_csv, to_latex, to_markdown
 from mazebench.report.tables import build_tables, format_distances
+from mazebench.report.write_report import provenance_of, write_report
 from mazebench.storage.json_files import write_json
 
 AGENTS = ("mah", "random")

@@ -12,7 +12,7 @@ from mazebench.maps import colors
 from mazebench.report.episodes import join_episodes, read_results
 from mazebench.report.figures import Panel, draw_distributions, draw_panels, draw_table, save
 from mazebench.report.tables import build_tables
-from mazebench.report.trajectories import draw_trajectories
+from mazebench.report.trajectory_figures import draw_trajectories
 
 LONG = [f"mylab.navigation.experiments.variant_{number}.agents:PlannerWithRecurrentMemory" for number in range(9)]
 TWELVE = ["mmn", "planner", "random", *LONG]

@@ -13,7 +13,7 @@ from made_results import edit_summary, make_result, of_own_mazes, read_summary
 from mazebench import cli
 from mazebench.errors import InputError, Remark
 from mazebench.report.episodes import read_results
-from mazebench.report.report import write_report
+from mazebench.report.write_report import write_report
 from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY
 from mazebench.results.trajectories import TRAJECTORIES
 

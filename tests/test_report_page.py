@@ -12,9 +12,9 @@ from made_results import MADE_AGENTS, NASTY, edit_records, make_result
 
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.maps.benchmark import load_kind_mazes
-from mazebench.report.report import write_report
+from mazebench.report.write_report import write_report
 from mazebench.tasks.context import resized_map
-from mazebench.world.lidar import Lidar
+from mazebench.world.ray_casting import Lidar
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ import pytest
 import mazebench
 from benchmarks.results.kept import Kept, keep, read_kept
 from benchmarks.results.pages import PAGES, RECORDS, ROOT, with_tables
-from benchmarks.results.tables import make_table
+from benchmarks.results.results_tables import make_table
 from mazebench.report.curves import Run
 from mazebench.results.reading import load_result
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mazebench.commands.table import print_summary
+from mazebench.commands.summary_table import print_summary
 from mazebench.results.paper import printed, printed_mmn
 from mazebench.results.records import Summary
 

@@ -12,15 +12,15 @@ from mazebench_agents.robot import rays
 from mazebench_agents.robot.beams import beams_of
 from mazebench_agents.robot.body import COASTING_TIME, Body
 from mazebench_agents.robot.cells import nearest_cell
+from mazebench_agents.robot.dead_reckoning import DeadReckoning
 from mazebench_agents.robot.occupancy import Occupancy
-from mazebench_agents.robot.odometry import DeadReckoning
 from mazebench_agents.robot.shortest_paths import cheapest_ways
 
 from mazebench.constants import STEP_TIME
 from mazebench.maps.kinds.dfs import dfs_walls
 from mazebench.maps.kinds.obstacles import obstacles_walls
 from mazebench.maps.maze import Maze
-from mazebench.world.lidar import Lidar, LidarModel
+from mazebench.world.ray_casting import Lidar, LidarModel
 
 BODY_RADIUS = 0.15
 

@@ -15,7 +15,7 @@ from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, cell_to_point
 from mazebench.tasks.odometry import NoisyMotion, Odometry
 from mazebench.world.angles import wrap_angle
-from mazebench.world.lidar import TURTLEBOT3, Lidar, LidarModel
+from mazebench.world.ray_casting import TURTLEBOT3, Lidar, LidarModel
 
 EXACT = beams.beams_of(LidarModel(), 1.0)
 FREE, WALL = -1, 1

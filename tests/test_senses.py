@@ -20,8 +20,8 @@ from mazebench.envs.goal import GoalMazeEnv
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
+from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.evaluation.evaluate import run_evaluation
-from mazebench.evaluation.options import EvalOptions, RunOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.report.leaderboard import read_entries
 from mazebench.report.settings import make_setting
@@ -35,7 +35,7 @@ from mazebench.tasks.odometry import NoisyMotion
 from mazebench.tasks.sensors.lidar_noise import model_of, noise_text, read
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.angles import wrap_angle
-from mazebench.world.lidar import TURTLEBOT3, LidarModel
+from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
 
 NOISE = {"sensors": "lidar", "lidar_noise": "turtlebot3", "odometry_noise": 0.2}
 X, Y, YAW, FORWARD, LEFT, YAW_RATE = 0, 1, 5, 6, 7, 11  # indices in the state

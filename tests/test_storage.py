@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mazebench.errors import InputError
-from mazebench.storage.arrays import read_arrays
+from mazebench.storage.array_files import read_arrays
 from mazebench.storage.files import open_whole, read_at_most
 from mazebench.storage.json_files import read_json, read_lines, to_line, write_json
 

@@ -17,7 +17,7 @@ from mazebench_agents.random_agent import RandomAgent
 import mazebench
 from mazebench.constants import TASK_VERSION
 from mazebench.envs.dm_control import Environment
-from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.provenance import provenance
 from mazebench.tasks.build import build_task
 

@@ -144,7 +144,7 @@ class TestOptions:
 
     def test_reading_the_options_does_not_load_mujoco(self):
         # The command line reads them before it chooses MuJoCo's rendering backend.
-        program = "import sys, mazebench.tasks.options; sys.exit('mujoco' in sys.modules)"
+        program = "import sys, mazebench.tasks.task_options; sys.exit('mujoco' in sys.modules)"
         run_python("-c", program)
 
     def test_the_context_has_the_mazes_size_by_default_and_21_at_most(self):

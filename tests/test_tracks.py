@@ -10,8 +10,8 @@ import pytest
 import mazebench
 from benchmarks.freeze_kinds import freeze_kinds
 from mazebench.errors import InputError
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.evaluation.options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import (
     DEV,
@@ -26,15 +26,15 @@ from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.tasks.build import make_spec
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, START
 from mazebench.tasks.episode import Episode, sample_episode
-from mazebench.tasks.perturbations.base import ShownMap
+from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.shown_map import is_blocked, leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.time_limit import track_time_limit
 from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.base import LEVELS
-from mazebench.tasks.tracks.building import TurnedSheet
+from mazebench.tasks.tracks.building import TurnedMap
+from mazebench.tasks.tracks.track import LEVELS
 from mazebench.tasks.trials import frozen_trials
-from mazebench.world.lidar import TURTLEBOT3
+from mazebench.world.ray_casting import TURTLEBOT3
 from tests.simple_mazes import field
 
 PLAYED = [(name, level) for name in TRACKS for level in LEVELS]
@@ -92,8 +92,8 @@ def test_the_task_of_a_level(track, level):
 
 
 class TestBuilding:
-    @pytest.mark.parametrize(("level", "num_sheets"), [(2, 4), (3, 8)])
-    def test_the_sheet_lies_in_any_way_and_the_goal_with_it(self, level, num_sheets):
+    @pytest.mark.parametrize(("level", "num_maps"), [(2, 4), (3, 8)])
+    def test_the_sheet_lies_in_any_way_and_the_goal_with_it(self, level, num_maps):
         spec = make_spec("building", level=level)
         seen = set()
         for episode in episodes(spec, 100):
@@ -101,17 +101,17 @@ class TestBuilding:
             assert not planes[[LOCAL_MAP, START]].any()
             marked = maze.walls.astype(int)
             marked[episode.goal] = 2
-            sheets = [np.rot90(grid, turns) for grid in (marked, marked[:, ::-1]) for turns in range(4)]
+            maps = [np.rot90(grid, turns) for grid in (marked, marked[:, ::-1]) for turns in range(4)]
             shown = planes[GLOBAL_MAP] + 2 * planes[GOAL]
-            (lies,) = (index for index, sheet in enumerate(sheets) if (sheet == shown).all())
+            (lies,) = (index for index, lain in enumerate(maps) if (lain == shown).all())
             seen.add(lies)
-        assert seen == set(range(num_sheets))
+        assert seen == set(range(num_maps))
 
     @pytest.mark.parametrize("seed", range(4))
-    def test_points_and_cells_lie_at_the_same_place_of_the_sheet(self, seed):
+    def test_points_and_cells_lie_at_the_same_place_of_the_map(self, seed):
         maze = generate("house", 21, np.random.default_rng(seed))
-        sheet, rng = TurnedSheet(turns=True, mirrors=True), np.random.default_rng(seed)
-        shown = sheet.show(ShownMap(maze.walls), 1, ((1, 1), (1, 1)), rng)
+        turned, rng = TurnedMap(turns=True, mirrors=True), np.random.default_rng(seed)
+        shown = turned.show(ShownMap(maze.walls), 1, ((1, 1), (1, 1)), rng)
         cell = tuple(maze.free_cells[seed].tolist())
         x, y = shown.seen_points(np.array([[cell[1] + 0.5, 21 - cell[0] - 0.5]]))[0]
         assert (int(21 - y), int(x)) == shown.seen_cell(cell)
@@ -177,7 +177,7 @@ class TestAdriftAndRough:
     def test_a_rough_sheet_is_mirrored_in_half_of_the_episodes_of_level_3(self):
         straight, mirrored = (make_spec("rough", level=level) for level in (2, 3))
         drawn = [show_map(mirrored, episode).drawing for episode in episodes(mirrored, 40)]
-        assert 8 < sum(sheet.is_mirrored for sheet in drawn) < 32
+        assert 8 < sum(each.is_mirrored for each in drawn) < 32
         assert not any(hasattr(show_map(straight, episode).drawing, "quarters") for episode in episodes(straight, 3))
 
 

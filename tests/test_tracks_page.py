@@ -8,7 +8,7 @@ import re
 from mazebench.maps.benchmark import KINDS_SIZE
 from mazebench.tasks.time_limit import track_time_limit
 from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.base import DISTANCES, LEVELS
+from mazebench.tasks.tracks.track import DISTANCES, LEVELS
 
 PAGE = pathlib.Path(__file__).parent.parent / "docs" / "tracks.md"
 DERIVED_TABLE = re.compile(r"\| track \| level \| what is imperfect \|.*\n(?:\|.*\n)+")

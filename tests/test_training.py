@@ -21,7 +21,7 @@ from mazebench.tasks.build import make_spec
 from mazebench.training import loop
 from mazebench.training.experience import Collector
 from mazebench.training.loop import TrainingError, train
-from mazebench.training.options import TrainOptions
+from mazebench.training.train_options import TrainOptions
 
 
 def tiny_options(**changes):

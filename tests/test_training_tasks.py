@@ -20,7 +20,7 @@ from mazebench.tasks.context import GLOBAL_MAP
 from mazebench.training.experience import Collector
 from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.loop import train
-from mazebench.training.options import TrainOptions
+from mazebench.training.train_options import TrainOptions
 
 
 def tiny_options(**changes: Any) -> TrainOptions:

@@ -45,7 +45,7 @@ class MapEncoder(nn.Module):
 
 
 def marked_position(plane: torch.Tensor) -> torch.Tensor:
-    """Returns the row and column `[G, 2]` float of the mark in planes `[G, M, M]`; the middle where there is none."""
+    """Returns the row and column `[G, 2]` float of the marker in planes `[G, M, M]`; the middle where there is none."""
     size = plane.shape[-1]
     mark, index = plane.flatten(1).max(dim=1)
     position = torch.stack([index // size, index % size], dim=-1).to(plane.dtype)

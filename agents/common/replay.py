@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mazebench.storage.arrays import read_arrays
+from mazebench.storage.array_files import read_arrays
 from mazebench.tasks.context import GLOBAL_MAP
 from mazebench.training.experience import Experience
 

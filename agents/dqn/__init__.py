@@ -1,5 +1,5 @@
 """The paper's model-free agent without context, and the Q-learning that it shares with MAH."""
 
-from .agent import DQN
+from .dqn import DQN
 
 __all__ = ["DQN"]

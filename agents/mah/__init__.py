@@ -1,5 +1,5 @@
 """The paper's model-free agent that gets the context."""
 
-from .agent import MAH, MAHPaper
+from .mah import MAH, MAHPaper
 
 __all__ = ["MAH", "MAHPaper"]

@@ -20,9 +20,9 @@ from mazebench.constants import NUM_ACTIONS
 from ..common.layers import DISPLACEMENT_UNIT, NUM_PLACE, NUM_TO_GOAL, PERIODS, WAY_UNIT, WIDTHS, steepness
 from ..muzero.search import KernelModel, Root, run_simulations
 from ..muzero.tree import ROOT, Evaluation, Settings, empty_evaluation
+from .hypermodel import NUM_BODY, NUM_CHANGES, NUM_FREE, NUM_POSE, SCALE_RATE, Code, MMNNetwork
 from .kernel_layers import ONE, ZERO, Linear, add_product, inlined, kernel, linear, linear_of, normalize, rectify
-from .network import NUM_BODY, NUM_CHANGES, NUM_FREE, NUM_POSE, SCALE_RATE, Code, MMNNetwork
-from .reading import REACH
+from .map_reader import REACH
 
 _TURN = np.float32(2 * math.pi)
 _TWO = np.float32(2.0)

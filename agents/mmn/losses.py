@@ -11,8 +11,8 @@ from torch.nn import functional
 
 from ..common.layers import VALUE_UNIT
 from .batches import Batch
-from .config import MMNConfig
-from .network import Code, MMNNetwork
+from .hypermodel import Code, MMNNetwork
+from .mmn_config import MMNConfig
 from .targets import Targets, n_step_returns
 
 _HIDDEN_GRADIENT = 0.5  # of an unrolled state at each step: MuZero's

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import torch
 
 from .batches import Batch
-from .config import MMNConfig
-from .network import MMNNetwork
-from .planning import plan
+from .hypermodel import MMNNetwork
+from .mmn_config import MMNConfig
+from .search_policy import plan
 
 
 class Targets(NamedTuple):

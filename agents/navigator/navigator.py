@@ -17,23 +17,23 @@ from mazebench.agent import Agent, Inputs, Interface
 from mazebench.errors import UnplayableError
 from mazebench.maps.maze import Cell, cell_to_point
 from mazebench.tasks.context import START
-from mazebench.world.lidar import LidarModel
+from mazebench.world.ray_casting import LidarModel
 
 from ..robot.beams import beams_of
 from ..robot.body import LOOK_LEFT, LOOK_RIGHT, TURN_STEP, Body, observed_body
 from ..robot.cells import marked_cell, nearest_cell
 from ..robot.contacts import felt_walls
+from ..robot.dead_reckoning import DeadReckoning
 from ..robot.driving import Drive
 from ..robot.map_matching import MapBelief
 from ..robot.map_reading import read_map
 from ..robot.occupancy import Occupancy
-from ..robot.odometry import DeadReckoning
 from ..robot.pilot import steer
 from ..robot.planning import plan
 from ..robot.tracking import Tracker, aligned
 
 _BLOCKED = 0.35  # probability of a wall from which driving keeps clear of a cell off the path
-_MARK_OFF = 1.0  # cells, standard deviation of the goal from its mark, once it was not there
+_MARK_OFF = 1.0  # cells, standard deviation of the goal from its marker, once it was not there
 # Cells, which are taken for 1 m wide: standard deviations of a position.
 _EXACT, _TRACKED, _RECKONED = 0.01, 0.03, 0.15  # that is observed, tracked by a lidar, or reckoned from noisy ones
 _GAIN = 0.03  # weight of a noisy position against the one that velocities tell
@@ -129,7 +129,7 @@ class Navigator(Agent):
         start = (observed.x, observed.y) if off_centre < _ROUNDING else None
         reading, odometry = read_map(context, self._size), _pose(observed)
         if start is not None:
-            # The grid is the maze. A start that is known but not marked says that the sheet may lie in any way.
+            # The grid is the maze. A start that is known but not marked says that the map may lie in any way.
             num_turns = 1 if context[START].any() else 8
             belief = MapBelief.begin(reading.walls, reading.goal, num_turns, None, self._size)
             if ranges is None or self._odometry_noise == 0:

@@ -12,7 +12,7 @@ from mazebench.tasks.context import GLOBAL_MAP
 
 from ..robot.body import Point, observed_body
 from ..robot.cells import nearest_cell, start_cell
-from ..robot.odometry import DeadReckoning
+from ..robot.dead_reckoning import DeadReckoning
 from ..robot.pilot import Pilot
 from .map_planner import MapPlanner, plan
 

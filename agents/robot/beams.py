@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mazebench.world.lidar import LidarModel
+from mazebench.world.ray_casting import LidarModel
 
 from ..common.kernels import compiled, inlined
 from . import rays

@@ -50,7 +50,7 @@ _ERROR_SLOPE = 4.0  # by how much that grows with the difference of picture and 
 _LARGEST_ERROR = 0.3
 _CENTRE = 0.1  # pixels, smallest deviation of where a cell's centre is drawn
 _FARTHEST_MARK = 4.0  # pixels from the centre of the cell that it marks
-_UNEXPLAINED_MARK = 1e-3  # weight of cells that a mark should not mark, at no distance from it
+_UNEXPLAINED_MARK = 1e-3  # weight of cells that a marker should not mark, at no distance from it
 # [25, 2] deviates of two normal variables, each of the same probability
 _QUANTILES = np.array(list(itertools.product(special.ndtri(np.arange(0.1, 1, 0.2)), repeat=2)))
 

@@ -1,12 +1,12 @@
 """A belief over the placements of the shown map on the grid of what was seen.
 
 What was seen from the start on is kept in one grid, which does not depend on the map (`tracking`, `occupancy`). A
-hypothesis lays the sheet on this grid: turned by quarter turns, perhaps mirrored, and shifted by whole cells. All that
+hypothesis lays the map on this grid: turned by quarter turns, perhaps mirrored, and shifted by whole cells. All that
 was seen so far weighs it, under the assumption that each cell of the map may be wrong with a known probability. So a
-hypothesis has its own account of what has changed since the map was made: the cells in which the grid and the sheet
+hypothesis has its own account of what has changed since the map was made: the cells in which the grid and the map
 differ. This is a Rao-Blackwellised filter (Doucet et al. 2000) whose discrete part is enumerated.
 
-`G` is the number of orientations, `N` the cells on a side of the sheet, `L` of the grid, `H` the number of hypotheses.
+`G` is the number of orientations, `N` the cells on a side of the map, `L` of the grid, `H` the number of hypotheses.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from scipy import special
 from ..common.kernels import compiled
 
 _ERROR = 0.05  # probability that a cell of the map is wrong
-_OUTSIDE = 1e-3  # probability that a cell outside of the sheet, or of its border, is free
-_MIRRORED = 0.05  # probability that a sheet that may lie in any way is mirrored
-_UNTOLD = 1e-4  # probability of a goal in a cell that the mark excludes
+_OUTSIDE = 1e-3  # probability that a cell outside of the map, or of its border, is free
+_MIRRORED = 0.05  # probability that a map that may lie in any way is mirrored
+_UNTOLD = 1e-4  # probability of a goal in a cell that the marker excludes
 _CHANGED = 0.02  # difference of probabilities of a wall, from which a cell is weighed anew
 _UNLIKELY = 1e-3  # of the likeliest hypothesis, up to which one is not considered, or not used in mixtures
 _MOST_MIXED = 32  # hypotheses
@@ -35,11 +35,11 @@ def orientations(plane: np.ndarray, count: int) -> np.ndarray:
 
 @dataclasses.dataclass
 class MapBelief:
-    """The hypotheses of where the sheet lies, and their probabilities."""
+    """The hypotheses of where the map lies, and their probabilities."""
 
-    walls: np.ndarray  # [G, N, N] float, the probability of a wall by the sheet in each orientation
+    walls: np.ndarray  # [G, N, N] float, the probability of a wall by the map in each orientation
     goals: np.ndarray  # [G, N, N] float, the probability of the goal
-    placements: np.ndarray  # [H, 3] int: orientation, and the row and column of the sheet at the grid's (0, 0)
+    placements: np.ndarray  # [H, 3] int: orientation, and the row and column of the map at the grid's (0, 0)
     log_weights: np.ndarray  # [H] float
     weighed: np.ndarray  # [L, L] float, the probability of a wall with which each cell of the grid was weighed
     visited: np.ndarray  # [L, L] bool, the cells without the goal
@@ -51,11 +51,11 @@ class MapBelief:
         """Returns the belief before anything was seen.
 
         Args:
-          walls: `[N, N]` float, the probability of a wall by the sheet.
+          walls: `[N, N]` float, the probability of a wall by the map.
           goal: `[N, N]` float, the probability of the goal.
-          num_turns: 1, 4 or 8: whether the sheet may be turned, or mirrored, too.
-          middle: `[N, N]` float, the probability that a cell of the sheet is the middle of the grid; None if grid and
-            sheet have the same corners.
+          num_turns: 1, 4 or 8: whether the map may be turned, or mirrored, too.
+          middle: `[N, N]` float, the probability that a cell of the map is the middle of the grid; None if grid and
+            map have the same corners.
           size: L.
         """
         if middle is None:
@@ -78,7 +78,7 @@ class MapBelief:
         )
 
     def on_leg(self, walls: np.ndarray, goal: np.ndarray) -> MapBelief:
-        """Returns the belief with another leg's map and goal, which a sheet shows that lies as this one."""
+        """Returns the belief with another leg's map and goal, shown on a map that lies as this one."""
         count = len(self.walls)
         return dataclasses.replace(
             self,
@@ -149,7 +149,7 @@ def _mixed(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the mixtures of walls and goals `[L, L]`; the arguments are those of `MapBelief`.
 
-    Outside of a sheet, all is wall.
+    Outside of a map, all is wall.
     """
     wall, goal = np.ones((size, size)), np.zeros((size, size))
     side = walls.shape[-1]

@@ -11,9 +11,9 @@ import sys
 
 import typer
 
-from benchmarks.results.figures import draw_figures, figures
 from benchmarks.results.kept import keep, read_kept
 from benchmarks.results.pages import PAGES, RECORDS, ROOT, with_tables
+from benchmarks.results.results_figures import draw_figures, figures
 from mazebench.errors import InputError
 from mazebench.storage.files import open_whole
 

@@ -26,7 +26,7 @@ from mazebench.results.reading import CONFIG, EPISODES, ORACLE, SUITE, SUMMARY, 
 from mazebench.results.records import column
 from mazebench.storage.files import make_folder, open_whole
 from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.tracks.track import LEVELS
 from mazebench.training.run_folder import METRICS, checkpoints
 
 PAPER = "paper"  # the suite

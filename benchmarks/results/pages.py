@@ -10,7 +10,7 @@ import pathlib
 import re
 
 from benchmarks.results.kept import Kept
-from benchmarks.results.tables import SATURATED, make_table
+from benchmarks.results.results_tables import SATURATED, make_table
 from mazebench.errors import InputError
 
 ROOT = pathlib.Path(__file__).parent.parent.parent

@@ -19,15 +19,15 @@ import mujoco.batch
 import numpy as np
 
 from mazebench.agent_loading import agent_names, load_agent_class
-from mazebench.commands.table import print_table
+from mazebench.commands.summary_table import print_table
 from mazebench.constants import ACTIONS, STEPS_PER_ACTION
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
 from mazebench.tasks.build import make_spec
-from mazebench.tasks.options import TRAIN_DISTANCES
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task_options import TRAIN_DISTANCES
 from mazebench.training.experience import Collector
 from mazebench.training.protocol import LearningAgent
 from mazebench.world.backend import RenderingError

@@ -27,7 +27,7 @@ def compare(
 
     They are of two agents, or of one agent at two levels of a track.
     """
-    from mazebench.commands import table
+    from mazebench.commands import summary_table
     from mazebench.results import comparison
 
     found = comparison.compare_folders(a, b)
@@ -39,6 +39,6 @@ def compare(
     if "" in found.parts:
         rows = found.parts[""].by_distance if found.has_distances else {}
         named = {str(distance): row for distance, row in rows.items()}
-        table.print_comparison(found.title, "distance", {**named, "all": found.parts[""].overall})
+        summary_table.print_comparison(found.title, "distance", {**named, "all": found.parts[""].overall})
     else:
-        table.print_comparison(found.title, "part", {name: part.overall for name, part in found.parts.items()})
+        summary_table.print_comparison(found.title, "part", {name: part.overall for name, part in found.parts.items()})

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.options import takes_options
-from mazebench.maps.options import ReadOptions
+from mazebench.commands.option_parameters import takes_options
+from mazebench.maps.maze_options import ReadOptions
 
 
 @takes_options(ReadOptions)

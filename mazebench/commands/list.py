@@ -9,9 +9,9 @@ def list_() -> None:
     from mazebench.constants import TASK_VERSION
     from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS
     from mazebench.maps.kinds import KINDS
-    from mazebench.tasks.options import TASKS
     from mazebench.tasks.perturbations import PERTURBATIONS
     from mazebench.tasks.sensors import SENSORS
+    from mazebench.tasks.task_options import TASKS
     from mazebench.tasks.tracks import TRACKS
 
     ids = (f"mazebench/{kind}-{SIZES[0]}-v{TASK_VERSION}" for kind in ("Local", "Hierarchical", "LocalGoal"))

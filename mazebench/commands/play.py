@@ -7,11 +7,11 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.options import chosen, takes_options, watched
+from mazebench.commands.option_parameters import chosen, takes_options, watched
 from mazebench.errors import InputError
-from mazebench.evaluation.options import EvalOptions
-from mazebench.maps.options import MazeOptions
-from mazebench.tasks.options import TaskOptions
+from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.maps.maze_options import MazeOptions
+from mazebench.tasks.task_options import TaskOptions
 from mazebench.world.backend import has_display
 
 

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.options import chosen, takes_options, watched
-from mazebench.evaluation.options import EvalOptions
+from mazebench.commands.option_parameters import chosen, takes_options, watched
+from mazebench.evaluation.eval_options import EvalOptions
 
 _DRAWN = ("map", "lidar")  # views that need no rendering
 

@@ -31,8 +31,8 @@ def report(
     try:
         from mazebench.report.curves import find_runs, write_learning_curves
         from mazebench.report.episodes import folders_below
-        from mazebench.report.files import DOCUMENT, PAGE
-        from mazebench.report.report import counted, write_report
+        from mazebench.report.report_files import DOCUMENT, PAGE
+        from mazebench.report.write_report import counted, write_report
     except ImportError as error:
         raise InputError(f"the report needs {error.name}, which the extra [report] installs (docs/start.md)") from error
     names = [_parse_name(text) for text in name or ()]

@@ -10,10 +10,10 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import has_camera, load_mujoco
-from mazebench.commands.options import chosen, takes_options
+from mazebench.commands.option_parameters import chosen, takes_options
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import SIZES
-from mazebench.training.options import FIXED, TrainOptions
+from mazebench.training.train_options import FIXED, TrainOptions
 
 
 @takes_options(TrainOptions, without=FIXED)

@@ -25,9 +25,9 @@ from mazebench.tasks.arguments import Arguments, require_task_spec
 from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.observation import OpenSensors, lidar_noise, observation_specs, state_errors
-from mazebench.tasks.perturbations.base import ShownMap, StateError
+from mazebench.tasks.perturbations.perturbation import ShownMap, StateError
 from mazebench.tasks.route import Event, Route, plan_route
-from mazebench.tasks.sensors.base import Worlds
+from mazebench.tasks.sensors.sensor import Worlds
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.angles import wrap_angle

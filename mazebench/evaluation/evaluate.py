@@ -13,8 +13,8 @@ from mazebench.agent import Agent, SingleAgent
 from mazebench.agent_loading import checked_agent_class, load_agent_class
 from mazebench.errors import InputError, remark
 from mazebench.evaluation.chunk import Chunk
-from mazebench.evaluation.options import NUM_ENVS, EvalOptions, RunOptions
-from mazebench.evaluation.oracle import ORACLE, measure_oracle_steps
+from mazebench.evaluation.eval_options import NUM_ENVS, EvalOptions, RunOptions
+from mazebench.evaluation.measured_oracle import ORACLE, measure_oracle_steps
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import Pool, open_pool
 from mazebench.evaluation.store import Store, check_same_run, is_finished

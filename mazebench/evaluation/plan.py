@@ -12,20 +12,20 @@ from mazebench.agent import Agent, Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.errors import InputError, RunError, UnplayableError, held_remarks
 from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of, only_context_size
-from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.provenance import provenance
+from mazebench.results.frozen_oracle import frozen_oracle_steps
 from mazebench.results.metrics import Steps
-from mazebench.results.oracle import frozen_oracle_steps
 from mazebench.results.records import Provenance
 from mazebench.tasks.build import build_task
 from mazebench.tasks.context import default_context_size
-from mazebench.tasks.options import EVAL_DISTANCES, HIDEABLE
 from mazebench.tasks.perturbations import perturbation_levels
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task_options import EVAL_DISTANCES, HIDEABLE
 from mazebench.tasks.trials import Trial, select_trials
 from mazebench.world.mjcf import maze_spec
 
-# Of a provenance: what must be the same in all sittings of a run, besides the options.
+# Of a provenance: what must be the same in all processes of a run, besides the options.
 _IDENTIFYING = (
     "task_version",
     "benchmark_manifest_sha256",

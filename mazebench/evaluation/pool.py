@@ -15,7 +15,7 @@ from typing import Protocol
 
 from mazebench.errors import RunError
 from mazebench.evaluation.chunk import PATIENCE, Chunk, Ended, run_chunk, run_whole_chunk
-from mazebench.evaluation.options import RunOptions
+from mazebench.evaluation.eval_options import RunOptions
 
 
 class Pool(Protocol):

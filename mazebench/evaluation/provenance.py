@@ -19,14 +19,14 @@ from mazebench.agent import Agent
 from mazebench.agent_loading import package_of
 from mazebench.constants import TASK_VERSION
 from mazebench.errors import InputError
-from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.maps.benchmark import manifest_hash
 from mazebench.options import by_name
 from mazebench.results.played import mazes_hash
 from mazebench.results.records import Provenance
 from mazebench.storage.files import open_file
-from mazebench.tasks.options import Variants
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task_options import Variants
 
 _PACKAGES = (
     *("mazebench-mujoco", "mujoco", "dm-control", "dm-env", "gymnasium", "numpy", "scipy"),
@@ -77,7 +77,7 @@ def _told_checkpoint(path: str | None, agent_class: type[Agent]) -> str | None:
 
 
 def code_hash(agent: str, agent_class: type[Agent]) -> str | None:
-    """Returns the SHA-256 of an agent's code, which may be edited between two sittings of a run.
+    """Returns the SHA-256 of an agent's code, which may be edited before a run is resumed.
 
     It is that of the file of a `module:Class`, and that of all Python files of the package of an installed agent. None
     for classes of no file, as in a notebook.

@@ -28,7 +28,7 @@ from mazebench.storage.json_files import read_json, read_lines, to_line, write_j
 def is_finished(folder: pathlib.Path, record: bool = False) -> bool:
     """Returns whether `folder` holds an evaluation that came to its end, with trajectories if those are wanted."""
     names = (SUMMARY, EPISODES, TRAJECTORIES) if record else (SUMMARY, EPISODES)
-    # A kill may have left the journal, or trajectories may be recorded in another sitting.
+    # A kill may have left the journal, or a resumed run may record trajectories again.
     return all((folder / name).exists() for name in names) and not (folder / JOURNAL).exists()
 
 

@@ -12,8 +12,8 @@ from typing import Any
 
 from mazebench.agent import Interface
 from mazebench.errors import InputError, RunError, UnplayableError, remark, unknown
+from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.evaluation.evaluate import Progress, run_plan
-from mazebench.evaluation.options import EvalOptions, RunOptions
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import open_pool
 from mazebench.evaluation.store import check_same_run, is_finished
@@ -23,7 +23,7 @@ from mazebench.results.records import Summary
 from mazebench.storage.files import make_folder, writing_to
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.tracks.track import LEVELS
 
 _DEFAULT_RUN = RunOptions()
 _TABLE_DISTANCES = (2, 4, 6, 8, 10)  # those that the paper prints

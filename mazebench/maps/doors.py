@@ -11,8 +11,8 @@ import numpy as np
 
 from mazebench.errors import InputError, unknown
 from mazebench.maps.kinds import KINDS
-from mazebench.maps.kinds.base import door_slots as any_door_slots
-from mazebench.maps.kinds.base import rooms_beside
+from mazebench.maps.kinds.kind import door_slots as any_door_slots
+from mazebench.maps.kinds.kind import rooms_beside
 from mazebench.maps.maze import Cell, Maze
 
 _MOST_DOORS = 4  # of a room, that are told apart: a corridor has many

@@ -1,6 +1,6 @@
 """Drawings of mazes: `H` and `W` are the rows and columns of a picture, `N` the cells along a side of the maze.
 
-Row 0 is on top. `mazebench.maps.readers.image` reads a drawing without marks exactly.
+Row 0 is on top. `mazebench.maps.readers.image` reads a drawing without markers exactly.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def draw_maze(
 
     A green disc marks `start`, a red one `goal`, each at least 3 % of the picture wide. `path` is `[T, 2]` points
     (x, y) in metres, equally spaced in time; it is drawn as a line from blue (first) to orange (last).
-    `maze_from_image` reads a drawing without marks exactly.
+    `maze_from_image` reads a drawing without markers exactly.
 
     Raises:
       InputError: if the picture would be larger than 8192 pixels a side or `path` is not finite points.

@@ -10,9 +10,9 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
-from mazebench.maps.files import read_all
 from mazebench.maps.maze import Maze, resized
-from mazebench.maps.options import MazeOptions, ReadOptions
+from mazebench.maps.maze_files import read_all
+from mazebench.maps.maze_options import MazeOptions, ReadOptions
 from mazebench.maps.readers.arrays import read_array
 
 _NUM_MAZES = 20  # of a kind, unless another number is asked for

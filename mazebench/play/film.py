@@ -17,13 +17,13 @@ from mazebench.constants import STEP_TIME
 from mazebench.envs.gym import MazeEnv
 from mazebench.errors import InputError, unknown
 from mazebench.evaluation.agent_inputs import agent_seed, true_state
-from mazebench.evaluation.options import EvalOptions
+from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.pictures import draw_grid, draw_rays, write_image
 from mazebench.storage.files import open_whole, writing_to
 from mazebench.tasks.context import resized_map
-from mazebench.world.lidar import ray_ends
 from mazebench.world.models import models_of
+from mazebench.world.ray_casting import ray_ends
 from mazebench.world.rendering import CAMERAS, Cameras
 
 MAP, LIDAR = "map", "lidar"

@@ -9,7 +9,7 @@ import numpy as np
 from mazebench.envs.gym import MazeEnv
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.spec import TaskSpec
-from mazebench.world.lidar import ray_ends
+from mazebench.world.ray_casting import ray_ends
 
 # The actions of letters and of arrow keys, as indices in `ACTIONS`.
 LETTERS = {"w": 0, "s": 1, "a": 2, "d": 3, "q": 4, "e": 5}

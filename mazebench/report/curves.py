@@ -11,7 +11,7 @@ import pandas as pd
 
 from mazebench.errors import InputError, remark
 from mazebench.report.figures import Panel, draw_panels, save
-from mazebench.report.files import DOCUMENT, FIGURES, new_report, write_text
+from mazebench.report.report_files import DOCUMENT, FIGURES, new_report, write_text
 from mazebench.report.table import escape_markdown, to_markdown
 from mazebench.storage.json_files import read_json, read_lines
 from mazebench.training.run_folder import CHECKPOINTS, CONFIG, METRICS

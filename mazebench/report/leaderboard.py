@@ -22,15 +22,15 @@ from mazebench.constants import ON_TIME
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import load_kind_mazes, manifest_hash
 from mazebench.report.table import escape_markdown, to_markdown
+from mazebench.results.frozen_oracle import frozen_oracle_steps
 from mazebench.results.intervals import mean_interval
 from mazebench.results.metrics import is_on_time
-from mazebench.results.oracle import frozen_oracle_steps
 from mazebench.results.reading import SUITE, Result, find_parts, load_result, read_suite
 from mazebench.results.records import Name, Share, column
 from mazebench.storage.files import make_folder, open_file
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.tracks.track import LEVELS
 from mazebench.tasks.trials import frozen_trials
 
 BEGIN, END = "<!-- leaderboard begins -->\n", "<!-- leaderboard ends -->\n"

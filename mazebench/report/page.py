@@ -1,6 +1,6 @@
 """The report as one page that needs no network: figures, tables, and an explorer of the episodes, all data inside.
 
-explorer.js and drawing.js replay episodes.
+explorer.js and canvas.js replay episodes.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from mazebench.report.episodes import ReportedResult
 from mazebench.report.figures import Drawn, to_svg
 from mazebench.report.settings import Setting
 from mazebench.report.table import METRICS, Table
-from mazebench.report.trajectories import CELL_COLORS, TIME_COLORS
+from mazebench.report.trajectory_figures import CELL_COLORS, TIME_COLORS
 from mazebench.results.paper import citation, reference
 from mazebench.results.played import Shown
 from mazebench.results.trajectories import Trajectory
-from mazebench.world.lidar import NUM_RAYS
 from mazebench.world.mjcf import BODY_RADIUS
+from mazebench.world.ray_casting import NUM_RAYS
 
 _NUM_TIME_COLORS = 32
 _POSITION_UNITS = 32  # a cell; one unit is about a pixel on the screen
@@ -57,7 +57,7 @@ def build_page(
       warnings: lines about the results.
     """
     style = f":root {{ {' '.join(f'--{name}: {color};' for name, color in _colors().items())} }}\n{_read('page.css')}"
-    script = "".join(map(_read, ("drawing.js", "explorer.js")))
+    script = "".join(map(_read, ("canvas.js", "explorer.js")))
     columns: dict[str, int] = {}  # packed, with their numbers
     used = [
         [columns.setdefault(_pack(part), len(columns)) for part in (_trials(result), _outcomes(result))]

@@ -17,10 +17,10 @@ from mazebench.results.records import Summary
 from mazebench.tasks.build import build_task
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.options import EnvironmentOptions
 from mazebench.tasks.route import plan_route
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task_options import EnvironmentOptions
 
 BENCHMARKS = (PAPER_BENCHMARK, TRACKS_BENCHMARK)
 # Options that change nothing of what is shown. A summary has the chosen values, which options may not allow.

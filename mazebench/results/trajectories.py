@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mazebench.errors import InputError
-from mazebench.storage.arrays import read_arrays
+from mazebench.storage.array_files import read_arrays
 from mazebench.storage.files import open_whole
 
 TRAJECTORIES = "trajectories.npz"

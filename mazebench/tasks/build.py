@@ -10,11 +10,12 @@ import numpy as np
 from mazebench.errors import InputError, unknown
 from mazebench.maps.benchmark import KINDS_SIZE, load_kind_mazes
 from mazebench.maps.drawn import FreshMazes, Mazes
-from mazebench.maps.options import MazeOptions
+from mazebench.maps.maze_options import MazeOptions
 from mazebench.maps.selection import OwnMazes, load_mazes_of
 from mazebench.options import by_name, from_names, options_of
 from mazebench.tasks.context import default_context_size
-from mazebench.tasks.options import (
+from mazebench.tasks.spec import TaskSpec, check_mazes
+from mazebench.tasks.task_options import (
     EVAL_DISTANCES,
     TASKS,
     TRAIN_DISTANCES,
@@ -23,10 +24,9 @@ from mazebench.tasks.options import (
     Variants,
     is_own,
 )
-from mazebench.tasks.spec import TaskSpec, check_mazes
 from mazebench.tasks.time_limit import TIME_LIMIT, fitting_time_limit
 from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.base import DISTANCES
+from mazebench.tasks.tracks.track import DISTANCES
 
 # Of the diameter of a large maze. Few pairs of cells are farther apart, so that they would be long to find.
 _FARTHEST_SHARE = 0.9
@@ -44,8 +44,9 @@ def make_spec(
       split: "train" or "eval" mazes of the benchmark.
       mazes: mazes of your own instead: a `Maze`, an array as `maze_from_array` takes it, several of these of one size,
         or the path of a file or of a folder of files.
-      **options: those of `mazebench.tasks.options.TaskOptions` and `Variants`, of `mazebench.maps.options.MazeOptions`
-        and, with `mazes`, of `ReadOptions`, which docs/options.md lists; None stands for the default.
+      **options: those of `TaskOptions` and `Variants` in `mazebench.tasks.task_options`, of `MazeOptions` in
+        `mazebench.maps.maze_options` and, with `mazes`, of `ReadOptions`, which docs/options.md lists; None stands for
+        the default.
 
     Raises:
       InputError: if an option is unknown or not allowed, or a map can't be read.

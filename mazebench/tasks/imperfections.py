@@ -6,7 +6,7 @@ import numpy as np
 
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations import active_perturbations
-from mazebench.tasks.perturbations.base import Perturbation
+from mazebench.tasks.perturbations.perturbation import Perturbation
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.tracks import TRACKS

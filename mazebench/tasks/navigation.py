@@ -17,9 +17,9 @@ from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_action, controls_
 from mazebench.tasks.arguments import Arguments, require_task_spec
 from mazebench.tasks.episode import Episode, check_episode, sample_episode
 from mazebench.tasks.observation import OpenSensors, lidar_noise, observation_specs, state_errors
-from mazebench.tasks.perturbations.base import ShownMap, StateError
+from mazebench.tasks.perturbations.perturbation import ShownMap, StateError
 from mazebench.tasks.route import Event, Route, plan_route
-from mazebench.tasks.sensors.base import Worlds
+from mazebench.tasks.sensors.sensor import Worlds
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.world.models import models_of

@@ -11,9 +11,9 @@ from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.imperfections import episode_level, imperfections
 from mazebench.tasks.odometry import NoisyMotion
-from mazebench.tasks.perturbations.base import StateError
+from mazebench.tasks.perturbations.perturbation import StateError
 from mazebench.tasks.sensors import SENSORS
-from mazebench.tasks.sensors.base import Sensor, Worlds
+from mazebench.tasks.sensors.sensor import Sensor, Worlds
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.streams import Stream
 from mazebench.world.simulation import STATE_SIZE

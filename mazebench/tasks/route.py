@@ -10,7 +10,7 @@ import numpy as np
 
 from mazebench.maps.maze import Cell, Maze, path_through_walls
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.perturbations.base import ShownMap
+from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.time_limit import track_time_limit

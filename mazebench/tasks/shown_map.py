@@ -8,7 +8,7 @@ from mazebench.maps.maze import Cell, path_through_walls
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, build_context
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.imperfections import imperfections
-from mazebench.tasks.perturbations.base import ShownMap
+from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.spec import TaskSpec
 
 _GREY_LEVELS = np.float32(255)

@@ -7,9 +7,9 @@ from pydantic import InstanceOf
 from mazebench.errors import InputError
 from mazebench.maps.drawn import FreshMazes, Mazes
 from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, Maze, require_one_size
-from mazebench.maps.options import THIN_WALLS
+from mazebench.maps.maze_options import THIN_WALLS
 from mazebench.options import options
-from mazebench.tasks.options import ENDS, TaskOptions, Variants
+from mazebench.tasks.task_options import ENDS, TaskOptions, Variants
 from mazebench.tasks.time_limit import track_time_limit
 from mazebench.tasks.tracks import TRACKS
 

@@ -14,8 +14,8 @@ from mazebench.maps.benchmark import MAZES_PER_SPLIT, PAPER_BENCHMARK, SIZES, TR
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.episode import Episode, make_episode, sample_pair
-from mazebench.tasks.options import EVAL_DISTANCES
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task_options import EVAL_DISTANCES
 from mazebench.world.mjcf import BODY_RADIUS
 
 COLUMNS = ("maze", "start_row", "start_column", "goal_row", "goal_column", "distance", "yaw", "seed", "shortest_path")

@@ -23,20 +23,20 @@ from mazebench.agent_loading import learning_agents, load_agent_class
 from mazebench.errors import InputError, RunError, unknown
 from mazebench.evaluation.checked_agent import context_size_of
 from mazebench.evaluation.provenance import code_hash
-from mazebench.maps.options import DrawnOptions
+from mazebench.maps.maze_options import DrawnOptions
 from mazebench.options import fields_of, from_names
 from mazebench.results.played import mazes_hash
 from mazebench.tasks.build import build_task
-from mazebench.tasks.options import TaskOptions, Variants
 from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task_options import TaskOptions, Variants
 from mazebench.training.counters import Counters
 from mazebench.training.experience import Experience
 from mazebench.training.held_out import HeldOutEvaluation
-from mazebench.training.options import TrainOptions
 from mazebench.training.protocol import Learner, LearningAgent
 from mazebench.training.run_folder import RunFolder, read_counters
 from mazebench.training.sources import InProcessSource, Source
 from mazebench.training.status import Progress, Timer, in_words
+from mazebench.training.train_options import TrainOptions
 
 # As many steps take less than a minute on two cores. They are counted, not timed, so that the same run writes the same
 # lines.

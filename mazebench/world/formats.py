@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from mazebench.errors import InputError, unknown
-from mazebench.maps.files import read_located
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, resized
-from mazebench.maps.options import ReadOptions
+from mazebench.maps.maze_files import read_located
+from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.pictures import draw_maze, write_image
-from mazebench.maps.readers.occupancy import LocatedMaze
+from mazebench.maps.readers.occupancy_grid import LocatedMaze
 from mazebench.maps.readers.ros import write_ros_map
 from mazebench.maps.text import write_text_maze
 from mazebench.world.export import MESH_FORMATS, write_mesh, write_mjcf

@@ -39,7 +39,7 @@ class Cameras:
         Args:
           maze: its index among the models.
           qpos: `[3]`, the body's x, y (m) and yaw (rad).
-          marker: `[3]` m, where the goal's marker stands.
+          marker: `[3]` m, where the goal marker stands.
 
         Raises:
           RenderingError: if no rendering context can be opened; the message says what to set.

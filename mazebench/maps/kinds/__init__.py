@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from mazebench.errors import InputError, unknown
-from mazebench.maps.kinds.base import Kind
 from mazebench.maps.kinds.cave import CAVE
 from mazebench.maps.kinds.dfs import DFS
 from mazebench.maps.kinds.hospital import HOSPITAL
 from mazebench.maps.kinds.house import HOUSE
+from mazebench.maps.kinds.kind import Kind
 from mazebench.maps.kinds.museum import MUSEUM
 from mazebench.maps.kinds.obstacles import OBSTACLES
 from mazebench.maps.kinds.office import OFFICE

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import ndimage
 
 from mazebench.maps.grids import largest_area
-from mazebench.maps.kinds.base import Kind
+from mazebench.maps.kinds.kind import Kind
 
 _DENSITY = 0.46  # share of the cells that are rock at first
 _GENERATIONS = 3

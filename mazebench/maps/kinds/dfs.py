@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mazebench.maps.kinds.base import Kind, lattice_door_slots
+from mazebench.maps.kinds.kind import Kind, lattice_door_slots
 from mazebench.maps.maze import Cell
 
 # Share of the walls between two corridors that are opened. With it, over 90 % of 13 x 13 mazes have 3 to 6 landmarks at

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from mazebench.maps.kinds.base import Kind
-from mazebench.maps.kinds.building import cut, open_doors, split_rooms
+from mazebench.maps.kinds.floor_plan import cut, open_doors, split_rooms
+from mazebench.maps.kinds.kind import Kind
 
 _BLOCK = 10  # cells across, with a corridor of two cells
 _LEAST_BLOCK = 3

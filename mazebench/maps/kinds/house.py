@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mazebench.maps.kinds.base import Kind
-from mazebench.maps.kinds.building import open_doors, split_rooms
+from mazebench.maps.kinds.floor_plan import open_doors, split_rooms
+from mazebench.maps.kinds.kind import Kind
 
 _LEAST_SIDE = 3  # of a room, in cells
 _EXTRA_DOORS = 0.05

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mazebench.maps.kinds.base import Kind
-from mazebench.maps.kinds.building import cut, open_doors, turned
+from mazebench.maps.kinds.floor_plan import cut, open_doors, turned
+from mazebench.maps.kinds.kind import Kind
 
 _ROOM_SIDE = 6  # on average, with a wall
 _LEAST_SIDE = 2  # of a room, in cells

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from mazebench.maps.kinds.base import Kind, lattice_door_slots
 from mazebench.maps.kinds.dfs import between_lattice_cells, carve_corridors
+from mazebench.maps.kinds.kind import Kind, lattice_door_slots
 
 # Of the labmaze library's rooms, in cells. The sides are odd, so that walls between rooms lie between lattice cells.
 _ROOM_SHAPES = ((3, 3), (3, 5), (5, 3))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mazebench.maps.kinds.base import Kind
+from mazebench.maps.kinds.kind import Kind
 
 _SHELF_DEPTHS = (1, 2)  # cells, the same for all shelves of a maze
 _AISLE_WIDTHS = (1, 2)

@@ -13,8 +13,8 @@ from mazebench.errors import InputError
 from mazebench.maps.file_kinds import kind_of
 from mazebench.maps.grids import square_maze
 from mazebench.maps.maze import MIN_CELL_SIZE, Maze, MazeError
-from mazebench.maps.options import ReadOptions
-from mazebench.maps.readers.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, locate_maze
+from mazebench.maps.maze_options import ReadOptions
+from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, locate_maze
 from mazebench.storage.files import read_at_most
 
 _MAX_BYTES = 2**27  # of a .npy file

@@ -11,7 +11,7 @@ import numpy as np
 
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, MazeError, require_connected
 from mazebench.maps.readers.cell_grid import core_bounds, fit_grid
-from mazebench.maps.readers.drawing import (
+from mazebench.maps.readers.pixel_map import (
     READ_LINES,
     STRAIGHTEN,
     WORKING_SIDE,

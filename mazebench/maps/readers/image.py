@@ -23,7 +23,7 @@ _MAX_BYTES = 2**27  # of a picture's file; _MAX_PIXELS gray pixels take half of 
 _MAX_PIXELS = MAX_SIDE**2  # of a picture that is read: every drawing of this package
 _PNG_START = b"\x89PNG\r\n\x1a\n"
 _MIN_DARK = 0.3  # share of the pixels of a picture of light walls on a dark ground
-_MARK_SATURATION = 90  # of 255, between the strongest and the weakest channel of a mark
+_MARK_SATURATION = 90  # of 255, between the strongest and the weakest channel of a marker
 _MAX_MARK_SHARE = 0.15  # of the picture, and of its dark pixels; if more are coloured, the paper or the walls are
 _MAX_MAP_SHADES = 8  # of a map of one pixel a cell: walls, floor, marks; a scan has more
 
@@ -112,7 +112,7 @@ def _decode(content: bytes) -> np.ndarray | None:
 
 
 def to_gray(image: np.ndarray, name: str) -> np.ndarray:
-    """Returns the luminance of a picture on white paper, without its marks in colour: `[H, W]` uint8.
+    """Returns the luminance of a picture on white paper, without its markers in colour: `[H, W]` uint8.
 
     Raises:
       MazeError: if `image` is not of a kind that `maze_from_image` takes, or too small.

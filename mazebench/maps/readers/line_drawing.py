@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 
 from mazebench.maps.maze import MAX_SIZE, MazeError
-from mazebench.maps.options import THIN_WALLS
+from mazebench.maps.maze_options import THIN_WALLS
 from mazebench.maps.readers.cell_grid import CORE, core_bounds, fit_grid
-from mazebench.maps.readers.drawing import STRAIGHTEN, WORKING_SIDE, enlarged, ink_of, on_white, outer_walls
+from mazebench.maps.readers.pixel_map import STRAIGHTEN, WORKING_SIDE, enlarged, ink_of, on_white, outer_walls
 
 _NEARLY_BEST = 0.9  # share of the best fit
 _MIN_CLARITY = 0.2  # between the share of a boundary that is line, and a half

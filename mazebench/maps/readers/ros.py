@@ -17,9 +17,9 @@ from scipy import ndimage
 
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze, MazeError
-from mazebench.maps.options import ReadOptions
+from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.readers.image import read_picture, to_gray
-from mazebench.maps.readers.occupancy import FREE, OCCUPIED, UNKNOWN, LocatedMaze, OccupancyGrid, Pose, locate_maze
+from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, UNKNOWN, LocatedMaze, OccupancyGrid, Pose, locate_maze
 from mazebench.storage.files import open_whole, read_at_most
 
 ROS_SUFFIXES = (".yaml", ".yml")

@@ -6,9 +6,9 @@ import typing
 from typing import Annotated
 
 from mazebench.options import options
-from mazebench.tasks.perturbations.base import Perturbation
 from mazebench.tasks.perturbations.flip import MapFlip
 from mazebench.tasks.perturbations.noise import PositionNoise
+from mazebench.tasks.perturbations.perturbation import Perturbation
 from mazebench.tasks.perturbations.warp import MapWarp
 
 

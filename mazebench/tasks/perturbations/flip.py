@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from mazebench.maps.maze import Cell
-from mazebench.tasks.perturbations.base import Perturbation, ShownMap
+from mazebench.tasks.perturbations.perturbation import Perturbation, ShownMap
 from mazebench.tasks.streams import Stream
 
 

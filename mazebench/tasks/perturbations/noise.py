@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from mazebench.tasks.perturbations.base import Perturbation, StateError
+from mazebench.tasks.perturbations.perturbation import Perturbation, StateError
 from mazebench.tasks.streams import Stream
 
 

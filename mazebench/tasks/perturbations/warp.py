@@ -9,7 +9,7 @@ import numpy as np
 
 from mazebench.maps.homography import warp_cell, warp_points, warp_walls
 from mazebench.maps.maze import Cell
-from mazebench.tasks.perturbations.base import Drawing, Perturbation, ShownMap
+from mazebench.tasks.perturbations.perturbation import Drawing, Perturbation, ShownMap
 from mazebench.tasks.streams import Stream
 
 # If every corner moves by less than this share of the side, the four corners stay a convex quadrilateral.

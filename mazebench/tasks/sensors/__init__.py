@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mazebench.tasks.sensors.base import Sensor
 from mazebench.tasks.sensors.cameras import CameraSensor
 from mazebench.tasks.sensors.lidar import LidarSensor
+from mazebench.tasks.sensors.sensor import Sensor
 
 SENSORS: dict[str, type[Sensor]] = {
     "egocentric": CameraSensor,

@@ -1,4 +1,4 @@
-"""Pictures of the true world, the goal's marker in it, as observations."""
+"""Pictures of the true world, the goal marker in it, as observations."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from dm_env import specs
 
 from mazebench.maps.drawn import Mazes
-from mazebench.tasks.sensors.base import Sensor, SensorOptions, Worlds
+from mazebench.tasks.sensors.sensor import Sensor, SensorOptions, Worlds
 
 
 class CameraSensor(Sensor):

@@ -6,13 +6,13 @@ import numpy as np
 from dm_env import specs
 
 from mazebench.maps.drawn import Mazes
-from mazebench.tasks.sensors.base import Sensor, SensorOptions, Worlds
 from mazebench.tasks.sensors.lidar_noise import read
-from mazebench.world.lidar import NUM_RAYS, Lidar, LidarModel
+from mazebench.tasks.sensors.sensor import Sensor, SensorOptions, Worlds
+from mazebench.world.ray_casting import NUM_RAYS, Lidar, LidarModel
 
 
 class LidarSensor(Sensor):
-    """A range sensor at the body's centre. It sees the walls only, neither the body nor the goal's marker."""
+    """A range sensor at the body's centre. It sees the walls only, neither the body nor the goal marker."""
 
     @classmethod
     def observation_spec(cls, name: str, options: SensorOptions) -> specs.BoundedArray:

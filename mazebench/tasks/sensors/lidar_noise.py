@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mazebench.errors import InputError
-from mazebench.world.lidar import NUM_RAYS, TURTLEBOT3, LidarModel
+from mazebench.world.ray_casting import NUM_RAYS, TURTLEBOT3, LidarModel
 
 _NAMED = {"turtlebot3": TURTLEBOT3}
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from mazebench.constants import TRACK_NAMES
 from mazebench.tasks.tracks.adrift import Adrift
-from mazebench.tasks.tracks.base import Track
 from mazebench.tasks.tracks.building import Building
 from mazebench.tasks.tracks.rebuilt import Rebuilt
 from mazebench.tasks.tracks.rough import Rough
+from mazebench.tasks.tracks.track import Track
 
 TRACKS: dict[str, Track] = dict(zip(TRACK_NAMES, (Building(), Rebuilt(), Adrift(), Rough()), strict=True))

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from mazebench.tasks.odometry import Odometry, corrupted_odometry
-from mazebench.tasks.perturbations.base import Perturbation, StateError
+from mazebench.tasks.perturbations.perturbation import Perturbation, StateError
 from mazebench.tasks.streams import Stream
-from mazebench.tasks.tracks.base import Track
 from mazebench.tasks.tracks.building import HiddenStart
 from mazebench.tasks.tracks.rebuilt import MovedDoors
+from mazebench.tasks.tracks.track import Track
 
 _BLOCKED = (0.7, 0.7, 0.85)  # share of the shortest paths on the map, by level
 

@@ -1,4 +1,4 @@
-"""The track `building`: the map is right, but the sheet that it is drawn on may be turned or mirrored."""
+"""The track `building`: the map is right, but may be turned or mirrored."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 
 from mazebench.maps.maze import Cell
 from mazebench.tasks.context import LOCAL_MAP, START
-from mazebench.tasks.perturbations.base import Drawing, Perturbation, ShownMap
+from mazebench.tasks.perturbations.perturbation import Drawing, Perturbation, ShownMap
 from mazebench.tasks.streams import Stream
-from mazebench.tasks.tracks.base import Track
+from mazebench.tasks.tracks.track import Track
 
 
 class Building(Track):
-    """Shows the building as it is. The pose is exact in the building's frame, of which the sheet need not tell."""
+    """Shows the building as it is. The pose is exact in the building's frame, which the map need not show."""
 
-    help = "The map is right; the sheet that it is drawn on may be turned or mirrored."
+    help = "The map is right, but may be turned or mirrored."
     levels = (
         "the map as drawn",
         "turned by unknown quarter turns; planes 1 and 3 of the context are zero",
@@ -25,13 +25,13 @@ class Building(Track):
     )
 
     def parts(self, level: int) -> Sequence[tuple[Perturbation, float]]:
-        sheet = TurnedSheet(turns=True, mirrors=level == 3)
-        return () if level == 1 else ((sheet, 1), (HiddenStart(), 1))
+        turned = TurnedMap(turns=True, mirrors=level == 3)
+        return () if level == 1 else ((turned, 1), (HiddenStart(), 1))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class TurnedSheet(Perturbation):
-    """Turns the sheet by 0 to 3 quarters, or mirrors it with probability .5, or both; draws are the same for all."""
+class TurnedMap(Perturbation):
+    """Turns the map by 0 to 3 quarters, or mirrors it with probability .5, or both; draws are the same for all."""
 
     turns: bool
     mirrors: bool
@@ -41,12 +41,12 @@ class TurnedSheet(Perturbation):
     def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
         quarters, is_mirrored = int(rng.integers(4)), bool(rng.integers(2))
         side = len(shown.seen_walls())
-        sheet = _Sheet(shown.drawing, side, quarters * self.turns, is_mirrored and self.mirrors)
-        return dataclasses.replace(shown, drawing=sheet)
+        turned = _TurnedDrawing(shown.drawing, side, quarters * self.turns, is_mirrored and self.mirrors)
+        return dataclasses.replace(shown, drawing=turned)
 
 
 @dataclasses.dataclass(frozen=True)
-class _Sheet(Drawing):
+class _TurnedDrawing(Drawing):
     """A drawing, or the plain map, that is first mirrored (left to right) and then turned counter-clockwise."""
 
     inner: Drawing | None
@@ -80,7 +80,7 @@ class _Sheet(Drawing):
 
 
 class HiddenStart(Perturbation):
-    """Gives neither the mark of the start nor the map around it: planes 1 and 3 of the context are zero."""
+    """Gives neither the marker of the start nor the map around it: planes 1 and 3 of the context are zero."""
 
     stream = Stream.HIDDEN_START
 

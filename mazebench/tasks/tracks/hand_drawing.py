@@ -1,7 +1,7 @@
 """A map as it is drawn by hand: a grey picture of 2 N x 2 N pixels.
 
 - A smooth displacement bends the maze. Its largest value is the level's.
-- Each axis is scaled by 0.85 to 1.15, where 1.15 fills the sheet. The drawing lies anywhere on the sheet.
+- Each axis is scaled by 0.85 to 1.15, where 1.15 fills the picture. The drawing lies anywhere on the picture.
 - Walls are drawn up to a pixel thicker or thinner, where a cell is two pixels.
 - A pixel has the share of wall in it, to 8 bits. The paper around the maze is wall.
 - Marks are displaced as the maze is, and are never inside a wall.
@@ -14,7 +14,7 @@ import dataclasses
 import numpy as np
 
 from mazebench.maps.maze import Cell
-from mazebench.tasks.perturbations.base import Drawing
+from mazebench.tasks.perturbations.perturbation import Drawing
 
 DISPLACEMENTS = (0.5, 1.0, 1.5)  # cells, the largest one at each level of `rough`
 PIXELS = 2  # pixels of the picture per cell of the maze, along each axis
@@ -57,7 +57,7 @@ class Displacement:
         return float(np.sqrt((self.on_grid(_nodes(size)) ** 2).sum(axis=0)).max())
 
     def folds(self, size: int) -> bool:
-        """Returns whether the displaced sheet lies over itself somewhere, or one of its axes runs backwards."""
+        """Returns whether the displaced picture lies over itself somewhere, or one of its axes runs backwards."""
         nodes, count = _nodes(size), self.noise.shape[-1]
         smooth, slope = _gaussians(nodes, count), _gaussian_slopes(nodes, count)
 
@@ -150,7 +150,7 @@ class HandDrawing(Drawing):
 def draw_by_hand(size: int, level: float, rng: np.random.Generator) -> HandDrawing:
     """Draws how a maze of `size` cells a side is drawn by hand; the largest displacement is `level`, in cells.
 
-    Each axis is scaled by uniform(0.85, 1.15). At the largest scale the drawing is as long as the sheet, else it lies
+    Each axis is scaled by uniform(0.85, 1.15). At the largest scale the drawing is as long as the picture, else it lies
     anywhere on it. `rng` gives the same draws at all levels.
     """
     displacement = draw_displacement(size, rng).scaled(level)
@@ -163,7 +163,7 @@ def draw_by_hand(size: int, level: float, rng: np.random.Generator) -> HandDrawi
 def fitted_drawing(
     size: int, displacement: Displacement, share: np.ndarray, margin: np.ndarray, thickening: float
 ) -> HandDrawing:
-    """Returns a drawing that takes `share` `[2]` of the sheet along rows and columns.
+    """Returns a drawing that takes `share` `[2]` of the picture along rows and columns.
 
     Of the paper that it leaves bare, the share `margin` `[2]` lies above the drawing, and on its left.
     """

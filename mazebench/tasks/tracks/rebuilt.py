@@ -11,9 +11,9 @@ from mazebench.errors import InputError
 from mazebench.maps.benchmark import KINDS_SIZE
 from mazebench.maps.doors import door_slots, num_swappable, swap_doors
 from mazebench.maps.maze import Cell, Maze
-from mazebench.tasks.perturbations.base import Perturbation, ShownMap
+from mazebench.tasks.perturbations.perturbation import Perturbation, ShownMap
 from mazebench.tasks.streams import Stream
-from mazebench.tasks.tracks.base import Track
+from mazebench.tasks.tracks.track import Track
 
 # How many doors of a maze of 31 x 31 cells move, by kind, so that this share of the shortest paths on the map is
 # blocked in the maze (`python -m benchmarks.tracks_checks swaps`). Mazes of no kind are taken for houses.

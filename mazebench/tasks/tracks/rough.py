@@ -1,4 +1,4 @@
-"""The track `rough`: a sheet as people draw it, of a building in which doors have moved; the pose is odometry."""
+"""The track `rough`: a map as people draw it, of a building in which doors have moved; the pose is odometry."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from mazebench.maps.maze import Cell
-from mazebench.tasks.perturbations.base import Perturbation, ShownMap
+from mazebench.tasks.perturbations.perturbation import Perturbation, ShownMap
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.tracks.adrift import Adrift, lost_pose
-from mazebench.tasks.tracks.base import Track
-from mazebench.tasks.tracks.building import TurnedSheet
+from mazebench.tasks.tracks.building import TurnedMap
 from mazebench.tasks.tracks.hand_drawing import DISPLACEMENTS, PIXELS, draw_by_hand
 from mazebench.tasks.tracks.rebuilt import MovedDoors
+from mazebench.tasks.tracks.track import Track
 
 _BLOCKED = (0.45, 0.7, 0.7)  # share of the shortest paths on the map, by level
 
 
 class Rough(Track):
-    """Doors have moved, the sheet is drawn by hand, and the pose is odometry as on `adrift`."""
+    """Doors have moved, the map is drawn by hand, and the pose is odometry as on `adrift`."""
 
     help = "The map is drawn by hand, doors have moved since, and the pose is odometry."
     levels = (
@@ -33,12 +33,12 @@ class Rough(Track):
     pixels_per_cell = PIXELS
 
     def parts(self, level: int) -> Sequence[tuple[Perturbation, float]]:
-        doors, sheet = (MovedDoors(), _BLOCKED[level - 1]), (DrawnSheet(), DISPLACEMENTS[level - 1])
-        mirrored = ((TurnedSheet(turns=False, mirrors=True), 1),) if level == 3 else ()
-        return doors, sheet, *mirrored, *lost_pose(level)
+        doors, drawn = (MovedDoors(), _BLOCKED[level - 1]), (HandDrawnMap(), DISPLACEMENTS[level - 1])
+        mirrored = ((TurnedMap(turns=False, mirrors=True), 1),) if level == 3 else ()
+        return doors, drawn, *mirrored, *lost_pose(level)
 
 
-class DrawnSheet(Perturbation):
+class HandDrawnMap(Perturbation):
     """Draws the map by hand, as `draw_by_hand` does; the level is the largest displacement in cells."""
 
     stream = Stream.DRAWN_SHEET

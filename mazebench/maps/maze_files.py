@@ -9,10 +9,10 @@ import numpy as np
 
 from mazebench.errors import InputError, held_remarks, remark
 from mazebench.maps.maze import Maze, resized
-from mazebench.maps.options import ReadOptions
+from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.readers.arrays import read_array_maze
 from mazebench.maps.readers.image import read_image_maze
-from mazebench.maps.readers.occupancy import LocatedMaze
+from mazebench.maps.readers.occupancy_grid import LocatedMaze
 from mazebench.maps.readers.ros import ROS_SUFFIXES, locate_floor_plan, locate_ros_maze, map_of_picture, picture_of
 from mazebench.maps.text import read_text_maze
 
@@ -34,7 +34,7 @@ def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any)
     Args:
       path: of the file; of a ROS map, of its YAML file.
       size: N that the maze must have; for a picture whose cells can't be counted, the cells on its longer side.
-      **options: those of `mazebench.maps.options.ReadOptions`.
+      **options: those of `mazebench.maps.maze_options.ReadOptions`.
 
     Raises:
       InputError: if the file can't be read or holds no legal maze.
@@ -50,7 +50,7 @@ def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
 
     Args:
       path: of the file or folder.
-      **options: those of `mazebench.maps.options.ReadOptions`.
+      **options: those of `mazebench.maps.maze_options.ReadOptions`.
 
     Raises:
       InputError: if there is no map or one can't be read.

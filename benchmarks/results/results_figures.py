@@ -26,7 +26,7 @@ from mazebench.report.figures import Drawn, Panel, draw_distributions, draw_pane
 from mazebench.report.table import Table
 from mazebench.results.intervals import Estimate
 from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.tracks.track import LEVELS
 
 # Of the report of the suite `paper`.
 _FLIPS, _WARPS = "flip-hierarchical-13", "warp-local-13"

@@ -1,6 +1,6 @@
 """Prints the speed of the tree search beside that of mctx, as ratios taken in one run.
 
-    python benchmarks/search.py [--seconds SECONDS]
+    python benchmarks/search_and_mctx.py [--seconds SECONDS]
 
 Both search with the same network, a stand-in of about MMN's size, whose transition has other weights in each root as a
 hypermodel's has. In both, network and search are compiled together and run in one thread. A rate is of simulations in a

@@ -35,7 +35,7 @@ from mazebench.results.metrics import ON_TIME_METRICS
 from mazebench.results.reading import Result
 from mazebench.results.records import column
 from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.base import LEVELS
+from mazebench.tasks.tracks.track import LEVELS
 
 SATURATED = "At 1.00 ["  # begins the sentence below a table
 _PAPERS_MMN = "MMN (paper)"

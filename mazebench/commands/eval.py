@@ -13,9 +13,9 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import has_camera, load_mujoco
-from mazebench.commands.options import chosen, takes_options
+from mazebench.commands.option_parameters import chosen, takes_options
 from mazebench.errors import InputError, RunError
-from mazebench.evaluation.options import EvalOptions, RunOptions
+from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.options import options_of
 
 
@@ -84,12 +84,12 @@ def evaluate(
 
 
 def _evaluate_one(options: EvalOptions, folder: pathlib.Path, run: RunOptions, kept: progress.Kept) -> None:
-    from mazebench.commands import table
+    from mazebench.commands import summary_table
     from mazebench.evaluation import evaluate
 
     with progress.evaluating(f"{options.agent}, {options.task.track or options.task.task}", kept) as show:
         summary = evaluate.run_evaluation(options, folder, run, show)
-    table.print_summary(summary)
+    summary_table.print_summary(summary)
 
 
 def _evaluate_suite(
@@ -100,12 +100,12 @@ def _evaluate_suite(
     run: RunOptions,
     kept: progress.Kept,
 ) -> None:
-    from mazebench.commands import table
+    from mazebench.commands import summary_table
     from mazebench.evaluation import suites
 
     with progress.evaluating(f"{suite}, {', '.join(agents)}", kept) as show:
         summaries = suites.run_suite(suite, agents, folder, run, show, checkpoint=options.checkpoint, seed=options.seed)
-    table.print_suite(summaries)
+    summary_table.print_suite(summaries)
 
 
 def _new_folder(name: str) -> pathlib.Path:

@@ -9,7 +9,7 @@ from mazebench import stopping
 from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.chunk import run_trials
-from mazebench.evaluation.options import NUM_ENVS
+from mazebench.evaluation.eval_options import NUM_ENVS
 from mazebench.results.metrics import Steps
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.trials import Trial

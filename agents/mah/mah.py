@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from ..dqn.agent import QAgent
-from ..dqn.config import DQNConfig
-from ..dqn.network import QNetwork
-from .network import JoinedQNetwork, ReadingQNetwork
+from ..dqn.dqn import QAgent
+from ..dqn.dqn_config import DQNConfig
+from ..dqn.q_network import QNetwork
+from .map_q_network import JoinedQNetwork, ReadingQNetwork
 
 
 class _MapAgent(QAgent):

@@ -28,8 +28,8 @@ from ..common.layers import (
     marked_position,
     place_code,
 )
-from .config import MMNConfig
-from .reading import read
+from .map_reader import read
+from .mmn_config import MMNConfig
 
 NUM_POSE = 4  # x and y moved, sine and cosine of yaw: the first numbers of a latent state, as of state features
 NUM_BODY = 7  # and velocities forward, left and of yaw

@@ -12,9 +12,9 @@ from mazebench.constants import NUM_ACTIONS
 
 from ..muzero.search import RecurrentFn, Root, SearchResult, gumbel_muzero_policy
 from ..muzero.tree import Evaluation
-from .config import MMNConfig
+from .hypermodel import Code, MMNNetwork, Predictions, reward_and_discount
 from .kernel_model import kernel_model
-from .network import Code, MMNNetwork, Predictions, reward_and_discount
+from .mmn_config import MMNConfig
 
 
 @torch.no_grad()

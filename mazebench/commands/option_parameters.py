@@ -13,9 +13,9 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from mazebench.errors import InputError, held_remarks
-from mazebench.maps.options import MazeOptions
+from mazebench.maps.maze_options import MazeOptions
 from mazebench.options import Option, from_names, options_of
-from mazebench.tasks.options import EVAL_DISTANCES, TaskOptions, is_own
+from mazebench.tasks.task_options import EVAL_DISTANCES, TaskOptions, is_own
 
 Chosen = TypeVar("Chosen")
 

@@ -13,9 +13,9 @@ from ..common.actor import one_torch_thread
 from ..common.descent import Descent, in_numbers
 from ..common.learner import HindsightLearner
 from .batches import make_batch
-from .config import MMNConfig
+from .hypermodel import MMNNetwork
 from .losses import q_losses, unrolled_losses
-from .network import MMNNetwork
+from .mmn_config import MMNConfig
 from .targets import targets_of
 
 

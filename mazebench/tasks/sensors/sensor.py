@@ -15,7 +15,7 @@ from mazebench.constants import MAX_PIXELS
 from mazebench.maps.drawn import Mazes
 from mazebench.options import Doc, options
 from mazebench.tasks.sensors.lidar_noise import model_of, noise_text
-from mazebench.world.lidar import LidarModel
+from mazebench.world.ray_casting import LidarModel
 
 
 @options
@@ -44,7 +44,7 @@ class Worlds(NamedTuple):
 
     maze: np.ndarray  # [K] int, index among the task's mazes
     pose: np.ndarray  # [K, 3] float64, of the body: x, y (m), yaw (rad, not wrapped)
-    marker: np.ndarray  # [K, 3] float64, m: where the goal's marker stands
+    marker: np.ndarray  # [K, 3] float64, m: where the goal marker stands
     noise: Sequence[np.random.Generator | None]  # [K], draws the lidar's noise in an episode; None: there is none
 
 

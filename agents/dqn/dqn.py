@@ -16,9 +16,9 @@ from mazebench.constants import NUM_ACTIONS
 
 from ..common.actor import NetworkAgent, acting
 from ..common.layers import in_batches, state_features
-from .config import DQNConfig
-from .learner import DQNLearner
-from .network import CONTEXTS_AT_ONCE, STATES_AT_ONCE, QNetwork
+from .dqn_config import DQNConfig
+from .q_learner import DQNLearner
+from .q_network import CONTEXTS_AT_ONCE, STATES_AT_ONCE, QNetwork
 
 
 @dataclasses.dataclass

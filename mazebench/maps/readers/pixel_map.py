@@ -8,7 +8,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from mazebench.maps.options import THIN_WALLS
+from mazebench.maps.maze_options import THIN_WALLS
 
 WORKING_SIDE = 2400  # pixels; larger pictures are shrunk to it
 READ_LINES = f"read them with --walls lines; {THIN_WALLS}"

@@ -12,11 +12,11 @@ import pandas as pd
 from mazebench.errors import held_remarks, remark
 from mazebench.report.episodes import ReportedResult, join_episodes, read_results
 from mazebench.report.figures import draw_distributions, draw_several_tables, draw_table, save
-from mazebench.report.files import FIGURES, PAGE, TABLES, new_report, write_text
 from mazebench.report.page import build_page
+from mazebench.report.report_files import FIGURES, PAGE, TABLES, new_report, write_text
 from mazebench.report.table import latex_name, to_csv, to_latex, to_markdown
 from mazebench.report.tables import build_tables
-from mazebench.report.trajectories import draw_trajectories
+from mazebench.report.trajectory_figures import draw_trajectories
 
 _PACKAGES = ("mazebench-mujoco", "mujoco", "numpy", "torch")  # in provenance
 

@@ -10,16 +10,16 @@ from pydantic import BeforeValidator
 
 from mazebench.errors import InputError
 from mazebench.maps.maze import MAX_SIZE, Cell, Maze, corner_cells
-from mazebench.maps.options import MazeOptions
+from mazebench.maps.maze_options import MazeOptions
 from mazebench.options import Doc, OneOf, options
 from mazebench.tasks.perturbations import Perturbations, perturbation_levels
 from mazebench.tasks.sensors import SENSORS
-from mazebench.tasks.sensors.base import SensorOptions
+from mazebench.tasks.sensors.sensor import SensorOptions
 from mazebench.tasks.start_goal import cell_of_end, end_text
 from mazebench.tasks.time_limit import track_time_limit
 from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.base import LEVELS
-from mazebench.world.lidar import TURTLEBOT3, LidarModel
+from mazebench.tasks.tracks.track import LEVELS
+from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
 
 TASKS = ("local", "hierarchical")
 TRAIN_DISTANCES = tuple(range(1, 6))

@@ -22,7 +22,7 @@ from ..common.layers import (
     position_code,
     waves,
 )
-from ..dqn.network import QNetwork
+from ..dqn.q_network import QNetwork
 
 # Dilations of the 3 x 3 convolutions; together they see 19 cells far, across a 13 x 13 map.
 _FAR = (1, 1, 2, 2, 4, 4, 2, 1, 1)

@@ -10,10 +10,10 @@ from annotated_types import Ge
 from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import FROZEN_SPLITS, PAPER_BENCHMARK, TRACKS_BENCHMARK
-from mazebench.maps.options import MazeOptions
+from mazebench.maps.maze_options import MazeOptions
 from mazebench.options import Doc, fields_of, from_names, options
-from mazebench.tasks.options import TaskOptions, Variants, is_own
-from mazebench.tasks.tracks.base import DISTANCES
+from mazebench.tasks.task_options import TaskOptions, Variants, is_own
+from mazebench.tasks.tracks.track import DISTANCES
 
 NUM_ENVS = 256  # environments side by side in a process, unless another number is asked for
 

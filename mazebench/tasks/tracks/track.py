@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from mazebench.maps.maze import Maze
-from mazebench.tasks.perturbations.base import Perturbation
+from mazebench.tasks.perturbations.perturbation import Perturbation
 
 LEVELS = (1, 2, 3)
 DISTANCES = tuple(range(15, 41))  # cells between start and goal

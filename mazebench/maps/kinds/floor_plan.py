@@ -6,7 +6,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from mazebench.maps.kinds.base import door_slots, rooms_beside
+from mazebench.maps.kinds.kind import door_slots, rooms_beside
 
 Box = tuple[int, int, int, int]  # the first row and column, and those after the last: top, left, bottom, right
 

@@ -8,9 +8,9 @@ from typing import Annotated
 from annotated_types import Ge, Interval
 
 from mazebench.errors import InputError
-from mazebench.maps.options import MazeOptions
+from mazebench.maps.maze_options import MazeOptions
 from mazebench.options import Doc, by_name, options, options_of
-from mazebench.tasks.options import Pairs, TaskOptions
+from mazebench.tasks.task_options import Pairs, TaskOptions
 
 # Options of `TaskOptions` and `MazeOptions` for which trainings have one value only.
 FIXED = ("task", "start", "goal", "landmark_distance", "split")

@@ -17,7 +17,7 @@ from scipy import ndimage
 from mazebench.errors import InputError, remark
 from mazebench.maps.grids import largest_area, pad_to_square
 from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, MIN_SIZE, Maze, MazeError
-from mazebench.maps.options import ReadOptions
+from mazebench.maps.maze_options import ReadOptions
 
 Pose = tuple[float, float, float]  # x, y (m), yaw (rad)
 

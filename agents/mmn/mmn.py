@@ -17,10 +17,10 @@ from mazebench.tasks.context import START
 
 from ..common.actor import NetworkAgent, acting
 from ..common.layers import in_batches, marked_position, state_features
-from .config import MMNConfig
-from .learner import MMNLearner
-from .network import CONTEXTS_AT_ONCE, STATES_AT_ONCE, Code, MMNNetwork, rows_of
-from .planning import plan
+from .hypermodel import CONTEXTS_AT_ONCE, STATES_AT_ONCE, Code, MMNNetwork, rows_of
+from .mmn_config import MMNConfig
+from .model_learner import MMNLearner
+from .search_policy import plan
 
 
 @dataclasses.dataclass
@@ -106,7 +106,7 @@ class MMN(NetworkAgent):
         moved = torch.from_numpy(position - origin).to(self._device)
         state.origin[new] = origin
 
-        # Where the anchor is on the map: at the mark of the start, if it is new.
+        # Where the anchor is on the map: at the marker of the start, if it is new.
         rows = torch.from_numpy(new).to(self._device)
         context = torch.from_numpy(observation["context"][new]).to(self._device)
         anchor = start = marked_position(context[:, START])
