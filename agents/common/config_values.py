@@ -55,11 +55,7 @@ def override(config: Config, values: Mapping[str, Any]) -> Config:
 
 
 def check_rows(config: Any) -> None:
-    """Checks that the replay can hold as many rows as learning waits for.
-
-    Raises:
-      InputError: if it can't.
-    """
+    """Checks that the replay can hold as many rows as learning waits for."""
     rows = config.replay_capacity // config.num_envs * config.num_envs
     if rows < config.min_rows:
         raise InputError(f"expected a replay_capacity of at least min_rows {config.min_rows}, found one of {rows} rows")

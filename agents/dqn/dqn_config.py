@@ -13,11 +13,7 @@ from ..common.config_values import Ahead, Count, Exponent, Factor, Length, Rows,
 
 @options
 class DQNConfig:
-    """Ape-X DQN (Horgan et al. 2018) with hindsight (Andrychowicz et al. 2017), sized for two CPU cores.
-
-    Raises:
-      InputError: if a value is out of its range.
-    """
+    """Ape-X DQN (Horgan et al. 2018) with hindsight (Andrychowicz et al. 2017), sized for two CPU cores."""
 
     reading: bool = True  # MAH reads the map where it is; False, the paper's: one code of the whole context
     channels: Size = 32  # of the map encoder

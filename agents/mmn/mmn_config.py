@@ -14,11 +14,7 @@ from ..common.config_values import Ahead, Count, Factor, Length, Rows, Share, Si
 
 @options
 class MMNConfig:
-    """The paper's choices where it states them, unless docs/agents/mmn.md says otherwise; sized for two CPU cores.
-
-    Raises:
-      InputError: if a value is out of its range.
-    """
+    """The paper's choices where it states them, unless docs/agents/mmn.md says otherwise; sized for two CPU cores."""
 
     # Networks
     # An ablation without model: the heads give action values, learned by double Q-learning with values of n_step. What

@@ -69,11 +69,7 @@ class Kept:
         return found
 
     def curves(self, name: str) -> list[Run]:
-        """Returns what the training runs of an archive logged.
-
-        Raises:
-          InputError: if it is not kept.
-        """
+        """Returns what the training runs of an archive logged."""
         if name not in self.training:
             raise InputError(f"expected training runs {name} among the records, found none")
         return self.training[name]
@@ -82,9 +78,6 @@ class Kept:
         """Returns what an archive's training runs logged at the milestones that all of them reached, a line each.
 
         The index has millions of agent steps, rounded to a tenth.
-
-        Raises:
-          InputError: if the archive is not kept.
         """
         runs = []
         for run in self.curves(name):
@@ -100,21 +93,13 @@ class Kept:
         return {steps: of_runs.tolist() for steps, of_runs in rates.groupby(level=0)}
 
     def result(self, row: str, part: str) -> Result:
-        """Returns the evaluation of an agent on a part of a suite.
-
-        Raises:
-          InputError: if it is not kept.
-        """
+        """Returns the evaluation of an agent on a part of a suite."""
         if (row, part) not in self.results:
             raise InputError(f"expected an evaluation of {row} on {part} among the records, found none")
         return self.results[row, part]
 
     def levels(self, row: str, track: str) -> list[Result]:
-        """Returns an agent's evaluations at the levels of a track; none with the true pose on a track that tells it.
-
-        Raises:
-          InputError: if one is not kept.
-        """
+        """Returns an agent's evaluations at the levels of a track; none with the true pose on a track that tells it."""
         if row == TRUE_POSE and not TRACKS[track].hides_pose:
             return []
         return [self.result(row, f"{track}-{level}") for level in LEVELS]
@@ -162,9 +147,6 @@ def keep(folder: pathlib.Path, records: pathlib.Path) -> pathlib.Path:
 
     A folder without any may hold training runs. Their configs, curves and last checkpoints go to `records/training`.
     Equal contents give equal bytes.
-
-    Raises:
-      InputError: if there is neither.
     """
     folder = folder.resolve()
     finished = sorted(path.parent for path in folder.rglob(SUMMARY))

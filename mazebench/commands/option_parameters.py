@@ -57,9 +57,6 @@ def chosen(options_class: type[Chosen], values: Mapping[str, Any], **others: Any
       options_class: one of those that the command takes.
       values: by name, also of other classes.
       **others: fields that are no options.
-
-    Raises:
-      InputError: if a value is not allowed.
     """
     names = options_of(options_class)
     return from_names(options_class, {name: value for name, value in values.items() if name in names}, **others)

@@ -41,9 +41,6 @@ class MazeEnv(JsonSpec, gymnasium.Env):
           seed: of the first reset.
           render_mode: None or "rgb_array".
           camera: of `render`: "top", "chase" or "egocentric".
-
-        Raises:
-          InputError: if an argument is not allowed.
         """
         arguments = Arguments(render_mode=render_mode, camera=camera)
         self.task = Navigation(task_spec, seed)

@@ -70,11 +70,7 @@ class Cluster:
 
 
 def connect(address: str) -> None:
-    """Connects this process to the cluster at `address`, as `Cluster` does.
-
-    Raises:
-      InputError: if there is none.
-    """
+    """Connects this process to the cluster at `address`, as `Cluster` does."""
     handler, is_terminated = signal.getsignal(signal.SIGTERM), False
     try:
         parts = urllib.parse.urlsplit(address if "://" in address else f"//{address}")

@@ -18,11 +18,7 @@ ORACLE = "oracle"
 
 
 def measure_oracle_steps(task: TaskSpec, trials: Sequence[Trial], num_envs: int = NUM_ENVS) -> Steps:
-    """Returns the oracle's steps in each trial; None where it does not reach the goal.
-
-    Raises:
-      InputError: if no such agent is installed.
-    """
+    """Returns the oracle's steps in each trial; None where it does not reach the goal."""
     # The oracle observes nothing; tracks have the lidar all the same.
     task = dataclasses.replace(task, sensors=tuple(name for name in task.sensors if name == "lidar"))
     interface = Interface(task.task, task.size, task.context_size, cell_size=task.cell_size)

@@ -35,11 +35,7 @@ class Pool(Protocol):
 
 @contextlib.contextmanager
 def open_pool(run: RunOptions) -> Iterator[Pool]:
-    """Yields the pool that is asked for and ends it.
-
-    Raises:
-      InputError: if there is no such cluster.
-    """
+    """Yields the pool that is asked for and ends it."""
     if run.cluster is not None:
         from mazebench.evaluation.cluster import Cluster  # Ray is an extra
 

@@ -94,11 +94,7 @@ class Store:
         return [self._ended[index].record for index in sorted(self._ended)]
 
     def keep_oracle_steps(self, steps: Steps) -> None:
-        """Writes the oracle's steps in all episodes.
-
-        Raises:
-          RunError: as for `append`.
-        """
+        """Writes the oracle's steps in all episodes."""
         with self._keeping_what_is_written():
             write_json(self.folder / ORACLE, {"steps": steps}, indent=None)
         self.oracle_steps = steps
@@ -115,11 +111,7 @@ class Store:
         self._ended |= {each.record.episode: each for each in ended}
 
     def finish(self, summary: Summary) -> None:
-        """Writes the results; all episodes must have ended.
-
-        Raises:
-          RunError: as for `append`.
-        """
+        """Writes the results; all episodes must have ended."""
         ended = [self._ended[index] for index in range(len(self._plan.trials))]
         with self._keeping_what_is_written():
             with open_whole(self.folder / EPISODES) as file:

@@ -141,11 +141,7 @@ def run_suite(
 
 
 def _playable(plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str) -> dict[tuple[str, str], Plan]:
-    """Returns the plans that their agents can play, and warns of the others in a line an agent.
-
-    Raises:
-      UnplayableError: if one agent can play no part.
-    """
+    """Returns the plans that their agents can play, and warns of the others in a line an agent."""
     refusals: dict[tuple[str, Interface], str | None] = {}  # an agent is built once for equal environments
     left_out: dict[str, dict[str, str]] = {}  # reasons by folder and part
     for (folder, part), plan in plans.items():
@@ -213,11 +209,7 @@ def _prepare(
 
 
 def _folders(agents: Sequence[str]) -> dict[str, str]:
-    """Returns the name of each agent's folder.
-
-    Raises:
-      InputError: if two would have the same one.
-    """
+    """Returns the name of each agent's folder."""
     folders: dict[str, str] = {}
     for agent in agents:
         folder = folder_name(agent)

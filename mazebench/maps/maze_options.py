@@ -15,11 +15,7 @@ from mazebench.options import Doc, OneOf, fields_of, options
 
 @options
 class ReadOptions:
-    """Options of reading mazes of one's own.
-
-    Raises:
-      InputError: if an option is not allowed.
-    """
+    """Options of reading mazes of one's own."""
 
     cell_size: Annotated[
         float | None,
@@ -81,11 +77,7 @@ def _refuse_novel(kinds: tuple[Any, ...]) -> tuple[Any, ...]:
 
 @options
 class DrawnOptions:
-    """Options of mazes that are drawn, instead of the benchmark's.
-
-    Raises:
-      InputError: if an option is not allowed.
-    """
+    """Options of mazes that are drawn, instead of the benchmark's."""
 
     kinds: Annotated[
         tuple[Annotated[str, OneOf(*DRAWN_KINDS)], ...],

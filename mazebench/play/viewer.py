@@ -63,11 +63,7 @@ def play(game: Game) -> None:
 
 
 def _import_viewer() -> types.ModuleType:
-    """Imports mujoco.viewer if a window can be opened; otherwise its launch would never return.
-
-    Raises:
-      InputError: if no window can be opened.
-    """
+    """Imports mujoco.viewer if a window can be opened; otherwise its launch would never return."""
     try:
         import glfw
         import mujoco.viewer

@@ -67,22 +67,14 @@ def open_whole(path: str | pathlib.Path) -> Iterator[IO[bytes]]:
 
 
 def make_folder(path: pathlib.Path) -> None:
-    """Makes a folder, and those that it lies in, unless it exists.
-
-    Raises:
-      WriteError: if it can't be made.
-    """
+    """Makes a folder, and those that it lies in, unless it exists."""
     with writing_to(path):
         path.mkdir(parents=True, exist_ok=True)
 
 
 @contextlib.contextmanager
 def writing_to(folder: pathlib.Path) -> Iterator[None]:
-    """Turns an `OSError` in the block into a `WriteError` that names the file, or `folder` if the error names none.
-
-    Raises:
-      WriteError: if the block raises an `OSError`.
-    """
+    """Turns an `OSError` in the block into a `WriteError` that names the file, or `folder` if the error names none."""
     try:
         yield
     except OSError as error:

@@ -16,11 +16,7 @@ def to_line(record: dict[str, Any]) -> str:
 
 
 def write_json(path: pathlib.Path, content: Any, indent: int | None = 1) -> None:
-    """Writes `content` all or nothing: a reader finds the old file or the new one. Without `indent`, it is one line.
-
-    Raises:
-      OSError: if it can't be written.
-    """
+    """Writes `content` all or nothing: a reader finds the old file or the new one. Without `indent`, it is one line."""
     with open_whole(path) as file:
         file.write((json.dumps(content, indent=indent, allow_nan=False) + "\n").encode("utf-8"))
 

@@ -14,11 +14,7 @@ _CONTROLS = action_controls()
 
 
 def controls_of_action(action: int) -> np.ndarray:
-    """Returns `[5]` float: the controls of one of the six actions.
-
-    Raises:
-      InputError: if there is no such action.
-    """
+    """Returns `[5]` float: the controls of one of the six actions."""
     try:
         index = int(action)
         is_one = 0 <= index < len(ACTIONS) and index == action
@@ -31,11 +27,7 @@ def controls_of_action(action: int) -> np.ndarray:
 
 
 def controls_of_actions(actions: np.ndarray, num_envs: int) -> np.ndarray:
-    """Returns `[B, 5]` float: the controls of `[B]` int actions, one for each of B environments.
-
-    Raises:
-      InputError: if `actions` are not B of the six actions.
-    """
+    """Returns `[B, 5]` float: the controls of `[B]` int actions, one for each of B environments."""
     actions = np.asarray(actions)
     is_integer = np.issubdtype(actions.dtype, np.integer)
     if actions.shape != (num_envs,) or not is_integer or actions.min() < 0 or actions.max() >= len(ACTIONS):

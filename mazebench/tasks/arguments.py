@@ -14,11 +14,7 @@ from mazebench.world.rendering import CAMERAS
 
 @options
 class Arguments:
-    """The arguments of an environment; each constructor gives those that it has.
-
-    Raises:
-      InputError: if a value is not allowed.
-    """
+    """The arguments of an environment; each constructor gives those that it has."""
 
     seed: Annotated[int | None, Ge(0)] = None  # of the first reset
     render_mode: Annotated[str | None, OneOf("rgb_array")] = None  # of `render`

@@ -42,11 +42,7 @@ Pairs = Annotated[
 
 @options
 class TaskOptions(Perturbations, SensorOptions):
-    """Options of a task, except the mazes.
-
-    Raises:
-      InputError: if an option is not allowed.
-    """
+    """Options of a task, except the mazes."""
 
     task: Annotated[str, OneOf(*TASKS), Doc("Kind of navigation.")] = "local"
     track: Annotated[

@@ -188,11 +188,7 @@ def num_updates_due(learner: Learner, env_steps: int) -> int:
 
 
 def _training_task(options: TrainOptions, agent_class: type[LearningAgent], defaults: dict[str, Any]) -> TaskSpec:
-    """Returns the task of `options`; `defaults` are the learner's, by name, for what the user left as it was.
-
-    Raises:
-      InputError: if there is no such task, or one of `defaults` is no option of a task.
-    """
+    """Returns the task of `options`; `defaults` are the learner's, by name, for what the user left as it was."""
     if needed := [name for name in agent_class.needs_shown if name in options.task.hide]:
         raise InputError(f"agent {options.agent!r}: needs the {needed[0]}, found it hidden")
     of_task, of_variants = fields_of(TaskOptions), fields_of(Variants)

@@ -73,11 +73,7 @@ class RunFolder:
                 shutil.rmtree(checkpoint, ignore_errors=True)
 
     def make_milestone(self, counters: Counters, metrics: Mapping[str, float]) -> None:
-        """Logs the metrics of the checkpoint at `counters`, which then is a milestone.
-
-        Raises:
-          RunError: if they can't be written; the checkpoints are intact.
-        """
+        """Logs the metrics of the checkpoint at `counters`, which then is a milestone."""
         self.log(counters, metrics)
         path = self._checkpoint(counters) / _COUNTERS
         try:
@@ -86,11 +82,7 @@ class RunFolder:
             raise self._cannot("save", path, error) from error
 
     def log(self, counters: Counters, metrics: Mapping[str, float]) -> None:
-        """Appends a line to the metrics, and writes them for TensorBoard.
-
-        Raises:
-          RunError: if they can't be written; the checkpoints are intact.
-        """
+        """Appends a line to the metrics, and writes them for TensorBoard."""
         values = {"env_steps": counters.env_steps, "updates": counters.updates, **metrics}
         try:
             with (self.path / METRICS).open("a", encoding="utf-8") as file:
@@ -141,9 +133,5 @@ def checkpoints(path: pathlib.Path) -> list[pathlib.Path]:
 
 
 def read_counters(checkpoint: pathlib.Path) -> Counters:
-    """Returns the counters of a checkpoint.
-
-    Raises:
-      InputError: if they can't be read.
-    """
+    """Returns the counters of a checkpoint."""
     return Counters(**read_json(checkpoint / _COUNTERS))

@@ -49,11 +49,7 @@ def make_mazes(
 
 
 def parse_formats(text: str) -> list[str]:
-    """Returns the formats in a list separated by commas, in its order.
-
-    Raises:
-      InputError: if one is unknown.
-    """
+    """Returns the formats in a list separated by commas, in its order."""
     formats = [name.strip() for name in text.split(",")]
     for name in formats:
         if name not in _FORMATS:

@@ -40,9 +40,6 @@ def read_plan(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
       gray: the picture.
       size: the larger one of R and C; estimated from the drawing if None.
       name: of the maze, for errors.
-
-    Raises:
-      MazeError: if no legal maze is found.
     """
     # The drawing without noise, and as it is.
     fine = on_white(gray, min(WORKING_SIDE, max(gray.shape)))

@@ -27,9 +27,6 @@ def read_lines(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
 
     Returns:
       `[2 R + 1, 2 C + 1]` bool: rooms have odd rows and columns, the cells between them are wall where a line is.
-
-    Raises:
-      MazeError: if no such plan is found.
     """
     problem = MazeError(
         f"{name}: expected rooms in an upright square grid with lines as walls between them, found none; "
