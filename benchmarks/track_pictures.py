@@ -41,7 +41,9 @@ def main() -> None:
             _show(row[level], _shown_map(shown), f"{track} {level}")
             if track == "rebuilt":
                 _mark_moved_doors(row[level], maze, shown)
-        _show(row[0], _true_maze(maze, goal, pose), "the maze, and a path")
+        x, y = pose[0, :2]
+        start = int(maze.size - y), int(x)
+        _show(row[0], draw_grid(maze.walls, PANEL // maze.size, start, goal, pose[:, :2]), "the maze, and a path")
     figure.savefig(PATH, dpi=110, metadata={"Software": None})
     print(PATH)
 
@@ -60,19 +62,10 @@ def play(track: str, level: int) -> tuple[Maze, Cell, np.ndarray, Shown]:
         return maze, record.goal, pose, shown
 
 
-def _true_maze(maze: Maze, goal: Cell, pose: np.ndarray) -> np.ndarray:
-    x, y = pose[0, :2]
-    return draw_grid(maze.walls, PANEL // maze.size, (int(maze.size - y), int(x)), goal, pose[:, :2])
-
-
 def _shown_map(shown: Shown) -> np.ndarray:
     pixels = shown.walls if shown.are_cells else shown.walls / 255
-    start, goal = (_cell(mark, len(pixels)) for mark in (shown.start, shown.goal))
+    start, goal = (None if mark < 0 else divmod(mark, len(pixels)) for mark in (shown.start, shown.goal))
     return draw_grid(pixels, PANEL // len(pixels), start, goal)
-
-
-def _cell(mark: int, size: int) -> Cell | None:
-    return None if mark < 0 else divmod(mark, size)
 
 
 def _mark_moved_doors(axes: Axes, maze: Maze, shown: Shown) -> None:

@@ -63,7 +63,11 @@ def check_swaps(kinds: Sequence[str], episodes: int) -> None:
     print(f"\nDoors that move, and the share of {episodes} paths on the map that they block:\n")
     _print_head("kind", "doors", "open", *(f"{share:g}" for share in shares), "at most")
     for kind in kinds:
-        cases = _draw_cases(kind, episodes)
+        rng = np.random.default_rng(_SEED)
+        cases = [
+            _Case(maze, door_slots(maze), sample_pair(maze, int(rng.choice(DISTANCES)), rng))
+            for maze in check_mazes(kind, episodes)
+        ]
         blocked = functools.cache(functools.partial(_blocked_share, cases))
         doors = np.mean([len(case.slots) for case in cases])
         num_open = np.mean([np.sum(~case.maze.walls[tuple(case.slots.T)]) for case in cases])
@@ -80,12 +84,6 @@ class _Case(NamedTuple):
     maze: Maze
     slots: np.ndarray  # [D, 2] int
     ends: tuple[Cell, Cell]
-
-
-def _draw_cases(kind: str, count: int) -> list[_Case]:
-    rng = np.random.default_rng(_SEED)
-    mazes = check_mazes(kind, count)
-    return [_Case(maze, door_slots(maze), sample_pair(maze, int(rng.choice(DISTANCES)), rng)) for maze in mazes]
 
 
 def _nearest(blocked: Callable[[int], float], first_above: int, share: float) -> int:

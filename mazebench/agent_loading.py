@@ -81,19 +81,18 @@ def checked_agent_class(name: str, loaded: Any) -> type[Agent]:
 
 def source_line(error: BaseException) -> str:
     """Returns where in an agent's own files `error` arose, as " (FILE:LINE)"; empty if it arose outside of them."""
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if not _is_ours(frame.filename)]
+    ours = {pathlib.Path(__file__).parent, _IMPORTLIB}
+    frames = [
+        frame
+        for frame in traceback.extract_tb(error.__traceback__)
+        if not frame.filename.startswith("<") and ours.isdisjoint(pathlib.Path(frame.filename).parents)
+    ]
     if not frames:
         return ""
     # The agent's own files are those beside the first one; below them are the libraries that it calls.
     folder = pathlib.Path(frames[0].filename).parent
     last = [frame for frame in frames if folder in pathlib.Path(frame.filename).parents][-1]
     return f" ({pathlib.Path(last.filename).name}:{last.lineno})"
-
-
-def _is_ours(filename: str) -> bool:
-    """Returns whether a file belongs to mazebench, or to Python's import system."""
-    ours = pathlib.Path(__file__).parent
-    return filename.startswith("<") or not {ours, _IMPORTLIB}.isdisjoint(pathlib.Path(filename).parents)
 
 
 def _entry_points() -> dict[str, metadata.EntryPoint]:

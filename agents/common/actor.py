@@ -13,6 +13,7 @@ import numpy as np
 import torch
 
 from mazebench.agent import Interface
+from mazebench.constants import NUM_ACTIONS
 from mazebench.errors import UnplayableError
 from mazebench.tasks.spec import TaskSpec
 from mazebench.training.protocol import Learner, LearningAgent
@@ -160,7 +161,7 @@ class NetworkAgent(LearningAgent):
             str(resources.files("mazebench_assets").joinpath("checkpoints", f"{cls.name}-13.safetensors"))
         )
 
-    def _explored(self, actions: np.ndarray, num_actions: int) -> np.ndarray:
+    def _explored(self, actions: np.ndarray) -> np.ndarray:
         """Returns `actions` `[B]`, some of them replaced by random ones."""
         at_random = self._rng.random(len(actions)) < self._epsilon
-        return np.where(at_random, self._rng.integers(num_actions, size=len(actions)), actions)
+        return np.where(at_random, self._rng.integers(NUM_ACTIONS, size=len(actions)), actions)

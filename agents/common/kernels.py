@@ -83,19 +83,14 @@ def _options(fused: bool) -> dict[str, Any]:
 def _cached(compile_with: Callable[..., Any], function: Callable[..., Any], **options: Any) -> Any:
     config: Any = numba.config
     given = config.CACHE_DIR
-    config.CACHE_DIR = str(_cache_folder(function, given))
+    parent = pathlib.Path(given) if given else pathlib.Path(function.__code__.co_filename).parent / "__pycache__"
+    config.CACHE_DIR = str(parent / f"kernels-{_digest()}")
     try:
         return compile_with(cache=True, **options)(function)
     except RuntimeError:  # numba found no folder that it can write to
         return compile_with(**options)(function)
     finally:
         config.CACHE_DIR = given
-
-
-def _cache_folder(function: Callable[..., Any], given: str) -> pathlib.Path:
-    """Returns a folder below the `given` one, or else beside Python's own compiled files."""
-    parent = pathlib.Path(given) if given else pathlib.Path(function.__code__.co_filename).parent / "__pycache__"
-    return parent / f"kernels-{_digest()}"
 
 
 @functools.cache

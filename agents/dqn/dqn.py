@@ -12,7 +12,6 @@ import numpy as np
 import torch
 
 from mazebench.agent import Inputs
-from mazebench.constants import NUM_ACTIONS
 
 from ..common.actor import NetworkAgent, acting
 from ..common.layers import in_batches, state_features
@@ -58,7 +57,7 @@ class QAgent(NetworkAgent):
         features = state_features(torch.from_numpy(observed), torch.from_numpy(state.origin))[:, None]
         arguments = (features,) if state.code is None else (features, state.code)
         actions = in_batches(self.network, STATES_AT_ONCE, *arguments)[:, 0].argmax(dim=-1).numpy()
-        return self._explored(actions, NUM_ACTIONS) if explore else actions, state
+        return self._explored(actions) if explore else actions, state
 
 
 class DQN(QAgent):

@@ -181,7 +181,10 @@ class MMNNetwork(nn.Module):
         free = (
             latent[..., NUM_POSE:NUM_BODY] @ weights["free"] + weights["free_bias"] + chosen @ weights["free_actions"]
         )
-        first = first + chosen @ weights["actions"] + _ahead_of(free, latent) @ weights["ahead"]
+        heading = latent[..., 2:NUM_POSE]
+        # The move and the velocity of free motion, in the map's frame: [G, K, 4].
+        ahead = torch.cat([_rotate(free[..., :2], heading), _rotate(free[..., 3:5], heading)], dim=-1)
+        first = first + chosen @ weights["actions"] + ahead @ weights["ahead"]
         hidden = functional.relu(functional.layer_norm(first, first.shape[-1:]))
         body, motion = _moved_by(latent, free, hidden @ weights["second"] + weights["second_bias"])
         motion = functional.layer_norm(latent[..., NUM_BODY:] + motion, motion.shape[-1:])
@@ -310,12 +313,6 @@ def _ordinary(name: str, shapes: dict[str, tuple[int, int]]) -> torch.Tensor:
     }
     scale = _FIRST_CHANGE if name == "second" else 1.0
     return scale * torch.randn(rows, columns, device="cpu") / math.sqrt(num_inputs.get(name, rows))
-
-
-def _ahead_of(free: torch.Tensor, latent: torch.Tensor) -> torch.Tensor:
-    """Returns `[G, K, 4]`, in the map's frame: the move and the velocity of free motion, given in the body's frame."""
-    heading = latent[..., 2:NUM_POSE]
-    return torch.cat([_rotate(free[..., :2], heading), _rotate(free[..., 3:5], heading)], dim=-1)
 
 
 def _moved_by(latent: torch.Tensor, free: torch.Tensor, change: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:

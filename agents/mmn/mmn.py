@@ -12,7 +12,6 @@ import numpy as np
 import torch
 
 from mazebench.agent import Inputs, Observation
-from mazebench.constants import NUM_ACTIONS
 from mazebench.tasks.context import START
 
 from ..common.actor import NetworkAgent, acting
@@ -79,12 +78,12 @@ class MMN(NetworkAgent):
         if not self.config.model:
             values = in_batches(self._action_values, STATES_AT_ONCE, latent, *code)[:, 0]
             chosen = values.argmax(dim=-1).cpu().numpy()
-            chosen = self._explored(chosen, NUM_ACTIONS) if explore else chosen
+            chosen = self._explored(chosen) if explore else chosen
         elif explore:
             found = plan(
                 self.network, self.config, latent, code, self.config.num_simulations, self._rng, self._noise_scale
             )
-            chosen = self._explored(found.action, NUM_ACTIONS)
+            chosen = self._explored(found.action)
         else:
             chosen = plan(self.network, self.config, latent, code, self.config.num_eval_simulations).action
         action = np.zeros(len(active), dtype=np.int64)

@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 
 from mazebench.agent import Inputs
-from mazebench.maps.maze import Cell, cell_to_point
+from mazebench.maps.maze import cell_to_point
 from mazebench.tasks.context import GLOBAL_MAP
 
-from ..robot.body import Point, observed_body
+from ..robot.body import observed_body
 from ..robot.cells import nearest_cell, start_cell
 from ..robot.dead_reckoning import DeadReckoning
 from ..robot.pilot import Pilot
@@ -52,13 +52,9 @@ class ClosedLoopPlanner(MapPlanner):
             else:
                 body = drive.odometry.update(observed)
             if inputs.new_context[slot]:
-                path = plan(contexts[slot], _nearest_free(contexts[slot], (body.x, body.y), start))
+                cell = nearest_cell(body.x, body.y, size)
+                is_wall = contexts[slot][GLOBAL_MAP][cell] > 0.5  # of the map that is shown
+                path = plan(contexts[slot], start if is_wall else cell)
                 drive.pilot = Pilot.along(path, size, self._cells_per_metre)
             actions[slot] = drive.pilot.action(body)
         return actions, state
-
-
-def _nearest_free(context: np.ndarray, position: Point, start: Cell) -> Cell:
-    """Returns the cell of `position`, or the marked start if the shown map has a wall there."""
-    cell = nearest_cell(*position, context.shape[-1])
-    return start if context[GLOBAL_MAP][cell] > 0.5 else cell

@@ -122,8 +122,8 @@ def _rate(step: Step, num_envs: int, seconds: float) -> float:
     return count * num_envs / elapsed
 
 
-def _random_actions(num_envs: int, num_steps: int = 512) -> np.ndarray:
-    return np.random.default_rng(0).integers(len(ACTIONS), size=(num_steps, num_envs))
+def _random_actions(num_envs: int) -> np.ndarray:
+    return np.random.default_rng(0).integers(len(ACTIONS), size=(512, num_envs))
 
 
 def _vector_pair(spec: TaskSpec, num_envs: int, num_threads: int) -> tuple[Step, Step]:

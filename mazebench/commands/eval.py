@@ -59,7 +59,10 @@ def evaluate(
     load_mujoco(renders=has_camera(options.task.sensors))
 
     what = options.task.track or options.task.task
-    folder = out or _new_folder(suite or f"{agents[0].replace(':', '-')}-{what}")
+    name = suite or f"{agents[0].replace(':', '-')}-{what}"
+    # The process tells runs apart that start at the same time.
+    new_folder = pathlib.Path("results") / f"{name}-{datetime.datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}"
+    folder = out or new_folder
     if run.resume:
         begun = folder.is_dir() and any(folder.iterdir())
         print(f"resuming {folder}" if begun else f"nothing to resume in {folder}; starting a new run")
@@ -106,9 +109,3 @@ def _evaluate_suite(
     with progress.evaluating(f"{suite}, {', '.join(agents)}", kept) as show:
         summaries = suites.run_suite(suite, agents, folder, run, show, checkpoint=options.checkpoint, seed=options.seed)
     summary_table.print_suite(summaries)
-
-
-def _new_folder(name: str) -> pathlib.Path:
-    """Returns a folder in results/ that no run has."""
-    # The process tells runs apart that start at the same time.
-    return pathlib.Path("results") / f"{name}-{datetime.datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}"

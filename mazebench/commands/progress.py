@@ -69,7 +69,7 @@ def training() -> Iterator[Progress]:
     console = Console()
     if not console.is_terminal:
         lines = StatusLines()
-        with _logged("mazebench.training", lines.say):
+        with _logged(lines.say):
             yield lines
         return
     with Live(console=console) as live:
@@ -83,14 +83,14 @@ def training() -> Iterator[Progress]:
             shown.add_row(Text(describe(status)))
             live.update(shown)
 
-        with _logged("mazebench.training", say):
+        with _logged(say):
             yield show
 
 
 @contextmanager
-def _logged(name: str, say: Callable[[str], None]) -> Iterator[None]:
-    """Gives `say` what the logger called `name` logs in the block; warnings go to standard error."""
-    logger, handler = logging.getLogger(name), _Lines(say)
+def _logged(say: Callable[[str], None]) -> Iterator[None]:
+    """Gives `say` what the training logs in the block; warnings go to standard error."""
+    logger, handler = logging.getLogger("mazebench.training"), _Lines(say)
     level, propagates = logger.level, logger.propagate
     logger.setLevel(logging.INFO)
     logger.propagate = False  # an agent's module may have configured the root logger

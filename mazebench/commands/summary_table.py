@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from rich import box
 from rich.console import Console
@@ -60,7 +60,11 @@ def print_comparison(title: str, name: str, rows: Mapping[str, Row]) -> None:
     has_on_time = all(_ON_TIME in row.metrics for row in rows.values())
     metrics = {"success_rate": "success rate", **({_ON_TIME: _NAME_OF_ON_TIME} if has_on_time else {}), "spl": "SPL"}
     head = (name, "A", "B", *(f"A - B, {metric}" for metric in metrics.values()), "A wins")
-    cells = [[key, *_comparison_cells(row, metrics)] for key, row in rows.items()]
+    cells = []
+    for key, row in rows.items():
+        rates, differences = row.metrics["success_rate"], [row.metrics[metric].difference for metric in metrics]
+        intervals = [f"{each.value:+.2f} [{each.low:+.2f}, {each.high:+.2f}]" for each in differences]
+        cells.append([key, f"{rates.a:.2f}", f"{rates.b:.2f}", *intervals, f"{row.win_share.value:.2f}"])
     print_table(title, head, cells)
 
 
@@ -82,14 +86,6 @@ def print_table(
     for number, row in enumerate([*rows, *totals], 1):
         table.add_row(*row, end_section=number == len(rows))
     console.print(table)
-
-
-def _comparison_cells(row: Row, metrics: Iterable[str]) -> list[str]:
-    cells = [f"{row.metrics['success_rate'].a:.2f}", f"{row.metrics['success_rate'].b:.2f}"]
-    for metric in metrics:
-        difference = row.metrics[metric].difference
-        cells.append(f"{difference.value:+.2f} [{difference.low:+.2f}, {difference.high:+.2f}]")
-    return [*cells, f"{row.win_share.value:.2f}"]
 
 
 def _with_paper(row: Figures, paper: Mapping[int, float], distance: int = 0) -> list[str]:

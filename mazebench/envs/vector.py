@@ -93,7 +93,10 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
         # What Gymnasium expects of a vector environment.
         self.render_mode = render_mode
-        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        try:
+            self.autoreset_mode = AutoresetMode(autoreset_mode)
+        except ValueError as error:
+            raise unknown("autoreset_mode", autoreset_mode, [mode.value for mode in AutoresetMode]) from error
         self.metadata = self.metadata | {"autoreset_mode": self.autoreset_mode}
         self.single_observation_space = spaces.observation_space(task_spec)
         self.single_action_space = spaces.action_space(task_spec)
@@ -207,7 +210,10 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """
         self._require_open()
         self._require_reset()
-        self._ctrl[:] = self._controls(actions)
+        if self.task_spec.continuous:
+            self._ctrl[:] = controls_of_velocities(actions, (self.num_envs, VELOCITY_SIZE))
+        else:
+            self._ctrl[:] = controls_of_actions(actions, self.num_envs)
 
         # Simulate the environments whose episode is under way.
         running = self._active & ~self._ended
@@ -256,12 +262,6 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
                 "expected a call to reset(options={'reset_mask': mask}) before this step(): the episodes ended in "
                 f"environments {', '.join(map(str, np.flatnonzero(self._ended)))}"[:200]
             )
-
-    def _controls(self, actions: np.ndarray) -> np.ndarray:
-        """Returns `[B, 5]` float: the controls of `actions`, which are checked."""
-        if self.task_spec.continuous:
-            return controls_of_velocities(actions, (self.num_envs, VELOCITY_SIZE))
-        return controls_of_actions(actions, self.num_envs)
 
     def _advance(self, running: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Returns three `[B]` bool: where a new leg began, where the goal was reached, where the time ran out."""
@@ -424,13 +424,6 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         if self._top_camera is not None:
             self._top_camera.close()
         del self._batch, self._sensordata, self._qpos, self._ctrl, self._marker  # which ends the threads
-
-
-def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
-    try:
-        return AutoresetMode(mode)
-    except ValueError as error:
-        raise unknown("autoreset_mode", mode, [known.value for known in AutoresetMode]) from error
 
 
 def _seeds(seed: Seeds, num_envs: int) -> list[int | None]:

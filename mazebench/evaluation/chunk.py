@@ -185,12 +185,13 @@ def _outcome(
 
 def _to_record(plan: Plan, outcome: Outcome) -> Record:
     episode, trial = outcome.trial.episode, outcome.trial
+    maze = plan.task.mazes[episode.maze]
     # Of the body as a disc, and from cell to cell; both in metres.
     shortest = np.array([trial.shortest_path, trial.distance * plan.task.cell_size])
     spl_of_disc, spl_grid = spl(np.array([outcome.success]), shortest, np.array([outcome.path_length])).tolist()
     values = {
         "episode": outcome.index,
-        "maze": plan.task.mazes[episode.maze].name,
+        "maze": maze.name,
         "start": episode.start,
         "goal": episode.goal,
         "distance": trial.distance,
@@ -202,13 +203,10 @@ def _to_record(plan: Plan, outcome: Outcome) -> Record:
         "spl_grid": spl_grid,
         "seed": episode.seed,
     }
-    return Record.model_validate(plan.labels | values | plan.levels | _facts(plan.task, episode))
-
-
-def _facts(task: TaskSpec, episode: Episode) -> dict[str, bool | str]:
-    """Returns what the record of a track says of an episode beside its outcome; summaries report the groups."""
-    if task.track is None:
-        return {}
-    maze, shown = task.mazes[episode.maze], show_map(task, episode)
-    kind = {"kind": maze.kind} if maze.kind else {}
-    return {"blocked": is_blocked(maze.walls, shown.walls, (episode.start, episode.goal))} | kind
+    groups: dict[str, bool | str] = {}  # summaries report the episodes of each one apart
+    if plan.task.track is not None:
+        shown = show_map(plan.task, episode)
+        groups["blocked"] = is_blocked(maze.walls, shown.walls, (episode.start, episode.goal))
+        if maze.kind:
+            groups["kind"] = maze.kind
+    return Record.model_validate(plan.labels | values | plan.levels | groups)

@@ -171,10 +171,6 @@ class _Scene:
         return 2 * self.pixels // len(walls) + 1
 
 
-def _write_png(frames: list[np.ndarray], out: pathlib.Path) -> None:
-    write_image(frames[0], out)
-
-
 def _write_gif(frames: list[np.ndarray], out: pathlib.Path) -> None:
     animation = cv2.Animation()
     animation.frames = [cv2.cvtColor(frame, cv2.COLOR_RGB2BGRA) for frame in frames]
@@ -204,7 +200,7 @@ def _write_mp4(frames: list[np.ndarray], out: pathlib.Path) -> None:
 
 
 _WRITERS: dict[str, Callable[[list[np.ndarray], pathlib.Path], None]] = {
-    ".png": _write_png,
+    ".png": lambda frames, out: write_image(frames[0], out),
     ".gif": _write_gif,
     ".mp4": _write_mp4,
 }

@@ -132,13 +132,11 @@ def make_trial(maze: Maze, index: int, pair: tuple[Cell, Cell], rng: np.random.G
     """Returns the trial of a start and a goal in maze number `index`; draws the first heading and the seed."""
     start, goal = pair
     episode = make_episode(index, start, goal, rng)
-    shortest = _disc_paths(maze).length(maze.point(start), goal)
+    shortest = _disc_paths(maze, BODY_RADIUS).length(maze.point(start), goal)
     return Trial(episode, maze.distance(start, goal), shortest)
 
 
-@functools.lru_cache(maxsize=2)
-def _disc_paths(maze: Maze) -> DiscPaths:
-    return DiscPaths(maze, BODY_RADIUS)
+_disc_paths = functools.lru_cache(maxsize=2)(DiscPaths)
 
 
 def benchmark_task_sizes() -> list[tuple[str, int, int]]:

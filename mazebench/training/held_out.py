@@ -10,7 +10,7 @@ import numpy as np
 from mazebench.agent import Agent
 from mazebench.errors import InputError
 from mazebench.evaluation.chunk import run_trials
-from mazebench.maps.drawn import FreshMazes, Mazes
+from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.spec import TaskSpec, check_mazes
@@ -34,7 +34,9 @@ class HeldOutEvaluation:
         Raises:
           InputError: if no such mazes are found.
         """
-        kinds = _kinds(task.mazes)
+        mazes = task.mazes
+        all_kinds = mazes.kinds if isinstance(mazes, FreshMazes) else (maze.kind for maze in mazes if maze.kind)
+        kinds = tuple(dict.fromkeys(all_kinds))  # each once; mazes of one's own have none
         if not distances:
             distances = _DISTANCES if task.track is None and kinds else task.distances
         spread = np.linspace(min(distances), max(distances), len(_DISTANCES)).round().astype(int).tolist()
@@ -63,12 +65,6 @@ class HeldOutEvaluation:
             num_ended += len(outcomes)
             progress(num_ended, len(self.trials))
         return {distance: float(np.mean(successes)) for distance, successes in reached.items()}
-
-
-def _kinds(mazes: Mazes) -> tuple[str, ...]:
-    """Returns the kinds of mazes, each once; none of mazes of one's own."""
-    kinds = mazes.kinds if isinstance(mazes, FreshMazes) else (maze.kind for maze in mazes if maze.kind)
-    return tuple(dict.fromkeys(kinds))
 
 
 def _draw_maze(task: TaskSpec, kind: str, name: str, stream: np.random.SeedSequence) -> Maze:

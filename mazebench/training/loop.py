@@ -118,7 +118,8 @@ class TrainingLoop:
 
     def _train_until(self, env_steps: int) -> None:
         # New trajectories, so that a run that is resumed from this milestone goes on as the unbroken one did.
-        source = self._source.collect(_mix(self._options.seed, self._counters.env_steps))
+        seeds = np.random.SeedSequence((self._options.seed, self._counters.env_steps))
+        source = self._source.collect(int(seeds.generate_state(1)[0]))
         while self._counters.env_steps < env_steps and not self._is_over():
             line_steps = self._counters.logged_steps + STEPS_BETWEEN_LINES
             if line_steps <= self._counters.env_steps < env_steps - STEPS_BETWEEN_LINES // 2:  # a milestone has a line
@@ -266,8 +267,3 @@ def _origin(options: TrainOptions, task: TaskSpec) -> dict[str, Any]:
     elif options.maze_options.mazes is not None:
         origin["mazes"] = {"sha256": mazes_hash(task)}
     return origin
-
-
-def _mix(*numbers: int) -> int:
-    """Returns one seed made of several numbers."""
-    return int(np.random.SeedSequence(numbers).generate_state(1)[0])

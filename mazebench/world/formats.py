@@ -11,7 +11,7 @@ import numpy as np
 
 from mazebench.errors import InputError, unknown
 from mazebench.maps.kinds import generate
-from mazebench.maps.maze import Maze, resized
+from mazebench.maps.maze import resized
 from mazebench.maps.maze_files import read_located
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.pictures import draw_maze, write_image
@@ -84,15 +84,13 @@ def write_maze(
     return paths
 
 
-def _write_picture(maze: Maze, path: pathlib.Path) -> None:
-    write_image(draw_maze(maze, max(1, _PICTURE_PIXELS // maze.size)), path)
-
-
 _FORMATS: dict[str, _Format] = {
     "txt": _Format(("txt",), write_text_maze),
     "mjcf": _Format(("xml",), write_mjcf),
     "mjcf-textured": _Format(("textured.xml",), functools.partial(write_mjcf, textures=True)),
-    "png": _Format(("png",), _write_picture),
+    "png": _Format(
+        ("png",), lambda maze, path: write_image(draw_maze(maze, max(1, _PICTURE_PIXELS // maze.size)), path)
+    ),
     _ROS: _Format(("yaml", "pgm"), write_ros_map),  # which also takes the frame of the map
     **{name: _Format((name,), write_mesh) for name in MESH_FORMATS},
 }

@@ -59,7 +59,8 @@ class Displacement:
     def folds(self, size: int) -> bool:
         """Returns whether the displaced picture lies over itself somewhere, or one of its axes runs backwards."""
         nodes, count = _nodes(size), self.noise.shape[-1]
-        smooth, slope = _gaussians(nodes, count), _gaussian_slopes(nodes, count)
+        smooth = _gaussians(nodes, count)
+        slope = -(nodes[:, None] - _noise_centres(count)) / SIGMA**2 * smooth
 
         # By how much each component changes along rows and along columns.
         row_row, column_row = _weighted(slope, self.noise, smooth)
@@ -99,7 +100,9 @@ class HandDrawing(Drawing):
         size, pixels = len(walls), PIXELS * len(walls)
         # How many samples of the maze, and how many of its walls, fall into each pixel.
         samples = (np.arange(_SAMPLES * size) + 0.5) / _SAMPLES
-        row, column = np.clip(self._drawn_grid(samples), 0, pixels - 1).astype(np.intp)
+        points = np.stack(np.meshgrid(samples, samples, indexing="ij")) + self.displacement.on_grid(samples)
+        drawn_at = self.origin[:, None, None] + self.scale[:, None, None] * points
+        row, column = np.clip(drawn_at, 0, pixels - 1).astype(np.intp)
         pixel = row * pixels + column
         drawn = np.bincount(pixel.ravel(), minlength=pixels**2)
         wall = np.bincount(pixel[self._thick_walls(walls, samples)], minlength=pixels**2)
@@ -126,11 +129,6 @@ class HandDrawing(Drawing):
 
     def _drawn(self, points: np.ndarray) -> np.ndarray:  # [T, 2] to [T, 2]: points of the maze to pixels
         return self.origin + self.scale * (points + self.displacement.at(points))
-
-    def _drawn_grid(self, coordinates: np.ndarray) -> np.ndarray:  # [T] to [2, T, T], rows and columns in pixels
-        points = np.stack(np.meshgrid(coordinates, coordinates, indexing="ij"))
-        points += self.displacement.on_grid(coordinates)
-        return self.origin[:, None, None] + self.scale[:, None, None] * points
 
     def _thick_walls(self, walls: np.ndarray, samples: np.ndarray) -> np.ndarray:
         """Returns `[T, T]` bool: which points of `samples` x `samples` (`[T]`) are drawn as wall.
@@ -182,10 +180,6 @@ def _nodes(size: int) -> np.ndarray:
 def _gaussians(coordinates: np.ndarray, count: int) -> np.ndarray:
     """Returns `[T, count]` float64: the weight of each cell's noise at `coordinates` `[T]` along one axis."""
     return np.exp(-(((coordinates[:, None] - _noise_centres(count)) / SIGMA) ** 2) / 2)
-
-
-def _gaussian_slopes(coordinates: np.ndarray, count: int) -> np.ndarray:
-    return -(coordinates[:, None] - _noise_centres(count)) / SIGMA**2 * _gaussians(coordinates, count)
 
 
 def _weighted(rows: np.ndarray, noise: np.ndarray, columns: np.ndarray) -> np.ndarray:
