@@ -105,4 +105,4 @@ def test_a_summary_of_a_track_has_the_time_limit_of_its_farthest_goals(tmp_path)
     records = [json.loads(line) for line in (tmp_path / "episodes.jsonl").read_text().splitlines()]
     assert options["time_limit"] == max(record["steps"] for record in records) == 6 * 15 + 150
     again = EvalOptions.of(**options)
-    assert build_task(again.task, again.mazes).longest_time_limit == 240
+    assert build_task(again.task, again.maze_options).longest_time_limit == 240

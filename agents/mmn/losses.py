@@ -48,13 +48,7 @@ def unrolled_losses(
     generated for another maze of the batch, over its error with its own weights.
 
     The losses are the paper's task losses (of values, policies and ends) at the roots and, weighted by 1 / K, in K
-    unrolled states, and its auxiliary model loss in the unrolled states.
-
-    Args:
-      network: the one that learns.
-      config: the weights of the losses, and K.
-      batch: the experience.
-      targets: the planned values and policies.
+    unrolled states, and its auxiliary model loss in the unrolled states. `config` has their weights, and K.
     """
     code = network.hypermodel(batch.context, batch.anchor)
     roots = slice(0, config.sequence_steps - config.unroll + 1, config.unroll)

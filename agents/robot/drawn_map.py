@@ -127,12 +127,7 @@ class Registration:
 
 
 def register(picture: np.ndarray, size: int) -> Registration:
-    """Returns the registration of a picture with a maze of `size` cells a side.
-
-    Args:
-      picture: `[M, M]` float, the share of wall in each pixel.
-      size: N.
-    """
+    """Returns the registration of `picture`, `[M, M]` shares of wall, with a maze of `size` cells a side."""
     picture = picture.astype(np.float64)
     found: list[Registration] = []
     for schedule in _SCHEDULES:

@@ -56,12 +56,7 @@ Step = Callable[[int], Any]
 
 
 def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, Any]:
-    """Measures everything and returns it as plain values.
-
-    Args:
-      quick: shorter rounds, fewer of them.
-      say: told what is being measured.
-    """
+    """Measures everything and returns it as plain values; `quick`, in fewer and shorter rounds."""
     seconds, rounds = (_QUICK_SECONDS, _QUICK_ROUNDS) if quick else (_SECONDS, _ROUNDS)
     results: dict[str, Any] = {"machine": {"cores": os.cpu_count(), "mujoco": mujoco.__version__}}
     spec = make_spec()

@@ -58,7 +58,12 @@ def evaluate(
     options = chosen(EvalOptions, values, agent=agents[0])
     load_mujoco(renders=has_camera(options.task.sensors))
 
+    from mazebench.commands.summary_table import print_suite, print_summary
+    from mazebench.evaluation.evaluate import run_evaluation
+    from mazebench.evaluation.suites import run_suite
+
     what = options.task.track or options.task.task
+    title = f"{agents[0]}, {what}" if suite is None else f"{suite}, {', '.join(agents)}"
     name = suite or f"{agents[0].replace(':', '-')}-{what}"
     # The process tells runs apart that start at the same time.
     new_folder = pathlib.Path("results") / f"{name}-{datetime.datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}"
@@ -75,37 +80,19 @@ def evaluate(
 
     try:
         with stopping.stoppable(how_to_go_on, waits=True):
+            with progress.evaluating(title, kept) as show:
+                if suite is None:
+                    summaries = [run_evaluation(options, folder, run, show)]
+                else:
+                    summaries = run_suite(
+                        suite, agents, folder, run, show, checkpoint=options.checkpoint, seed=options.seed
+                    )
             if suite is None:
-                _evaluate_one(options, folder, run, kept)
+                print_summary(summaries[0])
             else:
-                _evaluate_suite(suite, agents, options, folder, run, kept)
+                print_suite(summaries)
     except AgentError as error:
         if show_traceback and error.__cause__ is not None:
             traceback.print_exception(error.__cause__)
         raise RunError(f"{error}; {kept} in {folder}" if kept.ended else str(error)) from error
     print(f"results in {folder}")
-
-
-def _evaluate_one(options: EvalOptions, folder: pathlib.Path, run: RunOptions, kept: progress.Kept) -> None:
-    from mazebench.commands import summary_table
-    from mazebench.evaluation import evaluate
-
-    with progress.evaluating(f"{options.agent}, {options.task.track or options.task.task}", kept) as show:
-        summary = evaluate.run_evaluation(options, folder, run, show)
-    summary_table.print_summary(summary)
-
-
-def _evaluate_suite(
-    suite: str,
-    agents: list[str],
-    options: EvalOptions,
-    folder: pathlib.Path,
-    run: RunOptions,
-    kept: progress.Kept,
-) -> None:
-    from mazebench.commands import summary_table
-    from mazebench.evaluation import suites
-
-    with progress.evaluating(f"{suite}, {', '.join(agents)}", kept) as show:
-        summaries = suites.run_suite(suite, agents, folder, run, show, checkpoint=options.checkpoint, seed=options.seed)
-    summary_table.print_suite(summaries)

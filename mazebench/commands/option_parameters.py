@@ -51,13 +51,7 @@ def takes_options(
 
 
 def chosen(options_class: type[Chosen], values: Mapping[str, Any], **others: Any) -> Chosen:
-    """Returns the options of a class from the `values` of a command.
-
-    Args:
-      options_class: one of those that the command takes.
-      values: by name, also of other classes.
-      **others: fields that are no options.
-    """
+    """Returns the options of a class from the `values` of a command; `others` are fields that are no options."""
     names = options_of(options_class)
     return from_names(options_class, {name: value for name, value in values.items() if name in names}, **others)
 

@@ -82,12 +82,7 @@ def run_evaluation(
 ) -> Summary:
     """Runs what is left of an evaluation and returns its summary; as `evaluate`, which makes the options.
 
-    Args:
-      options: what is evaluated.
-      out: the folder; None keeps the summary alone.
-      run: how.
-      progress: called as episodes end.
-      agent_class: the class that `options.agent` names, if it is loaded already.
+    `agent_class` is the class that `options.agent` names, if it is loaded already.
     """
     plan = make_plan(options, agent_class)
     if plan.remark:

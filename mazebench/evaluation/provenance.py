@@ -37,6 +37,9 @@ _MAX_HEADER_BYTES = 2**18
 
 def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -> Provenance:
     """Returns what lets someone else repeat the run; the version of a package that is not installed is None."""
+    checkpoint = options.checkpoint
+    if checkpoint and checkpoint == str(agent_class.default_checkpoint()):
+        checkpoint = pathlib.Path(checkpoint).name  # the folder depends on the installation
     content = {
         "benchmark": options.benchmark,
         "benchmark_manifest_sha256": manifest_hash(options.benchmark),
@@ -52,7 +55,7 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
         "options": {
             **by_name(options),
             **by_name(Variants()),
-            "checkpoint": _told_checkpoint(options.checkpoint, agent_class),
+            "checkpoint": checkpoint,
             "distances": task.distances,
             "time_limit": task.longest_time_limit,
         },
@@ -68,11 +71,6 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
         "mazes_sha256": mazes_hash(task),
     }
     return Provenance.model_validate_json(json.dumps(content))  # as a reader will find it
-
-
-def _told_checkpoint(path: str | None, agent_class: type[Agent]) -> str | None:
-    """Returns the path of a checkpoint as given; a file that ships is told by its name alone."""
-    return pathlib.Path(path).name if path and path == str(agent_class.default_checkpoint()) else path
 
 
 def code_hash(agent: str, agent_class: type[Agent]) -> str | None:

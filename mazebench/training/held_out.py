@@ -51,11 +51,9 @@ class HeldOutEvaluation:
         self.trials = list(enumerate(draw_trials(self.task, _EPISODES)))
 
     def success_rates(self, agent: Agent, progress: Callable[[int, int], None]) -> dict[int, float]:
-        """Returns the agent's success rate by distance in cells; it acts greedily.
+        """Returns the success rate of the agent, which acts greedily, by distance in cells.
 
-        Args:
-          agent: the agent, which does not change.
-          progress: called with how many episodes have ended, and of how many.
+        `progress` is called with how many episodes have ended, and of how many.
         """
         reached: dict[int, list[bool]] = {distance: [] for distance in self._distances}
         num_ended = 0

@@ -56,13 +56,7 @@ def train(
     """Trains an agent in the run folder `out`; from its last checkpoint if `resume`.
 
     The logger "mazebench.training" says what happens. In a block of `mazebench.stopping.stoppable` that waits, a signal
-    saves a savepoint and ends the training.
-
-    Args:
-      options: what is trained, in which task, and for how long.
-      out: the run folder.
-      resume: whether to go on from its last checkpoint.
-      progress: called with the status after each step.
+    saves a savepoint and ends the training. `progress` is called with the status after each step.
 
     Raises:
       InputError: if an option is wrong, or `out` can't be used.

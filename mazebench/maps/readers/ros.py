@@ -48,11 +48,7 @@ def read_ros_maze(path: str | pathlib.Path, **options: Any) -> LocatedMaze:
     """Reads the maze in a map of ROS, named after the YAML file at `path`, and its place in the map's frame.
 
     A point (x, y) of the maze lies at `(x0 + x cos(yaw) - y sin(yaw), y0 + x sin(yaw) + y cos(yaw))` in the map's frame
-    if (x0, y0, yaw) is the origin that is returned.
-
-    Args:
-      path: of the YAML file.
-      **options: those of `ReadOptions`.
+    if (x0, y0, yaw) is the origin that is returned. `options` are those of `ReadOptions`.
 
     Raises:
       InputError: if a file can't be read or an option is not allowed.
