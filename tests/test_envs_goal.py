@@ -107,5 +107,5 @@ class TestEnvironment:
 
     @pytest.mark.parametrize("options", [{"task": "hierarchical"}, {"num_goals": 2}])
     def test_a_task_with_several_goals_is_refused(self, options):
-        with pytest.raises(InputError, match="expected the local task with one goal"):
+        with pytest.raises(InputError, match="expected the local task, one goal, no track, no hide"):
             GoalMazeEnv(make_spec(**options))

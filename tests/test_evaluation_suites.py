@@ -53,7 +53,7 @@ class TestParts:
             *(f"noise-{level}" for level in ("0.1", "0.2", "0.3", "0.4", "0.5", "0.6", "0.7", "0.8", "0.9", "1.0")),
         ]
         assert paper["local-13"].task.distances == ()  # 1 to 15
-        assert paper["local-21"].mazes.size == 21
+        assert paper["local-21"].maze_options.size == 21
         corners, flipped = paper["hierarchical-13-k2"].task, paper["flip-0.3"].task
         assert (corners.task, corners.landmark_distance) == ("hierarchical", 2)
         assert (flipped.task, flipped.map_flip) == ("hierarchical", 0.3)

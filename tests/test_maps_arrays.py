@@ -99,7 +99,7 @@ class TestTasks:
         with pytest.raises(InputError, match=r"found list; wrap rows of numbers in np\.array$"):
             mazebench.make_spec(mazes=WALLS.tolist())
 
-    @pytest.mark.parametrize("maps", [5, [WALLS.tolist()], [None]])
-    def test_what_is_no_map_is_refused(self, maps):
-        with pytest.raises(InputError, match=r"expected .* in maps|expected maps as"):
-            mazebench.make_spec(mazes=maps)
+    @pytest.mark.parametrize("mazes", [5, [WALLS.tolist()], [None]])
+    def test_what_is_no_maze_is_refused(self, mazes):
+        with pytest.raises(InputError, match=r"expected .* in mazes|expected mazes as"):
+            mazebench.make_spec(mazes=mazes)
