@@ -98,7 +98,7 @@ class TestOptions:
                 {"num_goals": 2, "task": "hierarchical"},
                 r"expected num_goals 1 unless the task is local and pairs are random, found 2",
             ),
-            ({"mapz": "plan.txt"}, r"unknown option 'mapz'; available: .*map_warp, maps, .*size, split, start"),
+            ({"mapz": "plan.txt"}, r"unknown option 'mapz'; available: .*map_warp, mazes, .*size, split, start"),
             ({"map_warp": 0.26}, r"expected map_warp from 0 to 0\.25, found 0\.26"),
         ],
     )

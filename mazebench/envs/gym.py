@@ -36,8 +36,14 @@ class MazeEnv(JsonSpec, gymnasium.Env):
     ):
         """Opens the environment.
 
-        `seed` is that of the first reset. `render_mode` is None or "rgb_array", and `camera` is "top", "chase" or
-        "egocentric".
+        Args:
+          task_spec: the task.
+          seed: of the first reset.
+          render_mode: None or "rgb_array".
+          camera: of `render`: "top", "chase" or "egocentric".
+
+        Raises:
+          InputError: if an argument is not allowed.
         """
         arguments = Arguments(render_mode=render_mode, camera=camera)
         self.task = Navigation(task_spec, seed)

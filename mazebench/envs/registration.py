@@ -121,6 +121,9 @@ def _task_spec(task: str, options: dict[str, Any], arguments: Iterable[str]) -> 
     """Returns the task of an environment that takes `arguments` besides `options`.
 
     The size that an id names is the size of the mazes unless a size or mazes are given.
+
+    Raises:
+      InputError: as `mazebench.make_spec`.
     """
     from mazebench.envs.env_spec import with_mazes
     from mazebench.tasks.build import check_names, make_spec

@@ -85,6 +85,9 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
           render_mode: None or "rgb_array", for Gymnasium's wrappers.
           episode_source: returns the next episode of an environment; by default each draws from a stream of its own.
           autoreset_mode: one of Gymnasium's three, or its value: "SameStep", "NextStep" or "Disabled".
+
+        Raises:
+          InputError: if an argument is not allowed.
         """
         require_task_spec(task_spec)
         arguments = Arguments(num_envs=num_envs, num_threads=num_threads, render_mode=render_mode)

@@ -20,7 +20,11 @@ NUM_ENVS = 256  # environments side by side in a process, unless another number 
 
 @options
 class EvalOptions:
-    """Options of an evaluation. Two runs with equal options give the same `episodes.jsonl`."""
+    """Options of an evaluation. Two runs with equal options give the same `episodes.jsonl`.
+
+    Raises:
+      InputError: if a value is not allowed.
+    """
 
     agent: str = dataclasses.field(kw_only=False)
     task: TaskOptions = TaskOptions()
@@ -38,6 +42,9 @@ class EvalOptions:
         """Returns the options of an agent's evaluation; `values` are those of the task, the mazes and these, by name.
 
         They may include what evaluations don't vary, as the provenance of a summary does.
+
+        Raises:
+          InputError: if a name is unknown or a value is not allowed.
         """
         for name, option in fields_of(Variants).items():
             if (found := values.pop(name, option.default)) != option.default:
@@ -80,7 +87,11 @@ class EvalOptions:
 
 @options
 class RunOptions:
-    """Options of the run of an evaluation, which make no difference to its results."""
+    """Options of the run of an evaluation, which make no difference to its results.
+
+    Raises:
+      InputError: if a value is not allowed.
+    """
 
     resume: Annotated[bool, Doc("Go on with the run in --out.")] = False
     record: Annotated[bool | None, Doc("Write trajectories too; a suite does by default.")] = None

@@ -101,7 +101,11 @@ def run_plan(
     suite: str | None = None,
     part: str | None = None,
 ) -> Summary:
-    """Runs what is left of a plan in `folder` and returns its summary; a finished run is not run again."""
+    """Runs what is left of a plan in `folder` and returns its summary; a finished run is not run again.
+
+    Raises:
+      InputError, RunError: as `evaluate`.
+    """
     num_trials, record = len(plan.trials), bool(run.record)
     if run.resume and is_finished(folder, record):
         check_same_run(folder, plan)

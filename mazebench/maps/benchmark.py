@@ -55,7 +55,11 @@ def load_mazes(size: int, split: str) -> tuple[Maze, ...]:
 
 @functools.cache
 def load_kind_mazes(split: str) -> tuple[Maze, ...]:
-    """Returns the tracks' mazes of one split, kind by kind."""
+    """Returns the tracks' mazes of one split, kind by kind.
+
+    Raises:
+      InputError: if there is no such split.
+    """
     if split not in ALL_SPLITS:
         raise unknown("split", split, ALL_SPLITS)
     mazes: list[Maze] = []

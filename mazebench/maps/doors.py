@@ -19,7 +19,11 @@ _MOST_DOORS = 4  # of a room, that are told apart: a corridor has many
 
 
 def door_slots(maze: Maze) -> np.ndarray:
-    """Returns the door slots of a maze, as its kind has them: `[D, 2]` int, in reading order."""
+    """Returns the door slots of a maze, as its kind has them: `[D, 2]` int, in reading order.
+
+    Raises:
+      InputError: if its kind is unknown.
+    """
     if maze.kind and maze.kind not in KINDS:
         raise unknown("kind", maze.kind, KINDS)
     return KINDS[maze.kind].door_slots(maze.walls) if maze.kind else any_door_slots(maze.walls)

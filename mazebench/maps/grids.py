@@ -16,6 +16,9 @@ def square_maze(walls: np.ndarray, name: str, cell_size: float = 1.0) -> Maze:
     """Returns the maze with `walls` (`[R, C]` bool), padded to a square with wall on the right or at the bottom.
 
     A cell keeps its row and column. A `Remark` says what was padded.
+
+    Raises:
+      MazeError: if it is not a legal maze.
     """
     if walls.ndim != 2 or walls.shape[0] == walls.shape[1]:
         return Maze(walls, name, cell_size)

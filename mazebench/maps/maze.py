@@ -187,7 +187,11 @@ def corner_cells(maze: Maze) -> tuple[Cell, Cell]:
 
 
 def require_one_size(mazes: Sequence[Maze]) -> None:
-    """Checks that there is a maze, and that all have one size and cells of one size."""
+    """Checks that there is a maze, and that all have one size and cells of one size.
+
+    Raises:
+      MazeError: if not.
+    """
     if not isinstance(mazes, Sequence) or not all(isinstance(maze, Maze) for maze in mazes):
         raise MazeError(f"expected a sequence of Maze, found {mazes!r}"[:200])
     if not mazes:

@@ -144,7 +144,11 @@ class Navigation:
         self._maze = index
 
     def before_step(self, action: int | np.ndarray, simulation: Simulation) -> None:
-        """Sets the controls of an action."""
+        """Sets the controls of an action.
+
+        Raises:
+          InputError: if there is no such action.
+        """
         if self.spec.continuous:
             simulation.set_controls(controls_of_velocities(np.asarray(action), (VELOCITY_SIZE,)))
         else:

@@ -42,7 +42,11 @@ Pairs = Annotated[
 
 @options
 class TaskOptions(Perturbations, SensorOptions):
-    """Options of a task, except the mazes."""
+    """Options of a task, except the mazes.
+
+    Raises:
+      InputError: if an option is not allowed.
+    """
 
     task: Annotated[str, OneOf(*TASKS), Doc("Kind of navigation.")] = "local"
     track: Annotated[

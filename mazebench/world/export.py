@@ -26,7 +26,11 @@ _TO_GLTF = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
 def write_mjcf(maze: Maze, path: pathlib.Path, textures: bool = False) -> None:
-    """Writes a model that MuJoCo and its viewer open without any other file; with `textures`, in the textured look."""
+    """Writes a model that MuJoCo and its viewer open without any other file; with `textures`, in the textured look.
+
+    Raises:
+      OSError: if it can't be written.
+    """
     spec = maze_spec(maze)
     if textures:
         faces = wall_faces(maze)
@@ -68,7 +72,11 @@ def _diagonal_corners(maze: Maze) -> np.ndarray:
 
 
 def write_mesh(maze: Maze, path: pathlib.Path) -> None:
-    """Writes the wall mesh as GLB (y up, as in glTF), OBJ or STL (z up), by the suffix of `path`."""
+    """Writes the wall mesh as GLB (y up, as in glTF), OBJ or STL (z up), by the suffix of `path`.
+
+    Raises:
+      OSError: if it can't be written.
+    """
     mesh = wall_mesh(maze)
     if path.suffix == ".glb":
         mesh.apply_transform(_TO_GLTF)
