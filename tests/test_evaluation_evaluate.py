@@ -183,16 +183,6 @@ class TestAgents:
         evaluate(Witness, tmp_path / "given", sensors=("lidar",), **FEW)
         assert results_of(tmp_path / "declared") == results_of(tmp_path / "given")
 
-    def test_a_sensor_that_a_track_offers_is_not_added(self, monkeypatch):
-        monkeypatch.setattr(Witness, "needs_sensors", ("lidar",))
-
-        def plan(**options):
-            return make_plan(EvalOptions.of("mine:Witness", **options), Witness)
-
-        assert plan(track="building").options.task.sensors == ()
-        assert plan().options.task.sensors == ("lidar",)
-        assert plan(sensors=("top",)).task.sensors == ("top", "lidar")
-
 
 class TestSeeds:
     def test_agents_draw_otherwise_with_another_seed(self, random_run, tmp_path):
@@ -364,10 +354,6 @@ class TestRefused:
         with pytest.raises(UnplayableError, match="its checkpoint reads maps of 13 x 13 only, found 15 x 15"):
             evaluate("mmn", tmp_path / "out", size=15, **FEW)
         assert list(tmp_path.iterdir()) == []
-
-    def test_an_object_in_place_of_a_class_is_refused(self):
-        with pytest.raises(InputError, match="expected the name of an agent or its class, found an object of Ahead"):
-            evaluate(Ahead(), **FEW)
 
 
 class TestMaps:
