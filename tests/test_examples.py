@@ -61,7 +61,11 @@ class TestScripts:
         ("flags", "agent", "side", "options"),
         [
             ((), "HerAgent", 13, {}),
-            (("--tracks",), "LidarHerAgent", 31, {"size": 31, "context_size": 31, "fresh": True, "sensors": "lidar"}),
+            pytest.param(
+                *(("--tracks",), "LidarHerAgent", 31),
+                {"size": 31, "context_size": 31, "fresh": True, "sensors": "lidar"},
+                marks=pytest.mark.slow,
+            ),
         ],
     )
     def test_sb3_her(self, tmp_path, flags, agent, side, options):
@@ -97,7 +101,11 @@ for action in (0, 0, 2, 2, 4, 0, 0):
         run("-c", check, folder=tmp_path)
 
     @pytest.mark.parametrize(
-        ("agent", "options"), [("PPOAgent", ()), ("RecurrentPPOAgent", ("--recurrent", "--kinds", "dfs"))]
+        ("agent", "options"),
+        [
+            ("PPOAgent", ()),
+            pytest.param("RecurrentPPOAgent", ("--recurrent", "--kinds", "dfs"), marks=pytest.mark.slow),
+        ],
     )
     def test_sb3_tracks(self, tmp_path, agent, options):
         needs("stable_baselines3", "sb3_contrib")
@@ -115,6 +123,7 @@ for action in (0, 0, 2, 2, 4, 0, 0):
         )
         run("-c", check, folder=tmp_path)
 
+    @pytest.mark.slow
     def test_sb3_tracks_on_a_task_without_lidar(self, tmp_path):
         needs("stable_baselines3", "sb3_contrib")
         output = run(EXAMPLES / "sb3_tracks.py", *PPO_BUDGET, "--track", "mazebench/Local-13-v1", folder=tmp_path)
