@@ -30,7 +30,7 @@ from mazebench.tasks.tracks.track import LEVELS
 from mazebench.training.run_folder import METRICS, checkpoints
 
 PAPER = "paper"  # the suite
-LOCAL = "local-13"  # the part of `paper` that training runs play
+LOCAL = "local-13"  # the part of `paper` on which training runs are evaluated
 ON_TIME_125, ON_TIME_2 = ON_TIME_METRICS  # within 1.25 and 2 times the oracle's steps
 # Agents, with what they were told less or more than others.
 NAVIGATOR, NO_MAP, TRUE_POSE = "navigator", "navigator without map", "navigator with the true pose"

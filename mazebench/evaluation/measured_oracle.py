@@ -1,4 +1,4 @@
-"""Plays the agent `oracle` in the episodes of an evaluation whose steps are not frozen."""
+"""Measures the steps of `oracle` in the episodes of an evaluation, where they are not frozen."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Settings: what was played in an evaluation."""
+"""Settings: the tasks of evaluations."""
 
 from __future__ import annotations
 

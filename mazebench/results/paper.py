@@ -34,7 +34,7 @@ def printed(task: str, size: int, warped: bool = False) -> dict[str, dict[str, d
 def printed_mmn(summary: Summary) -> dict[int, float]:
     """Success rates of the paper's MMN by distance, or landmark distance, where `summary` can be held against them.
 
-    That is where it is of unseen mazes, no track was played, nothing was perturbed and the senses were not noisy.
+    That is where it is of unseen mazes, of no track, nothing was perturbed and the senses were not noisy.
     """
     if summary.split != "eval" or summary.track or any(summary.perturbation.values()) or summary.senses:
         return {}

@@ -29,7 +29,7 @@ KINDS: dict[str, Kind] = {
     "warehouse": WAREHOUSE,
 }
 KNOWN = ("dfs", "house", "rooms")  # of the mazes to train and to choose agents on
-NOVEL = ("office", "hospital", "museum")  # of eval mazes only; no learned agent meets them before its one play
+NOVEL = ("office", "hospital", "museum")  # of eval mazes only; learned agents meet them in their one evaluation only
 CHECK = ("obstacles", "cave", "warehouse")  # in which a map is worth little; agents may be chosen on them
 
 
