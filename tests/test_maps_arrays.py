@@ -37,9 +37,10 @@ class TestWalls:
             (np.full((5, 5), "#"), "expected a two-dimensional array of numbers, found shape (5, 5) <U1"),
             (
                 np.full((5, 5), 0.5),
-                "bool or as 0 and 1, or occupancy as integers from -1 to 100, found float64",
+                "or occupancy as -1, 0 and 1 or as per cent up to 100, found float64 with the values 0.5",
             ),
-            (np.arange(25).reshape(5, 5) * 11, "found int64 from 0 to 264"),
+            (np.arange(25).reshape(5, 5) * 11, "found int64 with the values 0, 11, 22, 33, 44, 55, ... 264"),
+            (WALLS + 2 * np.eye(len(WALLS), dtype=int), "`array == VALUE` says which are walls"),
             (np.zeros((5, 5)), "expected a closed border, found cell (0, 0) free"),
             (np.zeros((5, 9)), "expected a closed border, found cell (0, 0) free"),
         ],
@@ -51,6 +52,11 @@ class TestWalls:
 
 
 class TestOccupancy:
+    def test_one_is_occupied_beside_minus_one(self):
+        occupancy = WALLS.astype(np.int8)
+        occupancy[0, 0] = -1
+        assert maze_from_array(occupancy) == Maze(WALLS)
+
     def test_per_cent_are_thresholded_and_what_cannot_be_reached_is_closed(self, remarks):
         occupancy = np.full((5, 6), 100, dtype=np.int8)
         occupancy[1, 1:5] = [0, 25, -1, 0]  # the last is cut off by the unknown cell

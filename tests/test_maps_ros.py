@@ -99,6 +99,24 @@ class TestThresholds:
 BUILDING = "??????? ?#####? ?#...#? ?#.?.#? ?#...#? ?#####? ???????"
 
 
+def test_a_yaw_that_is_no_number_and_a_map_without_walls_get_a_line(tmp_path, remarks):
+    picture = drawn(BUILDING)
+    picture[picture == 0] = 205
+    path = write_map(tmp_path, picture, origin=[0.0, 0.0, float("nan")])
+    assert read_ros_maze(path).origin[2] == 0.0
+    assert remarks()[0].startswith("map: yaw nan read as 0; no pixel is occupied by occupied_thresh 0.65; ")
+
+
+@pytest.mark.parametrize("white", [100, 1000])
+def test_a_binary_pgm_is_scaled_by_its_largest_number(tmp_path, white):
+    numbers = (drawn(BUILDING) / 255 * white).round().astype(np.uint8 if white < 256 else ">u2")
+    path = write_map(tmp_path, drawn(BUILDING))
+    expected = read_occupancy(path).states
+    head = f"P5\n# scaled\n{numbers.shape[1]} {numbers.shape[0]}\n{white}\n"
+    (tmp_path / METADATA["image"]).write_bytes(head.encode() + numbers.tobytes())
+    np.testing.assert_array_equal(read_occupancy(path).states, expected)
+
+
 class TestMapSaver:
     """map_saver of ROS 2 wrote `free_thresh: 0.25`, with which map_server takes its own shade for unknown as free."""
 
@@ -346,7 +364,10 @@ class TestRefusal:
                 yaml.safe_dump(METADATA | {"resolution": 0}),
                 "with resolution (the side of a pixel, above 0 m), found 0",
             ),
-            (yaml.safe_dump(METADATA | {"origin": [0, 0]}), "with origin (three numbers, [x, y, yaw]), found [0, 0]"),
+            (yaml.safe_dump(METADATA | {"origin": [0, 0]}), "origin (three finite numbers, [x, y, yaw]), found [0, 0]"),
+            (yaml.safe_dump(METADATA | {"origin": [0.0, float("inf"), 0.0]}), "found [0.0, inf, 0.0]"),
+            (yaml.safe_dump(METADATA | {"occupied_thresh": 65}), "occupied_thresh (a number from 0 to 1), found 65"),
+            (yaml.safe_dump(METADATA | {"free_thresh": 0.9}), "(a number from 0 to occupied_thresh), found 0.9"),
             (yaml.safe_dump(METADATA), "map.yaml: {folder}/map.pgm: can't read the picture: No such file"),
         ],
     )

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from typing import Annotated, Any
 
 import numpy as np
 import pytest
 from annotated_types import Ge, Interval
-from hypothesis import given
-from hypothesis import strategies as st
 
 from mazebench.errors import InputError
-from mazebench.options import Doc, OneOf, by_name, from_names, options, options_of
+from mazebench.options import Doc, OneOf, from_names, options
 
 
 @options
@@ -67,38 +64,6 @@ def test_any_iterable_and_a_single_value_become_a_tuple(sizes: Any):
     assert Given(sizes=sizes).sizes == (5,)
 
 
-def test_options_are_listed_with_those_that_they_hold_and_their_defaults():
-    found = options_of(Whole)
-    assert list(found) == ["share", "count", "colour", "sizes", "seed"]
-    assert found["share"][:2] == ("A share.", 0.5)
-    assert (found["share"].lowest, found["share"].highest) == (0, 1)
-    assert (found["sizes"].lowest, found["colour"].choices) == (3, ("red", "blue"))
-    assert found["colour"].default == "blue"
-
-
 def test_a_name_that_no_option_has_is_refused():
     with pytest.raises(InputError, match="unknown option 'hue'; available: colour, count, seed, share, sizes"):
         from_names(Whole, {"hue": 1}, agent="mmn")
-
-
-@given(
-    st.fixed_dictionaries(
-        {},
-        optional={
-            "share": st.floats(0, 1),
-            "count": st.none() | st.integers(1),
-            "colour": st.sampled_from(["red", "blue"]),
-            "sizes": st.lists(st.integers(3)),
-            "seed": st.integers(0),
-        },
-    )
-)
-def test_options_survive_the_way_through_json(values: dict[str, Any]):
-    made = from_names(Whole, values, agent="mmn")
-    table = by_name(made)
-    assert table.pop("agent") == "mmn"
-    assert table.pop("name") == "no option"
-    assert table == {"share": 0.5, "count": None, "colour": "blue", "sizes": (3, 4), "seed": 0} | {
-        name: tuple(value) if name == "sizes" else value for name, value in values.items()
-    }
-    assert from_names(Whole, json.loads(json.dumps(table)), agent="mmn") == made

@@ -19,6 +19,7 @@ from mazebench.storage.files import read_at_most
 
 _MAX_BYTES = 2**27  # of a .npy file
 _MAX_FREE, _MIN_OCCUPIED = 25, 65  # per cent, of map_saver
+_LEAST_PERCENT = 50  # that the largest number of an occupancy grid has; smaller ones are codes of something else
 
 
 def maze_from_array(array: np.ndarray, name: str = "maze", **options: Any) -> Maze:
@@ -26,7 +27,8 @@ def maze_from_array(array: np.ndarray, name: str = "maze", **options: Any) -> Ma
 
     Args:
       array: `[R, C]`, either walls as bool or as 0 (free) and 1 (wall), which are padded to a square by `square_maze`;
-        or occupancy as integers from 0 (free) to 100 (occupied) per cent, -1 where unknown, see `locate_maze`.
+        or occupancy, -1 where unknown, as 0 (free) and 1 (occupied) or as integers from 0 to 100 per cent, see
+        `locate_maze`.
       name: of the maze.
       **options: those of `ReadOptions`.
 
@@ -44,10 +46,14 @@ def read_array(array: np.ndarray, name: str, options: ReadOptions) -> Maze:
     cell_size = 1.0 if options.cell_size is None else options.cell_size
     if array.dtype == bool or np.isin(array, (0, 1)).all():
         return square_maze(array == 1, name, cell_size)
-    if array.dtype.kind == "f" or array.min() < UNKNOWN or array.max() > OCCUPIED:
+    is_percent = array.dtype.kind != "f" and array.min() >= UNKNOWN and _LEAST_PERCENT <= array.max() <= OCCUPIED
+    is_ternary = np.isin(array, (UNKNOWN, 0, 1)).all()  # as in ROS 2's OccupancyGrid, and in Player's maps
+    if not (is_percent or is_ternary):
+        found = np.unique(array)
+        values = ", ".join(f"{value:g}" for value in found[:6]) + (f", ... {found[-1]:g}" if len(found) > 6 else "")
         raise MazeError(
-            f"{name}: expected walls as bool or as 0 and 1, or occupancy as integers from -1 to 100, "
-            f"found {array.dtype} from {array.min():g} to {array.max():g}"
+            f"{name}: expected walls as bool or as 0 and 1, or occupancy as -1, 0 and 1 or as per cent up to 100, "
+            f"found {array.dtype} with the values {values}; `array == VALUE` says which are walls"
         )
     if cell_size < MIN_CELL_SIZE:
         raise InputError(
@@ -55,8 +61,8 @@ def read_array(array: np.ndarray, name: str, options: ReadOptions) -> Maze:
             f"found {cell_size:g}; save a finer grid as a ROS map, which is coarsened"
         )
     states = np.full(array.shape, UNKNOWN, dtype=np.int8)
-    states[(array >= 0) & (array <= _MAX_FREE)] = FREE
-    states[array >= _MIN_OCCUPIED] = OCCUPIED
+    states[(array >= 0) & (array <= (0 if is_ternary else _MAX_FREE))] = FREE
+    states[array >= (1 if is_ternary else _MIN_OCCUPIED)] = OCCUPIED
     return locate_maze(OccupancyGrid(states, cell_size), dataclasses.replace(options, cell_size=cell_size), name).maze
 
 

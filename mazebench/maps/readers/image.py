@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import pathlib
+import re
 
 import cv2
 import numpy as np
@@ -21,6 +22,9 @@ from mazebench.storage.files import read_at_most
 
 _MAX_BYTES = 2**27  # of a picture's file; _MAX_PIXELS gray pixels take half of it
 _MAX_PIXELS = MAX_SIDE**2  # of a picture that is read: every drawing of this package
+_PGM_HEAD = re.compile(
+    rb"P5(?:\s|#[^\n]*\n)+(?P<width>\d{1,5})(?:\s|#[^\n]*\n)+(?P<height>\d{1,5})(?:\s|#[^\n]*\n)+(?P<white>\d{1,5})\s"
+)
 _PNG_START = b"\x89PNG\r\n\x1a\n"
 _MIN_DARK = 0.3  # share of the pixels of a picture of light walls on a dark ground
 _MARK_SATURATION = 90  # of 255, between the strongest and the weakest channel of a marker
@@ -95,8 +99,24 @@ def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maz
         ) from error
 
 
+def _scaled_pgm(content: bytes) -> np.ndarray | None:
+    """Returns `[H, W]` uint8 of a binary PGM whose white is not the largest number, which OpenCV does not scale."""
+    head = _PGM_HEAD.match(content)
+    if head is None or (white := int(head["white"])) in (0, 255, 65535):
+        return None
+    shape = int(head["height"]), int(head["width"])
+    numbers = np.dtype(np.uint8 if white < 256 else ">u2")
+    body = content[head.end() : head.end() + shape[0] * shape[1] * numbers.itemsize]
+    if len(body) < shape[0] * shape[1] * numbers.itemsize:
+        return None
+    shades = np.rint(np.minimum(np.arange(2**16) / white, 1) * 255).astype(np.uint8)
+    return shades[np.frombuffer(body, numbers)].reshape(shape)
+
+
 def _decode(content: bytes) -> np.ndarray | None:
     """Returns the picture in a file's bytes, as `maze_from_image` takes it; None if OpenCV can't decode it."""
+    if (gray := _scaled_pgm(content)) is not None:
+        return gray
     # Only PNG may have opacity. A JPEG is turned as its camera was held, which IMREAD_UNCHANGED would not do.
     flags = cv2.IMREAD_UNCHANGED if content.startswith(_PNG_START) else cv2.IMREAD_COLOR
     log_level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)

@@ -6,13 +6,15 @@ The rules are those of http://wiki.ros.org/map_server, and in the details of `na
 from __future__ import annotations
 
 import contextlib
+import math
 import pathlib
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import cv2
 import numpy as np
 import pydantic
 import yaml
+from annotated_types import Interval
 from scipy import ndimage
 
 from mazebench.errors import InputError
@@ -27,6 +29,7 @@ _MAX_BYTES = 2**16  # of a YAML file
 _FREE_SHADE, _UNKNOWN_SHADE, _OCCUPIED_SHADE = 254, 205, 0  # that map_saver writes
 _OCCUPIED_THRESH, _FREE_THRESH = 0.65, 0.196  # with which map_server reads them back
 _LEAST_INSIDE = 0.2  # share of a floor plan that is free inside of closed outer walls; less of it is a closed room
+_Share = Annotated[float, Interval(ge=0, le=1)]
 _MOSTLY_DARK = 0.8  # share of walls from which a floor plan is light on dark; mazes of corridors have up to 0.6
 
 
@@ -36,12 +39,21 @@ class _Metadata(pydantic.BaseModel):
     image: str = pydantic.Field(min_length=1, description="the name of a picture")  # absolute, or beside the YAML file
     resolution: float = pydantic.Field(gt=0, allow_inf_nan=False, description="the side of a pixel, above 0 m")
     # x, y (m) and yaw (rad) of the lower left corner of the picture
-    origin: Pose = pydantic.Field(description="three numbers, [x, y, yaw]")
+    origin: tuple[pydantic.FiniteFloat, pydantic.FiniteFloat, float] = pydantic.Field(
+        description="three finite numbers, [x, y, yaw]"
+    )
     negate: bool = pydantic.Field(description="0 or 1")  # whether light is occupied
     # A pixel whose probability of being occupied is above the first is wall, below the second free.
-    occupied_thresh: float = pydantic.Field(description="a number from 0 to 1")
-    free_thresh: float = pydantic.Field(description="a number from 0 to 1")
+    occupied_thresh: _Share = pydantic.Field(description="a number from 0 to 1")
+    free_thresh: _Share = pydantic.Field(description="a number from 0 to occupied_thresh")
     mode: Literal["trinary", "scale", "raw"] = pydantic.Field("trinary", description="trinary, scale or raw")
+
+    @pydantic.field_validator("free_thresh")
+    @classmethod
+    def _is_lower(cls, free_thresh: float, info: pydantic.ValidationInfo) -> float:
+        if free_thresh > info.data.get("occupied_thresh", 1.0):
+            raise ValueError
+        return free_thresh
 
 
 def read_ros_maze(path: str | pathlib.Path, **options: Any) -> LocatedMaze:
@@ -143,7 +155,13 @@ def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
             f"shade {_UNKNOWN_SHADE} read as unknown, as map_saver means it, though free_thresh "
             f"{metadata.free_thresh:g} says free"
         )
-    return OccupancyGrid(states, metadata.resolution, metadata.origin, tuple(changes))
+    x, y, yaw = metadata.origin
+    if not math.isfinite(yaw):  # some versions of map_saver wrote nan
+        changes.append(f"yaw {yaw:g} read as 0")
+        yaw = 0.0
+    if not (states == OCCUPIED).any():
+        changes.append(f"no pixel is occupied by occupied_thresh {metadata.occupied_thresh:g}")
+    return OccupancyGrid(states, metadata.resolution, (x, y, yaw), tuple(changes))
 
 
 def picture_of(path: str | pathlib.Path) -> pathlib.Path:
