@@ -51,6 +51,7 @@ def test_mazes_when_compared_up_to_symmetry(size):
     assert [maze.name for maze in load_mazes(size, "eval")] == [f"{size}-eval-{index:02d}" for index in range(20)]
 
 
+@pytest.mark.slow
 def test_freeze_when_compared_with_shipped_files(shipped, tmp_path):
     freeze.freeze(tmp_path)
     made = {path.name: path.read_bytes() for path in tmp_path.iterdir()}

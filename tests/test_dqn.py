@@ -1,6 +1,7 @@
 """The DQN agents: targets, network, config, and that they learn."""
 
 import numpy as np
+import pytest
 import torch
 from acting import inputs_of
 from mazebench_agents.dqn import DQN
@@ -66,6 +67,7 @@ def test_mah_paper_reads_one_code_of_the_context_and_codes_of_the_estimated_posi
     assert not torch.equal(agent.network(state, code)[0], agent.network(state, code)[1])
 
 
+@pytest.mark.slow
 def test_mah_after_a_minute_beats_random_in_a_small_maze():
     """The learning test: goals up to 3 cells away in 25 steps, where acting at random reaches some 40 %."""
     values = {

@@ -133,10 +133,6 @@ class TestValue:
         assert Maze(field(6)) != Maze(grid(RING))
         assert len({Maze(field(5), "a"), Maze(field(5), "b"), Maze(grid(RING))}) == 2
 
-    @pytest.mark.parametrize("cell", [(0, 0), (-2, 2), (2, -2), (5, 2), (2, 5)])
-    def test_a_cell_outside_is_not_free(self, cell):
-        assert not Maze(field(5)).is_free(cell)
-
 
 class TestDistances:
     def test_distances_are_those_of_walking_round_a_block(self):
