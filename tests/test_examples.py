@@ -43,7 +43,6 @@ class TestScripts:
                 "--steps 3000 --num-envs 16 --learning-starts 500 --target-updates 50",
                 "156 updates; success rate ",
             ),
-            ("torch", "vector_dqn.py", "--steps 64", r"\A0 updates, because 64 steps .* --learning-starts 5000\n\Z"),
             (
                 "torchrl",
                 "torchrl_ppo.py",

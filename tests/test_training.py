@@ -267,6 +267,7 @@ def cluster():
 
 
 @pytest.mark.filterwarnings("ignore")
+@pytest.mark.slow
 def test_training_on_ray_keeps_the_replay_ratio(cluster, tmp_path):
     train(tiny_options(env_steps=1600, workers=2), tmp_path)
     last = metrics(tmp_path)[-1]
