@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mazebench.errors import InputError, unknown
-from mazebench.maps.benchmark import PAPER_BENCHMARK, TRACKS_BENCHMARK, manifest_hash
+from mazebench.errors import InputError
+from mazebench.maps.benchmark import manifest_hash
 from mazebench.options import from_names, options_of
 from mazebench.results.records import Summary
 from mazebench.tasks.build import build_task
@@ -22,7 +22,6 @@ from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.task_options import EnvironmentOptions
 
-BENCHMARKS = (PAPER_BENCHMARK, TRACKS_BENCHMARK)
 # Options that change nothing of what is shown. A summary has the chosen values, which options may not allow.
 _UNSEEN = ("distances", "time_limit")
 
@@ -48,8 +47,6 @@ def task_of(summary: Summary) -> TaskSpec:
       InputError: if this version of the benchmark has no such task, or the mazes are gone or were changed.
     """
     provenance = summary.provenance
-    if summary.benchmark not in BENCHMARKS:
-        raise unknown("benchmark", summary.benchmark, BENCHMARKS)
     installed, found = manifest_hash(summary.benchmark), provenance.benchmark_manifest_sha256 or "unknown"
     if installed != found:
         raise InputError(
