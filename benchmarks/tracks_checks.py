@@ -19,12 +19,12 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import typer
 
-from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.constants import ON_TIME
 from mazebench.errors import InputError
 from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.measured_oracle import measure_oracle_steps
+from mazebench.evaluation.plan import interface_of
 from mazebench.maps.benchmark import KINDS_SIZE
 from mazebench.maps.doors import door_slots, num_swappable, swap_doors
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
@@ -131,17 +131,8 @@ def play(agent_name: str, kind: str, episodes: int, hide: tuple[str, ...] = ()) 
         for index, maze in enumerate(spec.mazes)
         for _ in range(_PER_MAZE)
     ]
-    interface = Interface(
-        spec.task,
-        spec.size,
-        spec.context_size,
-        sensors=spec.sensors,
-        hidden=spec.hide,
-        lidar=spec.lidar,
-        odometry_noise=spec.odometry_noise_at(1),
-    )
     agent_class = load_agent_class(agent_name)
-    agent = agent_class.build(interface)
+    agent = agent_class.build(interface_of(spec))
     steps = np.full(len(trials), np.inf)
     numbered = list(enumerate(trials))
     for outcomes in run_trials(agent, spec, numbered, len(trials), 1, needs_truth=agent_class.needs_truth):

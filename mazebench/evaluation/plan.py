@@ -105,17 +105,7 @@ class Plan:
     @property
     def interface(self) -> Interface:
         """The environments that the agent is built for."""
-        task = self.task
-        return Interface(
-            task.task,
-            task.size,
-            task.context_size,
-            sensors=task.sensors,
-            cell_size=task.cell_size,
-            hidden=task.hide,
-            lidar=task.lidar if "lidar" in task.sensors else None,
-            odometry_noise=max(map(task.odometry_noise_at, task.level)),
-        )
+        return interface_of(self.task)
 
     def build_agent(self) -> CheckedAgent:
         """Returns a new agent for the task, held to its contract.
@@ -137,6 +127,20 @@ class Plan:
         with calling(options.agent, "build"):
             agent = self.agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)
         return CheckedAgent(options.agent, agent, interface.num_actions)
+
+
+def interface_of(task: TaskSpec) -> Interface:
+    """Returns what an agent may know of the environments of a task."""
+    return Interface(
+        task.task,
+        task.size,
+        task.context_size,
+        sensors=task.sensors,
+        cell_size=task.cell_size,
+        hidden=task.hide,
+        lidar=task.lidar if "lidar" in task.sensors else None,
+        odometry_noise=max(map(task.odometry_noise_at, task.level)),
+    )
 
 
 def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> Plan:
