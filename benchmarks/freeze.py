@@ -17,9 +17,7 @@ from mazebench.maps.benchmark import MANIFEST, MAZES_PER_SPLIT, PAPER_BENCHMARK,
 from mazebench.maps.kinds.dfs import DFS_OPENINGS, dfs_walls
 from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
-from mazebench.tasks.build import make_spec
-from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.task_options import EVAL_DISTANCES
+from mazebench.tasks.task import EVAL_DISTANCES, Task
 from mazebench.tasks.trials import COLUMNS, Trial, benchmark_task_sizes, draw_trials, episodes_file
 
 _MAZE_SEED = 1  # with the size it seeds the stream that all its mazes are drawn from
@@ -44,8 +42,8 @@ def freeze(folder: pathlib.Path) -> None:
         folder.joinpath(name).write_bytes(text.encode("ascii"))
 
 
-def _task(task: str, mazes: list[Maze]) -> TaskSpec:
-    return make_spec(task, mazes=mazes, distances=EVAL_DISTANCES if task == "local" else None)
+def _task(task: str, mazes: list[Maze]) -> Task:
+    return Task.of(task, mazes=mazes, distances=EVAL_DISTANCES if task == "local" else None)
 
 
 def draw_mazes(size: int) -> list[Maze]:

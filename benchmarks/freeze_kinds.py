@@ -32,10 +32,9 @@ from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
 from mazebench.results.frozen_oracle import oracle_file
-from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.shown_map import leg_context, show_map
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.track import DISTANCES, LEVELS
 from mazebench.tasks.trials import Trial, episodes_file, make_trial
@@ -108,8 +107,8 @@ def contexts_hash(track: str, level: int, mazes: Sequence[Maze], trials: Sequenc
     return digest.hexdigest()
 
 
-def _task(track: str, level: int, mazes: Sequence[Maze]) -> TaskSpec:
-    return make_spec(track, mazes=list(mazes), level=level, distances=DISTANCES)
+def _task(track: str, level: int, mazes: Sequence[Maze]) -> Task:
+    return Task.of(track, mazes=list(mazes), level=level, distances=DISTANCES)
 
 
 def _shuffled_rounds(values: Sequence[int], rng: np.random.Generator) -> Iterator[int]:

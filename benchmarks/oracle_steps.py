@@ -12,7 +12,7 @@ import sys
 
 from mazebench.evaluation.measured_oracle import measure_oracle_steps
 from mazebench.results.frozen_oracle import oracle_key
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.trials import benchmark_task_sizes, frozen_trials
 
 
@@ -20,7 +20,7 @@ def main(path: pathlib.Path) -> None:
     """Writes the steps in each episode to `path`, in the order of the frozen episodes, and prints the file's hash."""
     lines = []
     for name, size, _ in benchmark_task_sizes():
-        steps = measure_oracle_steps(make_spec(name, size, "eval"), frozen_trials(name, size))
+        steps = measure_oracle_steps(Task.of(name, size=size, split="eval"), frozen_trials(name, size))
         key = oracle_key(name, size)
         reached = [each for each in steps if each is not None]
         print(f"{key}: {len(reached)} of {len(steps)} goals, {sum(reached) / len(reached):.2f} steps on average")

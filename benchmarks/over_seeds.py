@@ -20,8 +20,7 @@ from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.kinds import generate
 from mazebench.results.intervals import Estimate, runs_interval
-from mazebench.tasks.build import make_spec
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
 
 _DISTANCES = (2, 4, 6, 8, 10)
@@ -66,7 +65,7 @@ def main() -> None:
             _print_row([runs_interval(*at) for at in pairs], f"{name} - {other}")
 
 
-def _task(distance: int, given: argparse.Namespace) -> TaskSpec:
+def _task(distance: int, given: argparse.Namespace) -> Task:
     """Returns the local task at one distance in the mazes that the options name."""
     if given.trained_in is None:
         streams, mazes = np.random.SeedSequence([given.seed, given.size]), []
@@ -75,12 +74,12 @@ def _task(distance: int, given: argparse.Namespace) -> TaskSpec:
             maze = generate(given.kind, given.size, rng, f"held-out-{len(mazes)}")
             if maze.diameter >= distance:
                 mazes.append(maze)
-        return make_spec("local", mazes=mazes, distances=(distance,))
+        return Task.of("local", mazes=mazes, distances=(distance,))
     drawn = {"kinds": (given.kind,), "num_mazes": given.trained_in} if given.trained_in else {}
-    return make_spec("local", given.size, "train", distances=(distance,), **drawn)
+    return Task.of("local", size=given.size, split="train", distances=(distance,), **drawn)
 
 
-def _outcomes(agent: Agent, task: TaskSpec) -> tuple[np.ndarray, np.ndarray]:
+def _outcomes(agent: Agent, task: Task) -> tuple[np.ndarray, np.ndarray]:
     """Returns the success and the maze of each episode, in the order of the trials."""
     trials = list(enumerate(draw_trials(task, _EPISODES)))
     ended = [outcome for some in run_trials(agent, task, trials, len(trials)) for outcome in some]

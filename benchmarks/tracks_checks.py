@@ -30,9 +30,9 @@ from mazebench.maps.doors import door_slots, num_swappable, swap_doors
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.maps.maze import Cell, Maze
 from mazebench.results.intervals import Estimate, difference_interval, mean_interval
-from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.shown_map import is_blocked
+from mazebench.tasks.task import Task
 from mazebench.tasks.tracks.rebuilt import SWAPS
 from mazebench.tasks.tracks.track import DISTANCES
 from mazebench.tasks.trials import make_trial
@@ -124,11 +124,11 @@ class Episodes(NamedTuple):
 def play(agent_name: str, kind: str, episodes: int, hide: tuple[str, ...] = ()) -> Episodes:
     """Runs an agent with right maps of a kind, in episodes that are the same ones for all agents."""
     mazes = check_mazes(kind, -(-episodes // _PER_MAZE))
-    spec = make_spec(_TRACK, mazes=mazes, level=1, distances=DISTANCES, hide=hide, sensors=("lidar",))
+    spec = Task.of(_TRACK, mazes=mazes, level=1, distances=DISTANCES, hide=hide, sensors=("lidar",))
     rng = np.random.default_rng(_SEED)
     trials = [
         make_trial(maze, index, sample_pair(maze, int(rng.choice(DISTANCES)), rng), rng)
-        for index, maze in enumerate(spec.mazes)
+        for index, maze in enumerate(spec.all_mazes)
         for _ in range(_PER_MAZE)
     ]
     agent_class = load_agent_class(agent_name)

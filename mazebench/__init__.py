@@ -12,17 +12,24 @@ from typing import TYPE_CHECKING, Any
 from mazebench.envs.registration import register_environments
 
 if TYPE_CHECKING:
-    from mazebench.agent import Agent, Inputs, SingleAgent
-    from mazebench.envs.registration import load, make_vec
-    from mazebench.errors import InputError, UnplayableError
-    from mazebench.evaluation.evaluate import evaluate
-    from mazebench.maps.kinds import generate
-    from mazebench.maps.maze import Maze, MazeError
-    from mazebench.maps.maze_files import read_maze, read_mazes
-    from mazebench.maps.readers.arrays import maze_from_array
-    from mazebench.tasks.build import make_spec
-    from mazebench.tasks.episode import Episode
-    from mazebench.tasks.spec import TaskSpec
+    from mazebench.agent import Agent as Agent
+    from mazebench.agent import Inputs as Inputs
+    from mazebench.agent import SingleAgent as SingleAgent
+    from mazebench.envs.registration import load as load
+    from mazebench.envs.registration import make as make
+    from mazebench.envs.registration import make_vec as make_vec
+    from mazebench.errors import InputError as InputError
+    from mazebench.errors import UnplayableError as UnplayableError
+    from mazebench.evaluation.evaluate import evaluate as evaluate
+    from mazebench.maps.kinds import generate as generate
+    from mazebench.maps.maze import Maze as Maze
+    from mazebench.maps.maze import MazeError as MazeError
+    from mazebench.maps.maze_files import read_maze as read_maze
+    from mazebench.maps.maze_files import read_mazes as read_mazes
+    from mazebench.maps.readers.arrays import maze_from_array as maze_from_array
+    from mazebench.tasks.episode import Episode as Episode
+    from mazebench.tasks.task import Task as Task
+    from mazebench.training.loop import train as train
 
 __version__ = "0.1.0"
 
@@ -38,37 +45,20 @@ _HOMES = {
     "Maze": "mazebench.maps.maze",
     "MazeError": "mazebench.maps.maze",
     "SingleAgent": "mazebench.agent",
-    "TaskSpec": "mazebench.tasks.spec",
+    "Task": "mazebench.tasks.task",
     "UnplayableError": "mazebench.errors",
     "evaluate": "mazebench.evaluation.evaluate",
     "generate": "mazebench.maps.kinds",
     "load": "mazebench.envs.registration",
-    "make_spec": "mazebench.tasks.build",
+    "make": "mazebench.envs.registration",
     "maze_from_array": "mazebench.maps.readers.arrays",
     "make_vec": "mazebench.envs.registration",
     "read_maze": "mazebench.maps.maze_files",
     "read_mazes": "mazebench.maps.maze_files",
+    "train": "mazebench.training.loop",
 }
 
-__all__ = [
-    "Agent",
-    "Episode",
-    "InputError",
-    "Inputs",
-    "Maze",
-    "MazeError",
-    "SingleAgent",
-    "TaskSpec",
-    "UnplayableError",
-    "evaluate",
-    "generate",
-    "load",
-    "make_spec",
-    "make_vec",
-    "maze_from_array",
-    "read_maze",
-    "read_mazes",
-]
+__all__ = list(_HOMES)
 
 
 def __dir__() -> list[str]:
@@ -80,6 +70,6 @@ if not TYPE_CHECKING:  # a type checker would take any name for one that is here
     def __getattr__(name: str) -> Any:
         if name not in _HOMES:
             raise AttributeError(f"module 'mazebench' has no attribute {name!r}")
-        if name == "evaluate":
+        if name in ("evaluate", "train"):
             importlib.import_module("mazebench.world.backend").load_mujoco()  # for its error if MUJOCO_GL is wrong
         return getattr(importlib.import_module(_HOMES[name]), name)

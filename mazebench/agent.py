@@ -7,7 +7,6 @@ the context's planes.
 from __future__ import annotations
 
 import copy
-import dataclasses
 import functools
 import pathlib
 from typing import Any, ClassVar, NamedTuple, Self
@@ -15,24 +14,9 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from mazebench.tasks.context import default_context_size
-from mazebench.world.ray_casting import LidarModel
+from mazebench.tasks.interface import Interface as Interface
 
 Observation = dict[str, np.ndarray]  # "state" [B, 12] float32, "context" [B, 4, M, M] float32, sensors by name
-
-
-@dataclasses.dataclass(frozen=True)
-class Interface:
-    """The environments that an agent is built for."""
-
-    task: str  # "local" or "hierarchical"
-    size: int  # N
-    context_size: int  # M
-    num_actions: int = 6
-    sensors: tuple[str, ...] = ()  # whose readings are observed beside the state and the context
-    cell_size: float = 1.0  # m, the side of a cell of the mazes
-    hidden: tuple[str, ...] = ()  # of "map" and "goal": what the context does not show
-    lidar: LidarModel | None = None  # what the sensor lidar measures; None without it
-    odometry_noise: float = 0.0  # alpha of the noise on the observed motion (`mazebench.tasks.odometry.NoisyMotion`)
 
 
 class Truth(NamedTuple):

@@ -5,9 +5,7 @@
         inflate: Annotated[float, Interval(ge=0, le=10), Doc("Metres by which walls are thickened.")] = 0.0
         unknown: Annotated[str, OneOf("wall", "free"), Doc("What unknown cells become.")] = "wall"
 
-The command line, keyword arguments, config files and docs/options.md follow from the declaration. A field may hold
-options itself: `EvalOptions.task` is `TaskOptions`. `from_names` and `by_name` go between such options and one flat
-table of names, which is what a command line or a JSON file has.
+The command line, keyword arguments, config files and docs/options.md follow from the declaration.
 """
 
 from __future__ import annotations
@@ -102,12 +100,10 @@ def options(cls: type[Options]) -> type[Options]:
 
 @functools.cache
 def fields_of(options_class: Any) -> Mapping[str, Option]:
-    """Returns what is known of each field of a class that `options` made, but of those that hold options."""
+    """Returns the description of each field of a class that `options` made; a field that is no option has no help."""
     kinds, extras = typing.get_type_hints(options_class), typing.get_type_hints(options_class, include_extras=True)
     described = {}
     for field in dataclasses.fields(options_class):
-        if _is_options(kinds[field.name]):
-            continue
         metadata = list(_metadata(extras[field.name]))
         described[field.name] = Option(
             help=next((item.documentation for item in metadata if isinstance(item, Doc)), ""),
@@ -118,69 +114,6 @@ def fields_of(options_class: Any) -> Mapping[str, Option]:
             choices=next((item.choices for item in metadata if isinstance(item, OneOf)), None),
         )
     return types.MappingProxyType(described)
-
-
-def options_of(options_class: type, defaults: Any = None) -> dict[str, Option]:
-    """Returns the options of a class by name, with those of the options that it holds: the fields that have a `Doc`.
-
-    Args:
-      options_class: made by `options`.
-      defaults: an object of the class whose values are the defaults; None for those that the class declares.
-    """
-    found: dict[str, Option] = {}
-    own = fields_of(options_class)
-    for field in dataclasses.fields(options_class):
-        default = field.default if defaults is None else getattr(defaults, field.name)
-        if field.name not in own:
-            found |= options_of(type(field.default), default)
-        elif own[field.name].help:
-            found[field.name] = own[field.name]._replace(default=default)
-    return found
-
-
-def from_names(options_class: type[Options], values: Mapping[str, Any], **others: Any) -> Options:
-    """Returns options of a class from one table of names, which may be those of options that it holds.
-
-    Args:
-      options_class: made by `options`.
-      values: by name; what is missing has its default.
-      **others: fields that are no options.
-
-    Raises:
-      InputError: if a name is unknown, or a value is not allowed.
-    """
-    known = options_of(options_class)
-    for name in values:
-        if name not in known:
-            raise unknown("option", name, known)
-    return _filled(options_class, values, None, others)
-
-
-def by_name(options: Any) -> dict[str, Any]:
-    """Returns the fields of options and of the options that they hold as one table."""
-    found: dict[str, Any] = {}
-    for field in dataclasses.fields(options):
-        value = getattr(options, field.name)
-        found |= by_name(value) if _is_options(type(value)) else {field.name: value}
-    return found
-
-
-def _filled(options_class: type[Options], values: Mapping[str, Any], base: Any, others: dict[str, Any]) -> Options:
-    """Returns options with `values`; those that are missing are as in `base`, or the class's defaults if it is None."""
-    given = dict(others)
-    for field in dataclasses.fields(options_class):  # type: ignore[arg-type]
-        default = field.default if base is None else getattr(base, field.name)
-        if _is_options(type(default)):
-            given[field.name] = _filled(type(default), values, default, {})
-        elif field.name in values:
-            given[field.name] = values[field.name]
-        elif base is not None:
-            given[field.name] = default
-    return options_class(**given)
-
-
-def _is_options(kind: Any) -> bool:
-    return isinstance(kind, type) and pydantic.dataclasses.is_pydantic_dataclass(kind)
 
 
 def _metadata(kind: Any) -> Iterable[Any]:

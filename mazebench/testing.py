@@ -18,9 +18,8 @@ from mazebench.errors import InputError
 from mazebench.evaluation.agent_inputs import agent_seed, true_state
 from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling, context_size_of
 from mazebench.maps.kinds import generate
-from mazebench.tasks.build import make_spec
 from mazebench.tasks.episode import Episode, sample_episode
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 
 _SIZE = 7
 _NUM_MAZES = 3  # of different paths between their corners, so that episodes side by side end at different steps
@@ -118,7 +117,7 @@ class _Episodes:
         rng = np.random.default_rng(0)
         drawn = (generate("dfs", interface.size, rng, f"maze-{index}") for index in range(_NUM_MAZES))
         self._needs_truth = needs_truth
-        self._task_spec: TaskSpec = make_spec(
+        self._task_spec = Task.of(
             "hierarchical",
             mazes=tuple(dataclasses.replace(maze, cell_size=interface.cell_size) for maze in drawn),
             time_limit=_TIME_LIMIT,

@@ -18,10 +18,10 @@ from mazebench.results.reading import EPISODES, SUMMARY
 from mazebench.results.records import Record
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, save_trajectories
 from mazebench.storage.json_files import write_json
-from mazebench.tasks.build import build_task, make_spec
+from mazebench.tasks.build import build_task, Task.of
 from mazebench.tasks.observation import state_errors
 from mazebench.tasks.perturbations import perturbation_levels
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.tasks.trials import Trial, select_trials
 
 NASTY = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=1>"
@@ -156,7 +156,7 @@ def of_own_mazes(folder: pathlib.Path, name: str) -> pathlib.Path:
         if maze.name in used:
             rows = ("".join("#" if wall else "." for wall in row) for row in maze.walls)
             (maps / f"{name}{maze.name[-3:]}.txt").write_text("\n".join(rows) + "\n")
-    provenance = summary["provenance"] | {"mazes_sha256": mazes_hash(make_spec(mazes=maps))}
+    provenance = summary["provenance"] | {"mazes_sha256": mazes_hash(Task.of(mazes=maps))}
     provenance["options"] |= {"mazes": str(maps), "size": None}
     return edit_summary(folder, split="custom", provenance=provenance)
 
@@ -168,9 +168,9 @@ def _set_means(folder: pathlib.Path, records: list[Record]) -> pathlib.Path:
     return edit_summary(folder, overall=overall.model_dump(), by_distance=means, by_fact=by_fact)
 
 
-def _drive(spec: TaskSpec, trial: Trial, success: bool, rng: np.random.Generator) -> Trajectory:
+def _drive(spec: Task, trial: Trial, success: bool, rng: np.random.Generator) -> Trajectory:
     """Drives along the shortest path with some jitter, only a part of it without success."""
-    episode, maze = trial.episode, spec.mazes[trial.episode.maze]
+    episode, maze = trial.episode, spec.all_mazes[trial.episode.maze]
     points = cell_to_point(np.array(path_through_walls(maze.walls, episode.start, episode.goal)), spec.size)
     distances = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1]), axis=1).cumsum()
     end = distances[-1] - 0.5 if success else distances[-1] * rng.uniform(0.1, 0.8)
@@ -191,13 +191,13 @@ def _drive(spec: TaskSpec, trial: Trial, success: bool, rng: np.random.Generator
     return Trajectory(np.column_stack([place, heading]).astype(np.float16), observed)
 
 
-def _outcome(number: int, trial: Trial, spec: TaskSpec, success: bool, drive: Trajectory) -> dict[str, Any]:
+def _outcome(number: int, trial: Trial, spec: Task, success: bool, drive: Trajectory) -> dict[str, Any]:
     driven = float(np.linalg.norm(np.diff(drive.pose[:, :2].astype(float), axis=0), axis=1).sum())
     shortest = np.array([trial.shortest_path, float(trial.distance)])
     scores = spl(np.array([success] * 2), shortest, np.array([driven] * 2)).tolist()
     return {
         "episode": number,
-        "maze": spec.mazes[trial.episode.maze].name,
+        "maze": spec.all_mazes[trial.episode.maze].name,
         "start": trial.episode.start,
         "goal": trial.episode.goal,
         "distance": trial.distance,

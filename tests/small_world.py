@@ -9,7 +9,7 @@ from simple_mazes import field
 
 from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.maze import Maze
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
 from mazebench.training.experience import Collector
 from mazebench.training.loop import num_updates_due
@@ -22,7 +22,7 @@ def learn(
 ) -> tuple[float, float]:
     """Success rates before and after so many updates, in a field of `side` x `side` cells with walls around."""
     maze = field(side + 2)
-    spec = make_spec(mazes=maze, distances=distances, time_limit=TIME_LIMIT, num_goals=4)
+    spec = Task.of(mazes=maze, distances=distances, time_limit=TIME_LIMIT, num_goals=4)
     overrides = {key: str(value) for key, value in values.items()}
     learner = agent_class.build_learner(spec, overrides=overrides)
     before = _success_rate(learner.actor, maze, distances)
@@ -42,6 +42,6 @@ def learn(
 
 def _success_rate(actor: Any, maze: Maze, distances: tuple[int, ...]) -> float:
     """Of acting greedily, over 32 episodes a distance."""
-    spec = make_spec(mazes=maze, distances=distances, time_limit=TIME_LIMIT)
+    spec = Task.of(mazes=maze, distances=distances, time_limit=TIME_LIMIT)
     trials = list(enumerate(draw_trials(spec, 32, seed=7)))
     return np.mean([outcome.success for outcomes in run_trials(actor, spec, trials, 64) for outcome in outcomes])

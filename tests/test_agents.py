@@ -22,8 +22,7 @@ from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.kinds import generate
-from mazebench.tasks.build import make_spec
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
 from mazebench.testing import ConformanceError, check_agent
 from mazebench.training.protocol import LearningAgent
@@ -138,7 +137,7 @@ class TestConformance:
         if issubclass(agent_class, LearningAgent):
             # Untrained: the contract does not depend on what it learned.
             mazes = (generate("dfs", 7, np.random.default_rng(0), "m"),)
-            task = make_spec(mazes=mazes, distances=(1, 2, 3), context_size=interface.context_size)
+            task = Task.of(mazes=mazes, distances=(1, 2, 3), context_size=interface.context_size)
             agent_class.build_learner(task).save(tmp_path, {})
             checkpoint = tmp_path / "agent.safetensors"
         check_agent(agent_class, interface, checkpoint)
@@ -321,7 +320,7 @@ class TestTracks:
     def test_every_agent_acts_or_says_that_it_serves_one_size(self, name, options):
         agent_class = load_agent_class(name)
         options = {"sensors": agent_class.needs_sensors} | options if "size" in options else options
-        spec = make_spec(**options)
+        spec = Task.of(**options)
         if name in OF_ONE_SIZE and spec.context_size != 13:
             with pytest.raises(UnplayableError, match=r"reads maps of 13 x 13 only, found .* mah reads"):
                 act_for_three_steps(name, spec)
@@ -329,7 +328,7 @@ class TestTracks:
             assert act_for_three_steps(name, spec) == 3
 
 
-def act_for_three_steps(name: str, spec: TaskSpec) -> int:
+def act_for_three_steps(name: str, spec: Task) -> int:
     """Returns how many steps were taken, of a run of which all actions are checked."""
     agent_class = load_agent_class(name)
     interface = Interface(spec.task, spec.size, spec.context_size, sensors=spec.sensors)
@@ -349,7 +348,7 @@ def success_rate(
     name: str, num_mazes: int, distances, episodes_per_distance: int, context_size: int = 13, **perturbation: float
 ) -> float:
     agent_class = load_agent_class(name)
-    spec = make_spec("local", mazes=load_mazes(13, "train")[:num_mazes], distances=distances, **perturbation)
+    spec = Task.of("local", mazes=load_mazes(13, "train")[:num_mazes], distances=distances, **perturbation)
     spec = dataclasses.replace(spec, context_size=context_size)
     trials = list(enumerate(draw_trials(spec, episodes_per_distance)))
     agent = agent_class.build(Interface("local", 13, spec.context_size))

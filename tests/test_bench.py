@@ -7,9 +7,9 @@ import pytest
 
 from mazebench.bench import measure as bench
 from mazebench.maps.benchmark import load_mazes
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 
-SPEC = make_spec(mazes=load_mazes(13, "train")[:2], distances=(1, 2, 3, 4, 5))
+SPEC = Task.of(mazes=load_mazes(13, "train")[:2], distances=(1, 2, 3, 4, 5))
 
 
 def test_ratio_of_an_environment_to_the_bare_simulation_is_measured():

@@ -18,7 +18,7 @@ from mazebench.maps import benchmark
 from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS, load_mazes, mazes_file, read_asset
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.maze import canonical_bytes, cell_to_point
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.trials import benchmark_task_sizes, draw_trials, episodes_file, frozen_trials, select_trials
 
 BODY_RADIUS = 0.15
@@ -62,8 +62,8 @@ def test_freeze_when_compared_with_shipped_files(shipped, tmp_path):
 def test_trials_when_drawn_again_in_part():
     # The first episodes of a (maze, distance) don't depend on how many are drawn, nor those of a maze on the others.
     mazes = load_mazes(13, "eval")
-    drawn = draw_trials(make_spec(mazes=mazes[:3], distances=[4, 9]), episodes_per_distance=2)
-    chosen = select_trials(make_spec(split="eval", distances=[9, 4]), "eval", episodes_per_distance=2)[: len(drawn)]
+    drawn = draw_trials(Task.of(mazes=mazes[:3], distances=[4, 9]), episodes_per_distance=2)
+    chosen = select_trials(Task.of(split="eval", distances=[9, 4]), "eval", episodes_per_distance=2)[: len(drawn)]
     assert [trial.episode for trial in drawn] == [trial.episode for trial in chosen]
     assert [trial.distance for trial in chosen] == [4, 4, 9, 9] * 3
 

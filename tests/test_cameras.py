@@ -12,19 +12,19 @@ from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 
 
 class TestOptions:
     def test_all_environments_declare_the_sensors(self):
-        spec = make_spec(sensors=["egocentric", "top"], camera_size=32)
+        spec = Task.of(sensors=["egocentric", "top"], camera_size=32)
         expected = specs.BoundedArray((32, 32, 3), np.uint8, 0, 255, name="egocentric")
         assert Environment(spec).observation_spec()["egocentric"] == expected
         space = MazeEnv(spec).observation_space
         assert set(space) == {"state", "context", "egocentric", "top"}
         assert space["top"] == gymnasium.spaces.Box(0, 255, (32, 32, 3), np.uint8)
         assert MazeVectorEnv(spec, 2).observation_space["top"].shape == (2, 32, 32, 3)
-        assert make_spec(sensors="top").sensors == ("top",)
+        assert Task.of(sensors="top").sensors == ("top",)
 
     @pytest.mark.parametrize(
         ("options", "message"),
@@ -37,7 +37,7 @@ class TestOptions:
     )
     def test_an_option_out_of_range_is_refused(self, options, message):
         with pytest.raises(InputError, match=message):
-            make_spec(**options)
+            Task.of(**options)
 
 
 class TestPictures:

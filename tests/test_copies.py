@@ -19,7 +19,7 @@ from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 
 TASKS: dict[str, dict[str, Any]] = {
     "local": {"time_limit": 60},
@@ -112,8 +112,7 @@ class TestCopies:
         run_with_egl("""
 import copy, pickle
 from mazebench.envs.gym import MazeEnv
-from mazebench.tasks.build import make_spec
-env = MazeEnv(make_spec(size=13, sensors=("egocentric",)), seed=0, render_mode="rgb_array")
+env = MazeEnv(Task.of(size=13, sensors=("egocentric",)), seed=0, render_mode="rgb_array")
 env.reset(seed=0)
 picture = env.render()
 for copied in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
@@ -127,7 +126,7 @@ for copied in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
 
     @pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, pickle.dumps])
     def test_the_vector_environment_refuses(self, duplicate):
-        envs = MazeVectorEnv(make_spec(size=13), 2)
+        envs = MazeVectorEnv(Task.of(size=13), 2)
         with pytest.raises(TypeError, match="MazeVectorEnv can't be copied or pickled; copy dm_env or Gymnasium"):
             duplicate(envs)
 
@@ -169,7 +168,7 @@ class TestStates:
         assert_equal(expected, play(env, actions))
 
     def test_gymnasium_goes_back_to_a_state(self):
-        env = MazeEnv(make_spec("adrift", level=3), seed=1)
+        env = MazeEnv(Task.of("adrift", level=3), seed=1)
         env.reset()
         actions = [int(action) for action in actions_of(mazebench.load(), seed=1)]
         for action in actions[:30]:

@@ -11,14 +11,14 @@ from simple_mazes import corridor
 from mazebench.envs.goal import GoalMazeEnv
 from mazebench.envs.gym import MazeEnv
 from mazebench.errors import InputError
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode
 
 FORWARD, LOOK_LEFT = 0, 4
 
 
 def corridor_spec(**options):
-    return make_spec(mazes=corridor(), **options)
+    return Task.of(mazes=corridor(), **options)
 
 
 def drive(env: GoalMazeEnv, episode: Episode, num_steps: int, action: int = FORWARD):
@@ -34,7 +34,7 @@ def drive(env: GoalMazeEnv, episode: Episode, num_steps: int, action: int = FORW
 
 class TestObservation:
     def test_the_observation_is_the_tasks_without_the_goal(self):
-        goal_env, env = GoalMazeEnv(make_spec()), MazeEnv(make_spec())
+        goal_env, env = GoalMazeEnv(Task.of()), MazeEnv(Task.of())
         found, expected = goal_env.reset(seed=7)[0], env.reset(seed=7)[0]
         for _ in range(5):
             assert goal_env.observation_space.contains(found)
@@ -108,4 +108,4 @@ class TestEnvironment:
     @pytest.mark.parametrize("options", [{"task": "hierarchical"}, {"num_goals": 2}])
     def test_a_task_with_several_goals_is_refused(self, options):
         with pytest.raises(InputError, match="expected the local task, one goal, no track, no hide"):
-            GoalMazeEnv(make_spec(**options))
+            GoalMazeEnv(Task.of(**options))

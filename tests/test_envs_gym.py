@@ -22,7 +22,7 @@ from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import write_text_maze
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.tracks import TRACKS
 
@@ -41,7 +41,7 @@ def _registered():
 
 
 def corridor_env(**options) -> MazeEnv:
-    return MazeEnv(make_spec(mazes=corridor(), **options))
+    return MazeEnv(Task.of(mazes=corridor(), **options))
 
 
 def test_it_steps_without_dm_control():
@@ -57,7 +57,7 @@ class TestRegistration:
     def test_the_size_of_an_id_yields_to_maps_and_to_a_size(self, name, size):
         name = f"mazebench/{name}-v1"
         maze = generate("dfs", 51, np.random.default_rng(0))
-        assert gymnasium.make(name, mazes=maze, distances=[40]).unwrapped.task_spec.mazes == (maze,)
+        assert gymnasium.make(name, mazes=maze, distances=[40]).unwrapped.task_spec.all_mazes == (maze,)
         assert gymnasium.make(name).unwrapped.task_spec.size == size
         with pytest.raises(InputError, match="expected mazes of size 15, found size 51"):
             gymnasium.make(name, mazes=maze, size=15)
@@ -85,7 +85,7 @@ class TestRegistration:
     def test_an_environment_is_made_with_options(self):
         env = gymnasium.make("mazebench/Local-13-v1", split="eval", distances=[7], context_size=9, seed=3)
         spec = env.unwrapped.task_spec
-        assert (spec.mazes[0].name, spec.distances, spec.context_size) == ("13-eval-00", (7,), 9)
+        assert (spec.all_mazes[0].name, spec.distances, spec.context_size) == ("13-eval-00", (7,), 9)
         first, again = env.reset()[0], env.reset(seed=3)[0]
         np.testing.assert_array_equal(first["state"], again["state"])
 
@@ -208,7 +208,7 @@ class TestSpec:
         again = gymnasium.make(EnvSpec.from_json(env.spec.to_json()))
         assert again.spec.to_json() == env.spec.to_json()
         assert again.unwrapped.task_spec == env.unwrapped.task_spec
-        names = [[maze.name for maze in each.unwrapped.task_spec.mazes] for each in (env, again)]
+        names = [[maze.name for maze in each.unwrapped.task_spec.all_mazes] for each in (env, again)]
         assert names[0] == names[1]
 
     @pytest.mark.parametrize("options", OPTIONS)

@@ -19,9 +19,8 @@ from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.spec import TaskSpec
 
 NUM_STEPS = 320
 SEEDS = [3, 1000, 17, 4]
@@ -42,14 +41,14 @@ def small_mazes() -> list[Maze]:
 
 
 SPECS = {
-    "local": make_spec(mazes=dfs_mazes(), distances=[1, 2], time_limit=25),
-    "hierarchical": make_spec("hierarchical", mazes=small_mazes(), landmark_distance=2, time_limit=12),
-    "map_flip": make_spec("hierarchical", mazes=small_mazes(), landmark_distance=2, time_limit=12, map_flip=0.2),
-    "map_warp": make_spec(mazes=dfs_mazes(), distances=[1, 2], time_limit=25, map_warp=0.2),
-    "position_noise": make_spec(mazes=dfs_mazes(), distances=[1, 2], time_limit=25, position_noise=0.4),
-    "context_size": make_spec(mazes=dfs_mazes(), distances=[1, 2], time_limit=25, context_size=6),
-    "num_goals": make_spec(mazes=dfs_mazes(), distances=[1, 2], time_limit=15, num_goals=3),
-    "fresh": make_spec(kinds=("dfs", "obstacles"), size=13, fresh=True, distances=[1, 2], time_limit=25),
+    "local": Task.of(mazes=dfs_mazes(), distances=[1, 2], time_limit=25),
+    "hierarchical": Task.of("hierarchical", mazes=small_mazes(), landmark_distance=2, time_limit=12),
+    "map_flip": Task.of("hierarchical", mazes=small_mazes(), landmark_distance=2, time_limit=12, map_flip=0.2),
+    "map_warp": Task.of(mazes=dfs_mazes(), distances=[1, 2], time_limit=25, map_warp=0.2),
+    "position_noise": Task.of(mazes=dfs_mazes(), distances=[1, 2], time_limit=25, position_noise=0.4),
+    "context_size": Task.of(mazes=dfs_mazes(), distances=[1, 2], time_limit=25, context_size=6),
+    "num_goals": Task.of(mazes=dfs_mazes(), distances=[1, 2], time_limit=15, num_goals=3),
+    "fresh": Task.of(kinds=("dfs", "obstacles"), size=13, fresh=True, distances=[1, 2], time_limit=25),
 }
 every_spec = pytest.mark.parametrize("spec", SPECS.values(), ids=SPECS)
 
@@ -76,7 +75,7 @@ def random_actions(num_steps: int, num_envs: int, seed: int = 0) -> np.ndarray:
     return actions
 
 
-def play_dm_env(spec: TaskSpec, seed: int, actions: np.ndarray) -> Iterator[Step]:
+def play_dm_env(spec: Task, seed: int, actions: np.ndarray) -> Iterator[Step]:
     env = Environment(spec)
 
     def seen(time_step) -> Step:
@@ -189,7 +188,7 @@ def without_final(infos: dict) -> dict:
     return {key: infos[key] for key in infos if "final" not in key}
 
 
-def sync_vector_env(spec: TaskSpec, mode: AutoresetMode) -> SyncVectorEnv:
+def sync_vector_env(spec: Task, mode: AutoresetMode) -> SyncVectorEnv:
     return SyncVectorEnv([lambda: MazeEnv(spec)] * NUM_ENVS, autoreset_mode=mode)
 
 
@@ -233,7 +232,7 @@ class TestAutoreset:
             self.assert_same_infos(*resets)
 
     def test_a_step_is_refused_where_an_episode_ended_if_autoreset_is_disabled(self):
-        env = MazeVectorEnv(make_spec(mazes=corridor(), time_limit=1), 3, autoreset_mode=AutoresetMode.DISABLED)
+        env = MazeVectorEnv(Task.of(mazes=corridor(), time_limit=1), 3, autoreset_mode=AutoresetMode.DISABLED)
         env.reset(seed=0)
         env.step(np.full(3, LOOK_LEFT))
         env.reset(options={"reset_mask": np.array([True, False, False])})
@@ -302,7 +301,7 @@ class TestEpisodeSource:
 
     def env(self, num_episodes: int, time_limit: int = 100, **arguments) -> MazeVectorEnv:
         waiting = collections.deque(Episode(0, (1, 1), (1, 4), 0.0, seed) for seed in range(num_episodes))
-        spec = make_spec(mazes=corridor(), time_limit=time_limit)
+        spec = Task.of(mazes=corridor(), time_limit=time_limit)
         return MazeVectorEnv(spec, 3, episode_source=lambda slot: waiting.popleft() if waiting else None, **arguments)
 
     def test_slots_stand_still_when_episodes_run_out(self):

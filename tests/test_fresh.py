@@ -24,7 +24,7 @@ from mazebench.maps import drawn
 from mazebench.maps.drawn import FreshMazes, draw_mazes
 from mazebench.maps.text import format_maze
 from mazebench.options import from_names
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.episode import sample_episode
 from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.loop import train
@@ -75,13 +75,13 @@ class TestDrawnMazes:
     )
     def test_options_that_do_not_fit_are_refused_in_one_line(self, options, message):
         with pytest.raises(InputError, match=message) as caught:
-            make_spec(**options)
+            Task.of(**options)
         assert "\n" not in str(caught.value)
 
     def test_an_evaluation_draws_other_mazes_than_a_training(self):
         options = EvalOptions.of("random", kinds="house", num_mazes=2, distances=(3,), episodes_per_distance=1)
         plan = make_plan(options)
-        assert [maze.name for maze in plan.task.mazes] == ["house-13-dev-00", "house-13-dev-01"]
+        assert [maze.name for maze in plan.task.all_mazes] == ["house-13-dev-00", "house-13-dev-01"]
         assert plan.labels["split"] == "custom"
         with pytest.raises(InputError, match="expected no fresh mazes in an evaluation"):
             EvalOptions.of("random", fresh=True)
@@ -105,12 +105,12 @@ class TestFreshMazes:
                 np.testing.assert_array_equal(getattr(written, name), getattr(compiled, name), err_msg=name)
 
     def test_a_body_moves_as_in_the_compiled_model_of_the_same_maze(self):
-        spec = make_spec(kinds="obstacles", fresh=True)
+        spec = Task.of(kinds="obstacles", fresh=True)
         env = MazeEnv(spec, seed=5)
         env.reset()
         env.reset()  # in a model that is written
         episode = env.task.episode
-        compiled = MazeEnv(make_spec(mazes=spec.mazes[episode.maze], distances=1, time_limit=300))
+        compiled = MazeEnv(Task.of(mazes=spec.all_mazes[episode.maze], distances=1, time_limit=300))
         compiled.reset(options={"episode": dataclasses.replace(episode, maze=0)})
         rng = np.random.default_rng(0)
         for _ in range(60):
@@ -131,9 +131,9 @@ class TestFreshMazes:
             np.testing.assert_array_equal(forgetting.ranges(maze, pose), keeping.ranges(maze, pose))
 
     def test_a_maze_that_is_too_small_for_the_distance_is_drawn_again(self):
-        spec = make_spec(kinds="house", fresh=True, distances=max(each.diameter for each in small_houses()))
+        spec = Task.of(kinds="house", fresh=True, distances=max(each.diameter for each in small_houses()))
         episode = sample_episode(spec, np.random.default_rng(0))
-        assert spec.mazes[episode.maze].distance(episode.start, episode.goal) == spec.distances[0]
+        assert spec.all_mazes[episode.maze].distance(episode.start, episode.goal) == spec.distances[0]
 
     def test_pictures_show_the_maze_of_the_episode(self):
         run_with_egl("""
@@ -157,7 +157,7 @@ class TestEnvironments:
             np.testing.assert_array_equal(one, other)
 
     def test_an_episode_is_played_again_by_its_value(self):
-        spec = make_spec(kinds=KINDS, fresh=True, sensors="lidar")
+        spec = Task.of(kinds=KINDS, fresh=True, sensors="lidar")
         env, other = MazeEnv(spec, seed=1), MazeEnv(spec, seed=2)
         first, _ = env.reset()
         other.reset()
@@ -175,7 +175,7 @@ class TestEnvironments:
         assert len(set(infos["maze"])) == 3
 
     def test_a_fixed_number_of_mazes_is_played(self):
-        env = MazeVectorEnv(make_spec(kinds="rooms", num_mazes=2), 30)
+        env = MazeVectorEnv(Task.of(kinds="rooms", num_mazes=2), 30)
         _, infos = env.reset(seed=0)
         assert set(infos["maze"]) == {0, 1}
 
@@ -203,12 +203,12 @@ class TestTraining:
             train(options(fresh=False), tmp_path / "resumed", resume=True)
 
     def test_held_out_mazes_are_of_the_kinds_that_are_trained_in(self):
-        evaluation = HeldOutEvaluation(make_spec(kinds=KINDS, fresh=True), 4)
-        assert [maze.kind for maze in evaluation.task.mazes] == ["dfs", "house"] * 2
+        evaluation = HeldOutEvaluation(Task.of(kinds=KINDS, fresh=True), 4)
+        assert [maze.kind for maze in evaluation.task.all_mazes] == ["dfs", "house"] * 2
 
     def test_maps_of_your_own_are_trained_and_evaluated_in(self, tmp_path):
         path = tmp_path / "plan.txt"
         path.write_text(format_maze(draw_mazes(("house",), 13, "dev", 1)[0]))
         train(options(mazes=str(path), kinds=(), fresh=False, env_steps=480), tmp_path / "run")
         assert "sha256" in json.loads((tmp_path / "run" / "config.json").read_text())["mazes"]
-        assert HeldOutEvaluation(make_spec(mazes=str(path)), 4).task.mazes[0].name == "plan"
+        assert HeldOutEvaluation(Task.of(mazes=str(path)), 4).task.mazes[0].name == "plan"

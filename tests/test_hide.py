@@ -14,7 +14,7 @@ from mazebench.errors import InputError, UnplayableError
 from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.plan import make_plan
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, START
 
 
@@ -80,14 +80,14 @@ def test_the_navigator_plays_without_map_and_goal():
 )
 def test_what_would_tell_is_refused_in_a_line(options, message):
     with pytest.raises(InputError, match=message) as caught:
-        make_spec(**options)
+        Task.of(**options)
     assert "\n" not in str(caught.value)
 
 
 def test_an_egocentric_camera_may_look_for_a_marked_goal():
-    assert make_spec(hide=("map",), sensors=("egocentric",)).hide == ("map",)
+    assert Task.of(hide=("map",), sensors=("egocentric",)).hide == ("map",)
 
 
 def test_goal_conditioned_environments_refuse_it():
     with pytest.raises(InputError, match=r"goal-conditioned environment: expected .*no hide"):
-        GoalMazeEnv(make_spec(hide=("goal",)))
+        GoalMazeEnv(Task.of(hide=("goal",)))

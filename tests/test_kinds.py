@@ -14,7 +14,7 @@ from mazebench.maps.kinds import CHECK, KINDS, KNOWN, NOVEL, generate
 from mazebench.maps.kinds.dfs import dfs_walls
 from mazebench.maps.maze import Maze, corner_cells
 from mazebench.maps.text import format_maze, parse_maze
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.route import plan_route
 from mazebench.tasks.shown_map import show_map
@@ -164,9 +164,9 @@ def test_dfs_opens_a_tenth_of_the_walls():
 
 def test_mazes_of_13_cells_mostly_have_3_to_6_landmarks():
     rng = np.random.default_rng(0)
-    spec = make_spec("hierarchical", mazes=[generate("dfs", 13, rng) for _ in range(300)], landmark_distance=5)
+    spec = Task.of("hierarchical", mazes=[generate("dfs", 13, rng) for _ in range(300)], landmark_distance=5)
     num_landmarks = []
-    for index, maze in enumerate(spec.mazes):
+    for index, maze in enumerate(spec.all_mazes):
         episode = Episode(index, *corner_cells(maze), yaw=0.0, seed=0)
         num_landmarks.append(
             len(plan_route(spec, episode, show_map(spec, episode)).cells) - 2

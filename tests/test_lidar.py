@@ -19,7 +19,7 @@ from mazebench.envs.vector import MazeVectorEnv
 from mazebench.maps.kinds import KINDS, generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.world.mjcf import BODY_HEIGHT, maze_spec
 from mazebench.world.ray_casting import MAX_RANGE, NUM_RAYS, Lidar, ray_ends
 
@@ -130,7 +130,7 @@ class TestRanges:
 
 class TestSensor:
     def test_all_environments_declare_the_sensor(self):
-        spec = make_spec(sensors="lidar")
+        spec = Task.of(sensors="lidar")
         expected = specs.BoundedArray((NUM_RAYS,), np.float32, 0.0, 5.0, name="lidar")
         assert Environment(spec).observation_spec()["lidar"] == expected
         assert MazeEnv(spec).observation_space["lidar"] == gymnasium.spaces.Box(0.0, 5.0, (NUM_RAYS,), np.float32)
@@ -142,13 +142,13 @@ class TestSensor:
         env = mazebench.load(sensors="lidar", position_noise=0.5, map_flip=0.2, map_warp=0.2, seed=3)
         time_step = env.reset()
         for action in (4, 0, 0, 2, 5, 0):
-            maze, pose = env.task.spec.mazes[env.task.episode.maze], env.physics.data.qpos
+            maze, pose = env.task.spec.all_mazes[env.task.episode.maze], env.physics.data.qpos
             np.testing.assert_array_equal(time_step.observation["lidar"], ranges_of(maze, *pose))
             time_step = env.step(action)
 
     @pytest.mark.parametrize("task", ["local", "hierarchical"])
     def test_readings_are_the_same_in_all_environments(self, task):
-        spec = make_spec(task, sensors="lidar", time_limit=7)
+        spec = Task.of(task, sensors="lidar", time_limit=7)
         seeds, actions = (3, 8, 21), np.random.default_rng(0).integers(6, size=(40, 3))
         envs, env, dm = MazeVectorEnv(spec, 3), MazeEnv(spec), Environment(spec)
         seen = [envs.reset(seed=seeds)[0]["lidar"]]

@@ -94,18 +94,18 @@ class TestFile:
 class TestTasks:
     def test_an_array_is_a_task(self):
         env = mazebench.load(mazes=WALLS, distances=[2])
-        assert env.task.spec.mazes == (Maze(WALLS),)
+        assert env.task.spec.all_mazes == (Maze(WALLS),)
 
     def test_several_arrays_are_a_task(self):
         other = WALLS.T.copy()
         for maps in ([WALLS, other], (Maze(WALLS), other), np.stack([WALLS, other])):
-            assert mazebench.make_spec(mazes=maps, distances=[2]).mazes == (Maze(WALLS), Maze(other))
+            assert mazebench.Task.of(mazes=maps, distances=[2]).mazes == (Maze(WALLS), Maze(other))
 
     def test_rows_that_are_no_array_are_answered_with_how_to_make_one(self):
         with pytest.raises(InputError, match=r"found list; wrap rows of numbers in np\.array$"):
-            mazebench.make_spec(mazes=WALLS.tolist())
+            mazebench.Task.of(mazes=WALLS.tolist())
 
     @pytest.mark.parametrize("mazes", [5, [WALLS.tolist()], [None]])
     def test_what_is_no_maze_is_refused(self, mazes):
         with pytest.raises(InputError, match=r"expected .* in mazes|expected mazes as"):
-            mazebench.make_spec(mazes=mazes)
+            mazebench.Task.of(mazes=mazes)

@@ -18,7 +18,7 @@ from small_world import learn
 from mazebench.agent import Interface
 from mazebench.errors import UnplayableError
 from mazebench.maps.kinds import generate
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.context import START
 from mazebench.training.experience import Collector
 
@@ -54,7 +54,7 @@ def an_observation(batch):
 def make_learner(mazes, config=SMALL, seed=0, steps=100):
     """A small learner that has seen some steps of random driving."""
     overrides = {name: str(value) for name, value in dataclasses.asdict(config).items()}
-    spec = make_spec(mazes=mazes, distances=(1, 2, 3), num_goals=config.num_goals)
+    spec = Task.of(mazes=mazes, distances=(1, 2, 3), num_goals=config.num_goals)
     learner = MMN.build_learner(spec, seed=seed, overrides=overrides)
     collector = Collector(spec, learner.num_envs, seed=seed)
     rng = np.random.default_rng(seed)

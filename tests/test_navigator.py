@@ -12,8 +12,7 @@ from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.chunk import Outcome, run_trials
 from mazebench.maps.benchmark import load_kind_mazes, load_mazes
-from mazebench.tasks.build import make_spec
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
 
 
@@ -63,7 +62,7 @@ class TestDriving:
         assert drive.next(blocked, path, body, 1.0) == (action, (x, y))
 
 
-def play(spec: TaskSpec, trials: list) -> list[Outcome]:
+def play(spec: Task, trials: list) -> list[Outcome]:
     """The outcomes of the navigator, in the order of the trials."""
     agent_class = load_agent_class("navigator")
     interface = Interface(
@@ -85,7 +84,7 @@ def success_rate(outcomes: list[Outcome]) -> float:
 
 def track_success_rate(track: str, level: int, distances: tuple[int, ...], num_mazes: int = 9, **options) -> float:
     mazes = load_kind_mazes("train")
-    spec = make_spec(track, mazes=mazes[:: len(mazes) // num_mazes], level=level, distances=distances, **options)
+    spec = Task.of(track, mazes=mazes[:: len(mazes) // num_mazes], level=level, distances=distances, **options)
     return success_rate(play(spec, draw_trials(spec, 2)))
 
 
@@ -93,7 +92,7 @@ class TestNavigator:
     def test_goals_are_reached_where_the_map_is_true(self):
         mazes = load_mazes(13, "train")[:4]
         distances = tuple(range(1, 16))
-        spec = make_spec(mazes=mazes, distances=distances, sensors=("lidar",), time_limit=100)
+        spec = Task.of(mazes=mazes, distances=distances, sensors=("lidar",), time_limit=100)
         assert success_rate(play(spec, draw_trials(spec, 2))) == 1.0
 
     @pytest.mark.parametrize(
@@ -118,7 +117,7 @@ class TestNavigator:
 
     def test_near_goals_are_found_without_a_map_and_a_mark(self):
         mazes, hide = load_mazes(13, "train")[::2], ("map", "goal")
-        spec = make_spec(mazes=mazes, distances=(3, 5), sensors=("lidar",), time_limit=200, hide=hide)
+        spec = Task.of(mazes=mazes, distances=(3, 5), sensors=("lidar",), time_limit=200, hide=hide)
         assert success_rate(play(spec, draw_trials(spec, 2))) >= 0.7
 
     def test_odometry_that_drifts_from_a_known_pose_is_corrected(self):
@@ -127,11 +126,11 @@ class TestNavigator:
     def test_a_landmark_in_a_wall_is_given_up(self):
         # Landmarks are planned on the shown map, and some of them lie in walls. The legs to them time out.
         mazes = load_mazes(13, "train")[:20]
-        spec = make_spec("hierarchical", mazes=mazes, map_flip=0.1, sensors=("lidar",), time_limit=100)
+        spec = Task.of("hierarchical", mazes=mazes, map_flip=0.1, sensors=("lidar",), time_limit=100)
         assert success_rate(play(spec, draw_trials(spec))) >= 0.9
 
     @pytest.mark.parametrize("perturbation", [{"position_noise": 0.5}, {"map_warp": 0.1}], ids=["noise", "warp"])
     def test_goals_are_reached_where_positions_or_marks_are_off(self, perturbation):
         mazes = load_mazes(13, "train")[:5]
-        spec = make_spec(mazes=mazes, distances=(5, 10), sensors=("lidar",), time_limit=100, **perturbation)
+        spec = Task.of(mazes=mazes, distances=(5, 10), sensors=("lidar",), time_limit=100, **perturbation)
         assert success_rate(play(spec, draw_trials(spec, 2))) >= 0.9

@@ -11,7 +11,7 @@ import mazebench
 from mazebench.constants import STEP_TIME
 from mazebench.envs.goal import GoalMazeEnv
 from mazebench.errors import InputError
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.odometry import Odometry, corrupted_odometry
 
 X, Y, YAW, FORWARD, LEFT, YAW_RATE = 0, 1, 5, 6, 7, 11  # indices in the state
@@ -145,7 +145,7 @@ class TestTrack:
         env = mazebench.load("adrift", seed=3, odometry_noise=0.0, lidar_noise="0,0")
         time_step = env.reset()
         (x, y), yaw = env.physics.position(), env.physics.yaw()
-        walls = env.task.spec.mazes[env.task.episode.maze].walls
+        walls = env.task.spec.all_mazes[env.task.episode.maze].walls
         for action in self.ACTIONS:
             own_x, own_y, own_yaw = time_step.observation["state"][[X, Y, YAW]].astype(float)
             # Where the rays end in the frame of odometry, turned and shifted into the maze by the pose at the start.
@@ -160,4 +160,4 @@ class TestTrack:
 
     def test_the_goal_conditioned_environment_is_refused(self):
         with pytest.raises(InputError, match=r"goal-conditioned environment: expected .*no track"):
-            GoalMazeEnv(make_spec("adrift"))
+            GoalMazeEnv(Task.of("adrift"))

@@ -7,7 +7,7 @@ import re
 
 from mazebench.maps.maze_options import DrawnOptions, ReadOptions
 from mazebench.options import Option, options_of
-from mazebench.tasks.task_options import TaskOptions, Variants
+from mazebench.tasks.task import TaskOptions, Variants
 
 PAGE = pathlib.Path(__file__).parent.parent / "docs" / "options.md"
 DERIVED_TABLE = re.compile(r"\| option \| default \| values \| what \|\n(?:\|.*\n)+")

@@ -22,7 +22,7 @@ from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.results import frozen_oracle
 from mazebench.tasks.actions import controls_of_action
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials, frozen_trials
 from mazebench.world.models import models_of
 from mazebench.world.simulation import MujocoSimulation
@@ -80,7 +80,7 @@ class TestQuickestDrive:
 
 class TestOracle:
     def test_nobody_else_is_quicker_and_its_paths_are_short(self):
-        task = make_spec(mazes=[dfs(seed) for seed in range(4)], distances=(3, 8, 14))
+        task = Task.of(mazes=[dfs(seed) for seed in range(4)], distances=(3, 8, 14))
         trials = draw_trials(task, 3)
         ours, others = play("oracle", task, trials), play("planner-closed-loop", task, trials)
         assert all(outcome.success for outcome in ours)
@@ -91,24 +91,24 @@ class TestOracle:
 
     @pytest.mark.parametrize("cell_size", [0.4, 0.5, 2.0])
     def test_it_reaches_goals_in_cells_of_other_widths(self, cell_size):
-        task = make_spec(mazes=dfs(3, cell_size=cell_size), distances=(5, 12))
+        task = Task.of(mazes=dfs(3, cell_size=cell_size), distances=(5, 12))
         steps = measure_oracle_steps(task, draw_trials(task, 4))
         assert all(each is not None and each < 60 for each in steps)
 
     def test_it_takes_no_detour_over_landmarks(self):
         maze = dfs(4)
-        local = make_spec(mazes=maze, start=(1, 11), goal=(11, 1), time_limit=300)
+        local = Task.of(mazes=maze, start=(1, 11), goal=(11, 1), time_limit=300)
         [trial, *_] = draw_trials(local, 1)
-        over_landmarks = make_spec("hierarchical", mazes=maze, landmark_distance=3)
+        over_landmarks = Task.of("hierarchical", mazes=maze, landmark_distance=3)
         assert measure_oracle_steps(over_landmarks, [trial]) == measure_oracle_steps(local, [trial])
 
     def test_a_goal_that_it_does_not_reach_in_time_has_no_steps(self):
-        task = make_spec(mazes=dfs(5), distances=(14,), time_limit=10)
+        task = Task.of(mazes=dfs(5), distances=(14,), time_limit=10)
         assert measure_oracle_steps(task, draw_trials(task, 1)) == (None,)
 
     def test_frozen_steps_are_those_that_it_takes(self):
         trials = frozen_trials("local", 13)[::50]
-        task = make_spec(size=13, split="eval")
+        task = Task.of(size=13, split="eval")
         frozen = frozen_oracle.frozen_oracle_steps("paper", "local", 13, "eval", trials)
         assert frozen == measure_oracle_steps(task, trials)
 

@@ -25,7 +25,7 @@ from mazebench.maps.text import format_maze
 from mazebench.report.episodes import read_results
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.trials import draw_trials
 from mazebench.world.mjcf import action_controls
@@ -97,7 +97,7 @@ class TestEnvironments:
             steps = single.step(action), gym.step(action), vector.step(np.full(2, action))
             observed = [steps[0].observation, steps[1][0], steps[2][0]]
         start = single.task.episode.start
-        assert vector.task_spec.mazes[0].cell_at(*single.physics.position()) != start
+        assert vector.task_spec.all_mazes[0].cell_at(*single.physics.position()) != start
         vector.close()
 
     def test_the_goal_is_reached_in_its_cell(self):
@@ -111,15 +111,15 @@ class TestEnvironments:
 
     def test_mazes_of_one_task_have_one_scale(self):
         with pytest.raises(InputError, match=r"expected mazes of cells of one size in metres, found 0.5, 1.0"):
-            make_spec(mazes=(dfs(), dfs(cell_size=0.5, seed=1)))
+            Task.of(mazes=(dfs(), dfs(cell_size=0.5, seed=1)))
 
     def test_cells_through_which_no_body_passes_are_refused(self):
         with pytest.raises(InputError, match=r"dfs-0: expected cells of at least 0.4 m.*found 0.35 m"):
-            make_spec(mazes=dfs(cell_size=0.35))
+            Task.of(mazes=dfs(cell_size=0.35))
 
     def test_tracks_keep_their_scale(self):
         with pytest.raises(InputError, match=r"track 'building': expected cells of 1 m, found 0.5 m"):
-            make_spec("building", mazes=dfs(13, cell_size=0.5))
+            Task.of("building", mazes=dfs(13, cell_size=0.5))
 
 
 class TestAgents:
@@ -128,7 +128,7 @@ class TestAgents:
     )
     def test_agents_that_plan_drive_at_any_scale(self, name, cell_size):
         agent_class, maze = load_agent_class(name), dfs(9, cell_size)
-        spec = make_spec(mazes=maze, context_size=agent_class.context_size(9), sensors=("lidar",))
+        spec = Task.of(mazes=maze, context_size=agent_class.context_size(9), sensors=("lidar",))
         interface = Interface("local", 9, spec.context_size, sensors=spec.sensors, cell_size=cell_size)
         trials = list(enumerate(draw_trials(spec, 1)))
         agent = agent_class.build(interface)
@@ -172,18 +172,18 @@ class TestAgents:
 class TestEnds:
     @pytest.mark.parametrize("start", ["1,3", (1, 3), "3.01m, 7.99 m"])
     def test_a_start_is_a_cell_or_a_point(self, start):
-        spec = make_spec(mazes=field(9), start=start)
+        spec = Task.of(mazes=field(9), start=start)
         episodes = [sample_episode(spec, np.random.default_rng(seed)) for seed in range(20)]
         assert {episode.start for episode in episodes} == {(1, 3)}
         assert len({episode.goal for episode in episodes}) > 5
         assert len({episode.yaw for episode in episodes}) == 20
 
     def test_the_other_end_is_drawn_at_the_distances(self):
-        spec = make_spec(mazes=dfs(), goal=(7, 7), distances=(2, 5))
+        spec = Task.of(mazes=dfs(), goal=(7, 7), distances=(2, 5))
         for seed in range(20):
             episode = sample_episode(spec, np.random.default_rng(seed))
             assert episode.goal == (7, 7)
-            assert spec.mazes[0].distance(episode.start, episode.goal) in (2, 5)
+            assert spec.all_mazes[0].distance(episode.start, episode.goal) in (2, 5)
 
     def test_landmarks_lead_from_the_start_to_the_goal(self):
         env = mazebench.load("hierarchical", mazes=dfs(), start=(7, 7))
@@ -211,7 +211,7 @@ class TestEnds:
     )
     def test_ends_that_contradict_are_refused_in_a_line(self, options, message):
         with pytest.raises(InputError, match=message) as caught:
-            make_spec(mazes=dfs(), **options)
+            Task.of(mazes=dfs(), **options)
         assert "\n" not in str(caught.value)
 
 
@@ -225,7 +225,7 @@ class TestDefaults:
         ],
     )
     def test_distances_reach_as_far_as_the_map(self, maze, distances, time_limit):
-        spec = make_spec(mazes=maze)
+        spec = Task.of(mazes=maze)
         if time_limit is None:
             assert (len(spec.distances), spec.distances[0], spec.distances[-1]) == (15, 3, 39)
             assert spec.time_limit == 6 * 39 + 50
@@ -235,10 +235,10 @@ class TestDefaults:
     @pytest.mark.parametrize(("cell_size", "steps_a_cell"), [(0.5, 5), (1.0, 6), (3.0, 10)])
     def test_the_time_limit_grows_with_the_way(self, cell_size, steps_a_cell):
         maze = dataclasses.replace(field(25), cell_size=cell_size)
-        assert make_spec(mazes=maze, distances=(20, 40)).time_limit == steps_a_cell * 40 + 50
-        assert make_spec(mazes=maze, start=(1, 1), goal=(1, 21)).time_limit == steps_a_cell * 20 + 50
-        assert make_spec("hierarchical", mazes=maze, landmark_distance=20).time_limit == steps_a_cell * 20 + 50
-        assert make_spec(mazes=maze, time_limit=7).time_limit == 7
+        assert Task.of(mazes=maze, distances=(20, 40)).time_limit == steps_a_cell * 40 + 50
+        assert Task.of(mazes=maze, start=(1, 1), goal=(1, 21)).time_limit == steps_a_cell * 20 + 50
+        assert Task.of("hierarchical", mazes=maze, landmark_distance=20).time_limit == steps_a_cell * 20 + 50
+        assert Task.of(mazes=maze, time_limit=7).time_limit == 7
 
 
 class TestEvaluation:

@@ -14,7 +14,7 @@ import pytest
 from mazebench.maps.maze import Maze
 from mazebench.play import viewer
 from mazebench.play.game import LETTERS, Game
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode
 
 SECONDS = 60  # to wait for what must come
@@ -31,7 +31,7 @@ def corridor() -> Maze:
 @pytest.fixture
 def game(corridor) -> Game:
     """From (1, 1), where the body looks at the goal in (1, 3)."""
-    game = Game(make_spec(mazes=corridor, distances=[2]), seed=0)
+    game = Game(Task.of(mazes=corridor, distances=[2]), seed=0)
     game.env.task.choose_episode(episode=Episode(0, (1, 1), (1, 3), 0.0, 0))
     game.begin()
     return game
@@ -61,7 +61,7 @@ class TestGame:
 
 class TestViewer:
     def test_rays_of_the_range_sensor_are_drawn_in_the_world(self, corridor):
-        game = Game(make_spec(mazes=corridor, distances=[2], sensors="lidar"), seed=0)
+        game = Game(Task.of(mazes=corridor, distances=[2], sensors="lidar"), seed=0)
         np.testing.assert_allclose(np.hypot(*(game.rays - game.path[-1]).T), game.observation["lidar"])
         scene = mujoco.MjvScene(game.env.simulation.model, maxgeom=40)
         viewer._draw_rays(scene, game)
@@ -70,7 +70,7 @@ class TestViewer:
         np.testing.assert_allclose(middles, (game.path[-1] + game.rays) / 2, atol=1e-5)
 
     def test_the_map_is_the_one_that_an_agent_is_shown(self):
-        game = Game(make_spec("local", 13, map_flip=0.3), seed=0)
+        game = Game(Task.of("local", size=13, map_flip=0.3), seed=0)
         picture = viewer._map_picture(game.context, 260)
         seen = picture[2::20, 2::20].max(axis=-1) < 128  # beside the marks, which are discs
         np.testing.assert_array_equal(seen, game.env.task.shown_map.walls)

@@ -11,7 +11,7 @@ from mazebench.evaluation.evaluate import evaluate
 from mazebench.report.episodes import read_results
 from mazebench.results.played import shown_of, task_of
 from mazebench.results.reading import load_result
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.trials import frozen_trials, select_trials
@@ -22,7 +22,7 @@ ROOM = "#####\n#...#\n#...#\n#...#\n#####\n"
 @pytest.mark.parametrize("level", [{"map_flip": 0.2}, {"map_warp": 0.2}], ids=["flip", "warp"])
 def test_the_map_is_the_one_that_the_agent_was_shown(tmp_path, level):
     task = task_of(load_result(make_result(tmp_path / "made", task="hierarchical", **level)).summary)
-    spec = make_spec("hierarchical", 13, "eval", **level)
+    spec = Task.of("hierarchical", size=size=13, split="eval", **level)
     num_changed = 0
     for trial in frozen_trials("hierarchical", 13)[:5]:
         found, shown = shown_of(task, trial.episode), show_map(spec, trial.episode)
@@ -32,14 +32,14 @@ def test_the_map_is_the_one_that_the_agent_was_shown(tmp_path, level):
             shown.seen_cell(cell) @ np.array((13, 1)) for cell in ((1, 11), (11, 1))
         )
         assert len(found.landmarks) > 2
-        num_changed += ((found.walls > 0) != spec.mazes[trial.episode.maze].walls).sum()
+        num_changed += ((found.walls > 0) != spec.all_mazes[trial.episode.maze].walls).sum()
     assert num_changed > 25
 
 
 @pytest.mark.parametrize(("track", "level"), [("rebuilt", 1), ("adrift", 2), ("rough", 3)])
 def test_on_a_track_it_is_what_the_agent_was_given(tmp_path, track, level):
     task = task_of(load_result(make_result(tmp_path / "made", track=track, level=level, num_mazes=1)).summary)
-    spec = make_spec(track, split="eval", level=level)
+    spec = Task.of(track, split="eval", level=level)
     for trial in select_trials(spec, "eval", 1)[:2]:
         found = shown_of(task, trial.episode)
         context = leg_context(spec, show_map(spec, trial.episode), trial.episode.start, trial.episode.goal)

@@ -15,7 +15,7 @@ from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.kinds.obstacles import obstacles_walls
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
 
 
@@ -70,7 +70,7 @@ def test_what_is_felt_on_random_drives_are_walls():
     [({}, 1.0), ({"map_flip": 0.1}, 0.9), ({"map_warp": 0.1}, 0.75), ({"position_noise": 1.0}, 0.9)],
 )
 def test_a_robot_without_lidar_reaches_goals(options, least):
-    spec = make_spec(mazes=load_mazes(13, "train")[:8], distances=(4, 8, 12), **options)
+    spec = Task.of(mazes=load_mazes(13, "train")[:8], distances=(4, 8, 12), **options)
     agent = load_agent_class("navigator").build(Interface("local", 13, 13))
     played = run_trials(agent, spec, list(enumerate(draw_trials(spec, 2))), 64)
     assert np.mean([outcome.success for outcomes in played for outcome in outcomes]) >= least

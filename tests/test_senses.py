@@ -28,12 +28,11 @@ from mazebench.report.settings import make_setting
 from mazebench.results.comparison import compare_folders
 from mazebench.results.paper import printed_mmn
 from mazebench.results.reading import load_result
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.observation import state_errors
 from mazebench.tasks.odometry import NoisyMotion
 from mazebench.tasks.sensors.lidar_noise import model_of, noise_text, read
-from mazebench.tasks.spec import TaskSpec
 from mazebench.world.angles import wrap_angle
 from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
 
@@ -87,10 +86,10 @@ class TestLidar:
         assert noise_text(noise_text(text)) == noise_text(text)
 
     def test_the_sensor_sees_as_far_as_the_model(self):
-        spec = make_spec(sensors="lidar", lidar_noise="turtlebot3")
+        spec = Task.of(sensors="lidar", lidar_noise="turtlebot3")
         box = MazeEnv(spec).observation_space["lidar"]
         assert (box.low.min(), box.high.max()) == (np.float32(0.12), 3.5)
-        env, exact = MazeEnv(make_spec(sensors="lidar"), 0), MazeEnv(spec, 0)
+        env, exact = MazeEnv(Task.of(sensors="lidar"), 0), MazeEnv(spec, 0)
         true, seen = (each.reset()[0]["lidar"].clip(0, 3.5) for each in (env, exact))
         assert np.abs(seen - true)[seen < 3.5].max() < 0.06
 
@@ -191,7 +190,7 @@ SPECS = {
 }
 
 
-def alone(spec: TaskSpec, seed: int) -> Iterator[dict[str, np.ndarray]]:
+def alone(spec: Task, seed: int) -> Iterator[dict[str, np.ndarray]]:
     """Yields the observations of the Gymnasium environment, episode after episode, the last of an episode included."""
     env = MazeEnv(spec)
     observation, _ = env.reset(seed=seed)
@@ -204,7 +203,7 @@ def alone(spec: TaskSpec, seed: int) -> Iterator[dict[str, np.ndarray]]:
             yield observation
 
 
-def side_by_side(spec: TaskSpec, seed: int, num_envs: int, mode: AutoresetMode) -> Iterator[dict[str, np.ndarray]]:
+def side_by_side(spec: Task, seed: int, num_envs: int, mode: AutoresetMode) -> Iterator[dict[str, np.ndarray]]:
     """Yields the same observations as `alone`, of the last slot of a vector environment."""
     env = MazeVectorEnv(spec, num_envs, num_threads=1, autoreset_mode=mode)
     with contextlib.closing(env):
@@ -230,7 +229,7 @@ def side_by_side(spec: TaskSpec, seed: int, num_envs: int, mode: AutoresetMode) 
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 @pytest.mark.parametrize("name", SPECS)
 def test_all_environments_observe_the_same(name, mode):
-    spec = make_spec(**SPECS[name])
+    spec = Task.of(**SPECS[name])
     count = 0
     for expected, found in zip(alone(spec, 3), side_by_side(spec, 3, 3, mode), strict=True):
         for key, values in expected.items():
@@ -240,7 +239,7 @@ def test_all_environments_observe_the_same(name, mode):
 
 
 def test_dm_control_observes_the_same():
-    spec = make_spec(**NOISE)
+    spec = Task.of(**NOISE)
     environment, env = mazebench.load(**NOISE, seed=3), MazeEnv(spec)
     expected = environment.reset().observation
     found, _ = env.reset(seed=3)
@@ -252,14 +251,14 @@ def test_dm_control_observes_the_same():
 
 
 def test_goal_conditioned_and_registered_environments_take_the_options():
-    env = GoalMazeEnv(make_spec(**NOISE))
+    env = GoalMazeEnv(Task.of(**NOISE))
     assert env.observation_space.contains(env.reset(seed=0)[0])
     made = gymnasium.make("mazebench/Adrift-v1", lidar_noise=".1,.1", odometry_noise=0.2)
     assert made.observation_space["lidar"].high.max() == 5.0
 
 
 def test_a_slot_without_an_episode_draws_nothing():
-    spec = make_spec(**NOISE, time_limit=5)
+    spec = Task.of(**NOISE, time_limit=5)
     rng = np.random.default_rng(0)
     first, second = (sample_episode(spec, rng) for _ in range(2))
 
@@ -278,7 +277,7 @@ def test_a_slot_without_an_episode_draws_nothing():
 
 
 def test_a_state_that_is_restored_goes_on_with_the_same_noise():
-    env = MazeEnv(make_spec(**NOISE), 0)
+    env = MazeEnv(Task.of(**NOISE), 0)
     env.reset()
     for action in ACTIONS[:10].tolist():
         env.step(action)
@@ -293,8 +292,8 @@ def test_a_state_that_is_restored_goes_on_with_the_same_noise():
 
 
 def test_each_noise_has_a_stream_of_its_own():
-    episodes = [sample_episode(make_spec(), np.random.default_rng(0))] * 3
-    envs = [MazeEnv(make_spec(**NOISE | changes)) for changes in ({}, {"lidar_noise": None}, {"odometry_noise": None})]
+    episodes = [sample_episode(Task.of(), np.random.default_rng(0))] * 3
+    envs = [MazeEnv(Task.of(**NOISE | changes)) for changes in ({}, {"lidar_noise": None}, {"odometry_noise": None})]
     both, moving, sensing = (
         env.reset(options={"episode": episode}) and [env.step(action)[0] for action in ACTIONS[:10].tolist()]
         for env, episode in zip(envs, episodes, strict=True)
@@ -323,10 +322,10 @@ class TestOptions:
     )
     def test_what_is_not_allowed_is_refused(self, options, message):
         with pytest.raises(InputError, match=message):
-            make_spec(**options)
+            Task.of(**options)
 
     def test_a_track_has_senses_of_its_own_unless_others_are_set(self):
-        spec = make_spec("adrift", level=(1, 3))
+        spec = Task.of("adrift", level=(1, 3))
         assert (spec.lidar, spec.odometry_noise_at(1), spec.odometry_noise_at(3)) == (TURTLEBOT3, 0.01, 0.2)
         other = dataclasses.replace(spec, lidar_noise="0,0", odometry_noise=0.0)
         assert (other.lidar, other.odometry_noise_at(3)) == (LidarModel(), 0.0)
@@ -337,7 +336,7 @@ class TestOptions:
         assert drawn == {0.01, 0.2}
 
     def test_the_true_pose_has_no_noise(self):
-        spec = make_spec("adrift", exact_pose=True)
+        spec = Task.of("adrift", exact_pose=True)
         assert state_errors(spec, sample_episode(spec, np.random.default_rng(0))) == []
 
 

@@ -10,7 +10,7 @@ from simple_mazes import field
 
 from mazebench.envs.dm_control import Environment
 from mazebench.maps.kinds import generate
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.context import build_context
 from mazebench.tasks.episode import Episode
 
@@ -71,7 +71,7 @@ def test_turned_experience_is_what_the_simulation_does_in_the_turned_maze(turned
 
 
 def drive(episode, actions):
-    env = Environment(make_spec(mazes=field(13), distances=(1,), time_limit=1000))
+    env = Environment(Task.of(mazes=field(13), distances=(1,), time_limit=1000))
     states = [env.reset(episode=episode).observation["state"]]
     for action in actions:
         states.append(env.step(int(action)).observation["state"])

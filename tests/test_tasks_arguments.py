@@ -18,7 +18,7 @@ MAKERS = {
     "make": lambda **options: gymnasium.make(ID, **options),
     "make_vec": lambda **options: gymnasium.make_vec(ID, **options),
 }
-SPEC = mazebench.make_spec(size=13)
+SPEC = mazebench.Task.of(size=13)
 
 WRONG_OPTIONS = [
     ("map_flip", "0.1", "expected map_flip of type float, found '0.1'"),
@@ -51,11 +51,11 @@ class TestArguments:
         numbers = {"time_limit": np.int32(50), "distances": np.arange(1, 4), "map_flip": np.float32(0.5)}
         env = maker(seed=np.int64(3), **numbers)
         spec = env.task.spec if maker is mazebench.load else env.unwrapped.task_spec
-        assert spec == mazebench.make_spec(time_limit=50, distances=(1, 2, 3), map_flip=0.5)
+        assert spec == mazebench.Task.of(time_limit=50, distances=(1, 2, 3), map_flip=0.5)
 
     @pytest.mark.parametrize("make", [Environment, MazeEnv, lambda spec: MazeVectorEnv(spec, 2)])
     def test_anything_but_a_task_spec_is_refused(self, make):
-        with pytest.raises(InputError, match=r"expected a TaskSpec, as mazebench.make_spec\(\) returns, found str"):
+        with pytest.raises(InputError, match=r"expected a Task, as mazebench.Task.of\(\) returns, found str"):
             make("local")
 
 
@@ -89,7 +89,7 @@ class TestActions:
     @pytest.mark.parametrize("action", [None, [0, 0], [np.nan, 0, 0]])
     @pytest.mark.parametrize("make", [MazeEnv, Environment, lambda spec: MazeVectorEnv(spec, 3)])
     def test_a_wrong_velocity_is_refused_in_one_line(self, make, action):
-        env = make(mazebench.make_spec(size=13, continuous=True))
+        env = make(mazebench.Task.of(size=13, continuous=True))
         env.reset(seed=0)
         with pytest.raises(InputError, match=r"^expected velocities [^\n]*, found shape [^\n]*$"):
             env.step(action)

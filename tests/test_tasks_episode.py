@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from simple_mazes import corridor
 
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.perturbations.warp import Perspective
@@ -118,7 +118,7 @@ class TestLandmarks:
         assert self.cells(1, (1, 1), (1, 7), task="local") == [(1, 1), (1, 7)]
 
     def cells(self, every: int, start, goal, task: str = "hierarchical") -> list[tuple[int, int]]:
-        spec = make_spec(task, mazes=corridor(), landmark_distance=every)
+        spec = Task.of(task, mazes=corridor(), landmark_distance=every)
         episode = Episode(0, start, goal, 0.0, 0)
         return plan_route(spec, episode, show_map(spec, episode)).cells
 

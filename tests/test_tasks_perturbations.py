@@ -12,7 +12,7 @@ from mazebench.maps.maze import corner_cells
 from mazebench.tasks.perturbations import perturbation_levels
 from mazebench.tasks.perturbations.flip import flip
 from mazebench.tasks.perturbations.warp import MAX_WARP, random_homography
-from mazebench.tasks.task_options import TaskOptions
+from mazebench.tasks.task import TaskOptions
 
 
 @pytest.fixture(scope="module")

@@ -16,11 +16,10 @@ from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import format_maze, parse_maze
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.route import plan_route
 from mazebench.tasks.shown_map import leg_context, show_map
-from mazebench.tasks.spec import TaskSpec
 
 CORRIDOR = corridor()
 # No free cell at the corners (1, 5) and (5, 1): (2, 5) and (4, 1) are the nearest.
@@ -32,7 +31,7 @@ def dfs_mazes(size: int = 9, count: int = 3) -> tuple[Maze, ...]:
     return tuple(generate("dfs", size, rng, f"dfs-{index}") for index in range(count))
 
 
-def episodes(spec: TaskSpec, count: int, seed: int = 0):
+def episodes(spec: Task, count: int, seed: int = 0):
     rng = np.random.default_rng(seed)
     return [sample_episode(spec, rng) for _ in range(count)]
 
@@ -40,16 +39,16 @@ def episodes(spec: TaskSpec, count: int, seed: int = 0):
 class TestDistances:
     def test_all_distances_are_drawn_equally_often(self):
         distances = (2, 5, 7)
-        spec = make_spec(mazes=dfs_mazes(), distances=distances)
+        spec = Task.of(mazes=dfs_mazes(), distances=distances)
         drawn = episodes(spec, 300)
-        found = collections.Counter(spec.mazes[e.maze].distance(e.start, e.goal) for e in drawn)
+        found = collections.Counter(spec.all_mazes[e.maze].distance(e.start, e.goal) for e in drawn)
         assert set(found) == set(distances)
         # Each about as often as the others: 300 draws, 7 standard deviations.
         share = 1 / len(distances)
         assert max(abs(count / 300 - share) for count in found.values()) <= 7 * np.sqrt(share * (1 - share) / 300)
 
     def test_mazes_and_yaws_are_drawn_uniformly(self):
-        drawn = episodes(make_spec(mazes=dfs_mazes()), 300)
+        drawn = episodes(Task.of(mazes=dfs_mazes()), 300)
         assert {e.maze for e in drawn} == {0, 1, 2}
         yaws = np.array([e.yaw for e in drawn])
         assert np.all((yaws >= -np.pi) & (yaws < np.pi))
@@ -58,23 +57,23 @@ class TestDistances:
 
     def test_only_starts_with_a_goal_far_enough_are_drawn(self):
         # At distance 6 in a corridor of 7 cells only the ends will do.
-        drawn = episodes(make_spec(mazes=CORRIDOR, distances=[6]), 40)
+        drawn = episodes(Task.of(mazes=CORRIDOR, distances=[6]), 40)
         assert {(e.start, e.goal) for e in drawn} == {((1, 1), (1, 7)), ((1, 7), (1, 1))}
 
     def test_a_distance_that_a_maze_does_not_have_is_refused(self):
         with pytest.raises(InputError, match=r"corridor: expected distances of at most 6 cells.*found 7.*--distances"):
-            make_spec(mazes=CORRIDOR, distances=[1, 7])
+            Task.of(mazes=CORRIDOR, distances=[1, 7])
 
     def test_distances_depend_on_the_split_and_the_track_by_default(self):
-        assert make_spec(split="train").distances == tuple(range(1, 6))
-        assert make_spec(split="eval").distances == tuple(range(1, 16))
-        assert make_spec("building", mazes=field(25)).distances == tuple(range(15, 41))
-        assert make_spec("building", mazes=field(15)).distances == tuple(range(15, 25))
+        assert Task.of(split="train").distances == tuple(range(1, 6))
+        assert Task.of(split="eval").distances == tuple(range(1, 16))
+        assert Task.of("building", mazes=field(25)).distances == tuple(range(15, 41))
+        assert Task.of("building", mazes=field(15)).distances == tuple(range(15, 25))
 
 
 class TestFixedPairs:
     def test_fixed_pairs_are_one_a_maze_whatever_the_seed(self):
-        spec = make_spec(mazes=dfs_mazes(), pairs="fixed")
+        spec = Task.of(mazes=dfs_mazes(), pairs="fixed")
         first, second = ({(e.maze, e.start, e.goal) for e in episodes(spec, 60, seed)} for seed in (1, 2))
         assert first == second
         assert len(first) == 3
@@ -104,7 +103,7 @@ class TestOptions:
     )
     def test_an_option_out_of_range_is_refused(self, options, message):
         with pytest.raises(InputError, match=message):
-            make_spec(**({"mazes": CORRIDOR} | options))
+            Task.of(**({"mazes": CORRIDOR} | options))
 
     @pytest.mark.parametrize(
         ("task", "options", "message"),
@@ -140,7 +139,7 @@ class TestOptions:
     )
     def test_an_option_that_contradicts_a_track_is_refused(self, task, options, message):
         with pytest.raises(InputError, match=re.escape(message)):
-            make_spec(task, **options)
+            Task.of(task, **options)
 
     def test_reading_the_options_does_not_load_mujoco(self):
         # The command line reads them before it chooses MuJoCo's rendering backend.
@@ -148,20 +147,20 @@ class TestOptions:
         run_python("-c", program)
 
     def test_the_context_has_the_mazes_size_by_default_and_21_at_most(self):
-        assert make_spec(mazes=CORRIDOR).context_size == 9
-        assert make_spec(mazes=generate("obstacles", 30, np.random.default_rng(0))).context_size == 21
+        assert Task.of(mazes=CORRIDOR).context_size == 9
+        assert Task.of(mazes=generate("obstacles", 30, np.random.default_rng(0))).context_size == 21
 
     def test_maps_may_be_a_maze_a_sequence_a_file_or_a_folder(self, tmp_path):
         path = tmp_path / "corridor.txt"
         path.write_text(format_maze(CORRIDOR), encoding="ascii")
         for maps in (CORRIDOR, [CORRIDOR], path, str(path), tmp_path):
-            assert make_spec(mazes=maps).mazes == (CORRIDOR,)
+            assert Task.of(mazes=maps).mazes == (CORRIDOR,)
 
 
 class TestShownMap:
     def test_an_episodes_map_follows_from_its_seed(self):
         for options in ({"map_flip": 0.3}, {"map_warp": 0.2}):
-            spec = make_spec(mazes=dfs_mazes(), **options)
+            spec = Task.of(mazes=dfs_mazes(), **options)
             first, second = episodes(spec, 2)
             np.testing.assert_array_equal(self.context(spec, first), self.context(spec, first))
             other = dataclasses.replace(first, seed=second.seed)
@@ -169,21 +168,21 @@ class TestShownMap:
 
     def test_a_warp_does_not_change_which_cells_are_flipped(self):
         # Each has a stream of its own: a warp changes nothing about which cells are flipped.
-        flipped = make_spec(mazes=dfs_mazes(), map_flip=0.3)
-        both = make_spec(mazes=dfs_mazes(), map_flip=0.3, map_warp=0.2)
+        flipped = Task.of(mazes=dfs_mazes(), map_flip=0.3)
+        both = Task.of(mazes=dfs_mazes(), map_flip=0.3, map_warp=0.2)
         episode = episodes(flipped, 1)[0]
         np.testing.assert_array_equal(show_map(flipped, episode).walls, show_map(both, episode).walls)
 
     def test_a_warped_map_has_one_mark_each_for_start_and_goal(self):
         # One mark each, wherever it went, and the crop stands at the start's.
-        spec = make_spec(mazes=dfs_mazes(), map_warp=0.25)
+        spec = Task.of(mazes=dfs_mazes(), map_warp=0.25)
         for episode in episodes(spec, 30):
             planes = self.context(spec, episode)
             assert planes[2].sum() == planes[3].sum() == 1
             row, column = np.argwhere(planes[3])[0]
             assert planes[1][4, 4] == planes[0][row, column]
 
-    def context(self, spec: TaskSpec, episode) -> np.ndarray:
+    def context(self, spec: Task, episode) -> np.ndarray:
         return leg_context(spec, show_map(spec, episode), episode.start, episode.goal)
 
 
@@ -193,14 +192,14 @@ class TestHierarchical:
         [(dfs_mazes(), ((1, 7), (7, 1))), (CUT_CORNERS, ((2, 5), (4, 1))), (CORRIDOR, ((1, 7), (1, 1)))],
     )
     def test_episodes_lead_from_corner_to_corner_or_the_free_cells_nearest_to_them(self, mazes, ends):
-        episode = episodes(make_spec("hierarchical", mazes=mazes), 1)[0]
+        episode = episodes(Task.of("hierarchical", mazes=mazes), 1)[0]
         assert (episode.start, episode.goal) == ends
 
     @pytest.mark.parametrize("every", [1, 5])
     def test_landmarks_lie_on_a_shortest_path_at_equal_distances(self, every):
-        spec = make_spec("hierarchical", mazes=dfs_mazes(), landmark_distance=every)
+        spec = Task.of("hierarchical", mazes=dfs_mazes(), landmark_distance=every)
         for episode in episodes(spec, 5):
-            maze, cells = spec.mazes[episode.maze], plan_route(spec, episode, show_map(spec, episode)).cells
+            maze, cells = spec.all_mazes[episode.maze], plan_route(spec, episode, show_map(spec, episode)).cells
             legs = [maze.distance(one, other) for one, other in itertools.pairwise(cells)]
             assert legs[:-1] == [every] * (len(legs) - 1)
             assert 1 <= legs[-1] <= every
@@ -209,7 +208,7 @@ class TestHierarchical:
 
     def test_landmarks_are_planned_on_the_flipped_map(self):
         # The corridor's cells are shown as walls, the others as free: the oracle plans through those.
-        spec = make_spec("hierarchical", mazes=CORRIDOR, landmark_distance=1, map_flip=1.0)
+        spec = Task.of("hierarchical", mazes=CORRIDOR, landmark_distance=1, map_flip=1.0)
         episode = episodes(spec, 1)[0]
         cells = plan_route(spec, episode, show_map(spec, episode)).cells
         assert len(cells) == 9
@@ -217,8 +216,8 @@ class TestHierarchical:
 
     def test_a_warp_does_not_move_landmarks(self):
         # Landmarks are cells of the world, which a warp of the planes does not move.
-        plain = make_spec("hierarchical", mazes=dfs_mazes())
-        warped = make_spec("hierarchical", mazes=dfs_mazes(), map_warp=0.2)
+        plain = Task.of("hierarchical", mazes=dfs_mazes())
+        warped = Task.of("hierarchical", mazes=dfs_mazes(), map_warp=0.2)
         episode = episodes(plain, 1)[0]
         routes = [plan_route(spec, episode, show_map(spec, episode)).cells for spec in (plain, warped)]
         assert routes[0] == routes[1]
@@ -226,9 +225,9 @@ class TestHierarchical:
 
 class TestSeveralGoals:
     def test_the_next_goal_lies_at_a_wanted_distance(self):
-        spec = make_spec(mazes=dfs_mazes(), distances=[2, 3], num_goals=50)
+        spec = Task.of(mazes=dfs_mazes(), distances=[2, 3], num_goals=50)
         episode = episodes(spec, 1)[0]
-        maze, route = spec.mazes[episode.maze], plan_route(spec, episode, show_map(spec, episode))
+        maze, route = spec.all_mazes[episode.maze], plan_route(spec, episode, show_map(spec, episode))
         again = plan_route(spec, episode, show_map(spec, episode))
         found = set()
         for step in range(1, 50):
@@ -240,7 +239,7 @@ class TestSeveralGoals:
 
     def test_the_farthest_cell_is_the_next_goal_if_none_is_far_enough(self):
         # From the middle of a corridor of 7 cells the farthest is 3 away.
-        spec = make_spec(mazes=CORRIDOR, distances=[6], num_goals=2, time_limit=5)
+        spec = Task.of(mazes=CORRIDOR, distances=[6], num_goals=2, time_limit=5)
         episode = episodes(spec, 1)[0]
         route = plan_route(spec, episode, show_map(spec, episode))
         route.advance((1, 4), 5)

@@ -23,12 +23,11 @@ from mazebench.maps.benchmark import (
 )
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.maps.maze import Maze, canonical_bytes
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, START
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.shown_map import is_blocked, leg_context, show_map
-from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.time_limit import track_time_limit
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.building import TurnedMap
@@ -40,12 +39,12 @@ from tests.simple_mazes import field
 PLAYED = [(name, level) for name in TRACKS for level in LEVELS]
 
 
-def episodes(spec: TaskSpec, count: int = 20) -> list[Episode]:
+def episodes(spec: Task, count: int = 20) -> list[Episode]:
     rng = np.random.default_rng(0)
     return [sample_episode(spec, rng) for _ in range(count)]
 
 
-def context(spec: TaskSpec, episode: Episode) -> np.ndarray:
+def context(spec: Task, episode: Episode) -> np.ndarray:
     return leg_context(spec, show_map(spec, episode), episode.start, episode.goal)
 
 
@@ -75,12 +74,12 @@ class TestFiles:
 
     def test_the_split_dev_belongs_to_the_tracks(self):
         with pytest.raises(InputError, match="split"):
-            make_spec(size=13, split="dev")
+            Task.of(size=13, split="dev")
 
 
 @pytest.mark.parametrize(("track", "level"), PLAYED)
 def test_the_task_of_a_level(track, level):
-    spec = make_spec(track, level=level)
+    spec = Task.of(track, level=level)
     assert (spec.size, spec.lidar, spec.sensors) == (31, TURTLEBOT3, ("lidar",))
     assert spec.context_size == (62 if track == "rough" else 31)
     is_lost = track in ("adrift", "rough")
@@ -94,10 +93,10 @@ def test_the_task_of_a_level(track, level):
 class TestBuilding:
     @pytest.mark.parametrize(("level", "num_maps"), [(2, 4), (3, 8)])
     def test_the_sheet_lies_in_any_way_and_the_goal_with_it(self, level, num_maps):
-        spec = make_spec("building", level=level)
+        spec = Task.of("building", level=level)
         seen = set()
         for episode in episodes(spec, 100):
-            maze, planes = spec.mazes[episode.maze], context(spec, episode)
+            maze, planes = spec.all_mazes[episode.maze], context(spec, episode)
             assert not planes[[LOCAL_MAP, START]].any()
             marked = maze.walls.astype(int)
             marked[episode.goal] = 2
@@ -123,7 +122,7 @@ class TestRebuilt:
     def test_so_many_doors_moved_that_the_share_of_paths_is_blocked(self, level, share):
         plan = make_plan(EvalOptions.of("random", track="rebuilt", level=level, split=DEV))
         blocked = [
-            is_blocked(plan.task.mazes[trial.episode.maze].walls, show_map(plan.task, trial.episode).walls, ends(trial))
+            is_blocked(plan.task.all_mazes[trial.episode.maze].walls, show_map(plan.task, trial.episode).walls, ends(trial))
             for trial in plan.trials
         ]
         assert abs(np.mean(blocked) - share) < 0.08
@@ -136,21 +135,21 @@ class TestRebuilt:
             assert is_blocked(world, shown, ends) == expected
 
     def test_start_and_goal_are_free_on_the_map_and_all_of_it_is_joined(self):
-        spec = make_spec("rebuilt", level=3)
+        spec = Task.of("rebuilt", level=3)
         for episode in episodes(spec, 10):
             shown = show_map(spec, episode).walls
             earlier = Maze(shown, "earlier")  # raises if its free cells are not joined
             assert all(map(earlier.is_free, (episode.start, episode.goal)))
-            assert (shown != spec.mazes[episode.maze].walls).any()
+            assert (shown != spec.all_mazes[episode.maze].walls).any()
 
     def test_the_doors_of_a_share_are_the_same_on_adrift(self):
-        rebuilt, adrift = make_spec("rebuilt", level=2), make_spec("adrift", level=1)
+        rebuilt, adrift = Task.of("rebuilt", level=2), Task.of("adrift", level=1)
         for episode in episodes(rebuilt, 5):
             assert (show_map(rebuilt, episode).walls == show_map(adrift, episode).walls).all()
 
     def test_a_maze_with_too_few_doors_is_refused_in_a_line(self):
         with pytest.raises(InputError, match=r"expected \d doors that can move, found 0"):
-            make_spec("rebuilt", mazes=field(9), distances=(2,))
+            Task.of("rebuilt", mazes=field(9), distances=(2,))
 
 
 def ends(trial) -> tuple:
@@ -170,12 +169,12 @@ class TestAdriftAndRough:
 
     def test_exact_pose_belongs_to_lost_poses(self):
         with pytest.raises(InputError, match="'rebuilt': expected no exact_pose"):
-            make_spec("rebuilt", exact_pose=True)
+            Task.of("rebuilt", exact_pose=True)
         with pytest.raises(InputError, match="exact_pose: expected a track whose pose is odometry"):
-            make_spec(exact_pose=True)
+            Task.of(exact_pose=True)
 
     def test_a_rough_sheet_is_mirrored_in_half_of_the_episodes_of_level_3(self):
-        straight, mirrored = (make_spec("rough", level=level) for level in (2, 3))
+        straight, mirrored = (Task.of("rough", level=level) for level in (2, 3))
         drawn = [show_map(mirrored, episode).drawing for episode in episodes(mirrored, 40)]
         assert 8 < sum(each.is_mirrored for each in drawn) < 32
         assert not any(hasattr(show_map(straight, episode).drawing, "quarters") for episode in episodes(straight, 3))

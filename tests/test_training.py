@@ -17,7 +17,7 @@ from mazebench import stopping
 from mazebench.agent import Agent
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.training import loop
 from mazebench.training.experience import Collector
 from mazebench.training.loop import TrainingError, train
@@ -200,7 +200,7 @@ def test_minutes_limit_a_command(tmp_path):
 
 def test_collector_gives_trajectories_that_hang_together():
     """Each next state follows the one before it, and cells, legs and ends are those of the environments."""
-    spec = make_spec(mazes=field(7), distances=(1, 2), time_limit=10, num_goals=3)
+    spec = Task.of(mazes=field(7), distances=(1, 2), time_limit=10, num_goals=3)
     collector = Collector(spec, 4, seed=1)
     rng = np.random.default_rng(0)
     steps = [collector.step(rng.integers(6, size=4)) for _ in range(80)]
@@ -231,7 +231,7 @@ class Rolling(Agent):
 
 def roll(seed):
     """The inputs of 40 steps in four environments, the steps, and the seeds of the environments' first episodes."""
-    spec = make_spec(mazes=field(7), distances=(1, 2), time_limit=6, num_goals=3)
+    spec = Task.of(mazes=field(7), distances=(1, 2), time_limit=6, num_goals=3)
     collector, state, steps = Collector(spec, 4, seed=seed), [], []
     env = MazeVectorEnv(spec, 4)  # the same environments, to look at their episodes
     observation, _ = env.reset(seed=np.random.SeedSequence(seed).generate_state(4).tolist())

@@ -15,7 +15,7 @@ from mazebench_agents.mah import MAH
 
 from mazebench.errors import InputError
 from mazebench.options import from_names
-from mazebench.tasks.build import make_spec
+from mazebench.tasks.task import Task
 from mazebench.tasks.context import GLOBAL_MAP
 from mazebench.training.experience import Collector
 from mazebench.training.held_out import HeldOutEvaluation
@@ -115,7 +115,7 @@ def test_what_can_not_be_trained_is_refused_before_a_folder_is_made(tmp_path, ch
 
 
 def test_goals_are_relabelled_on_the_maps_that_were_shown():
-    task = make_spec("rebuilt", split="train", kinds=("house",), num_mazes=5, size=13, distances=(3, 4))
+    task = Task.of("rebuilt", split="train", kinds=("house",), num_mazes=5, size=13, distances=(3, 4))
     learner = MAH.build_learner(task, overrides=TINY)
     collector = Collector(task, learner.num_envs, seed=0)
     rng, shown = np.random.default_rng(0), set()
@@ -126,12 +126,12 @@ def test_goals_are_relabelled_on_the_maps_that_were_shown():
     sample = learner.replay.sample(200, 4, 3, hindsight=Hindsight(ratio=1.0), rng=rng)
     contexts = learner.maps.contexts(sample, 0).numpy()
     assert {context[GLOBAL_MAP].tobytes() for context in contexts} <= shown
-    true = np.stack([task.mazes[maze].walls for maze in sample.maze])
+    true = np.stack([task.all_mazes[maze].walls for maze in sample.maze])
     assert ((contexts[:, GLOBAL_MAP] != true).sum(axis=(1, 2)) == 2).all(), "a door closed, a door opened"
 
 
 def test_experience_has_what_the_sensors_read_before_a_step_and_after_the_last_one():
-    task = make_spec("local", 13, distances=(5,), time_limit=3, sensors=("lidar",))
+    task = Task.of("local", size=13, distances=(5,), time_limit=3, sensors=("lidar",))
     collector = Collector(task, 2, seed=0)
     steps = [collector.step(np.zeros(2, dtype=np.int64)) for _ in range(4)]
     assert [step.ended.all() for step in steps] == [False, False, True, False]
@@ -150,6 +150,6 @@ def test_experience_has_what_the_sensors_read_before_a_step_and_after_the_last_o
     ],
 )
 def test_held_out_goals_are_at_five_of_the_distances(task, distances, wanted):
-    spec = make_spec(**task, **({"distances": distances} if distances else {}))
+    spec = Task.of(**task, **({"distances": distances} if distances else {}))
     evaluation = HeldOutEvaluation(spec, 2, distances)
     assert sorted({trial.distance for _, trial in evaluation.trials}) == wanted

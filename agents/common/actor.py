@@ -15,7 +15,7 @@ import torch
 from mazebench.agent import Interface
 from mazebench.constants import NUM_ACTIONS
 from mazebench.errors import UnplayableError
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.training.protocol import Learner, LearningAgent
 
 from .checkpoint import load_agent, load_checkpoint, load_into, save_checkpoint
@@ -110,7 +110,7 @@ class NetworkAgent(LearningAgent):
         return {"num_goals": override(cls.default_config, overrides or {}).num_goals}
 
     @classmethod
-    def build_learner(cls, task: TaskSpec, *, seed: int = 0, overrides: Mapping[str, str] | None = None) -> Learner:
+    def build_learner(cls, task: Task, *, seed: int = 0, overrides: Mapping[str, str] | None = None) -> Learner:
         """Returns a learner for an agent of this class."""
         config = override(cls.default_config, overrides or {})
         device = "cuda" if cls.learns_on_gpu and torch.cuda.is_available() else "cpu"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mazebench.storage.json_files import read_json
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.training.experience import Experience
 
 from .actor import NetworkAgent
@@ -31,7 +31,7 @@ class HindsightLearner:
     def __init__(
         self,
         actor: NetworkAgent,
-        task: TaskSpec,
+        task: Task,
         seed: int,
         descent: Descent,
         *,

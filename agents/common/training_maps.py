@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 
 import numpy as np
@@ -11,9 +10,8 @@ import torch
 from mazebench.errors import InputError
 from mazebench.tasks.context import build_context
 from mazebench.tasks.episode import sample_episode
-from mazebench.tasks.perturbations import active_perturbations
 from mazebench.tasks.shown_map import show_map
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 
 from . import symmetry
 from .replay import Sample, SequenceSample
@@ -24,9 +22,9 @@ _NUM_KEPT = 2**16  # mazes whose walls are kept, in bits; a million rows of expe
 class TrainingMaps:
     """The maps of a task's mazes; a symmetry of 0 leaves them as they are. `G` is the number of a sample's groups."""
 
-    def __init__(self, task: TaskSpec):
-        self.mazes = task.mazes
-        self._bits = functools.lru_cache(_NUM_KEPT)(lambda maze: np.packbits(task.mazes[maze].walls))
+    def __init__(self, task: Task):
+        self.mazes = task.all_mazes
+        self._bits = functools.lru_cache(_NUM_KEPT)(lambda maze: np.packbits(task.all_mazes[maze].walls))
         self.size = task.size  # N
         self._context_size = task.context_size  # M
 
@@ -55,7 +53,7 @@ class TrainingMaps:
         return symmetry.turn_cells(cells, self.size, turned) * (self._context_size / self.size)
 
 
-def shows_other_maps(task: TaskSpec, agent: str) -> bool:
+def shows_other_maps(task: Task, agent: str) -> bool:
     """Returns whether the maps that `task` shows may be others than those of its mazes.
 
     Raises:
@@ -65,11 +63,11 @@ def shows_other_maps(task: TaskSpec, agent: str) -> bool:
     name = f"agent {agent!r}"
     if task.track is None and task.sensors:
         raise InputError(f"{name}: reads no sensors, found {', '.join(task.sensors)}")
-    if task.track is None and not active_perturbations(task):
+    if task.track is None and not task.active_perturbations:
         return False
 
     episode = sample_episode(task, np.random.default_rng(0))
-    shown = [show_map(dataclasses.replace(task, level=(level,)), episode) for level in task.level]
+    shown = [show_map(task.replace(level=(level,)), episode) for level in task.level]
     if any(each.drawing is not None or each.hidden for each in shown):
         found = "map_warp" if task.track is None else f"track {task.track!r}"
         raise InputError(f"{name}: learns only on maps of one pixel a cell with start and goal marked; found {found}")

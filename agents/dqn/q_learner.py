@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch.nn import functional
 
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 
 from ..common import symmetry
 from ..common.actor import NetworkAgent, one_torch_thread
@@ -21,7 +21,7 @@ from ..common.learner import HindsightLearner
 class DQNLearner(HindsightLearner):
     """Updates the Q-network of its actor."""
 
-    def __init__(self, actor: NetworkAgent, task: TaskSpec, seed: int):
+    def __init__(self, actor: NetworkAgent, task: Task, seed: int):
         config = actor.config
         descent = Descent(
             actor.network,

@@ -6,7 +6,7 @@ from typing import Any
 
 import torch
 
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 
 from ..common import symmetry
 from ..common.actor import one_torch_thread
@@ -22,7 +22,7 @@ from .targets import targets_of
 class MMNLearner(HindsightLearner):
     """Updates the network of its actor."""
 
-    def __init__(self, actor: Any, task: TaskSpec, seed: int):
+    def __init__(self, actor: Any, task: Task, seed: int):
         config = actor.config
         groups = parameter_groups(actor.network, config)
         descent = Descent(

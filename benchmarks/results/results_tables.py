@@ -27,8 +27,8 @@ from benchmarks.results.kept import (
 from mazebench.errors import InputError
 from mazebench.maps.kinds import KNOWN, NOVEL
 from mazebench.report.curves import SUCCESS
-from mazebench.report.settings import DEFAULT_LANDMARK_DISTANCE
 from mazebench.report.table import METRICS, to_markdown
+from mazebench.report.tables import DEFAULT_LANDMARK_DISTANCE
 from mazebench.results.comparison import compare_results
 from mazebench.results.intervals import CONFIDENCE, Estimate, runs_interval
 from mazebench.results.metrics import ON_TIME_METRICS
@@ -327,7 +327,7 @@ def _over_values(rates: Sequence[float]) -> str:
 
 def _rows_of_tracks(kept: Kept) -> dict[str, str]:
     """Returns those of `_ROWS` that are evaluated on the tracks."""
-    played = {row for (row, _), result in kept.results.items() if result.summary.track}
+    played = {row for (row, _), result in kept.results.items() if result.summary.task.track}
     if not played:
         raise InputError("expected evaluations on tracks among the records, found none")
     if unnamed := played - _ROWS.keys():

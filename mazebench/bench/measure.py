@@ -25,9 +25,7 @@ from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
-from mazebench.tasks.build import make_spec
-from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.task_options import TRAIN_DISTANCES
+from mazebench.tasks.task import TRAIN_DISTANCES, Task
 from mazebench.training.experience import Collector
 from mazebench.training.protocol import LearningAgent
 from mazebench.world.backend import RenderingError
@@ -59,7 +57,7 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
     """Measures everything and returns it as plain values; `quick`, in fewer and shorter rounds."""
     seconds, rounds = (_QUICK_SECONDS, _QUICK_ROUNDS) if quick else (_SECONDS, _ROUNDS)
     results: dict[str, Any] = {"machine": {"cores": os.cpu_count(), "mujoco": mujoco.__version__}}
-    spec = make_spec()
+    spec = Task.of()
     say("environments beside the bare simulation")
     results["environments"] = [
         _ratio("vector, 256 environments, all threads", 256, *_vector_pair(spec, 256, 0), seconds, rounds),
@@ -121,12 +119,12 @@ def _random_actions(num_envs: int) -> np.ndarray:
     return np.random.default_rng(0).integers(len(ACTIONS), size=(512, num_envs))
 
 
-def _vector_pair(spec: TaskSpec, num_envs: int, num_threads: int) -> tuple[Step, Step]:
+def _vector_pair(spec: Task, num_envs: int, num_threads: int) -> tuple[Step, Step]:
     """Returns a step of the vector environment, resets included, and one of a batch that only steps."""
     actions, controls = _random_actions(num_envs), action_controls()
     env = MazeVectorEnv(spec, num_envs, seed=0, num_threads=num_threads)
     env.reset()
-    models = models_of(spec.mazes)
+    models = models_of(spec.all_mazes)
     batch = mujoco.batch.Batch(models[0], num_envs, num_threads)
     batch.set_models([models[i % len(models)] for i in range(num_envs)])
     batch.reset(keyframe=0)
@@ -144,9 +142,9 @@ def _stepping(env: MazeVectorEnv) -> Step:
     return lambda count: env.step(actions[count % len(actions)])
 
 
-def _bare_loop(spec: TaskSpec, actions: list[int]) -> Step:
+def _bare_loop(spec: Task, actions: list[int]) -> Step:
     """Returns a step of one maze by mj_step, and nothing else."""
-    model = models_of(spec.mazes)[0]
+    model = models_of(spec.all_mazes)[0]
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     controls = action_controls()
@@ -158,7 +156,7 @@ def _bare_loop(spec: TaskSpec, actions: list[int]) -> Step:
     return step
 
 
-def _dm_control_pair(spec: TaskSpec) -> tuple[Step, Step]:
+def _dm_control_pair(spec: Task) -> tuple[Step, Step]:
     from mazebench.envs.dm_control import Environment
 
     actions = _random_actions(1)[:, 0].tolist()
@@ -167,7 +165,7 @@ def _dm_control_pair(spec: TaskSpec) -> tuple[Step, Step]:
     return lambda count: environment.step(actions[count % len(actions)]), _bare_loop(spec, actions)
 
 
-def _gym_pair(spec: TaskSpec) -> tuple[Step, Step]:
+def _gym_pair(spec: Task) -> tuple[Step, Step]:
     actions = _random_actions(1)[:, 0].tolist()
     env = MazeEnv(spec, 0)
     env.reset()
@@ -180,7 +178,7 @@ def _gym_pair(spec: TaskSpec) -> tuple[Step, Step]:
     return step, _bare_loop(spec, actions)
 
 
-def _training_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
+def _training_rows(spec: Task, seconds: float) -> list[dict[str, Any]]:
     """Returns the speed of each installed agent that learns, in 256 environments where it can."""
     rows = []
     for name in agent_names():
@@ -193,7 +191,7 @@ def _training_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
     return rows
 
 
-def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -> dict[str, Any]:
+def _training_row(name: str, agent_class: Any, spec: Task, seconds: float) -> dict[str, Any]:
     spec = dataclasses.replace(spec, **agent_class.task_options())
     try:
         learner = agent_class.build_learner(spec, overrides={"num_envs": "256"})
@@ -218,7 +216,7 @@ def _training_row(name: str, agent_class: Any, spec: TaskSpec, seconds: float) -
     }
 
 
-def _resets(spec: TaskSpec, count: int) -> list[dict[str, Any]]:
+def _resets(spec: Task, count: int) -> list[dict[str, Any]]:
     """Milliseconds a reset; models are compiled before, as after the first episodes of a run."""
     _compile(spec)
     env, envs = MazeEnv(spec, 0), MazeVectorEnv(spec, 256, seed=0)
@@ -229,14 +227,14 @@ def _resets(spec: TaskSpec, count: int) -> list[dict[str, Any]]:
     return [{"what": what, "ms": value} for what, value in rows]
 
 
-def _compile(spec: TaskSpec) -> None:
+def _compile(spec: Task) -> None:
     """Compiles all models of a task, which environments otherwise do one by one."""
-    models = models_of(spec.mazes)
+    models = models_of(spec.all_mazes)
     for index in range(len(models)):
         models[index]
 
 
-def _picture_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
+def _picture_rows(spec: Task, seconds: float) -> list[dict[str, Any]]:
     """Returns the cost of a step of the vector environment with each camera, and with none."""
     rows = []
     for cameras in ((), ("egocentric",), ("top",), ("egocentric", "top")):
@@ -251,7 +249,7 @@ def _picture_rows(spec: TaskSpec, seconds: float) -> list[dict[str, Any]]:
     return rows
 
 
-def _vector_row(spec: TaskSpec, num_envs: int, seconds: float, rounds: int) -> dict[str, Any]:
+def _vector_row(spec: Task, num_envs: int, seconds: float, rounds: int) -> dict[str, Any]:
     """Returns the speed of the vector environment in a task, next to a simulation that observes nothing."""
     return _ratio(f"{num_envs} environments", num_envs, *_vector_pair(spec, num_envs, 0), seconds, rounds)
 
@@ -264,10 +262,10 @@ def _milliseconds(call: Callable[[], Any], count: int) -> float:
 def _size_row(size: int, seconds: float, rounds: int) -> dict[str, Any]:
     """Returns the speed of the vector environment in mazes of `size` cells a side; the context has the default size."""
     mazes = [generate("dfs", size, np.random.default_rng([size, index])) for index in range(_MAZES_PER_SIZE)]
-    spec = make_spec(mazes=mazes, distances=TRAIN_DISTANCES)
+    spec = Task.of(mazes=mazes, distances=TRAIN_DISTANCES)
     begin = time.perf_counter()
     _compile(spec)
     compiled = (time.perf_counter() - begin) / len(mazes)
     row = _ratio(f"{size} x {size}", 256, *_vector_pair(spec, 256, 0), seconds, rounds)
     # Padding included; floor and body are the two other geoms.
-    return {**row, "compile ms": 1e3 * compiled, "walls": models_of(spec.mazes)[0].ngeom - 2}
+    return {**row, "compile ms": 1e3 * compiled, "walls": models_of(spec.all_mazes)[0].ngeom - 2}

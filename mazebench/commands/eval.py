@@ -13,13 +13,14 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import has_camera, load_mujoco
-from mazebench.commands.option_parameters import chosen, takes_options
+from mazebench.commands.option_parameters import NOT_IN_EVALUATIONS, given, takes_options
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions
-from mazebench.options import options_of
+from mazebench.options import fields_of
+from mazebench.tasks.task import Task, evaluation_task
 
 
-@takes_options(RunOptions, EvalOptions, without=["fresh"])
+@takes_options(RunOptions, Task, EvalOptions, without=NOT_IN_EVALUATIONS, split="eval")
 def evaluate(
     agents: Annotated[
         list[str],
@@ -49,19 +50,19 @@ def evaluate(
     if suite is None and len(agents) > 1:
         raise InputError(f"expected one --agent without --suite, found {len(agents)}")
     if suite is not None:
-        for name, option in options_of(EvalOptions).items():
-            if name not in ("checkpoint", "seed") and values.get(name, option.default) != option.default:
-                raise InputError(f"the suite {suite!r} has evaluations of its own; found --{name.replace('_', '-')}")
-    run = chosen(RunOptions, values)
+        own = (*fields_of(Task), "episodes_per_distance")
+        if named := [name for name in values if name in own]:
+            raise InputError(f"the suite {suite!r} has evaluations of its own; found --{named[0].replace('_', '-')}")
+    run = RunOptions(**given(values, RunOptions))
     if run.resume and out is None:
         raise InputError("--resume needs --out, the folder of the run to go on with")
-    options = chosen(EvalOptions, values, agent=agents[0])
-    load_mujoco(renders=has_camera(options.task.sensors))
+    load_mujoco(renders=has_camera(values.get("sensors", ())))
 
     from mazebench.commands.summary_table import print_suite, print_summary
     from mazebench.evaluation.evaluate import run_evaluation
     from mazebench.evaluation.suites import run_suite
 
+    options = EvalOptions(agents[0], evaluation_task(**given(values, Task)), **given(values, EvalOptions))
     what = options.task.track or options.task.task
     title = f"{agents[0]}, {what}" if suite is None else f"{suite}, {', '.join(agents)}"
     name = suite or f"{agents[0].replace(':', '-')}-{what}"

@@ -2,35 +2,37 @@
 
 from __future__ import annotations
 
-import dataclasses
 import enum
 import functools
 import inspect
-import typing
 from collections.abc import Callable, Iterable, Mapping
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import typer
 
 from mazebench.errors import InputError, held_remarks
-from mazebench.maps.maze_options import MazeOptions
-from mazebench.options import Option, from_names, options_of
-from mazebench.tasks.task_options import EVAL_DISTANCES, TaskOptions, is_own
+from mazebench.options import Option, fields_of
+from mazebench.tasks.task import Task, evaluation_task
 
-Chosen = TypeVar("Chosen")
-
+# Fields of a task that evaluations do not vary.
+NOT_IN_EVALUATIONS = ("fresh", "pairs", "num_goals", "continuous", "context_size")
 _WORTH_WATCHING = 10  # cells from start to goal
 
 
 def takes_options(
-    *options_classes: type, without: Iterable[str] = ()
+    *options_classes: type, without: Iterable[str] = (), **defaults: Any
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Gives a command an option for each option of some classes, with those that they hold, but for `without`.
+    """Gives a command an option for each field of some classes that has a help, but for `without`.
 
-    The command has a parameter `values`, which receives the values by name. `chosen` makes options of them.
+    The command has a parameter `values`, which receives the values by name of those that are not left at the default.
+    `given` picks those of one class. `defaults` stand in the place of those that the classes declare.
     """
-    found = {name: option for each in options_classes for name, option in options_of(each).items()}
-    options = {name: option for name, option in found.items() if name not in without}
+    found = {name: option for each in options_classes for name, option in fields_of(each).items() if option.help}
+    options = {
+        name: option._replace(default=defaults.get(name, option.default))
+        for name, option in found.items()
+        if name not in without
+    }
     added = [_parameter(name, option) for name, option in options.items()]
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
@@ -38,9 +40,10 @@ def takes_options(
         kept = [parameter for name, parameter in own.parameters.items() if name != "values"]
 
         @functools.wraps(command)
-        def run(**given: Any) -> None:
-            values = {name: _to_value(name, option, given.pop(name)) for name, option in options.items()}
-            command(**given, values=values)
+        def run(**chosen: Any) -> None:
+            values = {name: _to_value(name, option, chosen.pop(name)) for name, option in options.items()}
+            changed = {name: value for name, value in values.items() if value != options[name].default}
+            command(**chosen, values=changed)
 
         parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in [*kept, *added]]
         run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
@@ -50,28 +53,24 @@ def takes_options(
     return decorate
 
 
-def chosen(options_class: type[Chosen], values: Mapping[str, Any], **others: Any) -> Chosen:
-    """Returns the options of a class from the `values` of a command; `others` are fields that are no options."""
-    names = options_of(options_class)
-    return from_names(options_class, {name: value for name, value in values.items() if name in names}, **others)
+def given(values: Mapping[str, Any], options_class: type) -> dict[str, Any]:
+    """Returns those of the `values` of a command that are fields of a class."""
+    return {name: value for name, value in values.items() if name in fields_of(options_class)}
 
 
-def watched(task: TaskOptions, mazes: MazeOptions) -> TaskOptions:
+def watched_task(values: Mapping[str, Any]) -> Task:
     """Returns the task of an episode that is to be looked at, of 10 cells or near to that if no distance is chosen.
 
     Raises:
-      InputError: if the options name no task.
+      InputError: if the values name no task.
     """
-    if task.distances or task.ends_given == 2 or task.track is not None or task.task == "hierarchical":
+    options = given(values, Task)
+    task = evaluation_task(**options)
+    if "distances" in options or task.num_ends == 2 or task.track is not None or task.task == "hierarchical":
         return task
-    distances: tuple[int, ...] = (_WORTH_WATCHING,)
-    if is_own(task, mazes):
-        from mazebench.tasks.build import build_task
-
-        with held_remarks():  # the command reads the files again
-            distances = build_task(task, mazes, default_distances=EVAL_DISTANCES).distances
-    nearest = min(distances, key=lambda distance: abs(distance - _WORTH_WATCHING))
-    return dataclasses.replace(task, distances=(nearest,))
+    nearest = min(task.distances, key=lambda distance: abs(distance - _WORTH_WATCHING))
+    with held_remarks():  # on files that are read again
+        return evaluation_task(**options | {"distances": (nearest,)})
 
 
 def parse_numbers(name: str, text: str) -> tuple[int, ...]:
@@ -105,7 +104,7 @@ def _parameter(name: str, option: Option) -> inspect.Parameter:
     elif option.choices:
         choice: Any = enum.StrEnum(name, {each: each for each in option.choices})  # type: ignore[misc]  # as typer wants
         kind, default = (choice | None, None) if default is None else (choice, choice(default))
-    elif kind is typing.Any:  # in Python also an object, on the command line a text
+    elif name == "mazes":  # in Python also values, on the command line a path
         kind = str | None
     annotation = Annotated[kind, typer.Option(help=option.help, metavar=metavar)]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)

@@ -7,30 +7,26 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.option_parameters import chosen, takes_options, watched
+from mazebench.commands.option_parameters import NOT_IN_EVALUATIONS, takes_options, watched_task
 from mazebench.errors import InputError
-from mazebench.evaluation.eval_options import EvalOptions
-from mazebench.maps.maze_options import MazeOptions
-from mazebench.tasks.task_options import TaskOptions
+from mazebench.tasks.task import Task
 from mazebench.world.backend import has_display
 
 
-@takes_options(EvalOptions, without=["episodes_per_distance", "fresh", "camera_size", "textures", "checkpoint", "seed"])
+@takes_options(Task, without=[*NOT_IN_EVALUATIONS, "camera_size", "textures"], split="eval")
 def play(
     values: dict[str, Any],
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode and those after it.")] = 0,
 ) -> None:
     """Drive yourself, with the keyboard, in a window."""
-    mazes = chosen(MazeOptions, values)
-    task = watched(chosen(TaskOptions, values), mazes)
+    task = watched_task(values)
     load_mujoco(renders=has_display())
     from mazebench.play import viewer
     from mazebench.play.game import LIDAR, Game
-    from mazebench.tasks.build import build_task
 
     for sensor in task.sensors:
         if sensor != LIDAR:
             raise InputError(f"expected sensors {LIDAR} or none, found {sensor}, which is not shown while you drive")
-    game = Game(build_task(task, mazes), seed)
+    game = Game(task, seed)
     viewer.play(game)
     print(game.outcome())

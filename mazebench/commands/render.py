@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import dataclasses
 import pathlib
 from typing import Annotated, Any
 
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.option_parameters import chosen, takes_options, watched
+from mazebench.commands.option_parameters import NOT_IN_EVALUATIONS, given, takes_options, watched_task
 from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.tasks.task import Task
 
 _DRAWN = ("map", "lidar")  # views that need no rendering
 
 
-@takes_options(EvalOptions, without=["episodes_per_distance", "fresh"])
+@takes_options(Task, EvalOptions, without=[*NOT_IN_EVALUATIONS, "episodes_per_distance"], split="eval")
 def render(
     out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
     values: dict[str, Any],
@@ -30,8 +30,7 @@ def render(
     pixels: Annotated[int, typer.Option(min=64, max=1280, help="Side of a view.")] = 360,
 ) -> None:
     """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
-    options = chosen(EvalOptions, values, agent=agent)
-    options = dataclasses.replace(options, task=watched(options.task, options.maze_options))
+    options = EvalOptions(agent, watched_task(values), **given(values, EvalOptions))
     load_mujoco(renders=view not in _DRAWN)
     from mazebench.play import film
 

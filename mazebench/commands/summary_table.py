@@ -25,22 +25,22 @@ def print_summary(summary: Summary) -> None:
 
     What the paper's MMN reached stands beside it where it can be compared.
     """
-    task = f"{summary.track} {summary.level}" if summary.track else summary.task
-    scale = "" if summary.cell_size is None else f" cells of {summary.cell_size:g} m"
-    title = f"{summary.who}: {task}, {summary.split} mazes {summary.size} x {summary.size}{scale}"
-    perturbations = [f"{name} {value}" for name, value in summary.perturbation.items() if value]
-    perturbed = ", ".join([*perturbations, *summary.senses])
+    task = summary.task
+    scale = "" if task.cell_size == 1 else f" cells of {task.cell_size:g} m"
+    title = f"{summary.who}: {task.title}, {task.split_in_results} mazes {task.size} x {task.size}{scale}"
+    perturbations = [f"{name} {value}" for name, value in task.perturbations.items() if value]
+    perturbed = ", ".join([*perturbations, *task.noise_in_words])
     paper = printed_mmn(summary)
     head = ["n", "success rate", *["paper"] * bool(paper), *_HEAD[2:]]
     totals = []
-    if summary.task == "local":
+    if task.task == "local":
         head = ["distance", *head]
         rows = [[distance, *_with_paper(row, paper, int(distance))] for distance, row in summary.by_distance.items()]
         totals = [
             [name, *_with_paper(row, paper)] for name, row in [*summary.by_fact.items(), ("all", summary.overall)]
         ]
     else:
-        rows = [_with_paper(summary.overall, paper, summary.provenance.options.landmark_distance)]
+        rows = [_with_paper(summary.overall, paper, task.landmark_distance)]
     print_table(f"{title}{', ' + perturbed if perturbed else ''}", head, rows, totals)
     print(_NOTE)
     if paper:

@@ -10,13 +10,14 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import has_camera, load_mujoco
-from mazebench.commands.option_parameters import chosen, takes_options
+from mazebench.commands.option_parameters import given, takes_options
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import SIZES
+from mazebench.tasks.task import Task
 from mazebench.training.train_options import FIXED, TrainOptions
 
 
-@takes_options(TrainOptions, without=FIXED)
+@takes_options(TrainOptions, Task, without=("task", *FIXED))
 def train(
     agent: Annotated[
         str,
@@ -34,11 +35,12 @@ def train(
     ] = None,
 ) -> None:
     """Train an agent, on the benchmark's training mazes or others; evaluated on held-out mazes of the same kinds."""
-    load_mujoco(renders=has_camera(values["sensors"]))
+    load_mujoco(renders=has_camera(values.get("sensors", ())))
     from mazebench.training import loop, run_folder
 
-    options = chosen(TrainOptions, values, agent=agent, overrides=tuple(map(_parse_override, overrides or [])))
-    folder = out or pathlib.Path("runs") / _folder_name(options)
+    parsed = tuple(map(_parse_override, overrides or []))
+    options = TrainOptions(agent, overrides=parsed, **given(values, TrainOptions))
+    folder = out or pathlib.Path("runs") / _folder_name(options, values)
 
     def how_to_go_on() -> tuple[str, ...]:
         last = next(reversed(run_folder.checkpoints(folder)), None)
@@ -48,17 +50,16 @@ def train(
         return (f"the checkpoint at {int(last.name):,} steps is kept in {folder}; go on{again}", "--resume")
 
     with stopping.stoppable(how_to_go_on, waits=True), progress.training() as show:
-        loop.train(options, folder, resume, show)
+        loop.run_training(options, given(values, Task), folder, resume, show)
     print(f"run in {folder}; evaluate it by: mazebench eval --agent {agent} --checkpoint {folder}")
 
 
-def _folder_name(options: TrainOptions) -> str:
-    track, level = options.task.track, options.task.level
-    mazes = options.maze_options
-    parts = [options.agent.replace(":", "-"), *mazes.kinds, *(["fresh"] if mazes.fresh else [])]
-    if mazes.mazes is not None:
-        parts.append(pathlib.Path(mazes.mazes).stem)
-    parts += [str(mazes.size or SIZES[0])] if track is None else [track, *map(str, level)]
+def _folder_name(options: TrainOptions, values: dict[str, Any]) -> str:
+    parts = [options.agent.replace(":", "-"), *values.get("kinds", ()), *(["fresh"] if "fresh" in values else [])]
+    if "mazes" in values:
+        parts.append(pathlib.Path(values["mazes"]).stem)
+    track = values.get("track")
+    parts += [track, *map(str, values.get("level", (1,)))] if track else [str(values.get("size", SIZES[0]))]
     return "-".join([*parts, str(options.seed)])
 
 

@@ -13,7 +13,7 @@ from dm_env import specs
 from mazebench.constants import STEPS_PER_ACTION
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.navigation import EnvironmentState, Navigation
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task as MazeTask
 from mazebench.world.models import models_of
 from mazebench.world.simulation import FULL_STATE, Simulation
 
@@ -62,15 +62,15 @@ class Environment(control.Environment):
     physics: Physics
     task: Task
 
-    def __init__(self, spec: TaskSpec, seed: int | None = None):
+    def __init__(self, spec: MazeTask, seed: int | None = None):
         """Opens the environment; `seed` is that of the first reset.
 
         Raises:
-          InputError: if `seed` is not a natural number, or `spec` not a `TaskSpec`.
+          InputError: if `seed` is not a natural number, or `spec` not a `Task`.
         """
         task = Task(spec, seed)
         # The task judges the time limit itself, so that a goal reached on the last step is a termination.
-        super().__init__(Physics.of_maze(models_of(spec.mazes)[0]), task, n_sub_steps=STEPS_PER_ACTION)
+        super().__init__(Physics.of_maze(models_of(spec.all_mazes)[0]), task, n_sub_steps=STEPS_PER_ACTION)
 
     def reset(self, seed: int | None = None, episode: Episode | None = None) -> dm_env.TimeStep:
         """Starts an episode: the next one of the environment's stream, the first one of `seed`'s, or `episode`."""

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Mapping
 from enum import Enum
 from typing import Any
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
-from mazebench.errors import InputError
-from mazebench.maps.maze import Maze
-from mazebench.maps.text import format_maze, parse_maze
-from mazebench.tasks.spec import TaskSpec
+from mazebench.maps.selection import described_maze
+from mazebench.tasks.task import Task
 
 
 class JsonSpec:
     """Base class of environments whose `spec.to_json()` describes them, mazes of one's own included."""
 
-    task_spec: TaskSpec
+    task_spec: Task
     _spec: EnvSpec | None = None
 
     @property
@@ -34,32 +31,9 @@ class JsonSpec:
         if spec is not None:
             kwargs = {name: _plain(value) for name, value in spec.kwargs.items()}
             if not isinstance(kwargs.get("mazes"), str | None):  # else a path, or none
-                kwargs["mazes"] = [_describe(maze) for maze in self.task_spec.fixed_mazes]
+                kwargs["mazes"] = [described_maze(maze) for maze in self.task_spec.fixed_mazes]
             spec = dataclasses.replace(spec, kwargs=kwargs)
         self._spec = spec
-
-
-def with_mazes(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns the options of an environment, with the mazes that a `JsonSpec` describes in place of the descriptions.
-
-    Raises:
-      InputError: if a description is none of a `JsonSpec`, or of no legal maze.
-    """
-    mazes = options.get("mazes")
-    if not (isinstance(mazes, list) and mazes and all(isinstance(described, dict) for described in mazes)):
-        return dict(options)
-    return {**options, "mazes": [_maze(described) for described in mazes]}
-
-
-def _describe(maze: Maze) -> dict[str, Any]:
-    return {"name": maze.name, "rows": format_maze(maze).splitlines(), "cell_size": maze.cell_size}
-
-
-def _maze(described: dict[str, Any]) -> Maze:
-    if described.keys() != {"name", "rows", "cell_size"}:
-        raise InputError(f"expected a maze with name, rows and cell_size, found {', '.join(map(str, described))}")
-    maze = parse_maze("\n".join(described["rows"]), described["name"])
-    return dataclasses.replace(maze, cell_size=described["cell_size"])
 
 
 def _plain(value: Any) -> Any:

@@ -12,7 +12,7 @@ from mazebench.envs import spaces
 from mazebench.envs.gym import MazeEnv
 from mazebench.errors import InputError
 from mazebench.tasks.context import GOAL, NUM_PLANES
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.world.simulation import STATE_SIZE
 
 _SHOWN_PLANES = [plane for plane in range(NUM_PLANES) if plane != GOAL]
@@ -36,14 +36,12 @@ class GoalMazeEnv(MazeEnv):
     if the goal is `desired_goal`. They take single goals and arrays of goals.
     """
 
-    def __init__(
-        self, task_spec: TaskSpec, seed: int | None = None, render_mode: str | None = None, camera: str = "top"
-    ):
+    def __init__(self, task_spec: Task, seed: int | None = None, render_mode: str | None = None, camera: str = "top"):
         # A track may hide the body's position and has its own time limits, and the goals would tell what is hidden.
         if task_spec.has_legs or task_spec.track is not None or task_spec.hide:
             raise InputError("a goal-conditioned environment: expected the local task, one goal, no track, no hide")
         super().__init__(task_spec, seed, render_mode, camera)
-        side, num_values = task_spec.mazes[0].side, STATE_SIZE + len(_SHOWN_PLANES) * task_spec.context_size**2
+        side, num_values = task_spec.all_mazes[0].side, STATE_SIZE + len(_SHOWN_PLANES) * task_spec.context_size**2
         sensed = {name: spaces.observation_space(task_spec)[name] for name in task_spec.sensors}
         self.observation_space = gymnasium.spaces.Dict(
             {
@@ -70,7 +68,7 @@ class GoalMazeEnv(MazeEnv):
 
     def _observation(self) -> dict[str, np.ndarray]:
         shown = super()._observation()
-        maze = self.task_spec.mazes[self.task.maze]
+        maze = self.task_spec.all_mazes[self.task.maze]
         planes = shown.pop("context")[_SHOWN_PLANES]
         return {
             "observation": np.concatenate([shown.pop("state"), planes.ravel()]),

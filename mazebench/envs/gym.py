@@ -15,7 +15,7 @@ from mazebench.errors import InputError, unknown
 from mazebench.tasks.arguments import Arguments
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.navigation import EnvironmentState, Navigation
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.world.models import models_of
 from mazebench.world.rendering import Cameras
 from mazebench.world.simulation import MujocoSimulation
@@ -31,9 +31,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 1 / STEP_TIME}  # noqa: RUF012
 
-    def __init__(
-        self, task_spec: TaskSpec, seed: int | None = None, render_mode: str | None = None, camera: str = "top"
-    ):
+    def __init__(self, task_spec: Task, seed: int | None = None, render_mode: str | None = None, camera: str = "top"):
         """Opens the environment.
 
         Args:
@@ -48,7 +46,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         arguments = Arguments(render_mode=render_mode, camera=camera)
         self.task = Navigation(task_spec, seed)
         self.task_spec = task_spec
-        self.simulation = MujocoSimulation(models_of(task_spec.mazes)[0])
+        self.simulation = MujocoSimulation(models_of(task_spec.all_mazes)[0])
         self._needs_reset = True
         self.render_mode = render_mode
         self.observation_space = spaces.observation_space(task_spec)
@@ -94,7 +92,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         if self.render_mode is None:
             return None
         if self._cameras is None:
-            self._cameras = Cameras(models_of(self.task_spec.mazes, self.task_spec.textures), (self._camera,))
+            self._cameras = Cameras(models_of(self.task_spec.all_mazes, self.task_spec.textures), (self._camera,))
         data = self.simulation.data
         return self._cameras.take(self.task.maze, data.qpos, data.mocap_pos[0])[self._camera]
 

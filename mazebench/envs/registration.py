@@ -5,9 +5,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Unpack
 
 import gymnasium
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from mazebench.envs.goal import GoalMazeEnv
     from mazebench.envs.gym import MazeEnv
     from mazebench.envs.vector import MazeVectorEnv
-    from mazebench.tasks.spec import TaskSpec
+    from mazebench.tasks.task import Task, TaskOptions
 
 _SINGLE = ("seed", "render_mode", "camera")  # what a single environment takes besides its task's options
 _VECTOR = ("seed", "num_envs", "num_threads", "render_mode", "autoreset_mode")
@@ -36,10 +36,10 @@ def register_environments() -> None:
     """
     for size in BENCHMARK_SIZES:
         for task in ("local", "hierarchical"):
-            _register(f"{task.title()}-{size}", "make_env", "make_vec", task=task, id_size=size)
-        _register(f"LocalGoal-{size}", "make_goal_env", id_size=size)
+            _register(f"{task.title()}-{size}", "make", "make_vec", task=task, id_size=size)
+        _register(f"LocalGoal-{size}", "make_goal", id_size=size)
     for track in TRACK_NAMES:
-        _register(track.title(), "make_env", "make_vec", task=track)
+        _register(track.title(), "make", "make_vec", task=track)
 
 
 def _register(name: str, make: str, make_many: str | None = None, **options: str | int) -> None:
@@ -53,13 +53,12 @@ def _register(name: str, make: str, make_many: str | None = None, **options: str
         )
 
 
-def load(
-    task: str = "local", size: int | None = None, split: str = "train", seed: int | None = None, **options: Any
-) -> Environment:
-    """Returns a dm_control environment of a navigation task; `options` are those of `mazebench.make_spec`.
+def load(task: str = "local", *, seed: int | None = None, **options: Unpack[TaskOptions]) -> Environment:
+    """Returns a dm_control environment of a navigation task; `options` are those of `mazebench.Task.of`.
 
-    Its first episode is the one of `reset(seed=seed)`. `env.physics` and `env.task` are a
-    `mazebench.envs.dm_control.Physics` and a `mazebench.tasks.navigation.Navigation`.
+        >>> env = mazebench.load("local", size=15, seed=0)
+
+    Its first episode is the one of `reset(seed=seed)`. `env.physics` is a `mazebench.envs.dm_control.Physics`.
 
     Raises:
       InputError: if an option is unknown or not allowed, or dm_control is not installed.
@@ -72,27 +71,43 @@ def load(
     with loading_backend():
         from mazebench.envs.dm_control import Environment
 
-    return Environment(_task_spec(task, {"size": size, "split": split, **options}, ("seed",)), seed)
+    return Environment(_task(task, options, ("seed",)), seed)
 
 
-def make_env(
-    task: str = "local", *, seed: int | None = None, render_mode: str | None = None, camera: str = "top", **options: Any
+def make(
+    task: str = "local",
+    *,
+    seed: int | None = None,
+    render_mode: str | None = None,
+    camera: str = "top",
+    id_size: int = 0,
+    **options: Unpack[TaskOptions],
 ) -> MazeEnv:
-    """Returns a `MazeEnv`; `options` are those of `mazebench.make_spec`."""
+    """Returns a Gymnasium environment, as `gymnasium.make` does; `options` are those of `mazebench.Task.of`.
+
+        >>> env = mazebench.make("rebuilt", level=2, sensors="egocentric")
+
+    `id_size` is the size of the mazes that an id names, unless size or mazes are given.
+    """
     load_mujoco()
     from mazebench.envs.gym import MazeEnv
 
-    return MazeEnv(_task_spec(task, options, _SINGLE), seed, render_mode, camera)
+    return MazeEnv(_task(task, options, _SINGLE, id_size), seed, render_mode, camera)
 
 
-def make_goal_env(
-    *, seed: int | None = None, render_mode: str | None = None, camera: str = "top", **options: Any
+def make_goal(
+    *,
+    seed: int | None = None,
+    render_mode: str | None = None,
+    camera: str = "top",
+    id_size: int = 0,
+    **options: Unpack[TaskOptions],
 ) -> GoalMazeEnv:
-    """Returns a `GoalMazeEnv` of the local task; `options` are those of `mazebench.make_spec`."""
+    """Returns a goal-conditioned environment of the local task; `options` are those of `mazebench.Task.of`."""
     load_mujoco()
     from mazebench.envs.goal import GoalMazeEnv
 
-    return GoalMazeEnv(_task_spec("local", options, _SINGLE), seed, render_mode, camera)
+    return GoalMazeEnv(_task("local", options, _SINGLE, id_size), seed, render_mode, camera)
 
 
 def make_vec(
@@ -103,33 +118,32 @@ def make_vec(
     num_threads: int = 0,
     render_mode: str | None = None,
     autoreset_mode: AutoresetMode | str = "SameStep",
-    **options: Any,
+    id_size: int = 0,
+    **options: Unpack[TaskOptions],
 ) -> MazeVectorEnv:
     """Returns `num_envs` environments side by side on `num_threads` threads (0: all cores).
 
+        >>> envs = mazebench.make_vec("building", 64, level=(1, 2), split="train")
+
     `autoreset_mode` says what follows the end of an episode; see `MazeVectorEnv`. `options` are those of
-    `mazebench.make_spec`.
+    `mazebench.Task.of`.
     """
     load_mujoco()
     from mazebench.envs.vector import MazeVectorEnv
 
-    task_spec = _task_spec(task, options, _VECTOR)
-    return MazeVectorEnv(task_spec, num_envs, seed, num_threads, render_mode, autoreset_mode=autoreset_mode)
+    chosen = _task(task, options, _VECTOR, id_size)
+    return MazeVectorEnv(chosen, num_envs, seed, num_threads, render_mode, autoreset_mode=autoreset_mode)
 
 
-def _task_spec(task: str, options: dict[str, Any], arguments: Iterable[str]) -> TaskSpec:
+def _task(task: str, options: TaskOptions, arguments: Sequence[str], id_size: int = 0) -> Task:
     """Returns the task of an environment that takes `arguments` besides `options`.
 
-    The size that an id names is the size of the mazes unless a size or mazes are given.
-
     Raises:
-      InputError: as `mazebench.make_spec`.
+      InputError: as `mazebench.Task.of`.
     """
-    from mazebench.envs.env_spec import with_mazes
-    from mazebench.tasks.build import check_names, make_spec
+    from mazebench.tasks.task import Task, check_names
 
-    id_size = options.pop("id_size", None)  # the size that an id names
-    if options.get("mazes") is None and options.get("size") is None:
-        options["size"] = id_size
     check_names(options, arguments)
-    return make_spec(task, **with_mazes(options))
+    if options.get("mazes") is None and options.get("size") is None and id_size:
+        options["size"] = id_size
+    return Task.of(task, **options)

@@ -9,10 +9,10 @@ from gymnasium import spaces
 from mazebench.constants import ACTIONS
 from mazebench.tasks.actions import VELOCITY_SIZE
 from mazebench.tasks.observation import observation_specs
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 
 
-def observation_space(spec: TaskSpec) -> spaces.Dict:
+def observation_space(spec: Task) -> spaces.Dict:
     """Returns the space of the observations that `Navigation` documents, except `is_first`, which is in `info`."""
     return spaces.Dict({name: _box(array) for name, array in observation_specs(spec).items()})
 
@@ -24,7 +24,7 @@ def _box(array: specs.Array) -> spaces.Box:
     return spaces.Box(-np.inf, np.inf, array.shape, array.dtype)
 
 
-def action_space(spec: TaskSpec) -> spaces.Discrete | spaces.Box:
+def action_space(spec: Task) -> spaces.Discrete | spaces.Box:
     """Returns the space of the six actions, in the order of `mazebench.constants.ACTIONS`, or of velocities."""
     if spec.continuous:
         return spaces.Box(-1.0, 1.0, (VELOCITY_SIZE,), np.float32)

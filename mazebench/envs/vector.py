@@ -29,7 +29,7 @@ from mazebench.tasks.perturbations.perturbation import ShownMap, StateError
 from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.sensors.sensor import Worlds
 from mazebench.tasks.shown_map import leg_context, show_map
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.world.angles import wrap_angle
 from mazebench.world.batch import open_batch
 from mazebench.world.models import models_of
@@ -67,7 +67,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
     def __init__(
         self,
-        task_spec: TaskSpec,
+        task_spec: Task,
         num_envs: int,
         seed: Seeds = None,
         num_threads: int = 0,
@@ -113,7 +113,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._allocate()
 
         # The simulation, with views of its arrays, and the sensors.
-        self._maze_models = models_of(task_spec.mazes)
+        self._maze_models = models_of(task_spec.all_mazes)
         self._models = self._maze_models.first_models(num_envs)
         self._process = os.getpid()
         self._batch = open_batch(self._maze_models[0], num_envs, arguments.num_threads)
@@ -333,7 +333,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._state_errors[i] = state_errors(spec, episode)
         self._lidar_noise[i] = lidar_noise(spec, episode)
         self._maze[i] = episode.maze
-        self._positions[i] = spec.mazes[episode.maze].point(episode.start)
+        self._positions[i] = spec.all_mazes[episode.maze].point(episode.start)
         self._qpos[i] = (*self._positions[i], episode.yaw)
         self._path_length[i] = 0.0
         self._steps[i] = 0
@@ -348,7 +348,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._goal[i] = self._cell_index(route.goal)
         self._deadline[i] = route.deadline
         self._landmark[i] = route.leg
-        self._marker[i, 0] = (*self.task_spec.mazes[self._maze[i]].point(route.goal), 0.0)
+        self._marker[i, 0] = (*self.task_spec.all_mazes[self._maze[i]].point(route.goal), 0.0)
 
     def _cell_index(self, cell: Cell) -> int:
         return cell[0] * self.task_spec.size + cell[1]
@@ -408,7 +408,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
     def cells(self) -> np.ndarray:
         """Returns `[B]` int: the true cells of the bodies, as row * N + column; agents must not use them."""
         # All mazes have one size and one cell size, so the first one converts the points of all.
-        return self.task_spec.mazes[0].cell(self._positions) @ (self.task_spec.size, 1)
+        return self.task_spec.all_mazes[0].cell(self._positions) @ (self.task_spec.size, 1)
 
     def legs(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns two `[B]` int: the start cells and target cells of the current legs, as row * N + column."""
@@ -418,7 +418,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """Returns a picture `[480, 480, 3]` uint8 of each environment, seen from above."""
         self._require_open()
         if self._top_camera is None:
-            self._top_camera = Cameras(models_of(self.task_spec.mazes, self.task_spec.textures), ("top",))
+            self._top_camera = Cameras(models_of(self.task_spec.all_mazes, self.task_spec.textures), ("top",))
         worlds = zip(self._maze.tolist(), self._qpos, self._marker[:, 0], strict=True)
         return tuple(self._top_camera.take(*world)["top"] for world in worlds)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from mazebench.agent import Truth
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 
 
 def agent_seed(run_seed: int, number: int) -> int:
@@ -19,7 +19,7 @@ def agent_seed(run_seed: int, number: int) -> int:
     return int(np.random.SeedSequence([run_seed, number]).generate_state(1)[0])
 
 
-def true_state(task_spec: TaskSpec, episodes: Sequence[Episode | None], position: np.ndarray, yaw: np.ndarray) -> Truth:
+def true_state(task_spec: Task, episodes: Sequence[Episode | None], position: np.ndarray, yaw: np.ndarray) -> Truth:
     """Returns the truth of B environments.
 
     Args:
@@ -28,7 +28,7 @@ def true_state(task_spec: TaskSpec, episodes: Sequence[Episode | None], position
       position: `[B, 2]` m, true.
       yaw: `[B]` rad, true.
     """
-    mazes = [task_spec.mazes[episode.maze if episode else 0] for episode in episodes]
+    mazes = [task_spec.all_mazes[episode.maze if episode else 0] for episode in episodes]
     goals = [episode.goal if episode else (0, 0) for episode in episodes]
     pose = np.column_stack([position, yaw]).astype(np.float64)
     return Truth(np.stack([maze.walls for maze in mazes]), pose, np.array(goals, dtype=np.int64))

@@ -26,7 +26,7 @@ from mazebench.results.trajectories import Trajectory
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.observation import state_errors
 from mazebench.tasks.shown_map import is_blocked, show_map
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.tasks.trials import Trial
 
 PATIENCE = 0.5  # seconds that a pool waits for a chunk to end before it lets the caller look for signals
@@ -95,7 +95,7 @@ def run_whole_chunk(chunk: Chunk) -> list[Ended]:
 
 def run_trials(
     agent: Agent,
-    task: TaskSpec,
+    task: Task,
     trials: Sequence[tuple[int, Trial]],
     num_envs: int,
     num_threads: int = 0,
@@ -171,7 +171,7 @@ def _present(numbered: tuple[int, Trial] | None) -> tuple[int, Trial]:
 
 
 def _outcome(
-    task: TaskSpec, index: int, trial: Trial, info: dict[str, Any], slot: int, recorder: Recorder | None
+    task: Task, index: int, trial: Trial, info: dict[str, Any], slot: int, recorder: Recorder | None
 ) -> Outcome:
     final, trajectory = info["final_info"], None
     if recorder:
@@ -184,12 +184,16 @@ def _outcome(
 
 
 def _to_record(plan: Plan, outcome: Outcome) -> Record:
-    episode, trial = outcome.trial.episode, outcome.trial
-    maze = plan.task.mazes[episode.maze]
+    task, trial, episode = plan.task, outcome.trial, outcome.trial.episode
+    maze = task.all_mazes[episode.maze]
     # Of the body as a disc, and from cell to cell; both in metres.
-    shortest = np.array([trial.shortest_path, trial.distance * plan.task.cell_size])
+    shortest = np.array([trial.shortest_path, trial.distance * task.cell_size])
     spl_of_disc, spl_grid = spl(np.array([outcome.success]), shortest, np.array([outcome.path_length])).tolist()
     values = {
+        "agent": plan.options.agent,
+        "task": task.task,
+        "size": task.size,
+        "split": task.split_in_results,
         "episode": outcome.index,
         "maze": maze.name,
         "start": episode.start,
@@ -203,10 +207,15 @@ def _to_record(plan: Plan, outcome: Outcome) -> Record:
         "spl_grid": spl_grid,
         "seed": episode.seed,
     }
-    groups: dict[str, bool | str] = {}  # summaries report the episodes of each one apart
-    if plan.task.track is not None:
-        shown = show_map(plan.task, episode)
-        groups["blocked"] = is_blocked(maze.walls, shown.walls, (episode.start, episode.goal))
+    further: dict[str, Any] = {} if task.cell_size == 1 else {"cell_size": task.cell_size}
+    if task.track is not None:
+        further |= {"track": task.track, "level": task.level[0]}
+    noise = {"lidar_noise": task.lidar_noise, "odometry_noise": task.odometry_noise}
+    further |= {name: value for name, value in noise.items() if value is not None}
+    further |= task.perturbations
+    if task.track is not None:  # summaries report the episodes of each of these groups apart
+        shown = show_map(task, episode)
+        further["blocked"] = is_blocked(maze.walls, shown.walls, (episode.start, episode.goal))
         if maze.kind:
-            groups["kind"] = maze.kind
-    return Record.model_validate(plan.labels | values | plan.levels | groups)
+            further["kind"] = maze.kind
+    return Record.model_validate(values | further)

@@ -6,11 +6,12 @@ import math
 import pathlib
 import tempfile
 from collections.abc import Callable
-from typing import Any
+from typing import Unpack
 
 from mazebench import stopping
 from mazebench.agent import Agent, SingleAgent
 from mazebench.agent_loading import checked_agent_class, load_agent_class
+from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.errors import InputError, remark
 from mazebench.evaluation.chunk import Chunk
 from mazebench.evaluation.eval_options import NUM_ENVS, EvalOptions, RunOptions
@@ -21,6 +22,7 @@ from mazebench.evaluation.store import Store, check_same_run, is_finished
 from mazebench.results import metrics
 from mazebench.results.reading import load_result
 from mazebench.results.records import Summary
+from mazebench.tasks.task import Task, TaskOptions, evaluation_task
 
 _CHUNKS_PER_WORKER = 4  # so that no worker waits long for the last one,
 _LEAST_CHUNK = 64  # but not so many that their environments are few: agents act on all of them at once
@@ -32,31 +34,42 @@ Progress = Callable[[int, int], None]
 
 def evaluate(
     agent: str | type[Agent] | type[SingleAgent],
+    task: str | Task = "local",
     out: str | pathlib.Path | None = None,
     *,
+    episodes_per_distance: int = EPISODES_PER_DISTANCE,
+    checkpoint: str | pathlib.Path | None = None,
+    seed: int = 0,
     resume: bool = False,
     record: bool = False,
     num_envs: int = NUM_ENVS,
     workers: int = 0,
     ray_address: str | None = None,
     progress: Progress = lambda ended, of: None,
-    **options: Any,
+    **options: Unpack[TaskOptions],
 ) -> Summary:
-    """Evaluates an agent and returns the summary.
+    """Evaluates an agent in a task and returns the summary.
+
+        >>> mazebench.evaluate("planner", "building", level=2).overall.success_rate
 
     A `mazebench.errors.Remark` warns of what a user should know, such as maps of a scale on which the agent did not
     learn.
 
     Args:
       agent: the name of an installed agent, "module:Class", or a class.
+      task: a `Task`, or "local", "hierarchical" or the name of a track, as `Task.of` takes it with `options`. Those are
+        completed as evaluations are: eval mazes, distances of 1 to 15.
       out: the folder for records, summary and options; None keeps the summary alone.
       resume: go on with the run that `out` holds; an empty or missing folder starts one.
+      episodes_per_distance: for each maze and distance, of the local task.
+      checkpoint: a learned agent's checkpoint or run folder; the shipped one by default.
+      seed: of what the agent draws, and of episodes that are not frozen.
       record: write trajectories too.
       num_envs: environments side by side in each process, at most.
       workers: processes; 0 runs in this one, on all cores.
       ray_address: of a Ray cluster to run the workers on; 0 of them then are as many as it has CPUs.
       progress: called as episodes end.
-      **options: those of `EvalOptions` by name: `task`, `size`, `split`, `mazes`, `distances`, `map_flip`, `seed`, ...
+      **options: those of `Task.of`, unless `task` is a `Task`.
 
     Raises:
       InputError: if an option can't be met, or `out` can't be written or holds another run.
@@ -67,7 +80,15 @@ def evaluate(
         raise InputError(f"expected the name of an agent or its class, found an object of {type(agent).__name__}")
     name = agent if isinstance(agent, str) else f"{agent.__module__}:{agent.__qualname__}"
     agent_class = load_agent_class(name) if isinstance(agent, str) else checked_agent_class(name, agent)
-    chosen = EvalOptions.of(name, **options)
+    if isinstance(task, Task) and options:
+        raise InputError(f"expected no options beside a Task, found {next(iter(options))}")
+    chosen = EvalOptions(
+        name,
+        task if isinstance(task, Task) else evaluation_task(task, **options),
+        episodes_per_distance=episodes_per_distance,
+        checkpoint=checkpoint,  # type: ignore[arg-type]  # a path becomes text
+        seed=seed,
+    )
     if (run.workers or run.cluster) and (name.startswith("__main__:") or load_agent_class(name) is not agent_class):
         raise InputError(f"expected a class that other processes can import by its name, found {name}")
     return run_evaluation(chosen, out, run, progress, agent_class)
@@ -126,15 +147,14 @@ def run_plan(
             store.keep_oracle_steps([each.steps if each.success else None for each in store.records])
         overall, by_distance = metrics.summarize(store.records, store.oracle_steps)
         summary = Summary(
-            **plan.labels,
-            **plan.conditions,
+            agent=plan.options.agent,
+            task=plan.task,
             privileged=plan.agent_class.needs_truth,
             untrained_scale=plan.untrained_scale,
             suite=suite,
             part=part,
-            benchmark=plan.options.benchmark,
+            benchmark=plan.task.benchmark,
             episodes=num_trials,
-            perturbation=plan.levels,
             provenance=plan.provenance,
             overall=overall,
             by_distance=by_distance,

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 
 from mazebench import stopping
-from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.eval_options import NUM_ENVS
 from mazebench.results.metrics import Steps
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.tasks.trials import Trial
 
 ORACLE = "oracle"
 
 
-def measure_oracle_steps(task: TaskSpec, trials: Sequence[Trial], num_envs: int = NUM_ENVS) -> Steps:
+def measure_oracle_steps(task: Task, trials: Sequence[Trial], num_envs: int = NUM_ENVS) -> Steps:
     """Returns the oracle's steps in each trial; None where it does not reach the goal."""
     # The oracle observes nothing; tracks have the lidar all the same.
-    task = dataclasses.replace(task, sensors=tuple(name for name in task.sensors if name == "lidar"))
-    interface = Interface(task.task, task.size, task.context_size, cell_size=task.cell_size)
-    agent = load_agent_class(ORACLE).build(interface)
+    task = task.replace(sensors=tuple(name for name in task.sensors if name == "lidar"))
+    agent = load_agent_class(ORACLE).build(task.interface)
     steps: list[int | None] = [None] * len(trials)
     for outcomes in run_trials(agent, task, list(enumerate(trials)), num_envs, needs_truth=True):
         stopping.check()

@@ -8,7 +8,7 @@ import hashlib
 import pathlib
 from typing import Any
 
-from mazebench.agent import Agent, Interface
+from mazebench.agent import Agent
 from mazebench.agent_loading import load_agent_class
 from mazebench.errors import InputError, RunError, UnplayableError, held_remarks
 from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of, only_context_size
@@ -17,11 +17,8 @@ from mazebench.evaluation.provenance import provenance
 from mazebench.results.frozen_oracle import frozen_oracle_steps
 from mazebench.results.metrics import Steps
 from mazebench.results.records import Provenance
-from mazebench.tasks.build import build_task
 from mazebench.tasks.context import default_context_size
-from mazebench.tasks.perturbations import perturbation_levels
-from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.task_options import EVAL_DISTANCES, HIDEABLE
+from mazebench.tasks.task import Task, check_shown
 from mazebench.tasks.trials import Trial, select_trials
 from mazebench.world.mjcf import maze_spec
 
@@ -34,28 +31,26 @@ _IDENTIFYING = (
     "agent_code_sha256",
     "checkpoint_sha256",
 )
-_PATHS = ("mazes", "checkpoint")  # options that may change, for the hashes tell what they lead to
-# Options of which records and summaries tell where a user sets them.
-_SENSES = ("lidar_noise", "odometry_noise")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Plan:
     """Everything that one evaluation will run. A pickled plan is its options; unpickling makes the plan anew."""
 
-    options: EvalOptions  # with the very file of the checkpoint, and the sensors that the agent needs
+    options: EvalOptions  # with the very file of the checkpoint, and the task as the agent plays it
     agent_class: type[Agent]
-    task: TaskSpec
     trials: tuple[Trial, ...]  # in the protocol's order, by which they are numbered
-    labels: dict[str, Any]  # agent, task, size and split: what every record begins with
-    conditions: dict[str, Any]  # what the agent is told less or more than others, as the summary says
-    levels: dict[str, float]  # of the perturbations: what every record ends with
     identity: dict[str, Any]  # the content of config.json; only runs of equal identity are resumed
     provenance: Provenance  # where the result will come from
     oracle_steps: Steps | None  # the oracle's steps in each trial, if those are frozen
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _make_plan_once, (self.options,)
+
+    @property
+    def task(self) -> Task:
+        """The task as the agent plays it: with the sensors that it needs, and maps of the size that it asks for."""
+        return self.options.task
 
     @property
     def untrained_scale(self) -> bool:
@@ -73,7 +68,7 @@ class Plan:
                 f"{agent} learned on maps of {self._learned_scale:g} m a cell and may fail here: its map of {size} "
                 f"cells shows {_square(task.size)} cells of {task.cell_size:g} m, {self._scale:.3g} m a cell{way_out}"
             )
-        if self.options.maze_options.mazes is not None and is_coarse:
+        if task.mazes is not None and is_coarse:
             return f"{agent} is shown the {_square(task.size)} cells as a map of {size}{way_out}"
         if task.track is not None:
             try:
@@ -88,7 +83,7 @@ class Plan:
 
     @property
     def _scale(self) -> float:  # m a cell of the context
-        return self.task.mazes[0].side / self.task.context_size
+        return self.task.all_mazes[0].side / self.task.context_size
 
     @property
     def _learned_scale(self) -> float | None:
@@ -102,11 +97,6 @@ class Plan:
                 return None if size is None else size / told["context_size"]
         return None
 
-    @property
-    def interface(self) -> Interface:
-        """The environments that the agent is built for."""
-        return interface_of(self.task)
-
     def build_agent(self) -> CheckedAgent:
         """Returns a new agent for the task, held to its contract.
 
@@ -114,7 +104,7 @@ class Plan:
           InputError: if the agent can't use its checkpoint.
           UnplayableError: if the agent can't play the task.
         """
-        options, interface = self.options, self.interface
+        options, interface = self.options, self.task.interface
         checkpoint = None if options.checkpoint is None else pathlib.Path(options.checkpoint)
         only = only_context_size(options.agent, self.agent_class, interface.size)
         if only is not None and only != interface.context_size:
@@ -129,20 +119,6 @@ class Plan:
         return CheckedAgent(options.agent, agent, interface.num_actions)
 
 
-def interface_of(task: TaskSpec) -> Interface:
-    """Returns what an agent may know of the environments of a task."""
-    return Interface(
-        task.task,
-        task.size,
-        task.context_size,
-        sensors=task.sensors,
-        cell_size=task.cell_size,
-        hidden=task.hide,
-        lidar=task.lidar if "lidar" in task.sensors else None,
-        odometry_noise=max(map(task.odometry_noise_at, task.level)),
-    )
-
-
 def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> Plan:
     """Returns the plan of an evaluation; reads what is needed and writes nothing.
 
@@ -154,48 +130,27 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
       InputError: if an option can't be met.
     """
     agent_class = agent_class or load_agent_class(options.agent)
-    options = _with_sensors(_with_checkpoint(options, agent_class), agent_class)
-    choose_context_size = functools.partial(context_size_of, options.agent, agent_class)
-    task = build_task(
-        options.task, options.maze_options, default_distances=EVAL_DISTANCES, choose_context_size=choose_context_size
-    )
-    split = "custom" if options.is_own else options.maze_options.split
-    labels = {"agent": options.agent, "task": task.task, "size": task.size, "split": split}
-    if task.cell_size != 1:
-        labels["cell_size"] = task.cell_size
-    if task.track is not None:
-        labels |= {"track": task.track, "level": task.level[0]}
-    labels |= {name: value for name in _SENSES if (value := getattr(task, name)) is not None}
-    conditions: dict[str, Any] = {}
-    if task.hide:
-        conditions["hide"] = ",".join(name for name in HIDEABLE if name in task.hide)
-    if task.exact_pose:
-        conditions["exact_pose"] = True
-    frozen_split = options.maze_options.split if options.is_frozen else None
-    trials = select_trials(task, frozen_split, options.episodes_per_distance, options.seed)
-    oracle_steps = None
-    if frozen_split is not None:
-        oracle_steps = frozen_oracle_steps(options.benchmark, task.task, task.size, frozen_split, trials)
-    levels = perturbation_levels(task)
-    origin = provenance(options, agent_class, task)
+    options = _with_checkpoint(_as_played(options, agent_class), agent_class)
+    task = options.task
+    trials = select_trials(task, options.episodes_per_distance, options.seed)
+    origin = provenance(options, agent_class)
     identity = {
-        **{name: value for name, value in origin.options.model_dump().items() if name not in _PATHS},
-        **labels,
+        "agent": options.agent,
+        **task.to_json(),
+        "mazes": None if task.mazes is None else "own",  # which the hash tells apart
+        "episodes_per_distance": options.episodes_per_distance,
+        "seed": options.seed,
         **{name: getattr(origin, name) for name in _IDENTIFYING},
         "mujoco": origin.packages.get("mujoco"),
-        "world_sha256": hashlib.sha256(maze_spec(task.mazes[0]).to_xml().encode("utf-8")).hexdigest(),
+        "world_sha256": hashlib.sha256(maze_spec(task.all_mazes[0]).to_xml().encode("utf-8")).hexdigest(),
     }
     return Plan(
         options=options,
         agent_class=agent_class,
-        task=task,
         trials=tuple(trials),
-        labels=labels,
-        conditions=conditions,
-        levels=levels,
         identity=identity,
         provenance=origin,
-        oracle_steps=oracle_steps,
+        oracle_steps=frozen_oracle_steps(task, trials),
     )
 
 
@@ -210,12 +165,15 @@ def _make_plan_once(options: EvalOptions) -> Plan:
         return make_plan(options)
 
 
-def _with_sensors(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:
-    """Returns `options` with the sensors that the agent needs."""
-    observed = options.task.observed_sensors
-    missing = tuple(name for name in agent_class.needs_sensors if name not in observed)
-    sensors = (*options.task.sensors, *missing)
-    return dataclasses.replace(options, task=dataclasses.replace(options.task, sensors=sensors))
+def _as_played(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:
+    """Returns `options` with the sensors that the agent needs and, off the tracks, maps of the size it asks for."""
+    task = options.task
+    missing = tuple(name for name in agent_class.needs_sensors if name not in task.sensors)
+    task = task.replace(sensors=(*task.sensors, *missing))
+    if task.track is None:
+        task = task.replace(context_size=context_size_of(options.agent, agent_class, task.size))
+        check_shown(task)
+    return dataclasses.replace(options, task=task)
 
 
 def _with_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:

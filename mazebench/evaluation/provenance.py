@@ -20,12 +20,9 @@ from mazebench.constants import TASK_VERSION
 from mazebench.errors import InputError
 from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.maps.benchmark import manifest_hash
-from mazebench.options import by_name
 from mazebench.results.played import mazes_hash
 from mazebench.results.records import Provenance
 from mazebench.storage.files import open_file
-from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.task_options import Variants
 
 _PACKAGES = (
     *("mazebench-mujoco", "mujoco", "dm-control", "dm-env", "gymnasium", "numpy", "scipy"),
@@ -35,30 +32,22 @@ _PACKAGES = (
 _MAX_HEADER_BYTES = 2**18
 
 
-def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -> Provenance:
+def provenance(options: EvalOptions, agent_class: type[Agent]) -> Provenance:
     """Returns what lets someone else repeat the run; the version of a package that is not installed is None."""
     checkpoint = options.checkpoint
     if checkpoint and checkpoint == str(agent_class.default_checkpoint()):
         checkpoint = pathlib.Path(checkpoint).name  # the folder depends on the installation
     content = {
-        "benchmark": options.benchmark,
-        "benchmark_manifest_sha256": manifest_hash(options.benchmark),
+        "benchmark_manifest_sha256": manifest_hash(options.task.benchmark),
         "task_version": TASK_VERSION,
-        "context_size": task.context_size,  # which the agent chooses
+        "checkpoint": checkpoint,
         "checkpoint_sha256": file_hash(options.checkpoint),
         "checkpoint_metadata": checkpoint_metadata(options.checkpoint),
         "agent_class": f"{agent_class.__module__}:{agent_class.__qualname__}",
         "agent_package": _package_of(options.agent, agent_class),
         "agent_code_sha256": code_hash(options.agent, agent_class),
         "seed": options.seed,
-        # With the distances and the time limit that are played, of which the options may only say to choose them.
-        "options": {
-            **by_name(options),
-            **by_name(Variants()),
-            "checkpoint": checkpoint,
-            "distances": task.distances,
-            "time_limit": task.longest_time_limit,
-        },
+        "episodes_per_distance": options.episodes_per_distance,
         "command": [pathlib.Path(sys.argv[0]).name, *sys.argv[1:]],
         "python": platform.python_version(),
         "packages": {name: _version(name) for name in _PACKAGES},
@@ -68,7 +57,7 @@ def provenance(options: EvalOptions, agent_class: type[Agent], task: TaskSpec) -
             "processor": platform.machine(),
             "cores": os.cpu_count(),
         },
-        "mazes_sha256": mazes_hash(task),
+        "mazes_sha256": mazes_hash(options.task),
     }
     return Provenance.model_validate_json(json.dumps(content))  # as a reader will find it
 

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from mazebench.agent import Interface
+from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.errors import InputError, RunError, UnplayableError, remark, unknown
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.evaluation.evaluate import Progress, run_plan
@@ -22,6 +23,7 @@ from mazebench.results.reading import CONFIG, SUITE, Suite, read_suite
 from mazebench.results.records import Summary
 from mazebench.storage.files import make_folder, writing_to
 from mazebench.storage.json_files import write_json
+from mazebench.tasks.task import evaluation_task
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.track import LEVELS
 
@@ -29,34 +31,32 @@ _DEFAULT_RUN = RunOptions()
 _TABLE_DISTANCES = (2, 4, 6, 8, 10)  # those that the paper prints
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Part:
     """One evaluation of a suite."""
 
     name: str
-    changes: dict[str, Any]  # of `EvalOptions`, by name
+    task: str  # "local", "hierarchical" or a track
+    options: dict[str, Any]  # of the task, by name
+    episodes_per_distance: int = EPISODES_PER_DISTANCE
 
 
-def _hierarchical(name: str, **changes: Any) -> Part:
-    return Part(name, {"task": "hierarchical", **changes})
+def _hierarchical(name: str, **options: Any) -> Part:
+    return Part(name, "hierarchical", options)
 
 
-def _local(name: str, distances: tuple[int, ...] = _TABLE_DISTANCES, **changes: Any) -> Part:
-    return Part(name, {"task": "local", "distances": distances, **changes})
+def _local(name: str, distances: tuple[int, ...] = _TABLE_DISTANCES, episodes: int = 5, **options: Any) -> Part:
+    return Part(name, "local", {"distances": distances, **options}, episodes)
 
 
-_EACH_LEVEL = tuple(Part(f"{track}-{level}", {"track": track, "level": level}) for track in TRACKS for level in LEVELS)
-_EACH_LOST_LEVEL = tuple(part for part in _EACH_LEVEL if TRACKS[part.changes["track"]].hides_pose)
-
-
-def _with(parts: tuple[Part, ...], **changes: Any) -> tuple[Part, ...]:
-    return tuple(dataclasses.replace(part, changes=part.changes | changes) for part in parts)
+def _each_level(tracks: Iterable[str] = TRACKS, **options: Any) -> tuple[Part, ...]:
+    return tuple(Part(f"{track}-{level}", track, {"level": level, **options}) for track in tracks for level in LEVELS)
 
 
 # A map flipped with probability 0 is hierarchical-13-k5; no warp and no noise are local-13: they are not run again.
 SUITES: dict[str, tuple[Part, ...]] = {
     "paper": (
-        *(Part(f"local-{size}", {"task": "local", "size": size}) for size in SIZES),
+        *(Part(f"local-{size}", "local", {"size": size}) for size in SIZES),
         *(_hierarchical(f"hierarchical-13-k{cells}", landmark_distance=cells) for cells in range(1, 6)),
         *(_hierarchical(f"flip-{share}", map_flip=share) for share in (0.05, 0.1, 0.2, 0.3)),
         # The paper does not print the ratio of its transforms.
@@ -64,19 +64,19 @@ SUITES: dict[str, tuple[Part, ...]] = {
         *(_local(f"noise-{tenths / 10}", position_noise=tenths / 10) for tenths in range(1, 11)),
     ),
     "quick": (
-        _local("local-13", episodes_per_distance=2),
-        _local("local-21", (2, 6, 10), size=21, episodes_per_distance=1),
+        _local("local-13", episodes=2),
+        _local("local-21", (2, 6, 10), size=21, episodes=1),
         _hierarchical("hierarchical-13-k5"),
         _hierarchical("flip-0.1", map_flip=0.1),
-        _local("warp-0.1", (2, 6, 10), map_warp=0.1, episodes_per_distance=1),
-        _local("noise-0.5", (2, 6, 10), position_noise=0.5, episodes_per_distance=1),
+        _local("warp-0.1", (2, 6, 10), map_warp=0.1, episodes=1),
+        _local("noise-0.5", (2, 6, 10), position_noise=0.5, episodes=1),
     ),
-    "tracks": _EACH_LEVEL,
-    "tracks-dev": _with(_EACH_LEVEL, split=DEV),  # to choose agents by
+    "tracks": _each_level(),
+    "tracks-dev": _each_level(split=DEV),  # to choose agents by
     # What agents are measured against: without the map, without map and goal, with the true pose.
-    "tracks-no-map": _with(_EACH_LEVEL, hide=("map",)),
-    "tracks-no-goal": _with(_EACH_LEVEL, hide=("map", "goal")),
-    "tracks-true-pose": _with(_EACH_LOST_LEVEL, exact_pose=True),
+    "tracks-no-map": _each_level(hide=("map",)),
+    "tracks-no-goal": _each_level(hide=("map", "goal")),
+    "tracks-true-pose": _each_level((name for name, track in TRACKS.items() if track.hides_pose), exact_pose=True),
 }
 
 
@@ -113,10 +113,13 @@ def run_suite(
         raise unknown("suite", suite, SUITES)
     if checkpoint is not None and len(agents) > 1:
         raise InputError(f"expected one agent with --checkpoint, found {len(agents)}")
+    tasks = {part: evaluation_task(part.task, **part.options) for part in SUITES[suite]}
     plans = {
-        (folder, part.name): make_plan(EvalOptions.of(agent, checkpoint=checkpoint, seed=seed, **part.changes))
+        (folder, part.name): make_plan(
+            EvalOptions(agent, task, episodes_per_distance=part.episodes_per_distance, checkpoint=checkpoint, seed=seed)
+        )
         for agent, folder in _folders(agents).items()
-        for part in SUITES[suite]
+        for part, task in tasks.items()
     }
     plans = _playable(plans, out, suite)
     with open_pool(run) as pool:
@@ -147,7 +150,7 @@ def _playable(plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str)
     for (folder, part), plan in plans.items():
         if is_finished(out / folder / part):
             continue
-        key = folder, plan.interface
+        key = folder, plan.task.interface
         if key not in refusals:
             refusals[key] = _refusal(plan)
         if (reason := refusals[key]) is not None:
@@ -184,7 +187,7 @@ def _prepare(
             raise InputError(f"{out}: holds a run already; go on with --resume or name another folder")
         before = read_suite(out)
     folders = _folders(list(dict.fromkeys([*(before.folders if before else ()), *agents])))
-    benchmark = next(iter(plans.values())).options.benchmark  # the parts of a suite belong to one
+    benchmark = next(iter(plans.values())).task.benchmark  # the parts of a suite belong to one
     content = Suite(
         suite=suite,
         parts=tuple(part.name for part in SUITES[suite]),

@@ -88,7 +88,7 @@ def read_located(path: pathlib.Path, size: int | None, options: ReadOptions) -> 
         located = locate_floor_plan(path, options.pixel_size, options)
     else:
         maze = read_image_maze(path, size, options.walls)
-        if options.cell_size is None:
+        if not options.cell_size:
             _remark_on_thin_walls(maze)
         located = LocatedMaze(resized(maze, options.cell_size))
     if size not in (None, located.maze.size):

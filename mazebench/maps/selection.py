@@ -1,64 +1,38 @@
-"""The mazes that the options of a task name: the benchmark's, or one's own."""
+"""Mazes of one's own that are given as values, and mazes as JSON describes them."""
 
 from __future__ import annotations
 
+import dataclasses
 import pathlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
 from mazebench.errors import InputError
-from mazebench.maps.benchmark import load_mazes
-from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
 from mazebench.maps.maze import Maze, resized
-from mazebench.maps.maze_files import read_all
-from mazebench.maps.maze_options import MazeOptions, ReadOptions
+from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.readers.arrays import read_array
-
-_NUM_MAZES = 20  # of a kind, unless another number is asked for
+from mazebench.maps.text import format_maze, parse_maze
 
 # Mazes of one's own: one or several, as values or arrays, or the path of a file or of a folder.
 OwnMazes = str | pathlib.Path | Maze | np.ndarray | Iterable[Maze | np.ndarray]
 
 
-def load_mazes_of(options: MazeOptions, default_size: int = 13) -> Mazes:
-    """Returns the mazes that options name, but for those of tracks.
-
-    Args:
-      options: `size` is N, the cells on a side of the benchmark's mazes: 13 (the default), 15, 17, 19 or 21; with
-        `mazes`, a size that they must have. `split` names mazes of the benchmark. `mazes` are your own instead: a
-        `Maze`, an array as `maze_from_array` takes it, several of these of one size, or the path of a file or of a
-        folder of files. With `kinds`, `num_mazes` or `fresh`, mazes are drawn, of any N that the kinds can make: those
-        of the split "train", or others, "dev".
-      default_size: N, unless options name it.
+def own_mazes(mazes: Any, options: ReadOptions) -> tuple[Maze, ...]:
+    """Returns mazes that are given as values: a maze, an array, or several of these.
 
     Raises:
-      InputError: if there are no such mazes, or a map can't be read.
+      InputError: if something else is given, or an array is no maze.
     """
-    size = options.size
-    if options.mazes is None:
-        size = default_size if size is None else size
-        if options.fresh:
-            return FreshMazes(options.drawn_kinds, size)
-        if options.is_drawn:
-            split = "train" if options.split == "train" else "dev"
-            return draw_mazes(options.drawn_kinds, size, split, options.num_mazes or _NUM_MAZES)
-        return load_mazes(size, options.split)
-    mazes = _own_mazes(options.mazes, options)
-    for maze in mazes:
-        if size not in (None, maze.size):
-            raise InputError(f"expected mazes of size {size}, found size {maze.size}")
-    return mazes
-
-
-def _own_mazes(mazes: OwnMazes, options: ReadOptions) -> tuple[Maze, ...]:
-    if isinstance(mazes, (str, pathlib.Path)):
-        return read_all(pathlib.Path(mazes), options)
     if isinstance(mazes, Maze) or (isinstance(mazes, np.ndarray) and mazes.ndim < 3):
         return (_own_maze(mazes, "maze", options),)
     if not isinstance(mazes, Iterable):
         raise InputError(f"expected mazes as values, arrays or a path, found {type(mazes).__name__}")
-    return tuple(_own_maze(item, f"maze-{index}", options) for index, item in enumerate(mazes))
+    found = tuple(_own_maze(item, f"maze-{index}", options) for index, item in enumerate(mazes))
+    if not found:
+        raise InputError("expected at least one maze, found none")
+    return found
 
 
 def _own_maze(item: object, name: str, options: ReadOptions) -> Maze:
@@ -68,3 +42,20 @@ def _own_maze(item: object, name: str, options: ReadOptions) -> Maze:
         hint = "; wrap rows of numbers in np.array" if isinstance(item, list) else ""
         raise InputError(f"expected a Maze or an array in mazes, found {type(item).__name__}{hint}")
     return resized(item, options.cell_size)
+
+
+def described_maze(maze: Maze) -> dict[str, Any]:
+    """Returns a maze in values that JSON has."""
+    return {"name": maze.name, "rows": format_maze(maze).splitlines(), "cell_size": maze.cell_size, "kind": maze.kind}
+
+
+def maze_as_described(described: Mapping[str, Any]) -> Maze:
+    """Returns the maze that `described_maze` described.
+
+    Raises:
+      InputError: if the description is no such one, or of no legal maze.
+    """
+    if described.keys() != {"name", "rows", "cell_size", "kind"}:
+        raise InputError(f"expected a maze with name, rows, cell_size and kind, found {', '.join(map(str, described))}")
+    maze = parse_maze("\n".join(described["rows"]), described["name"])
+    return dataclasses.replace(maze, cell_size=described["cell_size"], kind=described["kind"])

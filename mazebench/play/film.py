@@ -69,7 +69,7 @@ def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[l
     number = options.seed % len(plan.trials)
     trial = plan.trials[number]
     episode = trial.episode
-    maze = plan.task.mazes[episode.maze]
+    maze = plan.task.all_mazes[episode.maze]
 
     agent = plan.build_agent()
     state = agent.initial_state(1)
@@ -116,7 +116,7 @@ class _Scene:
     def __post_init__(self) -> None:
         self._path: list[np.ndarray] = []
         names = tuple(view for view in self.views if view in CAMERAS)
-        models = models_of(self.env.task_spec.mazes, self.env.task_spec.textures)
+        models = models_of(self.env.task_spec.all_mazes, self.env.task_spec.textures)
         self._cameras = Cameras(models, names, self.pixels) if names else None
 
     def record_position(self) -> None:
@@ -157,7 +157,7 @@ class _Scene:
     def _rays(self, ranges: np.ndarray) -> np.ndarray:
         """Returns a picture of the true maze with the rays of the range sensor, some two times as large as a view."""
         simulation, episode = self.env.simulation, self.env.task.episode
-        walls = self.env.task_spec.mazes[episode.maze].walls
+        walls = self.env.task_spec.all_mazes[episode.maze].walls
         cell_pixels = self._cell_pixels(walls)
         picture = draw_grid(walls, cell_pixels, episode.start, episode.goal, self._to_cells(self._path))
         pose = np.array([*simulation.position(), simulation.yaw()])

@@ -8,7 +8,7 @@ import numpy as np
 
 from mazebench.envs.gym import MazeEnv
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.world.ray_casting import ray_ends
 
 # The actions of letters and of arrow keys, as indices in `ACTIONS`.
@@ -22,7 +22,7 @@ HELP = "w s a d  drive   q e  turn   arrows too   r  again   n  next   Esc  quit
 class Game:
     """An environment, the path driven in the current episode, and the number of episodes and of goals reached."""
 
-    def __init__(self, task_spec: TaskSpec, seed: int):
+    def __init__(self, task_spec: Task, seed: int):
         """Begins the first episode of `seed`."""
         self.task_spec = task_spec
         self.env = MazeEnv(task_spec, seed)
@@ -71,7 +71,7 @@ class Game:
     def title(self) -> str:
         """Returns a line that describes the episode."""
         task = self.env.task
-        maze, episode = self.task_spec.mazes[task.episode.maze], task.episode
+        maze, episode = self.task_spec.all_mazes[task.episode.maze], task.episode
         distance = maze.distance(episode.start, episode.goal)
         scale = "" if maze.cell_size == 1 else f" of {maze.cell_size:g} m"
         return f"maze {maze.name}, {self.task_spec.task}: the goal is {distance} cells{scale} away"

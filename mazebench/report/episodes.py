@@ -12,21 +12,19 @@ import numpy as np
 import pandas as pd
 
 from mazebench.errors import InputError, remark, unknown
-from mazebench.report.settings import CUSTOM, Setting, make_setting
 from mazebench.results.metrics import ON_TIME_METRICS, by_fact, scores
-from mazebench.results.played import Shown, shown_of, task_of
+from mazebench.results.played import Shown, check_mazes, shown_of
 from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, Result, load_result
 from mazebench.results.records import Summary
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, load_trajectories
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import CUSTOM, Task
 
 # What `ReportedResult.episodes` says of each episode: fields of its record. Facts of a track are further columns.
 _OF_RECORDS = [
     *("maze", "start", "goal", "distance", "success", "steps", "path_length", "shortest_path", "spl", "spl_grid"),
     "seed",
 ]
-_OF_SETTING = ("task", "size", "split", "landmark_distance", "track", "level")
 # Where well-known agents stand among others.
 _AGENT_ORDER = ("oracle", "navigator", "mmn", "mah", "mah-paper", "dqn", "planner-closed-loop", "planner", "random")
 
@@ -38,10 +36,10 @@ class ReportedResult:
     folder: pathlib.Path
     summary: Summary
     label: str  # the agent's name in the report, with more where the name alone is ambiguous
-    setting: Setting
+    setting: Task  # of which results are compared, see `Task.setting`
     episodes: pd.DataFrame  # a row for each episode in protocol order; the metrics are columns
     facts: tuple[str, ...]  # columns of bools: what a track says of episodes, as "blocked" and "not blocked"
-    task: TaskSpec | None  # None if its mazes are gone
+    task: Task | None  # None if its mazes are gone
     trajectories: list[Trajectory] | None  # None if none were recorded, or the task is not known
 
     @property
@@ -57,7 +55,7 @@ class ReportedResult:
     @property
     def seed(self) -> int:
         """The seed of the run."""
-        return self.summary.provenance.options.seed
+        return self.summary.provenance.seed
 
     @property
     def run(self) -> str:
@@ -82,7 +80,7 @@ class ReportedResult:
 
     def walls(self, maze: str) -> np.ndarray | None:
         """Returns `[N, N]` bool, a maze; None if the task is not known."""
-        return self.task.mazes[self.mazes[maze]].walls if self.task else None
+        return self.task.all_mazes[self.mazes[maze]].walls if self.task else None
 
 
 def read_results(paths: Iterable[pathlib.Path], names: Sequence[tuple[str, str]] = ()) -> list[ReportedResult]:
@@ -131,7 +129,12 @@ def join_episodes(results: Sequence[ReportedResult]) -> pd.DataFrame:
                 is_untrained=result.summary.untrained_scale,
                 setting=pd.Categorical([result.setting] * len(result.episodes), settings, ordered=True),
                 is_exact=result.setting.is_exact,
-                **{name: getattr(result.setting, name) for name in _OF_SETTING},
+                task=result.setting.task,
+                size=result.setting.size,
+                split=result.setting.split_in_results,
+                landmark_distance=result.setting.landmark_distance if result.setting.task == "hierarchical" else 0,
+                track=result.setting.track or "",
+                level=result.setting.level[0] if result.setting.track else 0,
             )
             for result in results
         ],
@@ -149,7 +152,7 @@ def facts_of(episodes: pd.DataFrame) -> list[str]:
     return list(dict.fromkeys(fact for result in episodes.result.unique() for fact in result.facts))
 
 
-def settings_of(episodes: pd.DataFrame) -> list[Setting]:
+def settings_of(episodes: pd.DataFrame) -> list[Task]:
     """Returns the settings of which there are episodes, sorted."""
     return sorted(episodes.setting.unique())
 
@@ -197,17 +200,18 @@ def _rank(label: str) -> tuple[int, str]:
 
 def _read_result(folder: pathlib.Path) -> ReportedResult:
     result = load_result(folder)
-    summary, task = result.summary, None
+    summary = result.summary
+    task: Task | None = summary.task
     try:
-        task = task_of(summary)
+        check_mazes(summary)
     except InputError as error:
-        if summary.split != CUSTOM:
+        if summary.task.split_in_results != CUSTOM:
             raise InputError(f"{folder}: {error}") from error
+        task = None
         remark(f"{folder}: {error}; reported without mazes and paths")
     episodes, facts = _to_table(result)
     trajectories = _read_trajectories(folder, episodes) if task else None
-    setting = make_setting(summary, result.records)
-    return ReportedResult(folder, summary, summary.agent, setting, episodes, facts, task, trajectories)
+    return ReportedResult(folder, summary, summary.agent, summary.task.setting, episodes, facts, task, trajectories)
 
 
 def _to_table(result: Result) -> tuple[pd.DataFrame, tuple[str, ...]]:
@@ -274,7 +278,7 @@ def _label(results: list[ReportedResult]) -> list[ReportedResult]:
 
 def _drop_repeats(results: list[ReportedResult]) -> list[ReportedResult]:
     """Returns one result for each agent and setting: the one with the most episodes, the first of equals."""
-    kept: dict[tuple[str, Setting], ReportedResult] = {}
+    kept: dict[tuple[str, Task], ReportedResult] = {}
     for result in results:
         other = kept.setdefault((result.label, result.setting), result)
         if other is result:

@@ -18,9 +18,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
 from mazebench.report.episodes import at_common_distances
-from mazebench.report.settings import level_help, level_name, short_name
 from mazebench.report.table import METRICS, UNTRAINED_NOTE, Table
-from mazebench.report.tables import note_on_distances, perturbed_groups
+from mazebench.report.tables import level_help, level_name, note_on_distances, perturbed_groups, perturbed_name
 from mazebench.results.intervals import mean_interval
 from mazebench.results.metrics import ON_TIME_METRICS
 from mazebench.storage.files import open_whole
@@ -121,7 +120,7 @@ def draw_distributions(episodes: pd.DataFrame) -> Iterator[Drawn]:
                 _set_ticks(axes, {index: f"{level:g}" for index, level in enumerate(levels)})
                 axes.set(xlabel=level_name(perturbation), ylabel="SPL", xlim=(-0.6, len(levels) - 0.4))
                 axes.set_ylim(-0.05, 1.05)
-        yield Drawn(f"violins-{short_name(perturbation)}-{base.place}", title, " ".join(note.split()), figure)
+        yield Drawn(f"violins-{perturbed_name(perturbation, base)}", title, " ".join(note.split()), figure)
 
 
 def draw_panels(title: str, panels: Sequence[Panel], labels: Sequence[str], height: float = 2.2) -> Figure:

@@ -139,21 +139,22 @@ def _make_entry(folder: pathlib.Path) -> Entry:
 def _read_episodes(result: Result) -> pd.DataFrame:
     """Returns the `part`, `maze`, `success` and `on_time` of all frozen episodes of a part; refuses other episodes."""
     summary, records = result.summary, result.records
-    part = f"{summary.track or summary.task} {summary.level or ''}".strip()
-    if part not in PARTS or summary.split != "eval" or summary.senses:
-        found = " ".join([summary.split, part, *summary.senses])
+    task = summary.task
+    part, split = task.title, task.split_in_results
+    if part not in PARTS or split != "eval" or task.noise_in_words:
+        found = " ".join([split, part, *task.noise_in_words])
         raise InputError(f"{result.folder}: expected eval episodes of a track, with its senses, found {found}")
     if summary.provenance.benchmark_manifest_sha256 != manifest_hash(summary.benchmark):
         raise InputError(f"{result.folder}: expected results of the installed benchmark, found those of another one")
     if summary.provenance.agent_code_sha256 is None:
         raise InputError(f"{result.folder}: expected the hash of the agent's code, found none; evaluate it again")
-    mazes, trials = load_kind_mazes("eval"), frozen_trials("local", summary.size, summary.benchmark, "eval")
+    mazes, trials = load_kind_mazes("eval"), frozen_trials("local", task.size, task.benchmark, "eval")
     episodes = [trial.episode for trial in trials]
     frozen = [(mazes[episode.maze].name, episode.start, episode.goal, episode.seed) for episode in episodes]
     if [(record.maze, record.start, record.goal, record.seed) for record in records] != frozen:
         raise InputError(f"{result.folder}: expected the {len(frozen)} frozen episodes, found others")
 
-    steps = frozen_oracle_steps(summary.benchmark, "local", summary.size, "eval", trials)
+    steps = frozen_oracle_steps(task, trials)
     assert steps is not None, "the oracle's steps are frozen with the episodes"
     success, on_time = column(records, "success"), is_on_time(records, steps, ON_TIME[0])
     return pd.DataFrame({"part": part, "maze": column(records, "maze"), "success": success, "on_time": on_time})

@@ -24,12 +24,12 @@ from mazebench.maps import colors
 from mazebench.maps.maze import Cell
 from mazebench.report.episodes import ReportedResult
 from mazebench.report.figures import Drawn, to_svg
-from mazebench.report.settings import Setting
 from mazebench.report.table import METRICS, Table
 from mazebench.report.trajectory_figures import CELL_COLORS, TIME_COLORS
 from mazebench.results.paper import citation, reference
 from mazebench.results.played import Shown
 from mazebench.results.trajectories import Trajectory
+from mazebench.tasks.task import Task
 from mazebench.world.mjcf import BODY_RADIUS
 from mazebench.world.ray_casting import NUM_RAYS
 
@@ -197,7 +197,7 @@ def _outcomes(result: ReportedResult) -> dict[str, Any]:
 
 def _shown(result: ReportedResult) -> list[Shown]:
     """Returns what was shown in the episodes of a result with paths or perturbations; nothing for others."""
-    return result.shown if result.trajectories or result.setting.perturbations else []
+    return result.shown if result.trajectories or result.setting.active_perturbations else []
 
 
 def lay_on_first_pose(trajectory: Trajectory) -> np.ndarray:
@@ -236,7 +236,7 @@ def _mazes(results: Sequence[ReportedResult]) -> tuple[list[dict[str, Any]], lis
         setting = result.setting
         here = []
         for name in result.episodes.maze.unique():
-            key = (setting.split, setting.mazes, setting.size, name)
+            key = (setting.split_in_results, setting.mazes, setting.kinds, setting.num_mazes, setting.size, name)
             if key not in index:
                 index[key] = len(mazes)
                 walls = result.walls(name)
@@ -246,10 +246,11 @@ def _mazes(results: Sequence[ReportedResult]) -> tuple[list[dict[str, Any]], lis
     return mazes, places
 
 
-def _names(setting: Setting) -> dict[str, Any]:
+def _names(setting: Task) -> dict[str, Any]:
     """Returns what the explorer calls a setting: the levels of a track share a name."""
-    of_split = "" if setting.split == "eval" else f", {setting.split} mazes"
-    return {"name": f"track {setting.track}{of_split}" if setting.track else str(setting), "level": setting.level}
+    split, level = setting.split_in_results, setting.level[0] if setting.track else 0
+    of_split = "" if split == "eval" else f", {split} mazes"
+    return {"name": f"track {setting.track}{of_split}" if setting.track else str(setting), "level": level}
 
 
 def _describe(result: ReportedResult) -> dict[str, Any]:

@@ -10,13 +10,15 @@ from typing import Any
 
 import pandas as pd
 
+from mazebench.options import fields_of
 from mazebench.report.episodes import at_common_distances, common_distances, facts_of, settings_of
-from mazebench.report.settings import DEFAULT_LANDMARK_DISTANCE, Setting, level_help, level_name, short_name
 from mazebench.report.table import METRICS, UNTRAINED_NOTE, Table, make_values
 from mazebench.results.intervals import Estimate, mean_interval, pool_runs
 from mazebench.results.paper import printed
+from mazebench.tasks.task import CUSTOM, Task
 from mazebench.tasks.tracks import TRACKS
 
+DEFAULT_LANDMARK_DISTANCE = 5  # cells; the paper's choice wherever it varies something else
 Rows = dict[str, pd.DataFrame]  # named groups of the episodes of all agents
 
 _DISTANCES_NOTE = (
@@ -88,9 +90,11 @@ def measure(episodes: pd.DataFrame) -> dict[str, Estimate]:
 
 def maze_sets(episodes: pd.DataFrame) -> Iterator[tuple[pd.DataFrame, str, str]]:
     """Yields the episodes of each set of mazes, a prefix for names of files, and a suffix for titles; eval first."""
-    sets: dict[tuple[str, tuple[str, ...], tuple[str, ...]], list[Setting]] = {}
-    for setting in settings_of(episodes):
-        sets.setdefault((setting.split, setting.mazes, setting.own), []).append(setting)
+    sets: dict[tuple[str, tuple[str, ...], tuple[str, ...]], list[Task]] = {}
+    for setting, group in episodes.groupby("setting", observed=True):
+        split = setting.split_in_results
+        names = tuple(sorted(group.maze.unique())) if split == CUSTOM else ()
+        sets.setdefault((split, names, setting.own_in_words), []).append(setting)
     num_custom = 0
     for split, mazes, own in sorted(sets, key=lambda key: (("eval", "dev", "train", "custom").index(key[0]), *key[1:])):
         prefix, suffix = "", ""
@@ -107,21 +111,40 @@ def maze_sets(episodes: pd.DataFrame) -> Iterator[tuple[pd.DataFrame, str, str]]
         yield episodes[episodes.setting.isin(sets[split, mazes, own])], prefix, suffix
 
 
-def perturbed_groups(episodes: pd.DataFrame) -> Iterator[tuple[str, Setting, pd.DataFrame]]:
+def perturbed_groups(episodes: pd.DataFrame) -> Iterator[tuple[str, Task, pd.DataFrame]]:
     """Yields each perturbation, a setting without it, and the episodes of that setting at all levels.
 
     The column `strength` has the level of the perturbation. Only settings without other perturbations count, and only
     agents that have results with the perturbation.
     """
     settings = settings_of(episodes)
-    alone = [setting for setting in settings if len(setting.perturbations) == 1]
-    for perturbation, base in sorted({(name, each.without(name)) for each in alone for name, _ in each.perturbations}):
-        levels = {
-            setting: setting.level_of(perturbation) for setting in settings if setting.without(perturbation) == base
-        }
+    pairs = [(name, each) for each in settings for name, _ in each.active_perturbations]
+    alone = {(name, _without(each, name)) for name, each in pairs if len(each.active_perturbations) == 1}
+    for perturbation, base in sorted(alone):
+        levels = {each: each.perturbations[perturbation] for each in settings if _without(each, perturbation) == base}
         group = episodes[episodes.setting.isin(levels)]
         group = group.assign(strength=group.setting.astype(object).map(levels))
         yield perturbation, base, group[group.label.isin(group.label[group.strength > 0])]
+
+
+def _without(setting: Task, perturbation: str) -> Task:
+    return dataclasses.replace(setting, **{perturbation: 0.0})  # type: ignore[arg-type]
+
+
+def level_name(perturbation: str) -> str:
+    """Returns the name of a perturbation in words."""
+    return perturbation.replace("_", " ")
+
+
+def level_help(perturbation: str) -> str:
+    """Returns in a sentence what a level means."""
+    return fields_of(Task)[perturbation].help
+
+
+def perturbed_name(perturbation: str, base: Task) -> str:
+    """Returns the name of files on the levels of a perturbation in a setting that is else `base`."""
+    is_usual = base.landmark_distance == DEFAULT_LANDMARK_DISTANCE
+    return f"{perturbation.rpartition('_')[2]}-{base.name}" + ("" if is_usual else f"-k{base.landmark_distance}")
 
 
 def format_distances(distances: Sequence[int]) -> str:
@@ -166,12 +189,12 @@ def _tables_of(episodes: pd.DataFrame) -> Iterator[Table]:
         rows = _rows_by(group, "strength", "{:g}".format)
         name, note = level_name(perturbation), f"{level_help(perturbation)} {note_on_distances(group)}".strip()
         title = f"{name.capitalize()}: {base}"
-        yield make_table(f"{short_name(perturbation)}-{base.place}", title, note, name, rows, _positions(rows))
+        yield make_table(perturbed_name(perturbation, base), title, note, name, rows, _positions(rows))
         # The paper prints local navigation on warped maps by distance.
         if (perturbation, base.task) == ("map_warp", "local"):
             for level, warped in group[group.strength > 0].groupby("strength"):
                 title = f"Local navigation, {base.size} × {base.size}, on maps warped by up to {level:g} of their side"
-                yield _by_distance(f"warp-{level:g}-{base.place}", title, warped, is_warped=True)
+                yield _by_distance(f"warp-{level:g}-{base.name}", title, warped, is_warped=True)
     yield from _track_tables(episodes)
 
 
@@ -186,7 +209,7 @@ def _by_distance(name: str, title: str, episodes: pd.DataFrame, is_warped: bool 
 def _is_printed(episodes: pd.DataFrame) -> bool:
     """Returns whether the paper's values can stand beside those of episodes of one setting."""
     setting = episodes.setting.iloc[0]
-    return setting.split == "eval" and not setting.own
+    return setting.split_in_results == "eval" and not setting.own_in_words
 
 
 def _track_tables(episodes: pd.DataFrame) -> Iterator[Table]:
@@ -216,11 +239,12 @@ def _overview(episodes: pd.DataFrame) -> Table:
     return make_table("all", "All results", _DISTANCES_NOTE, "setting", rows)
 
 
-def _setting_in_words(setting: Setting, episodes: pd.DataFrame, has_namesake: bool) -> str:
+def _setting_in_words(setting: Task, episodes: pd.DataFrame, has_namesake: bool) -> str:
     """Returns the setting with what tells it from others and which episodes count."""
     parts = [str(setting)]
-    if has_namesake and setting.mazes:
-        parts.append(setting.mazes[0] + (f" and {len(setting.mazes) - 1} more" if len(setting.mazes) > 1 else ""))
+    if has_namesake and setting.split_in_results == CUSTOM:
+        first, *others = sorted(episodes.maze.unique())
+        parts.append(first + (f" and {len(others)} more" if others else ""))
     common = common_distances(episodes)
     if common and episodes.distance.nunique() > len(common):
         parts.append(f"distances {format_distances(common)}")
@@ -250,16 +274,17 @@ def _pooled_tables(episodes: pd.DataFrame) -> Iterator[Table]:
             row_name, rows = "distance", _rows_by_distance(runs)
         lines = [line for row, own in rows.items() for metric in METRICS for line in _pool(own, metric, row)]
         if lines:
-            parts = [what, *(f"{level_name(name)} {level:g}" for name, level in kind.perturbations)]
+            parts = [what, *(f"{level_name(name)} {level:g}" for name, level in kind.active_perturbations)]
             title = ", ".join([*parts, "pooled over training runs"])
             values = make_values(lines, rows, dict.fromkeys(line["column"] for line in lines))
             yield Table(f"pooled-{kind.track or kind.name}", title, _POOLED_NOTE, row_name, values)
 
 
-def _kind(setting: Setting) -> Setting:
+def _kind(setting: Task) -> Task:
     """Returns what all rows of a pooled table have in common."""
-    kind = dataclasses.replace(setting, landmark_distance=0)
-    return dataclasses.replace(kind, size=0, level=0) if kind.track else kind
+    if setting.track is not None:
+        return dataclasses.replace(setting, size=0, level=(1,))
+    return dataclasses.replace(setting, landmark_distance=DEFAULT_LANDMARK_DISTANCE)
 
 
 def _pool(episodes: pd.DataFrame, metric: str, row: str) -> Iterator[dict[str, Any]]:

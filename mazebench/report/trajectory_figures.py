@@ -19,8 +19,8 @@ from mazebench.maps import colors
 from mazebench.maps.maze import cell_to_point
 from mazebench.report.episodes import ReportedResult, settings_of
 from mazebench.report.figures import WIDTH, Drawn
-from mazebench.report.settings import Setting
 from mazebench.report.tables import maze_sets, perturbed_groups
+from mazebench.tasks.task import Task
 from mazebench.tasks.tracks import TRACKS
 
 # The page has the same: floor, wall, wall that only the map shows, wall that the map does not show, landmark.
@@ -59,7 +59,7 @@ def draw_trajectories(episodes: pd.DataFrame) -> Iterator[Drawn]:
                 yield Drawn(f"trajectories-{prefix}{setting.name}", title, _NOTE, figure)
 
 
-def _pick_settings(episodes: pd.DataFrame) -> Iterator[Setting]:
+def _pick_settings(episodes: pd.DataFrame) -> Iterator[Task]:
     settings = settings_of(episodes)
     for task in ("hierarchical", "local"):
         plain = [setting for setting in settings if setting.task == task and setting.is_exact]

@@ -20,8 +20,8 @@ from mazebench.results.metrics import by_distance, scores
 from mazebench.results.reading import Result, find_parts, load_result
 from mazebench.results.records import Record, Summary, column
 
-# Fields of summaries, of their provenance and of records that must be equal.
-_SAME_TASK = ("benchmark", "task", "size", "cell_size", "split")
+# What must be equal, of tasks, of their provenance and of records: what was played, whatever was shown.
+_SAME_TASK = ("benchmark", "task", "size", "cell_size", "split_in_results")
 _SAME_PROVENANCE = ("benchmark_manifest_sha256", "mazes_sha256")
 _SAME_EPISODE = ("maze", "start", "goal", "seed", "distance")
 
@@ -81,12 +81,13 @@ def compare_folders(a: pathlib.Path, b: pathlib.Path) -> Comparison:
     ]
     pairs = {name: (load_result(a_parts[name]), load_result(b_parts[name])) for name in common}
     ours, theirs = (result.summary for result in pairs[common[0]])
+    task = ours.task
     title = f"A is {_who(ours, common)} in {a}, B is {_who(theirs, common)} in {b}"
-    title += f"; {ours.task}, {ours.split} mazes {ours.size} x {ours.size}" if common == [""] else ""
+    title += f"; {task.task}, {task.split_in_results} mazes {task.size} x {task.size}" if common == [""] else ""
     return Comparison(
         title=title,
         parts={name: compare_results(*pair) for name, pair in pairs.items()},
-        has_distances=ours.task == "local",
+        has_distances=task.task == "local",
         notes=notes,
     )
 
@@ -159,9 +160,10 @@ def _named(parts: dict[str, pathlib.Path]) -> str:
 
 def _who(summary: Summary, parts: list[str]) -> str:
     """Returns the agent's row and, for a single evaluation, its track and level or its perturbations."""
-    wrong = [*(f"{key} {value}" for key, value in summary.perturbation.items() if value), *summary.senses]
-    if summary.track is not None:
-        wrong.insert(0, f"track {summary.track}, level {summary.level}")
+    task = summary.task
+    wrong = [*(f"{key} {value}" for key, value in task.perturbations.items() if value), *task.noise_in_words]
+    if task.track is not None:
+        wrong.insert(0, f"track {task.track}, level {task.level[0]}")
     return summary.row + (f" ({', '.join(wrong)})" if wrong and parts == [""] else "")
 
 
@@ -173,12 +175,13 @@ def check_pairs(a: Result, b: Result) -> None:
     """
     for key in (*_SAME_TASK, *_SAME_PROVENANCE):
         ours, theirs = (
-            getattr(result.summary.provenance if key in _SAME_PROVENANCE else result.summary, key) for result in (a, b)
+            getattr(result.summary.provenance if key in _SAME_PROVENANCE else result.summary.task, key)
+            for result in (a, b)
         )
         if ours != theirs:
             raise InputError(
-                f"expected results of one {key} to compare, found {str(ours)[:80]} in {a.folder} "
-                f"and {str(theirs)[:80]} in {b.folder}"
+                f"expected results of one {key.removesuffix('_in_results')} to compare, "
+                f"found {str(ours)[:80]} in {a.folder} and {str(theirs)[:80]} in {b.folder}"
             )
     fault = _other_episode(a.records, b.records)
     if fault:

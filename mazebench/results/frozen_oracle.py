@@ -11,15 +11,18 @@ from importlib import resources
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import manifest, read_asset
 from mazebench.results.metrics import Steps
+from mazebench.tasks.task import Task
 from mazebench.tasks.trials import Trial, frozen_trials
 
 # Of steps.json, which holds those of the paper's protocol. The manifest of the tracks names files of its own.
 _SHA256 = "de3d76f36e3ee498c6d15bea88dcf52d2c5f88d3df90d956691048694976f274"
 
 
-def frozen_oracle_steps(benchmark: str, task: str, size: int, split: str, trials: Sequence[Trial]) -> Steps | None:
+def frozen_oracle_steps(task: Task, trials: Sequence[Trial]) -> Steps | None:
     """Returns the oracle's steps in some trials; None unless all of them are frozen, and the oracle's steps, too."""
-    steps = _steps_by_seed(benchmark, task, size, split)
+    if task.frozen_split is None:
+        return None
+    steps = _steps_by_seed(task.benchmark, task.task, task.size, task.frozen_split)
     seeds = [trial.episode.seed for trial in trials]
     return tuple(steps[seed] for seed in seeds) if all(seed in steps for seed in seeds) else None
 

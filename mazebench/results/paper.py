@@ -36,6 +36,7 @@ def printed_mmn(summary: Summary) -> dict[int, float]:
 
     That is where it is of unseen mazes, of no track, nothing was perturbed and the senses were not noisy.
     """
-    if summary.split != "eval" or summary.track or any(summary.perturbation.values()) or summary.senses:
+    task = summary.task
+    if task.split_in_results != "eval" or not task.is_exact or task.noise_in_words:
         return {}
-    return printed(summary.task, summary.size).get("MMN", {}).get("success_rate", {})
+    return printed(task.task, task.size).get("MMN", {}).get("success_rate", {})

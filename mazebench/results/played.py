@@ -1,4 +1,4 @@
-"""The task and the shown maps of a finished evaluation, computed from its options and seeds.
+"""The mazes and the shown maps of a finished evaluation, computed from its task and seeds.
 
 `N` is the number of cells on a side of the mazes, `M` the number of pixels on a side of the agent's maps.
 """
@@ -12,18 +12,12 @@ import numpy as np
 
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import manifest_hash
-from mazebench.options import from_names, options_of
 from mazebench.results.records import Summary
-from mazebench.tasks.build import build_task
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.route import plan_route
 from mazebench.tasks.shown_map import leg_context, show_map
-from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.task_options import EnvironmentOptions
-
-# Options that change nothing of what is shown. A summary has the chosen values, which options may not allow.
-_UNSEEN = ("distances", "time_limit")
+from mazebench.tasks.task import Task
 
 
 class Shown(NamedTuple):
@@ -40,11 +34,11 @@ class Shown(NamedTuple):
         return self.walls.dtype == bool
 
 
-def task_of(summary: Summary) -> TaskSpec:
-    """Returns the task of an evaluation, with the default distances and time limit.
+def check_mazes(summary: Summary) -> None:
+    """Checks that the mazes of an evaluation are there, as they were played.
 
     Raises:
-      InputError: if this version of the benchmark has no such task, or the mazes are gone or were changed.
+      InputError: if this version of the benchmark has others, or the mazes are gone or were changed.
     """
     provenance = summary.provenance
     installed, found = manifest_hash(summary.benchmark), provenance.benchmark_manifest_sha256 or "unknown"
@@ -52,23 +46,18 @@ def task_of(summary: Summary) -> TaskSpec:
         raise InputError(
             f"expected results of benchmark {summary.benchmark!r}, manifest {installed[:8]}, found manifest {found[:8]}"
         )
-    names = set(options_of(EnvironmentOptions)) - set(_UNSEEN)
-    told = provenance.options.model_dump() | {"context_size": provenance.context_size}
-    chosen = from_names(EnvironmentOptions, {name: value for name, value in told.items() if name in names})
-    task = build_task(chosen.task, chosen.maze_options, chosen.variants)
-    if mazes_hash(task) != provenance.mazes_sha256:
+    if mazes_hash(summary.task) != provenance.mazes_sha256:
         raise InputError("expected the mazes that were played, found others")
-    return task
 
 
-def mazes_hash(task: TaskSpec) -> str:
+def mazes_hash(task: Task) -> str:
     """Returns a SHA-256 of the mazes; 1 m, the width of the benchmark's cells, does not change it."""
     scale = "" if task.cell_size == 1 else repr(task.cell_size)
     walls = b"".join(maze.walls.tobytes() for maze in task.fixed_mazes)
     return hashlib.sha256(walls + scale.encode("ascii")).hexdigest()
 
 
-def shown_of(task: TaskSpec, episode: Episode) -> Shown:
+def shown_of(task: Task, episode: Episode) -> Shown:
     """Returns what the agent was shown in an episode."""
     shown = show_map(task, episode)
     cells = plan_route(task, episode, shown).cells[1:-1]

@@ -10,6 +10,7 @@ import numpy as np
 import pydantic
 
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE
+from mazebench.tasks.task import Task
 
 _LARGEST = 2**53  # from here on, not every whole number is a float
 
@@ -78,22 +79,13 @@ class Figures(_Stored):
         return {"success_rate": self.success_rate, "spl": self.spl, "spl_grid": self.spl_grid} | on_time
 
 
-class TaskProvenance(_Stored):
-    """The options of an evaluation, as far as readers need them."""
-
-    landmark_distance: Count
-    seed: Count = 0
-    start: Name | None = None
-    goal: Name | None = None
-
-
 class Provenance(_Stored):
-    """The provenance of a result: versions, checkpoint, options, command, machine."""
+    """The provenance of a result: versions, checkpoint, seed, command, machine."""
 
-    options: TaskProvenance
+    seed: Count = 0
+    episodes_per_distance: Count | None = None
     task_version: int | None = None
     benchmark_manifest_sha256: str | None = None
-    context_size: int = 0  # M
     mazes_sha256: str | None = None
     checkpoint_sha256: str | None = None
     agent_class: str | None = None  # as module:Class
@@ -111,21 +103,11 @@ class Summary(_Stored):
     agent: Name
     privileged: bool = False  # whether the agent was given the true maze and pose
     untrained_scale: bool = False  # whether the agent learned on maps of another scale, in metres a cell of the context
-    task: Name
-    size: Size
-    split: Name
-    cell_size: Annotated[float, pydantic.Field(gt=0, lt=_LARGEST)] | None = None  # m, where it is not 1
-    track: str | None = None
-    level: int | None = None  # of the track
-    lidar_noise: Name | None = None  # the option, where it was given: "turtlebot3", or as "0.1,0.05"
-    odometry_noise: Share | None = None  # the option, where it was given
-    hide: Name | None = None  # what the context did not show: "map", "goal" or "map,goal"
-    exact_pose: bool = False  # whether the observed pose was the true one on a track whose pose is odometry
+    task: Task  # as this agent played it
     suite: str | None = None  # of a part of a suite, with the part's name
     part: str | None = None
     benchmark: Name
     episodes: Annotated[int, pydantic.Field(ge=1, lt=_LARGEST)]
-    perturbation: dict[str, Length]  # level by name
     provenance: Provenance
     overall: Figures
     by_distance: dict[str, Figures]
@@ -139,21 +121,14 @@ class Summary(_Stored):
     @property
     def row(self) -> str:
         """The agent, and what it was told less or more than others: "navigator without map"."""
-        without = "" if self.hide is None else f" without {self.hide.replace(',', ' and ')}"
-        return self.agent + without + (" with the true pose" if self.exact_pose else "")
-
-    @property
-    def senses(self) -> tuple[str, ...]:
-        """The noise on the senses that a user set, in words."""
-        noise = {"lidar noise": self.lidar_noise, "odometry noise": self.odometry_noise}
-        return tuple(f"{name} {value}" for name, value in noise.items() if value is not None)
+        without = f" without {' and '.join(self.task.hide)}" if self.task.hide else ""
+        return self.agent + without + (" with the true pose" if self.task.exact_pose else "")
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the content of `summary.json`."""
-        optional = {"untrained_scale", "cell_size", "hide", "exact_pose", "lidar_noise", "odometry_noise"}
-        optional |= {"suite", "part", "track", "level", "by_fact"}
-        defaults = {name: field.default for name, field in Summary.model_fields.items() if name in optional}
-        return {key: value for key, value in self.model_dump().items() if key not in optional or value != defaults[key]}
+        optional = ("untrained_scale", "suite", "part", "by_fact")
+        left_out = {name for name in optional if getattr(self, name) == type(self).model_fields[name].default}
+        return {"agent": self.agent, "task": self.task.to_json(), **self.model_dump(exclude={"task", *left_out})}
 
 
 def column(records: Sequence[Record], name: str) -> np.ndarray:

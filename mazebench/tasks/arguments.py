@@ -8,7 +8,7 @@ from annotated_types import Ge
 
 from mazebench.errors import InputError
 from mazebench.options import OneOf, options
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.world.rendering import CAMERAS
 
 
@@ -23,7 +23,7 @@ class Arguments:
     num_threads: Annotated[int, Ge(0)] = 0  # of the simulation; 0 uses all cores
 
 
-def require_task_spec(task_spec: TaskSpec) -> None:
+def require_task_spec(task_spec: Task) -> None:
     """Raises `InputError` unless `task_spec` is one, which a task's name, for example, is not."""
-    if not isinstance(task_spec, TaskSpec):
-        raise InputError(f"expected a TaskSpec, as mazebench.make_spec() returns, found {type(task_spec).__name__}")
+    if not isinstance(task_spec, Task):
+        raise InputError(f"expected a Task, as mazebench.Task.of() returns, found {type(task_spec).__name__}")

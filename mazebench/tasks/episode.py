@@ -10,8 +10,8 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.maze import Cell, Maze
-from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.streams import Stream
+from mazebench.tasks.task import Task
 from mazebench.tasks.tracks import TRACKS
 
 _SEEDS = 2**31
@@ -35,22 +35,22 @@ class Episode:
         return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(int(stream),)))
 
 
-def sample_episode(spec: TaskSpec, rng: np.random.Generator) -> Episode:
+def sample_episode(spec: Task, rng: np.random.Generator) -> Episode:
     """Draws an episode of a task; of fresh mazes, in one in which the task can be played.
 
     Raises:
       InputError: if no such maze is found.
     """
-    for _ in range(_MAX_REDRAWS if isinstance(spec.mazes, FreshMazes) else 0):
+    for _ in range(_MAX_REDRAWS if isinstance(spec.all_mazes, FreshMazes) else 0):
         with contextlib.suppress(InputError):
             return _sample_episode(spec, rng)
     return _sample_episode(spec, rng)
 
 
-def _sample_episode(spec: TaskSpec, rng: np.random.Generator) -> Episode:
-    index = int(rng.integers(len(spec.mazes)))
-    maze = spec.mazes[index]
-    if spec.track is not None and isinstance(spec.mazes, FreshMazes):
+def _sample_episode(spec: Task, rng: np.random.Generator) -> Episode:
+    index = int(rng.integers(len(spec.all_mazes)))
+    maze = spec.all_mazes[index]
+    if spec.track is not None and isinstance(spec.all_mazes, FreshMazes):
         TRACKS[spec.track].require(maze, spec.level)
     start, goal = spec.ends(maze)
     if start is None or goal is None:
@@ -98,14 +98,14 @@ def sample_pair(
     raise InputError(f"{maze.name}: found no two cells {distance} cells apart; the farthest are {maze.diameter}")
 
 
-def check_episode(spec: TaskSpec, episode: Episode) -> Episode:
+def check_episode(spec: Task, episode: Episode) -> Episode:
     """Returns `episode` if it can be played in a task.
 
     Raises:
       InputError: if there is no such maze, or start or goal is not free in it.
     """
-    if not 0 <= episode.maze < len(spec.mazes):
-        raise InputError(f"expected a maze from 0 to {len(spec.mazes) - 1}, found {episode.maze}")
+    if not 0 <= episode.maze < len(spec.all_mazes):
+        raise InputError(f"expected a maze from 0 to {len(spec.all_mazes) - 1}, found {episode.maze}")
     for cell in (episode.start, episode.goal):
-        spec.mazes[episode.maze].require_free(cell)
+        spec.all_mazes[episode.maze].require_free(cell)
     return episode

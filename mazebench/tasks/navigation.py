@@ -21,7 +21,7 @@ from mazebench.tasks.perturbations.perturbation import ShownMap, StateError
 from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.sensors.sensor import Worlds
 from mazebench.tasks.shown_map import leg_context, show_map
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.world.models import models_of
 from mazebench.world.simulation import Simulation
 
@@ -72,11 +72,11 @@ class Navigation:
     _context: np.ndarray  # of the current leg
     _is_first: bool
 
-    def __init__(self, spec: TaskSpec, seed: int | None = None):
+    def __init__(self, spec: Task, seed: int | None = None):
         """`seed` is that of the stream from which episodes are drawn.
 
         Raises:
-          InputError: if `seed` is not a natural number, or `spec` not a `TaskSpec`.
+          InputError: if `seed` is not a natural number, or `spec` not a `Task`.
         """
         require_task_spec(spec)
         self.spec = spec
@@ -86,7 +86,7 @@ class Navigation:
         self._next_episode: Episode | None = None
         self._maze = 0  # index of the maze that the simulation has
         self._event = Event.NONE
-        self._models = models_of(spec.mazes)
+        self._models = models_of(spec.all_mazes)
         self._sensors = OpenSensors(spec)
 
     def choose_episode(self, seed: int | None = None, episode: Episode | None = None) -> None:
@@ -123,7 +123,7 @@ class Navigation:
 
         # The body in its maze.
         self._load_maze(simulation, episode.maze)
-        start = self.spec.mazes[episode.maze].point(episode.start)
+        start = self.spec.all_mazes[episode.maze].point(episode.start)
         simulation.place_agent(start, episode.yaw)
 
         # What the agent is shown, and where it is sent.
@@ -163,7 +163,7 @@ class Navigation:
         self._position = (x, y)
         self.steps += 1
 
-        self._event = self.route.advance(self.spec.mazes[self._maze].cell_at(x, y), self.steps)
+        self._event = self.route.advance(self.spec.all_mazes[self._maze].cell_at(x, y), self.steps)
         self._is_first = False
         if self._event is Event.LANDMARK:
             self._begin_leg(simulation)
@@ -171,7 +171,7 @@ class Navigation:
     def _begin_leg(self, simulation: Simulation) -> None:
         self._context = leg_context(self.spec, self.shown_map, self.route.start, self.route.target)
         self._is_first = True
-        simulation.place_goal(self.spec.mazes[self._maze].point(self.route.goal))
+        simulation.place_goal(self.spec.all_mazes[self._maze].point(self.route.goal))
 
     def get_observation(self, simulation: Simulation) -> dict[str, np.ndarray]:
         """Returns the observation of the present moment; noise is drawn anew with each call."""
@@ -216,7 +216,7 @@ class Navigation:
         """Returns all that the future of the task and its simulation depends on."""
         changing = {name: value for name, value in vars(self).items() if name not in _NO_STATE}
         return EnvironmentState(
-            maze=self.spec.mazes[self._maze],
+            maze=self.spec.all_mazes[self._maze],
             simulation=simulation.full_state(),
             rng=self.rng.bit_generator.state,
             task=_copied(changing),
@@ -229,7 +229,7 @@ class Navigation:
           InputError: if it is of an environment with other mazes.
         """
         index = state.task["_maze"]
-        if index >= len(self.spec.mazes) or self.spec.mazes[index] != state.maze:
+        if index >= len(self.spec.all_mazes) or self.spec.all_mazes[index] != state.maze:
             raise InputError(f"expected a state of an environment with the same mazes, found one of {state.maze.name}")
         self._load_maze(simulation, index)
         simulation.set_full_state(state.simulation)

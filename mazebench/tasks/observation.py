@@ -14,12 +14,12 @@ from mazebench.tasks.odometry import NoisyMotion
 from mazebench.tasks.perturbations.perturbation import StateError
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.sensor import Sensor, Worlds
-from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.streams import Stream
+from mazebench.tasks.task import Task
 from mazebench.world.simulation import STATE_SIZE
 
 
-def observation_specs(spec: TaskSpec) -> dict[str, specs.Array]:
+def observation_specs(spec: Task) -> dict[str, specs.Array]:
     """Returns shape, type and range of each observation by name: the state, the context, and that of each sensor."""
     size = spec.context_size
     return {
@@ -29,7 +29,7 @@ def observation_specs(spec: TaskSpec) -> dict[str, specs.Array]:
     }
 
 
-def state_errors(spec: TaskSpec, episode: Episode) -> list[StateError]:
+def state_errors(spec: Task, episode: Episode) -> list[StateError]:
     """Returns what is wrong with the states observed in `episode`; each has a random stream of its own."""
     if spec.exact_pose:
         return []
@@ -39,7 +39,7 @@ def state_errors(spec: TaskSpec, episode: Episode) -> list[StateError]:
     return [error for error in (noise, *errors) if error is not None]
 
 
-def lidar_noise(spec: TaskSpec, episode: Episode) -> np.random.Generator | None:
+def lidar_noise(spec: Task, episode: Episode) -> np.random.Generator | None:
     """Returns what draws the noise on the lidar's readings in `episode`; None if nothing is drawn."""
     return episode.stream(Stream.LIDAR_NOISE) if "lidar" in spec.sensors and spec.lidar.is_random else None
 
@@ -47,12 +47,12 @@ def lidar_noise(spec: TaskSpec, episode: Episode) -> np.random.Generator | None:
 class OpenSensors:
     """The sensors of a task, opened for one environment."""
 
-    def __init__(self, spec: TaskSpec):
+    def __init__(self, spec: Task):
         self._spec = spec
         names: dict[type[Sensor], list[str]] = {}
         for name in spec.sensors:
             names.setdefault(SENSORS[name], []).append(name)
-        self._sensors = [kind(tuple(of_kind), spec, spec.mazes) for kind, of_kind in names.items()]
+        self._sensors = [kind(tuple(of_kind), spec, spec.all_mazes) for kind, of_kind in names.items()]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Makes copies open sensors of their own."""

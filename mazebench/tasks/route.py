@@ -11,8 +11,8 @@ import numpy as np
 from mazebench.maps.maze import Cell, Maze, path_through_walls
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
-from mazebench.tasks.spec import TaskSpec
 from mazebench.tasks.streams import Stream
+from mazebench.tasks.task import Task
 from mazebench.tasks.time_limit import track_time_limit
 
 # What an agent step led to.
@@ -77,13 +77,13 @@ class Route:
         return Event.LANDMARK
 
 
-def plan_route(spec: TaskSpec, episode: Episode, shown: ShownMap) -> Route:
+def plan_route(spec: Task, episode: Episode, shown: ShownMap) -> Route:
     """Returns the route of an episode; in the hierarchical task its landmarks are planned on the shown map.
 
     Landmarks are cells of the maze, so they are planned before the change of perspective.
     """
     if spec.task == "local":
-        maze, time_limit = spec.mazes[episode.maze], spec.time_limit
+        maze, time_limit = spec.all_mazes[episode.maze], spec.time_limit
         if spec.track is not None:
             time_limit = track_time_limit(spec.track, maze.distance(episode.start, episode.goal))
         later_goals = _LaterGoals(maze, spec.distances, episode.stream(Stream.LATER_GOALS))

@@ -9,15 +9,15 @@ from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, build_context
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.imperfections import imperfections
 from mazebench.tasks.perturbations.perturbation import ShownMap
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 
 _GREY_LEVELS = np.float32(255)
 _PLANES = {"map": (GLOBAL_MAP, LOCAL_MAP), "goal": (GOAL,)}  # of the context, by what `hide` names
 
 
-def show_map(spec: TaskSpec, episode: Episode) -> ShownMap:
+def show_map(spec: Task, episode: Episode) -> ShownMap:
     """Returns the map that the agent is shown in `episode`."""
-    maze = spec.mazes[episode.maze]
+    maze = spec.all_mazes[episode.maze]
     shown = ShownMap(maze.walls, kind=maze.kind)
     for perturbation, level, rng in imperfections(spec, episode):
         shown = perturbation.show(shown, level, (episode.start, episode.goal), rng)
@@ -29,7 +29,7 @@ def is_blocked(walls: np.ndarray, shown: np.ndarray, ends: tuple[Cell, Cell]) ->
     return bool(walls[tuple(np.transpose(path_through_walls(shown, *ends)))].any())
 
 
-def leg_context(spec: TaskSpec, shown: ShownMap, start: Cell, goal: Cell) -> np.ndarray:
+def leg_context(spec: Task, shown: ShownMap, start: Cell, goal: Cell) -> np.ndarray:
     """Returns `[4, M, M]` float32: the context of the leg between two cells of the maze (see `build_context`).
 
     On a track, the values of the maps have 8 bits.

@@ -14,8 +14,7 @@ from mazebench.maps.benchmark import MAZES_PER_SPLIT, PAPER_BENCHMARK, SIZES, TR
 from mazebench.maps.geodesic import DiscPaths
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.episode import Episode, make_episode, sample_pair
-from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.task_options import EVAL_DISTANCES
+from mazebench.tasks.task import EVAL_DISTANCES, Task
 from mazebench.world.mjcf import BODY_RADIUS
 
 COLUMNS = ("maze", "start_row", "start_column", "goal_row", "goal_column", "distance", "yaw", "seed", "shortest_path")
@@ -57,21 +56,21 @@ def _trial_of_row(row: dict[str, str]) -> Trial:
     return Trial(episode, distance=int(row["distance"]), shortest_path=float(row["shortest_path"]))
 
 
-def select_trials(
-    spec: TaskSpec, frozen_split: str | None, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0
-) -> list[Trial]:
+def select_trials(spec: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
     """Returns the episodes to evaluate, by maze and then by distance.
+
+    In the benchmark's mazes its frozen episodes are taken as far as they go: of a track all of the task's distances,
+    else at most five for each maze and distance. Elsewhere episodes are drawn.
 
     Args:
       spec: the task; its distances are those of the pairs.
-      frozen_split: the split of the benchmark that its mazes are, whose frozen episodes are then taken as far as they
-        go: of a track all of those distances, else at most five for each maze and distance. None for other mazes.
       episodes_per_distance: for each maze and distance.
       seed: of what is drawn.
 
     Raises:
       InputError: if no two cells of a maze are a wanted distance apart.
     """
+    frozen_split = spec.frozen_split
     if frozen_split is not None and spec.track is not None:
         trials = frozen_trials("local", spec.size, TRACKS_BENCHMARK, frozen_split)
         return [trial for trial in trials if trial.distance in spec.distances]
@@ -88,7 +87,7 @@ def select_trials(
     return draw_trials(spec, episodes_per_distance, seed)
 
 
-def draw_trials(spec: TaskSpec, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
+def draw_trials(spec: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
     """Draws episodes of a task, by maze and then by distance; of the hierarchical task, one in each maze.
 
     Where start and goal are given, an episode draws its heading only.

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from mazebench.errors import InputError, RunError
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.training.experience import Collector, Experience
 from mazebench.training.protocol import Learner, LearningAgent
 
@@ -34,7 +34,7 @@ _logger = logging.getLogger("mazebench.training")
 class _Player:
     """Plays in its share of the environments, in a process of its own."""
 
-    def __init__(self, task_spec: TaskSpec, actor: LearningAgent, first_env: int, num_envs: int):
+    def __init__(self, task_spec: Task, actor: LearningAgent, first_env: int, num_envs: int):
         self._collector = Collector(task_spec, num_envs, seed=0, num_threads=1)
         self._actor = actor
         self._first_env = first_env
@@ -60,7 +60,7 @@ class _Player:
 class RaySource:
     """Experience of Ray actors in the order in which it arrives; an actor that dies is replaced."""
 
-    def __init__(self, task_spec: TaskSpec, learner: Learner, workers: int, address: str | None):
+    def __init__(self, task_spec: Task, learner: Learner, workers: int, address: str | None):
         """Connects to the cluster at `address`, None starts a local one; `collect` starts the actors.
 
         Raises:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mazebench.agent import Agent, Inputs, Observation
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 
 _SEEDS = 2**31
 
@@ -41,8 +41,8 @@ class Experience(NamedTuple):
 class Collector:
     """Runs an exploring agent in B environments without end, and returns what it experiences."""
 
-    def __init__(self, task_spec: TaskSpec, num_envs: int, seed: int, num_threads: int = 0):
-        self._any_maze = task_spec.mazes[0]  # all have one size and one cell size
+    def __init__(self, task_spec: Task, num_envs: int, seed: int, num_threads: int = 0):
+        self._any_maze = task_spec.all_mazes[0]  # all have one size and one cell size
         self._sensors = task_spec.sensors
         self._env = MazeVectorEnv(task_spec, num_envs, num_threads=num_threads)
         self.restart(seed)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -13,7 +12,7 @@ from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
-from mazebench.tasks.spec import TaskSpec, check_mazes
+from mazebench.tasks.task import Task, check_distances, check_maze
 from mazebench.tasks.trials import draw_trials
 
 _SEED = 20_000  # of mazes that are drawn like the benchmark's, and in none of its splits
@@ -28,26 +27,26 @@ class HeldOutEvaluation:
     Mazes of one's own have no kind, and no others are like them: there, they are new episodes in the same mazes.
     """
 
-    def __init__(self, task: TaskSpec, num_mazes: int, distances: Sequence[int] = ()):
+    def __init__(self, task: Task, num_mazes: int, distances: Sequence[int] = ()):
         """Draws the mazes; the goals are at five of the `distances`, or of those of the task's track.
 
         Raises:
           InputError: if no such mazes are found.
         """
-        mazes = task.mazes
+        mazes = task.all_mazes
         all_kinds = mazes.kinds if isinstance(mazes, FreshMazes) else (maze.kind for maze in mazes if maze.kind)
         kinds = tuple(dict.fromkeys(all_kinds))  # each once; mazes of one's own have none
         if not distances:
             distances = _DISTANCES if task.track is None and kinds else task.distances
         spread = np.linspace(min(distances), max(distances), len(_DISTANCES)).round().astype(int).tolist()
         self._distances = tuple(sorted({min(distances, key=lambda each: abs(each - wanted)) for wanted in spread}))
-        plain = dataclasses.replace(task, distances=self._distances, num_goals=1, pairs="random")
+        plain = task.replace(distances=self._distances, num_goals=1, pairs="random")
         streams = np.random.SeedSequence([_SEED, task.size]).spawn(num_mazes)
         drawn = [
             _draw_maze(plain, kinds[index % len(kinds)], f"held-out-{index}", stream)
             for index, stream in enumerate(streams if kinds else ())
         ]
-        self.task = dataclasses.replace(plain, mazes=tuple(drawn) or plain.mazes)
+        self.task = plain.in_mazes(drawn) if drawn else plain
         self.trials = list(enumerate(draw_trials(self.task, _EPISODES)))
 
     def success_rates(self, agent: Agent, progress: Callable[[int, int], None]) -> dict[int, float]:
@@ -65,13 +64,14 @@ class HeldOutEvaluation:
         return {distance: float(np.mean(successes)) for distance, successes in reached.items()}
 
 
-def _draw_maze(task: TaskSpec, kind: str, name: str, stream: np.random.SeedSequence) -> Maze:
+def _draw_maze(task: Task, kind: str, name: str, stream: np.random.SeedSequence) -> Maze:
     """Returns the first maze of `stream` in which `task` can be played."""
     rng = np.random.default_rng(stream)
     for draw in range(_MAX_DRAWS):
         maze = generate(kind, task.size, rng, name)
         try:
-            check_mazes(dataclasses.replace(task, mazes=(maze,)), (maze,))
+            check_maze(task, maze)
+            check_distances(task, maze)
         except InputError:
             if draw == _MAX_DRAWS - 1:
                 raise

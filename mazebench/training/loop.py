@@ -8,27 +8,23 @@ goes on unchanged; a run that is resumed from it begins new trajectories there, 
 from __future__ import annotations
 
 import dataclasses
-import functools
 import logging
 import math
 import pathlib
 import time
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Unpack
 
 import numpy as np
 
 from mazebench import stopping
 from mazebench.agent_loading import learning_agents, load_agent_class
-from mazebench.errors import InputError, RunError, unknown
+from mazebench.errors import InputError, RunError
 from mazebench.evaluation.checked_agent import context_size_of
 from mazebench.evaluation.provenance import code_hash
-from mazebench.maps.maze_options import DrawnOptions
-from mazebench.options import fields_of, from_names
+from mazebench.options import fields_of
 from mazebench.results.played import mazes_hash
-from mazebench.tasks.build import build_task
-from mazebench.tasks.spec import TaskSpec
-from mazebench.tasks.task_options import TaskOptions, Variants
+from mazebench.tasks.task import Task, TaskOptions, check_names, check_shown
 from mazebench.training.counters import Counters
 from mazebench.training.experience import Experience
 from mazebench.training.held_out import HeldOutEvaluation
@@ -36,7 +32,7 @@ from mazebench.training.protocol import Learner, LearningAgent
 from mazebench.training.run_folder import RunFolder, read_counters
 from mazebench.training.sources import InProcessSource, Source
 from mazebench.training.status import Progress, Timer, in_words
-from mazebench.training.train_options import TrainOptions
+from mazebench.training.train_options import FIXED, TrainOptions
 
 # As many steps take less than a minute on two cores. They are counted, not timed, so that the same run writes the same
 # lines.
@@ -51,24 +47,81 @@ class TrainingError(RunError):
 
 
 def train(
-    options: TrainOptions, out: pathlib.Path, resume: bool = False, progress: Progress = lambda status: None
+    agent: str,
+    task: str = "local",
+    *,
+    out: str | pathlib.Path,
+    minutes: float | None = None,
+    env_steps: int | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    seed: int = 0,
+    checkpoint_steps: int = 200_000,
+    checkpoint_minutes: float = 5.0,
+    eval_mazes: int = 20,
+    workers: int = 0,
+    ray_address: str | None = None,
+    resume: bool = False,
+    progress: Progress = lambda status: None,
+    **options: Unpack[TaskOptions],
 ) -> None:
-    """Trains an agent in the run folder `out`; from its last checkpoint if `resume`.
+    """Trains an agent, as `mazebench train` does.
+
+        >>> mazebench.train("dqn", out="runs/dqn-15", minutes=10, size=15)
 
     The logger "mazebench.training" says what happens. In a block of `mazebench.stopping.stoppable` that waits, a signal
-    saves a savepoint and ends the training. `progress` is called with the status after each step.
+    saves a savepoint and ends the training.
+
+    Args:
+      agent: the name of an agent that learns, or "module:Class".
+      task: "local", or the name of a track.
+      out: the run folder.
+      minutes: how long this call trains.
+      env_steps: agent steps of the run, of all calls together.
+      overrides: values of the agent's config by name.
+      seed: of everything that is drawn.
+      checkpoint_steps: agent steps between milestones.
+      checkpoint_minutes: minutes between savepoints; 0 for none.
+      eval_mazes: held-out mazes of an evaluation.
+      workers: Ray actors that collect; 0 collects in this process.
+      ray_address: of a Ray cluster for the workers.
+      resume: go on from the last checkpoint in `out`.
+      progress: called with the status after each step.
+      **options: those of `Task.of`.
 
     Raises:
       InputError: if an option is wrong, or `out` can't be used.
       TrainingError: if a loss is not finite.
     """
+    chosen = TrainOptions(
+        agent,
+        overrides=tuple((name, str(value)) for name, value in (overrides or {}).items()),
+        minutes=minutes,
+        env_steps=env_steps,
+        seed=seed,
+        checkpoint_steps=checkpoint_steps,
+        checkpoint_minutes=checkpoint_minutes,
+        eval_mazes=eval_mazes,
+        workers=workers,
+        ray_address=ray_address,
+    )
+    run_training(chosen, {"task": task, **options}, pathlib.Path(out), resume, progress)
+
+
+def run_training(
+    options: TrainOptions,
+    task_options: Mapping[str, Any],
+    out: pathlib.Path,
+    resume: bool = False,
+    progress: Progress = lambda status: None,
+) -> None:
+    """Trains an agent in the task that `task_options` of `Task.of` name; as `train`, which makes the options."""
     agent_class = load_agent_class(options.agent)
     if not issubclass(agent_class, LearningAgent):
         raise InputError(f"agent {options.agent!r} doesn't learn; agents that do: {', '.join(learning_agents())}")
     overrides = dict(options.overrides)
-    task = _training_task(options, agent_class, agent_class.task_options(overrides))
+    task = training_task(options.agent, agent_class, agent_class.task_options(overrides), task_options)
     learner = agent_class.build_learner(task, seed=options.seed, overrides=overrides)
-    held_out = HeldOutEvaluation(task, options.eval_mazes, options.task.distances)
+    held_out = HeldOutEvaluation(task, options.eval_mazes, task_options.get("distances") or ())
     # The source comes first: if the cluster can't be reached, no run is begun.
     with open_source(options, task, learner) as source:
         folder = RunFolder(out)
@@ -91,7 +144,7 @@ class TrainingLoop:
     _options: TrainOptions
     _folder: RunFolder
     _learner: Learner
-    _task: TaskSpec
+    _task: Task
     _source: Source
     _held_out: HeldOutEvaluation
     _counters: Counters
@@ -182,33 +235,36 @@ def num_updates_due(learner: Learner, env_steps: int) -> int:
     return max(0, env_steps - learner.min_rows) // learner.steps_per_update
 
 
-def _training_task(options: TrainOptions, agent_class: type[LearningAgent], defaults: dict[str, Any]) -> TaskSpec:
-    """Returns the task of `options`; `defaults` are the learner's, by name, for what the user left as it was."""
-    if needed := [name for name in agent_class.needs_shown if name in options.task.hide]:
-        raise InputError(f"agent {options.agent!r}: needs the {needed[0]}, found it hidden")
-    of_task, of_variants = fields_of(TaskOptions), fields_of(Variants)
-    for name in defaults:
-        if name not in of_task and name not in of_variants:
-            raise unknown("option of the learner's task", name, (*of_task, *of_variants))
+def training_task(
+    agent: str, agent_class: type[LearningAgent], defaults: Mapping[str, Any], options: Mapping[str, Any]
+) -> Task:
+    """Returns the task that `options` of `Task.of` name; `defaults` are the learner's, for what the user left open.
 
-    left = {name for name in of_task if getattr(options.task, name) == of_task[name].default}
-    task = dataclasses.replace(options.task, **{name: defaults[name] for name in defaults if name in left})
+    Raises:
+      InputError: if trainings don't have such a task, or `Task.of` refuses it.
+    """
+    check_names(defaults)
+    given = {name: value for name, value in options.items() if value is not None}
+    for name in FIXED:
+        if name in given and given[name] != (wanted := fields_of(Task)[name].default):
+            raise InputError(f"expected {name} {wanted!r} in a training, found {given[name]!r}")
+    if given.get("task") == "hierarchical":
+        raise InputError("expected task 'local' or a track in a training, found 'hierarchical'")
+    values = {**defaults, **given}
+    if {values.get("track"), values.get("task", "local")} - {None, "local"} or values.get("pairs") == "fixed":
+        values["num_goals"] = 1  # a track has one goal, and so has a maze with a fixed pair
+    task = Task.of(**values)
+    if needed := [name for name in agent_class.needs_shown if name in task.hide]:
+        raise InputError(f"agent {agent!r}: needs the {needed[0]}, found it hidden")
+    if task.cell_size != 1:
+        raise InputError(f"expected mazes with cells of 1 m in a training, found {task.cell_size:g} m (--cell-size)")
+    if task.track is None:
+        task = task.replace(context_size=context_size_of(agent, agent_class, task.size))
+        check_shown(task)
+    return task
 
-    variants = {name: value for name, value in defaults.items() if name in of_variants}
-    if options.pairs != of_variants["pairs"].default:
-        variants["pairs"] = options.pairs
-    if task.track is not None or variants.get("pairs") == "fixed":
-        variants["num_goals"] = 1  # a track has one goal, and so has a maze with a fixed pair
 
-    choose_context_size = functools.partial(context_size_of, options.agent, agent_class)
-    chosen = from_names(Variants, variants)
-    spec = build_task(task, options.maze_options, chosen, choose_context_size=choose_context_size)
-    if spec.cell_size != 1:
-        raise InputError(f"expected mazes with cells of 1 m in a training, found {spec.cell_size:g} m (--cell-size)")
-    return spec
-
-
-def open_source(options: TrainOptions, task: TaskSpec, learner: Learner) -> Source:
+def open_source(options: TrainOptions, task: Task, learner: Learner) -> Source:
     """Returns where experience comes from: this process, or the workers of `options` on Ray.
 
     Raises:
@@ -221,9 +277,7 @@ def open_source(options: TrainOptions, task: TaskSpec, learner: Learner) -> Sour
     return RaySource(task, learner, options.workers, options.ray_address)
 
 
-def _begin_or_resume(
-    options: TrainOptions, folder: RunFolder, learner: Learner, task: TaskSpec, resume: bool
-) -> Counters:
+def _begin_or_resume(options: TrainOptions, folder: RunFolder, learner: Learner, task: Task, resume: bool) -> Counters:
     """Saves the first checkpoint of a new run, or loads the last one into `learner`; returns where the run is."""
     config = _origin(options, task) | {
         "checkpoint_steps": options.checkpoint_steps,
@@ -242,7 +296,7 @@ def _begin_or_resume(
     return counters
 
 
-def _save(options: TrainOptions, folder: RunFolder, learner: Learner, task: TaskSpec, counters: Counters) -> None:
+def _save(options: TrainOptions, folder: RunFolder, learner: Learner, task: Task, counters: Counters) -> None:
     provenance = {
         "env_steps": counters.env_steps,
         "updates": counters.updates,
@@ -252,12 +306,7 @@ def _save(options: TrainOptions, folder: RunFolder, learner: Learner, task: Task
     folder.save_checkpoint(counters, lambda path: learner.save(path, provenance))
 
 
-def _origin(options: TrainOptions, task: TaskSpec) -> dict[str, Any]:
+def _origin(options: TrainOptions, task: Task) -> dict[str, Any]:
     """Returns what is trained, and in which task."""
-    values = {name: getattr(task, name) for name in (*fields_of(TaskOptions), *fields_of(Variants))}
-    origin = {"agent": options.agent, "size": task.size, "task": values, "seed": options.seed}
-    if options.maze_options.is_drawn:
-        origin["mazes"] = {name: getattr(options.maze_options, name) for name in fields_of(DrawnOptions)}
-    elif options.maze_options.mazes is not None:
-        origin["mazes"] = {"sha256": mazes_hash(task)}
-    return origin
+    values = task.to_json() | {"mazes": None if task.all_mazes is None else {"sha256": mazes_hash(task)}}
+    return {"agent": options.agent, "size": task.size, "task": values, "seed": options.seed}

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from mazebench.agent import Agent
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.training.experience import Experience
 
 
@@ -29,8 +29,7 @@ class LearningAgent(Agent):
     def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:
         """Returns the options of the task that a learner is to collect in, unless the user asks for others; here none.
 
-        They are fields of `TaskOptions` and `Variants`, but not those that choose mazes or context size: `track`,
-        `level` and `context_size`.
+        They are fields of `Task`, but not those that choose mazes, track, level or context size.
 
         Args:
           overrides: values of the agent's config as text, by name.
@@ -41,7 +40,7 @@ class LearningAgent(Agent):
         return {}
 
     @classmethod
-    def build_learner(cls, task: TaskSpec, *, seed: int = 0, overrides: Mapping[str, str] | None = None) -> Learner:
+    def build_learner(cls, task: Task, *, seed: int = 0, overrides: Mapping[str, str] | None = None) -> Learner:
         """Returns a new learner, which is ready to learn.
 
         Args:

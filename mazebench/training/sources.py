@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
-from mazebench.tasks.spec import TaskSpec
+from mazebench.tasks.task import Task
 from mazebench.training.experience import Collector, Experience
 from mazebench.training.protocol import LearningAgent
 
@@ -27,7 +27,7 @@ class Source(Protocol):
 class InProcessSource:
     """Steps all environments in this process, acting with the learner's current network."""
 
-    def __init__(self, task_spec: TaskSpec, actor: LearningAgent, num_envs: int):
+    def __init__(self, task_spec: Task, actor: LearningAgent, num_envs: int):
         self._collector = Collector(task_spec, num_envs, seed=0)
         self._actor = actor
 

@@ -8,18 +8,16 @@ from typing import Annotated
 from annotated_types import Ge, Interval
 
 from mazebench.errors import InputError
-from mazebench.maps.maze_options import MazeOptions
-from mazebench.options import Doc, by_name, options, options_of
-from mazebench.tasks.task_options import Pairs, TaskOptions
+from mazebench.options import Doc, options
 
-# Options of `TaskOptions` and `MazeOptions` for which trainings have one value only.
-FIXED = ("task", "start", "goal", "landmark_distance", "split")
+# Fields of a task for which trainings have one value only: the default, or the learner's.
+FIXED = ("start", "goal", "landmark_distance", "split", "context_size", "num_goals", "continuous")
 _LONGEST_MINUTES = 366 * 24 * 60  # a year
 
 
 @options
 class TrainOptions:
-    """Options of a training: the agent, its task, and the length of the run.
+    """Options of a training: the agent, the values of its config, and the length of the run.
 
     Raises:
       InputError: if a value is not allowed, the options don't say when to stop, or they name a cluster for no workers.
@@ -45,16 +43,8 @@ class TrainOptions:
     eval_mazes: Annotated[int, Ge(1), Doc("Held-out mazes of an evaluation, with 10 episodes in each.")] = 20
     workers: Annotated[int, Ge(0), Doc("Ray actors that collect; 0 collects in this process.")] = 0
     ray_address: Annotated[str | None, Doc("Address of a Ray cluster for the workers; local if not given.")] = None
-    task: TaskOptions = TaskOptions()
-    maze_options: MazeOptions = MazeOptions()
-    pairs: Pairs = "random"
 
     def __post_init__(self) -> None:
-        values, declared = by_name(self.task) | by_name(self.maze_options), options_of(TrainOptions)
-        for name in FIXED:
-            value, default = values[name], declared[name].default
-            if value != default:
-                raise InputError(f"expected {name} {default!r} in a training, found {value!r}")
         if self.minutes is None and self.env_steps is None:
             raise InputError("expected --minutes or --env-steps, found neither")
         if self.ray_address is not None and not self.workers:

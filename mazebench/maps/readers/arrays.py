@@ -43,7 +43,7 @@ def read_array(array: np.ndarray, name: str, options: ReadOptions) -> Maze:
     """Returns the maze in an array, as `maze_from_array` does."""
     if array.ndim != 2 or array.dtype.kind not in "biuf":
         raise MazeError(f"{name}: expected a two-dimensional array of numbers, found shape {array.shape} {array.dtype}")
-    cell_size = 1.0 if options.cell_size is None else options.cell_size
+    cell_size = options.cell_size or 1.0
     if array.dtype == bool or np.isin(array, (0, 1)).all():
         return square_maze(array == 1, name, cell_size)
     is_percent = array.dtype.kind != "f" and array.min() >= UNKNOWN and _LEAST_PERCENT <= array.max() <= OCCUPIED

@@ -60,7 +60,7 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
     blocked = _inflate(_walls(states, options.unknown), options.inflate / grid.resolution)
 
     # Cells of several pixels.
-    if options.cell_size is None:
+    if not options.cell_size:
         pixels = _smallest_cell_pixels(blocked, grid.resolution)
     else:
         pixels = _cell_pixels(options.cell_size, grid.resolution)

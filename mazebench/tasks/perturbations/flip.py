@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Interval
 
 from mazebench.maps.maze import Cell
+from mazebench.options import Doc
 from mazebench.tasks.perturbations.perturbation import Perturbation, ShownMap
 from mazebench.tasks.streams import Stream
+
+FlipShare = Annotated[
+    float,
+    Interval(ge=0, le=1),
+    Doc("Probability of each inner cell of the shown map, except start and goal, to be flipped."),
+]
 
 
 class MapFlip(Perturbation):
     """Shows free cells as walls and walls as free cells."""
 
-    help = "Probability of each inner cell of the shown map, except start and goal, to be flipped."
-    highest = 1
     stream = Stream.MAP_FLIP
 
     def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Interval
 
+from mazebench.options import Doc
 from mazebench.tasks.perturbations.perturbation import Perturbation, StateError
 from mazebench.tasks.streams import Stream
+
+PositionDeviation = Annotated[
+    float,
+    Interval(ge=0, le=1000),  # more would be a mistake
+    Doc("Standard deviation of the noise on x and y of each observation, in metres."),
+]
 
 
 class PositionNoise(Perturbation):
     """Adds normal noise to x and y of each observed state."""
 
-    help = "Standard deviation of the noise on x and y of each observation, in metres."
-    highest = 1000  # m; more would be a mistake
     stream = Stream.POSITION_NOISE
 
     def state_error(self, level: float, rng: np.random.Generator) -> StateError:

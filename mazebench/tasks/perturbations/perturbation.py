@@ -5,14 +5,12 @@ from __future__ import annotations
 import abc
 import dataclasses
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
-from annotated_types import Ge, GroupedMetadata, Le
 
 from mazebench.maps.maze import Cell, Maze
-from mazebench.options import Doc
 from mazebench.tasks.streams import Stream
 
 # Changes an observed state `[12]` float64 in place. It is called once for each observation of one episode. It is an
@@ -65,16 +63,12 @@ class ShownMap:
         return points if self.drawing is None else self.drawing.points(points, len(self.walls))
 
 
-class Perturbation(GroupedMetadata):
+class Perturbation:
     """One thing that may be wrong with what the agent is shown; the world stays true.
 
-    A level says how wrong it is; at level 0 nothing is. A subclass overrides `show`, or `state_error`, or both. As
-    metadata of an option, it is the range of the level and what it means.
+    A level says how wrong it is; at level 0 nothing is. A subclass overrides `show`, or `state_error`, or both.
     """
 
-    help: ClassVar[str]  # what the level means, in one line; of an option
-    lowest: ClassVar[float] = 0
-    highest: ClassVar[float]  # of an option
     stream: ClassVar[Stream]  # that it draws from; no other one draws from it
 
     def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
@@ -87,8 +81,3 @@ class Perturbation(GroupedMetadata):
     def state_error(self, level: float, rng: np.random.Generator) -> StateError | None:
         """Returns what is wrong with the observed states of an episode that begins; None if nothing is."""
         return None
-
-    def __iter__(self) -> Iterator[object]:
-        yield Ge(self.lowest)
-        yield Le(self.highest)
-        yield Doc(self.help)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Annotated
 
 import cv2
 import numpy as np
+from annotated_types import Interval
 
 from mazebench.maps.homography import warp_cell, warp_points, warp_walls
 from mazebench.maps.maze import Cell
+from mazebench.options import Doc
 from mazebench.tasks.perturbations.perturbation import Drawing, Perturbation, ShownMap
 from mazebench.tasks.streams import Stream
 
@@ -16,11 +19,14 @@ from mazebench.tasks.streams import Stream
 MAX_WARP = 0.25
 
 
+WarpShare = Annotated[
+    float, Interval(ge=0, le=MAX_WARP), Doc("Largest shift of each corner of the shown map, as a share of its side.")
+]
+
+
 class MapWarp(Perturbation):
     """Shows the map through a random perspective transform."""
 
-    help = "Largest shift of each corner of the shown map, as a share of its side."
-    highest = MAX_WARP
     stream = Stream.MAP_WARP
 
     def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:

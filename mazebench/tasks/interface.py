@@ -1,0 +1,22 @@
+"""What an agent may know of the environments that it is built for."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from mazebench.world.ray_casting import LidarModel
+
+
+@dataclasses.dataclass(frozen=True)
+class Interface:
+    """The environments that an agent is built for."""
+
+    task: str  # "local" or "hierarchical"
+    size: int  # N
+    context_size: int  # M
+    num_actions: int = 6
+    sensors: tuple[str, ...] = ()  # whose readings are observed beside the state and the context
+    cell_size: float = 1.0  # m, the side of a cell of the mazes
+    hidden: tuple[str, ...] = ()  # of "map" and "goal": what the context does not show
+    lidar: LidarModel | None = None  # what the sensor lidar measures; None without it
+    odometry_noise: float = 0.0  # alpha of the noise on the observed motion (`mazebench.tasks.odometry.NoisyMotion`)

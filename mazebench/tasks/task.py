@@ -1,0 +1,761 @@
+"""The task: one value that says what is played, and what agents are shown of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import pathlib
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, TypedDict, Unpack
+
+import numpy as np
+from annotated_types import Ge, Interval
+from pydantic import BeforeValidator, InstanceOf
+
+from mazebench.errors import InputError, unknown
+from mazebench.maps.benchmark import (
+    ALL_SPLITS,
+    FROZEN_SPLITS,
+    KINDS_SIZE,
+    PAPER_BENCHMARK,
+    SIZES,
+    TRACKS_BENCHMARK,
+    load_kind_mazes,
+    load_mazes,
+)
+from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
+from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
+from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, Cell, Maze, corner_cells, require_one_size
+from mazebench.maps.maze_files import read_all
+from mazebench.maps.maze_options import THIN_WALLS, ReadOptions
+from mazebench.maps.selection import OwnMazes, described_maze, maze_as_described, own_mazes
+from mazebench.options import Doc, OneOf, fields_of, options
+from mazebench.tasks.context import default_context_size
+from mazebench.tasks.interface import Interface
+from mazebench.tasks.perturbations import PERTURBATIONS
+from mazebench.tasks.perturbations.flip import FlipShare
+from mazebench.tasks.perturbations.noise import PositionDeviation
+from mazebench.tasks.perturbations.warp import WarpShare
+from mazebench.tasks.sensors import SENSORS
+from mazebench.tasks.sensors.sensor import SensorOptions
+from mazebench.tasks.start_goal import cell_of_end, end_text
+from mazebench.tasks.time_limit import TIME_LIMIT, fitting_time_limit, track_time_limit
+from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks.track import DISTANCES, LEVELS
+from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
+
+KINDS_OF_TASK = ("local", "hierarchical")
+DRAWN_KINDS = (*KNOWN, *CHECK)  # of mazes
+TRAIN_DISTANCES = tuple(range(1, 6))
+EVAL_DISTANCES = tuple(range(1, 16))
+ENDS = ("start", "goal")
+HIDEABLE = ("map", "goal")
+CUSTOM = "custom"  # the split in results of mazes, a start or a goal that are not the benchmark's
+MIN_CONTEXT_SIZE = 3
+
+_FIRST_LEVEL = LEVELS[:1]
+_NUM_DRAWN = 20  # mazes of a kind, unless another number is asked for
+_NUM_CHECKED = 10  # of fresh mazes, one of which must have the distances
+_FARTHEST_SHARE = 0.9  # of the diameter of a large maze; few pairs of cells are farther apart
+_LIDAR = "lidar"  # the sensor that every track offers
+_SHOWING_POSE = ("top", "chase")  # the sensors that show where the body is
+# Fields that choose the mazes, and those that an agent may choose, or is not told, while the same is played.
+_OF_MAZES = ("size", "split", "mazes", "kinds", "num_mazes", "fresh", *fields_of(ReadOptions))
+_OF_AGENTS = ("sensors", "camera_size", "textures", "hide", "exact_pose", "context_size")
+
+
+class TaskOptions(TypedDict, total=False):
+    """The options of `Task.of` besides the task's name, for editors; the fields of `Task` say what they mean."""
+
+    size: int | None
+    split: str
+    mazes: OwnMazes | None
+    kinds: str | Sequence[str]
+    num_mazes: int
+    fresh: bool
+    cell_size: float | None
+    walls: str
+    pixel_size: float | None
+    unknown: str
+    inflate: float
+    track: str | None
+    level: int | Sequence[int]
+    distances: int | Sequence[int]
+    start: str | Cell | None
+    goal: str | Cell | None
+    time_limit: int
+    landmark_distance: int
+    pairs: str
+    num_goals: int
+    continuous: bool
+    map_flip: float
+    map_warp: float
+    position_noise: float
+    lidar_noise: str | None
+    odometry_noise: float | None
+    exact_pose: bool
+    hide: str | Sequence[str]
+    context_size: int
+    sensors: str | Sequence[str]
+    camera_size: int
+    textures: bool
+
+
+def _refuse_novel(kinds: Sequence[Any]) -> tuple[Any, ...]:
+    for kind in kinds:
+        if kind in NOVEL:
+            raise InputError(f"kind {kind!r}: only the eval split has it; kinds: {', '.join(DRAWN_KINDS)}")
+    return tuple(kinds)
+
+
+def _as_mazes(mazes: Any) -> Any:
+    """Returns mazes as `Task` keeps them; those of JSON are descriptions."""
+    if not isinstance(mazes, list | tuple):
+        return mazes
+    return tuple(maze_as_described(maze) if isinstance(maze, Mapping) else maze for maze in mazes)
+
+
+@options
+class Task(SensorOptions, ReadOptions):
+    """What is played, and what agents are shown of it, in plain values.
+
+    `Task.of` makes one and fills what is left open. Fields that it leaves alone: `time_limit` is 0 on a track, whose
+    limit depends on the distance, and `lidar_noise` and `odometry_noise` are None where the track has its own.
+    """
+
+    # What is played: the mazes, the episodes, the actions.
+    task: Annotated[str, OneOf(*KINDS_OF_TASK), Doc("Kind of navigation.")] = "local"
+    size: Annotated[
+        int,
+        Ge(0),
+        Doc(
+            "Cells a side of the benchmark's mazes: 13, 15, 17, 19 or 21; of drawn mazes, any that their kinds can "
+            "make; 0 stands for 13, for 31 on a track, and for that of your own mazes."
+        ),
+    ] = 0
+    split: Annotated[
+        str,
+        OneOf(*ALL_SPLITS),
+        Doc("The benchmark's training mazes, unseen ones to choose agents on (tracks), or those for results."),
+    ] = "train"
+    mazes: Annotated[
+        str | tuple[InstanceOf[Maze], ...] | None,
+        BeforeValidator(_as_mazes),
+        Doc("Mazes of your own: a text, picture, array or ROS map, or a folder of them."),
+    ] = None
+    kinds: Annotated[
+        tuple[Annotated[str, OneOf(*DRAWN_KINDS)], ...],
+        BeforeValidator(_refuse_novel),
+        Doc(f"Mazes that are drawn, of these kinds, as dfs,house; {DRAWN_KINDS[0]} beside the other two options."),
+    ] = ()
+    num_mazes: Annotated[int, Ge(0), Doc(f"Drawn mazes of each kind; 0 stands for {_NUM_DRAWN}.")] = 0
+    fresh: Annotated[bool, Doc("Every episode has a new maze, of one of the kinds (not in an evaluation).")] = False
+    track: Annotated[
+        str | None,
+        OneOf(*TRACKS),
+        Doc("A named way in which the map or the senses are imperfect (local task)."),
+    ] = None
+    level: Annotated[
+        tuple[Annotated[int, Interval(ge=LEVELS[0], le=LEVELS[-1])], ...],
+        Doc(
+            f"Level of the track, {LEVELS[0]} to {LEVELS[-1]} (`mazebench list` says what they mean); of several "
+            "levels, not in an evaluation, each episode draws one."
+        ),
+    ] = _FIRST_LEVEL
+    distances: Annotated[
+        tuple[Annotated[int, Ge(1)], ...],
+        Doc(
+            "Cells from start to goal, as 1-5,8,10 (local task); if none are given, 1-15 in evaluations and in the "
+            "benchmark's eval mazes, else 1-5; those of the track; or as far as mazes of your own reach."
+        ),
+    ] = ()
+    start: Annotated[
+        str | None,
+        BeforeValidator(functools.partial(end_text, "start")),
+        Doc(
+            "Where every episode begins, instead of a drawn cell, or of the upper right corner (hierarchical task): a "
+            "cell 'row,column', in Python also (row, column), or a point '1.5m,2.5m' (x, y) from the map's lower left "
+            "corner."
+        ),
+    ] = None
+    goal: Annotated[
+        str | None,
+        BeforeValidator(functools.partial(end_text, "goal")),
+        Doc("Where every episode leads, as for start; instead of a drawn cell, or of the lower left corner."),
+    ] = None
+    time_limit: Annotated[
+        int,
+        Ge(0),
+        Doc(
+            "Agent steps to the goal, in the hierarchical task to each landmark; 0 stands for 100, or more where a "
+            "map, a start or a goal of your own needs them; a track has its own."
+        ),
+    ] = 0
+    landmark_distance: Annotated[
+        int, Ge(1), Doc("Cells between landmarks, along a shortest path on the shown map (hierarchical task).")
+    ] = 5
+    pairs: Annotated[
+        str,
+        OneOf("random", "fixed"),
+        Doc(
+            "random: a new start and goal in each episode; fixed: one pair in each maze, the paper's "
+            "extremely-low-data regime (local task)."
+        ),
+    ] = "random"
+    num_goals: Annotated[
+        int,
+        Ge(1),
+        Doc(
+            "Goals of an episode, one after the other without a reset (local task, random pairs); rewards and success "
+            "are those of the last one."
+        ),
+    ] = 1
+    continuous: Annotated[bool, Doc("Actions are velocities (forward, left, turn) instead of one of six.")] = False
+
+    # What is shown: what is wrong with the map and the senses, and what an agent may ask for or is not told.
+    map_flip: FlipShare = 0.0
+    map_warp: WarpShare = 0.0
+    position_noise: PositionDeviation = 0.0
+    odometry_noise: Annotated[
+        float | None,
+        Interval(ge=0, le=1),
+        Doc(
+            "alpha of the noise on the observed motion, AMCL's omnidirectional model (.2 is its default): the observed "
+            "pose drifts away from the true one; that of the track, or 0, if not given."
+        ),
+    ] = None
+    exact_pose: Annotated[
+        bool, Doc("The observed pose is the true one on a track whose pose is odometry, as a reference.")
+    ] = False
+    hide: Annotated[
+        tuple[Annotated[str, OneOf(*HIDEABLE)], ...],
+        Doc(
+            "What the context does not show: map makes planes 0 and 1 zero, goal plane 2 (local task, one goal). "
+            "Results without the map say what the map is worth."
+        ),
+    ] = ()
+    sensors: Annotated[
+        tuple[Annotated[str, OneOf(*SENSORS)], ...],
+        Doc("Sensors that are observed besides the state and the context."),
+    ] = ()
+    context_size: Annotated[
+        int,
+        Interval(ge=0, le=MAX_SIZE),
+        Doc(
+            "M, the cells on a side of the context's planes, at least 3; 0 stands for min(N, 21); a track has its own."
+        ),
+    ] = 0
+
+    @classmethod
+    def of(cls, task: str = "local", **options: Unpack[TaskOptions]) -> Task:
+        """Returns the task that options name, with what they leave open.
+
+        Args:
+          task: "local", "hierarchical" or the name of a track.
+          **options: fields of `Task` by name, which docs/options.md lists; None stands for the default. `mazes` are
+            mazes of your own: a `Maze`, an array as `maze_from_array` takes it, several of these of one size, or the
+            path of a file or of a folder of files.
+
+        Raises:
+          InputError: if an option is unknown or not allowed, options contradict each other, or a map can't be read.
+        """
+        return _complete(_asked(task, options), None)
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> Task:
+        """Returns the task of which `to_json` returned the content.
+
+        Raises:
+          InputError: as `of`.
+        """
+        return cls.of(**content)
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns the fields by name, in values that JSON has."""
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        if isinstance(self.mazes, tuple):
+            values["mazes"] = [described_maze(maze) for maze in self.mazes]
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+
+    def replace(self, **changes: Any) -> Task:
+        """Returns the task with other values of some fields; the mazes are not loaded again unless they change."""
+        task = dataclasses.replace(self, **changes)
+        if not set(changes) & set(_OF_MAZES):
+            vars(task)["all_mazes"] = self.all_mazes  # as `cached_property` keeps them
+        return task
+
+    def in_mazes(self, mazes: Sequence[Maze]) -> Task:
+        """Returns the same task in other mazes."""
+        return dataclasses.replace(
+            self,
+            mazes=tuple(mazes),
+            size=mazes[0].size,
+            cell_size=mazes[0].cell_size,
+            **{name: fields_of(Task)[name].default for name in ("kinds", "num_mazes", "fresh")},
+        )
+
+    # The mazes.
+
+    @functools.cached_property
+    def all_mazes(self) -> Mazes:
+        """The mazes, loaded or drawn: `Episode.maze` is an index into them.
+
+        Raises:
+          InputError: if there are no such mazes, or a map can't be read.
+        """
+        if self.mazes is not None:
+            mazes = read_all(pathlib.Path(self.mazes), self) if isinstance(self.mazes, str) else self.mazes
+            for maze in mazes:
+                if self.size not in (0, maze.size):
+                    raise InputError(f"expected mazes of size {self.size}, found size {maze.size}")
+            return mazes
+        size = self.size or (SIZES[0] if self.track is None else KINDS_SIZE)
+        if self.fresh:
+            return FreshMazes(self._drawn_kinds, size)
+        if self.is_drawn:
+            split = "train" if self.split == "train" else "dev"
+            return draw_mazes(self._drawn_kinds, size, split, self.num_mazes or _NUM_DRAWN)
+        return load_mazes(size, self.split) if self.track is None else load_kind_mazes(self.split)
+
+    @property
+    def fixed_mazes(self) -> tuple[Maze, ...]:
+        """The mazes.
+
+        Raises:
+          InputError: if every episode has a new one.
+        """
+        if isinstance(self.all_mazes, FreshMazes):
+            raise InputError("expected a task with a number of mazes, found fresh ones")
+        return self.all_mazes
+
+    @property
+    def is_drawn(self) -> bool:
+        """True if mazes are drawn, of some kinds."""
+        return bool(self.kinds or self.num_mazes or self.fresh)
+
+    @property
+    def _drawn_kinds(self) -> tuple[str, ...]:
+        return self.kinds or DRAWN_KINDS[:1]
+
+    @property
+    def has_own(self) -> bool:
+        """True if mazes, start or goal are a user's own."""
+        return self.mazes is not None or self.num_ends > 0
+
+    @property
+    def split_in_results(self) -> str:
+        """The split as records and summaries have it."""
+        return CUSTOM if self.has_own or self.is_drawn else self.split
+
+    @property
+    def frozen_split(self) -> str | None:
+        """The split of the benchmark whose frozen episodes are evaluated; None for other mazes."""
+        return self.split_in_results if self.split_in_results in FROZEN_SPLITS else None
+
+    @property
+    def benchmark(self) -> str:
+        """The benchmark that the task belongs to."""
+        return PAPER_BENCHMARK if self.track is None else TRACKS_BENCHMARK
+
+    # Episodes.
+
+    @property
+    def num_ends(self) -> int:
+        """The number of given ends: start and goal."""
+        return (self.start is not None) + (self.goal is not None)
+
+    def ends(self, maze: Maze) -> tuple[Cell | None, Cell | None]:
+        """Returns the start and the goal of all episodes in a maze; None for one that each episode draws.
+
+        Raises:
+          InputError: if one is not free.
+        """
+        given = {name: end for name in ENDS if (end := getattr(self, name)) is not None}
+        cells = {name: cell_of_end(name, end, maze) for name, end in given.items()}
+        corners = dict(zip(ENDS, corner_cells(maze), strict=True)) if self.task == "hierarchical" else {}
+        start, goal = ((corners | cells).get(name) for name in ENDS)
+        return start, goal
+
+    def farthest(self, maze: Maze) -> int:
+        """Returns the largest distance in cells that start and goal can have in a maze."""
+        start, goal = self.ends(maze)
+        if start is not None and goal is not None:
+            return maze.distance(start, goal)
+        given = start or goal
+        return maze.diameter if given is None else int(maze.distances(given).max())
+
+    @property
+    def has_legs(self) -> bool:
+        """True if the context may change within an episode: at landmarks, or where one goal follows another."""
+        return self.task == "hierarchical" or self.num_goals > 1
+
+    @property
+    def longest_time_limit(self) -> int:
+        """The agent steps that a leg may take; on a track, those to the farthest goals."""
+        return self.time_limit if self.track is None else track_time_limit(self.track, max(self.distances))
+
+    # What is shown.
+
+    @property
+    def perturbations(self) -> dict[str, float]:
+        """The levels of all perturbations by name, in the order in which they apply."""
+        return {name: getattr(self, name) for name in PERTURBATIONS}
+
+    @property
+    def active_perturbations(self) -> tuple[tuple[str, float], ...]:
+        """The perturbations that are switched on, with their levels."""
+        return tuple((name, level) for name, level in self.perturbations.items() if level)
+
+    @property
+    def lidar(self) -> LidarModel:
+        """The model of the sensor `lidar`: as the option says, or the track."""
+        return TURTLEBOT3 if self.lidar_noise is None and self.track is not None else super().lidar
+
+    def odometry_noise_at(self, level: int) -> float:
+        """Returns alpha of the noise on the observed motion at a level: as the option says, or the track."""
+        if self.odometry_noise is not None or self.track is None or self.exact_pose:
+            return self.odometry_noise or 0.0
+        return TRACKS[self.track].odometry_noise[level - 1]
+
+    @property
+    def interface(self) -> Interface:
+        """What an agent may know of the task: neither the track nor its level."""
+        return Interface(
+            self.task,
+            self.size,
+            self.context_size,
+            sensors=self.sensors,
+            cell_size=self.cell_size,
+            hidden=self.hide,
+            lidar=self.lidar if _LIDAR in self.sensors else None,
+            odometry_noise=max(map(self.odometry_noise_at, self.level)),
+        )
+
+    # Results.
+
+    @property
+    def setting(self) -> Task:
+        """The task without what an agent chooses or is not told, and without distances: results of one are compared."""
+        left = [*_OF_AGENTS, "distances", "time_limit"]
+        if self.task == "local":
+            left.append("landmark_distance")
+        changes = {name: fields_of(Task)[name].default for name in left}
+        if self.mazes is not None:
+            changes |= {"split": "train"}
+        if isinstance(self.mazes, str):
+            changes |= {"mazes": pathlib.Path(self.mazes).name}  # wherever the folder is
+        return dataclasses.replace(self, **changes)
+
+    @property
+    def is_exact(self) -> bool:
+        """True if nothing is wrong with the map and the observed states."""
+        return self.track is None and not self.active_perturbations
+
+    @property
+    def noise_in_words(self) -> tuple[str, ...]:
+        """The noise on the senses that a user set, in words."""
+        noise = {"lidar noise": self.lidar_noise, "odometry noise": self.odometry_noise}
+        return tuple(f"{name} {value}" for name, value in noise.items() if value is not None)
+
+    @property
+    def own_in_words(self) -> tuple[str, ...]:
+        """What a user set besides the mazes, in words: the size of a cell, start and goal, noise on the senses."""
+        scale = () if self.cell_size == 1 else (f"cells of {self.cell_size:g} m",)
+        ends = (f"{name} {end}" for name in ENDS if (end := getattr(self, name)) is not None)
+        return (*scale, *ends, *self.noise_in_words)
+
+    @property
+    def title(self) -> str:
+        """The track and its level, or the kind of navigation: "rebuilt 2", "local"."""
+        return self.task if self.track is None else f"{self.track} {','.join(map(str, self.level))}"
+
+    @property
+    def name(self) -> str:
+        """Task and size, or track and level, and the perturbations, as names of files have them."""
+        levels = "".join(f"-{name.rpartition('_')[2]}-{level:g}" for name, level in self.active_perturbations)
+        return (self.title.replace(" ", "-") if self.track else f"{self.task}-{self.size}") + levels
+
+    def __str__(self) -> str:
+        parts = [self.task] if self.track is None else [self.track, f"level {','.join(map(str, self.level))}"]
+        parts.append(f"{self.size} × {self.size}")
+        if self.split_in_results != "eval":
+            parts.append(f"{self.split_in_results} mazes")
+        parts += self.own_in_words
+        if self.task == "hierarchical":
+            parts.append(f"landmarks every {self.landmark_distance}")
+        parts += [f"{name.replace('_', ' ')} {level:g}" for name, level in self.active_perturbations]
+        return ", ".join(parts)
+
+    def __lt__(self, other: Task) -> bool:
+        """Returns whether a table has this task above another one."""
+        return self._order < other._order
+
+    @property
+    def _order(self) -> tuple[Any, ...]:
+        return (
+            *(self.task, self.size, self.split_in_results),
+            self.landmark_distance if self.task == "hierarchical" else 0,
+            self.active_perturbations,
+            *(str(self.mazes or ""), self.kinds, self.num_mazes, self.track or "", self.level),
+            self.own_in_words,
+        )
+
+
+def evaluation_task(task: str = "local", **options: Unpack[TaskOptions]) -> Task:
+    """Returns the task of an evaluation, as `Task.of` does, but in eval mazes at distances of 1 to 15 by default.
+
+    Drawn mazes are those of the split dev, unless the split is train.
+
+    Raises:
+      InputError: as `Task.of`, and if the options name what evaluations do not vary.
+    """
+    given = _asked(task, options)
+    asked = Task(**{"split": "eval"} | given)
+    if asked.is_drawn and asked.split == "eval":
+        given["split"] = "dev"
+    for name in ("pairs", "num_goals", "continuous", "context_size"):
+        if (found := getattr(asked, name)) != (wanted := fields_of(Task)[name].default):
+            raise InputError(f"expected {name} {wanted!r} in an evaluation, found {found!r}")
+    if asked.fresh:
+        raise InputError("expected no fresh mazes in an evaluation; num_mazes says how many of each kind are drawn")
+    if len(asked.level) > 1:
+        found = ", ".join(map(str, asked.level))
+        raise InputError(f"expected one level in an evaluation, found {found}; the suite 'tracks' has all levels")
+    return _complete({"split": "eval"} | given, EVAL_DISTANCES)
+
+
+def check_names(options: Mapping[str, Any], arguments: Sequence[str] = ()) -> None:
+    """Checks the names of options for `Task.of`, in a call that takes `arguments` too.
+
+    Raises:
+      InputError: if there is no such option; it lists all that the call takes.
+    """
+    known = (*fields_of(Task), *arguments)
+    for name in options:
+        if name not in known:
+            raise unknown("option", name, known)
+
+
+def _asked(task: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns the fields that options set by name; mazes that are values have been read."""
+    check_names(options)
+    given = {name: value for name, value in options.items() if value is not None}
+    if "distances" in given and not np.size(given["distances"]):
+        raise InputError("expected at least one distance, found none")
+    if task not in (*KINDS_OF_TASK, *TRACKS):
+        raise unknown("task", task, (*KINDS_OF_TASK, *TRACKS))
+    if task in TRACKS:
+        if given.setdefault("track", task) != task:
+            raise InputError(f"expected one track, found {task!r} and {given['track']!r}")
+        task = "local"
+    if "mazes" in given and not isinstance(given["mazes"], str | pathlib.Path):
+        reading = {name: given[name] for name in fields_of(ReadOptions) if name in given}
+        given["mazes"] = own_mazes(_as_mazes(given["mazes"]), ReadOptions(**reading))
+    return {"task": task, **given}
+
+
+def _complete(given: Mapping[str, Any], default_distances: tuple[int, ...] | None) -> Task:
+    """Returns the task whose fields are `given`, with what is left open; checks all of it.
+
+    `default_distances` are those in the benchmark's mazes; None for 1 to 5, in eval mazes 1 to 15.
+    """
+    asked = Task(**given)
+    if asked.track is not None and _LIDAR not in asked.sensors:
+        asked = asked.replace(sensors=(_LIDAR, *asked.sensors))
+    _check_options(asked)
+    mazes = asked.all_mazes
+    _check_mazes(asked, mazes)
+
+    # The mazes that were found, and the distances that fit them.
+    found: dict[str, Any] = {"size": mazes[0].size, "cell_size": mazes[0].cell_size}
+    if asked.is_drawn:
+        found |= {"kinds": asked._drawn_kinds, "num_mazes": 0 if asked.fresh else asked.num_mazes or _NUM_DRAWN}
+    default_distances = default_distances or (EVAL_DISTANCES if asked.split == "eval" else TRAIN_DISTANCES)
+    distances = _distances(asked, mazes, default_distances)
+    if asked.num_ends == 2 and asked.distances not in ((), distances):
+        raise InputError(f"start and goal are given; found distances {asked.distances}, which would be ignored")
+    distances = asked.distances or distances
+
+    # A time limit in which goals of one's own are reached.
+    time_limit = asked.time_limit
+    if asked.track is None and not time_limit:
+        cells = asked.landmark_distance if asked.task == "hierarchical" else max(distances)
+        is_new = asked.has_own or asked.is_drawn
+        time_limit = fitting_time_limit(cells, mazes[0].cell_size) if is_new else TIME_LIMIT
+
+    context_size = asked.context_size
+    if not context_size:
+        pixels = None if asked.track is None else TRACKS[asked.track].pixels_per_cell
+        context_size = pixels * mazes[0].size if pixels else default_context_size(mazes[0].size)
+
+    hide = tuple(name for name in HIDEABLE if name in asked.hide)
+    task = dataclasses.replace(
+        asked, **found, distances=distances, time_limit=time_limit, context_size=context_size, hide=hide
+    )
+    vars(task)["all_mazes"] = mazes
+    check_shown(task)
+    checked: Sequence[Maze] = mazes  # type: ignore[assignment]
+    if isinstance(mazes, FreshMazes):  # an episode whose maze is too small takes another one
+        checked = (max((mazes[number] for number in range(_NUM_CHECKED)), key=task.farthest),)
+    for maze in checked:
+        check_distances(task, maze)
+    return task
+
+
+def _distances(task: Task, mazes: Mazes, default: tuple[int, ...]) -> tuple[int, ...]:
+    """Returns the distances in cells of a task that names none."""
+    of_track = DISTANCES if task.track is not None else ()
+    if not task.has_own or isinstance(mazes, FreshMazes):
+        return of_track or default
+
+    # Of given ends, that between them.
+    if task.task == "hierarchical" or task.num_ends == 2:
+        return tuple(sorted({task.farthest(maze) for maze in mazes}))
+
+    # Of a track, those that all mazes have; all of its own, if none has any.
+    farthest, count = min(map(task.farthest, mazes)), len(EVAL_DISTANCES)
+    if of_track:
+        return tuple(distance for distance in of_track if distance <= farthest) or of_track
+
+    # Else at most 15, evenly spaced up to what all mazes have.
+    if farthest > count:
+        farthest = max(count, int(_FARTHEST_SHARE * farthest))
+    count = min(count, farthest)
+    return tuple(round(farthest * number / count) for number in range(1, count + 1))
+
+
+def _check_options(task: Task) -> None:
+    """Raises `InputError` if options contradict each other."""
+    for name in ("sensors", "level", "kinds"):
+        values = getattr(task, name)
+        if len(set(values)) < len(values):
+            raise InputError(f"expected each of {name} once, found {', '.join(map(str, values))}")
+    if not task.level:
+        raise InputError("expected at least one level, found none")
+
+    # Mazes.
+    if task.fresh and task.num_mazes:
+        raise InputError(f"expected no num_mazes beside fresh, found {task.num_mazes}")
+    if task.is_drawn and task.mazes is not None:
+        raise InputError("expected mazes of your own or mazes that are drawn, found both")
+    if task.is_drawn and task.split == "eval":
+        raise InputError("mazes that are drawn: expected split 'train' or 'dev', found 'eval'")
+    for name, field in fields_of(ReadOptions).items():
+        found = getattr(task, name)
+        if task.mazes is None and found != field.default and (name, found) != ("cell_size", 1):
+            raise InputError(f"expected mazes of your own with {name}, found none")
+
+    # Episodes.
+    if task.num_goals > 1 and (task.task != "local" or task.pairs != "random"):
+        raise InputError(f"expected num_goals 1 unless the task is local and pairs are random, found {task.num_goals}")
+    if task.num_ends and task.pairs == "fixed":
+        raise InputError("expected pairs 'random' beside a start or a goal, found 'fixed', pairs of their own")
+    if task.goal is not None and task.num_goals > 1:
+        raise InputError(f"expected num_goals 1 beside a goal, found {task.num_goals}")
+    if task.lidar_noise is not None and _LIDAR not in task.sensors:
+        found = ", ".join(task.sensors) or "none"
+        raise InputError(f"lidar_noise {task.lidar_noise}: expected the sensor lidar, found {found}")
+    if task.odometry_noise and (task.position_noise or task.exact_pose):
+        beside = "exact_pose" if task.exact_pose else "position_noise"
+        raise InputError(f"odometry_noise {task.odometry_noise:g}: expected no {beside} beside it, found it")
+    if task.hide:
+        _check_hidden(task)
+
+    # Tracks.
+    if task.track is not None:
+        _check_track(task, task.track)
+    elif task.exact_pose:
+        raise InputError("exact_pose: expected a track whose pose is odometry beside it, found none")
+    elif task.level != _FIRST_LEVEL:
+        levels = ", ".join(map(str, task.level))
+        raise InputError(f"level {levels}: expected a track beside it, found none; tracks: {', '.join(TRACKS)}")
+
+
+def _check_hidden(task: Task) -> None:
+    """Raises `InputError` if something is hidden twice, or another option would tell it."""
+    hidden = ",".join(task.hide)
+    if len(set(task.hide)) < len(task.hide):
+        raise InputError(f"expected each of {', '.join(HIDEABLE)} once to hide, found {hidden}")
+    if task.task != "local":
+        raise InputError(f"hide {hidden}: expected the task 'local', found {task.task!r}")
+    if task.num_goals > 1:
+        raise InputError(f"hide {hidden}: expected num_goals 1, found {task.num_goals}")
+    cameras = [name for name in task.sensors if name != _LIDAR]
+    telling = cameras if "goal" in task.hide else [name for name in cameras if name != "egocentric"]
+    if telling:
+        what = "where the goal is" if "goal" in task.hide else "the maze from above"
+        raise InputError(f"hide {hidden}: expected sensors without {telling[0]!r}, which shows {what}")
+
+
+def _check_track(task: Task, name: str) -> None:
+    """Raises `InputError` if an option contradicts the track called `name`."""
+    if task.mazes is None and not task.is_drawn and task.size not in (0, KINDS_SIZE):
+        raise InputError(f"track {name!r}: expected size {KINDS_SIZE}, found {task.size}")
+    if task.time_limit:
+        raise InputError(f"track {name!r}: has its own time limit, found time_limit {task.time_limit}")
+    for option, value in {"task": "local", "start": None, "goal": None, "pairs": "random", "num_goals": 1}.items():
+        if (found := getattr(task, option)) != value:
+            raise InputError(f"track {name!r}: expected {option} {value!r}, found {found!r}")
+    for perturbation, strength in task.perturbations.items():
+        if strength:
+            raise InputError(f"track {name!r}: expected no perturbation, found {perturbation} {strength}")
+    if task.exact_pose and not TRACKS[name].hides_pose:
+        raise InputError(f"track {name!r}: expected no exact_pose, for the pose is exact; it belongs to lost poses")
+    for sensor in _SHOWING_POSE if TRACKS[name].hides_pose else ():
+        if sensor in task.sensors:
+            raise InputError(f"track {name!r}: expected sensors without {sensor!r}, which shows where the body is")
+
+
+def check_shown(task: Task) -> None:
+    """Raises `InputError` if a map of the task's `context_size` can't be shown."""
+    if task.track is None and task.context_size < MIN_CONTEXT_SIZE:
+        raise InputError(f"expected context_size from {MIN_CONTEXT_SIZE} to {MAX_SIZE}, found {task.context_size}")
+    if task.track is not None:
+        context_size = TRACKS[task.track].pixels_per_cell * task.size
+        if task.context_size != context_size:
+            raise InputError(f"track {task.track!r}: expected context_size {context_size}, found {task.context_size}")
+
+
+def _check_mazes(task: Task, mazes: Mazes) -> None:
+    """Raises `InputError` if mazes are not of one size and scale, or the task can't be played in one of them."""
+    if isinstance(mazes, FreshMazes):
+        if task.textures:
+            raise InputError("fresh mazes: expected no textures, which take long to make, found textures")
+        for name in ENDS:
+            if (end := getattr(task, name)) is not None:
+                raise InputError(f"fresh mazes: expected no {name}, which may be a wall in one of them, found {end!r}")
+        mazes.max_boxes  # noqa: B018 - raises if a kind can't make mazes of this size
+        return
+    require_one_size(mazes)
+    name, cell_size = mazes[0].name, mazes[0].cell_size
+    if cell_size < MIN_CELL_SIZE:
+        raise InputError(
+            f"{name}: expected cells of at least {MIN_CELL_SIZE} m, through which the body passes, "
+            f"found {cell_size} m; {THIN_WALLS}"
+        )
+    if task.track is not None and cell_size != 1:
+        raise InputError(f"track {task.track!r}: expected cells of 1 m, found {cell_size} m")
+    for maze in mazes:
+        check_maze(task, maze)
+
+
+def check_maze(task: Task, maze: Maze) -> None:
+    """Raises `InputError` if a maze has no two cells for a start and a goal, or the task's track does not take it."""
+    if task.track is not None:
+        TRACKS[task.track].require(maze, task.level)
+    if len(maze.free_cells) < 2:
+        raise InputError(f"{maze.name}: expected two free cells for a start and a goal, found one")
+    start, goal = task.ends(maze)
+    if start is not None and start == goal:
+        raise InputError(f"{maze.name}: expected start and goal in different cells, found both in {start}")
+
+
+def check_distances(task: Task, maze: Maze) -> None:
+    """Raises `InputError` if no goal of the local task is as far away in a maze as wanted."""
+    if task.task != "local" or task.num_ends == 2:
+        return
+    if max(task.distances) > (farthest := task.farthest(maze)):
+        raise InputError(
+            f"{maze.name}: expected distances of at most {farthest} cells, as far as the maze reaches, "
+            f"found {max(task.distances)}; choose others (--distances)"
+        )
