@@ -68,7 +68,7 @@ def episodes() -> Iterator[tuple[str, str]]:
     }
     for name, (agent, options) in runs.items():
         with tempfile.TemporaryDirectory() as folder:
-            mazebench.evaluate(agent, folder, **options)
+            mazebench.evaluate(agent, out=folder, **options)
             lines = pathlib.Path(folder, "episodes.jsonl").read_text(encoding="utf-8").splitlines()
         rows = [[json.loads(line)[column] for column in COLUMNS] for line in lines]
         yield f"episodes: {name}", _hash(json.dumps(rows).encode())

@@ -53,7 +53,7 @@ def play(track: str, level: int) -> tuple[Maze, Cell, np.ndarray, Shown]:
     options = {"track": track, "level": level, "split": "train", "distances": DISTANCE}
     maze = load_kind_mazes("train")[HOUSE]
     with tempfile.TemporaryDirectory() as folder:
-        mazebench.evaluate("oracle", folder, record=True, episodes_per_distance=1, **options)
+        mazebench.evaluate("oracle", out=folder, record=True, episodes_per_distance=1, **options)
         result = load_result(pathlib.Path(folder))
         [number] = [record.episode for record in result.records if record.maze == maze.name]
         record = result.records[number]

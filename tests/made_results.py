@@ -8,20 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.evaluation.eval_options import EvalOptions
-from mazebench.maps.benchmark import PAPER_BENCHMARK, TRACKS_BENCHMARK, load_mazes, manifest_hash
+from mazebench.maps.benchmark import load_mazes, manifest_hash
 from mazebench.maps.maze import cell_to_point, path_through_walls
-from mazebench.options import by_name
 from mazebench.results.metrics import spl, summarize, summarize_facts
 from mazebench.results.played import mazes_hash
 from mazebench.results.reading import EPISODES, SUMMARY
 from mazebench.results.records import Record
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, save_trajectories
 from mazebench.storage.json_files import write_json
-from mazebench.tasks.build import build_task, Task.of
 from mazebench.tasks.observation import state_errors
-from mazebench.tasks.perturbations import perturbation_levels
-from mazebench.tasks.task import Task
+from mazebench.tasks.task import Task, evaluation_task
 from mazebench.tasks.trials import Trial, select_trials
 
 NASTY = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=1>"
@@ -70,44 +66,36 @@ def make_result(
 
     On a track, all frozen episodes of the first `num_mazes` mazes are played.
     """
-    played: dict[str, Any] = {"split": split, "episodes_per_distance": episodes_per_distance, "seed": seed}
     if track is not None:
-        version, labels, played = (
-            TRACKS_BENCHMARK,
-            {"track": track, "level": level},
-            played | {"track": track, "level": level},
-        )
+        options = {"track": track, "level": level}
     else:
-        version, labels = PAPER_BENCHMARK, {}
-        played |= {"task": task, "size": size, "distances": distances, "landmark_distance": landmark_distance, **levels}
-    options = EvalOptions.of(agent, **played)
-    spec = build_task(options.task, options.maze_options)
-    trials = select_trials(spec, split if split == "eval" else None, episodes_per_distance)
-    size = spec.size
+        options = {"size": size, "distances": distances, "landmark_distance": landmark_distance, **levels}
+    spec = evaluation_task(task, split=split, **options)
+    trials, size = select_trials(spec, episodes_per_distance), spec.size
     rng = np.random.default_rng([len(agent), size, landmark_distance, seed])
-    labels = {"agent": agent, "task": task, "size": size, "split": split} | labels
+    labels = {"agent": agent, "task": task, "size": size, "split": split}
+    labels |= {} if track is None else {"track": track, "level": level}
     records, drives = [], []
     for trial in trials:
         if trial.episode.maze < num_mazes:
             success = bool(rng.random() < skill ** (trial.distance / 4))
             drives.append(_drive(spec, trial, success, rng))
-            content = labels | _outcome(len(records), trial, spec, success, drives[-1]) | perturbation_levels(spec)
+            content = labels | _outcome(len(records), trial, spec, success, drives[-1]) | spec.perturbations
             records.append(Record(**content))
     folder.mkdir(parents=True)
     (folder / EPISODES).write_text("".join(each.to_line() for each in records))
     if record:
         save_trajectories(folder / TRAJECTORIES, drives)
     provenance = {
-        "benchmark_manifest_sha256": manifest_hash(version),
+        "benchmark_manifest_sha256": manifest_hash(spec.benchmark),
         "checkpoint_sha256": checkpoint,
         "mazes_sha256": mazes_hash(spec),
-        "context_size": spec.context_size,
-        "options": by_name(options),
+        "seed": seed,
         "command": ["mazebench", "eval", "--agent", agent],
         "packages": {"mazebench-mujoco": "0.1.0", "numpy": np.__version__},
     }
-    content = {"benchmark": version, "episodes": len(records), "perturbation": perturbation_levels(spec)}
-    write_json(folder / SUMMARY, labels | content | {"provenance": provenance, "privileged": privileged})
+    content = {"agent": agent, "task": spec.to_json(), "benchmark": spec.benchmark, "episodes": len(records)}
+    write_json(folder / SUMMARY, content | {"provenance": provenance, "privileged": privileged})
     return _set_means(folder, records)
 
 
@@ -135,6 +123,11 @@ def edit_summary(folder: pathlib.Path, **changes: Any) -> pathlib.Path:
     return folder
 
 
+def edit_task(folder: pathlib.Path, **changes: Any) -> pathlib.Path:
+    """Puts other values into the summary's task."""
+    return edit_summary(folder, task=read_summary(folder)["task"] | changes)
+
+
 def edit_records(folder: pathlib.Path, edit: Any) -> pathlib.Path:
     """Replaces each record by what `edit` makes of its fields, and the summary's means by theirs."""
     lines = (folder / EPISODES).read_text().splitlines()
@@ -152,13 +145,12 @@ def of_own_mazes(folder: pathlib.Path, name: str) -> pathlib.Path:
     )
     maps = folder / "maps"
     maps.mkdir()
-    for maze in load_mazes(summary["size"], "eval"):
+    for maze in load_mazes(summary["task"]["size"], "eval"):
         if maze.name in used:
             rows = ("".join("#" if wall else "." for wall in row) for row in maze.walls)
             (maps / f"{name}{maze.name[-3:]}.txt").write_text("\n".join(rows) + "\n")
     provenance = summary["provenance"] | {"mazes_sha256": mazes_hash(Task.of(mazes=maps))}
-    provenance["options"] |= {"mazes": str(maps), "size": None}
-    return edit_summary(folder, split="custom", provenance=provenance)
+    return edit_summary(folder, task=summary["task"] | {"mazes": str(maps)}, provenance=provenance)
 
 
 def _set_means(folder: pathlib.Path, records: list[Record]) -> pathlib.Path:

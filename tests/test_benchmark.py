@@ -63,7 +63,7 @@ def test_trials_when_drawn_again_in_part():
     # The first episodes of a (maze, distance) don't depend on how many are drawn, nor those of a maze on the others.
     mazes = load_mazes(13, "eval")
     drawn = draw_trials(Task.of(mazes=mazes[:3], distances=[4, 9]), episodes_per_distance=2)
-    chosen = select_trials(Task.of(split="eval", distances=[9, 4]), "eval", episodes_per_distance=2)[: len(drawn)]
+    chosen = select_trials(Task.of(split="eval", distances=[9, 4]), episodes_per_distance=2)[: len(drawn)]
     assert [trial.episode for trial in drawn] == [trial.episode for trial in chosen]
     assert [trial.distance for trial in chosen] == [4, 4, 9, 9] * 3
 

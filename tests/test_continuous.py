@@ -16,8 +16,8 @@ from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.maze import Maze, cell_to_point
-from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.task import Task
 from mazebench.world.mjcf import BODY_RADIUS, TURN_RATE, action_controls, velocity_controls
 
 MIDDLE = Episode(0, (20, 20), (35, 35), 0.0, 0)

@@ -11,8 +11,8 @@ from simple_mazes import corridor
 from mazebench.envs.goal import GoalMazeEnv
 from mazebench.envs.gym import MazeEnv
 from mazebench.errors import InputError
-from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.task import Task
 
 FORWARD, LOOK_LEFT = 0, 4
 

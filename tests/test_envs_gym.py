@@ -22,8 +22,8 @@ from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import write_text_maze
-from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.task import Task
 from mazebench.tasks.tracks import TRACKS
 
 TITLES = ("Local", "Hierarchical", "LocalGoal")
@@ -174,13 +174,13 @@ for env in envs:
 
     def test_a_vector_environment_renders_what_single_ones_do(self):
         run_with_egl("""
-from mazebench.envs.registration import make_env, make_vec
+from mazebench.envs.registration import make, make_vec
 envs = make_vec("local", 2, size=13, render_mode="rgb_array")
 envs.reset(seed=0)
 pictures = envs.render()
 assert len(pictures) == 2
 for seed, picture in enumerate(pictures):
-    env = make_env("local", size=13, render_mode="rgb_array")
+    env = make("local", size=13, render_mode="rgb_array")
     env.reset(seed=seed)
     assert np.abs(env.render().astype(int) - picture).mean() < 1, "not the picture of the single environment"
     env.close()
@@ -227,5 +227,5 @@ class TestSpec:
         assert gymnasium.make(EnvSpec.from_json(env.spec.to_json())).unwrapped.task_spec == env.unwrapped.task_spec
 
     def test_a_description_that_lacks_something_is_refused(self):
-        with pytest.raises(InputError, match="expected a maze with name, rows and cell_size, found rows"):
+        with pytest.raises(InputError, match="expected a maze with name, rows, cell_size and kind, found rows"):
             gymnasium.make("mazebench/Local-13-v1", mazes=[{"rows": ["#####"]}])

@@ -19,8 +19,8 @@ from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
-from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.task import Task
 
 NUM_STEPS = 320
 SEEDS = [3, 1000, 17, 4]

@@ -16,7 +16,7 @@ from mazebench.evaluation.evaluate import evaluate
 
 
 def evaluate_at_hand(name, out, **running):
-    return evaluate(f"contract_at_hand:{name}", out, distances=(1,), episodes_per_distance=1, **running)
+    return evaluate(f"contract_at_hand:{name}", out=out, distances=(1,), episodes_per_distance=1, **running)
 
 
 AGENTS = """

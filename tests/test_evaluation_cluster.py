@@ -48,7 +48,7 @@ def unused_port() -> Iterator[int]:
 def test_a_cluster_that_is_not_there_is_named(tmp_path, unused_port, address):
     address = address.format(port=unused_port)
     with pytest.raises(InputError, match=f"^can't reach a Ray cluster at '{address}': "):
-        evaluate("random", tmp_path / "out", ray_address=address, **FEW)
+        evaluate("random", out=tmp_path / "out", ray_address=address, **FEW)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -66,16 +66,16 @@ def folder(tmp_path_factory) -> pathlib.Path:
 
 
 def test_ray_gives_the_same_bytes(folder, tmp_path):
-    evaluate("random", tmp_path / "here", record=True, **FEW)
-    summary = evaluate("random", tmp_path / "ray", record=True, workers=2, ray_address="local", **FEW)
+    evaluate("random", out=tmp_path / "here", record=True, **FEW)
+    summary = evaluate("random", out=tmp_path / "ray", record=True, workers=2, ray_address="local", **FEW)
     assert summary.overall.n == 40
     assert results_of(tmp_path / "ray") == results_of(tmp_path / "here")
 
 
 def test_a_lost_task_is_run_again(folder, tmp_path):
-    evaluate("cluster_at_hand:Mortal", tmp_path / "out", num_envs=4, workers=1, ray_address="local", **FEW)
+    evaluate("cluster_at_hand:Mortal", out=tmp_path / "out", num_envs=4, workers=1, ray_address="local", **FEW)
     assert (folder / "died").exists()
-    evaluate("cluster_at_hand:Mortal", tmp_path / "unbroken", **FEW)
+    evaluate("cluster_at_hand:Mortal", out=tmp_path / "unbroken", **FEW)
     assert results_of(tmp_path / "out") == results_of(tmp_path / "unbroken")
 
 

@@ -25,6 +25,7 @@ from mazebench.maps.kinds import generate
 from mazebench.maps.text import write_text_maze
 from mazebench.results.frozen_oracle import frozen_oracle_steps
 from mazebench.results.reading import load_result
+from mazebench.tasks.task import Task, evaluation_task
 from mazebench.tasks.trials import frozen_trials
 
 PERTURBATIONS = ("map_flip", "map_warp", "position_noise")
@@ -34,14 +35,14 @@ LEVELS = [{"position_noise": 0.5}, {"map_flip": 0.3}, {"map_warp": 0.2}]
 @pytest.fixture(scope="module")
 def random_run(tmp_path_factory) -> pathlib.Path:
     folder = tmp_path_factory.mktemp("runs") / "random"
-    evaluate("random", folder, **FEW)
+    evaluate("random", out=folder, **FEW)
     return folder
 
 
 @pytest.fixture(scope="module")
 def planner_run(tmp_path_factory) -> pathlib.Path:
     folder = tmp_path_factory.mktemp("runs") / "planner"
-    evaluate("planner", folder, **FEW)
+    evaluate("planner", out=folder, **FEW)
     return folder
 
 
@@ -81,16 +82,8 @@ class TestResults:
     def test_the_summary_tells_what_was_run_and_what_came_of_it(self, planner_run):
         summary = summary_of(planner_run)
         assert {path.name for path in planner_run.iterdir()} == FILES
-        expected = {
-            "agent": "planner",
-            "task": "local",
-            "size": 13,
-            "split": "eval",
-            "benchmark": "paper",
-            "episodes": 40,
-        }
-        assert expected.items() <= summary.items()
-        assert summary["perturbation"] == dict.fromkeys(PERTURBATIONS, 0.0)
+        assert (summary["agent"], summary["benchmark"], summary["episodes"]) == ("planner", "paper", 40)
+        assert Task.from_json(summary["task"]) == evaluation_task(distances=FEW["distances"])
         assert list(summary["by_distance"]) == ["1", "2"]
         for row in (summary["overall"], *summary["by_distance"].values()):
             assert row["success_rate"] == 1.0
@@ -120,8 +113,8 @@ class TestResults:
             assert expected.items() <= record.items()
 
     def test_hierarchical_episodes_lead_from_corner_to_corner(self, tmp_path):
-        summary = evaluate("planner", tmp_path, task="hierarchical")
-        assert (summary.task, summary.episodes, summary.overall.success_rate) == ("hierarchical", 20, 1.0)
+        summary = evaluate("planner", out=tmp_path, task="hierarchical")
+        assert (summary.task.task, summary.episodes, summary.overall.success_rate) == ("hierarchical", 20, 1.0)
         records = records_of(tmp_path)
         assert {tuple(record["start"] + record["goal"]) for record in records} == {(1, 11, 11, 1)}
         assert max(record["steps"] for record in records) > 100  # each landmark restarts the clock
@@ -130,7 +123,7 @@ class TestResults:
 class TestAgents:
     def test_a_class_and_its_name_give_the_same_records(self, tmp_path):
         for out, agent in (("class", Ahead), ("name", f"{__name__}:Ahead")):
-            assert evaluate(agent, tmp_path / out, **FEW).agent == f"{__name__}:Ahead"
+            assert evaluate(agent, out=tmp_path / out, **FEW).agent == f"{__name__}:Ahead"
         assert results_of(tmp_path / "class") == results_of(tmp_path / "name")
 
     def test_a_class_of_a_script_is_evaluated_in_this_process_only(self, tmp_path):
@@ -177,16 +170,16 @@ class TestAgents:
     def test_an_agent_that_needs_a_sensor_is_given_it_as_if_by_the_option(self, tmp_path, monkeypatch):
         monkeypatch.setattr(Witness, "inputs", [])
         monkeypatch.setattr(Witness, "needs_sensors", ("lidar",))
-        summary = evaluate(Witness, tmp_path / "declared", **FEW)
+        summary = evaluate(Witness, out=tmp_path / "declared", **FEW)
         assert Witness.inputs[0][0]["lidar"] == ((40, 32), "float32")
-        assert summary.provenance.options.model_dump()["sensors"] == ["lidar"]
-        evaluate(Witness, tmp_path / "given", sensors=("lidar",), **FEW)
+        assert summary.task.sensors == ("lidar",)
+        evaluate(Witness, out=tmp_path / "given", sensors=("lidar",), **FEW)
         assert results_of(tmp_path / "declared") == results_of(tmp_path / "given")
 
 
 class TestSeeds:
     def test_agents_draw_otherwise_with_another_seed(self, random_run, tmp_path):
-        evaluate("random", tmp_path, seed=1, **FEW)
+        evaluate("random", out=tmp_path, seed=1, **FEW)
         again, before = records_of(tmp_path), records_of(random_run)
         assert [record["seed"] for record in again] == [record["seed"] for record in before]
         assert [record["path_length"] for record in again] != [record["path_length"] for record in before]
@@ -216,42 +209,44 @@ class TestResume:
         rng = np.random.default_rng(seed)
         for _ in range(2):
             progress = kill_after(int(rng.integers(41)))
+            num_envs = int(rng.integers(1, 41))
             with pytest.raises(Killed):
-                evaluate("random", tmp_path, resume=True, num_envs=int(rng.integers(1, 41)), progress=progress, **FEW)
+                evaluate("random", out=tmp_path, resume=True, num_envs=num_envs, progress=progress, **FEW)
             with (tmp_path / "journal.jsonl").open("r+b") as journal:
                 size = journal.seek(0, os.SEEK_END)
                 journal.truncate(max(0, size - int(rng.integers(500))))
-        evaluate("random", tmp_path, resume=True, **FEW)
+        evaluate("random", out=tmp_path, resume=True, **FEW)
         assert {path.name for path in tmp_path.iterdir()} == FILES
         assert results_of(tmp_path) == results_of(random_run)
         assert summary_of(tmp_path)["overall"] == summary_of(random_run)["overall"]
 
     @pytest.mark.parametrize("num_files", range(4))
     def test_a_run_goes_on_wherever_its_end_was_killed(self, tmp_path, num_files):
-        evaluate("random", tmp_path / "whole", record=True, **FEW)
+        evaluate("random", out=tmp_path / "whole", record=True, **FEW)
         out = tmp_path / "out"
         with pytest.raises(Killed):
-            evaluate("random", out, record=True, progress=kill_after(40), **FEW)
+            evaluate("random", out=out, record=True, progress=kill_after(40), **FEW)
         for name in ("episodes.jsonl", "trajectories.npz", "summary.json")[:num_files]:
             shutil.copy(tmp_path / "whole" / name, out)
         (out / "summary.json.tmp").write_text('{"agent')
         calls = []
-        evaluate("random", out, resume=True, progress=lambda ended, of: calls.append((ended, of)), **FEW)
+        evaluate("random", out=out, resume=True, progress=lambda ended, of: calls.append((ended, of)), **FEW)
         assert calls == [(40, 40)]
         assert results_of(out) == results_of(tmp_path / "whole")
         assert {path.name for path in out.iterdir()} == RECORDED
 
     def test_a_finished_run_is_not_run_again(self, random_run):
         before = files_of(random_run)
-        evaluate("random", random_run, resume=True, **FEW)
+        evaluate("random", out=random_run, resume=True, **FEW)
         assert files_of(random_run) == before
 
     def test_trajectories_that_are_wanted_later_are_recorded(self, random_run, tmp_path):
         shutil.copytree(random_run, tmp_path / "out")
+        out = tmp_path / "out"
         with pytest.raises(Killed):
-            evaluate("random", tmp_path / "out", resume=True, record=True, num_envs=3, progress=kill_after(5), **FEW)
-        evaluate("random", tmp_path / "out", resume=True, record=True, **FEW)
-        evaluate("random", tmp_path / "whole", record=True, **FEW)
+            evaluate("random", out=out, resume=True, record=True, num_envs=3, progress=kill_after(5), **FEW)
+        evaluate("random", out=tmp_path / "out", resume=True, record=True, **FEW)
+        evaluate("random", out=tmp_path / "whole", record=True, **FEW)
         assert results_of(tmp_path / "out") == results_of(tmp_path / "whole")
 
 
@@ -260,7 +255,7 @@ class TestOracle:
 
     def test_frozen_ones_are_copied(self, planner_run):
         trials = [trial for trial in frozen_trials("local", 13) if trial.distance <= 2][::5]
-        steps = frozen_oracle_steps("paper", "local", 13, "eval", trials)
+        steps = frozen_oracle_steps(Task.of(split="eval"), trials)
         result = load_result(planner_run)
         assert result.oracle_steps == steps
         on_time = [record.steps <= 2 * limit for record, limit in zip(result.records, steps, strict=True)]
@@ -268,10 +263,10 @@ class TestOracle:
 
     def test_it_plays_first_where_none_are_frozen(self, tmp_path):
         with pytest.raises(Killed):
-            evaluate("planner", tmp_path / "planner", split="train", progress=kill_after(0), **FEW)
+            evaluate("planner", out=tmp_path / "planner", split="train", progress=kill_after(0), **FEW)
         with pytest.raises(Killed):
-            evaluate("planner", tmp_path / "planner", split="train", resume=True, progress=kill_after(1), **FEW)
-        summary = evaluate("oracle", tmp_path / "oracle", split="train", **FEW)
+            evaluate("planner", out=tmp_path / "planner", split="train", resume=True, progress=kill_after(1), **FEW)
+        summary = evaluate("oracle", out=tmp_path / "oracle", split="train", **FEW)
         assert summary.overall.on_time == {"1.25": 1.0, "2": 1.0}
         steps = [record["steps"] for record in records_of(tmp_path / "oracle")]
         for folder in tmp_path.iterdir():
@@ -279,15 +274,15 @@ class TestOracle:
 
     def test_it_does_not_play_again_in_a_run_that_goes_on(self, tmp_path):
         with pytest.raises(Killed):
-            evaluate("planner", tmp_path, split="train", progress=kill_after(1), **FEW)
+            evaluate("planner", out=tmp_path, split="train", progress=kill_after(1), **FEW)
         (tmp_path / "oracle.json").write_text(json.dumps({"steps": [None] * 40}))  # unlike the true ones
-        summary = evaluate("planner", tmp_path, split="train", resume=True, **FEW)
+        summary = evaluate("planner", out=tmp_path, split="train", resume=True, **FEW)
         assert summary.overall.on_time == {"1.25": 1.0, "2": 1.0}
 
     def test_what_is_wrong_with_the_map_and_the_senses_does_not_change_them(self, tmp_path):
         wrong = {"map_flip": 0.3, "odometry_noise": 0.2, "sensors": ("lidar",), "hide": ("map",)}
-        evaluate("random", tmp_path / "right", split="train", **FEW)
-        evaluate("random", tmp_path / "wrong", split="train", **FEW | wrong)
+        evaluate("random", out=tmp_path / "right", split="train", **FEW)
+        evaluate("random", out=tmp_path / "wrong", split="train", **FEW | wrong)
         assert (tmp_path / "right" / "oracle.json").read_bytes() == (tmp_path / "wrong" / "oracle.json").read_bytes()
 
     def test_those_of_other_episodes_are_refused(self, planner_run, tmp_path):
@@ -301,7 +296,7 @@ class TestRefused:
     def test_a_folder_that_holds_a_run_is_refused_without_resume(self, random_run):
         before = files_of(random_run)
         with pytest.raises(InputError, match=r"holds a run already; go on with --resume or name another folder$"):
-            evaluate("random", random_run, **FEW)
+            evaluate("random", out=random_run, **FEW)
         assert files_of(random_run) == before
 
     @pytest.mark.parametrize(
@@ -317,24 +312,24 @@ class TestRefused:
         shutil.copytree(random_run, tmp_path / "run")
         before = files_of(tmp_path)
         with pytest.raises(InputError, match=rf"run: holds another run: its {named} is .*, this one's "):
-            evaluate(agent, tmp_path / "run", resume=True, **FEW | changes)
+            evaluate(agent, out=tmp_path / "run", resume=True, **FEW | changes)
         assert files_of(tmp_path) == before
 
     @pytest.mark.parametrize("resume", [False, True])
     def test_a_folder_that_holds_other_things_is_refused(self, tmp_path, resume):
         (tmp_path / "thesis.tex").touch()
         with pytest.raises(InputError, match=r"expected an empty folder or an evaluation's, found 'thesis\.tex' in"):
-            evaluate("random", tmp_path, resume=resume, **FEW)
+            evaluate("random", out=tmp_path, resume=resume, **FEW)
         assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
     def test_an_agent_whose_file_was_changed_is_refused(self, tmp_path, monkeypatch):
         monkeypatch.syspath_prepend(tmp_path)
         module = tmp_path / "changing_at_hand.py"
         module.write_text(f"{IMPORTS}class Mine(SingleAgent):\n    def act(self, observation):\n        return 0\n")
-        evaluate("changing_at_hand:Mine", tmp_path / "out", **FEW)
+        evaluate("changing_at_hand:Mine", out=tmp_path / "out", **FEW)
         module.write_text(module.read_text().replace("return 0", "return 1"))
         with pytest.raises(InputError, match=r"out: holds another run: its agent's file was changed since"):
-            evaluate("changing_at_hand:Mine", tmp_path / "out", resume=True, **FEW)
+            evaluate("changing_at_hand:Mine", out=tmp_path / "out", resume=True, **FEW)
 
     @pytest.mark.parametrize(
         ("options", "message"),
@@ -352,29 +347,29 @@ class TestRefused:
 
     def test_an_agent_that_cannot_play_leaves_no_folder(self, tmp_path):
         with pytest.raises(UnplayableError, match="its checkpoint reads maps of 13 x 13 only, found 15 x 15"):
-            evaluate("mmn", tmp_path / "out", size=15, **FEW)
+            evaluate("mmn", out=tmp_path / "out", size=15, **FEW)
         assert list(tmp_path.iterdir()) == []
 
 
 class TestMaps:
     def test_mazes_of_ones_own_come_from_a_folder_or_a_file(self, map_folder, tmp_path):
         options = {"distances": (3, 9), "episodes_per_distance": 4}
-        summary = evaluate("planner", tmp_path / "out", mazes=str(map_folder), **options)
-        assert (summary.split, summary.size, summary.episodes) == ("custom", 9, 16)
+        summary = evaluate("planner", out=tmp_path / "out", mazes=str(map_folder), **options)
+        assert (summary.task.split_in_results, summary.task.size, summary.episodes) == ("custom", 9, 16)
         assert summary.overall.success_rate == 1.0
         assert [record["maze"] for record in records_of(tmp_path / "out")] == ["a"] * 8 + ["b"] * 8
         assert evaluate("planner", mazes=str(map_folder / "b.txt"), size=9, **options).episodes == 8
 
     def test_a_run_does_not_go_on_in_mazes_that_were_changed(self, map_folder, tmp_path):
         maps = shutil.copytree(map_folder, tmp_path / "maps")
-        evaluate("random", tmp_path / "out", mazes=str(maps), **FEW)
+        evaluate("random", out=tmp_path / "out", mazes=str(maps), **FEW)
         shutil.copy(maps / "a.txt", maps / "b.txt")
         with pytest.raises(InputError, match="holds another run: its mazes_sha256 is"):
-            evaluate("random", tmp_path / "out", mazes=str(maps), resume=True, **FEW)
+            evaluate("random", out=tmp_path / "out", mazes=str(maps), resume=True, **FEW)
 
     def test_the_seed_draws_episodes_that_are_not_frozen(self, map_folder, tmp_path):
         for seed, name in ((0, "first"), (0, "again"), (1, "other")):
-            evaluate("planner", tmp_path / name, mazes=str(map_folder), distances=(5,), seed=seed)
+            evaluate("planner", out=tmp_path / name, mazes=str(map_folder), distances=(5,), seed=seed)
         first, again, other = (records_of(tmp_path / name) for name in ("first", "again", "other"))
         assert first == again
         assert [record["start"] for record in first] != [record["start"] for record in other]
@@ -384,7 +379,7 @@ class TestPerturbations:
     @pytest.mark.parametrize("level", LEVELS, ids=lambda level: next(iter(level)))
     def test_the_world_stays_as_it_is(self, random_run, tmp_path, level):
         # The random agent looks at nothing, so that it drives the same ways.
-        summary = evaluate("random", tmp_path, **level, **FEW)
-        assert summary.perturbation == dict.fromkeys(PERTURBATIONS, 0.0) | level
-        expected = [record | summary.perturbation for record in records_of(random_run)]
+        summary = evaluate("random", out=tmp_path, **level, **FEW)
+        assert summary.task.perturbations == dict.fromkeys(PERTURBATIONS, 0.0) | level
+        expected = [record | summary.task.perturbations for record in records_of(random_run)]
         assert records_of(tmp_path) == expected

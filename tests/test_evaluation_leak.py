@@ -38,7 +38,7 @@ def test_a_planner_that_undoes_flips_with_its_seed_does_no_better(monkeypatch, t
     options = {"split": "train", "distances": (10,), "episodes_per_distance": 2, "map_flip": 0.1}
 
     def successes(agent: str | type[Agent], out: pathlib.Path) -> np.ndarray:
-        evaluate(agent, out, **options)
+        evaluate(agent, out=out, **options)
         return np.array([record["success"] for record in records_of(out)], dtype=float)
 
     honest = successes("planner-closed-loop", tmp_path / "honest")

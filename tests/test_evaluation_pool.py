@@ -41,7 +41,7 @@ def _agents_at_hand(tmp_path, monkeypatch):
 
 def test_the_bytes_do_not_depend_on_workers_or_environments(tmp_path):
     for folder, running in (("one", {}), ("few", {"num_envs": 7}), ("workers", {"workers": 2, "num_envs": 5})):
-        evaluate("random", tmp_path / folder, record=True, map_flip=0.1, **running, **FEW)
+        evaluate("random", out=tmp_path / folder, record=True, map_flip=0.1, **running, **FEW)
         assert results_of(tmp_path / folder) == results_of(tmp_path / "one")
 
 
@@ -49,11 +49,11 @@ def test_the_bytes_do_not_depend_on_workers_or_environments(tmp_path):
 def test_a_killed_worker_is_named_and_what_ended_is_kept(tmp_path):
     out = tmp_path / "out"
     with pytest.raises(RunError, match=r"^a worker process ended abruptly; go on with --resume$"):
-        evaluate("pool_at_hand:Mortal", out, workers=1, **FEW)
+        evaluate("pool_at_hand:Mortal", out=out, workers=1, **FEW)
     calls = []
-    evaluate("pool_at_hand:Mortal", out, workers=1, resume=True, progress=lambda *call: calls.append(call), **FEW)
+    evaluate("pool_at_hand:Mortal", out=out, workers=1, resume=True, progress=lambda *call: calls.append(call), **FEW)
     assert calls[0] == (80, 160)
-    evaluate("pool_at_hand:Mortal", tmp_path / "unbroken", **FEW)
+    evaluate("pool_at_hand:Mortal", out=tmp_path / "unbroken", **FEW)
     assert records_of(out) == records_of(tmp_path / "unbroken")
 
 
@@ -61,7 +61,7 @@ def test_a_killed_worker_is_named_and_what_ended_is_kept(tmp_path):
 def test_an_agents_error_in_a_worker_is_one_line(tmp_path):
     said = re.escape("agent 'pool_at_hand:Failing': act() raised ValueError: several lines (pool_at_hand.py:")
     with pytest.raises(RunError, match=rf"^{said}\d+\)$"):
-        evaluate("pool_at_hand:Failing", tmp_path / "out", workers=2, **FEW)
+        evaluate("pool_at_hand:Failing", out=tmp_path / "out", workers=2, **FEW)
 
 
 @pytest.mark.usefixtures("nothing_left")

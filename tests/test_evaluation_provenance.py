@@ -15,7 +15,7 @@ from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.provenance import checkpoint_metadata, code_hash, provenance
 from mazebench.maps.benchmark import manifest_hash
-from mazebench.tasks.build import build_task
+from mazebench.tasks.task import Task
 
 
 def write_checkpoint(path, metadata: object) -> str:
@@ -26,22 +26,20 @@ def write_checkpoint(path, metadata: object) -> str:
 
 
 def test_versions_options_and_machine_are_in_the_summary(tmp_path):
-    evaluate("planner", tmp_path, seed=3, **FEW)
+    evaluate("planner", out=tmp_path, seed=3, **FEW)
     found = summary_of(tmp_path)["provenance"]
     assert set(found) == {
-        *("options", "benchmark_manifest_sha256", "mazes_sha256", "checkpoint_sha256", "benchmark", "task_version"),
+        *("checkpoint", "benchmark_manifest_sha256", "mazes_sha256", "checkpoint_sha256", "task_version"),
         *("checkpoint_metadata", "agent_class", "agent_package", "agent_code_sha256", "seed", "command", "python"),
-        *("packages", "machine", "context_size"),
+        *("packages", "machine", "episodes_per_distance"),
     }
-    assert (found["benchmark"], found["benchmark_manifest_sha256"]) == ("paper", manifest_hash())
+    assert found["benchmark_manifest_sha256"] == manifest_hash()
     assert len(found["mazes_sha256"]) == 64
-    assert found["context_size"] == 13
     assert (found["checkpoint_sha256"], found["checkpoint_metadata"]) == (None, None)
     assert found["agent_class"].startswith("mazebench_agents.planner.")
     assert found["agent_package"] == f"mazebench-mujoco {__version__}"
     assert len(found["agent_code_sha256"]) == 64
-    options = {"agent": "planner", "distances": [1, 2], "episodes_per_distance": 1, "map_flip": 0.0, "seed": 3}
-    assert options.items() <= found["options"].items()
+    assert (found["episodes_per_distance"], found["seed"]) == (1, 3)
     assert found["packages"]["mazebench-mujoco"] == __version__
     assert {"mujoco", "dm-control", "numpy", "scipy", "gymnasium", "torch"} <= set(found["packages"])
     assert {"system", "release", "processor", "cores"} <= set(found["machine"])
@@ -50,17 +48,17 @@ def test_versions_options_and_machine_are_in_the_summary(tmp_path):
 def test_a_checkpoint_is_named_by_its_hash_and_tells_its_config(tmp_path):
     checkpoint = write_checkpoint(tmp_path / "x.safetensors", {"mine": json.dumps({"config": {"width": 8}})})
     options = EvalOptions.of("mah", checkpoint=checkpoint)
-    found = provenance(options, load_agent_class("mah"), build_task(options.task, options.maze_options)).model_dump()
+    found = provenance(options, load_agent_class("mah")).model_dump()
     assert found["checkpoint_sha256"] == hashlib.sha256((tmp_path / "x.safetensors").read_bytes()).hexdigest()
     assert found["checkpoint_metadata"] == {"mine": {"config": {"width": 8}}}
-    assert found["options"]["checkpoint"] == checkpoint
+    assert found["checkpoint"] == checkpoint
 
 
 def test_a_checkpoint_that_ships_is_told_without_the_path_to_it():
     agent_class = load_agent_class("mah")
     options = EvalOptions.of("mah", checkpoint=str(agent_class.default_checkpoint()))
-    found = provenance(options, agent_class, build_task(options.task, options.maze_options)).model_dump()
-    assert found["options"]["checkpoint"] == "mah-13.safetensors"
+    found = provenance(options, agent_class).model_dump()
+    assert found["checkpoint"] == "mah-13.safetensors"
 
 
 def test_an_agent_at_hand_is_named_by_the_hash_of_its_file(tmp_path, monkeypatch):
@@ -69,7 +67,7 @@ def test_an_agent_at_hand_is_named_by_the_hash_of_its_file(tmp_path, monkeypatch
     monkeypatch.syspath_prepend(tmp_path)
     name = "provenance_at_hand:Mine"
     options = EvalOptions.of(name)
-    found = provenance(options, load_agent_class(name), build_task(options.task, options.maze_options)).model_dump()
+    found = provenance(options, load_agent_class(name)).model_dump()
     assert found["agent_code_sha256"] == hashlib.sha256(code.encode()).hexdigest()
     assert (found["agent_class"], found["agent_package"]) == (name, None)
 
@@ -100,9 +98,7 @@ def test_a_checkpoint_of_another_kind_tells_nothing(tmp_path, content):
 
 
 def test_a_summary_of_a_track_has_the_time_limit_of_its_farthest_goals(tmp_path):
-    evaluate("random", tmp_path, track="adrift", split="dev", distances=(15,))
-    options = summary_of(tmp_path)["provenance"]["options"]
+    evaluate("random", out=tmp_path, track="adrift", split="dev", distances=(15,))
+    task = Task.from_json(summary_of(tmp_path)["task"])
     records = [json.loads(line) for line in (tmp_path / "episodes.jsonl").read_text().splitlines()]
-    assert options["time_limit"] == max(record["steps"] for record in records) == 6 * 15 + 150
-    again = EvalOptions.of(**options)
-    assert build_task(again.task, again.maze_options).longest_time_limit == 240
+    assert task.longest_time_limit == max(record["steps"] for record in records) == 6 * 15 + 150

@@ -39,7 +39,7 @@ def episodes(plan) -> list[Ended]:
 @pytest.fixture(scope="module")
 def unbroken(tmp_path_factory) -> pathlib.Path:
     folder = tmp_path_factory.mktemp("unbroken") / "run"
-    evaluate("random", folder, record=True, **FEW)
+    evaluate("random", out=folder, record=True, **FEW)
     return folder
 
 
@@ -108,7 +108,7 @@ def test_what_was_written_before_the_disk_is_full_is_kept(plan, episodes, summar
             store.finish(summary)
         # No file that a reader would take for a whole one.
         assert set(files_of(tmp_path)) == {"config.json", "journal.jsonl"}
-    evaluate("random", tmp_path, resume=True, **FEW)
+    evaluate("random", out=tmp_path, resume=True, **FEW)
     names = ["config.json", "oracle.json", "episodes.jsonl"] + ["trajectories.npz"] * record
     assert results_of(tmp_path) == {name: (unbroken / name).read_bytes() for name in names}
 

@@ -9,15 +9,16 @@ import pytest
 from run_folders import IMPORTS, RECORDED, Killed, files_of, kill_after, results_of, summary_of
 
 from mazebench.errors import InputError, Remark, RunError, UnplayableError
-from mazebench.evaluation.eval_options import EvalOptions, RunOptions
+from mazebench.evaluation.eval_options import RunOptions
 from mazebench.evaluation.suites import SUITES, Part, run_suite
 from mazebench.maps.benchmark import SIZES
 from mazebench.results.comparison import compare_folders
+from mazebench.tasks.task import evaluation_task
 
 TINY = (
-    Part("near", {"distances": (1, 2), "episodes_per_distance": 1}),
-    Part("noise-0.5", {"distances": (1,), "position_noise": 0.5, "episodes_per_distance": 1}),
-    Part("warp-0.2", {"distances": (3,), "map_warp": 0.2, "episodes_per_distance": 1}),
+    Part("near", "local", {"distances": (1, 2)}, 1),
+    Part("noise-0.5", "local", {"distances": (1,), "position_noise": 0.5}, 1),
+    Part("warp-0.2", "local", {"distances": (3,), "map_warp": 0.2}, 1),
 )
 PARTS = [part.name for part in TINY]
 BOTH = ["planner", "random"]
@@ -42,22 +43,23 @@ class TestParts:
     def test_no_part_is_run_twice(self, suite):
         parts = SUITES[suite]
         assert len({part.name for part in parts}) == len(parts)
-        assert len({EvalOptions.of("random", **part.changes) for part in parts}) == len(parts)
+        tasks = {(evaluation_task(part.task, **part.options), part.episodes_per_distance) for part in parts}
+        assert len(tasks) == len(parts)
 
     def test_the_suite_paper_is_the_papers_protocol(self):
-        paper = {part.name: EvalOptions.of("random", **part.changes) for part in SUITES["paper"]}
+        paper = {part.name: evaluation_task(part.task, **part.options) for part in SUITES["paper"]}
         assert list(paper) == [
             *(f"local-{size}" for size in SIZES),
             *(f"hierarchical-13-k{cells}" for cells in range(1, 6)),
             *("flip-0.05", "flip-0.1", "flip-0.2", "flip-0.3", "warp-0.05", "warp-0.1", "warp-0.2"),
             *(f"noise-{level}" for level in ("0.1", "0.2", "0.3", "0.4", "0.5", "0.6", "0.7", "0.8", "0.9", "1.0")),
         ]
-        assert paper["local-13"].task.distances == ()  # 1 to 15
-        assert paper["local-21"].maze_options.size == 21
-        corners, flipped = paper["hierarchical-13-k2"].task, paper["flip-0.3"].task
+        assert paper["local-13"].distances == tuple(range(1, 16))
+        assert paper["local-21"].size == 21
+        corners, flipped = paper["hierarchical-13-k2"], paper["flip-0.3"]
         assert (corners.task, corners.landmark_distance) == ("hierarchical", 2)
         assert (flipped.task, flipped.map_flip) == ("hierarchical", 0.3)
-        assert (paper["warp-0.1"].task.distances, paper["warp-0.1"].task.map_warp) == ((2, 4, 6, 8, 10), 0.1)
+        assert (paper["warp-0.1"].distances, paper["warp-0.1"].map_warp) == ((2, 4, 6, 8, 10), 0.1)
         assert (paper["noise-1.0"].task.distances, paper["noise-1.0"].task.position_noise) == ((2, 4, 6, 8, 10), 1.0)
 
 
@@ -137,8 +139,8 @@ class TestPartsThatCannotBePlayed:
     def mixed(self, monkeypatch):
         parts = (
             *TINY[:2],
-            Part("corners", {"task": "hierarchical"}),
-            Part("flips", {"task": "hierarchical", "map_flip": 0.1}),
+            Part("corners", "hierarchical", {}),
+            Part("flips", "hierarchical", {"map_flip": 0.1}),
         )
         monkeypatch.setitem(SUITES, "mixed", parts)
 

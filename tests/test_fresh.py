@@ -23,12 +23,10 @@ from mazebench.evaluation.plan import make_plan
 from mazebench.maps import drawn
 from mazebench.maps.drawn import FreshMazes, draw_mazes
 from mazebench.maps.text import format_maze
-from mazebench.options import from_names
-from mazebench.tasks.task import Task
 from mazebench.tasks.episode import sample_episode
+from mazebench.tasks.task import Task
 from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.loop import train
-from mazebench.training.train_options import TrainOptions
 from mazebench.world.mjcf import action_controls
 from mazebench.world.models import MazeModels
 from mazebench.world.ray_casting import Lidar
@@ -82,7 +80,7 @@ class TestDrawnMazes:
         options = EvalOptions.of("random", kinds="house", num_mazes=2, distances=(3,), episodes_per_distance=1)
         plan = make_plan(options)
         assert [maze.name for maze in plan.task.all_mazes] == ["house-13-dev-00", "house-13-dev-01"]
-        assert plan.labels["split"] == "custom"
+        assert plan.task.split_in_results == "custom"
         with pytest.raises(InputError, match="expected no fresh mazes in an evaluation"):
             EvalOptions.of("random", fresh=True)
 
@@ -181,26 +179,24 @@ class TestEnvironments:
 
 
 def options(**changes):
-    overrides = tuple((name, str(value)) for name, value in TINY.items() if name != "channels")
-    values = {"checkpoint_steps": 480, "eval_mazes": 1, "env_steps": 960}
-    return from_names(
-        TrainOptions, {"kinds": KINDS, "fresh": True, **values, **changes}, agent="dqn", overrides=overrides
-    )
+    overrides = {name: value for name, value in TINY.items() if name != "channels"}
+    values = {"agent": "dqn", "overrides": overrides, "checkpoint_steps": 480, "eval_mazes": 1, "env_steps": 960}
+    return {"kinds": KINDS, "fresh": True, **values, **changes}
 
 
 class TestTraining:
     def test_a_run_in_fresh_mazes_that_is_resumed_equals_the_unbroken_one(self, tmp_path):
-        train(options(), tmp_path / "unbroken")
-        train(options(env_steps=480), tmp_path / "resumed")
+        train(**options(), out=tmp_path / "unbroken")
+        train(**options(env_steps=480), out=tmp_path / "resumed")
         drawn._fresh_maze.cache_clear()
-        train(options(), tmp_path / "resumed", resume=True)
+        train(**options(), out=tmp_path / "resumed", resume=True)
         for name in ("agent.safetensors", "training.safetensors", "random.json", "replay.npz"):
             files = [tmp_path / run / "checkpoints" / "000000000960" / name for run in ("unbroken", "resumed")]
             assert files[0].read_bytes() == files[1].read_bytes(), name
         config = json.loads((tmp_path / "resumed" / "config.json").read_text())
-        assert config["mazes"] == {"kinds": list(KINDS), "num_mazes": 0, "fresh": True}
-        with pytest.raises(InputError, match="holds another run, differing in 'mazes'"):
-            train(options(fresh=False), tmp_path / "resumed", resume=True)
+        assert config["task"]["kinds"] == list(KINDS)
+        with pytest.raises(InputError, match="holds another run, differing in 'task'"):
+            train(**options(fresh=False), out=tmp_path / "resumed", resume=True)
 
     def test_held_out_mazes_are_of_the_kinds_that_are_trained_in(self):
         evaluation = HeldOutEvaluation(Task.of(kinds=KINDS, fresh=True), 4)
@@ -209,6 +205,6 @@ class TestTraining:
     def test_maps_of_your_own_are_trained_and_evaluated_in(self, tmp_path):
         path = tmp_path / "plan.txt"
         path.write_text(format_maze(draw_mazes(("house",), 13, "dev", 1)[0]))
-        train(options(mazes=str(path), kinds=(), fresh=False, env_steps=480), tmp_path / "run")
-        assert "sha256" in json.loads((tmp_path / "run" / "config.json").read_text())["mazes"]
+        train(**options(mazes=str(path), kinds=(), fresh=False, env_steps=480), out=tmp_path / "run")
+        assert "sha256" in json.loads((tmp_path / "run" / "config.json").read_text())["task"]["mazes"]
         assert HeldOutEvaluation(Task.of(mazes=str(path)), 4).task.mazes[0].name == "plan"

@@ -14,8 +14,8 @@ from mazebench.errors import InputError, UnplayableError
 from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.plan import make_plan
-from mazebench.tasks.task import Task
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, START
+from mazebench.tasks.task import Task
 
 
 @pytest.mark.parametrize(
@@ -49,9 +49,10 @@ class Asks(SingleAgent):
 
 
 def test_the_agent_and_the_summary_are_told(tmp_path):
-    summary = evaluate(Asks, tmp_path / "run", hide=("goal", "map"), distances=(1,), episodes_per_distance=1)
-    assert Asks.told == ("goal", "map")
-    assert summary.hide == json.loads((tmp_path / "run" / "summary.json").read_text())["hide"] == "map,goal"
+    summary = evaluate(Asks, out=tmp_path / "run", hide=("goal", "map"), distances=(1,), episodes_per_distance=1)
+    assert Asks.told == ("map", "goal")
+    assert summary.task.hide == ("map", "goal")
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["task"]["hide"] == ["map", "goal"]
     assert summary.who.endswith("Asks without map and goal")
     line = json.loads((tmp_path / "run" / "episodes.jsonl").read_text().splitlines()[0])
     assert "hide" not in line  # records do not change

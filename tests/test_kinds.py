@@ -14,10 +14,10 @@ from mazebench.maps.kinds import CHECK, KINDS, KNOWN, NOVEL, generate
 from mazebench.maps.kinds.dfs import dfs_walls
 from mazebench.maps.maze import Maze, corner_cells
 from mazebench.maps.text import format_maze, parse_maze
-from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.route import plan_route
 from mazebench.tasks.shown_map import show_map
+from mazebench.tasks.task import Task
 
 DFS_7_OF_SEED_0 = """\
 #######

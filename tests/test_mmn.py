@@ -18,8 +18,8 @@ from small_world import learn
 from mazebench.agent import Interface
 from mazebench.errors import UnplayableError
 from mazebench.maps.kinds import generate
-from mazebench.tasks.task import Task
 from mazebench.tasks.context import START
+from mazebench.tasks.task import Task
 from mazebench.training.experience import Collector
 
 SMALL = MMNConfig(hidden=16, head_hidden=16, latent=8, embedding=8, task_code=8, groups=4, num_envs=8, min_rows=100)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Annotated, Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 from annotated_types import Ge, Interval
 
 from mazebench.errors import InputError
-from mazebench.options import Doc, OneOf, from_names, options
+from mazebench.options import Doc, OneOf, options
 
 
 @options
@@ -24,13 +23,6 @@ class Given(Base):
     colour: Annotated[str, OneOf("red", "blue"), Doc("Which one.")] = "red"
     sizes: Annotated[tuple[Annotated[int, Ge(3)], ...], Doc("All sizes.")] = (3, 4)
     name: str = "no option"
-
-
-@options
-class Whole:
-    agent: str = dataclasses.field(kw_only=False)
-    given: Given = Given(colour="blue")
-    seed: Annotated[int, Ge(0), Doc("A seed.")] = 0
 
 
 @pytest.mark.parametrize(
@@ -62,8 +54,3 @@ def test_numpy_numbers_and_a_default_of_none_are_allowed():
 @pytest.mark.parametrize("sizes", [[5], iter([5]), np.array([5]), 5])
 def test_any_iterable_and_a_single_value_become_a_tuple(sizes: Any):
     assert Given(sizes=sizes).sizes == (5,)
-
-
-def test_a_name_that_no_option_has_is_refused():
-    with pytest.raises(InputError, match="unknown option 'hue'; available: colour, count, seed, share, sizes"):
-        from_names(Whole, {"hue": 1}, agent="mmn")

@@ -4,26 +4,33 @@ from __future__ import annotations
 
 import pathlib
 import re
+from collections.abc import Iterable
 
-from mazebench.maps.maze_options import DrawnOptions, ReadOptions
-from mazebench.options import Option, options_of
-from mazebench.tasks.task import TaskOptions, Variants
+from mazebench.maps.maze_options import ReadOptions
+from mazebench.options import Option, fields_of
+from mazebench.tasks.task import Task
 
 PAGE = pathlib.Path(__file__).parent.parent / "docs" / "options.md"
 DERIVED_TABLE = re.compile(r"\| option \| default \| values \| what \|\n(?:\|.*\n)+")
 
 
+OF_MAZES = ("size", "split", "mazes", "kinds", "num_mazes", "fresh")
+
+
 def derived_tables() -> list[str]:
-    """Returns the tables of the options of mazes and of tasks, in the order of the page."""
-    return [derived_table(DrawnOptions), derived_table(ReadOptions), derived_table(TaskOptions, Variants)]
+    """Returns the tables of the options of mazes, of reading them and of tasks, in the order of the page."""
+    others = [name for name in fields_of(Task) if name not in (*OF_MAZES, *fields_of(ReadOptions))]
+    of_sensors = [name for name in others if name not in Task.__annotations__]
+    others = [name for name in others if name not in of_sensors] + of_sensors
+    return [derived_table(OF_MAZES), derived_table(fields_of(ReadOptions)), derived_table(others)]
 
 
-def derived_table(*classes: type) -> str:
-    """Returns the table of the fields of some classes: of each its own first, then those of base classes."""
+def derived_table(names: Iterable[str]) -> str:
+    """Returns the table of some fields of a task."""
     lines = ["| option | default | values | what |\n", "|---|---|---|---|\n"]
-    for each in classes:
-        for name, option in sorted(options_of(each).items(), key=lambda item: item[0] not in each.__annotations__):
-            lines.append(f"| `{name}` | `{option.default!r}` | {values(option)} | {option.help} |\n")
+    for name in names:
+        option = fields_of(Task)[name]
+        lines.append(f"| `{name}` | `{option.default!r}` | {values(option)} | {option.help} |\n")
     return "".join(lines)
 
 

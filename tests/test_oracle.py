@@ -109,7 +109,7 @@ class TestOracle:
     def test_frozen_steps_are_those_that_it_takes(self):
         trials = frozen_trials("local", 13)[::50]
         task = Task.of(size=13, split="eval")
-        frozen = frozen_oracle.frozen_oracle_steps("paper", "local", 13, "eval", trials)
+        frozen = frozen_oracle.frozen_oracle_steps(task, trials)
         assert frozen == measure_oracle_steps(task, trials)
 
     def test_frozen_steps_that_were_changed_are_refused(self, monkeypatch):

@@ -25,8 +25,8 @@ from mazebench.maps.text import format_maze
 from mazebench.report.episodes import read_results
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
-from mazebench.tasks.task import Task
 from mazebench.tasks.episode import sample_episode
+from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
 from mazebench.world.mjcf import action_controls
 from mazebench.world.models import models_of
@@ -52,7 +52,7 @@ def scaled(tmp_path_factory):
     folder = tmp_path_factory.mktemp("scaled")
     (folder / "maze.txt").write_text(format_maze(dfs(13)))
     options = {"mazes": folder / "maze.txt", "cell_size": 0.5, "sensors": ("lidar",), "episodes_per_distance": 1}
-    mazebench.evaluate("oracle", folder / "oracle", record=True, **options)
+    mazebench.evaluate("oracle", out=folder / "oracle", record=True, **options)
     return folder / "oracle"
 
 
@@ -250,10 +250,10 @@ class TestEvaluation:
 
     def test_given_ends_are_not_the_frozen_benchmark(self, tmp_path):
         options = {"start": "1,1", "goal": "11.5m,1.5m", "episodes_per_distance": 1}
-        summary = mazebench.evaluate("planner-closed-loop", tmp_path, **options)
-        assert (summary.split, summary.episodes) == ("custom", 20)
+        summary = mazebench.evaluate("planner-closed-loop", out=tmp_path, **options)
+        assert (summary.task.split_in_results, summary.episodes) == ("custom", 20)
         assert load_result(tmp_path).oracle_steps == tuple(json.loads((tmp_path / "oracle.json").read_text())["steps"])
-        assert summary.provenance.options.start == "1,1"
+        assert summary.task.start == "1,1"
         records = load_result(tmp_path).records
         assert {(record.start, record.goal) for record in records} == {((1, 1), (11, 11))}
         assert {record.distance for record in records} == {20, 24, 28, 32, 36}
@@ -261,7 +261,7 @@ class TestEvaluation:
 
     def test_lengths_are_in_metres(self, scaled):
         summary, records = load_result(scaled).summary, load_result(scaled).records
-        assert summary.cell_size == 0.5
+        assert summary.task.cell_size == 0.5
         assert summary.overall.success_rate == 1.0
         for record in records:
             grid = record.distance * 0.5

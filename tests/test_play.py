@@ -14,8 +14,8 @@ import pytest
 from mazebench.maps.maze import Maze
 from mazebench.play import viewer
 from mazebench.play.game import LETTERS, Game
-from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.task import Task
 
 SECONDS = 60  # to wait for what must come
 

@@ -188,7 +188,7 @@ class TestOwnMaps:
         rows = ["#" * 30, *["#" + "." * 13 + "#" + "." * 14 + "#"] * 13, *["#" + "." * 28 + "#"] * 15, "#" * 30]
         (tmp_path / "hall.txt").write_text("\n".join(rows) + "\n")
         hall = {"mazes": str(tmp_path / "hall.txt"), "distances": [5], "episodes_per_distance": 1}
-        evaluate("random", tmp_path / "results", record=True, **hall)
+        evaluate("random", out=tmp_path / "results", record=True, **hall)
         write_report([tmp_path / "results"], tmp_path / "report")
         load_anew(browser, tmp_path / "report" / "report.html")
         assert browser.run("view.current.side") == 21

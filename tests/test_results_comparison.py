@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_results import edit_summary, make_record, make_result
+from made_results import edit_task, make_record, make_result
 
 from mazebench.errors import InputError
 from mazebench.results.comparison import Comparison, compare_folders, compare_results, to_json
 from mazebench.results.intervals import difference_interval
 from mazebench.results.metrics import summarize
 from mazebench.results.reading import Result
-from mazebench.results.records import Provenance, Record, Summary, TaskProvenance
+from mazebench.results.records import Provenance, Record, Summary
+from mazebench.tasks.task import Task
 
 
 def record(index: int, maze: str, distance: int, success: bool, spl: float) -> Record:
@@ -24,13 +25,10 @@ def result(folder, records: list[Record], **changes) -> Result:
     provenance = {"benchmark_manifest_sha256": changes.pop("manifest", "0f"), "mazes_sha256": "a1"}
     content = {
         "agent": "x",
-        "task": "local",
-        "size": 13,
-        "split": "eval",
+        "task": Task.of(split="eval"),
         "benchmark": "paper",
-        "perturbation": {},
         "episodes": len(records),
-        "provenance": Provenance.model_validate(provenance | {"options": TaskProvenance(landmark_distance=5)}),
+        "provenance": Provenance.model_validate(provenance),
         "overall": overall,
         "by_distance": by_distance,
     }
@@ -117,10 +115,10 @@ class TestResults:
         assert found.parts[""].overall.num_episodes == 10
 
     def test_the_title_says_what_an_agent_was_told_less_or_more(self, tmp_path):
-        told = {"shown": {}, "hidden": {"hide": "map,goal"}, "exact": {"exact_pose": True}}
+        told = {"shown": {}, "hidden": {"hide": ["map", "goal"]}, "exact": {"exact_pose": True}}
         for name, changes in told.items():
             make_result(tmp_path / name, "navigator", track="adrift", num_mazes=2, record=False)
-            edit_summary(tmp_path / name, **changes)
+            edit_task(tmp_path / name, **changes)
         for name, who in (("hidden", "navigator without map and goal"), ("exact", "navigator with the true pose")):
             title = compare_folders(tmp_path / "shown", tmp_path / name).title
             assert title.startswith("A is navigator (track adrift, level 1) in ")

@@ -28,7 +28,7 @@ def kept() -> Kept:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> pathlib.Path:
     folder = tmp_path_factory.mktemp("results") / "run"
-    mazebench.evaluate("random", folder, distances=(1,), episodes_per_distance=1)
+    mazebench.evaluate("random", out=folder, distances=(1,), episodes_per_distance=1)
     return folder
 
 

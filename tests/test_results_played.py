@@ -9,11 +9,11 @@ from made_results import make_result
 from mazebench.errors import InputError
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.report.episodes import read_results
-from mazebench.results.played import shown_of, task_of
+from mazebench.results.played import check_mazes, shown_of
 from mazebench.results.reading import load_result
-from mazebench.tasks.task import Task
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.shown_map import leg_context, show_map
+from mazebench.tasks.task import Task
 from mazebench.tasks.trials import frozen_trials, select_trials
 
 ROOM = "#####\n#...#\n#...#\n#...#\n#####\n"
@@ -21,8 +21,8 @@ ROOM = "#####\n#...#\n#...#\n#...#\n#####\n"
 
 @pytest.mark.parametrize("level", [{"map_flip": 0.2}, {"map_warp": 0.2}], ids=["flip", "warp"])
 def test_the_map_is_the_one_that_the_agent_was_shown(tmp_path, level):
-    task = task_of(load_result(make_result(tmp_path / "made", task="hierarchical", **level)).summary)
-    spec = Task.of("hierarchical", size=size=13, split="eval", **level)
+    task = load_result(make_result(tmp_path / "made", task="hierarchical", **level)).summary.task
+    spec = Task.of("hierarchical", size=13, split="eval", **level)
     num_changed = 0
     for trial in frozen_trials("hierarchical", 13)[:5]:
         found, shown = shown_of(task, trial.episode), show_map(spec, trial.episode)
@@ -38,9 +38,9 @@ def test_the_map_is_the_one_that_the_agent_was_shown(tmp_path, level):
 
 @pytest.mark.parametrize(("track", "level"), [("rebuilt", 1), ("adrift", 2), ("rough", 3)])
 def test_on_a_track_it_is_what_the_agent_was_given(tmp_path, track, level):
-    task = task_of(load_result(make_result(tmp_path / "made", track=track, level=level, num_mazes=1)).summary)
+    task = load_result(make_result(tmp_path / "made", track=track, level=level, num_mazes=1)).summary.task
     spec = Task.of(track, split="eval", level=level)
-    for trial in select_trials(spec, "eval", 1)[:2]:
+    for trial in select_trials(spec, 1)[:2]:
         found = shown_of(task, trial.episode)
         context = leg_context(spec, show_map(spec, trial.episode), trial.episode.start, trial.episode.goal)
         np.testing.assert_array_equal(
@@ -54,13 +54,13 @@ def test_on_a_track_it_is_what_the_agent_was_given(tmp_path, track, level):
 def test_of_maps_that_are_gone_a_report_has_no_paths(tmp_path, remarks):
     (tmp_path / "room.txt").write_text(ROOM)
     options = {"distances": (2,), "episodes_per_distance": 1, "record": True}
-    evaluate("random", tmp_path / "out", mazes=tmp_path / "room.txt", **options)
+    evaluate("random", out=tmp_path / "out", mazes=tmp_path / "room.txt", **options)
     [result] = read_results([tmp_path / "out"])
     assert result.trajectories
     assert result.walls("room").sum() == 16
     (tmp_path / "room.txt").write_text(ROOM.replace("#...#", "#.#.#", 1))
     with pytest.raises(InputError, match="expected the mazes that were played, found others"):
-        task_of(result.summary)
+        check_mazes(load_result(tmp_path / "out").summary)
     remarks()
     [result] = read_results([tmp_path / "out"])
     assert (result.trajectories, result.walls("room")) == (None, None)

@@ -17,7 +17,7 @@ from mazebench.results.reading import load_result
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> pathlib.Path:
     folder = tmp_path_factory.mktemp("runs") / "planner"
-    evaluate("planner", folder, **FEW)
+    evaluate("planner", out=folder, **FEW)
     return folder
 
 

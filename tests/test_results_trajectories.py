@@ -63,7 +63,7 @@ class TestRecording:
         ids=["local", "hierarchical", "noise"],
     )
     def test_poses_are_those_that_the_records_tell_of(self, tmp_path, agent, options):
-        evaluate(agent, tmp_path, record=True, num_envs=11, **options)
+        evaluate(agent, out=tmp_path, record=True, num_envs=11, **options)
         trajectories = load_trajectories(tmp_path / TRAJECTORIES)
         walls = {maze.name: maze.walls for maze in load_mazes(13, "eval")}
         for record, found in zip(records_of(tmp_path), trajectories, strict=True):
@@ -81,7 +81,7 @@ class TestRecording:
             assert np.abs(found.pose[:, 2]).max() <= np.pi
 
     def test_the_observed_path_is_the_true_one_in_the_frame_of_the_first_pose(self, tmp_path):
-        evaluate("random", tmp_path, record=True, track="adrift", distances=(15,), odometry_noise=0.0)
+        evaluate("random", out=tmp_path, record=True, track="adrift", distances=(15,), odometry_noise=0.0)
         for found in load_trajectories(tmp_path / TRAJECTORIES):
             true, observed = found.pose.astype(float), found.observed.astype(float)
             assert not observed[0].any()
@@ -90,7 +90,7 @@ class TestRecording:
             np.testing.assert_allclose(observed[:, :2], expected, atol=0.02)
 
     def test_yaw_follows_the_body(self, tmp_path):
-        evaluate(Turning, tmp_path, record=True, distances=(2,), episodes_per_distance=1)
+        evaluate(Turning, out=tmp_path, record=True, distances=(2,), episodes_per_distance=1)
         yaw = load_trajectories(tmp_path / TRAJECTORIES)[0].pose[:, 2].astype(float)
         turned = np.angle(np.exp(1j * np.diff(yaw)))
         # To the left by 21.12 degrees a step, once it has got going.
@@ -98,6 +98,6 @@ class TestRecording:
 
     def test_records_are_the_same_without_trajectories(self, tmp_path):
         for name, record, files in (("with", True, RECORDED), ("without", False, FILES)):
-            evaluate("random", tmp_path / name, record=record, **FEW)
+            evaluate("random", out=tmp_path / name, record=record, **FEW)
             assert {path.name for path in (tmp_path / name).iterdir()} == files
         assert records_of(tmp_path / "with") == records_of(tmp_path / "without")

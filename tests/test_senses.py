@@ -12,7 +12,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
-from made_results import edit_records, edit_summary, make_result
+from made_results import edit_records, edit_task, make_result
 
 import mazebench
 from mazebench.constants import STEP_TIME
@@ -24,15 +24,14 @@ from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.evaluation.evaluate import run_evaluation
 from mazebench.evaluation.plan import make_plan
 from mazebench.report.leaderboard import read_entries
-from mazebench.report.settings import make_setting
 from mazebench.results.comparison import compare_folders
 from mazebench.results.paper import printed_mmn
 from mazebench.results.reading import load_result
-from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.observation import state_errors
 from mazebench.tasks.odometry import NoisyMotion
 from mazebench.tasks.sensors.lidar_noise import model_of, noise_text, read
+from mazebench.tasks.task import Task
 from mazebench.world.angles import wrap_angle
 from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
 
@@ -346,9 +345,9 @@ def options(**values: Any) -> EvalOptions:
 
 class TestResults:
     def test_an_agent_is_told(self):
-        interface = make_plan(options(**NOISE)).interface
+        interface = make_plan(options(**NOISE)).task.interface
         assert (interface.lidar, interface.odometry_noise) == (TURTLEBOT3, 0.2)
-        interface = make_plan(options()).interface
+        interface = make_plan(options()).task.interface
         assert (interface.lidar, interface.odometry_noise) == (None, 0.0)
 
     def test_records_and_summary_say_what_was_set(self, tmp_path):
@@ -357,21 +356,21 @@ class TestResults:
         )
         result = load_result(tmp_path)
         said = {"lidar_noise": "0.1,0.1", "odometry_noise": 0.0}
-        assert said.items() <= summary.to_dict().items()
+        assert said.items() <= summary.to_dict()["task"].items()
         assert said.items() <= result.records[0].model_dump().items()
-        assert result.summary.senses == ("lidar noise 0.1,0.1", "odometry noise 0.0")
+        assert result.summary.task.noise_in_words == ("lidar noise 0.1,0.1", "odometry noise 0.0")
         assert printed_mmn(result.summary) == {}
-        assert "lidar noise 0.1,0.1" in str(make_setting(result.summary, result.records))
+        assert "lidar noise 0.1,0.1" in str(result.summary.task)
 
     def test_they_are_named_where_two_results_are_compared(self, tmp_path):
         plain, noisy = (make_result(tmp_path / name) for name in ("plain", "noisy"))
         edit_records(noisy, lambda record: record | {"odometry_noise": 0.2})
-        edit_summary(noisy, odometry_noise=0.2)
+        edit_task(noisy, odometry_noise=0.2)
         assert "planner (odometry noise 0.2) in" in compare_folders(plain, noisy).title
 
     def test_the_leaderboard_refuses_them(self, tmp_path):
         folder = make_result(tmp_path / "noisy", track="rebuilt")
         edit_records(folder, lambda record: record | {"lidar_noise": "0,0"})
-        edit_summary(folder, lidar_noise="0,0")
+        edit_task(folder, lidar_noise="0,0")
         with pytest.raises(InputError, match=r"a track, with its senses, found eval rebuilt 1 lidar noise 0,0$"):
             read_entries([folder])

@@ -32,10 +32,10 @@ def test_shipped_checkpoint_has_its_config_and_curve_beside_it(name):
 
 @pytest.mark.parametrize("name", ["mmn", "mah"])
 def test_shipped_agent_with_a_map_reaches_near_goals_in_its_training_mazes(tmp_path, name):
-    summary = evaluate(name, tmp_path / name, split="train", distances=(2, 4), episodes_per_distance=2)
+    summary = evaluate(name, out=tmp_path / name, split="train", distances=(2, 4), episodes_per_distance=2)
     assert summary.overall.success_rate > 0.9
 
 
 def test_shipped_dqn_without_a_map_does_not(tmp_path):
-    summary = evaluate("dqn", tmp_path / "dqn", split="train", distances=(4,), episodes_per_distance=2)
+    summary = evaluate("dqn", out=tmp_path / "dqn", split="train", distances=(4,), episodes_per_distance=2)
     assert summary.overall.success_rate < 0.6

@@ -10,9 +10,9 @@ from simple_mazes import field
 
 from mazebench.envs.dm_control import Environment
 from mazebench.maps.kinds import generate
-from mazebench.tasks.task import Task
 from mazebench.tasks.context import build_context
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.task import Task
 
 
 def test_turn_planes_by_symmetry_one_turns_to_the_left():

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from simple_mazes import corridor
 
-from mazebench.tasks.task import Task
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.perturbations.warp import Perspective
 from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.shown_map import show_map
+from mazebench.tasks.task import Task
 
 START, FIRST, SECOND, GOAL, ELSEWHERE = (1, 1), (1, 3), (1, 5), (1, 7), (2, 2)
 

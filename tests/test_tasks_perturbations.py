@@ -9,10 +9,9 @@ from hypothesis import strategies
 
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import corner_cells
-from mazebench.tasks.perturbations import perturbation_levels
 from mazebench.tasks.perturbations.flip import flip
 from mazebench.tasks.perturbations.warp import MAX_WARP, random_homography
-from mazebench.tasks.task import TaskOptions
+from mazebench.tasks.task import Task
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +21,7 @@ def maze():
 
 class TestTable:
     def test_levels_are_given_by_name(self):
-        levels = perturbation_levels(TaskOptions(position_noise=0.5))
+        levels = Task.of(position_noise=0.5).perturbations
         assert {name: level for name, level in levels.items() if level} == {"position_noise": 0.5}
 
 

@@ -16,10 +16,10 @@ from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import format_maze, parse_maze
-from mazebench.tasks.task import Task
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.route import plan_route
 from mazebench.tasks.shown_map import leg_context, show_map
+from mazebench.tasks.task import Task
 
 CORRIDOR = corridor()
 # No free cell at the corners (1, 5) and (5, 1): (2, 5) and (4, 1) are the nearest.
@@ -143,7 +143,7 @@ class TestOptions:
 
     def test_reading_the_options_does_not_load_mujoco(self):
         # The command line reads them before it chooses MuJoCo's rendering backend.
-        program = "import sys, mazebench.tasks.task_options; sys.exit('mujoco' in sys.modules)"
+        program = "import sys, mazebench.tasks.task; sys.exit('mujoco' in sys.modules)"
         run_python("-c", program)
 
     def test_the_context_has_the_mazes_size_by_default_and_21_at_most(self):
@@ -154,7 +154,7 @@ class TestOptions:
         path = tmp_path / "corridor.txt"
         path.write_text(format_maze(CORRIDOR), encoding="ascii")
         for maps in (CORRIDOR, [CORRIDOR], path, str(path), tmp_path):
-            assert Task.of(mazes=maps).mazes == (CORRIDOR,)
+            assert Task.of(mazes=maps).all_mazes == (CORRIDOR,)
 
 
 class TestShownMap:

@@ -23,11 +23,11 @@ from mazebench.maps.benchmark import (
 )
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.maps.maze import Maze, canonical_bytes
-from mazebench.tasks.task import Task
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, START
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.shown_map import is_blocked, leg_context, show_map
+from mazebench.tasks.task import Task
 from mazebench.tasks.time_limit import track_time_limit
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.building import TurnedMap
@@ -122,7 +122,9 @@ class TestRebuilt:
     def test_so_many_doors_moved_that_the_share_of_paths_is_blocked(self, level, share):
         plan = make_plan(EvalOptions.of("random", track="rebuilt", level=level, split=DEV))
         blocked = [
-            is_blocked(plan.task.all_mazes[trial.episode.maze].walls, show_map(plan.task, trial.episode).walls, ends(trial))
+            is_blocked(
+                plan.task.all_mazes[trial.episode.maze].walls, show_map(plan.task, trial.episode).walls, ends(trial)
+            )
             for trial in plan.trials
         ]
         assert abs(np.mean(blocked) - share) < 0.08
@@ -181,7 +183,7 @@ class TestAdriftAndRough:
 
 
 def test_summaries_have_the_figures_of_each_kind_and_of_blocked_episodes(tmp_path):
-    summary = evaluate("planner-closed-loop", tmp_path / "run", track="rebuilt", split=DEV, distances=(15,))
+    summary = evaluate("planner-closed-loop", out=tmp_path / "run", track="rebuilt", split=DEV, distances=(15,))
     assert list(summary.by_fact) == ["blocked", "not blocked", *KNOWN]
     assert sum(summary.by_fact[kind].n for kind in KNOWN) == summary.episodes
     assert summary.benchmark == "tracks"

@@ -21,12 +21,11 @@ from mazebench.tasks.task import Task
 from mazebench.training import loop
 from mazebench.training.experience import Collector
 from mazebench.training.loop import TrainingError, train
-from mazebench.training.train_options import TrainOptions
 
 
 def tiny_options(**changes):
-    values = {"agent": "mah", "overrides": tuple(TINY.items()), "checkpoint_steps": 800, "eval_mazes": 1}
-    return TrainOptions(**{**values, **changes})
+    values = {"agent": "mah", "overrides": TINY, "checkpoint_steps": 800, "eval_mazes": 1}
+    return {**values, **changes}
 
 
 def metrics(folder):
@@ -45,7 +44,7 @@ def assert_same_run(one, other):
 def unbroken(tmp_path_factory):
     """A run of three checkpoints in one go."""
     folder = tmp_path_factory.mktemp("runs") / "unbroken"
-    train(tiny_options(env_steps=2400), folder)
+    train(**tiny_options(env_steps=2400), out=folder)
     return folder
 
 
@@ -60,32 +59,32 @@ def test_run_folder_has_config_metrics_tensorboard_and_two_checkpoints(unbroken)
 
 
 def test_resume_without_the_replay_fills_it_before_learning_goes_on(tmp_path):
-    train(tiny_options(env_steps=800), tmp_path)
+    train(**tiny_options(env_steps=800), out=tmp_path)
     (tmp_path / "checkpoints" / "000000000800" / "replay.npz").unlink()
-    train(tiny_options(env_steps=1600), tmp_path, resume=True)
+    train(**tiny_options(env_steps=1600), out=tmp_path, resume=True)
     assert metrics(tmp_path)[-1]["updates"] == (1600 - 400) // 32
 
 
 def test_resume_reports_no_step_twice(tmp_path):
-    train(tiny_options(env_steps=800), tmp_path)
+    train(**tiny_options(env_steps=800), out=tmp_path)
     with open(tmp_path / "metrics.jsonl", "a") as file:
         file.write('{"env_steps":1200,"updates":1}\n{"env_st')  # what a killed process wrote after its last checkpoint
-    train(tiny_options(env_steps=1600), tmp_path, resume=True)
+    train(**tiny_options(env_steps=1600), out=tmp_path, resume=True)
     assert [line["env_steps"] for line in metrics(tmp_path)] == [800, 1600]
 
 
 def test_a_finished_run_is_not_run_again(unbroken, caplog):
     caplog.set_level(logging.INFO, "mazebench.training")
-    train(tiny_options(env_steps=2400), unbroken, resume=True)
+    train(**tiny_options(env_steps=2400), out=unbroken, resume=True)
     assert caplog.messages == [f"{unbroken}: the run is finished, at 2,400 steps"]
 
 
 def test_folder_of_a_run_is_refused_without_resume_and_for_another_config(unbroken):
     with pytest.raises(InputError, match="holds a run already"):
-        train(tiny_options(env_steps=2400), unbroken)
+        train(**tiny_options(env_steps=2400), out=unbroken)
     other = {**TINY, "hidden": "32"}
     with pytest.raises(InputError, match="holds another run, differing in 'agent_config'"):
-        train(tiny_options(env_steps=2400, overrides=tuple(other.items())), unbroken, resume=True)
+        train(**tiny_options(env_steps=2400, overrides=other), out=unbroken, resume=True)
 
 
 @pytest.mark.parametrize(
@@ -97,7 +96,7 @@ def test_folder_of_a_run_is_refused_without_resume_and_for_another_config(unbrok
 )
 def test_wrong_option_is_refused(tmp_path, changes, message):
     with pytest.raises(InputError, match=message):
-        train(tiny_options(**{"env_steps": 100, **changes}), tmp_path / "run")
+        train(**tiny_options(**{"env_steps": 100, **changes}), out=tmp_path / "run")
 
 
 def stopped(options, folder, wanted, resume=False):
@@ -111,7 +110,7 @@ def stopped(options, folder, wanted, resume=False):
             signal.raise_signal(signal.SIGTERM)
 
     with stopping.listening(), pytest.raises(SystemExit), stopping.stoppable(lambda: ("it",), waits=True):
-        train(options, folder, resume, stop)
+        train(**options, out=folder, resume=resume, progress=stop)
 
 
 def checkpoints(folder):
@@ -123,7 +122,7 @@ def test_stopped_run_leaves_a_savepoint_and_goes_on_from_it_to_its_next_mileston
     stopped(tiny_options(env_steps=2400), tmp_path, lambda status: status.env_steps == 1208)
     assert checkpoints(tmp_path) == [800, 1208]
     assert metrics(tmp_path) == metrics(unbroken)[:1]
-    train(tiny_options(env_steps=2400), tmp_path, resume=True)
+    train(**tiny_options(env_steps=2400), out=tmp_path, resume=True)
     assert f"resuming {tmp_path} at 1,208 steps" in caplog.messages
     assert checkpoints(tmp_path) == [1600, 2400]
     assert [line["env_steps"] for line in metrics(tmp_path)] == [800, 1600, 2400]
@@ -135,12 +134,12 @@ def test_run_that_is_stopped_while_it_is_evaluated_is_resumed_to_the_same_bytes(
     assert checkpoints(tmp_path) == [800, 1600]
     assert metrics(tmp_path) == metrics(unbroken)[:1]
     stopped(tiny_options(env_steps=2400), tmp_path, lambda status: status.evaluated and status.env_steps == 2400, True)
-    train(tiny_options(env_steps=2400), tmp_path, resume=True)
+    train(**tiny_options(env_steps=2400), out=tmp_path, resume=True)
     assert_same_run(tmp_path, unbroken)
 
 
 def test_savepoints_do_not_change_the_run_that_saves_them(unbroken, tmp_path):
-    train(tiny_options(env_steps=2400, checkpoint_minutes=1e-9), tmp_path)
+    train(**tiny_options(env_steps=2400, checkpoint_minutes=1e-9), out=tmp_path)
     assert_same_run(tmp_path, unbroken)
 
 
@@ -148,14 +147,14 @@ def test_without_savepoints_a_stopped_run_goes_on_from_its_last_milestone_to_the
     options = tiny_options(env_steps=2400, checkpoint_minutes=0)
     stopped(options, tmp_path, lambda status: status.env_steps == 1208)
     assert checkpoints(tmp_path) == [0, 800]
-    train(options, tmp_path, resume=True)
+    train(**options, out=tmp_path, resume=True)
     assert_same_run(tmp_path, unbroken)
 
 
 def test_metrics_have_a_line_every_so_many_steps_with_the_losses_since_the_line_before(unbroken, tmp_path, monkeypatch):
     monkeypatch.setattr(loop, "STEPS_BETWEEN_LINES", 400)
     options = tiny_options(env_steps=2400)
-    train(options, tmp_path / "whole")
+    train(**options, out=tmp_path / "whole")
     lines = metrics(tmp_path / "whole")
     assert [line["env_steps"] for line in lines] == [400, 800, 1200, 1600, 2000, 2400]
     assert ["success_rate_2" in line for line in lines] == [False, True] * 3
@@ -165,7 +164,7 @@ def test_metrics_have_a_line_every_so_many_steps_with_the_losses_since_the_line_
     assert math.isclose(of_milestone / (updates[3] - updates[1]), metrics(unbroken)[1]["td_loss"])
 
     stopped(options, tmp_path / "stopped", lambda status: status.env_steps == 1304)
-    train(options, tmp_path / "stopped", resume=True)
+    train(**options, out=tmp_path / "stopped", resume=True)
     resumed = metrics(tmp_path / "stopped")
     assert resumed[:3] == lines[:3]
     assert [line["env_steps"] for line in resumed] == [line["env_steps"] for line in lines]
@@ -177,14 +176,14 @@ def test_loss_that_is_not_finite_stops_the_run_with_the_last_checkpoint(tmp_path
     with pytest.raises(
         TrainingError, match=r"became (nan|inf|-inf) at update .*; last good checkpoint: .*000000000000"
     ):
-        train(tiny_options(env_steps=100_000, overrides=tuple(overrides.items())), tmp_path)
+        train(**tiny_options(env_steps=100_000, overrides=overrides), out=tmp_path)
 
 
 def test_training_leaves_pytorch_as_many_threads_as_it_had(tmp_path):
     num_threads = torch.get_num_threads()
     torch.set_num_threads(3)
     try:
-        train(tiny_options(env_steps=480), tmp_path)
+        train(**tiny_options(env_steps=480), out=tmp_path)
         assert metrics(tmp_path)[-1]["updates"]
         assert torch.get_num_threads() == 3
     finally:
@@ -193,7 +192,7 @@ def test_training_leaves_pytorch_as_many_threads_as_it_had(tmp_path):
 
 def test_minutes_limit_a_command(tmp_path):
     begin = time.monotonic()
-    train(tiny_options(minutes=0.02, checkpoint_steps=10**9), tmp_path)
+    train(**tiny_options(minutes=0.02, checkpoint_steps=10**9), out=tmp_path)
     assert time.monotonic() - begin < 60  # far from endless; no measure of speed
     assert metrics(tmp_path)[-1]["env_steps"] > 0
 
@@ -269,7 +268,7 @@ def cluster():
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.slow
 def test_training_on_ray_keeps_the_replay_ratio(cluster, tmp_path):
-    train(tiny_options(env_steps=1600, workers=2), tmp_path)
+    train(**tiny_options(env_steps=1600, workers=2), out=tmp_path)
     last = metrics(tmp_path)[-1]
     assert last["env_steps"] >= 1600
     assert last["updates"] == (last["env_steps"] - 400) // 32
@@ -278,4 +277,4 @@ def test_training_on_ray_keeps_the_replay_ratio(cluster, tmp_path):
 
 def test_more_workers_than_environments_are_refused(cluster, tmp_path):
     with pytest.raises(InputError, match="at most 8 workers"):
-        train(tiny_options(env_steps=100, workers=9), tmp_path)
+        train(**tiny_options(env_steps=100, workers=9), out=tmp_path)

@@ -17,7 +17,7 @@ from mazebench.commands.option_parameters import NOT_IN_EVALUATIONS, given, take
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.options import fields_of
-from mazebench.tasks.task import Task, evaluation_task
+from mazebench.tasks.task import Task
 
 
 @takes_options(RunOptions, Task, EvalOptions, without=NOT_IN_EVALUATIONS, split="eval")
@@ -62,7 +62,7 @@ def evaluate(
     from mazebench.evaluation.evaluate import run_evaluation
     from mazebench.evaluation.suites import run_suite
 
-    options = EvalOptions(agents[0], evaluation_task(**given(values, Task)), **given(values, EvalOptions))
+    options = EvalOptions.of(agents[0], **given(values, Task), **given(values, EvalOptions))
     what = options.task.track or options.task.task
     title = f"{agents[0]}, {what}" if suite is None else f"{suite}, {', '.join(agents)}"
     name = suite or f"{agents[0].replace(':', '-')}-{what}"

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Annotated
+import pathlib
+from typing import Annotated, Unpack
 
 from annotated_types import Ge
 
 from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.errors import InputError
 from mazebench.options import Doc, options
-from mazebench.tasks.task import Task
+from mazebench.tasks.task import Task, TaskOptions, evaluation_task
 from mazebench.tasks.tracks.track import DISTANCES
 
 NUM_ENVS = 256  # environments side by side in a process, unless another number is asked for
@@ -33,6 +34,32 @@ class EvalOptions:
         str | None, Doc("A learned agent's checkpoint or run folder; the shipped one if not given.")
     ] = None
     seed: Annotated[int, Ge(0), Doc("Seed of what the agent draws, and of episodes that are not frozen.")] = 0
+
+    @classmethod
+    def of(
+        cls,
+        agent: str,
+        task: str | Task = "local",
+        *,
+        episodes_per_distance: int = EPISODES_PER_DISTANCE,
+        checkpoint: str | pathlib.Path | None = None,
+        seed: int = 0,
+        **options: Unpack[TaskOptions],
+    ) -> EvalOptions:
+        """Returns the options of an evaluation in a task, or in the one that `evaluation_task` makes of its options.
+
+        Raises:
+          InputError: if a name is unknown or a value is not allowed.
+        """
+        if isinstance(task, Task) and options:
+            raise InputError(f"expected no options beside a Task, found {next(iter(options))}")
+        return cls(
+            agent,
+            task if isinstance(task, Task) else evaluation_task(task, **options),
+            episodes_per_distance=episodes_per_distance,
+            checkpoint=checkpoint,  # type: ignore[arg-type]  # a path becomes text
+            seed=seed,
+        )
 
     def __post_init__(self) -> None:
         task = self.task

@@ -22,7 +22,7 @@ from mazebench.evaluation.store import Store, check_same_run, is_finished
 from mazebench.results import metrics
 from mazebench.results.reading import load_result
 from mazebench.results.records import Summary
-from mazebench.tasks.task import Task, TaskOptions, evaluation_task
+from mazebench.tasks.task import Task, TaskOptions
 
 _CHUNKS_PER_WORKER = 4  # so that no worker waits long for the last one,
 _LEAST_CHUNK = 64  # but not so many that their environments are few: agents act on all of them at once
@@ -80,14 +80,8 @@ def evaluate(
         raise InputError(f"expected the name of an agent or its class, found an object of {type(agent).__name__}")
     name = agent if isinstance(agent, str) else f"{agent.__module__}:{agent.__qualname__}"
     agent_class = load_agent_class(name) if isinstance(agent, str) else checked_agent_class(name, agent)
-    if isinstance(task, Task) and options:
-        raise InputError(f"expected no options beside a Task, found {next(iter(options))}")
-    chosen = EvalOptions(
-        name,
-        task if isinstance(task, Task) else evaluation_task(task, **options),
-        episodes_per_distance=episodes_per_distance,
-        checkpoint=checkpoint,  # type: ignore[arg-type]  # a path becomes text
-        seed=seed,
+    chosen = EvalOptions.of(
+        name, task, episodes_per_distance=episodes_per_distance, checkpoint=checkpoint, seed=seed, **options
     )
     if (run.workers or run.cluster) and (name.startswith("__main__:") or load_agent_class(name) is not agent_class):
         raise InputError(f"expected a class that other processes can import by its name, found {name}")

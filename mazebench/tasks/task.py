@@ -629,7 +629,7 @@ def _check_options(task: Task) -> None:
     for name in ("sensors", "level", "kinds"):
         values = getattr(task, name)
         if len(set(values)) < len(values):
-            raise InputError(f"expected each of {name} once, found {', '.join(map(str, values))}")
+            raise InputError(f"expected each {name.rstrip('s')} once, found {', '.join(map(str, values))}")
     if not task.level:
         raise InputError("expected at least one level, found none")
 
