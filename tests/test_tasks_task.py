@@ -1,10 +1,11 @@
-"""Drawn starts and goals, shown maps, and refused options."""
+"""Tasks as values, drawn starts and goals, shown maps, and refused options."""
 
 from __future__ import annotations
 
 import collections
 import dataclasses
 import itertools
+import json
 import re
 
 import numpy as np
@@ -14,12 +15,13 @@ from simple_mazes import corridor, field
 
 from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
-from mazebench.maps.maze import Maze
-from mazebench.maps.text import format_maze, parse_maze
+from mazebench.maps.maze import Maze, resized
+from mazebench.maps.text import format_maze, parse_maze, write_text_maze
+from mazebench.options import fields_of
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.route import plan_route
 from mazebench.tasks.shown_map import leg_context, show_map
-from mazebench.tasks.task import Task
+from mazebench.tasks.task import Task, TaskOptions, evaluation_task
 
 CORRIDOR = corridor()
 # No free cell at the corners (1, 5) and (5, 1): (2, 5) and (4, 1) are the nearest.
@@ -34,6 +36,47 @@ def dfs_mazes(size: int = 9, count: int = 3) -> tuple[Maze, ...]:
 def episodes(spec: Task, count: int, seed: int = 0):
     rng = np.random.default_rng(seed)
     return [sample_episode(spec, rng) for _ in range(count)]
+
+
+class TestValue:
+    @pytest.mark.parametrize(
+        "options",
+        [
+            {"task": "hierarchical", "size": 15, "landmark_distance": 3},
+            {"task": "rough", "level": (1, 3), "sensors": "egocentric"},
+            {"kinds": "house", "num_mazes": 2, "size": 17, "split": "dev"},
+            {"kinds": ("dfs", "house"), "fresh": True},
+            {"mazes": dfs_mazes(), "cell_size": 0.5, "distances": 3, "hide": "goal,map"},
+            {"start": (1, 1), "goal": "3.5m,1.5m", "position_noise": 0.2},
+            {"lidar_noise": ".1,.2", "sensors": "lidar", "num_goals": 3, "continuous": True},
+        ],
+        ids=lambda options: next(iter(options)),
+    )
+    def test_a_task_goes_to_json_and_back(self, options):
+        task = Task.of(**options)
+        again = Task.from_json(json.loads(json.dumps(task.to_json())))
+        assert again == task
+        assert again.all_mazes == task.all_mazes
+
+    def test_mazes_of_a_file_are_the_same_when_the_task_is_read_again(self, tmp_path):
+        write_text_maze(CORRIDOR, tmp_path / "corridor.txt")
+        task = Task.of(mazes=tmp_path / "corridor.txt", cell_size=0.6)
+        assert Task.from_json(task.to_json()).all_mazes == task.all_mazes == (resized(CORRIDOR, 0.6),)
+
+    def test_options_for_editors_are_the_fields(self):
+        assert {"task", *TaskOptions.__annotations__} == set(fields_of(Task))
+
+    def test_an_agent_learns_neither_the_track_nor_its_level(self):
+        assert Task.of("building").interface == Task.of("rebuilt", level=3).interface
+
+    def test_results_of_one_setting_differ_in_what_an_agent_chooses_only(self):
+        plain = evaluation_task(size=15)
+        chosen = evaluation_task(size=15, sensors="egocentric", distances=(3,)).replace(context_size=9)
+        assert plain.setting == chosen.setting != evaluation_task(size=15, map_flip=0.1).setting
+
+    def test_options_that_evaluations_do_not_vary_are_refused(self):
+        with pytest.raises(InputError, match="expected num_goals 1 in an evaluation, found 2"):
+            evaluation_task(num_goals=2)
 
 
 class TestDistances:
