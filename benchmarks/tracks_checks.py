@@ -24,7 +24,6 @@ from mazebench.constants import ON_TIME
 from mazebench.errors import InputError
 from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.measured_oracle import measure_oracle_steps
-from mazebench.evaluation.plan import interface_of
 from mazebench.maps.benchmark import KINDS_SIZE
 from mazebench.maps.doors import door_slots, num_swappable, swap_doors
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
@@ -132,7 +131,7 @@ def play(agent_name: str, kind: str, episodes: int, hide: tuple[str, ...] = ()) 
         for _ in range(_PER_MAZE)
     ]
     agent_class = load_agent_class(agent_name)
-    agent = agent_class.build(interface_of(spec))
+    agent = agent_class.build(spec.interface)
     steps = np.full(len(trials), np.inf)
     numbered = list(enumerate(trials))
     for outcomes in run_trials(agent, spec, numbered, len(trials), 1, needs_truth=agent_class.needs_truth):

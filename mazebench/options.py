@@ -42,7 +42,7 @@ class OneOf:
 
     def _check(self, value: str | None) -> str | None:
         if value is not None and value not in self.choices:
-            raise PydanticCustomError("one_of", "")
+            raise PydanticCustomError("one_of", "Input should be one of {of}", {"of": ", ".join(self.choices)})
         return value
 
 

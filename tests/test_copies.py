@@ -111,6 +111,7 @@ class TestCopies:
     def test_renderers_and_cameras_are_not_copied_and_open_anew(self):
         run_with_egl("""
 import copy, pickle
+from mazebench.tasks.task import Task
 from mazebench.envs.gym import MazeEnv
 env = MazeEnv(Task.of(size=13, sensors=("egocentric",)), seed=0, render_mode="rgb_array")
 env.reset(seed=0)

@@ -60,7 +60,7 @@ class TestParts:
         assert (corners.task, corners.landmark_distance) == ("hierarchical", 2)
         assert (flipped.task, flipped.map_flip) == ("hierarchical", 0.3)
         assert (paper["warp-0.1"].distances, paper["warp-0.1"].map_warp) == ((2, 4, 6, 8, 10), 0.1)
-        assert (paper["noise-1.0"].task.distances, paper["noise-1.0"].task.position_noise) == ((2, 4, 6, 8, 10), 1.0)
+        assert (paper["noise-1.0"].distances, paper["noise-1.0"].position_noise) == ((2, 4, 6, 8, 10), 1.0)
 
 
 class TestRun:

@@ -207,4 +207,4 @@ class TestTraining:
         path.write_text(format_maze(draw_mazes(("house",), 13, "dev", 1)[0]))
         train(**options(mazes=str(path), kinds=(), fresh=False, env_steps=480), out=tmp_path / "run")
         assert "sha256" in json.loads((tmp_path / "run" / "config.json").read_text())["task"]["mazes"]
-        assert HeldOutEvaluation(Task.of(mazes=str(path)), 4).task.mazes[0].name == "plan"
+        assert HeldOutEvaluation(Task.of(mazes=str(path)), 4).task.all_mazes[0].name == "plan"

@@ -8,7 +8,7 @@ import sys
 import warnings
 
 import pytest
-from made_results import edit_summary, make_result, of_own_mazes, read_summary
+from made_results import edit_summary, edit_task, make_result, of_own_mazes, read_summary
 
 from mazebench import cli
 from mazebench.errors import InputError, Remark
@@ -47,18 +47,14 @@ def change_provenance(folder, **changes):
     edit_summary(folder, provenance=read_summary(folder)["provenance"] | changes)
 
 
-def change_options(folder, **options):
-    change_provenance(folder, options=read_summary(folder)["provenance"]["options"] | options)
-
-
 FAULTS = {
-    "expected level from 1 to 3, found 4": lambda folder: change_options(folder, track="adrift", level=[4]),
+    "task.level.0: Input should be less than or equal to 3, found '4'": lambda folder: edit_task(folder, level=[4]),
     "line 4": cut_records,
     "expected a finished evaluation": unfinish,
     "of benchmark 'paper', manifest 23359df5, found manifest 00": lambda folder: change_provenance(
         folder, benchmark_manifest_sha256="00"
     ),
-    "unknown split 'test'; available: ": lambda folder: change_options(folder, split="test"),
+    "task.split: Input should be one of train, dev, eval, found 'test'": lambda folder: edit_task(folder, split="test"),
 }
 
 
@@ -161,7 +157,7 @@ class TestRefused:
 def test_results_on_mazes_of_ones_own_are_reported_with_their_walls(tmp_path):
     folder = of_own_mazes(make_result(tmp_path / "own", "mah", num_mazes=2), "office")
     [result] = write_report([folder], tmp_path / "out")
-    assert result.setting.mazes == ("office-00", "office-01")
+    assert result.setting.mazes == "office-00, office-01"
     assert (tmp_path / "out" / "tables" / "custom-1-local-13.md").exists()
     data = (tmp_path / "out" / "report.html").read_text().split('id="data">')[1].split("</script>")[0]
     mazes = json.loads(data)["mazes"]

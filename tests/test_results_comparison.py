@@ -25,7 +25,7 @@ def result(folder, records: list[Record], **changes) -> Result:
     provenance = {"benchmark_manifest_sha256": changes.pop("manifest", "0f"), "mazes_sha256": "a1"}
     content = {
         "agent": "x",
-        "task": Task.of(split="eval"),
+        "task": Task.of(changes.pop("task", "local"), split="eval"),
         "benchmark": "paper",
         "episodes": len(records),
         "provenance": Provenance.model_validate(provenance),
@@ -86,7 +86,7 @@ class TestResults:
     @pytest.mark.parametrize(
         ("changes", "said"),
         [
-            ({"benchmark": "v0"}, "expected results of one benchmark to compare, found paper in .* and v0 in"),
+            ({"task": "building"}, "expected results of one benchmark to compare, found paper in .* and tracks in"),
             ({"manifest": "1e"}, "results of one benchmark_manifest_sha256 to compare, found 0f in .* and 1e in"),
             ({"task": "hierarchical"}, "results of one task to compare, found local in .* and hierarchical in"),
         ],

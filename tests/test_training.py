@@ -91,7 +91,7 @@ def test_folder_of_a_run_is_refused_without_resume_and_for_another_config(unbrok
     ("changes", "message"),
     [
         ({"agent": "planner"}, "doesn't learn"),
-        ({"overrides": (("colour", "red"),)}, "unknown config key 'colour'"),
+        ({"overrides": {"colour": "red"}}, "unknown config key 'colour'"),
     ],
 )
 def test_wrong_option_is_refused(tmp_path, changes, message):

@@ -54,8 +54,9 @@ def takes_options(
 
 
 def given(values: Mapping[str, Any], options_class: type) -> dict[str, Any]:
-    """Returns those of the `values` of a command that are fields of a class."""
-    return {name: value for name, value in values.items() if name in fields_of(options_class)}
+    """Returns those of the `values` of a command that are options of a class."""
+    options = {name for name, option in fields_of(options_class).items() if option.help}
+    return {name: value for name, value in values.items() if name in options}
 
 
 def watched_task(values: Mapping[str, Any]) -> Task:

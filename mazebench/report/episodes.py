@@ -211,7 +211,10 @@ def _read_result(folder: pathlib.Path) -> ReportedResult:
         remark(f"{folder}: {error}; reported without mazes and paths")
     episodes, facts = _to_table(result)
     trajectories = _read_trajectories(folder, episodes) if task else None
-    return ReportedResult(folder, summary, summary.agent, summary.task.setting, episodes, facts, task, trajectories)
+    setting = summary.task.setting
+    if setting.mazes is not None:  # by their names, wherever the files were
+        setting = dataclasses.replace(setting, mazes=", ".join(sorted(episodes.maze.unique())))
+    return ReportedResult(folder, summary, summary.agent, setting, episodes, facts, task, trajectories)
 
 
 def _to_table(result: Result) -> tuple[pd.DataFrame, tuple[str, ...]]:

@@ -442,8 +442,6 @@ class Task(SensorOptions, ReadOptions):
         changes = {name: fields_of(Task)[name].default for name in left}
         if self.mazes is not None:
             changes |= {"split": "train"}
-        if isinstance(self.mazes, str):
-            changes |= {"mazes": pathlib.Path(self.mazes).name}  # wherever the folder is
         return dataclasses.replace(self, **changes)
 
     @property
