@@ -21,6 +21,8 @@ StateError = Callable[[np.ndarray], None]
 class Drawing(abc.ABC):
     """A drawing of a map of N x N cells: a picture of P x P pixels, in which cells need not lie on a grid."""
 
+    pixels_per_cell: ClassVar[int] = 1  # P / N
+
     @abc.abstractmethod
     def picture(self, walls: np.ndarray) -> np.ndarray:
         """Returns `[P, P]`: the picture of `walls` (`[N, N]` bool); bool, or the share of wall in [0, 1] as float32."""

@@ -40,7 +40,7 @@ class TurnedMap(Perturbation):
 
     def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
         quarters, is_mirrored = int(rng.integers(4)), bool(rng.integers(2))
-        side = len(shown.seen_walls())
+        side = len(shown.walls) * (1 if shown.drawing is None else shown.drawing.pixels_per_cell)
         turned = _TurnedDrawing(shown.drawing, side, quarters * self.turns, is_mirrored and self.mirrors)
         return dataclasses.replace(shown, drawing=turned)
 

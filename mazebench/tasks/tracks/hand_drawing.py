@@ -52,10 +52,6 @@ class Displacement:
         """Returns the displacement times `factor`."""
         return Displacement(factor * self.noise, factor * self.mean)
 
-    def largest(self, size: int) -> float:
-        """Returns the length in cells of the largest displacement in a maze of `size` cells a side."""
-        return float(np.sqrt((self.on_grid(_nodes(size)) ** 2).sum(axis=0)).max())
-
     def folds(self, size: int) -> bool:
         """Returns whether the displaced picture lies over itself somewhere, or one of its axes runs backwards."""
         nodes, count = _nodes(size), self.noise.shape[-1]
@@ -77,8 +73,10 @@ def draw_displacement(size: int, rng: np.random.Generator) -> Displacement:
     count = size + 2 * int(_REACH)
     while True:
         noise = Displacement(rng.standard_normal((2, count, count)), np.zeros(2))
-        centred = dataclasses.replace(noise, mean=noise.on_grid(_nodes(size)).mean(axis=(1, 2)))
-        displacement = centred.scaled(1 / centred.largest(size))
+        moved = noise.on_grid(_nodes(size))
+        mean = moved.mean(axis=(1, 2))
+        largest = np.sqrt(((moved - mean[:, None, None]) ** 2).sum(axis=0)).max()
+        displacement = dataclasses.replace(noise, mean=mean).scaled(1 / float(largest))
         if not displacement.scaled(max(DISPLACEMENTS)).folds(size):
             return displacement
 
@@ -89,6 +87,8 @@ class HandDrawing(Drawing):
 
     A point (row, column) of the maze, in cells, is displaced, and is then drawn at `origin + scale * point`, in pixels.
     """
+
+    pixels_per_cell = PIXELS
 
     displacement: Displacement
     scale: np.ndarray  # [2] float64, pixels per cell along rows and columns
