@@ -21,7 +21,8 @@ from mazebench.options import fields_of
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.route import plan_route
 from mazebench.tasks.shown_map import leg_context, show_map
-from mazebench.tasks.task import Task, TaskOptions, evaluation_task
+from mazebench.tasks.task import Task, evaluation_task
+from mazebench.tasks.task_fields import TaskOptions
 
 CORRIDOR = corridor()
 # No free cell at the corners (1, 5) and (5, 1): (2, 5) and (4, 1) are the nearest.

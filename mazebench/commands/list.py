@@ -11,7 +11,7 @@ def list_() -> None:
     from mazebench.maps.kinds import KINDS
     from mazebench.tasks.perturbations import PERTURBATIONS
     from mazebench.tasks.sensors import SENSORS
-    from mazebench.tasks.task import KINDS_OF_TASK
+    from mazebench.tasks.task_fields import KINDS_OF_TASK
     from mazebench.tasks.tracks import TRACKS
 
     ids = (f"mazebench/{kind}-{SIZES[0]}-v{TASK_VERSION}" for kind in ("Local", "Hierarchical", "LocalGoal"))

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from mazebench.envs.goal import GoalMazeEnv
     from mazebench.envs.gym import MazeEnv
     from mazebench.envs.vector import MazeVectorEnv
-    from mazebench.tasks.task import Task, TaskOptions
+    from mazebench.tasks.task import Task
+    from mazebench.tasks.task_fields import TaskOptions
 
 _SINGLE = ("seed", "render_mode", "camera")  # what a single environment takes besides its task's options
 _VECTOR = ("seed", "num_envs", "num_threads", "render_mode", "autoreset_mode")

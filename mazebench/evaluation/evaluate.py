@@ -22,7 +22,8 @@ from mazebench.evaluation.store import Store, check_same_run, is_finished
 from mazebench.results import metrics
 from mazebench.results.reading import load_result
 from mazebench.results.records import Summary
-from mazebench.tasks.task import Task, TaskOptions
+from mazebench.tasks.task import Task
+from mazebench.tasks.task_fields import TaskOptions
 
 _CHUNKS_PER_WORKER = 4  # so that no worker waits long for the last one,
 _LEAST_CHUNK = 64  # but not so many that their environments are few: agents act on all of them at once

@@ -6,15 +6,12 @@ import dataclasses
 import functools
 import pathlib
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, TypedDict, Unpack
+from typing import Any, Unpack
 
 import numpy as np
-from annotated_types import Ge, Interval
-from pydantic import BeforeValidator, InstanceOf
 
 from mazebench.errors import InputError, unknown
 from mazebench.maps.benchmark import (
-    ALL_SPLITS,
     FROZEN_SPLITS,
     KINDS_SIZE,
     PAPER_BENCHMARK,
@@ -24,37 +21,36 @@ from mazebench.maps.benchmark import (
     load_mazes,
 )
 from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
-from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, Cell, Maze, corner_cells, require_one_size
 from mazebench.maps.maze_files import read_all
 from mazebench.maps.maze_options import THIN_WALLS, ReadOptions
-from mazebench.maps.selection import OwnMazes, described_maze, maze_as_described, own_mazes
-from mazebench.options import Doc, OneOf, fields_of, options
+from mazebench.maps.selection import described_maze, own_mazes
+from mazebench.options import fields_of, options
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.interface import Interface
 from mazebench.tasks.perturbations import PERTURBATIONS
-from mazebench.tasks.perturbations.flip import FlipShare
-from mazebench.tasks.perturbations.noise import PositionDeviation
-from mazebench.tasks.perturbations.warp import WarpShare
-from mazebench.tasks.sensors import SENSORS
-from mazebench.tasks.sensors.sensor import SensorOptions
-from mazebench.tasks.start_goal import cell_of_end, end_text
+from mazebench.tasks.start_goal import cell_of_end
+from mazebench.tasks.task_fields import (
+    DRAWN_KINDS,
+    FIRST_LEVEL,
+    HIDEABLE,
+    KINDS_OF_TASK,
+    NUM_DRAWN,
+    TaskFields,
+    TaskOptions,
+    as_mazes,
+)
 from mazebench.tasks.time_limit import TIME_LIMIT, fitting_time_limit, track_time_limit
 from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.track import DISTANCES, LEVELS
+from mazebench.tasks.tracks.track import DISTANCES
 from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
 
-KINDS_OF_TASK = ("local", "hierarchical")
-DRAWN_KINDS = (*KNOWN, *CHECK)  # of mazes
 TRAIN_DISTANCES = tuple(range(1, 6))
 EVAL_DISTANCES = tuple(range(1, 16))
 ENDS = ("start", "goal")
-HIDEABLE = ("map", "goal")
 CUSTOM = "custom"  # the split in results of mazes, a start or a goal that are not the benchmark's
 MIN_CONTEXT_SIZE = 3
 
-_FIRST_LEVEL = LEVELS[:1]
-_NUM_DRAWN = 20  # mazes of a kind, unless another number is asked for
 _NUM_CHECKED = 10  # of fresh mazes, one of which must have the distances
 _FARTHEST_SHARE = 0.9  # of the diameter of a large maze; few pairs of cells are farther apart
 _LIDAR = "lidar"  # the sensor that every track offers
@@ -64,187 +60,13 @@ _OF_MAZES = ("size", "split", "mazes", "kinds", "num_mazes", "fresh", *fields_of
 _OF_AGENTS = ("sensors", "camera_size", "textures", "hide", "exact_pose", "context_size")
 
 
-class TaskOptions(TypedDict, total=False):
-    """The options of `Task.of` besides the task's name, for editors; the fields of `Task` say what they mean."""
-
-    size: int | None
-    split: str
-    mazes: OwnMazes | None
-    kinds: str | Sequence[str]
-    num_mazes: int
-    fresh: bool
-    cell_size: float | None
-    walls: str
-    pixel_size: float | None
-    unknown: str
-    inflate: float
-    track: str | None
-    level: int | Sequence[int]
-    distances: int | Sequence[int]
-    start: str | Cell | None
-    goal: str | Cell | None
-    time_limit: int
-    landmark_distance: int
-    pairs: str
-    num_goals: int
-    continuous: bool
-    map_flip: float
-    map_warp: float
-    position_noise: float
-    lidar_noise: str | None
-    odometry_noise: float | None
-    exact_pose: bool
-    hide: str | Sequence[str]
-    context_size: int
-    sensors: str | Sequence[str]
-    camera_size: int
-    textures: bool
-
-
-def _refuse_novel(kinds: Sequence[Any]) -> tuple[Any, ...]:
-    for kind in kinds:
-        if kind in NOVEL:
-            raise InputError(f"kind {kind!r}: only the eval split has it; kinds: {', '.join(DRAWN_KINDS)}")
-    return tuple(kinds)
-
-
-def _as_mazes(mazes: Any) -> Any:
-    """Returns mazes as `Task` keeps them; those of JSON are descriptions."""
-    if not isinstance(mazes, list | tuple):
-        return mazes
-    return tuple(maze_as_described(maze) if isinstance(maze, Mapping) else maze for maze in mazes)
-
-
 @options
-class Task(SensorOptions, ReadOptions):
+class Task(TaskFields):
     """What is played, and what agents are shown of it, in plain values.
 
     `Task.of` makes one and fills what is left open. Fields that it leaves alone: `time_limit` is 0 on a track, whose
     limit depends on the distance, and `lidar_noise` and `odometry_noise` are None where the track has its own.
     """
-
-    # What is played: the mazes, the episodes, the actions.
-    task: Annotated[str, OneOf(*KINDS_OF_TASK), Doc("Kind of navigation.")] = "local"
-    size: Annotated[
-        int,
-        Ge(0),
-        Doc(
-            "Cells a side of the benchmark's mazes: 13, 15, 17, 19 or 21; of drawn mazes, any that their kinds can "
-            "make; 0 stands for 13, for 31 on a track, and for that of your own mazes."
-        ),
-    ] = 0
-    split: Annotated[
-        str,
-        OneOf(*ALL_SPLITS),
-        Doc("The benchmark's training mazes, unseen ones to choose agents on (tracks), or those for results."),
-    ] = "train"
-    mazes: Annotated[
-        str | tuple[InstanceOf[Maze], ...] | None,
-        BeforeValidator(_as_mazes),
-        Doc("Mazes of your own: a text, picture, array or ROS map, or a folder of them."),
-    ] = None
-    kinds: Annotated[
-        tuple[Annotated[str, OneOf(*DRAWN_KINDS)], ...],
-        BeforeValidator(_refuse_novel),
-        Doc(f"Mazes that are drawn, of these kinds, as dfs,house; {DRAWN_KINDS[0]} beside the other two options."),
-    ] = ()
-    num_mazes: Annotated[int, Ge(0), Doc(f"Drawn mazes of each kind; 0 stands for {_NUM_DRAWN}.")] = 0
-    fresh: Annotated[bool, Doc("Every episode has a new maze, of one of the kinds (not in an evaluation).")] = False
-    track: Annotated[
-        str | None,
-        OneOf(*TRACKS),
-        Doc("A named way in which the map or the senses are imperfect (local task)."),
-    ] = None
-    level: Annotated[
-        tuple[Annotated[int, Interval(ge=LEVELS[0], le=LEVELS[-1])], ...],
-        Doc(
-            f"Level of the track, {LEVELS[0]} to {LEVELS[-1]} (`mazebench list` says what they mean); of several "
-            "levels, not in an evaluation, each episode draws one."
-        ),
-    ] = _FIRST_LEVEL
-    distances: Annotated[
-        tuple[Annotated[int, Ge(1)], ...],
-        Doc(
-            "Cells from start to goal, as 1-5,8,10 (local task); if none are given, 1-15 in evaluations and in the "
-            "benchmark's eval mazes, else 1-5; those of the track; or as far as mazes of your own reach."
-        ),
-    ] = ()
-    start: Annotated[
-        str | None,
-        BeforeValidator(functools.partial(end_text, "start")),
-        Doc(
-            "Where every episode begins, instead of a drawn cell, or of the upper right corner (hierarchical task): a "
-            "cell 'row,column', in Python also (row, column), or a point '1.5m,2.5m' (x, y) from the map's lower left "
-            "corner."
-        ),
-    ] = None
-    goal: Annotated[
-        str | None,
-        BeforeValidator(functools.partial(end_text, "goal")),
-        Doc("Where every episode leads, as for start; instead of a drawn cell, or of the lower left corner."),
-    ] = None
-    time_limit: Annotated[
-        int,
-        Ge(0),
-        Doc(
-            "Agent steps to the goal, in the hierarchical task to each landmark; 0 stands for 100, or more where a "
-            "map, a start or a goal of your own needs them; a track has its own."
-        ),
-    ] = 0
-    landmark_distance: Annotated[
-        int, Ge(1), Doc("Cells between landmarks, along a shortest path on the shown map (hierarchical task).")
-    ] = 5
-    pairs: Annotated[
-        str,
-        OneOf("random", "fixed"),
-        Doc(
-            "random: a new start and goal in each episode; fixed: one pair in each maze, the paper's "
-            "extremely-low-data regime (local task)."
-        ),
-    ] = "random"
-    num_goals: Annotated[
-        int,
-        Ge(1),
-        Doc(
-            "Goals of an episode, one after the other without a reset (local task, random pairs); rewards and success "
-            "are those of the last one."
-        ),
-    ] = 1
-    continuous: Annotated[bool, Doc("Actions are velocities (forward, left, turn) instead of one of six.")] = False
-
-    # What is shown: what is wrong with the map and the senses, and what an agent may ask for or is not told.
-    map_flip: FlipShare = 0.0
-    map_warp: WarpShare = 0.0
-    position_noise: PositionDeviation = 0.0
-    odometry_noise: Annotated[
-        float | None,
-        Interval(ge=0, le=1),
-        Doc(
-            "alpha of the noise on the observed motion, AMCL's omnidirectional model (.2 is its default): the observed "
-            "pose drifts away from the true one; that of the track, or 0, if not given."
-        ),
-    ] = None
-    exact_pose: Annotated[
-        bool, Doc("The observed pose is the true one on a track whose pose is odometry, as a reference.")
-    ] = False
-    hide: Annotated[
-        tuple[Annotated[str, OneOf(*HIDEABLE)], ...],
-        Doc(
-            "What the context does not show: map makes planes 0 and 1 zero, goal plane 2 (local task, one goal). "
-            "Results without the map say what the map is worth."
-        ),
-    ] = ()
-    sensors: Annotated[
-        tuple[Annotated[str, OneOf(*SENSORS)], ...],
-        Doc("Sensors that are observed besides the state and the context."),
-    ] = ()
-    context_size: Annotated[
-        int,
-        Interval(ge=0, le=MAX_SIZE),
-        Doc(
-            "M, the cells on a side of the context's planes, at least 3; 0 stands for min(N, 21); a track has its own."
-        ),
-    ] = 0
 
     @classmethod
     def of(cls, task: str = "local", **options: Unpack[TaskOptions]) -> Task:
@@ -314,7 +136,7 @@ class Task(SensorOptions, ReadOptions):
             return FreshMazes(self._drawn_kinds, size)
         if self.is_drawn:
             split = "train" if self.split == "train" else "dev"
-            return draw_mazes(self._drawn_kinds, size, split, self.num_mazes or _NUM_DRAWN)
+            return draw_mazes(self._drawn_kinds, size, split, self.num_mazes or NUM_DRAWN)
         return load_mazes(size, self.split) if self.track is None else load_kind_mazes(self.split)
 
     @property
@@ -548,7 +370,7 @@ def _asked(task: str, options: Mapping[str, Any]) -> dict[str, Any]:
         task = "local"
     if "mazes" in given and not isinstance(given["mazes"], str | pathlib.Path):
         reading = {name: given[name] for name in fields_of(ReadOptions) if name in given}
-        given["mazes"] = own_mazes(_as_mazes(given["mazes"]), ReadOptions(**reading))
+        given["mazes"] = own_mazes(as_mazes(given["mazes"]), ReadOptions(**reading))
     return {"task": task, **given}
 
 
@@ -567,7 +389,7 @@ def _complete(given: Mapping[str, Any], default_distances: tuple[int, ...] | Non
     # The mazes that were found, and the distances that fit them.
     found: dict[str, Any] = {"size": mazes[0].size, "cell_size": mazes[0].cell_size}
     if asked.is_drawn:
-        found |= {"kinds": asked._drawn_kinds, "num_mazes": 0 if asked.fresh else asked.num_mazes or _NUM_DRAWN}
+        found |= {"kinds": asked._drawn_kinds, "num_mazes": 0 if asked.fresh else asked.num_mazes or NUM_DRAWN}
     default_distances = default_distances or (EVAL_DISTANCES if asked.split == "eval" else TRAIN_DISTANCES)
     distances = _distances(asked, mazes, default_distances)
     if asked.num_ends == 2 and asked.distances not in ((), distances):
@@ -664,7 +486,7 @@ def _check_options(task: Task) -> None:
         _check_track(task, task.track)
     elif task.exact_pose:
         raise InputError("exact_pose: expected a track whose pose is odometry beside it, found none")
-    elif task.level != _FIRST_LEVEL:
+    elif task.level != FIRST_LEVEL:
         levels = ", ".join(map(str, task.level))
         raise InputError(f"level {levels}: expected a track beside it, found none; tracks: {', '.join(TRACKS)}")
 

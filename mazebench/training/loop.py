@@ -24,7 +24,8 @@ from mazebench.evaluation.checked_agent import context_size_of
 from mazebench.evaluation.provenance import code_hash
 from mazebench.options import fields_of
 from mazebench.results.played import mazes_hash
-from mazebench.tasks.task import Task, TaskOptions, check_names, check_shown
+from mazebench.tasks.task import Task, check_names, check_shown
+from mazebench.tasks.task_fields import TaskOptions
 from mazebench.training.counters import Counters
 from mazebench.training.experience import Experience
 from mazebench.training.held_out import HeldOutEvaluation
