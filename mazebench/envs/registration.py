@@ -59,7 +59,7 @@ def load(
     """Returns a dm_control environment of a navigation task; `options` are those of `mazebench.make_spec`.
 
     Its first episode is the one of `reset(seed=seed)`. `env.physics` and `env.task` are a
-    `mazebench.envs.dm_control.Physics` and a `mazebench.tasks.navigation.Navigation`.
+    `mazebench.envs.dm_control.Physics` and a `mazebench.envs.dm_control.Task`.
 
     Raises:
       InputError: if an option is unknown or not allowed, or dm_control is not installed.
