@@ -80,8 +80,7 @@ def play_dm_env(spec: Task, seed: int, actions: np.ndarray) -> Iterator[Step]:
 
     def seen(time_step) -> Step:
         ended, task = time_step.last(), env.task
-        info = {name: getattr(task, name) for name in ("is_first", "success", "steps", "path_length")}
-        info |= {"position": env.physics.position(), "maze": task.episode.maze, "landmark": task.route.leg}
+        info = task.rules.info(0)
         terminated = ended and time_step.discount == 0
         state, context = time_step.observation["state"], time_step.observation["context"]
         return Step(state, context, time_step.reward, terminated, ended and not terminated, info)

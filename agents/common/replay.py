@@ -15,6 +15,7 @@ import numpy as np
 
 from mazebench.storage.array_files import read_arrays
 from mazebench.tasks.context import GLOBAL_MAP
+from mazebench.tasks.rules import reward
 from mazebench.training.experience import Experience
 
 from .sum_tree import SumTree
@@ -213,7 +214,7 @@ class Replay:
         """
         group = self._draw_groups(num_groups, num_steps, hindsight, rng)
         env, steps, goal = group.env[:, None], group.steps, group.goal[:, None]
-        reward, discount, last = self._returns(env, steps, goal, n)
+        total, discount, last = self._returns(env, steps, goal, n)
         rows = self._rows[env, steps]
         return Sample(
             row=group.row,
@@ -225,7 +226,7 @@ class Replay:
             cell=rows["cell"].astype(np.int64),
             state=rows["state"],
             action=rows["action"].astype(np.int64),
-            reward=reward,
+            reward=total,
             discount=discount,
             next_state=self._rows["state"][env, last],
             valid=(rows["cell"] != goal) & (last != steps),
@@ -365,19 +366,19 @@ class Replay:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Returns reward sums, discounts and last indices `[G, K]` of returns of up to n steps towards `goal`.
 
-        A step that ends in the goal is rewarded 0 and ends the return with discount 0; any other step is rewarded -1.
+        A step that ends in the goal ends the return with discount 0.
         A trajectory that ends earlier was cut short: its return bootstraps from its last state.
         """
-        reward = np.zeros(steps.shape, dtype=np.float32)
+        total = np.zeros(steps.shape, dtype=np.float32)
         going, hit = np.ones(steps.shape, dtype=bool), np.zeros(steps.shape, dtype=bool)
         last = steps.copy()
         for _ in range(n):
             going &= self._has_next(env, last)
             last = np.where(going, (last + 1) % self._length, last)
             hit |= going & (self._rows["cell"][env, last] == goal)
-            reward -= going & ~hit
+            total += going * reward(hit)
             going &= ~hit
-        return reward, (~hit).astype(np.float32), last
+        return total, (~hit).astype(np.float32), last
 
     def _has_next(self, env: np.ndarray, index: np.ndarray) -> np.ndarray:
         """Returns whether the row after `index` belongs to the same trajectory."""

@@ -10,9 +10,12 @@ import mujoco
 import numpy as np
 from dm_env import specs
 
-from mazebench.constants import STEPS_PER_ACTION
+from mazebench.constants import ACTIONS, STEPS_PER_ACTION
+from mazebench.envs.single import EnvironmentState, SingleTask
+from mazebench.tasks.actions import VELOCITY_SIZE
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.navigation import EnvironmentState, Navigation
+from mazebench.tasks.observation import observation_specs
+from mazebench.tasks.rules import reward
 from mazebench.tasks.task import Task as MazeTask
 from mazebench.world.models import models_of
 from mazebench.world.simulation import FULL_STATE, Simulation
@@ -52,8 +55,37 @@ class Physics(Simulation, engine.Physics):
         mujoco.mj_step1(self.model.ptr, self.data.ptr)
 
 
-class Task(Navigation, control.Task):
-    """The navigation task as a task of dm_control."""
+class Task(SingleTask, control.Task):
+    """The task as dm_control asks for it; `mazebench.tasks.rules.Rules` describes it."""
+
+    def get_observation(self, simulation: Simulation) -> dict[str, np.ndarray]:
+        observation = super().get_observation(simulation)
+        if self.spec.has_legs:
+            observation["is_first"] = np.array(self.rules.is_first.item())
+        return observation
+
+    def get_reward(self, simulation: Simulation) -> float:
+        """Returns 0 if the goal has been reached, else -1."""
+        return reward(self.success)
+
+    def get_termination(self, simulation: Simulation) -> float | None:
+        """Returns the last discount, 0 at the goal and 1 at the end of the time, or None if the episode goes on."""
+        if self.success:
+            return 0.0
+        return 1.0 if self.rules.timed_out.item() else None
+
+    def action_spec(self, simulation: Simulation) -> specs.DiscreteArray | specs.BoundedArray:
+        """Returns which actions there are."""
+        if self.spec.continuous:
+            return specs.BoundedArray((VELOCITY_SIZE,), np.float32, -1.0, 1.0, name="action")
+        return specs.DiscreteArray(len(ACTIONS), name="action")
+
+    def observation_spec(self, simulation: Simulation) -> dict[str, specs.Array]:
+        """Returns shape, type and range of each observation by name."""
+        result = observation_specs(self.spec)
+        if self.spec.has_legs:
+            result["is_first"] = specs.Array((), bool, name="is_first")
+        return result
 
 
 class Environment(control.Environment):

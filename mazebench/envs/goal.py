@@ -12,6 +12,7 @@ from mazebench.envs import spaces
 from mazebench.envs.gym import MazeEnv
 from mazebench.errors import InputError
 from mazebench.tasks.context import GOAL, NUM_PLANES
+from mazebench.tasks.rules import reward
 from mazebench.tasks.task import Task
 from mazebench.world.simulation import STATE_SIZE
 
@@ -53,8 +54,8 @@ class GoalMazeEnv(MazeEnv):
         )
 
     def compute_reward(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Infos) -> np.ndarray:
-        """Returns `[...]` float: 0 where the achieved goal `[..., 2]` is the desired one, else -1; ignores `info`."""
-        return np.where(self.compute_terminated(achieved_goal, desired_goal, info), 0.0, -1.0)[()]
+        """Returns `[...]` float: the reward where the achieved goal `[..., 2]` is the desired one; ignores `info`."""
+        return reward(self.compute_terminated(achieved_goal, desired_goal, info))
 
     def compute_terminated(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Infos) -> np.ndarray:
         """Returns `[...]` bool: where the achieved goal `[..., 2]` is the desired one; ignores `info`."""
@@ -68,7 +69,7 @@ class GoalMazeEnv(MazeEnv):
 
     def _observation(self) -> dict[str, np.ndarray]:
         shown = super()._observation()
-        maze = self.task_spec.all_mazes[self.task.maze]
+        maze = self.task_spec.all_mazes[self.task.episode.maze]
         planes = shown.pop("context")[_SHOWN_PLANES]
         return {
             "observation": np.concatenate([shown.pop("state"), planes.ravel()]),

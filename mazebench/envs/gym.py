@@ -11,10 +11,11 @@ import numpy as np
 from mazebench.constants import STEP_TIME, STEPS_PER_ACTION
 from mazebench.envs import spaces
 from mazebench.envs.env_spec import JsonSpec
+from mazebench.envs.single import EnvironmentState, SingleTask
 from mazebench.errors import InputError, unknown
 from mazebench.tasks.arguments import Arguments
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.navigation import EnvironmentState, Navigation
+from mazebench.tasks.rules import reward
 from mazebench.tasks.task import Task
 from mazebench.world.models import models_of
 from mazebench.world.rendering import Cameras
@@ -22,7 +23,7 @@ from mazebench.world.simulation import MujocoSimulation
 
 
 class MazeEnv(JsonSpec, gymnasium.Env):
-    """One environment; observations, rewards and endings are those of `mazebench.tasks.navigation.Navigation`.
+    """One environment; observations, rewards and endings are those of `mazebench.tasks.rules.Rules`.
 
     `info` has `is_first` (whether the context is new: an episode or the leg to the next landmark began), `success`,
     `steps`, `path_length` (m), `position` (`[2]` m) and `yaw` (rad; both are the true ones, for records and hindsight;
@@ -44,7 +45,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
           InputError: if an argument is not allowed.
         """
         arguments = Arguments(render_mode=render_mode, camera=camera)
-        self.task = Navigation(task_spec, seed)
+        self.task = SingleTask(task_spec, seed)
         self.task_spec = task_spec
         self.simulation = MujocoSimulation(models_of(task_spec.all_mazes)[0])
         self._needs_reset = True
@@ -68,7 +69,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         with self.simulation.reset_context():
             self.task.initialize_episode(self.simulation)
         self._needs_reset = False
-        return self._observation(), self._info()
+        return self._observation(), self.task.rules.info(0)
 
     def step(self, action: int | np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         """Takes one agent step of 0.16 s.
@@ -83,9 +84,9 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         task.before_step(action, simulation)
         simulation.step(STEPS_PER_ACTION)
         task.after_step(simulation)
-        discount = task.get_termination(simulation)
-        self._needs_reset = discount is not None
-        return self._observation(), task.get_reward(simulation), discount == 0.0, discount == 1.0, self._info()
+        reached, timed_out = task.rules.reached.item(), task.rules.timed_out.item()
+        self._needs_reset = reached or timed_out
+        return self._observation(), reward(reached), reached, timed_out, task.rules.info(0)
 
     def render(self) -> np.ndarray | None:
         """Returns `[480, 480, 3]` uint8 of the current state if `render_mode` is "rgb_array", else None."""
@@ -94,7 +95,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         if self._cameras is None:
             self._cameras = Cameras(models_of(self.task_spec.all_mazes, self.task_spec.textures), (self._camera,))
         data = self.simulation.data
-        return self._cameras.take(self.task.maze, data.qpos, data.mocap_pos[0])[self._camera]
+        return self._cameras.take(self.task.rules.maze.item(), data.qpos, data.mocap_pos[0])[self._camera]
 
     def close(self) -> None:
         if self._cameras is not None:
@@ -120,22 +121,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         return vars(self) | {"_cameras": None}  # a copy opens some of its own
 
     def _observation(self) -> dict[str, np.ndarray]:
-        observation = self.task.get_observation(self.simulation)
-        observation.pop("is_first", None)  # it is in `info`
-        return observation
-
-    def _info(self) -> dict[str, Any]:
-        task = self.task
-        return {
-            "is_first": task.is_first,
-            "success": task.success,
-            "steps": task.steps,
-            "path_length": task.path_length,
-            "position": self.simulation.position(),
-            "yaw": self.simulation.yaw(),
-            "maze": task.maze,
-            "landmark": task.route.leg,
-        }
+        return self.task.get_observation(self.simulation)
 
 
 def _episode_of(options: dict[str, Any] | None) -> Episode | None:

@@ -59,7 +59,8 @@ def load(task: str = "local", *, seed: int | None = None, **options: Unpack[Task
 
         >>> env = mazebench.load("local", size=15, seed=0)
 
-    Its first episode is the one of `reset(seed=seed)`. `env.physics` is a `mazebench.envs.dm_control.Physics`.
+    Its first episode is the one of `reset(seed=seed)`. `env.physics` is a `mazebench.envs.dm_control.Physics`, and
+    `env.task` a `mazebench.envs.dm_control.Task`.
 
     Raises:
       InputError: if an option is unknown or not allowed, or dm_control is not installed.

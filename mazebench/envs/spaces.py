@@ -13,7 +13,7 @@ from mazebench.tasks.task import Task
 
 
 def observation_space(spec: Task) -> spaces.Dict:
-    """Returns the space of the observations that `Navigation` documents, except `is_first`, which is in `info`."""
+    """Returns the space of the observations that `Rules` documents, except `is_first`, which is in `info`."""
     return spaces.Dict({name: _box(array) for name, array in observation_specs(spec).items()})
 
 

@@ -19,22 +19,16 @@ from mazebench.constants import STEP_TIME, STEPS_PER_ACTION
 from mazebench.envs import spaces
 from mazebench.envs.env_spec import JsonSpec
 from mazebench.errors import InputError, unknown
-from mazebench.maps.maze import Cell
 from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_actions, controls_of_velocities
 from mazebench.tasks.arguments import Arguments, require_task_spec
-from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode, sample_episode
-from mazebench.tasks.observation import OpenSensors, lidar_noise, observation_specs, state_errors
-from mazebench.tasks.perturbations.perturbation import ShownMap, StateError
-from mazebench.tasks.route import Event, Route, plan_route
-from mazebench.tasks.sensors.sensor import Worlds
-from mazebench.tasks.shown_map import leg_context, show_map
+from mazebench.tasks.observation import observation_specs
+from mazebench.tasks.rules import Rules, reward
 from mazebench.tasks.task import Task
-from mazebench.world.angles import wrap_angle
 from mazebench.world.batch import open_batch
 from mazebench.world.models import models_of
 from mazebench.world.rendering import Cameras
-from mazebench.world.simulation import STATE_SIZE, states_from_sensors
+from mazebench.world.simulation import states_from_sensors
 
 # Returns the next episode of environment i; None ends the environment, which is not stepped any more.
 EpisodeSource = Callable[[int], Episode | None]
@@ -106,13 +100,20 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
 
-        # The episodes, and where each of them is.
+        # The episodes, and what was observed of them last: [B, ...] by name.
         self._episode_source = episode_source
         self._rngs = [np.random.default_rng(value) for value in _seeds(seed, num_envs)]
+        self.rules = Rules(task_spec, num_envs)
+        self.episodes = self.rules.episodes
         self._was_reset = False
-        self._allocate()
+        self._ended = np.zeros(num_envs, dtype=bool)  # whether the episode is over and the next one has yet to begin
+        self._observed = {
+            name: np.zeros((num_envs, *array.shape), array.dtype)
+            for name, array in observation_specs(task_spec).items()
+        }
+        self._observed["context"] = self.rules.context
 
-        # The simulation, with views of its arrays, and the sensors.
+        # The simulation, with views of its arrays.
         self._maze_models = models_of(task_spec.all_mazes)
         self._models = self._maze_models.first_models(num_envs)
         self._process = os.getpid()
@@ -121,7 +122,6 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._qpos = self._batch.bind("qpos")
         self._ctrl = self._batch.bind("ctrl")
         self._marker = self._batch.bind("mocap_pos")
-        self._sensors = OpenSensors(task_spec)
         self._top_camera: Cameras | None = None  # of `render`
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -129,33 +129,6 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
             f"{type(self).__name__} can't be copied or pickled; copy dm_env or Gymnasium environments, or make another "
             "one with the same task_spec and seed"
         )
-
-    def _allocate(self) -> None:
-        num_envs, size = self.num_envs, self.task_spec.context_size
-        self.episodes: list[Episode | None] = [None] * num_envs
-        self._routes: list[Route | None] = [None] * num_envs
-        self._shown: list[ShownMap | None] = [None] * num_envs
-        self._state_errors: list[list[StateError]] = [[] for _ in range(num_envs)]
-        self._lidar_noise: list[np.random.Generator | None] = [None] * num_envs
-        self._context = np.zeros((num_envs, NUM_PLANES, size, size), dtype=np.float32)
-        self._positions = np.zeros((num_envs, 2))
-        self._path_length = np.zeros(num_envs)
-        self._steps = np.zeros(num_envs, dtype=np.int64)
-        # What each step is checked against: cells as row * N + column, and the step at which the leg times out.
-        self._start = np.zeros(num_envs, dtype=np.int64)
-        self._target = np.zeros(num_envs, dtype=np.int64)
-        self._goal = np.zeros(num_envs, dtype=np.int64)
-        self._deadline = np.zeros(num_envs, dtype=np.int64)
-        self._landmark = np.zeros(num_envs, dtype=np.int64)
-        self._maze = np.zeros(num_envs, dtype=np.int64)
-        self._active = np.zeros(num_envs, dtype=bool)  # whether the environment has an episode
-        self._ended = np.zeros(num_envs, dtype=bool)  # whether the episode is over and the next one has yet to begin
-        # As observed last: the states, and [B, ...] by sensor.
-        self._states = np.zeros((num_envs, STATE_SIZE), dtype=np.float32)
-        specs = observation_specs(self.task_spec)
-        self._sensed = {
-            name: np.zeros((num_envs, *specs[name].shape), specs[name].dtype) for name in self.task_spec.sensors
-        }
 
     def reset(
         self, *, seed: Seeds = None, options: dict[str, Any] | None = None
@@ -184,8 +157,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         indices = np.flatnonzero(mask)
         self._begin_episodes(indices)
         self._observe(indices)
-        infos = self._infos(is_first=mask.copy(), success=np.zeros(self.num_envs, dtype=bool), mask=mask)
-        return self._observations(), infos
+        return self._observations(), self._infos(mask.copy())
 
     def _reset_mask(self, options: dict[str, Any] | None) -> np.ndarray:
         """Returns `[B]` bool: which environments `options` say to reset."""
@@ -219,26 +191,22 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
             self._ctrl[:] = controls_of_actions(actions, self.num_envs)
 
         # Simulate the environments whose episode is under way.
-        running = self._active & ~self._ended
+        running = self.rules.active & ~self._ended
         all_run = running.all()
         self._batch.step(None if all_run else np.flatnonzero(running), nstep=STEPS_PER_ACTION, stage=_VELOCITY_STAGE)
 
-        # Take over how far the bodies moved.
-        moved = self._qpos[:, :2] - self._positions
-        self._positions += moved
-        self._path_length += np.sqrt(moved[:, 0] * moved[:, 0] + moved[:, 1] * moved[:, 1])
-        self._steps += running
-
         # Apply the rules of the task.
-        is_first, terminated, truncated = self._advance(running)
-        rewards = np.where(terminated, 0.0, -1.0)
-        rewards[~running] = 0.0
+        rules = self.rules
+        rules.advance(self._qpos, running)
+        self._marker[:, 0] = rules.marker
+        terminated, truncated = rules.reached.copy(), rules.timed_out.copy()
+        rewards = np.where(running, reward(terminated), 0.0)
 
         # With NEXT_STEP, begin the episodes that follow those that ended in the step before.
         if self._ended.any():
-            is_first[self._begin_episodes(np.flatnonzero(self._ended))] = True
-        self._observe(slice(None))
-        infos = self._infos(is_first, success=terminated)
+            self._begin_episodes(np.flatnonzero(self._ended))
+        self._observe(np.arange(self.num_envs))
+        infos = self._infos()
 
         # With SAME_STEP, begin those that follow the ones that ended in this step.
         ended = terminated | truncated
@@ -266,164 +234,69 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
                 f"environments {', '.join(map(str, np.flatnonzero(self._ended)))}"[:200]
             )
 
-    def _advance(self, running: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns three `[B]` bool: where a new leg began, where the goal was reached, where the time ran out."""
-        size = self.task_spec.size
-        is_first, terminated, truncated = np.zeros((3, self.num_envs), dtype=bool)
-        cells = self.cells()
-
-        # Nothing happens to a route unless one of these holds; then the route's own rules decide.
-        due = (cells == self._target) | (cells == self._goal) | (self._steps >= self._deadline)
-        for i in np.flatnonzero(due & running).tolist():
-            event = self._route(i).advance(divmod(int(cells[i]), size), int(self._steps[i]))
-            if event is Event.LANDMARK:
-                self._begin_leg(i)
-                is_first[i] = True
-            terminated[i] = event is Event.REACHED
-            truncated[i] = event is Event.TIMEOUT
-        return is_first, terminated, truncated
-
     def _autoreset(self, ended: np.ndarray, infos: dict[str, Any]) -> dict[str, Any]:
         """Begins the next episodes where one `ended`, and returns the infos with the ended ones' last observations."""
         # What was observed last, and the infos of then: those of the ended environments only.
         indices = np.flatnonzero(ended)
         final_obs = np.full(self.num_envs, None, dtype=object)
         for i in indices:
-            final_obs[i] = {name: values[i].copy() for name, values in self._observed().items()}
-        final_info = {key: value if key.startswith("_") else value.copy() for key, value in infos.items()}
-        final_info.update({key: ended for key in infos if key.startswith("_")})
+            final_obs[i] = {name: values[i].copy() for name, values in self._observed.items()}
+        final_info = infos | {key: ended for key in infos if key.startswith("_")}
 
         # The next episodes, and the infos of now.
         began = self._begin_episodes(indices)
         if len(began):
             self._observe(began)
-        is_first = infos["is_first"]
-        is_first[began] = True
-        infos = self._infos(is_first, success=infos["success"] & ~ended)
-        return infos | {"final_obs": final_obs, "_final_obs": ended, "final_info": final_info, "_final_info": ended}
+        final = {"final_obs": final_obs, "_final_obs": ended, "final_info": final_info, "_final_info": ended}
+        return self._infos() | final
 
     def _begin_episodes(self, indices: np.ndarray) -> np.ndarray:
         """Begins the next episodes of the environments `indices`; returns those of them that have one."""
         for i in indices.tolist():
             if self._episode_source:
-                self.episodes[i] = self._episode_source(i)
+                self.rules.begin(i, self._episode_source(i))
             else:
-                self.episodes[i] = sample_episode(self.task_spec, self._rngs[i])
-            self._active[i] = self.episodes[i] is not None
+                self.rules.begin(i, sample_episode(self.task_spec, self._rngs[i]))
         self._ended[indices] = False
-        began = indices[self._active[indices]]
+        began = indices[self.rules.active[indices]]
         if not len(began):
             return began
 
-        # Change the mazes, reset the simulations, place the bodies, and compute what follows from that.
+        # Change the mazes, reset the simulations, place bodies and markers, and compute what follows from that.
         for i in began:
-            self._models[i] = self._maze_models.replaced(self._models[i], self._episode(i).maze)
+            self._models[i] = self._maze_models.replaced(self._models[i], int(self.rules.maze[i]))
         self._batch.set_models(self._models)
         self._batch.reset(began, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
-        for i in began:
-            self._begin_episode(i)
+        self._qpos[began] = self.rules.pose[began]
+        self._marker[began, 0] = self.rules.marker[began]
         self._batch.forward(began, stage=_VELOCITY_STAGE)
         return began
 
-    def _begin_episode(self, i: int) -> None:
-        spec, episode = self.task_spec, self._episode(i)
-        shown = show_map(spec, episode)
-        self._shown[i] = shown
-        self._routes[i] = plan_route(spec, episode, shown)
-        self._state_errors[i] = state_errors(spec, episode)
-        self._lidar_noise[i] = lidar_noise(spec, episode)
-        self._maze[i] = episode.maze
-        self._positions[i] = spec.all_mazes[episode.maze].point(episode.start)
-        self._qpos[i] = (*self._positions[i], episode.yaw)
-        self._path_length[i] = 0.0
-        self._steps[i] = 0
-        self._begin_leg(i)
-
-    def _begin_leg(self, i: int) -> None:
-        route, shown = self._route(i), self._shown[i]
-        assert shown is not None
-        self._context[i] = leg_context(self.task_spec, shown, route.start, route.target)
-        self._start[i] = self._cell_index(route.start)
-        self._target[i] = self._cell_index(route.target)
-        self._goal[i] = self._cell_index(route.goal)
-        self._deadline[i] = route.deadline
-        self._landmark[i] = route.leg
-        self._marker[i, 0] = (*self.task_spec.all_mazes[self._maze[i]].point(route.goal), 0.0)
-
-    def _cell_index(self, cell: Cell) -> int:
-        return cell[0] * self.task_spec.size + cell[1]
-
-    def _observe(self, indices: np.ndarray | slice) -> None:
-        """Takes over what the agents of the environments `indices` observe; noise is drawn anew with each call."""
+    def _observe(self, indices: np.ndarray) -> None:
+        """Takes over what the agents of the environments `indices` observe; each call draws new noise."""
         states = states_from_sensors(self._sensordata[indices])
-        if any(self._state_errors):
-            for state, i in zip(states, np.arange(self.num_envs)[indices], strict=True):
-                for add_error in self._state_errors[i] if self._active[i] else ():
-                    add_error(state)
-        self._states[indices] = states
-
-        # What the sensors read.
-        slots = np.arange(self.num_envs)[indices].tolist()
-        worlds = Worlds(
-            maze=self._maze[indices],
-            pose=self._qpos[indices],
-            marker=self._marker[indices, 0],
-            noise=[self._lidar_noise[i] if self._active[i] else None for i in slots],
-        )
-        for name, values in self._sensors.read(worlds).items():
-            self._sensed[name][indices] = values
-
-    def _observed(self) -> dict[str, np.ndarray]:
-        """Returns `[B, ...]` by name: what was observed last, not copied."""
-        return {"state": self._states, "context": self._context, **self._sensed}
+        for name, values in self.rules.observe(states, indices).items():
+            self._observed[name][indices] = values
 
     def _observations(self) -> dict[str, np.ndarray]:
-        return {name: values.copy() for name, values in self._observed().items()}
+        return {name: values.copy() for name, values in self._observed.items()}
 
-    def _infos(self, is_first: np.ndarray, success: np.ndarray, mask: np.ndarray | None = None) -> dict[str, Any]:
+    def _infos(self, mask: np.ndarray | None = None) -> dict[str, Any]:
         """Returns the infos; `mask` (`[B]` bool) says of which environments they are, of all by default."""
-        infos = {
-            "is_first": is_first,
-            "success": success.copy(),
-            "steps": self._steps.copy(),
-            "path_length": self._path_length.copy(),
-            "position": self._positions.copy(),
-            "yaw": wrap_angle(self._qpos[:, 2]),
-            "maze": self._maze.copy(),
-            "landmark": self._landmark.copy(),
-        }
-        mask = np.ones(self.num_envs, dtype=bool) if mask is None else mask.copy()
+        infos = self.rules.infos()
+        mask = np.ones(self.num_envs, dtype=bool) if mask is None else mask
         return infos | {f"_{key}": mask for key in infos}
-
-    def _episode(self, i: int) -> Episode:
-        episode = self.episodes[i]
-        assert episode is not None
-        return episode
-
-    def _route(self, i: int) -> Route:
-        route = self._routes[i]
-        assert route is not None
-        return route
-
-    def cells(self) -> np.ndarray:
-        """Returns `[B]` int: the true cells of the bodies, as row * N + column; agents must not use them."""
-        # All mazes have one size and one cell size, so the first one converts the points of all.
-        return self.task_spec.all_mazes[0].cell(self._positions) @ (self.task_spec.size, 1)
-
-    def legs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Returns two `[B]` int: the start cells and target cells of the current legs, as row * N + column."""
-        return self._start.copy(), self._target.copy()
 
     def render(self) -> tuple[np.ndarray, ...]:
         """Returns a picture `[480, 480, 3]` uint8 of each environment, seen from above."""
         self._require_open()
         if self._top_camera is None:
             self._top_camera = Cameras(models_of(self.task_spec.all_mazes, self.task_spec.textures), ("top",))
-        worlds = zip(self._maze.tolist(), self._qpos, self._marker[:, 0], strict=True)
+        worlds = zip(self.rules.maze.tolist(), self._qpos, self._marker[:, 0], strict=True)
         return tuple(self._top_camera.take(*world)["top"] for world in worlds)
 
     def close_extras(self, **kwargs: Any) -> None:
-        self._sensors.close()
+        self.rules.close()
         if self._top_camera is not None:
             self._top_camera.close()
         del self._batch, self._sensordata, self._qpos, self._ctrl, self._marker  # which ends the threads

@@ -131,7 +131,7 @@ class _Scene:
         pictures = {}
         if self._cameras is not None:
             data = self.env.simulation.data
-            pictures = self._cameras.take(self.env.task.maze, data.qpos, data.mocap_pos[0])
+            pictures = self._cameras.take(self.env.task.episode.maze, data.qpos, data.mocap_pos[0])
         pictures |= {view: self._drawing(view, observation) for view in self.views if view not in pictures}
         return np.concatenate([pictures[view] for view in self.views], axis=1)
 

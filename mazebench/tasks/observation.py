@@ -39,11 +39,6 @@ def state_errors(spec: Task, episode: Episode) -> list[StateError]:
     return [error for error in (noise, *errors) if error is not None]
 
 
-def lidar_noise(spec: Task, episode: Episode) -> np.random.Generator | None:
-    """Returns what draws the noise on the lidar's readings in `episode`; None if nothing is drawn."""
-    return episode.stream(Stream.LIDAR_NOISE) if "lidar" in spec.sensors and spec.lidar.is_random else None
-
-
 class OpenSensors:
     """The sensors of a task, opened for one environment."""
 

@@ -70,8 +70,9 @@ class Collector:
 
     def step(self, action: np.ndarray) -> Experience:
         """Takes `action` `[B]` for the current `inputs`, which those of the next step replace."""
-        now, cell, (start, goal) = self.inputs, self._env.cells(), self._env.legs()
-        before = (now.new_episode, now.new_context, self._maze, start, goal)
+        now, rules = self.inputs, self._env.rules
+        cell = rules.cells()
+        before = (now.new_episode, now.new_context, self._maze, rules.start.copy(), rules.target.copy())
         observation, _, terminated, truncated, infos = self._env.step(action)
         ended = terminated | truncated
         seeds = now.seed.copy()
@@ -102,4 +103,4 @@ class Collector:
     def _final_cells(self, infos: dict[str, Any], ended: np.ndarray) -> np.ndarray:
         if not ended.any():
             return np.zeros(self.num_envs, dtype=np.int64)
-        return self._any_maze.cell(infos["final_info"]["position"]) @ (self._any_maze.size, 1)
+        return self._any_maze.cell_index(infos["final_info"]["position"])

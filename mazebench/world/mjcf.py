@@ -36,8 +36,7 @@ _PARKED_DEPTH = 10.0  # metres below the floor
 # The columns of `sensordata`, in the order in which `_add_sensors` adds them.
 SENSED_POSITION = slice(0, 3)
 SENSED_YAW = 3
-SENSED_VELOCITY = slice(4, 7)
-SENSED_ANGULAR_VELOCITY = slice(7, 10)
+SENSED_VELOCITIES = slice(4, 10)  # linear, then angular
 
 # The columns of controls, in the order in which `_add_actuators` adds them: four drives and the turn.
 NUM_CONTROLS = 5

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from mazebench.world.angles import wrap_angle
-from mazebench.world.mjcf import SENSED_ANGULAR_VELOCITY, SENSED_POSITION, SENSED_VELOCITY, SENSED_YAW
+from mazebench.world.mjcf import SENSED_POSITION, SENSED_VELOCITIES, SENSED_YAW
 from mazebench.world.models import MazeModels
 
 STATE_SIZE = 12
@@ -124,6 +124,5 @@ def states_from_sensors(sensors: np.ndarray) -> np.ndarray:
     states = np.zeros((*sensors.shape[:-1], STATE_SIZE))
     states[..., 0:3] = sensors[..., SENSED_POSITION]
     states[..., 5] = wrap_angle(sensors[..., SENSED_YAW])
-    states[..., 6:9] = sensors[..., SENSED_VELOCITY]
-    states[..., 9:12] = sensors[..., SENSED_ANGULAR_VELOCITY]
+    states[..., 6:12] = sensors[..., SENSED_VELOCITIES]
     return states

@@ -1,0 +1,171 @@
+"""A task in one simulation, as the Gymnasium and the dm_control environment share it."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from mazebench.errors import InputError
+from mazebench.maps.maze import Maze
+from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_action, controls_of_velocities
+from mazebench.tasks.arguments import Arguments, require_task_spec
+from mazebench.tasks.episode import Episode, check_episode, sample_episode
+from mazebench.tasks.perturbations.perturbation import ShownMap
+from mazebench.tasks.route import Route
+from mazebench.tasks.rules import Rules
+from mazebench.tasks.task import Task
+from mazebench.world.models import models_of
+from mazebench.world.simulation import Simulation
+
+_Value = TypeVar("_Value")
+
+_RUNNING = np.ones(1, dtype=bool)
+_INDEX = np.zeros(1, dtype=np.int64)
+_NO_STATE = ("spec", "_sensors")  # attributes of the rules that no step changes
+
+
+class SingleTask:
+    """The rules of one environment, its stream of episodes, and what they do to its simulation.
+
+    Its methods are those of a dm_control task. An environment calls them with the simulation that it steps.
+    """
+
+    def __init__(self, spec: Task, seed: int | None = None):
+        """`seed` is that of the stream from which episodes are drawn.
+
+        Raises:
+          InputError: if `seed` is not a natural number, or `spec` not a `Task`.
+        """
+        require_task_spec(spec)
+        self.spec = spec
+        self.rules = Rules(spec, num_envs=1)
+        self.rng = np.random.default_rng(Arguments(seed=seed).seed)
+        self._next_episode: Episode | None = None
+        self._models = models_of(spec.all_mazes)
+
+    def choose_episode(self, seed: int | None = None, episode: Episode | None = None) -> None:
+        """Makes the next reset begin the stream of episodes of `seed`, or play `episode` instead of a drawn one.
+
+        Raises:
+          InputError: if `seed` is not a natural number, or the episode can't be played in this task's mazes.
+        """
+        if seed is not None:
+            self.rng = np.random.default_rng(Arguments(seed=seed).seed)
+        if episode is not None:
+            self._next_episode = check_episode(self.spec, episode)
+
+    @property
+    def episode(self) -> Episode:
+        """The running episode, or the one that ended last."""
+        return _only(self.rules.episodes)
+
+    @property
+    def shown_map(self) -> ShownMap:
+        """The map that the agent is shown in the episode."""
+        return _only(self.rules.shown)
+
+    @property
+    def route(self) -> Route:
+        """The cells that the agent is sent to in the episode."""
+        return _only(self.rules.routes)
+
+    @property
+    def success(self) -> bool:
+        """True if the goal has been reached."""
+        return self.rules.reached.item()
+
+    @property
+    def steps(self) -> int:
+        """The agent steps since the start of the episode."""
+        return self.rules.steps.item()
+
+    @property
+    def path_length(self) -> float:
+        """The metres driven since the start of the episode."""
+        return self.rules.path_length.item()
+
+    def initialize_episode(self, simulation: Simulation) -> None:
+        """Draws an episode, or takes the chosen one, and places body and goal; call it within `reset_context()`."""
+        episode = self._next_episode or sample_episode(self.spec, self.rng)
+        self._next_episode = None
+        self.rules.begin(0, episode)
+        simulation.load_maze(self._models, episode.maze)
+        simulation.place_agent(self.rules.pose[0, :2], episode.yaw)
+        simulation.place_goal(self.rules.marker[0, :2])
+
+    def before_step(self, action: int | np.ndarray, simulation: Simulation) -> None:
+        """Sets the controls of an action.
+
+        Raises:
+          InputError: if there is no such action.
+        """
+        if self.spec.continuous:
+            simulation.set_controls(controls_of_velocities(np.asarray(action), (VELOCITY_SIZE,)))
+        else:
+            simulation.set_controls(controls_of_action(action))  # type: ignore[arg-type]
+
+    def after_step(self, simulation: Simulation) -> None:
+        """Takes note of what the action led to."""
+        self.rules.advance(simulation.data.qpos[None], _RUNNING)
+        if self.rules.is_first.item():
+            simulation.place_goal(self.rules.marker[0, :2])
+
+    def get_observation(self, simulation: Simulation) -> dict[str, np.ndarray]:
+        """Returns the observation of the present moment; each call draws new noise."""
+        observed = self.rules.observe(simulation.state()[None], _INDEX)
+        first = {"state": observed.pop("state")[0], "context": self.rules.context[0].copy()}
+        return first | {name: values[0] for name, values in observed.items()}
+
+    def get_state(self, simulation: Simulation) -> EnvironmentState:
+        """Returns all that the future of the task and its simulation depends on."""
+        changing = {name: value for name, value in vars(self.rules).items() if name not in _NO_STATE}
+        return EnvironmentState(
+            maze=self.spec.all_mazes[self.rules.maze.item()],
+            simulation=simulation.full_state(),
+            rng=self.rng.bit_generator.state,
+            rules=_copied(changing),
+        )
+
+    def set_state(self, state: EnvironmentState, simulation: Simulation) -> None:
+        """Goes back to a state.
+
+        Raises:
+          InputError: if it is of an environment with other mazes.
+        """
+        index = state.rules["maze"].item()
+        if index >= len(self.spec.all_mazes) or self.spec.all_mazes[index] != state.maze:
+            raise InputError(f"expected a state of an environment with the same mazes, found one of {state.maze.name}")
+        simulation.load_maze(self._models, index)
+        simulation.set_full_state(state.simulation)
+        self.rng.bit_generator.state = state.rng
+        vars(self.rules).update(_copied(state.rules))
+
+    def close(self) -> None:
+        """Closes the sensors."""
+        self.rules.close()
+
+
+class EnvironmentState(NamedTuple):
+    """A moment of an environment. Its content is the environment's own matter; it can be pickled."""
+
+    maze: Maze
+    simulation: np.ndarray  # [S], see `Simulation.full_state`
+    rng: Mapping[str, Any]  # of NumPy's bit generator that draws episodes
+    rules: dict[str, Any]  # attributes of the `Rules`
+    needs_reset: bool = False
+
+
+def _only(values: list[_Value | None]) -> _Value:
+    """Returns the value of the one environment, which has an episode."""
+    (value,) = values
+    assert value is not None
+    return value
+
+
+def _copied(attributes: dict[str, Any]) -> dict[str, Any]:
+    """Returns a copy of attributes of `Rules`, with the same episodes and shown maps, which never change."""
+    shared = {id(value): value for name in ("episodes", "shown") for value in attributes[name]}
+    return copy.deepcopy(attributes, shared)

@@ -1,0 +1,215 @@
+"""The rule book of a task: how an episode begins, what a step leads to, what is observed and rewarded."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, overload
+
+import numpy as np
+
+from mazebench.maps.maze import Cell
+from mazebench.tasks.context import NUM_PLANES
+from mazebench.tasks.episode import Episode
+from mazebench.tasks.observation import OpenSensors, state_errors
+from mazebench.tasks.perturbations.perturbation import ShownMap, StateError
+from mazebench.tasks.route import Event, Route, plan_route
+from mazebench.tasks.sensors.sensor import Worlds
+from mazebench.tasks.shown_map import leg_context, show_map
+from mazebench.tasks.streams import Stream
+from mazebench.tasks.task import Task
+from mazebench.world.angles import wrap_angle
+
+
+@overload
+def reward(reached: bool) -> float: ...
+@overload
+def reward(reached: np.ndarray) -> np.ndarray: ...
+def reward(reached: bool | np.ndarray) -> float | np.ndarray:
+    """Returns the reward of steps: 0 for a step that reaches the goal, else -1."""
+    return reached - 1.0
+
+
+class Rules:
+    """Drive to the goal cell of a maze that was never seen before, with a map of it.
+
+    These are the rules of B episodes, one in each of B environments. An environment calls `begin` and simulates; after
+    each agent step it calls `advance` with the poses of its bodies.
+
+    Actions: one of six, 0.16 s each: forward, backward, strafe_left, strafe_right, look_left, look_right. With
+    `continuous`, `[3]` velocities for 0.16 s, each in [-1, 1]: forward and left as shares of the top speed (together no
+    faster than it), turning to the left as a share of the turn rate.
+
+    Observations:
+
+    - state: `[12]` float32: x, y, z (m); roll, pitch, yaw (rad, yaw in [-pi, pi)); velocity forward, left, up (m/s);
+      angular velocity about the body's x, y, z (rad/s). With `position_noise`, x and y are noisy; with
+      `odometry_noise`, the pose and the velocities are.
+    - context: `[4, M, M]` float32, constant until the next landmark: the map, the map around the start, goal, start.
+    - is_first: bool, only in dm_env and if episodes may have several legs: whether this context is new. Gymnasium's
+      environments have it in `info`.
+    - egocentric, top, chase: `[H, H, 3]` uint8, if `sensors` names them: pictures of the true world, with a marker at
+      the goal.
+    - lidar: `[32]` float32, if `sensors` names it: metres from the body's centre to the nearest wall of the true maze,
+      at most 5, along horizontal rays; the first straight ahead, then counter-clockwise every 360 / 32 degrees. With
+      `lidar_noise`, they are noisy, and may reach less far.
+
+    Reward: -1 for each step, 0 for the step that reaches the goal cell; there is no discount on the way.
+
+    Termination: when the body's centre is in the goal cell after a step (discount 0). Otherwise the episode is
+    truncated (discount 1) after `time_limit` steps, in the hierarchical task of the last leg. A goal that is
+    entered on the last step is reached.
+    """
+
+    def __init__(self, spec: Task, num_envs: int):
+        self.spec = spec
+        self._sensors = OpenSensors(spec)
+
+        # The episodes; those of an environment that has none, or none yet, are None.
+        self.episodes: list[Episode | None] = [None] * num_envs
+        self.shown: list[ShownMap | None] = [None] * num_envs
+        self.routes: list[Route | None] = [None] * num_envs
+        self._state_errors: list[list[StateError]] = [[] for _ in range(num_envs)]
+        self._lidar_noise: list[np.random.Generator | None] = [None] * num_envs
+        self.maze = np.zeros(num_envs, dtype=np.int64)  # index among the task's mazes
+        self.active = np.zeros(num_envs, dtype=bool)  # whether the environment has an episode
+
+        # The current legs. Cells are given as row * N + column.
+        self.context = np.zeros((num_envs, NUM_PLANES, spec.context_size, spec.context_size), dtype=np.float32)
+        self.marker = np.zeros((num_envs, 3))  # m, of the goal
+        self.landmark = np.zeros(num_envs, dtype=np.int64)  # number of legs done
+        self.start, self.target, self._goal = np.zeros((3, num_envs), dtype=np.int64)
+        self._deadline = np.zeros(num_envs, dtype=np.int64)  # the step at which the leg times out
+
+        # What steps have led to.
+        self.pose = np.zeros((num_envs, 3))  # x, y (m), yaw (rad, not wrapped)
+        self.path_length = np.zeros(num_envs)  # m
+        self.steps = np.zeros(num_envs, dtype=np.int64)
+        self.is_first, self.reached, self.timed_out = np.zeros((3, num_envs), dtype=bool)
+
+    def begin(self, i: int, episode: Episode | None) -> None:
+        """Begins an episode in environment i, whose body must then be moved to `pose[i]`; None takes its episode."""
+        self.episodes[i], self.active[i] = episode, episode is not None
+        self.is_first[i] = self.reached[i] = self.timed_out[i] = False
+        self._state_errors[i], self._lidar_noise[i] = [], None
+        if episode is None:
+            return
+
+        # What the agent is shown and senses, and where it is sent.
+        spec = self.spec
+        self.shown[i] = shown = show_map(spec, episode)
+        self.routes[i] = route = plan_route(spec, episode, shown)
+        self._state_errors[i] = state_errors(spec, episode)
+        if "lidar" in spec.sensors and spec.lidar.is_random:
+            self._lidar_noise[i] = episode.stream(Stream.LIDAR_NOISE)
+
+        self.maze[i] = episode.maze
+        self.pose[i] = (*spec.all_mazes[episode.maze].point(episode.start), episode.yaw)
+        self.path_length[i] = self.steps[i] = 0
+        self._begin_leg(i, route, shown)
+
+    def _begin_leg(self, i: int, route: Route, shown: ShownMap) -> None:
+        size = self.spec.size
+        self.is_first[i] = True
+        self.context[i] = leg_context(self.spec, shown, route.start, route.target)
+        cells = np.array([route.start, route.target, route.goal])
+        self.start[i], self.target[i], self._goal[i] = cells @ (size, 1)
+        self.marker[i, :2] = self.spec.all_mazes[self.maze[i]].point(route.goal)
+        self._deadline[i] = route.deadline
+        self.landmark[i] = route.leg
+
+    def advance(self, poses: np.ndarray, running: np.ndarray) -> None:
+        """Takes note of an agent step after which the bodies have `poses` (`[B, 3]`: x, y, yaw).
+
+        Afterwards, `is_first`, `reached` and `timed_out` (`[B]` bool) say where the step began a new leg, reached the
+        goal, or used up the time. It was taken where `running` (`[B]` bool); elsewhere the body must not have moved.
+        """
+        for happened in (self.is_first, self.reached, self.timed_out):
+            happened.fill(False)
+        if len(poses) == 1 and running.item():  # plain numbers take a fourth of the time of arrays
+            self._move_one(*poses[0].tolist())
+            return
+
+        moved = poses[:, :2] - self.pose[:, :2]
+        moved *= moved
+        self.path_length += np.sqrt(moved[:, 0] + moved[:, 1])
+        self.pose[:] = poses
+        self.steps += running
+
+        # Nothing happens to a route unless one of these holds; then the route's own rules decide.
+        cells = self.cells()
+        due = (cells == self.target) | (cells == self._goal) | (self.steps >= self._deadline)
+        for i in np.flatnonzero(due & running).tolist():
+            self._follow_route(i, divmod(int(cells[i]), self.spec.size))
+
+    def _move_one(self, x: float, y: float, yaw: float) -> None:
+        """Does what `advance` does, for a single environment."""
+        last_x, last_y, _ = self.pose[0].tolist()
+        moved_x, moved_y = x - last_x, y - last_y
+        self.path_length[0] += math.sqrt(moved_x * moved_x + moved_y * moved_y)
+        self.pose[0] = x, y, yaw
+        self.steps[0] += 1
+        self._follow_route(0, self.spec.all_mazes[0].cell_at(x, y))
+
+    def _follow_route(self, i: int, cell: Cell) -> None:
+        """Takes note of what the step led to in environment i, whose body is in `cell`."""
+        route, shown = self.routes[i], self.shown[i]
+        assert route is not None
+        assert shown is not None
+        event = route.advance(cell, self.steps.item(i))
+        if event is Event.NONE:
+            return
+        self.reached[i] = event is Event.REACHED
+        self.timed_out[i] = event is Event.TIMEOUT
+        if event is Event.LANDMARK:
+            self._begin_leg(i, route, shown)
+
+    def observe(self, states: np.ndarray, indices: np.ndarray) -> dict[str, np.ndarray]:
+        """Returns `[K, ...]` by name: all observations but the context, of the environments `indices` (`[K]` int).
+
+        `states` (`[K, 12]` float64) are the true ones, to which errors are added in place. Each call draws new noise.
+        """
+        if any(self._state_errors):
+            for state, i in zip(states, indices.tolist(), strict=True):
+                for add_error in self._state_errors[i]:
+                    add_error(state)
+        observed = {"state": states.astype(np.float32)}
+        if self.spec.sensors:
+            noise = [self._lidar_noise[i] for i in indices.tolist()]
+            worlds = Worlds(self.maze[indices], self.pose[indices], self.marker[indices], noise)
+            observed |= self._sensors.read(worlds)
+        return observed
+
+    def infos(self) -> dict[str, np.ndarray]:
+        """Returns `[B, ...]` by name: what Gymnasium's environments tell in `info`."""
+        return {
+            "is_first": self.is_first.copy(),
+            "success": self.reached.copy(),
+            "steps": self.steps.copy(),
+            "path_length": self.path_length.copy(),
+            "position": self.pose[:, :2].copy(),
+            "yaw": wrap_angle(self.pose[:, 2]),
+            "maze": self.maze.copy(),
+            "landmark": self.landmark.copy(),
+        }
+
+    def info(self, i: int) -> dict[str, Any]:
+        """Returns the `infos` of environment i as plain values, in a fraction of the time."""
+        return {
+            "is_first": self.is_first.item(i),
+            "success": self.reached.item(i),
+            "steps": self.steps.item(i),
+            "path_length": self.path_length.item(i),
+            "position": self.pose[i, :2].copy(),
+            "yaw": wrap_angle(self.pose.item(i, 2)),
+            "maze": self.maze.item(i),
+            "landmark": self.landmark.item(i),
+        }
+
+    def cells(self) -> np.ndarray:
+        """Returns `[B]` int: the true cells of the bodies, as row * N + column; agents must not use them."""
+        # All mazes have one size and one cell size, so the first one converts the points of all.
+        return self.spec.all_mazes[0].cell_index(self.pose[:, :2])
+
+    def close(self) -> None:
+        """Closes the sensors."""
+        self._sensors.close()
