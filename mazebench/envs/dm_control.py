@@ -17,7 +17,7 @@ from mazebench.tasks.episode import Episode
 from mazebench.tasks.observation import observation_specs
 from mazebench.tasks.rules import reward
 from mazebench.tasks.task import Task as MazeTask
-from mazebench.world.models import models_of
+from mazebench.world.models import MazeModels, models_of
 from mazebench.world.simulation import FULL_STATE, Simulation
 
 with warnings.catch_warnings():
@@ -28,15 +28,24 @@ with warnings.catch_warnings():
 
 
 class Physics(Simulation, engine.Physics):
-    """One maze and the body in it; `load_maze` exchanges the maze but keeps MjData and rendering context."""
+    """A whole maze and the body in it; another maze is another model and other data."""
+
+    models: MazeModels
+    _maze = 0  # index of the maze
 
     @classmethod
-    def of_maze(cls, model: mujoco.MjModel) -> Physics:
-        """Returns a simulation of a copy of `model`, with the body in the maze's first free cell."""
-        physics = cls.from_model(wrapper.MjModel(copy.copy(model)))
+    def of_mazes(cls, models: MazeModels) -> Physics:
+        """Returns a simulation of the first of some mazes, with the body in its first free cell."""
+        physics = cls.from_model(wrapper.MjModel(copy.copy(models[0])))
+        physics.models = models
         with physics.reset_context():
             physics.data.qpos[:] = physics.model.key_qpos[0]
         return physics
+
+    def surround(self, maze: int, cell: int) -> None:
+        if maze != self._maze:
+            self.reload_from_model(wrapper.MjModel(copy.copy(self.models[maze])))
+            self._maze = maze
 
     def after_reset(self) -> None:
         """Computes what follows from positions and velocities, after a reset and in a new copy."""
@@ -102,7 +111,7 @@ class Environment(control.Environment):
         """
         task = Task(spec, seed)
         # The task judges the time limit itself, so that a goal reached on the last step is a termination.
-        super().__init__(Physics.of_maze(models_of(spec.all_mazes)[0]), task, n_sub_steps=STEPS_PER_ACTION)
+        super().__init__(Physics.of_mazes(models_of(spec.all_mazes)), task, n_sub_steps=STEPS_PER_ACTION)
 
     def reset(self, seed: int | None = None, episode: Episode | None = None) -> dm_env.TimeStep:
         """Starts an episode: the next one of the environment's stream, the first one of `seed`'s, or `episode`."""

@@ -18,6 +18,7 @@ from mazebench.tasks.episode import Episode
 from mazebench.tasks.rules import reward
 from mazebench.tasks.task import Task
 from mazebench.world.models import models_of
+from mazebench.world.near_walls import near_walls_of
 from mazebench.world.rendering import Cameras
 from mazebench.world.simulation import MujocoSimulation
 
@@ -47,7 +48,8 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         arguments = Arguments(render_mode=render_mode, camera=camera)
         self.task = SingleTask(task_spec, seed)
         self.task_spec = task_spec
-        self.simulation = MujocoSimulation(models_of(task_spec.all_mazes)[0])
+        walls = near_walls_of(task_spec.all_mazes, 1)
+        self.simulation = MujocoSimulation(walls.model, walls)
         self._needs_reset = True
         self.render_mode = render_mode
         self.observation_space = spaces.observation_space(task_spec)

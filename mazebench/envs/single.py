@@ -17,7 +17,6 @@ from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.route import Route
 from mazebench.tasks.rules import Rules
 from mazebench.tasks.task import Task
-from mazebench.world.models import models_of
 from mazebench.world.simulation import Simulation
 
 _Value = TypeVar("_Value")
@@ -44,7 +43,6 @@ class SingleTask:
         self.rules = Rules(spec, num_envs=1)
         self.rng = np.random.default_rng(Arguments(seed=seed).seed)
         self._next_episode: Episode | None = None
-        self._models = models_of(spec.all_mazes)
 
     def choose_episode(self, seed: int | None = None, episode: Episode | None = None) -> None:
         """Makes the next reset begin the stream of episodes of `seed`, or play `episode` instead of a drawn one.
@@ -92,7 +90,7 @@ class SingleTask:
         episode = self._next_episode or sample_episode(self.spec, self.rng)
         self._next_episode = None
         self.rules.begin(0, episode)
-        simulation.load_maze(self._models, episode.maze)
+        simulation.surround(episode.maze, self.rules.cell.item())
         simulation.place_agent(self.rules.pose[0, :2], episode.yaw)
         simulation.place_goal(self.rules.marker[0, :2])
 
@@ -102,6 +100,7 @@ class SingleTask:
         Raises:
           InputError: if there is no such action.
         """
+        simulation.surround(self.rules.maze.item(), self.rules.cell.item())
         if self.spec.continuous:
             simulation.set_controls(controls_of_velocities(np.asarray(action), (VELOCITY_SIZE,)))
         else:
@@ -138,7 +137,7 @@ class SingleTask:
         index = state.rules["maze"].item()
         if index >= len(self.spec.all_mazes) or self.spec.all_mazes[index] != state.maze:
             raise InputError(f"expected a state of an environment with the same mazes, found one of {state.maze.name}")
-        simulation.load_maze(self._models, index)
+        simulation.surround(index, state.rules["cell"].item())
         simulation.set_full_state(state.simulation)
         self.rng.bit_generator.state = state.rng
         vars(self.rules).update(_copied(state.rules))

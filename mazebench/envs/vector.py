@@ -27,6 +27,7 @@ from mazebench.tasks.rules import Rules, reward
 from mazebench.tasks.task import Task
 from mazebench.world.batch import open_batch
 from mazebench.world.models import models_of
+from mazebench.world.near_walls import WallGeoms, near_walls_of
 from mazebench.world.rendering import Cameras
 from mazebench.world.simulation import states_from_sensors
 
@@ -114,10 +115,11 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._observed["context"] = self.rules.context
 
         # The simulation, with views of its arrays.
-        self._maze_models = models_of(task_spec.all_mazes)
-        self._models = self._maze_models.first_models(num_envs)
+        self._walls = near_walls_of(task_spec.all_mazes, num_envs)
         self._process = os.getpid()
-        self._batch = open_batch(self._maze_models[0], num_envs, arguments.num_threads)
+        self._batch = open_batch(self._walls.model, num_envs, arguments.num_threads)
+        self._geoms = WallGeoms.of_batch(self._batch)
+        self._around = np.full((2, num_envs), -1)  # maze and cell that the walls are around
         self._sensordata = self._batch.bind("sensordata")
         self._qpos = self._batch.bind("qpos")
         self._ctrl = self._batch.bind("ctrl")
@@ -193,6 +195,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         # Simulate the environments whose episode is under way.
         running = self.rules.active & ~self._ended
         all_run = running.all()
+        self._surround()
         self._batch.step(None if all_run else np.flatnonzero(running), nstep=STEPS_PER_ACTION, stage=_VELOCITY_STAGE)
 
         # Apply the rules of the task.
@@ -262,15 +265,21 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         if not len(began):
             return began
 
-        # Change the mazes, reset the simulations, place bodies and markers, and compute what follows from that.
-        for i in began:
-            self._models[i] = self._maze_models.replaced(self._models[i], int(self.rules.maze[i]))
-        self._batch.set_models(self._models)
+        # Reset the simulations, place walls, bodies and markers, and compute what follows from that.
+        self._surround()
         self._batch.reset(began, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
         self._qpos[began] = self.rules.pose[began]
         self._marker[began, 0] = self.rules.marker[began]
         self._batch.forward(began, stage=_VELOCITY_STAGE)
         return began
+
+    def _surround(self) -> None:
+        """Puts the walls around the bodies that have entered another cell."""
+        around = np.stack([self.rules.maze, self.rules.cell])
+        moved = (around != self._around).any(axis=0).nonzero()[0]
+        if len(moved):
+            self._walls.write(self._geoms, moved, *around[:, moved])
+            self._around = around
 
     def _observe(self, indices: np.ndarray) -> None:
         """Takes over what the agents of the environments `indices` observe; each call draws new noise."""
@@ -299,7 +308,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self.rules.close()
         if self._top_camera is not None:
             self._top_camera.close()
-        del self._batch, self._sensordata, self._qpos, self._ctrl, self._marker  # which ends the threads
+        del self._batch, self._sensordata, self._qpos, self._ctrl, self._marker, self._geoms  # which ends the threads
 
 
 def _seeds(seed: Seeds, num_envs: int) -> list[int | None]:

@@ -82,6 +82,7 @@ class Rules:
 
         # What steps have led to.
         self.pose = np.zeros((num_envs, 3))  # x, y (m), yaw (rad, not wrapped)
+        self.cell = np.zeros(num_envs, dtype=np.int64)  # of the body; agents must not use it
         self.path_length = np.zeros(num_envs)  # m
         self.steps = np.zeros(num_envs, dtype=np.int64)
         self.is_first, self.reached, self.timed_out = np.zeros((3, num_envs), dtype=bool)
@@ -105,6 +106,7 @@ class Rules:
         self.maze[i] = episode.maze
         self.pose[i] = (*spec.all_mazes[episode.maze].point(episode.start), episode.yaw)
         self.path_length[i] = self.steps[i] = 0
+        self.cell[i] = episode.start[0] * spec.size + episode.start[1]
         self._begin_leg(i, route, shown)
 
     def _begin_leg(self, i: int, route: Route, shown: ShownMap) -> None:
@@ -136,10 +138,11 @@ class Rules:
         self.steps += running
 
         # Nothing happens to a route unless one of these holds; then the route's own rules decide.
-        cells = self.cells()
-        due = (cells == self.target) | (cells == self._goal) | (self.steps >= self._deadline)
+        # All mazes have one size and one cell size, so the first one converts the points of all.
+        self.cell[:] = self.spec.all_mazes[0].cell_index(self.pose[:, :2])
+        due = (self.cell == self.target) | (self.cell == self._goal) | (self.steps >= self._deadline)
         for i in np.flatnonzero(due & running).tolist():
-            self._follow_route(i, divmod(int(cells[i]), self.spec.size))
+            self._follow_route(i, divmod(int(self.cell[i]), self.spec.size))
 
     def _move_one(self, x: float, y: float, yaw: float) -> None:
         """Does what `advance` does, for a single environment."""
@@ -148,7 +151,9 @@ class Rules:
         self.path_length[0] += math.sqrt(moved_x * moved_x + moved_y * moved_y)
         self.pose[0] = x, y, yaw
         self.steps[0] += 1
-        self._follow_route(0, self.spec.all_mazes[0].cell_at(x, y))
+        row, column = cell = self.spec.all_mazes[0].cell_at(x, y)
+        self.cell[0] = row * self.spec.size + column
+        self._follow_route(0, cell)
 
     def _follow_route(self, i: int, cell: Cell) -> None:
         """Takes note of what the step led to in environment i, whose body is in `cell`."""
@@ -204,11 +209,6 @@ class Rules:
             "maze": self.maze.item(i),
             "landmark": self.landmark.item(i),
         }
-
-    def cells(self) -> np.ndarray:
-        """Returns `[B]` int: the true cells of the bodies, as row * N + column; agents must not use them."""
-        # All mazes have one size and one cell size, so the first one converts the points of all.
-        return self.spec.all_mazes[0].cell_index(self.pose[:, :2])
 
     def close(self) -> None:
         """Closes the sensors."""

@@ -71,7 +71,7 @@ class Collector:
     def step(self, action: np.ndarray) -> Experience:
         """Takes `action` `[B]` for the current `inputs`, which those of the next step replace."""
         now, rules = self.inputs, self._env.rules
-        cell = rules.cells()
+        cell = rules.cell.copy()
         before = (now.new_episode, now.new_context, self._maze, rules.start.copy(), rules.target.copy())
         observation, _, terminated, truncated, infos = self._env.step(action)
         ended = terminated | truncated

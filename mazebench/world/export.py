@@ -11,7 +11,7 @@ from mazebench.maps.covering import cover
 from mazebench.maps.maze import WALL_HEIGHT, Maze
 from mazebench.storage.files import open_whole
 from mazebench.world.mjcf import maze_spec
-from mazebench.world.textures import add_textures, wall_faces
+from mazebench.world.textures import add_textures
 
 MESH_FORMATS = ("glb", "obj", "stl")
 
@@ -33,8 +33,7 @@ def write_mjcf(maze: Maze, path: pathlib.Path, textures: bool = False) -> None:
     """
     spec = maze_spec(maze)
     if textures:
-        faces = wall_faces(maze)
-        add_textures(spec, maze, faces, len(faces))
+        add_textures(spec, maze)
     spec.compile()
     with open_whole(path) as file:
         file.write(spec.to_xml().encode("utf-8"))

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from mazebench.constants import ACTIONS, MAX_PIXELS, PHYSICS_TIMESTEP, TOP_SPEED
+from mazebench.errors import InputError
 from mazebench.maps import colors
 from mazebench.maps.maze import WALL_HEIGHT, Maze
 
@@ -27,10 +28,11 @@ _YAW_GAIN = 20.0  # with _YAW_INERTIA a time constant of 1 ms, well within a fra
 _YAW_INERTIA = 0.02
 # Metres before a wall at which contacts act, so that the body never sinks in. The margins of two geoms add up, so the
 # body has none.
-_CONTACT_MARGIN = 0.03
+CONTACT_MARGIN = 0.03
 # As stiff as the timestep allows, and overdamped: with a damping ratio of 1 up to 18 % of the speed rebounds.
 _CONTACT_SOLREF = [2 * PHYSICS_TIMESTEP, 3.0]
 _EYE_HEIGHT = 0.45
+MAX_BOXES = 32_768  # of a whole model; the time that MuJoCo takes for them, 2 s, grows with the square
 _PARKED_DEPTH = 10.0  # metres below the floor
 
 # The columns of `sensordata`, in the order in which `_add_sensors` adds them.
@@ -44,14 +46,32 @@ _FORWARD, _BACKWARD, _LEFT, _RIGHT, _TURN = range(NUM_CONTROLS)
 
 
 def maze_spec(maze: Maze) -> mujoco.MjSpec:
-    """Returns the standalone model of one maze, which `mazebench generate` writes."""
-    return build_spec(maze, len(maze.boxes), maze.name)
+    """Returns the whole model of one maze, which `mazebench generate` writes.
+
+    Raises:
+      InputError: if it has more boxes than MuJoCo puts together in some seconds.
+    """
+    if len(maze.boxes) > MAX_BOXES:
+        raise InputError(
+            f"{maze.name}: expected a maze of at most {MAX_BOXES} wall boxes for a whole model, found "
+            f"{len(maze.boxes)}; the Gymnasium and vector environments take it"
+        )
+    top, left, bottom, right = np.array(maze.boxes).T
+    spec = boxes_spec(maze, *placed_boxes(top, left, bottom, right, maze.size, maze.cell_size))
+    spec.modelname = maze.name
+    return spec
 
 
-def build_spec(maze: Maze, num_boxes: int, name: str = "maze") -> mujoco.MjSpec:
-    """Returns the model of `maze`, with boxes below the floor to make up `num_boxes`."""
+def boxes_spec(maze: Maze, middle: np.ndarray, half: np.ndarray) -> mujoco.MjSpec:
+    """Returns a model with the floor, body and goal of `maze`, and wall boxes of its own.
+
+    Args:
+      maze: where the body begins, in its first free cell.
+      middle: `[K, 3]` m, of the boxes.
+      half: `[K, 3]` m, their half sides.
+    """
     spec = mujoco.MjSpec()
-    spec.modelname = name
+    spec.modelname = "maze"
     spec.option.timestep = PHYSICS_TIMESTEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0, 0, 0]
@@ -71,7 +91,7 @@ def build_spec(maze: Maze, num_boxes: int, name: str = "maze") -> mujoco.MjSpec:
 
     _add_materials(spec, maze)
     _add_room(spec, maze.side)
-    _add_walls(spec, maze, num_boxes)
+    _add_walls(spec, middle, half)
     _add_goal(spec, maze.cell_size)
     _add_body(spec, maze)
     return spec
@@ -139,36 +159,39 @@ def _add_room(spec: mujoco.MjSpec, side: float) -> None:
     world.add_camera(name="top", pos=[middle, middle, height], quat=[1, 0, 0, 0], fovy=fovy)
 
 
-def wall_boxes(maze: Maze, num_boxes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the middles and half sides of the boxes that are a maze's walls: `[num_boxes, 3]` m, twice.
+def placed_boxes(
+    top: np.ndarray, left: np.ndarray, bottom: np.ndarray, right: np.ndarray, size: int, cell_size: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the middles and half sides (`[..., 3]` m) of wall boxes of a maze of `size` cells a side.
 
-    Those that the maze does not need are below the floor.
+    A box covers the cells of rows [top, bottom) and columns [left, right), `[...]` int each.
     """
-    # Collidable and apart from each other: geoms without contacts would change the layout of MjData.
-    scale, num_walls = maze.cell_size, len(maze.boxes)
-    middle, half = np.full((num_boxes, 3), scale * 0.5), np.full((num_boxes, 3), 0.1)
-    middle[:, 0] = scale * (np.arange(num_boxes) + 0.5)
-    middle[:, 2] = -_PARKED_DEPTH
-
-    top, left, bottom, right = np.transpose(maze.boxes)
-    middle[:num_walls, 0] = scale * (left + right) / 2
-    middle[:num_walls, 1] = scale * (maze.size - (top + bottom) / 2)
-    half[:num_walls, 0] = scale * (right - left) / 2
-    half[:num_walls, 1] = scale * (bottom - top) / 2
-    middle[:num_walls, 2] = half[:num_walls, 2] = WALL_HEIGHT / 2
+    middle, half = np.full((2, *top.shape, 3), WALL_HEIGHT / 2)
+    middle[..., 0] = cell_size * (left + right) / 2
+    middle[..., 1] = cell_size * (size - (top + bottom) / 2)
+    half[..., 0] = cell_size * (right - left) / 2
+    half[..., 1] = cell_size * (bottom - top) / 2
     return middle, half
 
 
-def _add_walls(spec: mujoco.MjSpec, maze: Maze, num_boxes: int) -> None:
-    for index, (pos, half) in enumerate(zip(*wall_boxes(maze, num_boxes), strict=True)):
+def parked_boxes(count: int, cell_size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the middles and half sides (`[count, 3]` m) of boxes below the floor, apart from each other."""
+    middle, half = np.full((count, 3), cell_size * 0.5), np.full((count, 3), 0.1)
+    middle[:, 0] = cell_size * (np.arange(count) + 0.5)
+    middle[:, 2] = -_PARKED_DEPTH
+    return middle, half
+
+
+def _add_walls(spec: mujoco.MjSpec, middle: np.ndarray, half: np.ndarray) -> None:
+    for index, (pos, size) in enumerate(zip(middle, half, strict=True)):
         spec.worldbody.add_geom(
             name=f"wall_{index}",
             type=mujoco.mjtGeom.mjGEOM_BOX,
             pos=pos,
-            size=half,
+            size=size,
             material="wall",
             condim=1,
-            margin=_CONTACT_MARGIN,
+            margin=CONTACT_MARGIN,
             solref=_CONTACT_SOLREF,
         )
 

@@ -17,7 +17,10 @@ _PICTURE_SIZE = 480  # pixels a side
 
 
 class Cameras:
-    """Pictures of any worlds of one `MazeModels` through one rendering context, which opens with the first of them."""
+    """Pictures of any worlds of one `MazeModels` through one rendering context, which opens with the first of them.
+
+    All models have the textures of the first one, which the context holds.
+    """
 
     def __init__(self, models: MazeModels, names: tuple[str, ...], pixels: int = _PICTURE_SIZE, smooth: bool = True):
         """`names` are of `CAMERAS`, `pixels` is the side of a picture.
@@ -26,12 +29,8 @@ class Cameras:
         """
         self._renderer: mujoco.Renderer | None = None
         self._models = models
-        self._model = copy.copy(models[0])
-        if not smooth:
-            self._model.vis.quality.offsamples = 0
-        self._data = mujoco.MjData(self._model)
-        self._names, self._pixels = names, pixels
-        self._shown = 0  # index of the maze that the model has
+        self._names, self._pixels, self._smooth = names, pixels, smooth
+        self._most_shown = 0  # geoms and sites that the context has room for
 
     def take(self, maze: int, qpos: np.ndarray, marker: np.ndarray) -> dict[str, np.ndarray]:
         """Returns `[pixels, pixels, 3]` uint8 by camera.
@@ -44,24 +43,29 @@ class Cameras:
         Raises:
           RenderingError: if no rendering context can be opened; the message says what to set.
         """
-        if self._renderer is None:
-            self._renderer = self._open()
-        if maze != self._shown:
-            self._models.load(maze, self._model)
-            self._shown = maze
-        self._data.qpos[:], self._data.mocap_pos[0] = qpos, marker
-        mujoco.mj_kinematics(self._model, self._data)
-        mujoco.mj_camlight(self._model, self._data)
-        return {name: self._render(self._renderer, name) for name in self._names}
+        model, data = self._models.with_data(maze)
+        if self._renderer is None or self._most_shown < model.ngeom + model.nsite:
+            self.close()
+            self._renderer = self._open(model)
+        data.qpos[:], data.mocap_pos[0] = qpos, marker
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_camlight(model, data)
+        return {name: self._render(self._renderer, model, data, name) for name in self._names}
 
-    def _render(self, renderer: mujoco.Renderer, camera: str) -> np.ndarray:
-        renderer.update_scene(self._data, camera)
+    def _render(self, renderer: mujoco.Renderer, model: mujoco.MjModel, data: mujoco.MjData, camera: str) -> np.ndarray:
+        view = mujoco.MjvCamera()
+        view.type, view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, model.camera(camera).id
+        every = mujoco.mjtCatBit.mjCAT_ALL
+        mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, view, every, renderer.scene)
         return renderer.render()
 
-    def _open(self) -> mujoco.Renderer:
-        num_shown = self._model.ngeom + self._model.nsite
+    def _open(self, model: mujoco.MjModel) -> mujoco.Renderer:
+        self._most_shown = 2 * (model.ngeom + model.nsite)  # for mazes with more walls
+        model = copy.copy(model)
+        if not self._smooth:
+            model.vis.quality.offsamples = 0
         try:
-            renderer = mujoco.Renderer(self._model, self._pixels, self._pixels, max_geom=num_shown)
+            renderer = mujoco.Renderer(model, self._pixels, self._pixels, max_geom=self._most_shown)
         # MUJOCO_GL names the backend, and each backend raises errors of its own.
         except (mujoco.FatalError, RuntimeError, ImportError, AttributeError, OSError, ValueError) as error:
             raise rendering_error(error) from error

@@ -13,7 +13,7 @@ import numpy as np
 
 from mazebench.world.angles import wrap_angle
 from mazebench.world.mjcf import SENSED_POSITION, SENSED_VELOCITIES, SENSED_YAW
-from mazebench.world.models import MazeModels
+from mazebench.world.near_walls import NearWalls, WallGeoms
 
 STATE_SIZE = 12
 FULL_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)  # all that MuJoCo's next step depends on
@@ -28,9 +28,9 @@ class Simulation(abc.ABC):
     model: Any
     data: Any
 
-    def load_maze(self, models: MazeModels, index: int) -> None:
-        """Changes to maze number `index` of the `models` that the simulation's own comes from."""
-        models.load(index, self.model)
+    @abc.abstractmethod
+    def surround(self, maze: int, cell: int) -> None:
+        """Makes the walls around the body those of a cell (row * N + column) of maze number `maze`."""
 
     def place_agent(self, position: np.ndarray, yaw: float) -> None:
         """Moves the body to `position` (`[2]`, m) and `yaw` (rad); call it within `reset_context()`."""
@@ -72,15 +72,25 @@ class Simulation(abc.ABC):
 class MujocoSimulation(Simulation):
     """A simulation on MuJoCo's bindings and nothing else."""
 
-    def __init__(self, model: mujoco.MjModel):
-        """Copies `model` and puts the body into the maze's first free cell."""
+    def __init__(self, model: mujoco.MjModel, walls: NearWalls | None = None):
+        """Copies `model` and puts the body into the maze's first free cell.
+
+        With `walls`, whose model it then is, `surround` chooses the walls.
+        """
         self.model = copy.copy(model)
         self.data = mujoco.MjData(self.model)
+        self._walls, self._geoms = walls, WallGeoms.of_model(self.model)
+        self._around = (-1, -1)  # maze and cell that the walls are around
         with self.reset_context():
             self.data.qpos[:] = model.key_qpos[0]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _resumed, (self.model, self.full_state())
+        return _resumed, (self.model, self._walls, self.full_state())
+
+    def surround(self, maze: int, cell: int) -> None:
+        if self._walls is not None and (maze, cell) != self._around:
+            self._walls.write(self._geoms, *np.array([[0], [maze], [cell]]))
+            self._around = maze, cell
 
     @contextmanager
     def reset_context(self) -> Iterator[None]:
@@ -108,9 +118,9 @@ class MujocoSimulation(Simulation):
         mujoco.mj_step1(self.model, self.data)
 
 
-def _resumed(model: mujoco.MjModel, state: np.ndarray) -> MujocoSimulation:
+def _resumed(model: mujoco.MjModel, walls: NearWalls | None, state: np.ndarray) -> MujocoSimulation:
     """Returns a simulation of `model` that goes on from a full state."""
-    simulation = MujocoSimulation(model)
+    simulation = MujocoSimulation(model, walls)
     simulation.set_full_state(state)
     return simulation
 

@@ -19,7 +19,6 @@ from mazebench.maps.maze import WALL_HEIGHT, Maze, grid_graph
 
 _CELLS_PER_REGION = 7
 _OFFSET = 0.002  # m, from a wall to its face
-_PARKED_DEPTH = 20.0  # m below the floor
 
 _Colour = tuple[float, float, float]
 
@@ -139,26 +138,16 @@ def _surfaces(maze: Maze) -> np.ndarray:
     return result
 
 
-def add_textures(spec: mujoco.MjSpec, maze: Maze, faces: list[Face], num_faces: int) -> None:
-    """Gives `spec`, the model of `maze`, the textured look.
-
-    Args:
-      spec: from `mazebench.world.mjcf`.
-      maze: the maze of that model.
-      faces: its `wall_faces`. They are only seen; the walls behind them are as they were.
-      num_faces: how many faces the model gets; those that are too many are below the floor.
-    """
+def add_textures(spec: mujoco.MjSpec, maze: Maze) -> None:
+    """Gives `spec`, the whole model of `maze`, the textured look: faces that are only seen, before the walls."""
     _add_materials(spec)
-    middle = maze.cell_size * maze.size / 2
-    parked = [Face(x=middle, y=middle, yaw=0.0, half_length=0.1, surface=0)] * (num_faces - len(faces))
-    for index, face in enumerate([*faces, *parked]):
-        depth = 0.0 if index < len(faces) else _PARKED_DEPTH
+    for index, face in enumerate(wall_faces(maze)):
         # A plane faces its own z axis. This one is turned so that its y axis points up, then about the vertical.
         cos, sin = np.cos((face.yaw + np.pi) / 2), np.sin((face.yaw + np.pi) / 2)
         spec.worldbody.add_geom(
             name=f"face_{index}",
             type=mujoco.mjtGeom.mjGEOM_PLANE,
-            pos=[face.x, face.y, WALL_HEIGHT / 2 - depth],
+            pos=[face.x, face.y, WALL_HEIGHT / 2],
             quat=np.array([cos, cos, sin, sin]) * np.sqrt(0.5),
             size=[face.half_length, WALL_HEIGHT / 2, 1],
             material=f"face_{face.surface}",

@@ -1,0 +1,140 @@
+"""The walls near a body, which are all that its physics needs: one small model for all mazes of a task.
+
+`B` is the number of environments, `E` of those whose bodies have entered other cells, `N` the cells a side of a maze,
+`K` the boxes of the model, and `W` the cells of the window around a cell.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Any, NamedTuple
+
+import mujoco
+import mujoco.batch
+import numpy as np
+
+from mazebench.constants import STEP_TIME, TOP_SPEED
+from mazebench.maps.drawn import FreshMazes, Mazes
+from mazebench.maps.maze import Maze
+from mazebench.world.mjcf import BODY_RADIUS, CONTACT_MARGIN, boxes_spec, parked_boxes, placed_boxes
+
+# Drives push a body to TOP_SPEED ahead. While it turns, they push it aside, too. Let v be its speed and c the cosine of
+# the angle between push and motion. v grows only while the push along it, c times at most 34 N, is above the damping,
+# 8 v: v < 4.25 c. The push falls below 34 N at v c = 3.06. So v can't grow beyond the v at which both hold, 3.61 m/s.
+_FASTEST = 1.13 * TOP_SPEED
+_REACH = BODY_RADIUS + CONTACT_MARGIN + _FASTEST * STEP_TIME  # m, from the body's centre at the start of an agent step
+_FIRST_WALL = 1  # index of its geom, after the floor
+_NO_TREE = int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)  # contacts are searched without trees of bounding boxes
+
+
+class WallGeoms(NamedTuple):
+    """The arrays of the wall boxes in the models of B environments; what is written there is simulated."""
+
+    pos: np.ndarray  # [B, K, 3] m
+    size: np.ndarray  # [B, K, 3] m, half sides
+    aabb: np.ndarray  # [B, K, 6] m, middle and half sides in the box's own frame
+    rbound: np.ndarray  # [B, K] m, the radius of a sphere around the box
+
+    @classmethod
+    def of_model(cls, model: Any) -> WallGeoms:
+        """Returns those of a single model."""
+        return cls(*(getattr(model, f"geom_{name}")[None, _FIRST_WALL:-1] for name in cls._fields))
+
+    @classmethod
+    def of_batch(cls, batch: mujoco.batch.Batch) -> WallGeoms:
+        """Returns those of all simulations of a batch, each of which then has its own."""
+        return cls(*(batch.expand(f"geom_{name}")[:, _FIRST_WALL:-1] for name in cls._fields))
+
+
+class NearWalls:
+    """The boxes near each cell of some mazes, and the model that holds them.
+
+    The boxes are those of the maze's whole model, in the same order, that a body can touch within an agent step. They
+    are found by their first cells in a window around the body's cell. The window's middle is free, so that `K` = W - 1
+    boxes are enough for any cell.
+    """
+
+    def __init__(self, mazes: Mazes, num_slots: int):
+        """`num_slots` is how many mazes are kept: all of them or, of fresh mazes, one for each environment."""
+        self._mazes, self._size, self._scale = mazes, mazes[0].size, mazes[0].cell_size
+        self._args = (mazes, num_slots)
+        reach = math.ceil(_REACH / self._scale)  # cells
+        width = self._size + 2 * reach
+        self._offsets = (np.arange(2 * reach + 1)[:, None] * width + np.arange(2 * reach + 1)).ravel()  # [W]
+        self._width, self._reach = width, reach
+        self.num_boxes = len(self._offsets) - 1
+        self._parked = parked_boxes(self.num_boxes, self._scale)
+
+        # By slot and cell. A cell is row * N + column; `_none` stands for no box, in free cells and around the maze.
+        self._none = self._size**2
+        self._shown = np.full(num_slots, -1, dtype=np.int64)  # the maze that a slot has
+        self._first = np.zeros((num_slots, width * width), dtype=np.int32)  # of a wall cell, the first cell of its box
+        self._end = np.zeros((num_slots, self._none, 2), dtype=np.int16)  # of a first cell, the box's bottom and right
+
+        self.model = boxes_spec(mazes[0], *self._parked).compile()
+        self.model.opt.disableflags |= _NO_TREE
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Makes pickles hold the mazes only."""
+        return near_walls_of, self._args
+
+    def write(self, geoms: WallGeoms, env: np.ndarray, maze: np.ndarray, cell: np.ndarray) -> None:
+        """Writes the boxes near cells into the models of environments.
+
+        Args:
+          geoms: of B environments; changed.
+          env: `[E]` int, whose models are written to.
+          maze: `[E]` int, the index of the maze that each is in.
+          cell: `[E]` int, the body's cell in it, as row * N + column.
+        """
+        slot = env if isinstance(self._mazes, FreshMazes) else maze
+        for index in np.flatnonzero(self._shown[slot] != maze).tolist():
+            self._show(int(slot[index]), int(maze[index]))
+
+        # The boxes in the window, each once, in the maze's order.
+        row, column = np.divmod(cell, self._size)
+        boxes = self._first[slot[:, None], (row * self._width + column)[:, None] + self._offsets]  # [E, W]
+        boxes.sort(axis=1)
+        boxes[:, 1:][boxes[:, 1:] == boxes[:, :-1].copy()] = self._none
+        boxes.sort(axis=1)
+        boxes = boxes[:, : self.num_boxes]
+        is_box = boxes < self._none
+
+        # Their middles and half sides; those that are not needed are below the floor.
+        first = np.where(is_box, boxes, 0)
+        top, left = np.divmod(first, self._size)
+        bottom, right = np.moveaxis(self._end[slot[:, None], first], -1, 0)
+        placed = placed_boxes(top, left, bottom, right, self._size, self._scale)
+        middle, half = (np.where(is_box[..., None], *pair) for pair in zip(placed, self._parked, strict=True))
+        geoms.pos[env] = middle
+        geoms.size[env] = half
+        geoms.aabb[env, :, 3:] = half
+        geoms.rbound[env] = np.sqrt((half * half).sum(axis=-1))
+
+    def _show(self, slot: int, maze: int) -> None:
+        """Puts a maze into a slot."""
+        boxes = np.array(self._mazes[maze].boxes, dtype=np.int64)  # [boxes, 4]: top, left, bottom, right
+        top, left, bottom, right = boxes.T
+        first = top * self._size + left
+        self._end[slot, first] = boxes[:, 2:]
+
+        # All cells of all boxes, one box after the other.
+        columns = right - left
+        area = (bottom - top) * columns
+        box = np.repeat(np.arange(len(boxes)), area)
+        within = np.arange(len(box)) - np.repeat(np.cumsum(area) - area, area)
+        row, column = top[box] + within // columns[box], left[box] + within % columns[box]
+        self._first[slot] = self._none
+        self._first[slot, (row + self._reach) * self._width + column + self._reach] = first[box]
+        self._shown[slot] = maze
+
+
+def near_walls_of(mazes: Mazes, num_envs: int) -> NearWalls:
+    """Returns the near walls of mazes for some environments; all environments with the same fixed mazes share them."""
+    return NearWalls(mazes, num_envs) if isinstance(mazes, FreshMazes) else _of_fixed(mazes)
+
+
+@functools.lru_cache(maxsize=8)
+def _of_fixed(mazes: tuple[Maze, ...]) -> NearWalls:
+    return NearWalls(mazes, len(mazes))
