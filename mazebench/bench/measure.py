@@ -8,14 +8,15 @@ from __future__ import annotations
 import dataclasses
 import os
 import statistics
+import subprocess
+import sys
 import time
 import timeit
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from typing import Any
 
 import mujoco
-import mujoco.batch
 import numpy as np
 
 from mazebench.agent_loading import agent_names, load_agent_class
@@ -29,10 +30,12 @@ from mazebench.tasks.task import TRAIN_DISTANCES, Task
 from mazebench.training.experience import Collector
 from mazebench.training.protocol import LearningAgent
 from mazebench.world.backend import RenderingError
+from mazebench.world.batch import open_batch
 from mazebench.world.mjcf import action_controls
-from mazebench.world.models import models_of
+from mazebench.world.near_walls import WallGeoms, near_walls_of
+from mazebench.world.simulation import MujocoSimulation
 
-_SIZES = (13, 21, 51, 101)
+_SIZES = (13, 31, 51, 101, 255)
 _NUM_ENVS = (1, 16, 256, 1024, 4096)
 _LIDAR_NUM_ENVS = (1, 16, 256)
 _MAZES_PER_SIZE = 8
@@ -77,7 +80,7 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
     sensing = dataclasses.replace(spec, sensors=("lidar",))
     results["lidar"] = [_vector_row(sensing, num_envs, seconds, rounds) for num_envs in _LIDAR_NUM_ENVS]
     say("cost against size")
-    results["sizes"] = [_size_row(size, seconds, rounds) for size in _SIZES]
+    results["sizes"] = _size_rows(_SIZES, seconds, rounds)
     say("cost against the number of environments")
     results["num_envs"] = [_vector_row(spec, num_envs, seconds, rounds) for num_envs in _NUM_ENVS]
     return results
@@ -96,15 +99,47 @@ def print_tables(results: dict[str, Any]) -> None:
         print_table(title, list(rows[0]), cells)
 
 
+def bare_simulation(task: Task, num_envs: int, num_threads: int = 0) -> Callable[[np.ndarray], None]:
+    """Returns a function that takes agent steps (0.16 s) in B simulations, and does nothing else.
+
+    It takes the actions, `[B]` int. It is what the environments simulate, without a task: the bodies begin in the first
+    free cells of the mazes, the walls near them are those of their cells, and they drive on without end.
+
+    Args:
+      task: the task whose mazes are simulated.
+      num_envs: B.
+      num_threads: 0 uses all cores.
+    """
+    walls = near_walls_of(task.all_mazes, num_envs)
+    batch = open_batch(walls.model, num_envs, num_threads)
+    geoms, qpos, ctrl = WallGeoms.of_batch(batch), batch.bind("qpos"), batch.bind("ctrl")
+    maze, around, controls = np.arange(num_envs) % len(task.all_mazes), np.full(num_envs, -1), action_controls()
+    batch.reset()
+    qpos[:, :2] = [task.all_mazes[index].point(task.all_mazes[index].free_cells[0]) for index in maze.tolist()]
+
+    def step(actions: np.ndarray) -> None:
+        nonlocal around
+        cell = task.all_mazes[0].cell_index(qpos[:, :2])
+        moved = np.flatnonzero(cell != around)
+        walls.write(geoms, moved, maze[moved], cell[moved])
+        around = cell
+        ctrl[:] = controls[actions]
+        batch.step(nstep=STEPS_PER_ACTION)
+
+    return step
+
+
+def _rates(steps: Sequence[Step], num_envs: int, seconds: float, rounds: int) -> np.ndarray:
+    """Returns `[rounds, steps]`: agent steps per second of several steps that take turns."""
+    return np.array([[_rate(step, num_envs, seconds) for step in steps] for _ in range(rounds)])
+
+
 def _ratio(what: str, num_envs: int, step: Step, bare: Step, seconds: float, rounds: int) -> dict[str, Any]:
     """Returns the agent steps per second of `step` and of `bare`, and their ratio."""
-    pairs = [(_rate(step, num_envs, seconds), _rate(bare, num_envs, seconds)) for _ in range(rounds)]
-    return {
-        "what": what,
-        "steps/s": round(statistics.median(rate for rate, _ in pairs)),
-        "bare steps/s": round(statistics.median(rate for _, rate in pairs)),
-        "ratio": statistics.median(rate / bare_rate for rate, bare_rate in pairs),
-    }
+    rates = _rates((step, bare), num_envs, seconds, rounds)
+    steps, bare_steps = np.median(rates, axis=0)
+    ratio = float(np.median(rates[:, 0] / rates[:, 1]))
+    return {"what": what, "steps/s": round(steps), "bare steps/s": round(bare_steps), "ratio": ratio}
 
 
 def _rate(step: Step, num_envs: int, seconds: float) -> float:
@@ -120,21 +155,11 @@ def _random_actions(num_envs: int) -> np.ndarray:
 
 
 def _vector_pair(spec: Task, num_envs: int, num_threads: int) -> tuple[Step, Step]:
-    """Returns a step of the vector environment, resets included, and one of a batch that only steps."""
-    actions, controls = _random_actions(num_envs), action_controls()
+    """Returns a step of the vector environment, resets included, and one of the bare simulation."""
     env = MazeVectorEnv(spec, num_envs, seed=0, num_threads=num_threads)
     env.reset()
-    models = models_of(spec.all_mazes)
-    batch = mujoco.batch.Batch(models[0], num_envs, num_threads)
-    batch.set_models([models[i % len(models)] for i in range(num_envs)])
-    batch.reset(keyframe=0)
-    ctrl = batch.bind("ctrl")
-
-    def bare(count: int) -> None:
-        ctrl[:] = controls[actions[count % len(actions)]]
-        batch.step(nstep=STEPS_PER_ACTION)
-
-    return _stepping(env), bare
+    actions, bare = _random_actions(num_envs), bare_simulation(spec, num_envs, num_threads)
+    return _stepping(env), lambda count: bare(actions[count % len(actions)])
 
 
 def _stepping(env: MazeVectorEnv) -> Step:
@@ -143,13 +168,15 @@ def _stepping(env: MazeVectorEnv) -> Step:
 
 
 def _bare_loop(spec: Task, actions: list[int]) -> Step:
-    """Returns a step of one maze by mj_step, and nothing else."""
-    model = models_of(spec.all_mazes)[0]
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    controls = action_controls()
+    """Returns a step of one simulation by mj_step, and nothing else."""
+    walls, maze = near_walls_of(spec.all_mazes, 1), spec.all_mazes[0]
+    simulation = MujocoSimulation(walls.model, walls)
+    model, data, controls = simulation.model, simulation.data, action_controls()
+    data.qpos[:2] = maze.point(maze.free_cells[0])
 
     def step(count: int) -> None:
+        row, column = maze.cell_at(*data.qpos[:2].tolist())
+        simulation.surround(0, row * maze.size + column)
         data.ctrl[:] = controls[actions[count % len(actions)]]
         mujoco.mj_step(model, data, STEPS_PER_ACTION)
 
@@ -217,21 +244,13 @@ def _training_row(name: str, agent_class: Any, spec: Task, seconds: float) -> di
 
 
 def _resets(spec: Task, count: int) -> list[dict[str, Any]]:
-    """Milliseconds a reset; models are compiled before, as after the first episodes of a run."""
-    _compile(spec)
+    """Milliseconds per reset, after the first ones."""
     env, envs = MazeEnv(spec, 0), MazeVectorEnv(spec, 256, seed=0)
     rows = [
         ("Gymnasium", _milliseconds(env.reset, count)),
         ("vector of 256, an environment", _milliseconds(envs.reset, max(3, count // 20)) / 256),
     ]
     return [{"what": what, "ms": value} for what, value in rows]
-
-
-def _compile(spec: Task) -> None:
-    """Compiles all models of a task, which environments otherwise do one by one."""
-    models = models_of(spec.all_mazes)
-    for index in range(len(models)):
-        models[index]
 
 
 def _picture_rows(spec: Task, seconds: float) -> list[dict[str, Any]]:
@@ -259,13 +278,39 @@ def _milliseconds(call: Callable[[], Any], count: int) -> float:
     return 1e3 * statistics.median(timeit.repeat(call, number=1, repeat=count))
 
 
-def _size_row(size: int, seconds: float, rounds: int) -> dict[str, Any]:
-    """Returns the speed of the vector environment in mazes of `size` cells a side; the context has the default size."""
+def _size_rows(sizes: Sequence[int], seconds: float, rounds: int) -> list[dict[str, Any]]:
+    """Returns the speed of 256 environments in mazes of several sizes, which take turns, and their memory."""
+    tasks = [_task_of_size(size) for size in sizes]
+    envs = [MazeVectorEnv(task, 256, seed=0) for task in tasks]
+    for env in envs:
+        env.reset()
+    rates = _rates([_stepping(env) for env in envs], 256, seconds, rounds)
+    return [
+        {
+            "what": f"{size} x {size}",
+            "steps/s": round(np.median(rates[:, index])),
+            f"of {sizes[0]} x {sizes[0]}": float(np.median(rates[:, index] / rates[:, 0])),
+            "walls": round(statistics.mean(len(maze.boxes) for maze in tasks[index].fixed_mazes)),
+            "reset ms": _milliseconds(envs[index].reset, 3) / 256,
+            "kB per environment": round((_memory(size, 320) - _memory(size, 64)) / 256),
+        }
+        for index, size in enumerate(sizes)
+    ]
+
+
+def _task_of_size(size: int) -> Task:
     mazes = [generate("dfs", size, np.random.default_rng([size, index])) for index in range(_MAZES_PER_SIZE)]
-    spec = Task.of(mazes=mazes, distances=TRAIN_DISTANCES)
-    begin = time.perf_counter()
-    _compile(spec)
-    compiled = (time.perf_counter() - begin) / len(mazes)
-    row = _ratio(f"{size} x {size}", 256, *_vector_pair(spec, 256, 0), seconds, rounds)
-    # Padding included; floor and body are the two other geoms.
-    return {**row, "compile ms": 1e3 * compiled, "walls": models_of(spec.all_mazes)[0].ngeom - 2}
+    return Task.of(mazes=mazes, distances=TRAIN_DISTANCES)
+
+
+def _memory(size: int, num_envs: int) -> float:
+    """Returns the memory, in kB, of a process that has stepped environments in mazes of a size; 0 if not on Linux."""
+    program = (
+        "import numpy; from mazebench.bench import measure; from mazebench.envs.vector import MazeVectorEnv; "
+        f"env = MazeVectorEnv(measure._task_of_size({size}), {num_envs}, seed=0); env.reset(); "
+        f"env.step(numpy.zeros({num_envs}, int)); print(open('/proc/self/statm').read().split()[1])"
+    )
+    if not os.path.exists("/proc/self/statm"):
+        return 0
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    return int(done.stdout) * os.sysconf("SC_PAGE_SIZE") / 1024

@@ -44,7 +44,7 @@ class Physics(Simulation, engine.Physics):
 
     def surround(self, maze: int, cell: int) -> None:
         if maze != self._maze:
-            self.reload_from_model(wrapper.MjModel(copy.copy(self.models[maze])))
+            self._reload_from_model(wrapper.MjModel(copy.copy(self.models[maze])))
             self._maze = maze
 
     def after_reset(self) -> None:

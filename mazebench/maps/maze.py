@@ -144,7 +144,12 @@ class Maze:
     def cells_at(self, source: Cell, distance: int) -> np.ndarray:
         """Returns the free cells at exactly `distance` from `source`, in reading order: `[K, 2]` int."""
         self.require_free(source)
-        return self.free_cells[self._distance_row(int(self._index[tuple(source)])) == distance]
+        index = int(self._index[tuple(source)])
+        if len(self.free_cells) <= _MAX_KEPT_ROWS:
+            row = self._distance_row(index)
+        else:  # no farther than needed
+            row = csgraph.dijkstra(self._graph, unweighted=True, indices=index, limit=distance)
+        return self.free_cells[row == distance]
 
     def shortest_path(self, start: Cell, goal: Cell) -> list[Cell]:
         """Returns a shortest 4-connected path, both ends included.

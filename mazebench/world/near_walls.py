@@ -89,8 +89,8 @@ class NearWalls:
           cell: `[E]` int, the body's cell in it, as row * N + column.
         """
         slot = env if isinstance(self._mazes, FreshMazes) else maze
-        for index in np.flatnonzero(self._shown[slot] != maze).tolist():
-            self._show(int(slot[index]), int(maze[index]))
+        for at, shown in {(int(slot[i]), int(maze[i])) for i in np.flatnonzero(self._shown[slot] != maze)}:
+            self._show(at, shown)
 
         # The boxes in the window, each once, in the maze's order.
         row, column = np.divmod(cell, self._size)
