@@ -13,6 +13,7 @@ from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, point_to_cell
 from mazebench.world.mjcf import BODY_HEIGHT, BODY_RADIUS, action_controls
 from mazebench.world.models import MazeModels
+from mazebench.world.near_walls import NearWalls, WallGeoms
 from mazebench.world.simulation import MujocoSimulation
 
 STEPS_PER_FRAME = 2
@@ -170,11 +171,11 @@ class TestWalls:
         num_mazes, num_actions = 8, 105
         rng = np.random.default_rng(size)
         mazes = [generate(kind, size, rng) for _ in range(num_mazes)]
-        models = MazeModels(mazes)
         num_bodies = 8 * num_mazes
         maze_of_body = np.arange(num_bodies) % num_mazes
-        batch = mujoco.batch.Batch(models[0], num_bodies, 0)
-        batch.set_models([models[index] for index in maze_of_body])
+        walls = NearWalls(tuple(mazes), num_mazes)
+        batch = mujoco.batch.Batch(walls.model, num_bodies, 0)
+        geoms = WallGeoms.of_batch(batch)
         qpos, ctrl = batch.bind("qpos"), batch.bind("ctrl")
         for body, index in enumerate(maze_of_body):
             cells = mazes[index].free_cells
@@ -188,6 +189,7 @@ class TestWalls:
                 changed = rng.random(num_bodies) < 0.3
                 actions = np.where(changed, rng.integers(len(ACTIONS), size=num_bodies), actions)
                 ctrl[:] = action_controls()[actions]
+                walls.write(geoms, np.arange(num_bodies), maze_of_body, mazes[0].cell_index(qpos[:, :2]))
             batch.step(None, nstep=1)
             visited[step] = qpos[:, :2]
         for index, maze in enumerate(mazes):

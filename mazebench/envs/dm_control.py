@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import warnings
+from typing import Any
 
 import dm_env
 import mujoco
@@ -41,6 +42,13 @@ class Physics(Simulation, engine.Physics):
         with physics.reset_context():
             physics.data.qpos[:] = physics.model.key_qpos[0]
         return physics
+
+    def __getstate__(self) -> Any:
+        return super().__getstate__(), self.models, self._maze
+
+    def __setstate__(self, state: Any) -> None:
+        inner, self.models, self._maze = state
+        super().__setstate__(inner)
 
     def surround(self, maze: int, cell: int) -> None:
         if maze != self._maze:

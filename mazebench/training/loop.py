@@ -309,5 +309,5 @@ def _save(options: TrainOptions, folder: RunFolder, learner: Learner, task: Task
 
 def _origin(options: TrainOptions, task: Task) -> dict[str, Any]:
     """Returns what is trained, and in which task."""
-    values = task.to_json() | {"mazes": None if task.all_mazes is None else {"sha256": mazes_hash(task)}}
+    values = task.to_json() | {"mazes": None if task.mazes is None else {"sha256": mazes_hash(task)}}
     return {"agent": options.agent, "size": task.size, "task": values, "seed": options.seed}

@@ -24,6 +24,8 @@ from mazebench.world.mjcf import BODY_RADIUS, CONTACT_MARGIN, boxes_spec, parked
 # 8 v: v < 4.25 c. The push falls below 34 N at v c = 3.06. So v can't grow beyond the v at which both hold, 3.61 m/s.
 _FASTEST = 1.13 * TOP_SPEED
 _REACH = BODY_RADIUS + CONTACT_MARGIN + _FASTEST * STEP_TIME  # m, from the body's centre at the start of an agent step
+_MOST_ENTERED = 10_000  # cells whose boxes are kept, some 1 kB each
+_AHEAD = 2  # cells around the one that is entered whose boxes are found in advance
 _FIRST_WALL = 1  # index of its geom, after the floor
 _NO_TREE = int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)  # contacts are searched without trees of bounding boxes
 
@@ -58,7 +60,7 @@ class NearWalls:
     def __init__(self, mazes: Mazes, num_slots: int):
         """`num_slots` is how many mazes are kept: all of them or, of fresh mazes, one for each environment."""
         self._mazes, self._size, self._scale = mazes, mazes[0].size, mazes[0].cell_size
-        self._args = (mazes, num_slots)
+        self._args, self._is_fresh = (mazes, num_slots), isinstance(mazes, FreshMazes)
         reach = math.ceil(_REACH / self._scale)  # cells
         width = self._size + 2 * reach
         self._offsets = (np.arange(2 * reach + 1)[:, None] * width + np.arange(2 * reach + 1)).ravel()  # [W]
@@ -71,6 +73,8 @@ class NearWalls:
         self._shown = np.full(num_slots, -1, dtype=np.int64)  # the maze that a slot has
         self._first = np.zeros((num_slots, width * width), dtype=np.int32)  # of a wall cell, the first cell of its box
         self._end = np.zeros((num_slots, self._none, 2), dtype=np.int16)  # of a first cell, the box's bottom and right
+
+        self._entered: dict[tuple[int, int], list[np.ndarray]] = {}  # by maze and cell: what `_near` returns
 
         self.model = boxes_spec(mazes[0], *self._parked).compile()
         self.model.opt.disableflags |= _NO_TREE
@@ -88,10 +92,30 @@ class NearWalls:
           maze: `[E]` int, the index of the maze that each is in.
           cell: `[E]` int, the body's cell in it, as row * N + column.
         """
-        slot = env if isinstance(self._mazes, FreshMazes) else maze
+        slot = env if self._is_fresh else maze
         for at, shown in {(int(slot[i]), int(maze[i])) for i in np.flatnonzero(self._shown[slot] != maze)}:
             self._show(at, shown)
+        _assign(geoms, env, *self._near(slot, cell))
 
+    def write_one(self, geoms: WallGeoms, maze: int, cell: int) -> None:
+        """Does what `write` does for a single environment, and prepares the cells around, which take little longer."""
+        if (boxes := self._entered.get((maze, cell))) is None:
+            slot = 0 if self._is_fresh else maze
+            if self._shown[slot] != maze:
+                self._show(slot, maze)
+            if len(self._entered) > _MOST_ENTERED:
+                self._entered.clear()
+            row, column = divmod(cell, self._size)
+            rows, columns = (slice(max(0, at - _AHEAD), at + _AHEAD + 1) for at in (row, column))
+            cells = np.argwhere(~self._mazes[maze].walls[rows, columns]) + np.array([rows.start, columns.start])
+            near = cells @ (self._size, 1)
+            found = zip(near.tolist(), *self._near(np.full(len(near), slot), near), strict=True)
+            self._entered |= {(maze, each): values for each, *values in found}
+            boxes = self._entered[maze, cell]
+        _assign(geoms, 0, *boxes)
+
+    def _near(self, slot: np.ndarray, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Returns middles, half sides (`[E, K, 3]` m) and radii (`[E, K]` m) of the boxes near cells of slots."""
         # The boxes in the window, each once, in the maze's order.
         row, column = np.divmod(cell, self._size)
         boxes = self._first[slot[:, None], (row * self._width + column)[:, None] + self._offsets]  # [E, W]
@@ -101,16 +125,13 @@ class NearWalls:
         boxes = boxes[:, : self.num_boxes]
         is_box = boxes < self._none
 
-        # Their middles and half sides; those that are not needed are below the floor.
+        # Those that are not needed are below the floor.
         first = np.where(is_box, boxes, 0)
         top, left = np.divmod(first, self._size)
         bottom, right = np.moveaxis(self._end[slot[:, None], first], -1, 0)
         placed = placed_boxes(top, left, bottom, right, self._size, self._scale)
         middle, half = (np.where(is_box[..., None], *pair) for pair in zip(placed, self._parked, strict=True))
-        geoms.pos[env] = middle
-        geoms.size[env] = half
-        geoms.aabb[env, :, 3:] = half
-        geoms.rbound[env] = np.sqrt((half * half).sum(axis=-1))
+        return middle, half, np.sqrt((half * half).sum(axis=-1))
 
     def _show(self, slot: int, maze: int) -> None:
         """Puts a maze into a slot."""
@@ -128,6 +149,13 @@ class NearWalls:
         self._first[slot] = self._none
         self._first[slot, (row + self._reach) * self._width + column + self._reach] = first[box]
         self._shown[slot] = maze
+
+
+def _assign(geoms: WallGeoms, env: np.ndarray | int, middle: np.ndarray, half: np.ndarray, radius: np.ndarray) -> None:
+    geoms.pos[env] = middle
+    geoms.size[env] = half
+    geoms.aabb[env, :, 3:] = half
+    geoms.rbound[env] = radius
 
 
 def near_walls_of(mazes: Mazes, num_envs: int) -> NearWalls:

@@ -19,7 +19,7 @@ _PICTURE_SIZE = 480  # pixels a side
 class Cameras:
     """Pictures of any worlds of one `MazeModels` through one rendering context, which opens with the first of them.
 
-    All models have the textures of the first one, which the context holds.
+    All pictures have the textures of the first model, which the context holds.
     """
 
     def __init__(self, models: MazeModels, names: tuple[str, ...], pixels: int = _PICTURE_SIZE, smooth: bool = True):
@@ -46,7 +46,7 @@ class Cameras:
         model, data = self._models.with_data(maze)
         if self._renderer is None or self._most_shown < model.ngeom + model.nsite:
             self.close()
-            self._renderer = self._open(model)
+            self._renderer = self._open(2 * (model.ngeom + model.nsite))  # for mazes with more walls
         data.qpos[:], data.mocap_pos[0] = qpos, marker
         mujoco.mj_kinematics(model, data)
         mujoco.mj_camlight(model, data)
@@ -59,9 +59,9 @@ class Cameras:
         mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, view, every, renderer.scene)
         return renderer.render()
 
-    def _open(self, model: mujoco.MjModel) -> mujoco.Renderer:
-        self._most_shown = 2 * (model.ngeom + model.nsite)  # for mazes with more walls
-        model = copy.copy(model)
+    def _open(self, most_shown: int) -> mujoco.Renderer:
+        self._most_shown = most_shown
+        model = copy.copy(self._models[0])
         if not self._smooth:
             model.vis.quality.offsamples = 0
         try:

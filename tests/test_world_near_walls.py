@@ -1,0 +1,120 @@
+"""The walls near a body: the same bits as the whole maze gives, wherever the body drives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mazebench.constants import ACTIONS, STEP_TIME, STEPS_PER_ACTION, TOP_SPEED
+from mazebench.envs.vector import MazeVectorEnv
+from mazebench.maps.doors import door_slots, swap_doors
+from mazebench.maps.drawn import FreshMazes
+from mazebench.maps.kinds import KINDS, generate
+from mazebench.maps.maze import MAX_SIZE, Maze, resized
+from mazebench.tasks.task import Task
+from mazebench.world.mjcf import BODY_RADIUS, CONTACT_MARGIN, action_controls, maze_spec
+from mazebench.world.near_walls import _REACH, NearWalls, WallGeoms
+from mazebench.world.simulation import MujocoSimulation
+
+CONTROLS = action_controls()
+
+
+def maze_of(kind: str, size: int = 21, cell_size: float = 1.0) -> Maze:
+    return resized(generate(kind, size, np.random.default_rng(3)), cell_size)
+
+
+def rebuilt() -> Maze:
+    """A house in which doors have moved."""
+    house = maze_of("house")
+    ends = tuple(map(tuple, house.free_cells[[0, -1]].tolist()))
+    return Maze(swap_doors(house.walls, door_slots(house), 2, ends, np.random.default_rng(0)), "rebuilt")
+
+
+def drive(maze: Maze, num_steps: int, held: float, seed: int = 0) -> tuple[int, float]:
+    """Drives at random in the whole maze and near its walls; returns the contacts and the top speed there were.
+
+    An action is held on with the probability `held` in each of the steps.
+    """
+    walls = NearWalls((maze,), 1)
+    whole, near = MujocoSimulation(maze_spec(maze).compile()), MujocoSimulation(walls.model, walls)
+    rng = np.random.default_rng(seed)
+    start = maze.free_cells[rng.integers(len(maze.free_cells))]
+    near.surround(0, int(start @ (maze.size, 1)))
+    for simulation in (whole, near):
+        with simulation.reset_context():
+            simulation.place_agent(maze.point(start), 0.3)
+    action, contacts, fastest = 0, 0, 0.0
+    for _ in range(num_steps):
+        action = action if rng.random() < held else int(rng.integers(len(ACTIONS)))
+        row, column = maze.cell_at(*near.position())
+        near.surround(0, row * maze.size + column)
+        for simulation in (whole, near):
+            simulation.set_controls(CONTROLS[action])
+            simulation.step(STEPS_PER_ACTION)
+        np.testing.assert_array_equal(near.data.qpos, whole.data.qpos)
+        np.testing.assert_array_equal(near.data.qvel, whole.data.qvel)
+        contacts, fastest = contacts + whole.data.ncon, max(fastest, whole.speed())
+    return contacts, fastest
+
+
+class TestBits:
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_a_body_moves_as_in_the_whole_maze(self, kind):
+        contacts, fastest = drive(maze_of(kind), 300, held=0.8)
+        assert contacts > 100
+        assert fastest > TOP_SPEED
+
+    @pytest.mark.parametrize("cell_size", [0.4, 0.75])
+    def test_in_narrow_cells_of_caves_too(self, cell_size):
+        assert drive(maze_of("cave", cell_size=cell_size), 300, held=0.8)[0] > 100
+
+    def test_where_doors_have_moved(self):
+        assert drive(rebuilt(), 300, held=0.8)[0] > 100
+
+    def test_when_cells_are_entered_at_top_speed(self):
+        contacts, fastest = drive(maze_of("dfs", 31), 600, held=0.95)
+        assert contacts > 100
+        assert fastest > 0.99 * TOP_SPEED
+
+    def test_all_that_a_body_can_touch_in_a_step_is_in_reach(self):
+        # No drive gives more than 3.61 m/s (the module's comment).
+        assert _REACH >= BODY_RADIUS + CONTACT_MARGIN + 3.61 * STEP_TIME
+
+
+class TestBoxes:
+    @pytest.mark.parametrize(("cell_size", "reach"), [(1.0, 1), (0.75, 2), (0.4, 2)])
+    def test_those_within_reach_of_a_cell_are_there_in_order(self, cell_size, reach):
+        maze = maze_of("obstacles", 15, cell_size)
+        whole = maze_spec(maze).compile()
+        walls = NearWalls((maze,), 1)
+        geoms = WallGeoms.of_model(walls.model)
+        for row, column in maze.free_cells[::7].tolist():
+            walls.write_one(geoms, 0, row * maze.size + column)
+            near = [
+                index
+                for index, box in enumerate(maze.boxes)
+                if box.top - reach <= row < box.bottom + reach and box.left - reach <= column < box.right + reach
+            ]
+            for name, values in zip(geoms._fields, geoms, strict=True):
+                expected = getattr(whole, f"geom_{name}")[np.add(near, 1)]  # after the floor
+                np.testing.assert_array_equal(values[0, : len(near)], expected, err_msg=name)
+            assert (geoms.pos[0, len(near) :, 2] < 0).all()
+
+    def test_environments_may_be_in_different_fresh_mazes(self):
+        mazes = FreshMazes(("dfs", "house"), 13)
+        walls, alone = NearWalls(mazes, 3), NearWalls((mazes[9],), 1)
+        expected = WallGeoms.of_model(alone.model)
+        geoms = WallGeoms(*(np.zeros((3, *each.shape[1:])) for each in expected))
+        cell = int(mazes[9].free_cells[4] @ (13, 1))
+        walls.write(geoms, np.array([2, 0]), np.array([9, 5]), np.array([cell, 14]))
+        alone.write_one(expected, 0, cell)
+        np.testing.assert_array_equal(geoms.pos[2], expected.pos[0])
+        assert not geoms.pos[1].any()
+
+
+@pytest.mark.slow
+def test_a_maze_of_the_largest_size_is_played():
+    envs = MazeVectorEnv(Task.of(mazes=maze_of("rooms", MAX_SIZE), distances=5, sensors="lidar"), 2)
+    observation, _ = envs.reset(seed=0)
+    assert observation["context"].shape == (2, 4, 21, 21)
+    assert (envs.step(np.zeros(2, dtype=int))[0]["lidar"] > 0).all()
