@@ -18,7 +18,7 @@ def generate(
     values: dict[str, Any],
     size: Annotated[
         int | None,
-        typer.Option(help="Cells a side, 5 to 255; 13 if not given. With --mazes, the size that the file shows."),
+        typer.Option(help="Cells a side, 5 to 1024; 13 if not given. With --mazes, the size that the file shows."),
     ] = None,
     count: Annotated[int, typer.Option(min=1, help="How many mazes.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same mazes.")] = 0,

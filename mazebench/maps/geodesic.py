@@ -12,11 +12,13 @@ indexed `[x, y]`. `K` is the number of circles, `P` of straight pieces and `S` o
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Iterator
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from scipy import sparse
+from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 
 from mazebench.errors import InputError
@@ -27,6 +29,38 @@ _TOLERANCE = 1e-9
 # Numbers tested at once, which keep temporary arrays to some ten megabytes.
 _PAIRS_AT_ONCE = 2**18
 _LINES_AT_ONCE = 16
+_LARGEST_WHOLE = 127  # cells a side of mazes whose paths are all found at once
+
+
+def length_between(maze: Maze, radius: float, start: Cell, goal: Cell) -> float:
+    """Returns the metres of a shortest path of a disc from the middle of a cell to a goal cell.
+
+    In a large maze, only the cells are searched that the path can pass. It is no longer than one from cell to cell, so
+    that they lie in an ellipse about start and goal.
+
+    Args:
+      radius: of the disc, in metres.
+    """
+    if maze.size <= _LARGEST_WHOLE:
+        return _whole(maze, radius).length(maze.point(start), goal)
+    cells = np.indices(maze.walls.shape)
+    to_start, to_goal = (np.hypot(cells[0] - row, cells[1] - column) for row, column in (start, goal))
+    is_near = to_start + to_goal <= maze.distance(start, goal) + 2 * math.sqrt(2)  # with a cell's extent at both ends
+    rows, columns = (np.flatnonzero(is_near.any(axis=axis)) for axis in (1, 0))
+    top, left = max(0, rows[0] - 1), max(0, columns[0] - 1)
+    window = np.s_[top : rows[-1] + 2, left : columns[-1] + 2]
+
+    # What the path can't pass is wall, and so are cells that only a way around leads to.
+    is_free = ~maze.walls[window] & is_near[window]
+    components, _ = ndimage.label(is_free)
+    here, there = ((row - top, column - left) for row, column in (start, goal))
+    walls = components != components[here]
+    side = max(walls.shape) + 2
+    padded = np.ones((side, side), dtype=bool)
+    padded[1 : 1 + walls.shape[0], 1 : 1 + walls.shape[1]] = walls
+    part = Maze(padded, maze.name, cell_size=maze.cell_size)
+    here, there = ((row + 1, column + 1) for row, column in (here, there))
+    return DiscPaths(part, radius).length(part.point(here), there)
 
 
 class _Circles(NamedTuple):
@@ -417,3 +451,6 @@ def _concatenate(parts: list[_Table]) -> _Table:
 
 def _is_in_cell(point: np.ndarray, corner: np.ndarray) -> bool:
     return bool(np.all((point >= corner) & (point <= corner + 1)))
+
+
+_whole = functools.lru_cache(maxsize=2)(DiscPaths)

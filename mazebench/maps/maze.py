@@ -24,7 +24,8 @@ from mazebench.maps.covering import Rectangle, cover
 Cell = tuple[int, int]
 
 MIN_SIZE = 5
-MAX_SIZE = 255
+MAX_SIZE = 1024
+MAX_CHOSEN_SIZE = 255  # of mazes whose cells a reader finds, or whose scale it chooses
 WALL_HEIGHT = 1.0  # metres; DeepMind Lab's 100 units
 MIN_CELL_SIZE = 0.4  # m, in which the body drives: it is 0.3 m wide, and contacts act 0.03 m before a wall
 UNREACHABLE = -1

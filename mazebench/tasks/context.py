@@ -8,6 +8,7 @@ import numpy as np
 from mazebench.maps.maze import Cell
 
 NUM_PLANES = 4
+MAX_CONTEXT_SIZE = 255
 GLOBAL_MAP, LOCAL_MAP, GOAL, START = range(NUM_PLANES)
 _LARGEST_DEFAULT_SIZE = 21
 

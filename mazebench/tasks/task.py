@@ -21,12 +21,12 @@ from mazebench.maps.benchmark import (
     load_mazes,
 )
 from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
-from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, Cell, Maze, corner_cells, require_one_size
+from mazebench.maps.maze import MIN_CELL_SIZE, Cell, Maze, corner_cells, require_one_size
 from mazebench.maps.maze_files import read_all
 from mazebench.maps.maze_options import THIN_WALLS, ReadOptions
 from mazebench.maps.selection import described_maze, own_mazes
 from mazebench.options import fields_of, options
-from mazebench.tasks.context import default_context_size
+from mazebench.tasks.context import MAX_CONTEXT_SIZE, default_context_size
 from mazebench.tasks.interface import Interface
 from mazebench.tasks.perturbations import PERTURBATIONS
 from mazebench.tasks.start_goal import cell_of_end
@@ -407,6 +407,11 @@ def _complete(given: Mapping[str, Any], default_distances: tuple[int, ...] | Non
     if not context_size:
         pixels = None if asked.track is None else TRACKS[asked.track].pixels_per_cell
         context_size = pixels * mazes[0].size if pixels else default_context_size(mazes[0].size)
+        if pixels and context_size > MAX_CONTEXT_SIZE:
+            raise InputError(
+                f"track {asked.track!r}: expected mazes of at most {MAX_CONTEXT_SIZE // pixels} cells a side, "
+                f"whose maps have at most {MAX_CONTEXT_SIZE} pixels, found {mazes[0].size}"
+            )
 
     hide = tuple(name for name in HIDEABLE if name in asked.hide)
     task = dataclasses.replace(
@@ -529,7 +534,9 @@ def _check_track(task: Task, name: str) -> None:
 def check_shown(task: Task) -> None:
     """Raises `InputError` if a map of the task's `context_size` can't be shown."""
     if task.track is None and task.context_size < MIN_CONTEXT_SIZE:
-        raise InputError(f"expected context_size from {MIN_CONTEXT_SIZE} to {MAX_SIZE}, found {task.context_size}")
+        raise InputError(
+            f"expected context_size from {MIN_CONTEXT_SIZE} to {MAX_CONTEXT_SIZE}, found {task.context_size}"
+        )
     if task.track is not None:
         context_size = TRACKS[task.track].pixels_per_cell * task.size
         if task.context_size != context_size:

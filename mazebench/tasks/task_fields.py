@@ -12,10 +12,11 @@ from pydantic import BeforeValidator, InstanceOf
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import ALL_SPLITS
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
-from mazebench.maps.maze import MAX_SIZE, Cell, Maze
+from mazebench.maps.maze import Cell, Maze
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.selection import OwnMazes, maze_as_described
 from mazebench.options import Doc, OneOf, options
+from mazebench.tasks.context import MAX_CONTEXT_SIZE
 from mazebench.tasks.perturbations.flip import FlipShare
 from mazebench.tasks.perturbations.noise import PositionDeviation
 from mazebench.tasks.perturbations.warp import WarpShare
@@ -204,7 +205,7 @@ class TaskFields(SensorOptions, ReadOptions):
     ] = ()
     context_size: Annotated[
         int,
-        Interval(ge=0, le=MAX_SIZE),
+        Interval(ge=0, le=MAX_CONTEXT_SIZE),
         Doc(
             "M, the cells on a side of the context's planes, at least 3; 0 stands for min(N, 21); a track has its own."
         ),

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import functools
 from collections.abc import Iterator
 
 import numpy as np
 
 from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.maps.benchmark import MAZES_PER_SPLIT, PAPER_BENCHMARK, SIZES, TRACKS_BENCHMARK, read_asset
-from mazebench.maps.geodesic import DiscPaths
+from mazebench.maps.geodesic import length_between
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.episode import Episode, make_episode, sample_pair
 from mazebench.tasks.task import EVAL_DISTANCES, Task
@@ -131,11 +130,8 @@ def make_trial(maze: Maze, index: int, pair: tuple[Cell, Cell], rng: np.random.G
     """Returns the trial of a start and a goal in maze number `index`; draws the first heading and the seed."""
     start, goal = pair
     episode = make_episode(index, start, goal, rng)
-    shortest = _disc_paths(maze, BODY_RADIUS).length(maze.point(start), goal)
+    shortest = length_between(maze, BODY_RADIUS, start, goal)
     return Trial(episode, maze.distance(start, goal), shortest)
-
-
-_disc_paths = functools.lru_cache(maxsize=2)(DiscPaths)
 
 
 def benchmark_task_sizes() -> list[tuple[str, int, int]]:

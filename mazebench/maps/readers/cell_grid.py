@@ -8,7 +8,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from mazebench.maps.maze import MAX_SIZE
+from mazebench.maps.maze import MAX_CHOSEN_SIZE
 
 # Of a cell: logarithm of width by height. A stretched picture has the same for all multiples of a grid.
 _MAX_STRETCH, _SAME_STRETCH = 0.3, 0.02
@@ -72,8 +72,10 @@ def core_bounds(count: int, length: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _axis_fits(edges: np.ndarray) -> tuple[np.ndarray, float]:
-    """Returns the fit of each number of cells along an axis, `[MAX_SIZE + 1]` float, and the weight of the edges."""
+    """Returns the fit of each number of cells along an axis, `[256]` float, and the weight of the edges."""
     positions = np.arange(1, len(edges) + 1) / (len(edges) + 1)
-    edges = np.where(np.minimum(positions, 1 - positions) < 0.5 / MAX_SIZE, 0, edges)  # without the frame's outline
+    edges = np.where(
+        np.minimum(positions, 1 - positions) < 0.5 / MAX_CHOSEN_SIZE, 0, edges
+    )  # without the frame's outline
     weight = float(edges.sum())
-    return np.cos(2 * np.pi * np.outer(np.arange(MAX_SIZE + 1), positions)) @ edges / max(1e-9, weight), weight
+    return np.cos(2 * np.pi * np.outer(np.arange(MAX_CHOSEN_SIZE + 1), positions)) @ edges / max(1e-9, weight), weight

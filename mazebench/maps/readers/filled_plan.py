@@ -9,7 +9,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, MazeError, require_connected
+from mazebench.maps.maze import MAX_CHOSEN_SIZE, MIN_SIZE, MazeError, require_connected
 from mazebench.maps.readers.cell_grid import core_bounds, fit_grid
 from mazebench.maps.readers.pixel_map import (
     READ_LINES,
@@ -137,7 +137,7 @@ def _count_cells(ink: np.ndarray, size: int | None) -> tuple[tuple[int, int], fl
         down,
         pixels=ink.shape,
         shortest=MIN_SIDE,
-        longest=(MIN_SIZE, MAX_SIZE),
+        longest=(MIN_SIZE, MAX_CHOSEN_SIZE),
         size=size,
         nearly_best=_NEARLY_BEST,
     )

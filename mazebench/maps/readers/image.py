@@ -14,7 +14,7 @@ import numpy as np
 from mazebench.errors import InputError, held_remarks
 from mazebench.maps.file_kinds import kind_of
 from mazebench.maps.grids import square_maze
-from mazebench.maps.maze import MAX_SIZE, MIN_SIZE, Maze, MazeError
+from mazebench.maps.maze import MAX_CHOSEN_SIZE, MIN_SIZE, Maze, MazeError
 from mazebench.maps.pictures import MAX_SIDE
 from mazebench.maps.readers.filled_plan import MIN_SIDE, read_plan
 from mazebench.maps.readers.line_drawing import read_lines
@@ -84,8 +84,8 @@ def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maz
       MazeError: if no legal maze is found. Nothing is repaired, except that the outer cells of a plan on paper are
         always walls.
     """
-    if size is not None and not MIN_SIZE <= size <= MAX_SIZE:
-        raise InputError(f"{name}: expected a size of {MIN_SIZE} to {MAX_SIZE} cells, found {size}")
+    if size is not None and not MIN_SIZE <= size <= MAX_CHOSEN_SIZE:
+        raise InputError(f"{name}: expected a size of {MIN_SIZE} to {MAX_CHOSEN_SIZE} cells, found {size}")
     gray = to_gray(image, name)
     if walls == "lines":
         return square_maze(read_lines(gray, size, name), name)
@@ -195,7 +195,12 @@ def _pixel_map(gray: np.ndarray, size: int | None) -> np.ndarray | None:
     longer, shorter = max(gray.shape), min(gray.shape)
     num_cells = size or longer // block
     cell = longer // num_cells
-    if not MIN_SIZE <= num_cells <= MAX_SIZE or cell * num_cells != longer or block % cell or shorter < MIN_SIDE * cell:
+    if (
+        not MIN_SIZE <= num_cells <= MAX_CHOSEN_SIZE
+        or cell * num_cells != longer
+        or block % cell
+        or shorter < MIN_SIDE * cell
+    ):
         return None
     if block == 1 and len(shades) > _MAX_MAP_SHADES:
         return None

@@ -8,7 +8,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from mazebench.maps.maze import MAX_SIZE, MazeError
+from mazebench.maps.maze import MAX_CHOSEN_SIZE, MazeError
 from mazebench.maps.maze_options import THIN_WALLS
 from mazebench.maps.readers.cell_grid import CORE, core_bounds, fit_grid
 from mazebench.maps.readers.pixel_map import STRAIGHTEN, WORKING_SIDE, enlarged, ink_of, on_white, outer_walls
@@ -56,7 +56,7 @@ def read_lines(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
         lines.mean(axis=0),
         pixels=lines.shape,
         shortest=2,
-        longest=(2, (MAX_SIZE - 1) // 2),
+        longest=(2, (MAX_CHOSEN_SIZE - 1) // 2),
         size=None if size is None else (size - 1) // 2,
         nearly_best=_NEARLY_BEST,
     )

@@ -16,7 +16,7 @@ from scipy import ndimage
 
 from mazebench.errors import InputError, remark
 from mazebench.maps.grids import largest_area, pad_to_square
-from mazebench.maps.maze import MAX_SIZE, MIN_CELL_SIZE, MIN_SIZE, Maze, MazeError
+from mazebench.maps.maze import MAX_CHOSEN_SIZE, MAX_SIZE, MIN_CELL_SIZE, MIN_SIZE, Maze, MazeError
 from mazebench.maps.maze_options import ReadOptions
 
 Pose = tuple[float, float, float]  # x, y (m), yaw (rad)
@@ -121,12 +121,12 @@ def _without_unknown_margin(states: np.ndarray) -> tuple[int, int, np.ndarray]:
 def _smallest_cell_pixels(blocked: np.ndarray, resolution: float) -> int:
     """Returns the pixels on a side of the smallest cells of at least `MIN_CELL_SIZE` of which a maze has enough."""
     pixels = _fewest_pixels(resolution)
-    if max(blocked.shape) <= pixels * MAX_SIZE:
+    if max(blocked.shape) <= pixels * MAX_CHOSEN_SIZE:
         return pixels
     free = [np.flatnonzero(~blocked.all(axis=axis)) for axis in (0, 1)]
     longest = max((int(np.ptp(indices)) + 1 for indices in free if len(indices)), default=1)
     # Beside these pixels there are walls, and the first and the last cell of them may be cut.
-    return max(pixels, math.ceil(longest / (MAX_SIZE - 3)))
+    return max(pixels, math.ceil(longest / (MAX_CHOSEN_SIZE - 3)))
 
 
 def _cell_pixels(cell_size: float, resolution: float) -> int:
