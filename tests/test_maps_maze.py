@@ -103,8 +103,8 @@ class TestValidation:
         [
             (np.ones((5, 6), dtype=bool), r"^m: expected a square grid, found shape \(5, 6\)$"),
             (np.ones((5, 5)), r"^m: expected walls of dtype bool, found float64$"),
-            (field(4), r"^m: expected 5 to 255 cells a side, found 4$"),
-            (field(256), r"^m: expected 5 to 255 cells a side, found 256$"),
+            (field(4), r"^m: expected 5 to 1024 cells a side, found 4$"),
+            (field(1025), r"^m: expected 5 to 1024 cells a side, found 1025$"),
             (np.ones((5, 5), dtype=bool), r"^m: expected a free cell, found only walls$"),
             (with_cell(field(5), 0, 3, False), r"^m: expected a closed border, found cell \(0, 3\) free$"),
             (with_cell(field(7), 5, 6, False), r"^m: expected a closed border, found cell \(5, 6\) free$"),

@@ -229,7 +229,12 @@ class TestMaze:
         picture[[0, -1]] = picture[:, [0, -1]] = 0
         path = write_map(tmp_path, picture, resolution=0.5)
         assert (read_maze(path).size, read_maze(path).cell_size) == (200, 1.5)
-        with pytest.raises(MazeError, match=r"at most 255 cells a side, found 600 of 0\.5 m; give a larger cell_size"):
+        assert read_maze(path, cell_size=0.5).size == 600
+        picture = cv2.resize(picture, (600, 1200), interpolation=cv2.INTER_NEAREST)
+        path = write_map(tmp_path, picture, resolution=0.5)
+        with pytest.raises(
+            MazeError, match=r"at most 1024 cells a side, found 1198 of 0\.5 m; give a larger cell_size"
+        ):
             read_maze(path, cell_size=0.5)
 
 

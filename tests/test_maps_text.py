@@ -75,7 +75,7 @@ class TestRefusal:
             (PLAN.replace(".", "·"), r"found '·' at \(1, 1\)$"),
             ("#####\n#..##\n####\n", r"^m: expected rows of 5 cells like the first, found 4 in row 2$"),
             ("#..#\n####\n####\n", r"^m: expected a closed border, found cell \(0, 1\) free$"),
-            ("####\n#..#\n####\n", r"^m: expected 5 to 255 cells a side, found 4$"),
+            ("####\n#..#\n####\n", r"^m: expected 5 to 1024 cells a side, found 4$"),
             (PLAN.replace("#..##", "...##"), r"^m: expected a closed border, found cell \(1, 0\) free$"),
         ],
     )

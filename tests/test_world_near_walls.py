@@ -112,9 +112,8 @@ class TestBoxes:
         assert not geoms.pos[1].any()
 
 
-@pytest.mark.slow
 def test_a_maze_of_the_largest_size_is_played():
-    envs = MazeVectorEnv(Task.of(mazes=maze_of("rooms", MAX_SIZE), distances=5, sensors="lidar"), 2)
+    envs = MazeVectorEnv(Task.of(mazes=maze_of("cave", MAX_SIZE - 1), distances=5, sensors="lidar"), 2)
     observation, _ = envs.reset(seed=0)
     assert observation["context"].shape == (2, 4, 21, 21)
     assert (envs.step(np.zeros(2, dtype=int))[0]["lidar"] > 0).all()
