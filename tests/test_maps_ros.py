@@ -232,9 +232,7 @@ class TestMaze:
         assert read_maze(path, cell_size=0.5).size == 600
         picture = cv2.resize(picture, (600, 1200), interpolation=cv2.INTER_NEAREST)
         path = write_map(tmp_path, picture, resolution=0.5)
-        with pytest.raises(
-            MazeError, match=r"at most 1024 cells a side, found 1198 of 0\.5 m; give a larger"
-        ):
+        with pytest.raises(MazeError, match=r"at most 1024 cells a side, found 1198 of 0\.5 m; give a larger"):
             read_maze(path, cell_size=0.5)
 
 

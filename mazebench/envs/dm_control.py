@@ -28,17 +28,23 @@ with warnings.catch_warnings():
     from dm_control.rl import control
 
 
+# What dm_control makes of a model, in 5 ms.
+_OF_MODEL = ("_data", "_warnings", "_warnings_before", "_new_warnings", "_named")
+_MOST_KEPT = 64  # mazes
+
+
 class Physics(Simulation, engine.Physics):
-    """A whole maze and the body in it; another maze is another model and other data."""
+    """A whole maze and the body in it; another maze is another model and other data, and those used last are kept."""
 
     models: MazeModels
     _maze = 0  # index of the maze
+    _others: dict[int, dict[str, Any]]  # by index of the maze: the attributes `_OF_MODEL` that it had
 
     @classmethod
     def of_mazes(cls, models: MazeModels) -> Physics:
         """Returns a simulation of the first of some mazes, with the body in its first free cell."""
         physics = cls.from_model(wrapper.MjModel(copy.copy(models[0])))
-        physics.models = models
+        physics.models, physics._others = models, {}
         with physics.reset_context():
             physics.data.qpos[:] = physics.model.key_qpos[0]
         return physics
@@ -48,12 +54,23 @@ class Physics(Simulation, engine.Physics):
 
     def __setstate__(self, state: Any) -> None:
         inner, self.models, self._maze = state
+        self._others = {}
         super().__setstate__(inner)
 
     def surround(self, maze: int, cell: int) -> None:
-        if maze != self._maze:
+        if maze == self._maze:
+            return
+        if len(self._others) >= _MOST_KEPT:
+            self._others.pop(next(iter(self._others)))
+        self._others[self._maze] = {name: getattr(self, name) for name in _OF_MODEL}
+        self._maze = maze
+        if (kept := self._others.pop(maze, None)) is None:
             self._reload_from_model(wrapper.MjModel(copy.copy(self.models[maze])))
-            self._maze = maze
+            return
+        if self._contexts:  # they are of the model
+            self._free_rendering_contexts()
+        self.__dict__.update(kept)
+        mujoco.mj_resetData(self.model.ptr, self.data.ptr)
 
     def after_reset(self) -> None:
         """Computes what follows from positions and velocities, after a reset and in a new copy."""
