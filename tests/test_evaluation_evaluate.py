@@ -90,6 +90,13 @@ class TestResults:
             assert 0 < row["spl"] <= row["spl_grid"] <= 1
         assert (summary["overall"]["n"], summary["by_distance"]["2"]["n"]) == (40, 20)
 
+    def test_a_task_that_was_made_before_is_evaluated(self):
+        task = Task.of("rebuilt", level=2, split="dev", distances=(15,))
+        summary = evaluate("random", task)
+        assert (summary.task, summary.benchmark) == (task, "tracks")
+        with pytest.raises(InputError, match="expected no options beside a Task, found size"):
+            evaluate("random", task, size=31)
+
     def test_without_a_folder_the_summary_alone_is_left(self, planner_run, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
