@@ -56,11 +56,11 @@ def published(shade: float, opacity: float = 1.0, *, mode="trinary", negate=Fals
     """The state that map_server gives a pixel: `shade` is the mean of its colours from 0 (black) to 1 (white)."""
     if mode == "raw":
         per_cent = round(shade * 255)
-        return "?" if per_cent > 100 else "#" if per_cent / 100 > occupied else "." if per_cent / 100 < free else "?"
-    if mode == "scale" and opacity < 1:
+        return "?" if per_cent > 100 else "#" if per_cent / 100 >= occupied else "." if per_cent / 100 <= free else "?"
+    if opacity < 1:
         return "?"
     probability = shade if negate else 1 - shade
-    return "#" if probability > occupied else "." if probability < free else "?"
+    return "#" if probability >= occupied else "." if probability <= free else "?"
 
 
 class TestThresholds:
@@ -85,15 +85,36 @@ class TestThresholds:
         ]
         assert read_occupancy(path).states.ravel().tolist() == expected
 
-    def test_colours_are_averaged_and_opacity_counts_as_map_server_counts_it(self, tmp_path):
+    @pytest.mark.parametrize("mode", ["trinary", "scale"])
+    def test_colours_are_averaged_and_what_is_not_opaque_is_unknown(self, tmp_path, mode):
         picture = np.zeros((5, 5, 4), dtype=np.uint8)
-        picture[:] = (0, 120, 240, 255)  # a mean of 120: occupied with 0.53; with the opacity 153.75: 0.397
-        picture[0] = (250, 255, 255, 100)  # a mean of 253: free; with the opacity 215: 0.157, free
-        picture[1] = (250, 255, 255, 0)  # with the opacity 190: 0.255, unknown
-        path = write_map(tmp_path, picture, image="map.png", free_thresh=0.2)
-        assert read_occupancy(path).states[:, 0].tolist() == [0, -1, -1, -1, -1]
-        path = write_map(tmp_path, picture, image="map.png", free_thresh=0.2, occupied_thresh=0.5, mode="scale")
-        assert read_occupancy(path).states[:, 0].tolist() == [-1, -1, 100, 100, 100]
+        picture[:] = (0, 120, 240, 255)  # a mean of 120: occupied with 0.53
+        picture[0] = (250, 255, 255, 254)
+        path = write_map(tmp_path, picture, image="map.png", free_thresh=0.2, occupied_thresh=0.5, mode=mode)
+        assert read_occupancy(path).states[:, 0].tolist() == [-1, 100, 100, 100, 100]
+
+    def test_a_shade_at_a_threshold_is_occupied_or_free(self, tmp_path):
+        picture = np.array([[0] * 5, [255] * 5, [128] * 5, [255] * 5, [0] * 5], np.uint8)
+        path = write_map(tmp_path, picture, free_thresh=0.0, occupied_thresh=1.0)
+        assert read_occupancy(path).states[:, 0].tolist() == [100, 0, -1, 0, 100]
+
+
+class TestPicture:
+    @pytest.mark.parametrize("image", ["file://{folder}/map.pgm", "/home/somebody/maps/map.pgm", "C:\\maps\\map.pgm"])
+    def test_a_picture_is_found_by_its_path_or_beside_the_file(self, tmp_path, image):
+        path = write_map(tmp_path, drawn(BUILDING), image="map.pgm")
+        expected = read_occupancy(path)
+        text = path.read_text().replace("image: map.pgm", f"image: '{image.format(folder=tmp_path)}'")
+        path.write_text(text)
+        found = read_occupancy(path)
+        np.testing.assert_array_equal(found.states, expected.states)
+        assert len(found.changes) == len(expected.changes) + (not image.startswith("file"))
+
+    def test_in_a_folder_a_yaml_that_is_no_map_is_left_out_with_a_line(self, tmp_path, remarks):
+        write_map(tmp_path, drawn(BUILDING))
+        (tmp_path / "nav2_params.yaml").write_text("amcl:\n  alpha1: 0.2\n")
+        assert len(read_mazes(tmp_path)) == 1
+        assert any("nav2_params.yaml" in line and line.endswith("left out") for line in remarks())
 
 
 BUILDING = "??????? ?#####? ?#...#? ?#.?.#? ?#...#? ?#####? ???????"

@@ -7,13 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.errors import InputError, held_remarks, remark
+from mazebench.errors import InputError, remark
 from mazebench.maps.maze import Maze, resized
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.readers.arrays import read_array_maze
 from mazebench.maps.readers.image import read_image_maze
 from mazebench.maps.readers.occupancy_grid import LocatedMaze
-from mazebench.maps.readers.ros import ROS_SUFFIXES, locate_floor_plan, locate_ros_maze, map_of_picture, picture_of
+from mazebench.maps.readers.ros import (
+    ROS_SUFFIXES,
+    is_other_yaml,
+    locate_floor_plan,
+    locate_ros_maze,
+    map_of_picture,
+    picture_of,
+)
 from mazebench.maps.text import read_text_maze
 
 IMAGE_SUFFIXES = (
@@ -24,6 +31,12 @@ TEXT_SUFFIXES = (".txt", ".map")
 ARRAY_SUFFIXES = (".npy",)
 # In the order in which they are read if a folder holds one map in several: those come first that say the cells' size.
 SUFFIXES = (*ROS_SUFFIXES, *TEXT_SUFFIXES, *ARRAY_SUFFIXES, *IMAGE_SUFFIXES)
+# What is recognised and not read, and the way out.
+_AS_PICTURE, _AS_TEXT = "save it as a PNG", "save it as a text map or as .npy"
+_CONVERTED = {
+    **dict.fromkeys((".avif", ".heic", ".heif", ".svg", ".pdf", ".dxf", ".dwg"), _AS_PICTURE),
+    **dict.fromkeys((".npz", ".csv", ".tsv", ".json", ".mat"), _AS_TEXT),
+}
 # Of a floor plan that is read as a picture of cells: cells a side, and the free share of them. Mazes have more walls.
 _MANY_CELLS, _MOSTLY_FREE = 100, 0.8
 
@@ -39,7 +52,7 @@ def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any)
     Raises:
       InputError: if the file can't be read or holds no legal maze.
     """
-    return read_located(pathlib.Path(path), size, ReadOptions(**options)).maze
+    return read_located(pathlib.Path(path).expanduser(), size, ReadOptions(**options)).maze
 
 
 def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
@@ -55,27 +68,21 @@ def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
     Raises:
       InputError: if there is no map or one can't be read.
     """
-    return read_all(pathlib.Path(path), ReadOptions(**options))
+    return read_all(pathlib.Path(path).expanduser(), ReadOptions(**options))
 
 
 def read_all(path: pathlib.Path, options: ReadOptions) -> tuple[Maze, ...]:
     """Reads the maze in a file, or those in a folder, as `read_mazes` does."""
     if not path.is_dir():
         return (read_located(path, None, options).maze,)
-    files = _map_files(path)
-    mazes, remarks = [], []
-    for file in files:
-        with held_remarks() as lines:
-            mazes.append(read_located(file, None, options).maze)
-        remarks.extend(lines[:1])
-    if remarks:
-        remark(f"{len(remarks)} of {len(mazes)} maps have remarks, such as {remarks[0]}")
-    return tuple(mazes)
+    return tuple(read_located(file, None, options).maze for file in _map_files(path))
 
 
 def read_located(path: pathlib.Path, size: int | None, options: ReadOptions) -> LocatedMaze:
     """Reads the maze in one file, as `read_maze` does, and its place in the frame of a ROS map."""
     suffix = path.suffix.lower()
+    if suffix in _CONVERTED:
+        raise InputError(f"{path}: expected a map ({' '.join(SUFFIXES)}), found {suffix}; {_CONVERTED[suffix]}")
     if suffix in IMAGE_SUFFIXES and (ros_map := map_of_picture(path)) is not None:
         raise InputError(f"{path}: expected a maze, found the picture of a ROS map; give {ros_map}")
     if suffix in ROS_SUFFIXES:
@@ -118,7 +125,13 @@ def _map_files(folder: pathlib.Path) -> list[pathlib.Path]:
     pictures: set[pathlib.Path] = set()  # of ROS maps
     for file in sorted(files, key=lambda file: (SUFFIXES.index(file.suffix.lower()), file.name)):
         if file.suffix.lower() in ROS_SUFFIXES:
-            pictures.add(picture_of(file))
+            try:
+                pictures.add(picture_of(file))
+            except InputError as error:
+                if not is_other_yaml(file):
+                    raise
+                remark(f"{error}; left out")
+                continue
         if file not in pictures:
             by_stem.setdefault(file.stem, file)
     if not by_stem:

@@ -126,7 +126,7 @@ class Task(TaskFields):
           InputError: if there are no such mazes, or a map can't be read.
         """
         if self.mazes is not None:
-            mazes = read_all(pathlib.Path(self.mazes), self) if isinstance(self.mazes, str) else self.mazes
+            mazes = read_all(pathlib.Path(self.mazes).expanduser(), self) if isinstance(self.mazes, str) else self.mazes
             for maze in mazes:
                 if self.size not in (0, maze.size):
                     raise InputError(f"expected mazes of size {self.size}, found size {maze.size}")

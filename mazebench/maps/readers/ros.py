@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import math
 import pathlib
+import re
 from typing import Annotated, Any, Literal
 
 import cv2
@@ -140,8 +141,9 @@ def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
     """
     path = pathlib.Path(path)
     metadata = _read_metadata(path)
+    image = _found_picture(path, metadata.image)
     try:
-        picture = read_picture(path.parent / metadata.image)
+        picture = read_picture(image)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     states = _states(picture, metadata)
@@ -149,6 +151,8 @@ def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
     # The departure from map_server.
     is_unknown = _saved_as_unknown(picture)
     changes = []
+    if image != path.parent / pathlib.Path(metadata.image.removeprefix("file://")).expanduser():
+        changes.append(f"picture {metadata.image} not there; {image.name} beside the file read instead")
     if metadata.mode == "trinary" and (states[is_unknown] == FREE).any():
         states[is_unknown] = UNKNOWN
         changes.append(
@@ -165,13 +169,29 @@ def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
 
 
 def picture_of(path: str | pathlib.Path) -> pathlib.Path:
-    """Returns the path of the picture that a YAML file names.
+    """Returns the path of the picture that a YAML file names; of its name beside the file if it is not there.
 
     Raises:
       InputError: if the file can't be read.
     """
     path = pathlib.Path(path)
-    return path.parent / _read_metadata(path).image
+    return _found_picture(path, _read_metadata(path).image)
+
+
+def _found_picture(path: pathlib.Path, image: str) -> pathlib.Path:
+    """Returns the path of the picture that the YAML file `path` calls `image`: a path, or a file's or package's URL."""
+    named = path.parent / pathlib.Path(image.removeprefix("file://")).expanduser()
+    beside = path.parent / re.split(r"[/\\]", image)[-1]
+    return beside if beside.is_file() and not named.is_file() else named
+
+
+def is_other_yaml(path: pathlib.Path) -> bool:
+    """Returns whether a YAML file is none of a map: parameters, say, which name neither picture nor resolution."""
+    try:
+        content = yaml.safe_load(read_at_most(path, _MAX_BYTES, "map"))
+    except (yaml.YAMLError, ValueError, InputError):
+        return False
+    return not isinstance(content, dict) or not {"image", "resolution"} & set(content)
 
 
 def map_of_picture(path: pathlib.Path) -> pathlib.Path | None:
@@ -234,15 +254,14 @@ def _states(picture: np.ndarray, metadata: _Metadata) -> np.ndarray:
     # [H, W, C], and where the picture is opaque.
     channels = picture if picture.ndim == 3 else picture[..., None]
     opaque = channels[..., 3] == 255 if channels.shape[2] == 4 else None
-    if opaque is not None and metadata.mode != "trinary":  # where the opacity counts as a fourth shade
-        channels = channels[..., :3]
+    channels = channels[..., :3]
 
-    # The shade of a pixel is the mean of its channels; states are looked up by their sum.
+    # The shade of a pixel is the mean of its colours; states are looked up by their sum.
     num_channels = channels.shape[2]
     sums = channels.sum(axis=2, dtype=np.uint16)
     shades = np.arange(255 * num_channels + 1) / (255 * num_channels)
     states = _state_of_shades(shades, metadata)[sums]
-    if opaque is not None and metadata.mode == "scale":
+    if opaque is not None and metadata.mode != "raw":
         states[~opaque] = UNKNOWN
     return states
 
@@ -264,6 +283,6 @@ def _state_of_shades(shades: np.ndarray, metadata: _Metadata) -> np.ndarray:
         percent = np.round(255 * shades)
         occupied = np.where(percent <= OCCUPIED, percent / OCCUPIED, np.nan)
     states = np.full(shades.shape, UNKNOWN, dtype=np.int8)
-    states[occupied < metadata.free_thresh] = FREE
-    states[occupied > metadata.occupied_thresh] = OCCUPIED
+    states[occupied <= metadata.free_thresh] = FREE
+    states[occupied >= metadata.occupied_thresh] = OCCUPIED
     return states
