@@ -99,6 +99,13 @@ class TestThresholds:
         assert read_occupancy(path).states[:, 0].tolist() == [100, 0, -1, 0, 100]
 
 
+def test_wall_around_an_open_border_and_the_shift_are_said(tmp_path, remarks):
+    path = write_map(tmp_path, drawn("....... .#...#. ....... .#...#. ....... .#...#. ......."), resolution=0.5)
+    assert read_maze(path, cell_size=0.5).size == 9
+    (line,) = remarks()
+    assert line.startswith("map: wall added around an open border; the maze's lower left corner is (-0.5, -0.5) m on")
+
+
 class TestPicture:
     @pytest.mark.parametrize("image", ["file://{folder}/map.pgm", "/home/somebody/maps/map.pgm", "C:\\maps\\map.pgm"])
     def test_a_picture_is_found_by_its_path_or_beside_the_file(self, tmp_path, image):
@@ -198,7 +205,7 @@ class TestMaze:
     def test_what_was_closed_padded_and_moved_is_said(self, tmp_path, remarks):
         read_maze(write_map(tmp_path, drawn("...#. ...#. ####."), origin=[-3.0, 2.0, 0.0]))
         assert remarks() == [
-            "map: 3 of 9 free cells (33 %) closed that can't be reached from the others; "
+            "map: 3 of 9 free cells (33 %) closed that can't be reached from the others; wall added around an open border; "
             "4 x 6 cells padded with wall to 6 x 6; "
             "the maze's lower left corner is (-4, 0) m on the map, so its point (x, y) is (x + 4, y) m in the maze",
         ]

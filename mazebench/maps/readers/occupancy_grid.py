@@ -74,7 +74,8 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
     # The largest area of free cells, closed all around.
     walls = largest_area(cells)
     num_free, num_closed = int((~cells).sum()), int(walls.sum() - cells.sum())
-    row, column, walls = _close_border(walls)
+    area = walls
+    row, column, walls = _close_border(area)
     maze = Maze(_checked_size(pad_to_square(walls), cell_size, name), name, cell_size)
 
     # Where the maze lies, in pixels from the left and from the lower edge of the map.
@@ -99,6 +100,10 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
         changes.append(f"{part} closed that can't be reached from the others")
         if share > _MANY_CLOSED:
             hints.extend(_reasons_to_close(states, pixels, grid.resolution, options))
+    if min(row, column) < 0 or max(np.subtract(walls.shape, area.shape)) > 0:
+        changes.append("wall added around an open border")
+    elif not changes and (from_left, from_below) != (0, 0):
+        changes.append("a margin without free cells cut off")
     if walls.shape != maze.walls.shape:
         changes.append(f"{walls.shape[0]} x {walls.shape[1]} cells padded with wall to {maze.size} x {maze.size}")
     if changes:
