@@ -205,8 +205,8 @@ class TestMaze:
     def test_what_was_closed_padded_and_moved_is_said(self, tmp_path, remarks):
         read_maze(write_map(tmp_path, drawn("...#. ...#. ####."), origin=[-3.0, 2.0, 0.0]))
         assert remarks() == [
-            "map: 3 of 9 free cells (33 %) closed that can't be reached from the others; wall added around an open border; "
-            "4 x 6 cells padded with wall to 6 x 6; "
+            "map: 3 of 9 free cells (33 %) closed that can't be reached from the others; "
+            "wall added around an open border; 4 x 6 cells padded with wall to 6 x 6; "
             "the maze's lower left corner is (-4, 0) m on the map, so its point (x, y) is (x + 4, y) m in the maze",
         ]
 
