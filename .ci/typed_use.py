@@ -49,7 +49,7 @@ def right_use() -> None:
     agent: Agent = Forward()
     check_agent(Forward)
     check_agent(Backward)
-    summary = mazebench.evaluate("planner", pathlib.Path("results"), size=13, map_flip=0.1)
+    summary = mazebench.evaluate("planner", out=pathlib.Path("results"), size=13, map_flip=0.1)
     rate: float = summary.overall.success_rate
     print(success, position, observations["state"], infos, agent, rate)
     gymnasium.make("mazebench/Local-13-v1")
@@ -57,10 +57,11 @@ def right_use() -> None:
 
 def wrong_use() -> None:
     mazebench.load("local", size="13")  # type: ignore[arg-type]
-    mazebench.TaskSpec(mazes=(), flip=0.1)  # type: ignore[call-arg]
+    mazebench.Task.of(flip=0.1)  # type: ignore[call-arg]
+    mazebench.make_vec("local", 4, num_goals="3")  # type: ignore[arg-type]
     mazebench.generate("dfs", 15)  # type: ignore[call-arg]
     print(mazebench.make_vec("local", 4).task_spec.sise)  # type: ignore[attr-defined]
     print(mazebench.nothing)  # type: ignore[attr-defined]
-    EvalOptions(agent=Forward)  # type: ignore[arg-type]
+    EvalOptions(agent=Forward, task=mazebench.Task.of())  # type: ignore[arg-type]
     print(mazebench.evaluate("planner").overal)  # type: ignore[attr-defined]
     check_agent(Sideways)  # type: ignore[arg-type]
