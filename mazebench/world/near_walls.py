@@ -22,7 +22,7 @@ from mazebench.world.mjcf import BODY_RADIUS, CONTACT_MARGIN, boxes_spec, parked
 # A drive pushes a body to TOP_SPEED ahead. While it turns, it is pushed aside, too. Let v be its speed and c the cosine
 # of the angle between push and motion. v grows only while the push along it, c times at most 34 N, is above the
 # damping, 8 v: v < 4.25 c. The push falls below 34 N at v c = 3.06. So v can't grow beyond the v at which both hold,
-# 3.61 m/s. With two drives at once, as velocities set them, it is 3.642 m/s, over all pairs of them and all angles.
+# 3.61 m/s. With two drives at once, as velocities set them, it is 3.643 m/s, over all pairs of them and all angles.
 _FASTEST = 1.14 * TOP_SPEED
 _REACH = BODY_RADIUS + CONTACT_MARGIN + _FASTEST * STEP_TIME  # m, from the body's centre at the start of an agent step
 _MOST_ENTERED = 10_000  # cells whose boxes are kept, some 1 kB each
@@ -110,9 +110,10 @@ class NearWalls:
             rows, columns = (slice(max(0, at - _AHEAD), at + _AHEAD + 1) for at in (row, column))
             cells = np.argwhere(~self._mazes[maze].walls[rows, columns]) + np.array([rows.start, columns.start])
             near = cells @ (self._size, 1)
-            found = zip(near.tolist(), *self._near(np.full(len(near), slot), near), strict=True)
-            self._entered |= {(maze, each): values for each, *values in found}
-            boxes = self._entered[maze, cell]
+            rows_of = zip(near.tolist(), *self._near(np.full(len(near), slot), near), strict=True)
+            found = {(maze, each): values for each, *values in rows_of}
+            self._entered |= found
+            boxes = found[maze, cell]
         _assign(geoms, 0, *boxes)
 
     def _near(self, slot: np.ndarray, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -147,8 +148,9 @@ class NearWalls:
         box = np.repeat(np.arange(len(boxes)), area)
         within = np.arange(len(box)) - np.repeat(np.cumsum(area) - area, area)
         row, column = top[box] + within // columns[box], left[box] + within % columns[box]
-        self._first[slot] = self._none
-        self._first[slot, (row + self._reach) * self._width + column + self._reach] = first[box]
+        grid = np.full_like(self._first[slot], self._none)
+        grid[(row + self._reach) * self._width + column + self._reach] = first[box]
+        self._first[slot] = grid  # at once, because environments in other threads may read it
         self._shown[slot] = maze
 
 
