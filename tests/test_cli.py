@@ -50,7 +50,7 @@ def bad(tmp_path_factory) -> pathlib.Path:
     """A folder of things that can't be used, and of a small map, good.txt, that can."""
     folder = tmp_path_factory.mktemp("bad")
     (folder / "good.txt").write_text(PLAN)
-    (folder / "open.txt").write_text(PLAN.replace("#.#.#", "#.#.."))
+    (folder / "marked.txt").write_text(PLAN.replace("#.#.#", "#.!.#"))
     (folder / "file").touch()
     (folder / "zip.txt").write_bytes(b"PK\x03\x04" + bytes(100_000))
     (folder / "map.yaml").write_text("image: map.pgm\n")
@@ -83,7 +83,7 @@ BAD_INPUT = [
     ((*RANDOM, "--track", "adrift", "--map-flip", "0.1"), "'adrift': expected no perturbation, found map_flip 0.1"),
     ((*TINY, "--out", "{bad}/file/out"), "file/out: can't write there: Not a directory"),
     ((*TINY, "--out", "{bad}/used"), "expected an empty folder or an evaluation's, found 'thesis.tex' in it"),
-    ((*TINY, "--mazes", "{bad}/open.txt"), "open: expected a closed border, found cell (2, 4) free"),
+    ((*TINY, "--mazes", "{bad}/marked.txt"), "marked: expected '#*1@%' or a block for wall"),
     (("generate", "--kind", "pub"), "unknown kind 'pub'; available: cave, dfs, hospital, house, museum, obstacles, "),
     (("generate", "--mazes", "{bad}/binary.png"), "binary.png: expected a "),
     (("train", "--agent", "mah"), "expected --minutes or --env-steps, found neither"),

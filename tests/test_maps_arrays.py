@@ -25,7 +25,10 @@ class TestWalls:
         maze = maze_from_array(walls, "hall")
         assert (maze.walls[:9] == walls).all()
         assert maze.walls[9:].all()
-        assert remarks() == ["hall: 9 x 15 cells, padded with wall at the bottom to 15 x 15"]
+        assert remarks() == [
+            "hall: 9 x 15 cells padded with wall to 15 x 15; the maze's lower left corner is (0, -6) m on the map, "
+            "so its point (x, y) is (x, y + 6) m in the maze"
+        ]
 
     def test_a_cell_has_the_size_asked_for(self):
         assert maze_from_array(WALLS, cell_size=0.5) == Maze(WALLS, cell_size=0.5)
@@ -34,15 +37,13 @@ class TestWalls:
         ("array", "message"),
         [
             (np.zeros(5), "expected a two-dimensional array of numbers, found shape (5,) float64"),
-            (np.full((5, 5), "#"), "expected a two-dimensional array of numbers, found shape (5, 5) <U1"),
+            (np.full((5, 5), "##"), "expected a two-dimensional array of numbers, found shape (5, 5) <U2"),
             (
                 np.full((5, 5), 0.5),
                 "or occupancy as -1, 0 and 1 or as per cent up to 100, found float64 with the values 0.5",
             ),
             (np.arange(25).reshape(5, 5) * 11, "found int64 with the values 0, 11, 22, 33, 44, 55, ... 264"),
             (WALLS + 2 * np.eye(len(WALLS), dtype=int), "`array == VALUE` says which are walls"),
-            (np.zeros((5, 5)), "expected a closed border, found cell (0, 0) free"),
-            (np.zeros((5, 9)), "expected a closed border, found cell (0, 0) free"),
         ],
     )
     def test_another_array_is_refused(self, array, message):
@@ -69,7 +70,43 @@ class TestOccupancy:
         assert maze_from_array(occupancy, unknown="free") == Maze(walls)
 
 
+class TestOneGrid:
+    """Walls, per cent and characters of one grid are one maze, and get the same lines."""
+
+    def answers(self, walls, remarks):
+        for array in (walls, 100 * walls.astype(int), np.where(walls, "#", ".")):
+            try:
+                yield maze_from_array(array, "m").walls.tolist(), remarks()
+            except MazeError as error:
+                yield str(error)
+
+    def test_an_open_grid_is_closed_and_the_shift_said(self, remarks):
+        walls = WALLS.copy()
+        walls[1, 0] = walls[0, 1] = False
+        first, *others = self.answers(walls, remarks)
+        np.testing.assert_array_equal(np.array(first[0])[1:, 1:], walls)
+        assert first[1][0].startswith("m: wall added along its border; its cell (r, c) is (r + 1, c + 1) in the maze; ")
+        assert others == [first] * 2
+
+    def test_an_inverted_grid_is_asked_about(self, remarks):
+        first, *others = self.answers(~WALLS, remarks)
+        assert "is it inverted?" in first
+        assert others == [first] * 2
+
+    def test_a_grid_without_walls_gets_a_line(self, remarks):
+        first, *others = self.answers(np.zeros((5, 5), dtype=bool), remarks)
+        assert first[1][0].startswith("m: nothing on it is wall; wall added along its border; ")
+        assert [other[0] for other in others] == [first[0]] * 2
+
+
 class TestFile:
+    def test_the_array_of_an_archive_is_read(self, tmp_path):
+        np.savez(tmp_path / "plan.npz", walls=WALLS)
+        assert mazebench.read_maze(tmp_path / "plan.npz") == Maze(WALLS)
+        np.savez(tmp_path / "plan.npz", walls=WALLS, other=WALLS)
+        with pytest.raises(InputError, match=r"with one array, found 2: walls, other; save one as \.npy"):
+            mazebench.read_maze(tmp_path / "plan.npz")
+
     def test_a_pickle_is_refused(self, tmp_path):
         np.save(tmp_path / "plan.npy", np.array([{}]), allow_pickle=True)
         with pytest.raises(InputError, match=r"plan\.npy: expected a \.npy file of numbers, found .*Object arrays"):

@@ -84,6 +84,16 @@ def test_the_text_is_read_where_there_is_a_picture_too(mazes, tmp_path):
     assert read_mazes(tmp_path) == (mazes[0],)
 
 
+def test_what_is_no_map_is_left_out_of_a_folder_with_a_line_and_all_remarks_are_shown(mazes, tmp_path, remarks):
+    (tmp_path / "a.txt").write_text("#####\n#...#\n#####\n")
+    (tmp_path / "b.csv").write_text("1,1,1,1,1\n1,0,2,0,1\n1,1,1,1,1\n".replace("2", "0"))
+    (tmp_path / "params.yaml").write_text("planner: {speed: 1}\n")
+    (tmp_path / "results.csv").write_text("name,steps\noracle,12\n")
+    assert [maze.name for maze in read_mazes(tmp_path)] == ["a", "b"]
+    starts = [f"{tmp_path}/params.yaml: left out", f"{tmp_path}/results.csv: left out", "a: 3 x 5 cells", "b: 3 x 5"]
+    assert all(line.startswith(start) for line, start in zip(remarks(), starts, strict=True))
+
+
 @pytest.mark.parametrize("content", [[], ["notes.md", "maze.xml"]])
 def test_a_folder_without_maps_is_refused(tmp_path, content):
     for name in content:
@@ -94,6 +104,6 @@ def test_a_folder_without_maps_is_refused(tmp_path, content):
 
 def test_a_broken_map_of_a_folder_is_named(mazes, tmp_path):
     write_text_maze(mazes[0], tmp_path / "a.txt")
-    (tmp_path / "b.txt").write_text("#####\n#...#\n#.x.#\n#...#\n#####\n")
-    with pytest.raises(InputError, match=r"^b: expected one of .*, found 'x' at \(2, 2\)$"):
+    (tmp_path / "b.txt").write_text("#####\n#...#\n#.!.#\n#...#\n#####\n")
+    with pytest.raises(InputError, match=r"^b: expected .*, found '!' at \(2, 2\)$"):
         read_mazes(tmp_path)

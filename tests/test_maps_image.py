@@ -17,7 +17,7 @@ from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.maze_files import read_maze
 from mazebench.maps.pictures import draw_maze
-from mazebench.maps.readers.image import maze_from_image, read_image_maze
+from mazebench.maps.readers.image import maze_from_image
 
 SEEDS = st.integers(0, 2**32 - 1)
 FEW = hypothesis.settings(max_examples=100, deadline=None)
@@ -57,7 +57,7 @@ def read_bytes(content: bytes, size: int | None = None) -> Maze:
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder) / "plan.png"
         path.write_bytes(content)
-        return read_image_maze(path, size)
+        return read_maze(path, size)
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +104,7 @@ def test_map_is_read_from_each_format(maze, tmp_path, extension, cell_pixels):
     drawing = draw_maze(maze, cell_pixels)
     path.write_bytes(encode(drawing[..., 0] if extension == ".pgm" else drawing, extension))
     assert read_maze(path) == maze
-    assert read_image_maze(path).name == "plan"
+    assert read_maze(path).name == "plan"
 
 
 def test_map_is_read_when_pixels_are_gray_deep_or_transparent(maze):
@@ -133,7 +133,7 @@ def rectangle(rows: int, columns: int, num_bars: int, rng: np.random.Generator) 
 
 
 def padded(walls: np.ndarray) -> Maze:
-    """The maze that a rectangular plan becomes, worked in another way than `square_maze` does."""
+    """The maze that a rectangular plan becomes, worked in another way than `locate_maze` does."""
     square = np.ones((max(walls.shape),) * 2, dtype=bool)
     square[: walls.shape[0], : walls.shape[1]] = walls
     return Maze(square)
@@ -352,10 +352,10 @@ PICTURE = draw_maze(MAZE)
     ("content", "message"),
     [
         (b"", "a picture, found an empty file$"),
-        (b"#####\n", "a picture, found a file of another kind$"),
+        (b"#####\n", "a picture, found a file of another kind"),
         (b"\x89PNG\r\n\x1a\n", "a picture, found a PNG picture that is damaged$"),
-        (b"%PDF-1.7\n", "a picture, found a PDF$"),
-        (b"PK\x03\x04\x14\0", "a picture, found a ZIP archive$"),
+        (b"%PDF-1.7\n", "a picture, found a PDF; export it as PNG"),
+        (b"PK\x03\x04\x14\0", "a picture, found a ZIP archive; unpack it$"),
         *(
             (encode(PICTURE, extension)[:500], "a picture, found a .* picture that is damaged$")
             for extension in (".png", ".bmp", ".jpg")

@@ -1,13 +1,18 @@
-"""Mazes as text: DeepMind Lab's characters, and what is refused with its position."""
+"""Mazes as text: the package's own, and the forms that others write."""
 
 from __future__ import annotations
+
+import json
 
 import numpy as np
 import pytest
 
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze, MazeError
-from mazebench.maps.text import format_maze, parse_maze, read_text_maze
+from mazebench.maps.maze_files import read_located, read_maze
+from mazebench.maps.maze_options import ReadOptions
+from mazebench.maps.readers.moving_ai import read_scenarios
+from mazebench.maps.text import format_maze, parse_maze
 
 PLAN = """\
 #####
@@ -16,79 +21,131 @@ PLAN = """\
 ##..#
 #####
 """
+MOVING_AI = "type octile\nheight 5\nwidth 5\nmap\n@@TTT\n@.G@@\n@W.@@\n@@S.O\n@@@@@\n"
 
 
-class TestReading:
+def read(tmp_path, content: str | bytes, name: str = "plan.txt") -> Maze:
+    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read_maze(tmp_path / name)
+
+
+def rows(numbers: np.ndarray) -> list[list[int]]:
+    return numbers.astype(int).tolist()
+
+
+class TestOwn:
     def test_a_maze_is_written_as_worked_by_hand(self):
         walls = np.ones((5, 5), dtype=bool)
         walls[[1, 1, 2, 3, 3], [1, 2, 2, 2, 3]] = False
         assert format_maze(Maze(walls)) == PLAN
         np.testing.assert_array_equal(parse_maze(PLAN).walls, walls)
 
+    @pytest.mark.parametrize("text", [PLAN.replace(".", " "), "#####\n#...#\n#####\n", PLAN.replace("#..##", "#..#")])
+    def test_another_text_is_refused(self, text):
+        with pytest.raises(MazeError, match="m: expected as many rows as columns, of '#'"):
+            parse_maze(text, "m")
+
+
+class TestReading:
     @pytest.mark.parametrize(
         "text",
         [
-            PLAN.replace("#", "*").replace(".", " "),  # DeepMind Lab and labmaze
-            PLAN.replace("#", "1").replace(".", "0"),
-            "*****\n*P ##\n##0#1\n##.G*\n1***#\n",
-            PLAN.rstrip("\n"),
-            "\n\n" + PLAN + "\n\n",
+            PLAN,
+            "\n   \n" + PLAN.rstrip("\n"),
             PLAN.replace("\n", "\r\n"),
-            "\r\n" + PLAN.replace("\n", "\r\n").rstrip("\r\n"),
+            PLAN.replace("\n", "\r"),
+            PLAN.replace("##.##", "##.## "),
+            PLAN.replace("#", "*").replace(".", " "),
+            PLAN.replace("#", "@"),
+            PLAN.replace("#", "█").replace(".", " "),
+            "┌───┐\n│  ├┤\n├┐ ├┤\n├┤  │\n└┴──┘\n",
+            PLAN.replace("#", "1").replace(".", "0"),
+            MOVING_AI,
+            MOVING_AI.replace("\n", "\r\n"),
+            PLAN.strip().replace("\n", "\\").replace(".", "O"),  # D4RL
+            "\n".join(" ".join(row) for row in PLAN.split()),
+            "\n".join(",".join(row) for row in PLAN.replace("#", "1").replace(".", "0").split()),
+            "\n".join("\t".join(str(100 * cell) for cell in row) for row in rows(parse_maze(PLAN).walls)),
+            json.dumps(rows(parse_maze(PLAN).walls)),
+            json.dumps(rows(parse_maze(PLAN).walls)).replace("[1, 0, 0", "[1, 'r', 'g'"),  # Gymnasium-Robotics
+            json.dumps(PLAN.split()),
+            str(parse_maze(PLAN).walls.astype(int)),
         ],
     )
-    def test_other_characters_and_line_ends_are_read(self, text):
-        assert parse_maze(text) == parse_maze(PLAN)
+    def test_a_form_that_people_write_is_the_same_maze(self, text, tmp_path):
+        assert read(tmp_path, text) == parse_maze(PLAN)
 
-    @pytest.mark.parametrize("encoding", ["ascii", "utf-8-sig", "utf-16"])
+    @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
     def test_a_byte_order_mark_is_no_error(self, encoding, tmp_path):
-        (tmp_path / "plan.txt").write_bytes(PLAN.encode(encoding))
-        assert read_text_maze(tmp_path / "plan.txt") == parse_maze(PLAN)
+        assert read(tmp_path, PLAN.encode(encoding)) == parse_maze(PLAN)
 
+    def test_letters_are_free_and_missing_ends_of_rows_wall_as_in_deepmind_lab(self, tmp_path, remarks):
+        assert read(tmp_path, "*****\n*PA*\n**H*\n**.G*\n*****\n\n") == parse_maze(PLAN)
+        assert remarks()[0].startswith("plan: A, H read as free; short rows filled with wall; ")
 
-class TestRectangle:
-    @pytest.mark.parametrize(
-        ("text", "padded", "line"),
-        [
-            (
-                "######\n#....#\n######\n",
-                "######\n#....#\n######\n######\n######\n######\n",
-                "m: 3 x 6 cells, padded with wall at the bottom to 6 x 6",
-            ),
-            (
-                "###\n#.#\n#.#\n#.#\n###\n",
-                "#####\n#.###\n#.###\n#.###\n#####\n",
-                "m: 5 x 3 cells, padded with wall on the right to 5 x 5",
-            ),
-        ],
-    )
-    def test_a_text_is_padded_with_wall_to_a_square_and_one_line_says_so(self, text, padded, line, remarks):
-        assert format_maze(parse_maze(text, "m")) == padded
-        assert remarks() == [line]
+    @pytest.mark.parametrize(("post", "gap"), [("o", 3), ("+", 3), ("+", 2)])
+    def test_walls_between_posts_are_cells(self, post, gap, tmp_path):
+        line, blank = "-" * gap, " " * gap
+        text = (
+            f"{post}{line}{post}{line}{post}\n|{blank} {blank}|\n{post}{line}{post}{blank}{post}\n|{blank}|{blank}|\n"
+        )
+        expected = "#####\n#...#\n###.#\n#.#.#\n#####\n".replace("#.#.#", "###.#")
+        text = text.replace(f"|{blank}|{blank}|", f"|{line}|{blank}|") + f"{post}{line}{post}{line}{post}\n"
+        assert read(tmp_path, text) == parse_maze(expected)
+
+    def test_a_house_is_the_floor_within_its_outline(self, tmp_path):
+        corners = [[1, 1], [5, 1], [5, 3], [3, 3], [3, 5], [1, 5]]
+        house = {"id": "a", "verts": corners, "room_category": {"Kitchen": [[1, 1, 3, 3]]}}
+        (tmp_path / "house.json").write_text(json.dumps(house))
+        maze, (x, y, _) = read_located(tmp_path / "house.json", None, ReadOptions(cell_size=0.5))
+        for point, is_free in {(2, 2): True, (4, 2): True, (2, 4): True, (4, 4): False}.items():
+            assert maze.is_free(maze.cell_at(point[0] - x, point[1] - y)) == is_free
 
 
 class TestRefusal:
     @pytest.mark.parametrize(
-        ("text", "message"),
+        ("content", "message"),
         [
-            ("#####\n#..x#\n", r"^m: expected one of '#\*1' \(wall\) or '\. 0PG' \(free\), found 'x' at \(1, 3\)$"),
-            (PLAN.replace(".", "·"), r"found '·' at \(1, 1\)$"),
-            ("#####\n#..##\n####\n", r"^m: expected rows of 5 cells like the first, found 4 in row 2$"),
-            ("#..#\n####\n####\n", r"^m: expected a closed border, found cell \(0, 1\) free$"),
-            ("####\n#..#\n####\n", r"^m: expected 5 to 1024 cells a side, found 4$"),
-            (PLAN.replace("#..##", "...##"), r"^m: expected a closed border, found cell \(1, 0\) free$"),
+            ("#####\n#.!.#\n#####\n", r"^plan: expected '#\*1@%' or a block for wall.*, found '!' at \(1, 2\)$"),
+            ("# my office\n" + PLAN, r"^plan: expected rows of cells, found the word 'office' in row 0"),
+            ("XXX\nXoX\nXXX\n", "found only X o$"),
+            ("11111\n10231\n11111\n", "found int64 with the values 0, 1, 2, 3"),
+            ("0.5,0.5,0.5\n0.1,0.2,0.3\n", "found float64 with the values 0.1, 0.2, 0.3, 0.5"),
+            (PLAN + "\n" + PLAN, "expected one maze, found 2 with blank lines between"),
+            (MOVING_AI.replace("height 5", "height 6"), "expected a MovingAI map of 6 rows of 5 cells"),
+            ('{"rooms": []}', "expected the JSON of a HouseExpo house"),
+            ("####\n#..#\n####\n", r"^plan: expected 5 to \d+ cells a side, found 4$"),
+            (b"\xff\xff\xff", "found byte 0xff at 0; text, pictures such as PNG"),
+            (b"AB\0", "found byte 0x00 at 2; text, pictures such as PNG"),
+            (b"\0\0\0 ftypheic", r"plan\.txt: expected a text map, found a HEIC picture; convert it to PNG$"),
+            (b"%PDF-1.7\n", "found a PDF; export it as PNG and give its scale by --pixel-size$"),
+            (b"  0\nSECTION\n", "found a DXF drawing; export"),
+            (b"", "found an empty file$"),
         ],
     )
-    def test_an_illegal_text_is_refused(self, text, message):
+    def test_what_is_not_read_is_named(self, content, message, tmp_path):
         with pytest.raises(MazeError, match=message):
-            parse_maze(text, "m")
+            read(tmp_path, content)
 
     def test_a_missing_file_is_named(self, tmp_path):
-        with pytest.raises(InputError, match=r"none\.txt: can't read the map: No such file or directory$"):
-            read_text_maze(tmp_path / "none.txt")
+        with pytest.raises(InputError, match=r"none\.txt: can't read the text map: No such file or directory$"):
+            read_maze(tmp_path / "none.txt")
 
-    def test_a_file_that_is_not_ascii_is_named(self, tmp_path):
-        path = tmp_path / "utf8.txt"
-        path.write_bytes(PLAN.replace(".", "·").encode("utf-8"))
-        with pytest.raises(MazeError, match=r"utf8\.txt: expected a text map, found byte 0xc2 at 7$"):
-            read_text_maze(path)
+
+class TestScenarios:
+    def test_ends_are_cells_of_the_maze_with_its_own_distances(self, tmp_path, remarks):
+        (tmp_path / "m.map").write_text("type octile\nheight 3\nwidth 4\nmap\n...@\n.@..\n...@\n")
+        lines = ["version 1", "0 m.map 4 3 0 0 2 2 4.0", "0 m.map 4 3 2 0 2 1 2.0", "0 m.map 4 3 0 0 1 1 1.4"]
+        (tmp_path / "m.scen").write_text("\n".join(lines) + "\n")
+        located = read_located(tmp_path / "m.map", None, ReadOptions(cell_size=2.0))
+        remarks()
+        scenarios = read_scenarios(tmp_path / "m.scen", located)
+        assert scenarios.starts.tolist() == [[1, 1], [1, 3]]
+        assert scenarios.goals.tolist() == [[3, 3], [2, 3]]
+        assert scenarios.distances.tolist() == [4, 1]
+        assert scenarios.octile_lengths.tolist() == [4.0, 2.0]
+        assert "1 of 3 scenarios left out" in remarks()[0]
+        with pytest.raises(
+            InputError, match="expected scenarios of MovingAI, which begin with 'version 1', found 'type"
+        ):
+            read_scenarios(tmp_path / "m.map", located)

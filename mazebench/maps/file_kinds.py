@@ -1,27 +1,45 @@
-"""Names of the kinds of files that are handed in as maps, for errors."""
+"""Names of the kinds of files that are handed in as maps, and what to do with those that are not read."""
 
 from __future__ import annotations
 
-_STARTS = {
-    b"\x89PNG": "a PNG picture",
-    b"\xff\xd8\xff": "a JPEG picture",
-    b"BM": "a BMP picture",
-    b"GIF8": "a GIF picture",
-    b"II*\0": "a TIFF picture",
-    b"MM\0*": "a TIFF picture",
-    b"RIFF": "a WebP picture",
-    b"P2": "a PGM picture",
-    b"P5": "a PGM picture",
-    b"P6": "a PPM picture",
-    b"\x93NUMPY": "a NumPy array",
-    b"%PDF": "a PDF",
-    b"PK\x03\x04": "a ZIP archive",
-    b"\x1f\x8b": "a gzip archive",
-    b"<svg": "an SVG drawing",
-    b"<?xml": "XML",
-    b"<mujoco": "an MJCF model",
-    b"glTF": "a glTF mesh",
-    b"image:": "the yaml of a ROS map",
+_PICTURE = "convert it to PNG"
+_DRAWING = "export it as PNG and give its scale by --pixel-size"
+_UNPACK = "unpack it"
+_READ = "text, pictures such as PNG, arrays (.npy) and ROS maps (.yaml) are read"
+# By the first bytes: the name, and what to do with a file that is not read.
+_KINDS = {
+    b"\x89PNG": ("a PNG picture", ""),
+    b"\xff\xd8\xff": ("a JPEG picture", ""),
+    b"BM": ("a BMP picture", ""),
+    b"GIF8": ("a GIF picture", ""),
+    b"II*\0": ("a TIFF picture", ""),
+    b"MM\0*": ("a TIFF picture", ""),
+    b"RIFF": ("a WebP picture", ""),
+    b"P2": ("a PGM picture", ""),
+    b"P5": ("a PGM picture", ""),
+    b"P6": ("a PPM picture", ""),
+    b"\x93NUMPY": ("a NumPy array", ""),
+    b"image:": ("the yaml of a ROS map", ""),
+    b"8BPS": ("a Photoshop picture", _PICTURE),
+    b"gimp xcf": ("a GIMP picture", _PICTURE),
+    b"%PDF": ("a PDF", _DRAWING),
+    b"<svg": ("an SVG drawing", _DRAWING),
+    b"AC10": ("a DWG drawing", _DRAWING),
+    b"PK\x03\x04": ("a ZIP archive", _UNPACK),
+    b"\x1f\x8b": ("a gzip archive", _UNPACK),
+    b"<?xml": ("XML", _READ),
+    b"<mujoco": ("an MJCF model", "give the map it was made from"),
+    b"glTF": ("a glTF mesh", "give the map it was made from"),
+    b"version 1": ("scenarios of MovingAI", "give the .map; mazebench.maps.readers.moving_ai reads scenarios"),
+}
+# By bytes further on.
+_CONTAINED = {
+    b"ftypavif": ("an AVIF picture", _PICTURE),
+    b"ftyphe": ("a HEIC picture", _PICTURE),
+    b"ftypmif1": ("a HEIC picture", _PICTURE),
+    b"<svg": ("an SVG drawing", _DRAWING),
+    b"\nSECTION": ("a DXF drawing", _DRAWING),
+    b"\r\nSECTION": ("a DXF drawing", _DRAWING),
 }
 
 
@@ -29,4 +47,12 @@ def kind_of(content: bytes) -> str | None:
     """Returns what a file is by its first bytes, in words, such as "a PDF"; None if they are of no known kind."""
     if not content:
         return "an empty file"
-    return next((kind for start, kind in _STARTS.items() if content.startswith(start)), None)
+    head = content[:1000].lstrip(b"\xef\xbb\xbf \t\r\n")
+    contained = (kind for part, (kind, _) in _CONTAINED.items() if part in content[:1000])
+    return next(contained, next((kind for start, (kind, _) in _KINDS.items() if head.startswith(start)), None))
+
+
+def way_out(kind: str | None) -> str:
+    """Returns what to do with a file of a kind that is never read, to be set after its name; empty for other kinds."""
+    ways = [way for name, way in (*_KINDS.values(), *_CONTAINED.values(), (None, _READ)) if name == kind and way]
+    return f"; {ways[0]}" if ways else ""

@@ -8,35 +8,30 @@ from typing import Any
 import numpy as np
 
 from mazebench.errors import InputError, remark
-from mazebench.maps.maze import Maze, resized
+from mazebench.maps.maze import Maze
 from mazebench.maps.maze_options import ReadOptions
-from mazebench.maps.readers.arrays import read_array_maze
-from mazebench.maps.readers.image import read_image_maze
-from mazebench.maps.readers.occupancy_grid import LocatedMaze
+from mazebench.maps.readers.arrays import read_array_file
+from mazebench.maps.readers.image import read_plan_image
+from mazebench.maps.readers.occupancy_grid import FREE, LocatedMaze, OccupancyGrid, locate_maze
 from mazebench.maps.readers.ros import (
     ROS_SUFFIXES,
-    is_other_yaml,
-    locate_floor_plan,
-    locate_ros_maze,
+    is_map,
     map_of_picture,
     picture_of,
+    read_floor_plan,
+    read_occupancy,
 )
-from mazebench.maps.text import read_text_maze
+from mazebench.maps.readers.text_map import read_text
 
 IMAGE_SUFFIXES = (
     *(".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".pbm", ".pnm"),
     *(".tif", ".tiff", ".webp", ".gif"),
 )
-TEXT_SUFFIXES = (".txt", ".map")
-ARRAY_SUFFIXES = (".npy",)
+_TABLE_SUFFIXES = (".csv", ".json")  # of files that may be something else
+TEXT_SUFFIXES = (".txt", ".map", *_TABLE_SUFFIXES)
+ARRAY_SUFFIXES = (".npy", ".npz")
 # In the order in which they are read if a folder holds one map in several: those come first that say the cells' size.
 SUFFIXES = (*ROS_SUFFIXES, *TEXT_SUFFIXES, *ARRAY_SUFFIXES, *IMAGE_SUFFIXES)
-# What is recognised and not read, and the way out.
-_AS_PICTURE, _AS_TEXT = "save it as a PNG", "save it as a text map or as .npy"
-_CONVERTED = {
-    **dict.fromkeys((".avif", ".heic", ".heif", ".svg", ".pdf", ".dxf", ".dwg"), _AS_PICTURE),
-    **dict.fromkeys((".npz", ".csv", ".tsv", ".json", ".mat"), _AS_TEXT),
-}
 # Of a floor plan that is read as a picture of cells: cells a side, and the free share of them. Mazes have more walls.
 _MANY_CELLS, _MOSTLY_FREE = 100, 0.8
 
@@ -52,7 +47,7 @@ def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any)
     Raises:
       InputError: if the file can't be read or holds no legal maze.
     """
-    return read_located(pathlib.Path(path).expanduser(), size, ReadOptions(**options)).maze
+    return read_located(pathlib.Path(path), size, ReadOptions(**options)).maze
 
 
 def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
@@ -68,49 +63,50 @@ def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
     Raises:
       InputError: if there is no map or one can't be read.
     """
-    return read_all(pathlib.Path(path).expanduser(), ReadOptions(**options))
+    return read_all(pathlib.Path(path), ReadOptions(**options))
 
 
 def read_all(path: pathlib.Path, options: ReadOptions) -> tuple[Maze, ...]:
     """Reads the maze in a file, or those in a folder, as `read_mazes` does."""
-    if not path.is_dir():
-        return (read_located(path, None, options).maze,)
-    return tuple(read_located(file, None, options).maze for file in _map_files(path))
+    path = path.expanduser()
+    files = _map_files(path) if path.is_dir() else [path]
+    return tuple(read_located(file, None, options).maze for file in files)
 
 
 def read_located(path: pathlib.Path, size: int | None, options: ReadOptions) -> LocatedMaze:
-    """Reads the maze in one file, as `read_maze` does, and its place in the frame of a ROS map."""
-    suffix = path.suffix.lower()
-    if suffix in _CONVERTED:
-        raise InputError(f"{path}: expected a map ({' '.join(SUFFIXES)}), found {suffix}; {_CONVERTED[suffix]}")
-    if suffix in IMAGE_SUFFIXES and (ros_map := map_of_picture(path)) is not None:
-        raise InputError(f"{path}: expected a maze, found the picture of a ROS map; give {ros_map}")
-    if suffix in ROS_SUFFIXES:
-        located = locate_ros_maze(path, options)
-    elif suffix in ARRAY_SUFFIXES:
-        located = LocatedMaze(read_array_maze(path, options))
-    elif suffix not in IMAGE_SUFFIXES:
-        located = LocatedMaze(resized(read_text_maze(path), options.cell_size))
-    elif options.pixel_size is not None:
-        located = locate_floor_plan(path, options.pixel_size, options)
-    else:
-        maze = read_image_maze(path, size, options.walls)
-        if not options.cell_size:
-            _remark_on_thin_walls(maze)
-        located = LocatedMaze(resized(maze, options.cell_size))
+    """Reads the maze in one file, as `read_maze` does, and its place in the frame of the map."""
+    path = path.expanduser()
+    located = locate_maze(_read_grid(path, size, options), options, path.stem)
     if size not in (None, located.maze.size):
         raise InputError(f"{path}: expected a maze of size {size}, found size {located.maze.size}")
     return located
 
 
-def _remark_on_thin_walls(maze: Maze) -> None:
+def _read_grid(path: pathlib.Path, size: int | None, options: ReadOptions) -> OccupancyGrid:
+    suffix = path.suffix.lower()
+    if suffix in ROS_SUFFIXES:
+        return read_occupancy(path)
+    if suffix in ARRAY_SUFFIXES:
+        return read_array_file(path)
+    if suffix not in IMAGE_SUFFIXES:
+        return read_text(path)
+    if (ros_map := map_of_picture(path)) is not None:
+        raise InputError(f"{path}: expected a maze, found the picture of a ROS map; give {ros_map}")
+    if options.pixel_size is not None:
+        return read_floor_plan(path, options.pixel_size)
+    grid = read_plan_image(path, size, options.walls)
+    if not options.cell_size:
+        _remark_on_thin_walls(grid.states == FREE, path.stem)
+    return grid
+
+
+def _remark_on_thin_walls(free: np.ndarray, name: str) -> None:
     """Says how large a maze is if its picture may be a floor plan in which each wall is as wide as a cell."""
-    free = ~maze.walls
     inside = free[np.ix_(free.any(axis=1), free.any(axis=0))]
     rows, columns = np.add(inside.shape, 2)  # with the outer walls
     if max(rows, columns) > _MANY_CELLS and inside.mean() > _MOSTLY_FREE:
         remark(
-            f"{maze.name}: read as {columns} m wide and {rows} m high, with a cell of 1 m for the width of a wall; "
+            f"{name}: read as {columns} m wide and {rows} m high, with a cell of 1 m for the width of a wall; "
             "if it is a floor plan, --pixel-size sets its scale"
         )
 
@@ -125,12 +121,15 @@ def _map_files(folder: pathlib.Path) -> list[pathlib.Path]:
     pictures: set[pathlib.Path] = set()  # of ROS maps
     for file in sorted(files, key=lambda file: (SUFFIXES.index(file.suffix.lower()), file.name)):
         if file.suffix.lower() in ROS_SUFFIXES:
+            if not is_map(file):
+                remark(f"{file}: left out, as it names no image and so is no map")
+                continue
+            pictures.add(picture_of(file))
+        if file.suffix.lower() in _TABLE_SUFFIXES:
             try:
-                pictures.add(picture_of(file))
+                read_text(file)
             except InputError as error:
-                if not is_other_yaml(file):
-                    raise
-                remark(f"{error}; left out")
+                remark(f"{file}: left out, as it is no map: {error}")
                 continue
         if file not in pictures:
             by_stem.setdefault(file.stem, file)

@@ -50,6 +50,13 @@ class ReadOptions:
             "body's radius."
         ),
     ] = 0.0
+    area: Annotated[
+        str | None,
+        Doc(
+            "The building, if a map has several separate free areas: a cell row,column or a point 1.5m,2.5m (x, y) of "
+            "the maze that lies in it. If not given, the largest area, or an enclosed one if that is the ground around."
+        ),
+    ] = None
 
 
 THIN_WALLS = "a floor plan with thin walls needs --pixel-size, its metres a pixel"  # of plans that can't be read

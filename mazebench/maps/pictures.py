@@ -49,6 +49,16 @@ def draw_maze(
     return draw_grid(maze.walls, cell_pixels, start, goal, None if path is None else np.asarray(path) / maze.cell_size)
 
 
+def draw_plan(maze: Maze, cell_pixels: int) -> np.ndarray:
+    """Draws `maze` as `draw_maze` does, without the padding that makes a long building square: `[H, W, 3]` uint8 RGB.
+
+    The picture has all rows and columns up to the last wall behind a free cell, along the axis that has fewer of them.
+    """
+    height, width = maze.free_cells.max(axis=0) + 2
+    image = draw_maze(maze, cell_pixels)
+    return image[: height * cell_pixels] if height <= width else image[:, : width * cell_pixels]
+
+
 def draw_grid(
     walls: np.ndarray,
     cell_pixels: int,

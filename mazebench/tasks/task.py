@@ -126,7 +126,11 @@ class Task(TaskFields):
           InputError: if there are no such mazes, or a map can't be read.
         """
         if self.mazes is not None:
-            mazes = read_all(pathlib.Path(self.mazes).expanduser(), self) if isinstance(self.mazes, str) else self.mazes
+            mazes = self.mazes
+            if isinstance(mazes, str):  # start and goal choose the area, unless it is given
+                reading = {name: getattr(self, name) for name in fields_of(ReadOptions)}
+                reading["area"] = self.area or self.start or self.goal
+                mazes = read_all(pathlib.Path(mazes), ReadOptions(**reading))
             for maze in mazes:
                 if self.size not in (0, maze.size):
                     raise InputError(f"expected mazes of size {self.size}, found size {maze.size}")

@@ -47,6 +47,7 @@ class TaskOptions(TypedDict, total=False):
     pixel_size: float | None
     unknown: str
     inflate: float
+    area: str | None
     track: str | None
     level: int | Sequence[int]
     distances: int | Sequence[int]

@@ -14,7 +14,7 @@ from mazebench.maps.kinds import generate
 from mazebench.maps.maze import resized
 from mazebench.maps.maze_files import read_located
 from mazebench.maps.maze_options import ReadOptions
-from mazebench.maps.pictures import draw_maze, write_image
+from mazebench.maps.pictures import draw_plan, write_image
 from mazebench.maps.readers.occupancy_grid import LocatedMaze
 from mazebench.maps.readers.ros import write_ros_map
 from mazebench.maps.text import write_text_maze
@@ -89,7 +89,7 @@ _FORMATS: dict[str, _Format] = {
     "mjcf": _Format(("xml",), write_mjcf),
     "mjcf-textured": _Format(("textured.xml",), functools.partial(write_mjcf, textures=True)),
     "png": _Format(
-        ("png",), lambda maze, path: write_image(draw_maze(maze, max(1, _PICTURE_PIXELS // maze.size)), path)
+        ("png",), lambda maze, path: write_image(draw_plan(maze, max(1, _PICTURE_PIXELS // maze.size)), path)
     ),
     _ROS: _Format(("yaml", "pgm"), write_ros_map),  # which also takes the frame of the map
     **{name: _Format((name,), write_mesh) for name in MESH_FORMATS},

@@ -11,13 +11,14 @@ import re
 import cv2
 import numpy as np
 
-from mazebench.errors import InputError, held_remarks
-from mazebench.maps.file_kinds import kind_of
-from mazebench.maps.grids import square_maze
-from mazebench.maps.maze import MAX_CHOSEN_SIZE, MIN_SIZE, Maze, MazeError
+from mazebench.errors import InputError
+from mazebench.maps.file_kinds import kind_of, way_out
+from mazebench.maps.maze import MAX_CHOSEN_SIZE, MIN_SIZE, Maze, MazeError, require_closed_border, require_connected
+from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.pictures import MAX_SIDE
 from mazebench.maps.readers.filled_plan import MIN_SIDE, read_plan
 from mazebench.maps.readers.line_drawing import read_lines
+from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, OccupancyGrid, locate_maze
 from mazebench.storage.files import read_at_most
 
 _MAX_BYTES = 2**27  # of a picture's file; _MAX_PIXELS gray pixels take half of it
@@ -32,15 +33,14 @@ _MAX_MARK_SHARE = 0.15  # of the picture, and of its dark pixels; if more are co
 _MAX_MAP_SHADES = 8  # of a map of one pixel a cell: walls, floor, marks; a scan has more
 
 
-def read_image_maze(path: str | pathlib.Path, size: int | None = None, walls: str = "filled") -> Maze:
-    """Reads the maze in a picture, as `maze_from_image` does, and names it after the file.
+def read_plan_image(path: pathlib.Path, size: int | None, walls: str) -> OccupancyGrid:
+    """Reads the cells in a picture, as `maze_from_image` does.
 
     Raises:
       InputError: if the file can't be read, or `size` is out of range.
       MazeError: if the file is not a picture that `read_picture` reads, or shows no legal maze.
     """
-    path = pathlib.Path(path)
-    return maze_from_image(read_picture(path), size, path.stem, walls)
+    return _grid_of_image(read_picture(path), size, path.stem, walls)
 
 
 def read_picture(path: str | pathlib.Path) -> np.ndarray:
@@ -54,7 +54,8 @@ def read_picture(path: str | pathlib.Path) -> np.ndarray:
     image = _decode(content)
     if image is None:
         kind = kind_of(content) or "a file of another kind"
-        raise MazeError(f"{path}: expected a picture, found {kind}{' that is damaged' * kind.endswith('picture')}")
+        is_damaged = kind.endswith("picture") and not way_out(kind)
+        raise MazeError(f"{path}: expected a picture, found {kind}{' that is damaged' * is_damaged}{way_out(kind)}")
     if image.shape[0] * image.shape[1] > _MAX_PIXELS:
         raise MazeError(f"{path}: expected at most {_MAX_PIXELS} pixels, found {image.shape[1]} x {image.shape[0]}")
     return image
@@ -64,7 +65,7 @@ def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maz
     """Reads the maze in a picture of a floor plan; dark is wall, light or transparent is floor.
 
     Two kinds of plan can be read. In both, walls are filled and at least as thick as a cell. A plan of R x C cells that
-    is not square is padded with wall, see `square_maze`. Marks in colour on a plan with gray walls are floor.
+    is not square is padded with wall, see `locate_maze`. Marks in colour on a plan with gray walls are floor.
 
     * A pixel map, in which each cell is a block of k x k pixels, k >= 1. It is read exactly.
     * A drawn, printed or scanned plan, on paper or cut out along its outer walls. The outer walls must form a closed,
@@ -84,19 +85,30 @@ def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maz
       MazeError: if no legal maze is found. Nothing is repaired, except that the outer cells of a plan on paper are
         always walls.
     """
+    return locate_maze(_grid_of_image(image, size, name, walls), ReadOptions(), name).maze
+
+
+def _grid_of_image(image: np.ndarray, size: int | None, name: str, walls: str) -> OccupancyGrid:
+    """Returns the cells that a picture shows, of which those that are free are one area within walls."""
     if size is not None and not MIN_SIZE <= size <= MAX_CHOSEN_SIZE:
         raise InputError(f"{name}: expected a size of {MIN_SIZE} to {MAX_CHOSEN_SIZE} cells, found {size}")
     gray = to_gray(image, name)
     if walls == "lines":
-        return square_maze(read_lines(gray, size, name), name)
+        return _grid_of_walls(read_lines(gray, size, name), name)
     try:
-        return square_maze(_read_walls(gray, size, name), name)
+        return _grid_of_walls(_read_walls(gray, size, name), name)
     except MazeError as error:
         if np.mean(gray < 128) < _MIN_DARK or not _is_maze(255 - gray, size, name):
             raise
         raise MazeError(
             f"{name}: expected dark walls on a light ground, found light ones on a dark ground; invert the picture"
         ) from error
+
+
+def _grid_of_walls(walls: np.ndarray, name: str) -> OccupancyGrid:
+    require_closed_border(walls, name)
+    require_connected(walls, name)
+    return OccupancyGrid(np.where(walls, OCCUPIED, FREE).astype(np.int8), is_cells=True)
 
 
 def _scaled_pgm(content: bytes) -> np.ndarray | None:
@@ -170,8 +182,7 @@ def _read_walls(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
 
 def _is_maze(gray: np.ndarray, size: int | None, name: str) -> bool:
     try:
-        with held_remarks():  # of a reading that is only tried
-            square_maze(_read_walls(gray, size, name), name)
+        _grid_of_walls(_read_walls(gray, size, name), name)
     except MazeError:
         return False
     return True

@@ -1,10 +1,12 @@
-"""Occupancy grids, such as maps of ROS, as mazes.
+"""Occupancy grids, which every file is read as, and the maze in one.
 
-`H` and `W` are the numbers of rows and columns of pixels of a grid, `R` and `C` of cells. Row 0 is on top.
+`H` and `W` are the numbers of rows and columns of pixels of a grid, `R` and `C` of cells. Row 0 is on top. In a grid of
+cells, such as a text, each pixel is a cell.
 """
 
 from __future__ import annotations
 
+import bisect
 import dataclasses
 import math
 from collections.abc import Iterator
@@ -15,9 +17,20 @@ import numpy as np
 from scipy import ndimage
 
 from mazebench.errors import InputError, remark
-from mazebench.maps.grids import largest_area, pad_to_square
 from mazebench.maps.maze import MAX_CHOSEN_SIZE, MAX_SIZE, MIN_CELL_SIZE, MIN_SIZE, Maze, MazeError
 from mazebench.maps.maze_options import ReadOptions
+from mazebench.maps.readers.areas import (
+    WORTH_SHIFTING,
+    Area,
+    Cells,
+    areas_of,
+    choose,
+    describe_areas,
+    enclose,
+    free_squares,
+    lay_cells,
+    num_kept,
+)
 
 Pose = tuple[float, float, float]  # x, y (m), yaw (rad)
 
@@ -25,6 +38,7 @@ FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 _TOLERANCE = 1e-3  # pixels by which a cell may miss a whole number of them
 _SURE_CELL_SIZE = 0.5  # m, from which agents that steer by their pose seldom miss a goal
 _MANY_CLOSED = 0.05  # share of the free cells of which a user would miss rooms
+_MIN_INVERTED = 0.25  # share of wall from which one connected wall in free cells is taken for the free cells
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -32,9 +46,11 @@ class OccupancyGrid:
     """States of the pixels of a map."""
 
     states: np.ndarray  # [H, W] int8: FREE, OCCUPIED or UNKNOWN
-    resolution: float  # m, the side of a pixel
+    resolution: float = 1.0  # m, the side of a pixel
     origin: Pose = (0.0, 0.0, 0.0)  # of the lower left corner
     changes: tuple[str, ...] = ()  # how the states differ from the file's, in words
+    shades: str = ""  # of the picture, and what they mean, in words
+    is_cells: bool = False  # whether each pixel is a cell, of the size that the options say
 
 
 class LocatedMaze(NamedTuple):
@@ -45,73 +61,86 @@ class LocatedMaze(NamedTuple):
 
 
 def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> LocatedMaze:
-    """Returns the largest connected free area of `grid` as a maze.
+    """Returns one connected free area of `grid` as a maze.
 
-    Rows and columns around the grid of which nothing is known are cut off. A cell is wall if one of its pixels is. Free
-    cells that can't be reached are closed. Wall is added where the border is open, then on the right or at the bottom
-    until the maze is square. A `Remark` says what was changed.
+    Rows and columns around the grid of which nothing is known are cut off. A cell is wall if one of its pixels is. The
+    area is the one that has the cell or point `options.area`. If none is given, it is the largest one, or the largest
+    enclosed one of a fair size if the largest is the ground around it. All others are closed. Wall is added where the
+    border is open, then on the right or at the bottom until the maze is square. A `Remark` says what was changed.
 
     Raises:
-      InputError: if the size of the cells is no multiple of the grid's resolution.
+      InputError: if an option does not fit the grid.
       MazeError: if nothing is free, or the maze would be too large or too small.
     """
-    # Which pixels can't be driven on.
+    if grid.is_cells:
+        grid = dataclasses.replace(grid, resolution=options.cell_size or 1.0)
+        _require_not_inverted(grid.states, name)
+
+    # Which pixels can't be driven on, and the cells made of them.
     top, left, states = _without_unknown_margin(grid.states)
     blocked = _inflate(_walls(states, options.unknown), options.inflate / grid.resolution)
-
-    # Cells of several pixels.
-    if not options.cell_size:
-        pixels = _smallest_cell_pixels(blocked, grid.resolution)
-    else:
-        pixels = _cell_pixels(options.cell_size, grid.resolution)
+    pixels = 1 if grid.is_cells else _cell_pixels(blocked, grid.resolution, options, name)
     cell_size = options.cell_size or round(pixels * grid.resolution, 9)
-    cells = _coarsen(blocked, pixels)
-    if cells.all():
+    cells = lay_cells(blocked, pixels)
+    if cells.walls.all():
         raise MazeError(
-            f"{name}: expected a free cell, found none of {cell_size:g} m; unknown cells: {options.unknown}"
+            f"{name}: expected a free cell of {cell_size:g} m, found none; {_describe_pixels(grid, blocked, pixels)}"
         )
 
-    # The largest area of free cells, closed all around.
-    walls = largest_area(cells)
-    num_free, num_closed = int((~cells).sum()), int(walls.sum() - cells.sum())
-    area = walls
-    row, column, walls = _close_border(area)
-    maze = Maze(_checked_size(pad_to_square(walls), cell_size, name), name, cell_size)
+    # One area, closed all around.
+    areas = areas_of(cells, blocked)
+    enclosed = [enclose(area.cells, 0 if grid.is_cells else MIN_SIZE) for area in areas]
+    number, is_found = choose(areas, enclosed, options.area, cell_size)
+    row, column, height, width, walls = enclosed[number]
+    size = len(walls)
+    if size > MAX_SIZE:
+        remedy = "save it as a ROS map, which is coarsened" if grid.is_cells else "give a larger cell_size"
+        raise MazeError(f"{name}: expected at most {MAX_SIZE} cells a side, found {size} of {cell_size:g} m; {remedy}")
+    maze = Maze(walls, name, cell_size)
 
-    # Where the maze lies, in pixels from the left and from the lower edge of the map.
-    from_left = left + column * pixels
-    from_below = len(grid.states) - top - (row + maze.size) * pixels
+    # Where the maze lies, in pixels from the edges of the map.
+    from_left, from_top = left + cells.right + column * pixels, top + cells.down + row * pixels
+    from_below = len(grid.states) - from_top - size * pixels
     origin = _moved(grid.origin, from_left * grid.resolution, from_below * grid.resolution)
 
     # What a user should know.
-    changes, hints = list(grid.changes), []
+    changes = [*grid.changes, *["nothing on it is wall"] * (not (states == OCCUPIED).any())]
     if pixels > 1:
-        height, width = grid.states.shape
-        changes.append(f"{width} x {height} pixels of {grid.resolution:g} m as cells of {cell_size:g} m")
-    if cell_size < _SURE_CELL_SIZE:
-        sure = math.ceil(_SURE_CELL_SIZE / grid.resolution - _TOLERANCE) * grid.resolution
-        hints.append(
-            f"agents drive surely in cells from {_SURE_CELL_SIZE:g} m; if doors are at least {2 * sure:g} m wide, try "
-            f"--cell-size {sure:g}"
-        )
-    if num_closed:
-        share = num_closed / num_free
-        part = f"{num_closed:,} of {num_free:,} free cells ({100 * share:.0f} %)"
-        changes.append(f"{part} closed that can't be reached from the others")
-        if share > _MANY_CLOSED:
-            hints.extend(_reasons_to_close(states, pixels, grid.resolution, options))
-    if min(row, column) < 0 or max(np.subtract(walls.shape, area.shape)) > 0:
-        changes.append("wall added around an open border")
-    elif not changes and (from_left, from_below) != (0, 0):
-        changes.append("a margin without free cells cut off")
-    if walls.shape != maze.walls.shape:
-        changes.append(f"{walls.shape[0]} x {walls.shape[1]} cells padded with wall to {maze.size} x {maze.size}")
-    if changes:
-        changes.append(_describe_corner(origin))
-        remark(f"{name}: {'; '.join(changes)}")
-    if hints:
+        shape = "{1} x {0}".format(*grid.states.shape)
+        changes.append(f"{shape} pixels of {grid.resolution:g} m as cells of {cell_size:g} m")
+    if len(areas) > 1:
+        changes.append(describe_areas(areas, enclosed, number, cell_size))
+    if not is_found:
+        changes.append(f"none has {options.area}")
+    changes += _describe_closed(areas[number], cells)
+    beyond = np.array([from_top + (height - 1) * pixels, from_left + (width - 1) * pixels]) - grid.states.shape
+    if min(from_top, from_left) < 0 or max(beyond) >= 0:
+        changes.append("wall added along its border")
+    if height < size or width < size:
+        changes.append(f"{height} x {width} cells padded with wall to {size} x {size}")
+    if grid.is_cells and (from_top or from_left):
+        changes.append(f"its cell (r, c) is ({_shifted('r', from_top)}, {_shifted('c', from_left)}) in the maze")
+    if changes or from_left or from_below:
+        remark(f"{name}: {'; '.join([*changes, _describe_corner(origin)])}")
+    if hints := [
+        *([] if grid.is_cells else _larger_cells(blocked, cells, grid.resolution)),
+        *_reasons_to_close(states, blocked, cells, areas[number], grid.resolution, options),
+    ]:
         remark(f"{name}: {'; '.join(hints)}")
     return LocatedMaze(maze, origin)
+
+
+def _require_not_inverted(states: np.ndarray, name: str) -> None:
+    """Raises `MazeError` if the walls look like the free cells of a maze, and the free cells like its walls."""
+    border = np.ones(states.shape, dtype=bool)
+    border[1:-1, 1:-1] = False
+    walls = states == OCCUPIED
+    is_free_around = (states != UNKNOWN).all() and not walls[border].any()
+    if is_free_around and walls.mean() >= _MIN_INVERTED and ndimage.label(walls)[1] == 1:
+        raise MazeError(
+            f"{name}: expected free cells within walls, found one connected wall within free cells; is it inverted? "
+            "1 is wall, and so are # and 100"
+        )
 
 
 def _without_unknown_margin(states: np.ndarray) -> tuple[int, int, np.ndarray]:
@@ -123,60 +152,34 @@ def _without_unknown_margin(states: np.ndarray) -> tuple[int, int, np.ndarray]:
     return int(rows[0]), int(columns[0]), states[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
-def _smallest_cell_pixels(blocked: np.ndarray, resolution: float) -> int:
-    """Returns the pixels on a side of the smallest cells of at least `MIN_CELL_SIZE` of which a maze has enough."""
-    pixels = _fewest_pixels(resolution)
-    if max(blocked.shape) <= pixels * MAX_CHOSEN_SIZE:
-        return pixels
-    free = [np.flatnonzero(~blocked.all(axis=axis)) for axis in (0, 1)]
-    longest = max((int(np.ptp(indices)) + 1 for indices in free if len(indices)), default=1)
-    # Beside these pixels there are walls, and the first and the last cell of them may be cut.
-    return max(pixels, math.ceil(longest / (MAX_CHOSEN_SIZE - 3)))
+def _cell_pixels(blocked: np.ndarray, resolution: float, options: ReadOptions, name: str) -> int:
+    """Returns the pixels on a side of a cell of `options.cell_size`.
 
-
-def _cell_pixels(cell_size: float, resolution: float) -> int:
-    """Returns the pixels on a side of a cell of `cell_size`.
+    If none is given, it is the smallest of at least `MIN_CELL_SIZE` of which a maze has enough.
 
     Raises:
       InputError: if that is no whole number of them, or the body does not fit through such a cell.
     """
-    pixels = max(round(cell_size / resolution), _fewest_pixels(resolution))
-    if abs(cell_size / resolution - pixels) > _TOLERANCE:
-        raise InputError(
-            f"expected a cell_size of at least {MIN_CELL_SIZE} m and of a whole number of pixels of {resolution:g} m, "
-            f"such as {pixels * resolution:g}, found {cell_size:g}"
-        )
-    return pixels
+    fewest = _fewest_pixels(resolution)
+    if options.cell_size:
+        pixels = max(round(options.cell_size / resolution), fewest)
+        if abs(options.cell_size / resolution - pixels) > _TOLERANCE:
+            raise InputError(
+                f"{name}: expected a cell_size of at least {MIN_CELL_SIZE} m and of a whole number of pixels of "
+                f"{resolution:g} m, such as {pixels * resolution:g}, found {options.cell_size:g}"
+            )
+        return pixels
+    if max(blocked.shape) <= fewest * MAX_CHOSEN_SIZE:
+        return fewest
+    free = [np.flatnonzero(~blocked.all(axis=axis)) for axis in (0, 1)]
+    longest = max((int(np.ptp(indices)) + 1 for indices in free if len(indices)), default=1)
+    # Beside these pixels there are walls, and the first and the last cell of them may be cut.
+    return max(fewest, math.ceil(longest / (MAX_CHOSEN_SIZE - 3)))
 
 
 def _fewest_pixels(resolution: float) -> int:
     """Returns the pixels on a side of the smallest cells of at least `MIN_CELL_SIZE`."""
     return max(1, math.ceil(MIN_CELL_SIZE / resolution - _TOLERANCE))
-
-
-def _reasons_to_close(states: np.ndarray, pixels: int, resolution: float, options: ReadOptions) -> Iterator[str]:
-    """Yields what may have cut off free cells, in words, and what to try against it."""
-    if pixels > 1:
-        remedy = ", try a smaller --cell-size" if pixels > _fewest_pixels(resolution) else ""
-        yield f"doors narrower than two cells ({2 * pixels * resolution:g} m) may close{remedy}"
-    if options.pixel_size is not None:
-        yield "text, furniture and door swings on a plan are walls too, erase them"
-    if options.unknown == "wall" and (_walls(states, "wall") != _walls(states, "free")).any():
-        yield "unknown cells are wall, try --unknown free"
-    if options.inflate:
-        yield "walls are inflated, try a smaller --inflate"
-
-
-def _describe_corner(origin: Pose) -> str:
-    """Returns where the maze lies on a map and, if it is not turned, where a point of the map lies in the maze."""
-    x, y, yaw = (round(number, 6) + 0.0 for number in origin)  # + 0.0: no -0
-    corner = f"the maze's lower left corner is ({x:g}, {y:g}) m on the map"
-    if yaw:
-        return f"{corner}, turned by {yaw:g} rad"
-    if x == y == 0:
-        return corner
-    shifted = (f"{name} {'+' if at < 0 else '-'} {abs(at):g}" if at else name for name, at in (("x", x), ("y", y)))
-    return f"{corner}, so its point (x, y) is ({', '.join(shifted)}) m in the maze"
 
 
 def _walls(states: np.ndarray, unknown: str) -> np.ndarray:
@@ -197,37 +200,84 @@ def _inflate(walls: np.ndarray, num_pixels: float) -> np.ndarray:
     return np.asarray(distances <= num_pixels + _TOLERANCE)
 
 
-def _coarsen(walls: np.ndarray, pixels: int) -> np.ndarray:
-    """Returns `[R, C]` bool: the cells of `pixels` x `pixels` in which there is wall or an end of the grid."""
-    height, width = (-length % pixels for length in walls.shape)
-    padded = np.pad(walls, ((0, height), (0, width)), constant_values=True)
-    rows, columns = (length // pixels for length in padded.shape)
-    return np.any(padded.reshape(rows, pixels, columns, pixels), axis=(1, 3))
+def _describe_pixels(grid: OccupancyGrid, blocked: np.ndarray, pixels: int) -> str:
+    """Returns what a map is made of that has no free cell of some pixels."""
+    shares = ((grid.states == state).mean() for state in (OCCUPIED, UNKNOWN, FREE))
+    parts = "{:.0f} % of the map is wall, {:.0f} % unknown, {:.0f} % free".format(*(100 * share for share in shares))
+    widest = bisect.bisect_left(range(1, pixels), True, key=lambda side: not free_squares(blocked, side).any())
+    gap = f"; its widest gap is {widest * grid.resolution:g} m" if widest else ""
+    height, width = (length * grid.resolution for length in grid.states.shape)
+    return f"{parts}{gap}; it is {width:g} x {height:g} m{'; ' * bool(grid.shades)}{grid.shades}"
 
 
-def _close_border(walls: np.ndarray) -> tuple[int, int, np.ndarray]:
-    """Returns the grid with a row or column of wall where its border is open, and with the first row and column of it.
-
-    If it is too large for a maze, it is cut to the free cells and the walls next to them.
-    """
-    row = column = 0
-    if max(walls.shape) > MAX_SIZE:
-        rows, columns = (np.flatnonzero(~walls.all(axis=axis)) for axis in (1, 0))
-        row, column = int(max(0, rows[0] - 1)), int(max(0, columns[0] - 1))
-        walls = walls[row : rows[-1] + 2, column : columns[-1] + 2]
-    is_open = [not edge.all() for edge in (walls[0], walls[-1], walls[:, 0], walls[:, -1])]
-    closed = np.pad(walls, np.array(is_open, dtype=int).reshape(2, 2), constant_values=True)
-    return row - is_open[0], column - is_open[2], closed
+def _describe_closed(area: Area, cells: Cells) -> list[str]:
+    num_free = int((~cells.walls).sum())
+    num_closed = num_free - area.num_cells
+    if not num_closed:
+        return []
+    part = f"{num_closed:,} of {num_free:,} free cells ({100 * num_closed / num_free:.0f} %)"
+    return [f"{part} closed that can't be reached from the others"]
 
 
-def _checked_size(walls: np.ndarray, cell_size: float, name: str) -> np.ndarray:
-    if len(walls) > MAX_SIZE:
-        raise MazeError(
-            f"{name}: expected at most {MAX_SIZE} cells a side, found {len(walls)} of {cell_size:g} m; "
-            "give a larger cell_size"
+def _larger_cells(blocked: np.ndarray, cells: Cells, resolution: float) -> Iterator[str]:
+    """Yields what cells would keep in which agents drive surely, if these are smaller."""
+    sure = math.ceil(_SURE_CELL_SIZE / resolution - _TOLERANCE)
+    if cells.pixels < sure:
+        kept, smaller = (
+            num_kept(each, blocked) * (each.pixels * resolution) ** 2 for each in (lay_cells(blocked, sure), cells)
         )
-    missing = max(0, MIN_SIZE - len(walls))
-    return np.pad(walls, ((0, missing), (0, missing)), constant_values=True)
+        yield (
+            f"agents drive surely in cells from {_SURE_CELL_SIZE:g} m; --cell-size {sure * resolution:g} keeps "
+            f"{kept:.4g} m2 of floor, these cells {smaller:.4g} m2"
+        )
+
+
+def _reasons_to_close(
+    states: np.ndarray, blocked: np.ndarray, cells: Cells, area: Area, resolution: float, options: ReadOptions
+) -> Iterator[str]:
+    """Yields what has cut off free cells that lie inside, in words, and what to try against it."""
+    outside = [other.cells for other in areas_of(cells, blocked) if other.is_ground]
+    closed = ~cells.walls & ~area.cells & ~np.any([np.zeros_like(area.cells), *outside], axis=0)
+    if closed.sum() <= _MANY_CLOSED * (~cells.walls).sum():
+        return
+
+    def is_joined(walls: np.ndarray) -> bool:
+        """Returns whether the area and what was closed are connected between walls of pixels."""
+        labels, _ = ndimage.label(~walls)
+        kept, lost = (
+            labels[rows * cells.pixels + cells.down, columns * cells.pixels + cells.right]
+            for rows, columns in map(np.nonzero, (area.cells, closed))
+        )
+        return bool(np.isin(lost, kept).any())
+
+    if is_joined(blocked):
+        fewest = _fewest_pixels(resolution)
+        smaller = num_kept(lay_cells(blocked, fewest), blocked) * fewest**2
+        helps = smaller > WORTH_SHIFTING * area.num_cells * cells.pixels**2
+        remedy = f", --cell-size {fewest * resolution:g} keeps more" if helps else ""
+        yield f"doors narrower than two cells ({2 * cells.pixels * resolution:g} m) may close{remedy}"
+    elif options.inflate and is_joined(_walls(states, options.unknown)):
+        yield "walls are inflated, try a smaller --inflate"
+    elif options.unknown == "wall" and is_joined(_walls(states, "free")):
+        yield "unknown cells are wall, try --unknown free"
+    elif options.pixel_size is not None:
+        yield "text, furniture and door swings on a plan are walls too, erase them"
+
+
+def _describe_corner(origin: Pose) -> str:
+    """Returns where the maze lies on a map and, if it is not turned, where a point of the map lies in the maze."""
+    x, y, yaw = (round(number, 6) + 0.0 for number in origin)  # + 0.0: no -0
+    corner = f"the maze's lower left corner is ({x:g}, {y:g}) m on the map"
+    if yaw:
+        return f"{corner}, turned by {yaw:g} rad"
+    if x == y == 0:
+        return corner
+    return f"{corner}, so its point (x, y) is ({_shifted('x', x)}, {_shifted('y', y)}) m in the maze"
+
+
+def _shifted(name: str, by: float) -> str:
+    """Returns a coordinate less a number, in words."""
+    return f"{name} {'+' if by < 0 else '-'} {abs(by):g}" if by else name
 
 
 def _moved(origin: Pose, x: float, y: float) -> Pose:

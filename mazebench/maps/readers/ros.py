@@ -1,6 +1,6 @@
 """Maps of ROS: a YAML file and a picture, as `map_server` reads and `map_saver` writes them.
 
-The rules are those of http://wiki.ros.org/map_server, and in the details of `nav2_map_server` (map_io.cpp).
+The rules are those of http://wiki.ros.org/map_server, and in details those of `nav2_map_server` since 1.4.0.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class _Metadata(pydantic.BaseModel):
         description="three finite numbers, [x, y, yaw]"
     )
     negate: bool = pydantic.Field(description="0 or 1")  # whether light is occupied
-    # A pixel whose probability of being occupied is above the first is wall, below the second free.
+    # A pixel whose probability of being occupied is at most the second is free, else at least the first wall.
     occupied_thresh: _Share = pydantic.Field(description="a number from 0 to 1")
     free_thresh: _Share = pydantic.Field(description="a number from 0 to occupied_thresh")
     mode: Literal["trinary", "scale", "raw"] = pydantic.Field("trinary", description="trinary, scale or raw")
@@ -67,15 +67,10 @@ def read_ros_maze(path: str | pathlib.Path, **options: Any) -> LocatedMaze:
       InputError: if a file can't be read or an option is not allowed.
       MazeError: if there is no legal maze in the map.
     """
-    return locate_ros_maze(path, ReadOptions(**options))
+    return locate_maze(read_occupancy(path), ReadOptions(**options), pathlib.Path(path).stem)
 
 
-def locate_ros_maze(path: str | pathlib.Path, options: ReadOptions) -> LocatedMaze:
-    """Reads a map of ROS as `read_ros_maze` does."""
-    return locate_maze(read_occupancy(path), options, pathlib.Path(path).stem)
-
-
-def locate_floor_plan(path: pathlib.Path, pixel_size: float, options: ReadOptions) -> LocatedMaze:
+def read_floor_plan(path: pathlib.Path, pixel_size: float) -> OccupancyGrid:
     """Reads a picture of a floor plan as a map of ROS with pixels of `pixel_size` m and the usual thresholds.
 
     Marks in colour are floor. What lies outside of closed outer walls is unknown, and is cut off around the plan. The
@@ -94,9 +89,11 @@ def locate_floor_plan(path: pathlib.Path, pixel_size: float, options: ReadOption
         free_thresh=_FREE_THRESH,
         mode="trinary",
     )
-    states = _states(to_gray(read_picture(path), path.stem), metadata)
+    gray = to_gray(read_picture(path), path.stem)
+    states = _states(gray, metadata)
+    shades = _describe_shades(gray, metadata)
     if not (states == OCCUPIED).any():
-        raise MazeError(f"{path.stem}: expected dark walls on light paper, found none")
+        raise MazeError(f"{path.stem}: expected dark walls on light paper, found none; {shades}")
     if (states == OCCUPIED).mean() > _MOSTLY_DARK:
         raise MazeError(
             f"{path.stem}: expected dark walls on light paper, found more dark than light; invert the picture"
@@ -106,8 +103,7 @@ def locate_floor_plan(path: pathlib.Path, pixel_size: float, options: ReadOption
     states = _without_surroundings(states)
     rows, columns = _box_of_walls(states)
     x, y = columns.start * pixel_size, (len(states) - rows.stop) * pixel_size
-    grid = OccupancyGrid(states[rows, columns], pixel_size, origin=(x, y, 0.0))
-    return locate_maze(grid, options, path.stem)
+    return OccupancyGrid(states[rows, columns], pixel_size, origin=(x, y, 0.0), shades=shades)
 
 
 def _box_of_walls(states: np.ndarray) -> tuple[slice, slice]:
@@ -141,7 +137,7 @@ def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
     """
     path = pathlib.Path(path)
     metadata = _read_metadata(path)
-    image = _found_picture(path, metadata.image)
+    image = picture_of(path)
     try:
         picture = read_picture(image)
     except InputError as error:
@@ -150,9 +146,7 @@ def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
 
     # The departure from map_server.
     is_unknown = _saved_as_unknown(picture)
-    changes = []
-    if image != path.parent / pathlib.Path(metadata.image.removeprefix("file://")).expanduser():
-        changes.append(f"picture {metadata.image} not there; {image.name} beside the file read instead")
+    changes = [] if _named_path(path, metadata) == image else [f"image {metadata.image} taken from {image.parent}"]
     if metadata.mode == "trinary" and (states[is_unknown] == FREE).any():
         states[is_unknown] = UNKNOWN
         changes.append(
@@ -163,35 +157,35 @@ def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
     if not math.isfinite(yaw):  # some versions of map_saver wrote nan
         changes.append(f"yaw {yaw:g} read as 0")
         yaw = 0.0
-    if not (states == OCCUPIED).any():
-        changes.append(f"no pixel is occupied by occupied_thresh {metadata.occupied_thresh:g}")
-    return OccupancyGrid(states, metadata.resolution, (x, y, yaw), tuple(changes))
+    shades = _describe_shades(picture, metadata)
+    return OccupancyGrid(states, metadata.resolution, (x, y, yaw), tuple(changes), shades)
+
+
+def is_map(path: pathlib.Path) -> bool:
+    """Returns whether a YAML file names a picture, as a map does; one that can't be read may be a map."""
+    try:
+        content = yaml.safe_load(read_at_most(path, _MAX_BYTES, "map"))
+    except (InputError, yaml.YAMLError, ValueError):
+        return True
+    return isinstance(content, dict) and "image" in content
 
 
 def picture_of(path: str | pathlib.Path) -> pathlib.Path:
-    """Returns the path of the picture that a YAML file names; of its name beside the file if it is not there.
+    """Returns the path of the picture that a YAML file names, or of one of that name beside it if there is none.
 
     Raises:
       InputError: if the file can't be read.
     """
     path = pathlib.Path(path)
-    return _found_picture(path, _read_metadata(path).image)
-
-
-def _found_picture(path: pathlib.Path, image: str) -> pathlib.Path:
-    """Returns the path of the picture that the YAML file `path` calls `image`: a path, or a file's or package's URL."""
-    named = path.parent / pathlib.Path(image.removeprefix("file://")).expanduser()
-    beside = path.parent / re.split(r"[/\\]", image)[-1]
+    metadata = _read_metadata(path)
+    named = _named_path(path, metadata)
+    beside = path.parent / re.split(r"[/\\]", metadata.image)[-1]
     return beside if beside.is_file() and not named.is_file() else named
 
 
-def is_other_yaml(path: pathlib.Path) -> bool:
-    """Returns whether a YAML file is none of a map: parameters, say, which name neither picture nor resolution."""
-    try:
-        content = yaml.safe_load(read_at_most(path, _MAX_BYTES, "map"))
-    except (yaml.YAMLError, ValueError, InputError):
-        return False
-    return not isinstance(content, dict) or not {"image", "resolution"} & set(content)
+def _named_path(path: pathlib.Path, metadata: _Metadata) -> pathlib.Path:
+    name = metadata.image.removeprefix("file://")
+    return path.parent / pathlib.Path(name).expanduser()
 
 
 def map_of_picture(path: pathlib.Path) -> pathlib.Path | None:
@@ -248,22 +242,35 @@ def _read_metadata(path: pathlib.Path) -> _Metadata:
 
 def _states(picture: np.ndarray, metadata: _Metadata) -> np.ndarray:
     """Returns `[H, W]` int8 of a picture: `[H, W]`, or `[H, W, 3]` or `[H, W, 4]` with opacity, uint8 or uint16."""
+    gray, is_opaque = _gray_and_opaque(picture)
+    states = _state_of_shades(metadata)[gray]
+    if metadata.mode != "raw":
+        states[~is_opaque] = UNKNOWN
+    return states
+
+
+def _gray_and_opaque(picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the luminance, `[H, W]` uint8, and where a picture is opaque, `[H, W]` bool."""
     if picture.dtype == np.uint16:
         picture = (picture >> 8).astype(np.uint8)
+    if picture.ndim == 2:
+        return picture, np.ones(picture.shape, dtype=bool)
+    gray = cv2.cvtColor(np.ascontiguousarray(picture[..., :3]), cv2.COLOR_RGB2GRAY)
+    return gray, picture[..., 3] == 255 if picture.shape[2] == 4 else np.ones(gray.shape, dtype=bool)
 
-    # [H, W, C], and where the picture is opaque.
-    channels = picture if picture.ndim == 3 else picture[..., None]
-    opaque = channels[..., 3] == 255 if channels.shape[2] == 4 else None
-    channels = channels[..., :3]
 
-    # The shade of a pixel is the mean of its colours; states are looked up by their sum.
-    num_channels = channels.shape[2]
-    sums = channels.sum(axis=2, dtype=np.uint16)
-    shades = np.arange(255 * num_channels + 1) / (255 * num_channels)
-    states = _state_of_shades(shades, metadata)[sums]
-    if opaque is not None and metadata.mode != "raw":
-        states[~opaque] = UNKNOWN
-    return states
+def _describe_shades(picture: np.ndarray, metadata: _Metadata) -> str:
+    """Returns the shades of a picture, and those that are wall and free, in words."""
+    gray, is_opaque = _gray_and_opaque(picture)
+    states = _state_of_shades(metadata)
+    ranges = [
+        f"{indices[0]} to {indices[-1]} are {name}" if len(indices) else f"none is {name}"
+        for name, state in (("wall", OCCUPIED), ("free", FREE))
+        if (indices := np.flatnonzero(states == state)) is not None
+    ]
+    clear = "" if is_opaque.all() else f"; {100 * (1 - is_opaque.mean()):.0f} % is transparent, which is unknown"
+    most = np.bincount(gray.ravel()).argmax()
+    return f"its shades are {gray.min()} to {gray.max()}, mostly {most}; {', '.join(ranges)}{clear}"
 
 
 def _saved_as_unknown(picture: np.ndarray) -> np.ndarray:
@@ -276,13 +283,17 @@ def _saved_as_unknown(picture: np.ndarray) -> np.ndarray:
     return (shades == _UNKNOWN_SHADE) & is_saved
 
 
-def _state_of_shades(shades: np.ndarray, metadata: _Metadata) -> np.ndarray:
-    """Returns the states, int8, of shades from 0 (black) to 1 (white)."""
-    occupied = shades if metadata.negate else 1 - shades
+def _state_of_shades(metadata: _Metadata) -> np.ndarray:
+    """Returns the states, `[256]` int8, of shades from 0 (black) to 255 (white)."""
+    shades = np.arange(256)
+    occupied = (shades if metadata.negate else 255 - shades) / 255
     if metadata.mode == "raw":  # the picture holds percentages; above 100 is unknown
-        percent = np.round(255 * shades)
-        occupied = np.where(percent <= OCCUPIED, percent / OCCUPIED, np.nan)
-    states = np.full(shades.shape, UNKNOWN, dtype=np.int8)
-    states[occupied <= metadata.free_thresh] = FREE
+        occupied = np.where(shades <= OCCUPIED, shades / OCCUPIED, np.nan)
+    states = np.full(len(shades), UNKNOWN, dtype=np.int8)
     states[occupied >= metadata.occupied_thresh] = OCCUPIED
+    states[occupied <= metadata.free_thresh] = FREE
+    if metadata.mode == "scale" and metadata.free_thresh < metadata.occupied_thresh:  # per cent, rounded
+        scaled = np.round(100 * (occupied - metadata.free_thresh) / (metadata.occupied_thresh - metadata.free_thresh))
+        states[scaled <= 0] = FREE
+        states[scaled >= OCCUPIED] = OCCUPIED
     return states

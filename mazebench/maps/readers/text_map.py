@@ -1,0 +1,127 @@
+"""Maps as text: rows of characters, and what other programs write as text."""
+
+from __future__ import annotations
+
+import codecs
+import pathlib
+import re
+
+import numpy as np
+
+from mazebench.maps.file_kinds import kind_of, way_out
+from mazebench.maps.maze import MazeError
+from mazebench.maps.readers.cells import grid_of_characters, grid_of_numbers
+from mazebench.maps.readers.house_expo import read_house
+from mazebench.maps.readers.occupancy_grid import OccupancyGrid
+from mazebench.storage.files import read_at_most
+
+_MAX_BYTES = 2**26  # 1,024 rows of 1,024 numbers with 18 digits take a third of it
+_ENCODINGS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+_POSTS = re.compile(r"([+o*.])(-+)\1(?:\2\1)*")  # the first line of a maze with walls between posts
+
+
+def read_text(path: pathlib.Path) -> OccupancyGrid:
+    """Reads the cells in a text file, UTF-8 or with a byte-order mark.
+
+    Raises:
+      InputError: if the file can't be read, or is larger than any maze's.
+      MazeError: if it is not text, or no text of `grid_of_text`.
+    """
+    content = read_at_most(path, _MAX_BYTES, "text map")
+    if (kind := kind_of(content)) is not None:
+        raise MazeError(f"{path}: expected a text map, found {kind}{way_out(kind)}")
+    encoding = next((name for mark, name in _ENCODINGS.items() if content.startswith(mark)), "utf-8")
+    try:
+        text = content.decode(encoding)
+        position = text.find("\0")
+    except UnicodeDecodeError as error:
+        position = error.start
+    if position >= 0:
+        raise MazeError(
+            f"{path}: expected a text map, found byte 0x{content[position]:02x} at {position}{way_out(None)}"
+        )
+    return grid_of_text(text, path.stem)
+
+
+def grid_of_text(text: str, name: str) -> OccupancyGrid:
+    """Returns the cells that a text holds: rows of characters, or of numbers as `grid_of_numbers` takes them.
+
+    Of other programs, it reads MovingAI's maps, levels of DeepMind Lab and labmaze, D4RL's one line, lists of lists as
+    in Gymnasium-Robotics, tables (CSV), mazes of walls between posts, and HouseExpo's JSON.
+
+    Raises:
+      MazeError: if it is none of these.
+    """
+    # Only these end a line: splitlines() would also split at characters that a text map must refuse.
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    if text.startswith("type "):
+        return _moving_ai(text, name)
+    if text.lstrip().startswith("{"):
+        return read_house(text, name)
+    if "[" in text:  # a list of rows, as Python, JSON or NumPy write it
+        lines = [" ".join(row.strip("[, \n").split()) for row in text.split("]")]
+        lines = lines[0].split(",") if len(list(filter(None, lines))) == 1 else lines
+    else:
+        lines = re.sub(r"\\n|\\+", "\n", text).split("\n")  # D4RL ends a row with a backslash
+    lines = [re.sub(r"^\s*[(\"']+|[\"'),]+\s*$|[\"']", "", line) for line in lines]  # of strings in a program
+    rows = [line for line in lines if line.strip()]
+    if not rows:
+        raise MazeError(f"{name}: expected a text map, found no row")
+    _require_one_maze(lines, name)
+    if (cells := _cells_in_table(rows)) is not None:
+        if any(len(cell) > 1 for row in cells for cell in row):
+            return grid_of_numbers(_numbers(cells, name), name)
+        rows = ["".join(row) for row in cells]
+    elif (posts := _POSTS.fullmatch(rows[0].strip())) and len(posts[2]) > 1:
+        return grid_of_characters(_between_posts(rows, len(posts[2]) + 1, name), name)
+    return grid_of_characters(rows, name)
+
+
+def _moving_ai(text: str, name: str) -> OccupancyGrid:
+    """Returns the cells of a map of the MovingAI benchmarks, whose header names its height and width."""
+    head, _, body = text.partition("\nmap\n")
+    values = dict(line.split(maxsplit=1) for line in head.split("\n") if len(line.split()) == 2)
+    rows = [line.rstrip().upper() for line in body.rstrip("\n").split("\n")]
+    found = f"{len(rows)} x {len(rows[0])}"
+    if any(len(row) != len(rows[0]) for row in rows) or found != f"{values.get('height')} x {values.get('width')}":
+        raise MazeError(
+            f"{name}: expected a MovingAI map of {values.get('height')} rows of {values.get('width')} cells after the "
+            f"line 'map', found {len(rows)} of {min(map(len, rows))} to {max(map(len, rows))}"
+        )
+    return grid_of_characters(rows, name, is_moving_ai=True)
+
+
+def _require_one_maze(lines: list[str], name: str) -> None:
+    """Raises `MazeError` if blank lines separate blocks that each begin and end with a row of wall."""
+    blocks = [block.strip("\n").split("\n") for block in re.split(r"\n\s*\n", "\n".join(lines).strip())]
+    ends = {letter for block in blocks for line in (block[0], block[-1]) for letter in line.strip()}
+    if len(blocks) > 1 and len(ends) == 1 and all(len(block) > 2 for block in blocks):
+        raise MazeError(f"{name}: expected one maze, found {len(blocks)} with blank lines between; give each a file")
+
+
+def _cells_in_table(rows: list[str]) -> list[list[str]] | None:
+    """Returns the cells of rows in which commas, semicolons, tabs or blanks stand between them; None for other rows."""
+    cells = [re.split(r"\s*[,;\t]\s*|\s+", row.strip(" \t,;")) for row in rows]
+    is_table = len({len(row) for row in cells}) == 1 and len(cells[0]) > 2
+    return cells if is_table else None
+
+
+def _numbers(cells: list[list[str]], name: str) -> np.ndarray:
+    try:
+        return np.array(cells, dtype=float)
+    except ValueError as error:
+        raise MazeError(
+            f"{name}: expected rows of as many numbers, or cells of one character, found {error}"
+        ) from error
+
+
+def _between_posts(rows: list[str], step: int, name: str) -> list[str]:
+    """Returns a row for each row of posts and of rooms, and a column for each post and each room between two."""
+    width = len(rows[0].strip())
+    indent = len(rows[0]) - len(rows[0].lstrip())
+    if len(rows) % 2 == 0:
+        raise MazeError(f"{name}: expected rows of posts and of rooms in turns, found {len(rows)} rows")
+    columns = sorted({column for post in range(0, width, step) for column in (post, post + 1) if column < width})
+    lines = [row[indent:].ljust(width) for row in rows]
+    posts = {lines[0][0], "-", "|"}
+    return ["".join("#" if line[column] in posts else " " for column in columns) for line in lines]

@@ -1,0 +1,98 @@
+"""Which part of a grid becomes the maze, where its cells lie, and what is said of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mazebench.errors import InputError
+from mazebench.maps.maze import MazeError
+from mazebench.maps.maze_options import ReadOptions
+from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, locate_maze
+
+
+def grid_of(text: str, pixels: int = 1, **values) -> OccupancyGrid:
+    states = {"#": OCCUPIED, ".": FREE, "?": UNKNOWN}
+    cells = np.array([[states[letter] for letter in row] for row in text.split()], dtype=np.int8)
+    return OccupancyGrid(cells.repeat(pixels, axis=0).repeat(pixels, axis=1), **values)
+
+
+# A room of 3 x 4 cells with a door to the grounds that a wall closes, and a smaller room.
+GROUNDS = """
+................
+.######.####....
+.#....#.#..#....
+.#....#.#..#....
+.#....#.####....
+.######.........
+................
+"""
+TWO_WINGS = "########## #....#...# #....#...# #....#...# ##########"
+
+
+class TestArea:
+    def test_a_room_is_preferred_to_the_ground_around_it_and_all_are_listed(self, remarks):
+        maze, origin = locate_maze(grid_of(GROUNDS), ReadOptions(), "map")
+        assert len(maze.free_cells) == 12
+        assert maze.is_free((2, 2))
+        assert origin[:2] == (0, 7 - 16)
+        line = remarks()[0]
+        assert (
+            "3 separate areas (66 m2 with cell 1,1, at 100 % of the edge; 12 m2 with cell 2,2, enclosed; 4 m2" in line
+        )
+        assert "; number 2 is the maze, --area chooses by a cell; " in line
+        assert "narrower" not in line
+
+    def test_a_building_whose_door_reaches_the_edge_is_no_ground(self):
+        maze, _ = locate_maze(grid_of("........ #####... #...#... #...#... ....#... #####..."), ReadOptions(), "map")
+        assert len(maze.free_cells) == 10
+
+    @pytest.mark.parametrize(("area", "num_free"), [("1,1", 12), ("1,6", 9), ("6.5m,8.5m", 9), (None, 12)])
+    def test_a_cell_or_a_point_chooses(self, area, num_free):
+        assert len(locate_maze(grid_of(TWO_WINGS), ReadOptions(area=area), "map").maze.free_cells) == num_free
+
+    def test_the_listed_cell_chooses_an_area_though_its_border_is_added(self, remarks):
+        locate_maze(grid_of(GROUNDS), ReadOptions(), "map")
+        assert "66 m2 with cell 1,1" in remarks()[0]
+        assert len(locate_maze(grid_of(GROUNDS), ReadOptions(area="1,1"), "map").maze.free_cells) == 66
+
+    def test_a_place_in_no_area_is_said(self, remarks):
+        locate_maze(grid_of(TWO_WINGS), ReadOptions(area="0,0"), "map")
+        assert "; none has 0,0; " in remarks()[0]
+        with pytest.raises(InputError, match=r"expected area as a cell 'row,column' or a point .*, found 'here'"):
+            locate_maze(grid_of(TWO_WINGS), ReadOptions(area="here"), "map")
+
+
+class TestCells:
+    def test_they_begin_where_they_keep_the_most_floor(self, remarks):
+        states = np.full((24, 44), OCCUPIED, dtype=np.int8)
+        states[3:21, 3:41] = FREE  # 1.8 m x 3.8 m: cells from the corner on would keep 1.5 m x 3.5 m
+        maze, (x, y, _) = locate_maze(OccupancyGrid(states, 0.1), ReadOptions(cell_size=0.6), "map")
+        assert len(maze.free_cells) == 3 * 6
+        points = maze.point(maze.free_cells) + np.array([x, y])
+        assert points.min() - 0.3 >= 0.3 - 1e-9
+        assert not any("narrower" in line for line in remarks())
+
+    @pytest.mark.parametrize(
+        ("options", "hint"),
+        [
+            ({"cell_size": 1.2}, "doors narrower than two cells (2.4 m) may close, --cell-size 0.4 keeps more"),
+            ({"inflate": 0.45}, "walls are inflated, try a smaller --inflate"),
+        ],
+    )
+    def test_only_the_cause_of_closed_cells_is_named(self, options, hint, remarks):
+        grid = grid_of(
+            TWO_WINGS.replace("#....#...# #....#...# #....", "#....#...# #........# #...."), 8, resolution=0.1
+        )
+        locate_maze(grid, ReadOptions(**options), "map")
+        assert remarks()[-1].endswith(hint)
+
+    def test_a_grid_without_a_free_cell_is_described(self):
+        grid = grid_of("##### #.?.# #?.?# #.?.# #####", 2, resolution=0.1, shades="its shades are 0 to 254")
+        message = (
+            "map: expected a free cell of 0.4 m, found none; 64 % of the map is wall, 16 % unknown, 20 % free; "
+            "its widest gap is 0.2 m; it is 1 x 1 m; its shades are 0 to 254"
+        )
+        with pytest.raises(MazeError) as caught:
+            locate_maze(grid, ReadOptions(), "map")
+        assert str(caught.value) == message
