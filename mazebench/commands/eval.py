@@ -13,11 +13,11 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import has_camera, load_mujoco
-from mazebench.commands.option_parameters import NOT_IN_EVALUATIONS, given, takes_options
+from mazebench.commands.option_parameters import given, takes_options
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.options import fields_of
-from mazebench.tasks.task import Task
+from mazebench.tasks.task import NOT_IN_EVALUATIONS, Task
 
 
 @takes_options(RunOptions, Task, EvalOptions, without=NOT_IN_EVALUATIONS, split="eval")

@@ -14,8 +14,6 @@ from mazebench.errors import InputError, held_remarks
 from mazebench.options import Option, fields_of
 from mazebench.tasks.task import Task, evaluation_task
 
-# Fields of a task that evaluations do not vary.
-NOT_IN_EVALUATIONS = ("fresh", "pairs", "num_goals", "continuous", "context_size")
 _WORTH_WATCHING = 10  # cells from start to goal
 
 

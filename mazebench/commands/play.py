@@ -7,9 +7,9 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.option_parameters import NOT_IN_EVALUATIONS, takes_options, watched_task
+from mazebench.commands.option_parameters import takes_options, watched_task
 from mazebench.errors import InputError
-from mazebench.tasks.task import Task
+from mazebench.tasks.task import NOT_IN_EVALUATIONS, Task
 from mazebench.world.backend import has_display
 
 

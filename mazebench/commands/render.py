@@ -8,9 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.option_parameters import NOT_IN_EVALUATIONS, given, takes_options, watched_task
+from mazebench.commands.option_parameters import given, takes_options, watched_task
 from mazebench.evaluation.eval_options import EvalOptions
-from mazebench.tasks.task import Task
+from mazebench.tasks.task import NOT_IN_EVALUATIONS, Task
 
 _DRAWN = ("map", "lidar")  # views that need no rendering
 

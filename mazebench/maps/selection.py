@@ -29,10 +29,7 @@ def own_mazes(mazes: Any, options: ReadOptions) -> tuple[Maze, ...]:
         return (_own_maze(mazes, "maze", options),)
     if not isinstance(mazes, Iterable):
         raise InputError(f"expected mazes as values, arrays or a path, found {type(mazes).__name__}")
-    found = tuple(_own_maze(item, f"maze-{index}", options) for index, item in enumerate(mazes))
-    if not found:
-        raise InputError("expected at least one maze, found none")
-    return found
+    return tuple(_own_maze(item, f"maze-{index}", options) for index, item in enumerate(mazes))
 
 
 def _own_maze(item: object, name: str, options: ReadOptions) -> Maze:

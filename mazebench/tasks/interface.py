@@ -1,4 +1,4 @@
-"""What an agent may know of the environments that it is built for."""
+"""The interface: the part of its environments that an agent may know."""
 
 from __future__ import annotations
 

@@ -50,6 +50,7 @@ EVAL_DISTANCES = tuple(range(1, 16))
 ENDS = ("start", "goal")
 CUSTOM = "custom"  # the split in results of mazes, a start or a goal that are not the benchmark's
 MIN_CONTEXT_SIZE = 3
+NOT_IN_EVALUATIONS = ("fresh", "pairs", "num_goals", "continuous", "context_size")  # fields that they do not vary
 
 _NUM_CHECKED = 10  # of fresh mazes, one of which must have the distances
 _FARTHEST_SHARE = 0.9  # of the diameter of a large maze; few pairs of cells are farther apart
@@ -62,7 +63,7 @@ _OF_AGENTS = ("sensors", "camera_size", "textures", "hide", "exact_pose", "conte
 
 @options
 class Task(TaskFields):
-    """What is played, and what agents are shown of it, in plain values.
+    """A task in plain values: what is played, and what agents are shown of it.
 
     `Task.of` makes one and fills what is left open. Fields that it leaves alone: `time_limit` is 0 on a track, whose
     limit depends on the distance, and `lidar_noise` and `odometry_noise` are None where the track has its own.
@@ -245,7 +246,7 @@ class Task(TaskFields):
 
     @property
     def interface(self) -> Interface:
-        """What an agent may know of the task: neither the track nor its level."""
+        """The part of the task that an agent may know: neither the track nor its level."""
         return Interface(
             self.task,
             self.size,
@@ -283,7 +284,7 @@ class Task(TaskFields):
 
     @property
     def own_in_words(self) -> tuple[str, ...]:
-        """What a user set besides the mazes, in words: the size of a cell, start and goal, noise on the senses."""
+        """The choices of a user besides the mazes: the size of a cell, start and goal, noise on the senses."""
         scale = () if self.cell_size == 1 else (f"cells of {self.cell_size:g} m",)
         ends = (f"{name} {end}" for name in ENDS if (end := getattr(self, name)) is not None)
         return (*scale, *ends, *self.noise_in_words)
@@ -337,7 +338,7 @@ def evaluation_task(task: str = "local", **options: Unpack[TaskOptions]) -> Task
     asked = Task(**{"split": "eval"} | given)
     if asked.is_drawn and asked.split == "eval":
         given["split"] = "dev"
-    for name in ("pairs", "num_goals", "continuous", "context_size"):
+    for name in NOT_IN_EVALUATIONS[1:]:  # fresh mazes have a line of their own
         if (found := getattr(asked, name)) != (wanted := fields_of(Task)[name].default):
             raise InputError(f"expected {name} {wanted!r} in an evaluation, found {found!r}")
     if asked.fresh:
