@@ -29,6 +29,9 @@ _SAME = 0.04  # m between states that count as the same one
 _DRIVEN_WEIGHT = 0.3  # of a metre that was driven against one that is left
 _ARRIVED = -1e9  # added to the score of a state in the goal cell: lower than all others
 
+_STEPS_AHEAD, _WIDTH_AHEAD = 6, 2  # of the search that follows each first action in `costs_of_actions`
+_STEP_WAY = 0.5  # m at about the top speed; what a step is worth after which the goal is reached
+
 _State = np.dtype(
     [
         *((name, np.float64) for name in ("x", "y", "vx", "vy", "driven", "score")),  # m, m/s; low scores are good
@@ -87,6 +90,42 @@ def quickest_drive(
         index = state["parent"]
     actions, points = zip(*drive[::-1], strict=True)
     return list(actions), list(points)
+
+
+@compiled
+def costs_of_actions(
+    walls: np.ndarray, way_left: np.ndarray, goal: np.ndarray, cell_size: float, pose: np.ndarray, velocity: np.ndarray
+) -> np.ndarray:
+    """Returns `[B, 6]`: metres of way left after each action and the best steps that a narrow search finds after it.
+
+    Less is better; a goal that is reached early counts as less than no way. Only differences mean something.
+
+    Args:
+      walls: `[B, N, N]` bool, `Course.walls` of each body's course.
+      way_left: `[B, N * 5, N * 5]` float, `Course.way_left`.
+      goal: `[B, 2]` int, the goals' x and y in cells.
+      cell_size: m.
+      pose: `[B, 3]` float, x and y (m) and yaw (rad).
+      velocity: `[B, 2]` float, on the map, m/s.
+    """
+    costs = np.empty((len(pose), NUM_ACTIONS))
+    beams = np.zeros((_STEPS_AHEAD + 1, _WIDTH_AHEAD * (2 * _TURNS + 1)), _State)
+    for body in range(len(pose)):
+        course = Course(walls[body], cell_size, goal[body, 0], goal[body, 1], way_left[body])
+        for action in range(NUM_ACTIONS):
+            yaw = turned(pose[body, 2], (action == LOOK_LEFT) - (action == LOOK_RIGHT))
+            first = beams[0, 0]
+            first.x, first.y, first.vx, first.vy = moved(
+                course.walls, cell_size, pose[body, 0], pose[body, 1], velocity[body, 0], velocity[body, 1], yaw, action
+            )
+            first.driven, first.turns = 0.0, 0
+            last = 0
+            if int(first.x / cell_size) != course.goal_x or int(first.y / cell_size) != course.goal_y:
+                last = _search(course, yaw, beams)
+                costs[body, action] = beams[last, 0].score
+            if last == 0 or costs[body, action] < 0:
+                costs[body, action] = -_STEP_WAY * (_STEPS_AHEAD - last)
+    return costs
 
 
 @compiled

@@ -122,6 +122,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._around = np.full((2, num_envs), -1)  # maze and cell that the walls are around
         self._sensordata = self._batch.bind("sensordata")
         self._qpos = self._batch.bind("qpos")
+        self._qvel = self._batch.bind("qvel")
         self._ctrl = self._batch.bind("ctrl")
         self._marker = self._batch.bind("mocap_pos")
         self._top_camera: Cameras | None = None  # of `render`
@@ -295,6 +296,10 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         infos = self.rules.infos()
         mask = np.ones(self.num_envs, dtype=bool) if mask is None else mask
         return infos | {f"_{key}": mask for key in infos}
+
+    def velocity(self) -> np.ndarray:
+        """Returns the true velocities `[B, 2]` (x and y on the map, m/s), for labels; agents must not use them."""
+        return self._qvel[:, :2].copy()
 
     def render(self) -> tuple[np.ndarray, ...]:
         """Returns a picture `[480, 480, 3]` uint8 of each environment, seen from above."""

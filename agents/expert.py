@@ -1,0 +1,77 @@
+"""The expert: what each action is worth by the oracle's look-ahead, from the true state of training environments.
+
+Labels are made of the truth, which agents are not shown: they are for training, not for evaluations. `B` is the number
+of environments.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Sequence
+
+import numpy as np
+
+from mazebench.envs.vector import MazeVectorEnv
+from mazebench.maps.maze import Maze
+
+from .robot.quickest import costs_of_actions, make_course
+
+_experts: weakref.WeakKeyDictionary[MazeVectorEnv, Expert] = weakref.WeakKeyDictionary()
+
+
+def labels(envs: MazeVectorEnv, costs: bool = False) -> np.ndarray:
+    """Returns what the oracle would do now in each environment, whatever was done before.
+
+        >>> actions = mazebench_agents.expert.labels(envs)
+        >>> observation, reward, terminated, truncated, info = envs.step(actions)
+
+    Args:
+      envs: whose episodes are under way.
+      costs: whether to return the costs of all six actions.
+
+    Returns:
+      `[B]` int, the best actions; with `costs`, `[B, 6]` float: the way (m) that is left some steps after each of the
+      actions, less than 0 where the goal is reached by then. Only differences between actions mean something.
+    """
+    rules = envs.rules
+    if envs not in _experts:
+        _experts[envs] = Expert(envs.task_spec.all_mazes, envs.num_envs)
+    found = _experts[envs].costs(rules.maze, rules.target, rules.pose, envs.velocity())
+    return found if costs else found.argmin(axis=1)
+
+
+class Expert:
+    """Costs of actions in B environments; the ways to a goal are computed once for each leg."""
+
+    def __init__(self, mazes: Sequence[Maze], num_envs: int):
+        """Knows `mazes`, which have one size and one cell size."""
+        self._mazes = mazes
+        self._courses: list[tuple[int, int] | None] = [None] * num_envs  # maze and goal of each course
+        self._arrays: tuple[np.ndarray, ...] = ()  # walls, ways left and goals of the courses
+
+    def costs(self, maze: np.ndarray, goal: np.ndarray, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Returns the costs `[B, 6]` of the actions, in metres of way left; less is better.
+
+        Args:
+          maze: `[B]` int, index of the maze of each environment.
+          goal: `[B]` int, its goal as row * N + column.
+          pose: `[B, 3]` float, true x and y (m) and yaw (rad).
+          velocity: `[B, 2]` float, on the map, m/s.
+        """
+        for slot, course in enumerate(zip(maze.tolist(), goal.tolist(), strict=True)):
+            if self._courses[slot] != course:
+                self._courses[slot] = course
+                self._make_course(slot, *course)
+        walls, way_left, goals = self._arrays
+        cell_size = self._mazes[0].cell_size
+        return costs_of_actions(walls, way_left, goals, cell_size, pose, velocity)
+
+    def _make_course(self, slot: int, maze: int, goal: int) -> None:
+        walls = np.asarray(self._mazes[maze].walls)
+        course = make_course(walls, self._mazes[maze].cell_size, divmod(goal, len(walls)))
+        of_course = course.walls, course.way_left, np.array([course.goal_x, course.goal_y])
+        if not self._arrays:
+            num_envs = len(self._courses)
+            self._arrays = tuple(np.zeros((num_envs, *array.shape), array.dtype) for array in of_course)
+        for arrays, array in zip(self._arrays, of_course, strict=True):
+            arrays[slot] = array
