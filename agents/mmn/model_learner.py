@@ -30,7 +30,7 @@ class MMNLearner(HindsightLearner):
             torch.optim.AdamW(groups, lr=config.learning_rate, weight_decay=config.weight_decay),
             max_gradient_norm=config.max_gradient_norm,
             target_rate=config.target_rate,
-            constant_steps=config.constant_updates,
+            rate=lambda step: min(1.0, config.constant_updates / step),
         )
         super().__init__(actor, task, seed, descent, keep_anchor=True)
 

@@ -1,8 +1,4 @@
-"""The navigator: a classical robot that localizes itself, maps the walls that it senses, and plans again at each step.
-
-It senses walls by its lidar, or by touch where there is none. It measures lengths in cells. `L` is the number of cells
-on a side of its grid: the maze where the position is known, else a grid around the start.
-"""
+"""The navigator: a classical robot that plans over what it knows of walls and goal, and drives, anew at each step."""
 
 from __future__ import annotations
 
@@ -11,61 +7,25 @@ import pathlib
 from typing import Self
 
 import numpy as np
-from scipy import ndimage
 
 from mazebench.agent import Agent, Inputs, Interface
-from mazebench.errors import UnplayableError
-from mazebench.maps.maze import Cell, cell_to_point
-from mazebench.tasks.context import START
-from mazebench.world.ray_casting import LidarModel
+from mazebench.maps.maze import cell_to_point
 
-from ..robot.beams import beams_of
-from ..robot.body import LOOK_LEFT, LOOK_RIGHT, TURN_STEP, Body, observed_body
-from ..robot.cells import marked_cell, nearest_cell
-from ..robot.contacts import felt_walls
-from ..robot.dead_reckoning import DeadReckoning
+from ..robot.body import LOOK_LEFT
 from ..robot.driving import Drive
-from ..robot.map_matching import MapBelief
-from ..robot.map_reading import read_map
-from ..robot.occupancy import Occupancy
 from ..robot.pilot import steer
 from ..robot.planning import plan
-from ..robot.tracking import Tracker, aligned
+from ..robot.senses import Memory, Senses
 
 _BLOCKED = 0.35  # probability of a wall from which driving keeps clear of a cell off the path
-_MARK_OFF = 1.0  # cells, standard deviation of the goal from its marker, once it was not there
-# Cells, which are taken for 1 m wide: standard deviations of a position.
-_EXACT, _TRACKED, _RECKONED = 0.01, 0.03, 0.15  # that is observed, tracked by a lidar, or reckoned from noisy ones
-_GAIN = 0.03  # weight of a noisy position against the one that velocities tell
-_ROUNDING = 1e-4  # of positions as float32
 
 
 @dataclasses.dataclass
-class Memory:
-    """Everything that the navigator knows in one environment; all is on one grid."""
+class _Robot:
+    """The robot in one environment: what it knows, and the drive that is under way."""
 
-    belief: MapBelief  # of how the map lies on the grid
-    body: Body
-    deviation: float  # standard deviation of the body's position
-    tracker: Tracker | None = None  # where a lidar is needed to know the pose
-    dead_reckoning: DeadReckoning | None = None  # where observed positions are noisy
-    occupancy: Occupancy = dataclasses.field(init=False)  # what was seen or felt of the walls
-    prior: np.ndarray = dataclasses.field(init=False)  # [L, L] float, the probability of a wall by the map
-    goal: np.ndarray = dataclasses.field(init=False)  # [L, L] float, the probability of the goal by the map
-    searched: np.ndarray = dataclasses.field(init=False)  # [L, L] bool, cells without the goal: the body was in them
-    drive: Drive = dataclasses.field(default_factory=Drive)  # the one that is under way
-    commanded: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(3))  # the pose after the last action
-    action: int = LOOK_LEFT  # the last one
-
-    def __post_init__(self) -> None:
-        self.prior, self.goal = self.belief.mixture()
-        self.occupancy = Occupancy.unseen(len(self.prior))
-        self.searched = np.zeros(self.prior.shape, dtype=bool)
-
-    @property
-    def cell(self) -> Cell:
-        """The cell of the body."""
-        return nearest_cell(self.body.x, self.body.y, len(self.searched))
+    memory: Memory
+    drive: Drive = dataclasses.field(default_factory=Drive)
 
 
 class Navigator(Agent):
@@ -73,12 +33,7 @@ class Navigator(Agent):
 
     def __init__(self, interface: Interface):
         """Acts in the environments of the interface, with their lidar if they have one."""
-        if interface.context_size < interface.size:
-            raise UnplayableError("agent 'navigator': expected maps of at least a pixel per cell, found fewer")
-        self._size, self._cell_size = interface.size, interface.cell_size
-        self._odometry_noise = interface.odometry_noise
-        self._has_lidar = "lidar" in interface.sensors
-        self._beams = beams_of(interface.lidar or LidarModel(), 1 / self._cell_size)
+        self._senses, self._cell_size = Senses(interface, "navigator"), interface.cell_size
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
@@ -90,131 +45,36 @@ class Navigator(Agent):
         """Returns N: the map at full resolution."""
         return size
 
-    def initial_state(self, batch_size: int) -> list[Memory | None]:
-        """Returns no memories yet: one is made where an episode begins."""
+    def initial_state(self, batch_size: int) -> list[_Robot | None]:
+        """Returns no robots yet: one is made where an episode begins."""
         return [None] * batch_size
 
     def act(
-        self, inputs: Inputs, state: list[Memory | None], explore: bool = False
-    ) -> tuple[np.ndarray, list[Memory | None]]:
+        self, inputs: Inputs, state: list[_Robot | None], explore: bool = False
+    ) -> tuple[np.ndarray, list[_Robot | None]]:
         """Returns actions `[B]`, for one environment after the other."""
         actions = np.zeros(len(state), dtype=np.int64)
-        for slot, memory in enumerate(state):
+        for slot, robot in enumerate(state):
             if inputs.active is None or inputs.active[slot]:
-                state[slot] = known = self._observe(memory, inputs, slot)
-                actions[slot] = self._command(known)
+                memory = self._senses.observe(robot.memory if robot else None, inputs, slot)
+                if robot is None or robot.memory is not memory:
+                    robot = state[slot] = _Robot(memory)
+                actions[slot] = self._command(robot)
         return actions, state
 
-    def _observe(self, memory: Memory | None, inputs: Inputs, slot: int) -> Memory:
-        """Returns the memory after an observation in environment `slot`; a new one where an episode begins."""
-        observed = observed_body(inputs.observation["state"][slot].tolist(), 1 / self._cell_size)
-        context, ranges = inputs.observation["context"][slot], None
-        if self._has_lidar:
-            metres = inputs.observation["lidar"][slot].astype(np.float64)
-            ranges = np.minimum(metres / self._cell_size, self._beams.reach)
-
-        if memory is None or inputs.new_episode[slot]:
-            memory = self._begin(context, observed, ranges)
-        else:
-            if inputs.new_context[slot]:
-                self._begin_leg(memory, context)
-            self._localize(memory, observed, ranges)
-        self._map(memory, ranges)
-        return memory
-
-    def _begin(self, context: np.ndarray, observed: Body, ranges: np.ndarray | None) -> Memory:
-        """Returns the memory at an episode's first observation, before the walls that are sensed are added."""
-        # An episode begins in the centre of a cell. Zero is odometry; any other position is a noisy one.
-        off_centre = max(abs(coordinate % 1.0 - 0.5) for coordinate in (observed.x, observed.y))
-        start = (observed.x, observed.y) if off_centre < _ROUNDING else None
-        reading, odometry = read_map(context, self._size), _pose(observed)
-        if start is not None:
-            # The grid is the maze. A start that is known but not marked says that the map may lie in any way.
-            num_turns = 1 if context[START].any() else 8
-            belief = MapBelief.begin(reading.walls, reading.goal, num_turns, None, self._size)
-            if ranges is None or self._odometry_noise == 0:
-                return Memory(belief, observed, _EXACT)
-            return Memory(belief, observed, _TRACKED, Tracker(odometry, odometry, self._odometry_noise))
-        if ranges is None:
-            # The grid is the maze, and the start is where it is marked.
-            x, y = cell_to_point(marked_cell(reading.start), self._size).tolist()
-            belief = MapBelief.begin(reading.walls, reading.goal, 1, None, self._size)
-            dead_reckoning = DeadReckoning((x, y), observed.velocity(), _GAIN)
-            return Memory(belief, observed._replace(x=x, y=y), _RECKONED, None, dead_reckoning)
-
-        # The grid has the start in its middle, and the axes of the maze or of the first scan.
-        size, reckoning = 2 * self._size - 1, None
-        if odometry.any():
-            pose, num_turns = np.array([size / 2, size / 2, observed.yaw]), 1
-            reckoning = DeadReckoning((observed.x, observed.y), observed.velocity())
-        else:
-            pose, num_turns = aligned(size, ranges, self._beams), 8
-        belief = MapBelief.begin(reading.walls, reading.goal, num_turns, reading.start, size)
-        x, y, yaw = pose.tolist()
-        tracker = Tracker(pose, odometry, self._odometry_noise)
-        return Memory(belief, observed._replace(x=x, y=y, yaw=yaw), _TRACKED, tracker, reckoning)
-
-    def _begin_leg(self, memory: Memory, context: np.ndarray) -> None:
-        """Takes in the map and the goal of another leg."""
-        reading = read_map(context, self._size)
-        memory.belief = memory.belief.on_leg(reading.walls, reading.goal)
-        memory.prior, memory.goal = memory.belief.mixture()
-        memory.searched[:] = False
-
-    def _localize(self, memory: Memory, observed: Body, ranges: np.ndarray | None) -> None:
-        """Takes in the body as it is observed one step on; without a lidar, a wall has stopped it if it is slow."""
-        before, body = memory.body, observed
-        if memory.dead_reckoning is not None:
-            body = memory.dead_reckoning.update(observed)
-        if memory.tracker is not None and ranges is not None:
-            walls = memory.occupancy.seen_walls()
-            memory.tracker.update(walls, _pose(body), memory.commanded, ranges, self._beams)
-            body = memory.tracker.body(observed)
-        memory.body = body
-        if ranges is None:
-            off, size = memory.deviation * self._cell_size, len(memory.searched)
-            for cell, log_odds in felt_walls(before, memory.action, body, self._cell_size, off, size):
-                memory.occupancy.feel(cell, log_odds)
-
-    def _map(self, memory: Memory, ranges: np.ndarray | None) -> None:
-        """Takes in that the body is where it is, and a scan `[R]` if there is one; compares both with the map."""
-        body, deviation = memory.body, memory.deviation
-        if ranges is not None:
-            memory.occupancy.see((body.x, body.y, body.yaw), ranges, self._beams, deviation)
-        # The episode would have ended in the goal. Near a cell's border, the body may be in another one.
-        off_x, off_y = (abs(coordinate % 1.0 - 0.5) for coordinate in (body.x, body.y))
-        if max(off_x, off_y) < 0.5 - 2 * deviation:
-            memory.searched[memory.cell] = True
-            if ranges is None:
-                memory.occupancy.visit(memory.cell)
-        if memory.belief.update(memory.occupancy.evidence, memory.searched):
-            memory.prior, memory.goal = memory.belief.mixture()
-
-    def _command(self, memory: Memory) -> int:
+    def _command(self, robot: _Robot) -> int:
         """Returns the next action, and remembers it."""
-        # The map counts as much as it has proved right. The goal is in no cell that was searched, nor in a seen wall.
-        walls = memory.occupancy.walls(memory.prior)
-        is_closed = memory.occupancy.is_seen() & (walls > 0.5)
-        is_possible = ~(memory.searched | is_closed)
-        goal = memory.goal * is_possible
-        if not goal.any():
-            goal = ndimage.gaussian_filter(memory.goal, _MARK_OFF, mode="constant") * is_possible
-        path = plan(np.where(is_closed, 1.0, walls), goal, memory.cell) if goal.any() else []
+        memory, body = robot.memory, robot.memory.body
+        walls, goal = memory.estimate()
+        path = plan(walls, goal, memory.cell) if goal.any() else []
 
         # It drives along the path, and waits where there is none.
-        body = memory.body
         action, point = LOOK_LEFT, body.rest()
         if len(path) == 1:
             action = steer(body, tuple(cell_to_point(path[0], len(walls)).tolist()))
         elif path:
             blocked = walls > _BLOCKED
             blocked[tuple(np.transpose(path))] = False
-            action, point = memory.drive.next(blocked, path, body, self._cell_size)
-        turn = TURN_STEP * ((action == LOOK_LEFT) - (action == LOOK_RIGHT))
-        memory.commanded, memory.action = np.array([*point, body.yaw + turn]), action
+            action, point = robot.drive.next(blocked, path, body, self._cell_size)
+        memory.command(action, point)
         return action
-
-
-def _pose(body: Body) -> np.ndarray:
-    """Returns x, y and yaw as `[3]` float."""
-    return np.array([body.x, body.y, body.yaw])

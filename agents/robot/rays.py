@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..common.kernels import inlined
+from ..common.kernels import compiled, inlined
 
 _SMALLEST = 1e-12  # instead of a direction's component of 0
 
@@ -65,3 +65,24 @@ def in_next_cell(ray: Ray) -> Ray:
 def is_on(ray: Ray, grid: np.ndarray) -> bool:
     """Returns whether the ray's cell is one of `grid` `[N, N]`."""
     return 0 <= ray.column < len(grid) and 0 <= ray.level < len(grid)
+
+
+@compiled
+def ranges_to(is_wall: np.ndarray, x: float, y: float, yaw: float, count: int, reach: float) -> np.ndarray:
+    """Returns `[count]`: the lengths, at most `reach`, of rays from (x, y) to the walls of a grid `[L, L]` bool.
+
+    The first ray points along `yaw`, the others follow counter-clockwise. There are no walls outside of the grid.
+    """
+    ranges = np.full(count, reach)
+    for index in range(count):
+        angle = yaw + index * (2 * math.pi / count)
+        ray = ray_from(x, y, math.cos(angle), math.sin(angle))
+        while leaves_at(ray) < reach:
+            length = leaves_at(ray)
+            ray = in_next_cell(ray)
+            if not is_on(ray, is_wall):
+                break
+            if is_wall[len(is_wall) - 1 - ray.level, ray.column]:
+                ranges[index] = length
+                break
+    return ranges

@@ -27,8 +27,9 @@ from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
 from mazebench.tasks.task import TRAIN_DISTANCES, Task
-from mazebench.training.experience import Collector
+from mazebench.training.loop import num_updates_due
 from mazebench.training.protocol import LearningAgent
+from mazebench.training.sources import Player
 from mazebench.world.backend import RenderingError
 from mazebench.world.batch import open_batch
 from mazebench.world.mjcf import action_controls
@@ -224,16 +225,24 @@ def _training_row(name: str, agent_class: Any, spec: Task, seconds: float) -> di
         learner = agent_class.build_learner(spec, overrides={"num_envs": "256"})
     except InputError:  # it calls its number of environments by another name, or has none
         learner = agent_class.build_learner(spec)
-    collector = Collector(spec, learner.num_envs, seed=0)
-    learner.actor.explore_from(0, learner.num_envs, seed=0)
-    state = learner.actor.initial_state(learner.num_envs)
-    count, begin = 0, time.perf_counter()
-    while (collecting := time.perf_counter() - begin) < seconds or learner.num_rows < learner.min_rows:
-        actions, state = learner.actor.act(collector.inputs, state, explore=True)
-        learner.observe(collector.step(actions))
-        count += learner.num_envs
-    collecting /= count  # seconds a step
-    learning = 1 / (_rate(lambda _: learner.update(), 1, seconds) * learner.steps_per_update)
+    player = Player([spec], learner.actor, learner.num_envs)
+    player.restart(seed=0)
+    steps = updates = 0
+    collecting = learning = 0.0  # seconds
+    while collecting < seconds or learning < seconds or updates == 0:
+        begin = time.perf_counter()
+        for first_env, experience in player.play():
+            learner.observe(experience, first_env)
+            steps += len(experience.action)
+        collecting += time.perf_counter() - begin
+        due = num_updates_due(learner, steps)
+        begin = time.perf_counter()
+        while updates < due and (learning < seconds or updates == 0):
+            learner.update()
+            updates += 1
+        learning += time.perf_counter() - begin
+    collecting /= steps  # seconds a step
+    learning /= updates * learner.steps_per_update
     return {
         "what": f"{name}, {learner.num_envs} envs",
         "collected steps/s": round(1 / collecting),

@@ -103,6 +103,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
         # The episodes, and what was observed of them last: [B, ...] by name.
         self._episode_source = episode_source
+        self._drawn_task = task_spec  # whose episodes are drawn
         self._rngs = [np.random.default_rng(value) for value in _seeds(seed, num_envs)]
         self.rules = Rules(task_spec, num_envs)
         self.episodes = self.rules.episodes
@@ -260,7 +261,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
             if self._episode_source:
                 self.rules.begin(i, self._episode_source(i))
             else:
-                self.rules.begin(i, sample_episode(self.task_spec, self._rngs[i]))
+                self.rules.begin(i, sample_episode(self._drawn_task, self._rngs[i]))
         self._ended[indices] = False
         began = indices[self.rules.active[indices]]
         if not len(began):
@@ -296,6 +297,14 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         infos = self.rules.infos()
         mask = np.ones(self.num_envs, dtype=bool) if mask is None else mask
         return infos | {f"_{key}": mask for key in infos}
+
+    def draw_distances(self, distances: Sequence[int]) -> None:
+        """Draws episodes with goals at these distances (cells) from now on; those under way are not changed.
+
+        Raises:
+          InputError: if distances are not allowed, or no maze has them.
+        """
+        self._drawn_task = self.task_spec.replace(distances=tuple(distances))
 
     def velocity(self) -> np.ndarray:
         """Returns the true velocities `[B, 2]` (x and y on the map, m/s), for labels; agents must not use them."""

@@ -14,8 +14,8 @@ from typing import Any
 
 from mazebench.errors import InputError, RunError
 from mazebench.tasks.task import Task
-from mazebench.training.experience import Collector, Experience
-from mazebench.training.protocol import Learner, LearningAgent
+from mazebench.training.protocol import Learner
+from mazebench.training.sources import Pieces, Player
 
 try:
     import ray
@@ -31,36 +31,20 @@ _MAX_FAILURES = 20  # of actors, before the run gives up
 _logger = logging.getLogger("mazebench.training")
 
 
-class _Player:
+class _Player(Player):
     """Plays in its share of the environments, in a process of its own."""
 
-    def __init__(self, task_spec: Task, actor: LearningAgent, first_env: int, num_envs: int):
-        self._collector = Collector(task_spec, num_envs, seed=0, num_threads=1)
-        self._actor = actor
-        self._first_env = first_env
-        self._state: Any = actor.initial_state(num_envs)
-
-    def restart(self, seed: int) -> None:
-        """Begins new trajectories everywhere, and a new stream of exploration."""
-        self._collector.restart(seed)
-        self._actor.explore_from(self._first_env, self._collector.num_envs, seed)
-        self._state = self._actor.initial_state(self._collector.num_envs)
-
-    def play(self, parameters: dict[str, Any] | None) -> list[Experience]:
+    def play_on(self, parameters: dict[str, Any] | None) -> Pieces:
         """Takes some steps, with new `parameters` if there are any."""
         if parameters is not None:
-            self._actor.set_parameters(parameters)
-        experiences = []
-        for _ in range(_STEPS_PER_CALL):
-            experience, self._state = self._collector.play(self._actor, self._state)
-            experiences.append(experience)
-        return experiences
+            self.set_parameters(parameters)
+        return [piece for _ in range(_STEPS_PER_CALL) for piece in self.play()]
 
 
 class RaySource:
     """Experience of Ray actors in the order in which it arrives; an actor that dies is replaced."""
 
-    def __init__(self, task_spec: Task, learner: Learner, workers: int, address: str | None):
+    def __init__(self, tasks: Sequence[Task], learner: Learner, workers: int, address: str | None):
         """Connects to the cluster at `address`, None starts a local one; `collect` starts the actors.
 
         Raises:
@@ -77,15 +61,16 @@ class RaySource:
         if num_cpus < workers:
             self.__exit__()
             raise InputError(f"expected at most {num_cpus} workers, one a CPU of the cluster, found {workers}")
-        self._learner, self._task_spec = learner, task_spec
+        self._learner, self._tasks = learner, tasks
         bounds = [worker * learner.num_envs // workers for worker in range(workers + 1)]
         self._shares = list(itertools.pairwise(bounds))
         self._players = [None] * workers
         self._calls: dict[Any, int] = {}  # the worker's index, by the awaited answer
         self._num_answers = [0] * workers
         self._num_failures = self._seed = 0
+        self._longest: int | None = None  # distance of goals, if it is limited
 
-    def collect(self, seed: int) -> Iterator[Sequence[tuple[int, Experience]]]:
+    def collect(self, seed: int) -> Iterator[Pieces]:
         """Begins new trajectories in all actors, and yields the steps of one actor after another."""
         self._seed = seed
         self._calls = {}  # answers still awaited are of older trajectories
@@ -97,24 +82,33 @@ class RaySource:
         while True:
             yield self._next_answer()
 
-    def _next_answer(self) -> Sequence[tuple[int, Experience]]:
+    def _next_answer(self) -> Pieces:
         """Waits for the steps of one actor, and lets that actor go on; none where the actor died and was replaced."""
         done, _ = ray.wait(list(self._calls), num_returns=1)
         worker = self._calls.pop(done[0])
         try:
-            experiences = ray.get(done[0])
+            pieces: Pieces = ray.get(done[0])
         except ray.exceptions.RayActorError as error:
             self._replace(worker, error)
             return []
         self._num_answers[worker] += 1
         self._play(worker, publish=self._num_answers[worker] % _CALLS_PER_PUBLISH == 0)
-        return [(self._shares[worker][0], experience) for experience in experiences]
+        return pieces
+
+    def limit_distances(self, longest: int) -> None:
+        """Sends the agent to goals at most so many cells away from now on."""
+        self._longest = longest
+        for player in self._players:
+            if player is not None:
+                player.limit_distances.remote(longest)
 
     def _start(self, worker: int) -> None:
-        first_env, end = self._shares[worker]
         player = ray.remote(num_cpus=1)(_Player)
         actor = copy.deepcopy(self._learner.actor)
-        self._players[worker] = player.remote(self._task_spec, actor, first_env, end - first_env)
+        num_envs = self._learner.num_envs
+        self._players[worker] = player.remote(self._tasks, actor, num_envs, self._shares[worker], num_threads=1)
+        if self._longest is not None:
+            self._players[worker].limit_distances.remote(self._longest)
         self._begin(worker)
 
     def _begin(self, worker: int) -> None:
@@ -123,7 +117,7 @@ class RaySource:
 
     def _play(self, worker: int, publish: bool) -> None:
         parameters = self._learner.actor.parameters() if publish else None
-        self._calls[self._players[worker].play.remote(parameters)] = worker
+        self._calls[self._players[worker].play_on.remote(parameters)] = worker
 
     def _replace(self, worker: int, error: Exception) -> None:
         self._num_failures += 1

@@ -5,13 +5,16 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mazebench.agent import Agent, Inputs, Observation
+from mazebench.agent import Inputs, Observation
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.tasks.task import Task
+
+if TYPE_CHECKING:
+    from mazebench.training.protocol import LearningAgent
 
 _SEEDS = 2**31
 
@@ -19,31 +22,36 @@ _SEEDS = 2**31
 class Experience(NamedTuple):
     """One agent step in B environments.
 
-    It holds neither rewards nor ends of episodes: both follow from the cells, for any goal that a step is learned from.
+    Rewards and ends are those of the goal that the agent was sent to; for another goal, they follow from the cells.
     """
 
     state: np.ndarray  # [B, 12] float32, observed before the step
     action: np.ndarray  # [B] int
     cell: np.ndarray  # [B] int, the body's true cell before the step
+    pose: np.ndarray  # [B, 3] float64, its true x and y (m) and yaw (rad)
     new_episode: np.ndarray  # [B] bool, whether a trajectory begins with this step
     new_context: np.ndarray  # [B] bool, whether a trajectory or the leg to another goal begins with this step
     maze: np.ndarray  # [B] int, index among the task's mazes
     start: np.ndarray  # [B] int, the cell where the leg started
     goal: np.ndarray  # [B] int, the cell where the leg leads
+    reward: np.ndarray  # [B] float, for the step
+    terminated: np.ndarray  # [B] bool, whether the step reached the goal
     ended: np.ndarray  # [B] bool, whether the trajectory ends with this step
     final_state: np.ndarray  # [B, 12] float32, observed after the step where it ended; undefined elsewhere
     final_cell: np.ndarray  # [B] int, likewise
     context: np.ndarray  # [B, 4, M, M] float32, observed before the step
     sensors: Observation  # [B, ...] by the sensor's name, observed before the step
     final_sensors: Observation  # observed after the step where the trajectory ended; undefined elsewhere
+    task: Task  # that was played
+    notes: Any  # what the agent's `notes` returned
 
 
 class Collector:
     """Runs an exploring agent in B environments without end, and returns what it experiences."""
 
     def __init__(self, task_spec: Task, num_envs: int, seed: int, num_threads: int = 0):
+        self._task = task_spec
         self._any_maze = task_spec.all_mazes[0]  # all have one size and one cell size
-        self._sensors = task_spec.sensors
         self._env = MazeVectorEnv(task_spec, num_envs, num_threads=num_threads)
         self.restart(seed)
 
@@ -63,34 +71,44 @@ class Collector:
         """B."""
         return self._env.num_envs
 
-    def play(self, agent: Agent, state: Any) -> tuple[Experience, Any]:
+    def limit_distances(self, longest: int) -> None:
+        """Sends the agent to goals at most so many cells away from now on, or to the nearest of the task's."""
+        distances = self._task.distances
+        self._env.draw_distances([each for each in distances if each <= longest] or [min(distances)])
+
+    def play(self, agent: LearningAgent, state: Any) -> tuple[Experience, Any]:
         """Takes the step that the exploring `agent` chooses in its `state`; returns the agent's next state, too."""
         actions, state = agent.act(self.inputs, state, explore=True)
-        return self.step(actions), state
+        return self.step(actions, agent.notes(state)), state
 
-    def step(self, action: np.ndarray) -> Experience:
+    def step(self, action: np.ndarray, notes: Any = None) -> Experience:
         """Takes `action` `[B]` for the current `inputs`, which those of the next step replace."""
         now, rules = self.inputs, self._env.rules
-        cell = rules.cell.copy()
+        cell, pose = rules.cell.copy(), rules.pose.copy()
         before = (now.new_episode, now.new_context, self._maze, rules.start.copy(), rules.target.copy())
-        observation, _, terminated, truncated, infos = self._env.step(action)
+        observation, reward, terminated, truncated, infos = self._env.step(action)
         ended = terminated | truncated
         seeds = now.seed.copy()
         seeds[ended] = self._agent_seeds.integers(_SEEDS, size=int(ended.sum()))
         self.inputs = Inputs(observation, ended, infos["is_first"], seeds)
         self._maze = infos["maze"]
-        final = {name: self._final(name, infos, ended) for name in ("state", *self._sensors)}
+        final = {name: self._final(name, infos, ended) for name in ("state", *self._task.sensors)}
         return Experience(
             now.observation["state"],
             action,
             cell,
+            pose,
             *before,
+            reward,
+            terminated,
             ended,
             final["state"],
             self._final_cells(infos, ended),
             now.observation["context"],
-            {name: now.observation[name] for name in self._sensors},
-            {name: final[name] for name in self._sensors},
+            {name: now.observation[name] for name in self._task.sensors},
+            {name: final[name] for name in self._task.sensors},
+            self._task,
+            notes,
         )
 
     def _final(self, name: str, infos: dict[str, Any], ended: np.ndarray) -> np.ndarray:

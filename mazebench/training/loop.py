@@ -27,11 +27,10 @@ from mazebench.results.played import mazes_hash
 from mazebench.tasks.task import Task, check_names, check_shown
 from mazebench.tasks.task_fields import TaskOptions
 from mazebench.training.counters import Counters
-from mazebench.training.experience import Experience
 from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.protocol import Learner, LearningAgent
 from mazebench.training.run_folder import RunFolder, read_counters
-from mazebench.training.sources import InProcessSource, Source
+from mazebench.training.sources import InProcessSource, Pieces, Source
 from mazebench.training.status import Progress, Timer, in_words
 from mazebench.training.train_options import FIXED, TrainOptions
 
@@ -59,6 +58,9 @@ def train(
     checkpoint_steps: int = 200_000,
     checkpoint_minutes: float = 5.0,
     eval_mazes: int = 20,
+    also: Sequence[str] = (),
+    first_distance: int | None = None,
+    widen_steps: int = 400_000,
     workers: int = 0,
     ray_address: str | None = None,
     resume: bool = False,
@@ -83,6 +85,9 @@ def train(
       checkpoint_steps: agent steps between milestones.
       checkpoint_minutes: minutes between savepoints; 0 for none.
       eval_mazes: held-out mazes of an evaluation.
+      also: tracks to train in besides `task`.
+      first_distance: cells that goals are away at most in the beginning; None for all distances.
+      widen_steps: agent steps over which that grows to the farthest distance of the task.
       workers: Ray actors that collect; 0 collects in this process.
       ray_address: of a Ray cluster for the workers.
       resume: go on from the last checkpoint in `out`.
@@ -102,6 +107,9 @@ def train(
         checkpoint_steps=checkpoint_steps,
         checkpoint_minutes=checkpoint_minutes,
         eval_mazes=eval_mazes,
+        also=tuple(also),
+        first_distance=first_distance,
+        widen_steps=widen_steps,
         workers=workers,
         ray_address=ray_address,
     )
@@ -120,13 +128,18 @@ def run_training(
     if not issubclass(agent_class, LearningAgent):
         raise InputError(f"agent {options.agent!r} doesn't learn; agents that do: {', '.join(learning_agents())}")
     overrides = dict(options.overrides)
-    task = training_task(options.agent, agent_class, agent_class.task_options(overrides), task_options)
-    learner = agent_class.build_learner(task, seed=options.seed, overrides=overrides)
-    held_out = HeldOutEvaluation(task, options.eval_mazes, task_options.get("distances") or ())
+    if options.also and not agent_class.learns_several_tasks:
+        raise InputError(f"agent {options.agent!r}: learns one task at a time, found --also {options.also[0]}")
+    all_options = [task_options, *(task_options | {"task": track, "track": track} for track in options.also)]
+    tasks = [
+        training_task(options.agent, agent_class, agent_class.task_options(overrides), each) for each in all_options
+    ]
+    learner = agent_class.build_learner(tasks[0], seed=options.seed, overrides=overrides)
+    held_out = [HeldOutEvaluation(task, options.eval_mazes, task_options.get("distances") or ()) for task in tasks]
     # The source comes first: if the cluster can't be reached, no run is begun.
-    with open_source(options, task, learner) as source:
+    with open_source(options, tasks, learner) as source:
         folder = RunFolder(out)
-        counters = _begin_or_resume(options, folder, learner, task, resume)
+        counters = _begin_or_resume(options, folder, learner, tasks, resume)
         if options.env_steps is not None and counters.env_steps >= options.env_steps and counters.is_milestone:
             _logger.info("%s: the run is finished, at %s steps", out, f"{counters.env_steps:,}")
             return
@@ -135,7 +148,7 @@ def run_training(
         elif resume:
             _logger.info("nothing to resume in %s; starting a new run", out)
         _logger.info("%s: %s", options.agent, learner.description())
-        TrainingLoop(options, folder, learner, task, source, held_out, counters, progress).run()
+        TrainingLoop(options, folder, learner, tasks, source, held_out, counters, progress).run()
 
 
 @dataclasses.dataclass
@@ -145,15 +158,16 @@ class TrainingLoop:
     _options: TrainOptions
     _folder: RunFolder
     _learner: Learner
-    _task: Task
+    _tasks: Sequence[Task]
     _source: Source
-    _held_out: HeldOutEvaluation
+    _held_out: Sequence[HeldOutEvaluation]  # of each task
     _counters: Counters
     _progress: Progress
 
     def __post_init__(self) -> None:
         self._timer = Timer(self._options.minutes, self._options.env_steps, self._counters)
         self._saved_steps, self._saved_time = self._counters.env_steps, time.monotonic()
+        self._longest = 0  # distance of goals now, where it grows
 
     def run(self) -> None:
         """Trains until the time or the steps are up; the last step is a milestone."""
@@ -166,6 +180,7 @@ class TrainingLoop:
 
     def _train_until(self, env_steps: int) -> None:
         # New trajectories, so that a run that is resumed from this milestone goes on as the unbroken one did.
+        self._widen()
         seeds = np.random.SeedSequence((self._options.seed, self._counters.env_steps))
         source = self._source.collect(int(seeds.generate_state(1)[0]))
         while self._counters.env_steps < env_steps and not self._is_over():
@@ -174,12 +189,22 @@ class TrainingLoop:
                 self._folder.log(self._counters, self._counters.mean_losses())
                 self._counters = self._counters.after_line()
             self._learn_from(next(source))
+            self._widen()
             self._progress(self._timer.status(self._counters))
             if self._is_savepoint_due():
                 self._save()
             stopping.check()
 
-    def _learn_from(self, pieces: Sequence[tuple[int, Experience]]) -> None:
+    def _widen(self) -> None:
+        """Sends the agent farther as the run goes on, if goals are near in the beginning."""
+        if self._options.first_distance is None:
+            return
+        longest = longest_distance(self._options, self._tasks, self._counters.env_steps)
+        if longest != self._longest:
+            self._longest = longest
+            self._source.limit_distances(longest)
+
+    def _learn_from(self, pieces: Pieces) -> None:
         """Stores experience, each piece with the index of its first environment, and makes the updates due."""
         for first_env, experience in pieces:
             self._learner.observe(experience, first_env)
@@ -207,15 +232,20 @@ class TrainingLoop:
     def _save(self) -> None:
         """Saves a checkpoint, unless the last one is of this very step: a source may have brought no experience."""
         if self._counters.env_steps != self._saved_steps:
-            _save(self._options, self._folder, self._learner, self._task, self._counters)
+            _save(self._options, self._folder, self._learner, self._tasks, self._counters)
         self._saved_steps, self._saved_time = self._counters.env_steps, time.monotonic()
 
     def _reach_milestone(self) -> None:
         """Saves, evaluates, and logs; a run that is stopped in the evaluation repeats it when it is resumed."""
         counters, status = self._counters, self._timer.status(self._counters)
         self._save()
-        rates = self._held_out.success_rates(self._learner.actor, self._show_evaluation)
-        metrics = counters.mean_losses() | {f"success_rate_{distance}": rate for distance, rate in rates.items()}
+        metrics = counters.mean_losses()
+        for held_out in self._held_out:
+            several = len(self._held_out) > 1
+            actor = self._learner.actor.in_task(held_out.task) if several else self._learner.actor
+            rates = held_out.success_rates(actor, self._show_evaluation)
+            name = f"{held_out.task.track or 'local'}_success_rate" if several else "success_rate"
+            metrics |= {f"{name}_{distance}": rate for distance, rate in rates.items()}
         self._folder.make_milestone(counters, metrics)
         self._counters = counters.at_milestone()
         _logger.info("%s: %s", status.summary, in_words(metrics))
@@ -234,6 +264,12 @@ def num_updates_due(learner: Learner, env_steps: int) -> int:
     if learner.num_rows < learner.min_rows:
         return 0
     return max(0, env_steps - learner.min_rows) // learner.steps_per_update
+
+
+def longest_distance(options: TrainOptions, tasks: Sequence[Task], env_steps: int) -> int:
+    """Returns how many cells goals are away at most after `env_steps` agent steps, where that grows with them."""
+    first, last = options.first_distance or 1, max(max(task.distances) for task in tasks)
+    return max(first, min(last, first + int((last - first) * env_steps / options.widen_steps)))
 
 
 def training_task(
@@ -265,22 +301,24 @@ def training_task(
     return task
 
 
-def open_source(options: TrainOptions, task: Task, learner: Learner) -> Source:
+def open_source(options: TrainOptions, tasks: Sequence[Task], learner: Learner) -> Source:
     """Returns where experience comes from: this process, or the workers of `options` on Ray.
 
     Raises:
       InputError: if workers are wanted, and Ray is not installed or its cluster can't be reached.
     """
     if not options.workers:
-        return InProcessSource(task, learner.actor, learner.num_envs)
+        return InProcessSource(tasks, learner.actor, learner.num_envs)
     from mazebench.training.distributed import RaySource
 
-    return RaySource(task, learner, options.workers, options.ray_address)
+    return RaySource(tasks, learner, options.workers, options.ray_address)
 
 
-def _begin_or_resume(options: TrainOptions, folder: RunFolder, learner: Learner, task: Task, resume: bool) -> Counters:
+def _begin_or_resume(
+    options: TrainOptions, folder: RunFolder, learner: Learner, tasks: Sequence[Task], resume: bool
+) -> Counters:
     """Saves the first checkpoint of a new run, or loads the last one into `learner`; returns where the run is."""
-    config = _origin(options, task) | {
+    config = _origin(options, tasks) | {
         "checkpoint_steps": options.checkpoint_steps,
         "agent_config": learner.config(),
     }
@@ -289,7 +327,7 @@ def _begin_or_resume(options: TrainOptions, folder: RunFolder, learner: Learner,
         raise InputError(f"{folder.path}: holds a run already; go on with --resume or name another folder")
     folder.check_config(config)
     if not checkpoints:
-        _save(options, folder, learner, task, Counters())
+        _save(options, folder, learner, tasks, Counters())
         return Counters()
     counters = read_counters(checkpoints[-1])
     learner.load(checkpoints[-1])
@@ -297,17 +335,25 @@ def _begin_or_resume(options: TrainOptions, folder: RunFolder, learner: Learner,
     return counters
 
 
-def _save(options: TrainOptions, folder: RunFolder, learner: Learner, task: Task, counters: Counters) -> None:
+def _save(
+    options: TrainOptions, folder: RunFolder, learner: Learner, tasks: Sequence[Task], counters: Counters
+) -> None:
     provenance = {
         "env_steps": counters.env_steps,
         "updates": counters.updates,
         "agent_code_sha256": code_hash(options.agent, type(learner.actor)),
-        **_origin(options, task),
+        **_origin(options, tasks),
     }
     folder.save_checkpoint(counters, lambda path: learner.save(path, provenance))
 
 
-def _origin(options: TrainOptions, task: Task) -> dict[str, Any]:
-    """Returns what is trained, and in which task."""
+def _origin(options: TrainOptions, tasks: Sequence[Task]) -> dict[str, Any]:
+    """Returns what is trained, and in which tasks."""
+    task, *others = tasks
     values = task.to_json() | {"mazes": None if task.mazes is None else {"sha256": mazes_hash(task)}}
-    return {"agent": options.agent, "size": task.size, "task": values, "seed": options.seed}
+    origin = {"agent": options.agent, "size": task.size, "task": values, "seed": options.seed}
+    if others:
+        origin["also"] = [other.track for other in others]
+    if options.first_distance is not None:
+        origin |= {"first_distance": options.first_distance, "widen_steps": options.widen_steps}
+    return origin

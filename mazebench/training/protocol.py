@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pathlib
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
@@ -24,6 +24,9 @@ class LearningAgent(Agent):
     """
 
     learns = True
+    learns_several_tasks: ClassVar[bool] = (
+        False  # whether it can be trained in the environments of several tasks at once
+    )
 
     @classmethod
     def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:
@@ -53,6 +56,17 @@ class LearningAgent(Agent):
             because its network does not take a sensor, say, or it needs exact maps.
         """
         raise NotImplementedError
+
+    def in_task(self, task: Task) -> Self:
+        """Returns the agent for the environments of `task`, one of several that it is trained in at once.
+
+        What is learned is shared with this agent. By default it is this agent.
+        """
+        return self
+
+    def notes(self, state: Any) -> Any:
+        """Returns what the learner needs of the step that was chosen last in `state`, such as probabilities."""
+        return None
 
     def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
         """Begins a new stream of exploration, as the environments from `first_env` on of the learner's."""

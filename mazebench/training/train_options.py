@@ -8,7 +8,8 @@ from typing import Annotated
 from annotated_types import Ge, Interval
 
 from mazebench.errors import InputError
-from mazebench.options import Doc, options
+from mazebench.options import Doc, OneOf, options
+from mazebench.tasks.tracks import TRACKS
 
 # Fields of a task for which trainings have one value only: the default, or the learner's.
 FIXED = ("start", "goal", "landmark_distance", "split", "context_size", "num_goals", "continuous")
@@ -41,6 +42,17 @@ class TrainOptions:
         Doc("Minutes between savepoints, which are saved between milestones, and when the run is stopped; 0 for none."),
     ] = 5.0
     eval_mazes: Annotated[int, Ge(1), Doc("Held-out mazes of an evaluation, with 10 episodes in each.")] = 20
+    also: Annotated[
+        tuple[str, ...],
+        OneOf(*TRACKS),
+        Doc("Tracks to train in besides --track, for agents that can; each has an equal share of the environments."),
+    ] = ()
+    first_distance: Annotated[
+        int | None, Ge(1), Doc("Cells that goals are away at most in the beginning; all distances if not given.")
+    ] = None
+    widen_steps: Annotated[
+        int, Ge(1), Doc("Agent steps over which that grows to the farthest distance of the task.")
+    ] = 400_000
     workers: Annotated[int, Ge(0), Doc("Ray actors that collect; 0 collects in this process.")] = 0
     ray_address: Annotated[str | None, Doc("Address of a Ray cluster for the workers; local if not given.")] = None
 

@@ -1,0 +1,217 @@
+"""The neural planner: senses written by hand, a plan over costs that are learned, and a learned policy that drives.
+
+docs/agents/neural_planner.md describes the network and both ways to train it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import torch
+
+from mazebench.agent import Inputs, Interface
+from mazebench.constants import NUM_ACTIONS
+from mazebench.tasks.task import Task
+
+from ..common.actor import NetworkAgent, acting
+from ..common.checkpoint import load_agent, load_into
+from ..common.config_values import override
+from ..common.layers import in_batches
+from ..robot.motion import moved
+from ..robot.rays import ranges_to
+from ..robot.senses import Memory, Senses
+from .network import NUM_RANGES, Plan, PlannerNetwork, Situation, grid_bytes, motion_features
+from .neural_planner_config import NeuralPlannerConfig
+from .planner_learner import PlannerLearner
+
+# Grids and states are computed as many at once, always, since PyTorch rounds differently at another batch size.
+_GRIDS_AT_ONCE = 8
+_STATES_AT_ONCE = 32
+_REACH = 3.5  # cells, of the ranges to walls
+_WALL = 0.5  # probability from which a cell is a wall for these ranges
+_YAW_RATE = 11  # index in the state
+_OPEN = np.zeros((3, 3), dtype=bool)  # a world without walls, where an action brings the body as far as it can
+
+
+@dataclasses.dataclass
+class Robot:
+    """What the agent knows in one environment."""
+
+    memory: Memory
+    noise: np.random.Generator  # of its choice of actions
+    grid: np.ndarray = dataclasses.field(init=False)  # [4, L, L] uint8, of the last plan
+    plan: Plan = dataclasses.field(init=False)  # of [L, L] each
+    age: int = 0  # steps of the episode
+    actions: tuple[int, int] = (-1, -1)  # the last one, and the one before
+
+
+@dataclasses.dataclass
+class Choice:
+    """The last choice of actions in B environments, and what it was made by; for the learner."""
+
+    grids: list[np.ndarray]  # B of [4, L, L] uint8; the same object while a plan is kept
+    situation: Situation  # of B states
+    log_probability: np.ndarray  # [B] float32, of the action
+    value: np.ndarray  # [B] float32
+
+
+@dataclasses.dataclass
+class ActorState:
+    """The state of acting in B environments."""
+
+    robots: list[Robot | None]
+    choice: Choice | None = None  # of the last step, while exploring
+
+
+class NeuralPlanner(NetworkAgent):
+    """Plans on what its senses tell, every few steps, and acts by a policy that reads the plan."""
+
+    name: ClassVar[str] = "neural-planner"
+    default_config: ClassVar[NeuralPlannerConfig] = NeuralPlannerConfig()
+    learner_class: ClassVar[type[PlannerLearner]] = PlannerLearner
+    learns_several_tasks = True
+    config: NeuralPlannerConfig
+    network: PlannerNetwork
+
+    def __init__(self, config: NeuralPlannerConfig, interface: Interface, seed: int = 0):
+        """Makes an agent with a new network, for the environments of an interface."""
+        super().__init__(config, interface.context_size, seed)
+        self._senses, self._cell_size = Senses(interface, self.name), interface.cell_size
+
+    @classmethod
+    def make_network(cls, config: NeuralPlannerConfig, context_size: int) -> PlannerNetwork:
+        """Returns a new network, which plans on grids of any size."""
+        return PlannerNetwork(config.channels, config.hidden, config.ways)
+
+    @classmethod
+    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
+        """Returns the agent of a checkpoint, by default of the one that ships."""
+        path = cls.default_checkpoint() if checkpoint is None else checkpoint
+        tensors, config, _ = load_agent(path, cls.name, cls.default_config)
+        agent = cls(config, interface, seed)
+        load_into(path, agent.network, tensors)
+        return agent
+
+    @classmethod
+    def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:
+        """Returns one goal an episode."""
+        return {"num_goals": 1}
+
+    @classmethod
+    def build_learner(cls, task: Task, *, seed: int = 0, overrides: Mapping[str, str] | None = None) -> PlannerLearner:
+        """Returns a learner for an agent of this class."""
+        config = override(cls.default_config, overrides or {})
+        return PlannerLearner(cls(config, task.interface, seed), seed)
+
+    def in_task(self, task: Task) -> Self:
+        """Returns an agent with the same network for another task's environments."""
+        agent = type(self)(self.config, task.interface)
+        agent.network = self.network
+        return agent
+
+    def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
+        """Begins a new stream of exploration, as the environments from `first_env` on of the learner's."""
+        self._rng = np.random.default_rng([seed, first_env])
+
+    def initial_state(self, batch_size: int) -> ActorState:
+        """Returns no robots yet: one is made where an episode begins."""
+        return ActorState([None] * batch_size)
+
+    @acting
+    def act(self, inputs: Inputs, state: ActorState, explore: bool = False) -> tuple[np.ndarray, ActorState]:
+        """Returns actions `[B]`, drawn by the policy's probabilities at a low temperature."""
+        slots = list(range(len(state.robots))) if inputs.active is None else np.flatnonzero(inputs.active).tolist()
+        robots = [self._observe(inputs, slot, state) for slot in slots]
+        self._plan([robot for robot in robots if robot.age % self.config.plan_steps == 0])
+
+        situation = self._situation(robots, inputs.observation["state"][slots])
+        logits, value = self._read(robots, situation)
+        exploring = explore and self.config.teacher == "reward"
+        temperature = 1.0 if exploring else self.config.temperature
+        noise = [(self._rng if explore else robot.noise).gumbel(size=NUM_ACTIONS) for robot in robots]
+        chosen = (logits + temperature * np.array(noise).reshape(logits.shape)).argmax(axis=1)
+
+        actions = np.zeros(len(state.robots), dtype=np.int64)
+        for robot, slot, action in zip(robots, slots, chosen.tolist(), strict=True):
+            actions[slot] = action
+            self._command(robot, action)
+        if explore:
+            log_probability = logits - np.log(np.exp(logits - logits.max(1, keepdims=True)).sum(1, keepdims=True))
+            log_probability -= logits.max(1, keepdims=True)
+            taken = np.take_along_axis(log_probability, chosen[:, None], axis=1)[:, 0]
+            state.choice = Choice([robot.grid for robot in robots], situation, taken, value)
+        return actions, state
+
+    def notes(self, state: ActorState) -> Choice | None:
+        """Returns what the last choice was made by."""
+        return state.choice
+
+    def _observe(self, inputs: Inputs, slot: int, state: ActorState) -> Robot:
+        """Returns the robot of environment `slot` after an observation; a new one where an episode begins."""
+        robot = state.robots[slot]
+        memory = self._senses.observe(robot.memory if robot else None, inputs, slot)
+        if robot is None or robot.memory is not memory:
+            robot = state.robots[slot] = Robot(memory, np.random.default_rng(int(inputs.seed[slot])))
+        return robot
+
+    def _plan(self, robots: list[Robot]) -> None:
+        """Plans anew for robots, those whose grids have one size at once."""
+        by_size: dict[int, list[Robot]] = {}
+        for robot in robots:
+            memory = robot.memory
+            walls, goal = memory.estimate()
+            robot.grid = grid_bytes(memory.prior, walls, memory.occupancy.evidence, goal)
+            by_size.setdefault(len(walls), []).append(robot)
+        for same in by_size.values():
+            plan = in_batches(
+                self.network.plan, _GRIDS_AT_ONCE, torch.from_numpy(np.stack([each.grid for each in same]))
+            )
+            for index, robot in enumerate(same):
+                robot.plan = Plan(*(part[index] for part in plan))
+
+    def _situation(self, robots: list[Robot], observed: np.ndarray) -> Situation:
+        """Returns the states of robots, whose observed ones `[K, 12]` tell how fast they turn."""
+        bodies = [robot.memory.body for robot in robots]
+        pose = np.array([(body.x, body.y, body.yaw) for body in bodies]).reshape(-1, 3)
+        velocity = np.array([(body.forward, body.left) for body in bodies]).reshape(-1, 2)
+        ranges = [
+            ranges_to(robot.grid[1] > 255 * _WALL, *where, NUM_RANGES, _REACH)
+            for robot, where in zip(robots, pose.tolist(), strict=True)
+        ]
+        actions = np.array([robot.actions for robot in robots]).reshape(-1, 2)
+        return Situation(
+            torch.from_numpy(pose.astype(np.float32)),
+            torch.from_numpy(np.array(ranges, dtype=np.float32).reshape(-1, NUM_RANGES)),
+            torch.from_numpy(motion_features(np.column_stack([velocity, observed[:, _YAW_RATE]]), actions)),
+        )
+
+    def _read(self, robots: list[Robot], situation: Situation) -> tuple[np.ndarray, np.ndarray]:
+        """Returns logits `[K, 6]` and values `[K]` of the states of robots."""
+        logits, value = np.zeros((len(robots), NUM_ACTIONS), np.float32), np.zeros(len(robots), np.float32)
+        by_size: dict[int, list[int]] = {}
+        for index, robot in enumerate(robots):
+            by_size.setdefault(len(robot.plan.way), []).append(index)
+        for same in by_size.values():
+            plan = (torch.stack(parts) for parts in zip(*(robots[index].plan for index in same), strict=True))
+            rows = (part[same] for part in situation)
+            read = in_batches(self._act, _STATES_AT_ONCE, *plan, *rows)
+            logits[same], value[same] = read[:, :-1].numpy(), read[:, -1].numpy()
+        return logits, value
+
+    def _act(self, *inputs: torch.Tensor) -> torch.Tensor:
+        """Returns logits and value `[K, 7]` of states, each on a plan of its own."""
+        plan, situation = Plan(*inputs[:3]), Situation(*inputs[3:])
+        logits, value = self.network(plan, torch.arange(len(plan.way)), situation)
+        return torch.cat([logits, value[:, None]], dim=1)
+
+    def _command(self, robot: Robot, action: int) -> None:
+        """Remembers an action, and where it should bring the body if no wall is in the way."""
+        body, cell_size = robot.memory.body, self._cell_size
+        vx, vy = (cell_size * speed for speed in body.velocity())
+        x, y, _, _ = moved(_OPEN, 1.0, 0.0, 0.0, vx, vy, body.yaw, action)
+        robot.memory.command(action, (body.x + x / cell_size, body.y + y / cell_size))
+        robot.actions, robot.age = (action, robot.actions[0]), robot.age + 1

@@ -1,0 +1,268 @@
+"""The learner of the neural planner: PPO from rewards, or imitation of the oracle, on the steps of the last rollout.
+
+Both are on-policy. `B` is the number of environments, `R` of the rollout's steps in all of them together.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import pathlib
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import torch
+from torch.nn import functional
+
+from mazebench.constants import NUM_ACTIONS
+from mazebench.storage.json_files import read_json
+from mazebench.training.experience import Experience
+
+from ..common.actor import one_torch_thread
+from ..common.checkpoint import AGENT_FILE, load_checkpoint, save_checkpoint
+from ..common.descent import Descent, in_numbers
+from ..expert import Expert
+from .network import Situation
+
+if TYPE_CHECKING:
+    from .neural_planner import Choice, NeuralPlanner
+
+_TRAINING_FILE = "training.safetensors"
+_RANDOM_FILE = "random.json"
+_LEAST_RATE = 0.02  # of the learning rate, at the end
+
+
+class Rows(NamedTuple):
+    """Steps on grids of one size."""
+
+    grids: torch.Tensor  # [G, 4, L, L] uint8
+    grid: torch.Tensor  # [R] int, the grid of each step
+    situation: Situation  # of R states
+    action: torch.Tensor  # [R] int
+    log_probability: torch.Tensor  # [R], of the action when it was chosen
+    advantage: torch.Tensor  # [R]
+    value: torch.Tensor  # [R], what the value should be
+    label: torch.Tensor  # [R, 6], the probabilities of actions by the oracle; without one, zeros
+
+
+class _Collected:
+    """Rows of steps that are collected one by one."""
+
+    def __init__(self) -> None:
+        self._grids: list[np.ndarray] = []
+        self._index: dict[int, int] = {}  # of a grid, by the identity of its array
+        self._rows: list[tuple[Any, ...]] = []
+
+    def add(self, grid: np.ndarray, *row: Any) -> None:
+        """Adds one step on a grid, its other parts in the order of `Rows`."""
+        if id(grid) not in self._index:
+            self._index[id(grid)] = len(self._grids)
+            self._grids.append(grid)
+        self._rows.append((self._index[id(grid)], *row))
+
+    def stacked(self) -> Rows:
+        """Returns all that was added."""
+        grid, pose, ranges, motion, action, log_probability, advantage, value, label = zip(*self._rows, strict=True)
+
+        def floats(values: Sequence[Any]) -> torch.Tensor:
+            return torch.from_numpy(np.asarray(values, dtype=np.float32))
+
+        return Rows(
+            torch.from_numpy(np.stack(self._grids)),
+            torch.tensor(grid),
+            Situation(torch.stack(pose), torch.stack(ranges), torch.stack(motion)),
+            torch.tensor(np.array(action)),
+            floats(log_probability),
+            floats(advantage),
+            floats(value),
+            floats(label),
+        )
+
+
+@dataclasses.dataclass
+class _Rollout:
+    """The last steps in the environments of one task, oldest first."""
+
+    steps: list[Experience] = dataclasses.field(default_factory=list)
+    labels: list[np.ndarray] = dataclasses.field(default_factory=list)  # [B, 6] for each step
+    expert: Expert | None = None
+
+
+class PlannerLearner:
+    """Updates the network of its actor after each rollout, and then forgets the rollout."""
+
+    min_rows = 0
+
+    def __init__(self, actor: NeuralPlanner, seed: int):
+        self.actor = actor
+        config = self._config = actor.config
+        self.num_envs: int = config.num_envs
+        self.steps_per_update: int = config.num_envs * config.rollout_steps
+        num_updates = max(1, config.total_steps // self.steps_per_update) * config.epochs * config.minibatches
+        self._descent = Descent(
+            actor.network,
+            torch.optim.Adam(actor.network.parameters(), lr=config.learning_rate),
+            max_gradient_norm=config.max_gradient_norm,
+            # Constant in the first half of the run, then falling to nearly 0.
+            rate=lambda step: min(1.0, max(_LEAST_RATE, 2 - 2 * step / num_updates)),
+        )
+        self._rng = np.random.default_rng([seed, 1])
+        self._rollouts: dict[int, _Rollout] = {}  # by the first environment
+
+    @property
+    def num_rows(self) -> int:
+        """The number of steps that are kept."""
+        return sum(len(step.action) for rollout in self._rollouts.values() for step in rollout.steps)
+
+    def config(self) -> dict[str, Any]:
+        """Returns all values of the config."""
+        return dataclasses.asdict(self._config)
+
+    def description(self) -> str:
+        """Returns the size of the network, and who teaches it."""
+        weights = sum(parameter.numel() for parameter in self.actor.network.parameters())
+        return f"{weights:,} weights, taught by {'rewards' if self._config.teacher == 'reward' else 'the oracle'}"
+
+    def observe(self, experience: Experience, first_env: int = 0) -> None:
+        """Keeps one step in the environments from `first_env` on, with the oracle's labels if it teaches."""
+        rollout = self._rollouts.setdefault(first_env, _Rollout())
+        if rollout.steps and not (rollout.steps[-1].ended | ~experience.new_episode).all():
+            # Trajectories were begun anew, at a milestone: a run that is resumed there has no steps from before.
+            rollout.steps.clear()
+            rollout.labels.clear()
+        rollout.steps.append(experience)
+        if self._config.teacher == "oracle":
+            rollout.labels.append(self._labels(rollout, experience))
+
+    @one_torch_thread()
+    def update(self) -> dict[str, float]:
+        """Learns from the rollout; returns the means of its losses and other scalars by name."""
+        groups = self._forget()
+        sums: dict[str, float] = {}
+        num_steps = self._config.epochs * self._config.minibatches
+        for _ in range(self._config.epochs):
+            # The steps of a plan stay together, so that each is planned once. Grids of one size are computed at once.
+            orders = [self._rng.permutation(len(rows.grids)) for rows in groups]
+            parts = zip(*(np.array_split(order, self._config.minibatches) for order in orders), strict=True)
+            for grids in parts:
+                minibatch = [_on_grids(rows, part) for rows, part in zip(groups, grids, strict=True)]
+                total = sum(len(rows.action) for rows in minibatch)
+                losses: dict[str, torch.Tensor] = {}
+                for rows in minibatch:
+                    for name, value in self._losses(rows).items():
+                        losses[name] = losses.get(name, torch.zeros(())) + value * (len(rows.action) / total)
+                losses["gradient_norm"] = self._descent.step(losses["loss"])
+                for name, number in in_numbers(losses).items():
+                    sums[name] = sums.get(name, 0.0) + number / num_steps
+        return sums
+
+    def _losses(self, rows: Rows) -> dict[str, torch.Tensor]:
+        """Returns the loss and its parts."""
+        config = self._config
+        plan = self.actor.network.plan(rows.grids)
+        logits, value = self.actor.network(plan, rows.grid, rows.situation)
+        log_probabilities = functional.log_softmax(logits, dim=1)
+        entropy = -(log_probabilities.exp() * log_probabilities).sum(dim=1).mean()
+        wall = plan.wall > 0.5
+        scalars = {"entropy": entropy, "wall_cost": plan.cost[wall].mean(), "free_cost": plan.cost[~wall].mean()}
+        if config.teacher == "oracle":
+            imitation = -(rows.label * log_probabilities).sum(dim=1).mean()
+            right = (logits.argmax(dim=1) == rows.label.argmax(dim=1)).float().mean()
+            return {"loss": imitation, "imitation_loss": imitation, "agreement": right, **scalars}
+        taken = log_probabilities.gather(1, rows.action[:, None])[:, 0]
+        policy_loss = clipped_loss(taken - rows.log_probability, rows.advantage, config.clip)
+        value_loss = functional.mse_loss(value, rows.value)
+        loss = policy_loss + config.value_weight * value_loss - config.entropy_weight * entropy
+        return {"loss": loss, "policy_loss": policy_loss, "value_loss": value_loss, **scalars}
+
+    def _labels(self, rollout: _Rollout, step: Experience) -> np.ndarray:
+        """Returns `[B, 6]`: the probabilities of actions by the oracle's look-ahead from the true state."""
+        if rollout.expert is None:
+            rollout.expert = Expert(step.task.all_mazes, len(step.action))
+        cosine, sine = np.cos(step.pose[:, 2]), np.sin(step.pose[:, 2])
+        forward, left = step.state[:, 6], step.state[:, 7]
+        velocity = np.stack([cosine * forward - sine * left, sine * forward + cosine * left], axis=1)
+        costs = rollout.expert.costs(step.maze, step.goal, step.pose, velocity.astype(np.float64))
+        best = costs.min(axis=1, keepdims=True)
+        weights = np.exp(-(costs - best) / self._config.label_temperature)
+        return (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
+
+    def _forget(self) -> list[Rows]:
+        """Returns the rollout's steps, those on grids of one size together, and forgets them.
+
+        The last step in each environment stays, for its value tells what the steps before it have led to.
+        """
+        config = self._config
+        discount, trace = 1 - 1 / config.discount_steps, 1 - 1 / config.trace_steps
+        collected: dict[int, _Collected] = {}
+        for rollout in self._rollouts.values():
+            choices: list[Choice] = [step.notes for step in rollout.steps]
+            value = np.stack([choice.value for choice in choices])
+            reward = config.reward_scale * np.stack([step.reward for step in rollout.steps])
+            terminated, ended = (
+                np.stack([getattr(step, name) for step in rollout.steps]) for name in ("terminated", "ended")
+            )
+            advantage = advantages(reward, value, terminated, ended, discount, trace)
+            for number, (step, choice) in enumerate(zip(rollout.steps[:-1], choices, strict=False)):
+                label = (
+                    rollout.labels[number] if rollout.labels else np.zeros((len(step.action), NUM_ACTIONS), np.float32)
+                )
+                found = [choice.log_probability, advantage[number], advantage[number] + value[number]]
+                for slot, grid in enumerate(choice.grids):
+                    rows = collected.setdefault(grid.shape[-1], _Collected())
+                    rows.add(grid, *(part[slot] for part in (*choice.situation, step.action, *found, label)))
+            del rollout.steps[:-1], rollout.labels[:-1]
+        return [rows.stacked() for rows in collected.values()]
+
+    def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:
+        """Writes the agent, the optimizer and the random generator; the rollout is collected anew."""
+        self.actor.save(folder / AGENT_FILE, provenance)
+        save_checkpoint(folder / _TRAINING_FILE, self._descent.tensors(), {"agent": self.actor.name})
+        (folder / _RANDOM_FILE).write_text(json.dumps(self._rng.bit_generator.state), encoding="ascii")
+
+    def load(self, folder: pathlib.Path) -> None:
+        """Restores what `save` wrote."""
+        self.actor.load(folder / AGENT_FILE)
+        tensors, _ = load_checkpoint(folder / _TRAINING_FILE, self.actor.name)
+        self._descent.load(tensors)
+        self._rng.bit_generator.state = read_json(folder / _RANDOM_FILE)
+
+
+def advantages(
+    reward: np.ndarray, value: np.ndarray, terminated: np.ndarray, ended: np.ndarray, discount: float, trace: float
+) -> np.ndarray:
+    """Returns generalized advantage estimates `[T - 1, B]` (Schulman et al. 2016, eq. 16) of all steps but the last.
+
+    Where an episode was cut short, what would have followed is taken for worth the last state's value.
+
+    Args:
+      reward: `[T, B]`, for each step.
+      value: `[T, B]`, of the state before each step.
+      terminated: `[T, B]` bool, whether the step reached the goal.
+      ended: `[T, B]` bool, whether the episode ended with the step.
+      discount: gamma.
+      trace: lambda.
+    """
+    found, following = np.zeros_like(value), np.zeros_like(value[0])
+    for step in range(len(value) - 2, -1, -1):
+        next_value = np.where(ended[step], np.where(terminated[step], 0.0, value[step]), value[step + 1])
+        error = reward[step] + discount * next_value - value[step]
+        found[step] = following = error + discount * trace * ~ended[step] * following
+    return found[:-1]
+
+
+def clipped_loss(log_ratio: torch.Tensor, advantage: torch.Tensor, clip: float) -> torch.Tensor:
+    """Returns PPO's loss (Schulman et al. 2017, eq. 7), with advantages scaled to a mean of 0 and a deviation of 1."""
+    scaled = (advantage - advantage.mean()) / (advantage.std() + 1e-6)
+    ratio = log_ratio.exp()
+    return -torch.minimum(ratio * scaled, ratio.clamp(1 - clip, 1 + clip) * scaled).mean()
+
+
+def _on_grids(rows: Rows, grids: np.ndarray) -> Rows:
+    """Returns the steps on some of the grids (`[K]` int)."""
+    number = torch.full((len(rows.grids),), -1)
+    number[torch.from_numpy(grids)] = torch.arange(len(grids))
+    taken = number[rows.grid] >= 0
+    situation = Situation(*(each[taken] for each in rows.situation))
+    return Rows(rows.grids[grids], number[rows.grid[taken]], situation, *(each[taken] for each in rows[3:]))
