@@ -43,8 +43,7 @@ class TrainOptions:
     ] = 5.0
     eval_mazes: Annotated[int, Ge(1), Doc("Held-out mazes of an evaluation, with 10 episodes in each.")] = 20
     also: Annotated[
-        tuple[str, ...],
-        OneOf(*TRACKS),
+        tuple[Annotated[str, OneOf(*TRACKS)], ...],
         Doc("Tracks to train in besides --track, for agents that can; each has an equal share of the environments."),
     ] = ()
     first_distance: Annotated[
