@@ -12,6 +12,8 @@ from mazebench_agents.common.replay import Hindsight, Replay
 
 from mazebench.training.experience import Experience
 
+# What the replay doesn't read: it makes rewards and ends for the goals that it relabels.
+UNREAD = dict.fromkeys(("pose", "reward", "terminated", "task", "notes"))
 NO_HINDSIGHT = Hindsight(ratio=0.0)
 ALWAYS = Hindsight(ratio=1.0, mean_offset=2.0, window=10)
 WINDOW = 5
@@ -126,6 +128,7 @@ def played(seed: int, num_envs: int, length: int, num_steps: int) -> tuple[Repla
                 context=context,
                 sensors={},
                 final_sensors={},
+                **UNREAD,
             )
         )
     return replay, reference
@@ -247,6 +250,7 @@ def filled(cells: list[int], goal: int, final_cell: int, priority_exponent: floa
                 context=np.zeros((1, 4, 3, 3), dtype=np.float32),
                 sensors={},
                 final_sensors={},
+                **UNREAD,
             )
         )
     return replay

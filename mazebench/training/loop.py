@@ -130,7 +130,7 @@ def run_training(
     overrides = dict(options.overrides)
     if options.also and not agent_class.learns_several_tasks:
         raise InputError(f"agent {options.agent!r}: learns one task at a time, found --also {options.also[0]}")
-    all_options = [task_options, *(task_options | {"task": track, "track": track} for track in options.also)]
+    all_options = [task_options, *({**task_options, "task": "local", "track": track} for track in options.also)]
     tasks = [
         training_task(options.agent, agent_class, agent_class.task_options(overrides), each) for each in all_options
     ]

@@ -24,9 +24,7 @@ class LearningAgent(Agent):
     """
 
     learns = True
-    learns_several_tasks: ClassVar[bool] = (
-        False  # whether it can be trained in the environments of several tasks at once
-    )
+    learns_several_tasks: ClassVar[bool] = False  # at once, in the environments of each
 
     @classmethod
     def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:

@@ -1,0 +1,204 @@
+"""The neural planner: its layer of cheapest ways, its losses by hand, its contract, and that both teachers teach it."""
+
+import json
+
+import numpy as np
+import pytest
+import torch
+from mazebench_agents.neural_planner import NeuralPlanner
+from mazebench_agents.neural_planner.network import PlannerNetwork, Situation, grid_bytes, motion_features
+from mazebench_agents.neural_planner.path_layer import FAR, CheapestWays
+from mazebench_agents.neural_planner.planner_learner import advantages, clipped_loss
+from simple_mazes import field
+
+from mazebench.agent import Interface
+from mazebench.errors import InputError
+from mazebench.evaluation.chunk import run_trials
+from mazebench.tasks.task import Task
+from mazebench.tasks.trials import draw_trials
+from mazebench.testing import check_agent
+from mazebench.training.loop import longest_distance, train
+from mazebench.training.sources import Player
+from mazebench.training.train_options import TrainOptions
+
+SMALL = {"num_envs": 16, "rollout_steps": 20, "minibatches": 2, "channels": 4, "hidden": 16}
+
+
+def ways_by_relaxation(cost: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """The layer's fixed point, by relaxing every cell until nothing changes."""
+    size, ways = len(cost), end.copy()
+    for _ in range(size * size):
+        for r in range(size):
+            for c in range(size):
+                for down in (-1, 0, 1):
+                    for right in (-1, 0, 1):
+                        m, k = r + down, c + right
+                        if not (0 <= m < size and 0 <= k < size):
+                            continue
+                        step = cost[r, c]
+                        if down and right:
+                            step = (2**0.5 - 0.5) * cost[r, c] + (cost[m, c] + cost[r, k]) / 4
+                        ways[r, c] = min(ways[r, c], ways[m, k] + step)
+    return ways
+
+
+def random_grid(seed: int, size: int = 6) -> tuple[torch.Tensor, torch.Tensor]:
+    generator = torch.Generator().manual_seed(seed)
+    cost = 1 + 3 * torch.rand(1, size, size, generator=generator)
+    end = torch.full((1, size, size), FAR)
+    end[0, 1, 2], end[0, 4, 4] = 0.0, 0.7
+    return cost, end
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_ways_are_the_fixed_point(seed):
+    cost, end = random_grid(seed)
+    expected = ways_by_relaxation(cost[0].double().numpy(), end[0].double().numpy())
+    np.testing.assert_allclose(CheapestWays.apply(cost, end)[0], expected, rtol=1e-5)
+
+
+def test_gradients_are_finite_differences():
+    cost, end = random_grid(5)
+    weight = torch.randn(cost.shape, generator=torch.Generator().manual_seed(1))
+    leaves = cost.clone().requires_grad_(), end.clone().requires_grad_()
+    (CheapestWays.apply(*leaves) * weight).sum().backward()
+    for number, values in enumerate((cost, end)):
+        for r, c in [(1, 2), (4, 4), (2, 2), (3, 1), (0, 5)] if number == 0 else [(1, 2), (4, 4)]:
+            off, sums = torch.zeros_like(values), []
+            off[0, r, c] = 5e-3
+            for moved in (values + off, values - off):
+                inputs = (moved, end) if number == 0 else (cost, moved)
+                sums.append((CheapestWays.apply(*inputs).double() * weight).sum().item())
+            assert leaves[number].grad[0, r, c].item() == pytest.approx((sums[0] - sums[1]) / 1e-2, abs=2e-2)
+
+
+def test_no_way_slips_between_two_walls_that_touch_at_a_corner():
+    cost, end = 1 + 99 * torch.eye(4).flip(0)[None], torch.full((1, 4, 4), FAR)
+    end[0, 0, 0] = 0.0
+    ways = CheapestWays.apply(cost, end)
+    assert ways[0, 1, 1] == pytest.approx(2**0.5)
+    assert ways[0, 2, 2] > 50
+
+
+@pytest.mark.parametrize("size", [5, 12])
+def test_network_reads_ways_in_the_frame_of_the_body(size):
+    """A body turned by a quarter, in a world turned by a quarter, reads the same but for the convolutions."""
+    network = PlannerNetwork(4, 16, ways=True)
+    for parameter in network.costs.parameters():
+        torch.nn.init.zeros_(parameter)  # all cells cost the same
+    goal = np.zeros((size, size))
+    goal[1, size - 2] = 1.0
+    free = np.zeros((size, size))
+    grids = np.stack([grid_bytes(free, free, free, each) for each in (goal, np.rot90(goal))])
+    x, y = 1.7, 2.2
+    pose = torch.tensor([[x, y, 0.3], [size - y, x, 0.3 + np.pi / 2]], dtype=torch.float32)
+    situation = Situation(pose, torch.ones(2, 32), torch.from_numpy(motion_features(np.ones((2, 3)), np.zeros((2, 2)))))
+    logits, value = network(network.plan(torch.from_numpy(grids)), torch.arange(2), situation)
+    torch.testing.assert_close(logits[0], logits[1], rtol=1e-4, atol=1e-4)
+    torch.testing.assert_close(value[0], value[1], rtol=1e-4, atol=1e-4)
+    assert logits[0].std() > 0
+
+
+def test_advantages_by_hand():
+    """Two environments: one goes on, in the other an episode ends in the goal, and then one is cut short."""
+    reward = np.array([[-1.0, -1.0], [-1.0, 0.0], [-1.0, -1.0], [-1.0, -1.0]])
+    value = np.array([[1.0, 1.0], [2.0, 3.0], [4.0, 5.0], [6.0, 7.0]])
+    terminated = np.array([[False, False], [False, True], [False, False], [False, False]])
+    ended = terminated | np.array([[False, False], [False, False], [False, True], [False, False]])
+    found = advantages(reward, value, terminated, ended, discount=0.5, trace=0.5)
+    errors = np.array([[-1.0, -0.5], [-1.0, -3.0], [-2.0, -3.5]])  # r + 0.5 v' - v
+    expected = errors.copy()
+    expected[1, 0] += 0.25 * expected[2, 0]
+    expected[0] += 0.25 * expected[1]
+    np.testing.assert_allclose(found, expected)
+
+
+def test_clipped_loss_by_hand():
+    advantage = torch.tensor([1.0, -1.0])
+    scaled = 1 / 2**0.5  # divided by the deviation of a sample of two
+    loss = clipped_loss(torch.log(torch.tensor([1.5, 1.5])), advantage, 0.2)
+    assert loss.item() == pytest.approx(-(1.2 - 1.5) / 2 * scaled, rel=1e-4)
+
+
+@pytest.mark.parametrize("sensors", [(), ("lidar",)])
+def test_agent_keeps_its_contract(tmp_path, sensors):
+    learner = NeuralPlanner.build_learner(Task.of(mazes=field(7), sensors=sensors), overrides=text(SMALL))
+    learner.save(tmp_path, {})
+    interface = Interface("hierarchical", 7, 7, sensors=sensors)
+    check_agent(NeuralPlanner, interface, checkpoint=tmp_path / "agent.safetensors")
+
+
+@pytest.mark.parametrize("teacher", ["reward", "oracle"])
+def test_both_teachers_teach(teacher):
+    """In a field of 4 x 4 cells, where the untrained agent finds few goals."""
+    spec = Task.of(mazes=field(6), distances=(2, 3, 4), time_limit=12, num_goals=1, sensors="lidar")
+    values = SMALL | {"teacher": teacher, "num_envs": 32, "minibatches": 4, "hidden": 64, "epochs": 6}
+    values |= {"learning_rate": 3e-3, "reward_scale": 0.1}
+    learner = NeuralPlanner.build_learner(spec, overrides=text(values))
+    trials = list(enumerate(draw_trials(spec, 32, seed=7)))
+
+    def success_rate():
+        played = run_trials(learner.actor, spec, trials, 64)
+        return np.mean([outcome.success for outcomes in played for outcome in outcomes])
+
+    before = success_rate()
+    player = Player([spec], learner.actor, learner.num_envs)
+    player.restart(seed=0)
+    for _ in range(6 if teacher == "reward" else 3):
+        for _ in range(20):
+            for first_env, experience in player.play():
+                learner.observe(experience, first_env)
+        learner.update()
+    assert before < 0.3
+    assert success_rate() > 0.7
+
+
+def text(values):
+    return {name: str(value) for name, value in values.items()}
+
+
+def run(out, **options):
+    """A training of four rollouts in two tracks, with a milestone in the middle; returns its last checkpoint."""
+    tracks = {"task": "building", "also": ("rebuilt",), "level": (1, 3), "kinds": ("dfs",), "fresh": True}
+    values = {"overrides": SMALL, "checkpoint_steps": 640, "eval_mazes": 1, "distances": (1, 2, 3, 4, 5)}
+    train("neural-planner", out=out, **tracks, **values, **options)
+    return max((out / "checkpoints").iterdir())
+
+
+def test_resumed_run_is_the_unbroken_one(tmp_path):
+    whole = run(tmp_path / "whole", env_steps=1280, first_distance=2, widen_steps=1000)
+    run(tmp_path / "broken", env_steps=640, first_distance=2, widen_steps=1000)
+    resumed = run(tmp_path / "broken", env_steps=1280, first_distance=2, widen_steps=1000, resume=True)
+    assert whole.name == resumed.name
+    for name in ("agent.safetensors", "training.safetensors", "random.json"):
+        assert (whole / name).read_bytes() == (resumed / name).read_bytes(), name
+    lines = [json.loads(line) for line in (tmp_path / "whole" / "metrics.jsonl").read_text().splitlines()]
+    assert lines[-1]["updates"] == 4
+    assert {"building_success_rate_1", "rebuilt_success_rate_5"} <= set(lines[-1])
+    config = json.loads((tmp_path / "whole" / "config.json").read_text())
+    assert config["also"] == ["rebuilt"]
+    assert config["first_distance"] == 2
+
+
+def test_other_agents_learn_one_task_at_a_time(tmp_path):
+    with pytest.raises(InputError, match="agent 'dqn': learns one task at a time, found --also rebuilt"):
+        train("dqn", "building", out=tmp_path, also=("rebuilt",), minutes=1)
+
+
+def test_goals_get_farther_as_the_run_goes_on():
+    task = Task.of(mazes=field(7), distances=(2, 4, 6))
+    options = TrainOptions("neural-planner", minutes=1, first_distance=3, widen_steps=300)
+    assert [longest_distance(options, [task], steps) for steps in (0, 100, 299, 300, 10**6)] == [3, 4, 5, 6, 6]
+    learner = NeuralPlanner.build_learner(task, overrides=text(SMALL))
+    player = Player([task], learner.actor, 16)
+
+    def distances(longest):
+        player.limit_distances(longest)
+        player.restart(seed=0)
+        ((_, step),) = player.play()
+        rows, columns = np.divmod(np.stack([step.start, step.goal]), 7)
+        return set((abs(rows[0] - rows[1]) + abs(columns[0] - columns[1])).tolist())
+
+    assert distances(1) == {2}, "the nearest that the task has"
+    assert distances(5) == {2, 4}
+    assert distances(6) == {2, 4, 6}
