@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 import torch
+from mazebench_agents.common.path_layer import FAR, CheapestWays
 from mazebench_agents.neural_planner import NeuralPlanner
 from mazebench_agents.neural_planner.network import PlannerNetwork, Situation, grid_bytes, motion_features
-from mazebench_agents.neural_planner.path_layer import FAR, CheapestWays
 from mazebench_agents.neural_planner.planner_learner import advantages, clipped_loss
 from simple_mazes import field
 

@@ -21,7 +21,7 @@ from numba.extending import register_jitable
 
 from mazebench import constants
 
-_WITH_KERNELS = ("mmn", "muzero", "neural_planner", "robot")
+_WITH_KERNELS = ("common", "mmn", "muzero", "robot")
 
 
 class _Announcement(Listener):

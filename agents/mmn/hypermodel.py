@@ -28,6 +28,7 @@ from ..common.layers import (
     marked_position,
     place_code,
 )
+from ..common.path_layer import FAR, CheapestWays
 from .map_reader import read
 from .mmn_config import MMNConfig
 
@@ -43,6 +44,8 @@ SCALE_RATE = 5.0  # the scale's parameters are multiplied by it, so that they ar
 _CHANNELS = 24  # of the map's convolutions
 _NEAR = (1, 1, 1, 1)  # dilations of the hypermodel's convolutions
 _FAR = (1, 1, 2, 2, 4, 4, 2, 1, 1)  # of the heads', which see 19 cells far, across a 13 x 13 map
+_NUM_WAY = 8 + 3  # features of a cell by the ways to the goal
+_LARGEST_COST = 5.0  # log of a cell's largest cost beside its length: 148 cells
 # Before anything is learned:
 _FIRST_VALUE = -20.0  # steps; the middle of the values
 _FIRST_GOAL = -4.0  # logit of being in the goal
@@ -249,7 +252,9 @@ class Hypermodel(nn.Module):
         nn.init.normal_(self.hyper.weight, std=0.02 / math.sqrt(size))
         num_encoded = _CHANNELS + NUM_PLANES
         self.rows = nn.Conv2d(num_encoded, config.hidden, 1) if config.rows else None
-        self.reader = MapEncoder(_CHANNELS, _FAR) if config.reading else None
+        self.reader: nn.Module | None = None
+        if config.reading:
+            self.reader = WayReader(_CHANNELS) if config.far == "paths" else MapEncoder(_CHANNELS, _FAR)
         self.num_features = num_encoded * config.reading
         self.sharpness = nn.Parameter(torch.tensor(0.0))
 
@@ -269,6 +274,36 @@ class Hypermodel(nn.Module):
         rows, features = (planes.flatten(2).transpose(1, 2) for planes in (rows, features))
         positions = torch.cat([anchor, marked_position(context[:, GOAL])], dim=-1)
         return Code(positions, weights, rows, self.task(functional.relu(embedding)), features)
+
+
+class WayReader(nn.Module):
+    """Features of every cell of the map by the cheapest ways to the goal, however far it is."""
+
+    def __init__(self, channels: int):
+        """`channels` are those of the costs and of the features."""
+        super().__init__()
+        self.costs = nn.Sequential(
+            nn.Conv2d(NUM_PLANES, channels, 3, padding=1), nn.ReLU(), nn.Conv2d(channels, channels, 3, padding=1),
+            nn.ReLU(), nn.Conv2d(channels, 1, 1),
+        )  # fmt: skip
+        self.features = nn.Conv2d(_NUM_WAY, channels, 1)
+
+    def forward(self, context: torch.Tensor) -> torch.Tensor:
+        """Returns `[G, C, M, M]` of contexts `[G, 4, M, M]`."""
+        cost = 1 + torch.exp(self.costs(context)[:, 0].clamp(max=_LARGEST_COST))
+        way = CheapestWays.apply(cost, torch.where(context[:, GOAL] > 0, 0.0, FAR))
+        # How much nearer the goal is in the eight cells around each; beyond the border, as far as beside it.
+        size = way.shape[-1]
+        padded = functional.pad(way[:, None], (1, 1, 1, 1), mode="replicate")[:, 0]
+        around = [
+            padded[:, row : row + size, column : column + size]
+            for row in range(3)
+            for column in range(3)
+            if (row, column) != (1, 1)
+        ]
+        nearer = ((way[:, None] - torch.stack(around, dim=1)) / 2).clamp(-2, 2)
+        scalars = torch.stack([torch.tanh(way / 5), torch.tanh(way / 40), torch.log(cost) / 3], dim=1)
+        return functional.relu(self.features(torch.cat([nearer, scalars], dim=1)))
 
 
 def reward_and_discount(predictions: Predictions) -> tuple[torch.Tensor, torch.Tensor]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from annotated_types import Interval
 
@@ -23,6 +23,9 @@ class MMNConfig:
     hypermodel: bool = True  # False, an ablation: the code of the context is an input of an ordinary transition
     rows: bool = True  # generates the first layer's weights of a position with convolutions, for each cell
     reading: bool = True  # the heads, the paper's g(s, c), read convolutions of the context at the estimated position
+    # How these convolutions see far: by dilations, 19 cells, or not at all: what they read of the cheapest ways to the
+    # goal, over costs that they give to cells (beyond the paper).
+    far: Literal["dilations", "paths"] = "dilations"
     embedding: Size = 64  # numbers of the code of a context, from which the other weights are generated
     task_code: Size = 64  # numbers of that code for the heads
     latent: Size = 32  # numbers of a latent state that are learned

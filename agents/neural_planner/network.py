@@ -15,7 +15,7 @@ from torch import nn
 
 from mazebench.constants import NUM_ACTIONS
 
-from .path_layer import FAR, CheapestWays
+from ..common.path_layer import FAR, CheapestWays
 
 NUM_RANGES = 32  # to the walls around the body
 _RADII = (0.4, 0.8, 1.2, 1.8, 2.5, 3.5)  # cells, of rings of points around the body

@@ -138,13 +138,13 @@ class PlannerLearner:
     @one_torch_thread()
     def update(self) -> dict[str, float]:
         """Learns from the rollout; returns the means of its losses and other scalars by name."""
+        config, sums = self._config, {"success": self._success_rate()}
         groups = self._forget()
-        sums: dict[str, float] = {}
-        num_steps = self._config.epochs * self._config.minibatches
-        for _ in range(self._config.epochs):
+        num_minibatches = min([config.minibatches, *(len(rows.grids) for rows in groups)])
+        for _ in range(config.epochs):
             # The steps of a plan stay together, so that each is planned once. Grids of one size are computed at once.
             orders = [self._rng.permutation(len(rows.grids)) for rows in groups]
-            parts = zip(*(np.array_split(order, self._config.minibatches) for order in orders), strict=True)
+            parts = zip(*(np.array_split(order, num_minibatches) for order in orders), strict=True)
             for grids in parts:
                 minibatch = [_on_grids(rows, part) for rows, part in zip(groups, grids, strict=True)]
                 total = sum(len(rows.action) for rows in minibatch)
@@ -154,7 +154,7 @@ class PlannerLearner:
                         losses[name] = losses.get(name, torch.zeros(())) + value * (len(rows.action) / total)
                 losses["gradient_norm"] = self._descent.step(losses["loss"])
                 for name, number in in_numbers(losses).items():
-                    sums[name] = sums.get(name, 0.0) + number / num_steps
+                    sums[name] = sums.get(name, 0.0) + number / (config.epochs * num_minibatches)
         return sums
 
     def _losses(self, rows: Rows) -> dict[str, torch.Tensor]:
@@ -188,6 +188,12 @@ class PlannerLearner:
         weights = np.exp(-(costs - best) / self._config.label_temperature)
         return (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
 
+    def _success_rate(self) -> float:
+        """Returns the share of the rollout's episodes that ended in the goal; 0 if none ended."""
+        steps = [step for rollout in self._rollouts.values() for step in rollout.steps[:-1]]
+        num_ended = sum(int(step.ended.sum()) for step in steps)
+        return sum(int(step.terminated.sum()) for step in steps) / max(1, num_ended)
+
     def _forget(self) -> list[Rows]:
         """Returns the rollout's steps, those on grids of one size together, and forgets them.
 
@@ -205,9 +211,7 @@ class PlannerLearner:
             )
             advantage = advantages(reward, value, terminated, ended, discount, trace)
             for number, (step, choice) in enumerate(zip(rollout.steps[:-1], choices, strict=False)):
-                label = (
-                    rollout.labels[number] if rollout.labels else np.zeros((len(step.action), NUM_ACTIONS), np.float32)
-                )
+                label = rollout.labels[number] if rollout.labels else np.zeros((len(step.action), NUM_ACTIONS))
                 found = [choice.log_probability, advantage[number], advantage[number] + value[number]]
                 for slot, grid in enumerate(choice.grids):
                     rows = collected.setdefault(grid.shape[-1], _Collected())

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from ..common.kernels import compiled
+from .kernels import compiled
 
 _DIAGONAL = math.sqrt(2.0) - 0.5  # share of the entered cell in the cost of a diagonal step
 _CORNER = 0.25  # share of each of the two cells beside it
@@ -32,7 +32,7 @@ FAR = 1e6  # what it costs to end in a cell that is no goal; more than any way
 
 
 class CheapestWays(torch.autograd.Function):
-    """Costs `[G, L, L]` of the cheapest ways, from the costs of entering cells and of ending in them."""
+    """Costs `[G, L, L]` of the cheapest ways, from those of entering cells and of ending in them, always on the CPU."""
 
     @staticmethod
     def forward(ctx: Any, cost: torch.Tensor, end: torch.Tensor) -> torch.Tensor:
@@ -43,16 +43,17 @@ class CheapestWays(torch.autograd.Function):
           cost: `[G, L, L]` float32, more than 0, of entering each cell.
           end: `[G, L, L]` float32, of ending in each cell; `FAR` where none of the goals is.
         """
-        least, before, order = _cheapest_ways(cost.detach().numpy(), end.detach().numpy())
+        least, before, order = _cheapest_ways(cost.detach().cpu().numpy(), end.detach().cpu().numpy())
         ctx.before, ctx.order = before, order
-        return torch.from_numpy(least)
+        return torch.from_numpy(least).to(cost.device)
 
     @staticmethod
     def backward(ctx: Any, *gradients: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Returns the gradients of costs and ends `[G, L, L]`, given that of u."""
-        gradient = gradients[0].contiguous().numpy()
-        of_cost, of_end = _gradients(gradient, ctx.before, ctx.order)
-        return torch.from_numpy(of_cost), torch.from_numpy(of_end)
+        gradient = gradients[0].contiguous()
+        found = _gradients(gradient.cpu().numpy(), ctx.before, ctx.order)
+        of_cost, of_end = (torch.from_numpy(each).to(gradient.device) for each in found)
+        return of_cost, of_end
 
 
 @compiled
