@@ -10,7 +10,7 @@ from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.evaluate import evaluate
 
-SHIPPED = ("mmn", "mah", "mah-paper", "dqn")
+SHIPPED = ("mmn", "mah", "mah-paper", "dqn", "neural-planner")
 OF_ONE_SIZE = ("mmn", "mah-paper")
 
 
@@ -34,6 +34,12 @@ def test_shipped_checkpoint_has_its_config_and_curve_beside_it(name):
 def test_shipped_agent_with_a_map_reaches_near_goals_in_its_training_mazes(tmp_path, name):
     summary = evaluate(name, out=tmp_path / name, split="train", distances=(2, 4), episodes_per_distance=2)
     assert summary.overall.success_rate > 0.9
+
+
+def test_shipped_neural_planner_reaches_goals_of_a_track(tmp_path):
+    parts = {"track": "rebuilt", "split": "train", "distances": (15,)}
+    summary = evaluate("neural-planner", out=tmp_path / "run", **parts)
+    assert summary.overall.success_rate > 0.8
 
 
 def test_shipped_dqn_without_a_map_does_not(tmp_path):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import pathlib
 from collections.abc import Mapping
+from importlib import resources
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -95,6 +96,12 @@ class NeuralPlanner(NetworkAgent):
         agent = cls(config, interface, seed)
         load_into(path, agent.network, tensors)
         return agent
+
+    @classmethod
+    def default_checkpoint(cls) -> pathlib.Path:
+        """Returns the checkpoint that ships, for mazes of any size."""
+        path = resources.files("mazebench_assets").joinpath("checkpoints", "neural-planner.safetensors")
+        return pathlib.Path(str(path))
 
     @classmethod
     def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:

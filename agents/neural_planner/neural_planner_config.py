@@ -34,8 +34,9 @@ class NeuralPlannerConfig:
     total_steps: Steps = 1_000_000  # of the environment; the learning rate falls to 0 over the second half
 
     # Learning
-    epochs: Length = 3  # over the steps of a rollout
-    minibatches: Length = 8  # of an epoch
+    kept_rollouts: Length = 25  # that imitation learns from: on few of them, the network learns their mazes by heart
+    epochs: Length = 3  # an update has as many minibatches as so many passes over the newest rollout
+    minibatches: Length = 8  # of a pass
     learning_rate: Factor = 7e-4  # Adam's
     max_gradient_norm: Factor = 0.5
     discount_steps: Ahead = 100.0  # steps ahead that count: a discount of 1 - 1 / 100

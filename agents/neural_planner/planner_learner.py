@@ -1,6 +1,6 @@
-"""The learner of the neural planner: PPO from rewards, or imitation of the oracle, on the steps of the last rollout.
+"""The learner of the neural planner: PPO from rewards on the last rollout, or imitation of the oracle on several.
 
-Both are on-policy. `B` is the number of environments, `R` of the rollout's steps in all of them together.
+`B` is the number of environments, `R` of steps in all of them together, `G` of grids that these are on.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import pathlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 
 _TRAINING_FILE = "training.safetensors"
 _RANDOM_FILE = "random.json"
+_REPLAY_FILE = "replay.npz"
+# The arrays of `Rows`, in their order.
+_NAMES = ("grids", "grid", "pose", "ranges", "motion", "action", "log_probability", "advantage", "value", "label")
 _LEAST_RATE = 0.02  # of the learning rate, at the end
 
 
@@ -90,7 +93,7 @@ class _Rollout:
 
 
 class PlannerLearner:
-    """Updates the network of its actor after each rollout, and then forgets the rollout."""
+    """Updates the network of its actor after each rollout; imitation learns from the rollouts before it, too."""
 
     min_rows = 0
 
@@ -109,6 +112,7 @@ class PlannerLearner:
         )
         self._rng = np.random.default_rng([seed, 1])
         self._rollouts: dict[int, _Rollout] = {}  # by the first environment
+        self._kept: list[dict[int, Rows]] = []  # the last rollouts, by the size of grids
 
     @property
     def num_rows(self) -> int:
@@ -139,23 +143,34 @@ class PlannerLearner:
     def update(self) -> dict[str, float]:
         """Learns from the rollout; returns the means of its losses and other scalars by name."""
         config, sums = self._config, {"success": self._success_rate()}
-        groups = self._forget()
-        num_minibatches = min([config.minibatches, *(len(rows.grids) for rows in groups)])
-        for _ in range(config.epochs):
-            # The steps of a plan stay together, so that each is planned once. Grids of one size are computed at once.
-            orders = [self._rng.permutation(len(rows.grids)) for rows in groups]
-            parts = zip(*(np.array_split(order, num_minibatches) for order in orders), strict=True)
-            for grids in parts:
-                minibatch = [_on_grids(rows, part) for rows, part in zip(groups, grids, strict=True)]
-                total = sum(len(rows.action) for rows in minibatch)
-                losses: dict[str, torch.Tensor] = {}
-                for rows in minibatch:
-                    for name, value in self._losses(rows).items():
-                        losses[name] = losses.get(name, torch.zeros(())) + value * (len(rows.action) / total)
-                losses["gradient_norm"] = self._descent.step(losses["loss"])
-                for name, number in in_numbers(losses).items():
-                    sums[name] = sums.get(name, 0.0) + number / (config.epochs * num_minibatches)
+        newest = self._forget()
+        self._kept.append(newest)
+        del self._kept[: -config.kept_rollouts if config.teacher == "oracle" else -1]
+
+        # The steps of a plan stay together, so that each is planned once. Grids of one size are computed at once.
+        batches = []
+        for size, rows in newest.items():
+            all_rows = _joined([rollout[size] for rollout in self._kept if size in rollout])
+            batches.append(self._minibatches(all_rows, max(1, len(rows.grids) // config.minibatches)))
+        num_minibatches = config.epochs * config.minibatches if batches else 0
+        for _ in range(num_minibatches):
+            minibatch = [next(each) for each in batches]
+            total = sum(len(rows.action) for rows in minibatch)
+            losses: dict[str, torch.Tensor] = {}
+            for rows in minibatch:
+                for name, value in self._losses(rows).items():
+                    losses[name] = losses.get(name, torch.zeros(())) + value * (len(rows.action) / total)
+            losses["gradient_norm"] = self._descent.step(losses["loss"])
+            for name, number in in_numbers(losses).items():
+                sums[name] = sums.get(name, 0.0) + number / num_minibatches
         return sums
+
+    def _minibatches(self, rows: Rows, num_grids: int) -> Iterator[Rows]:
+        """Yields the rows on so many grids at a time, again and again, each time in another order."""
+        while True:
+            order = self._rng.permutation(len(rows.grids))
+            for begin in range(0, len(order) - num_grids + 1, num_grids):
+                yield _on_grids(rows, order[begin : begin + num_grids])
 
     def _losses(self, rows: Rows) -> dict[str, torch.Tensor]:
         """Returns the loss and its parts."""
@@ -194,8 +209,8 @@ class PlannerLearner:
         num_ended = sum(int(step.ended.sum()) for step in steps)
         return sum(int(step.terminated.sum()) for step in steps) / max(1, num_ended)
 
-    def _forget(self) -> list[Rows]:
-        """Returns the rollout's steps, those on grids of one size together, and forgets them.
+    def _forget(self) -> dict[int, Rows]:
+        """Returns the rollout's steps by the size of the grids that they are on, and forgets them.
 
         The last step in each environment stays, for its value tells what the steps before it have led to.
         """
@@ -217,11 +232,20 @@ class PlannerLearner:
                     rows = collected.setdefault(grid.shape[-1], _Collected())
                     rows.add(grid, *(part[slot] for part in (*choice.situation, step.action, *found, label)))
             del rollout.steps[:-1], rollout.labels[:-1]
-        return [rows.stacked() for rows in collected.values()]
+        return {size: rows.stacked() for size, rows in collected.items()}
 
     def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:
-        """Writes the agent, the optimizer and the random generator; the rollout is collected anew."""
+        """Writes the agent, the optimizer, the random generator and the rollouts that are kept."""
         self.actor.save(folder / AGENT_FILE, provenance)
+        if self._config.teacher == "oracle":
+            arrays = {
+                f"{number}-{size}-{name}": array.numpy()
+                for number, rollout in enumerate(self._kept)
+                for size, rows in rollout.items()
+                for name, array in zip(_NAMES, (*rows[:2], *rows.situation, *rows[3:]), strict=True)
+            }
+            with (folder / _REPLAY_FILE).open("wb") as file:
+                np.savez_compressed(file, **arrays)
         save_checkpoint(folder / _TRAINING_FILE, self._descent.tensors(), {"agent": self.actor.name})
         (folder / _RANDOM_FILE).write_text(json.dumps(self._rng.bit_generator.state), encoding="ascii")
 
@@ -231,6 +255,15 @@ class PlannerLearner:
         tensors, _ = load_checkpoint(folder / _TRAINING_FILE, self.actor.name)
         self._descent.load(tensors)
         self._rng.bit_generator.state = read_json(folder / _RANDOM_FILE)
+        self._kept = []
+        if (folder / _REPLAY_FILE).exists():
+            with np.load(folder / _REPLAY_FILE, allow_pickle=False) as arrays:
+                for key in arrays:
+                    number, size, name = key.split("-")
+                    if name == _NAMES[0]:
+                        self._kept += [{} for _ in range(int(number) + 1 - len(self._kept))]
+                        found = [torch.from_numpy(arrays[f"{number}-{size}-{each}"]) for each in _NAMES]
+                        self._kept[-1][int(size)] = Rows(*found[:2], Situation(*found[2:5]), *found[5:])
 
 
 def advantages(
@@ -261,6 +294,15 @@ def clipped_loss(log_ratio: torch.Tensor, advantage: torch.Tensor, clip: float) 
     scaled = (advantage - advantage.mean()) / (advantage.std() + 1e-6)
     ratio = log_ratio.exp()
     return -torch.minimum(ratio * scaled, ratio.clamp(1 - clip, 1 + clip) * scaled).mean()
+
+
+def _joined(parts: list[Rows]) -> Rows:
+    """Returns the rows of all parts."""
+    offsets = np.cumsum([0, *(len(rows.grids) for rows in parts)]).tolist()
+    grid = torch.cat([rows.grid + offset for rows, offset in zip(parts, offsets, strict=False)])
+    situation = Situation(*map(torch.cat, zip(*(rows.situation for rows in parts), strict=True)))
+    rest = map(torch.cat, zip(*(rows[3:] for rows in parts), strict=True))
+    return Rows(torch.cat([rows.grids for rows in parts]), grid, situation, *rest)
 
 
 def _on_grids(rows: Rows, grids: np.ndarray) -> Rows:
