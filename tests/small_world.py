@@ -11,8 +11,8 @@ from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.maze import Maze
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
-from mazebench.training.experience import Collector
 from mazebench.training.loop import num_updates_due
+from mazebench.training.sources import Player
 
 TIME_LIMIT = 25
 
@@ -26,13 +26,12 @@ def learn(
     overrides = {key: str(value) for key, value in values.items()}
     learner = agent_class.build_learner(spec, overrides=overrides)
     before = _success_rate(learner.actor, maze, distances)
-    collector = Collector(spec, learner.num_envs, seed=0)
-    learner.actor.explore_from(0, learner.num_envs, seed=0)
-    state = learner.actor.initial_state(learner.num_envs)
+    player = Player([spec], learner.actor, learner.num_envs)
+    player.restart(seed=0)
     steps = updates = 0
     while updates < num_updates:
-        experience, state = collector.play(learner.actor, state)
-        learner.observe(experience)
+        for first_env, experience in player.play():
+            learner.observe(experience, first_env)
         steps += learner.num_envs
         while updates < num_updates_due(learner, steps):
             learner.update()

@@ -39,7 +39,8 @@ LAYERS = {name: layer for layer, names in enumerate(ORDER) for name in names}
 AGENT_ORDER = (
     {"common"},
     {"robot", "muzero"},
-    {"random_agent", "planner", "navigator", "mmn", "dqn"},
+    {"expert"},
+    {"random_agent", "planner", "navigator", "neural_planner", "mmn", "dqn"},
     {"mah"},
 )
 AGENT_LAYERS = {name: layer for layer, names in enumerate(AGENT_ORDER) for name in names}

@@ -14,13 +14,13 @@ from faults import TINY
 from simple_mazes import field
 
 from mazebench import stopping
+from mazebench.agent import Agent
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.tasks.task import Task
 from mazebench.training import loop
 from mazebench.training.experience import Collector
 from mazebench.training.loop import TrainingError, train
-from mazebench.training.protocol import LearningAgent
 
 
 def tiny_options(**changes):
@@ -218,7 +218,7 @@ def test_collector_gives_trajectories_that_hang_together():
     assert legs > sum(int(step.new_episode.sum()) for step in steps) > 4, "several goals an episode, several episodes"
 
 
-class Rolling(LearningAgent):
+class Rolling(Agent):
     """Goes forward, and returns the inputs it was given as its state."""
 
     def initial_state(self, batch_size):
@@ -237,8 +237,8 @@ def roll(seed):
     np.testing.assert_array_equal(observation["state"], collector.inputs.observation["state"])
     first = [episode.seed for episode in env.episodes]
     for _ in range(40):
-        step, state = collector.play(Rolling(), state)
-        steps.append(step)
+        actions, state = Rolling().act(collector.inputs, state, explore=True)
+        steps.append(collector.step(actions))
     return state, steps, first
 
 

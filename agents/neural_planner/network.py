@@ -57,6 +57,15 @@ class Situation(NamedTuple):
     motion: torch.Tensor  # [K, 15] float32, see `motion_features`
 
 
+class Choice(NamedTuple):
+    """The choice of actions in B environments, and what it was made by; what a learner needs of it."""
+
+    grids: list[np.ndarray]  # B of [4, L, L] uint8; the same object while a plan is kept
+    situation: Situation  # of B states
+    log_probability: np.ndarray  # [B] float32, of the action
+    value: np.ndarray  # [B] float32
+
+
 def grid_bytes(prior: np.ndarray, walls: np.ndarray, evidence: np.ndarray, goal: np.ndarray) -> np.ndarray:
     """Returns `[4, L, L]` uint8: what the network is told of a grid, in few bytes, since it is kept for learning.
 

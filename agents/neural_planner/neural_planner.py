@@ -25,7 +25,7 @@ from ..common.layers import in_batches
 from ..robot.motion import moved
 from ..robot.rays import ranges_to
 from ..robot.senses import Memory, Senses
-from .network import NUM_RANGES, Plan, PlannerNetwork, Situation, grid_bytes, motion_features
+from .network import NUM_RANGES, Choice, Plan, PlannerNetwork, Situation, grid_bytes, motion_features
 from .neural_planner_config import NeuralPlannerConfig
 from .planner_learner import PlannerLearner
 
@@ -48,16 +48,6 @@ class Robot:
     plan: Plan = dataclasses.field(init=False)  # of [L, L] each
     age: int = 0  # steps of the episode
     actions: tuple[int, int] = (-1, -1)  # the last one, and the one before
-
-
-@dataclasses.dataclass
-class Choice:
-    """The last choice of actions in B environments, and what it was made by; for the learner."""
-
-    grids: list[np.ndarray]  # B of [4, L, L] uint8; the same object while a plan is kept
-    situation: Situation  # of B states
-    log_probability: np.ndarray  # [B] float32, of the action
-    value: np.ndarray  # [B] float32
 
 
 @dataclasses.dataclass

@@ -9,7 +9,7 @@ import dataclasses
 import json
 import pathlib
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -19,14 +19,11 @@ from mazebench.constants import NUM_ACTIONS
 from mazebench.storage.json_files import read_json
 from mazebench.training.experience import Experience
 
-from ..common.actor import one_torch_thread
+from ..common.actor import NetworkAgent, one_torch_thread
 from ..common.checkpoint import AGENT_FILE, load_checkpoint, save_checkpoint
 from ..common.descent import Descent, in_numbers
 from ..expert import Expert
-from .network import Situation
-
-if TYPE_CHECKING:
-    from .neural_planner import Choice, NeuralPlanner
+from .network import Choice, Situation
 
 _TRAINING_FILE = "training.safetensors"
 _RANDOM_FILE = "random.json"
@@ -97,7 +94,7 @@ class PlannerLearner:
 
     min_rows = 0
 
-    def __init__(self, actor: NeuralPlanner, seed: int):
+    def __init__(self, actor: NetworkAgent, seed: int):
         self.actor = actor
         config = self._config = actor.config
         self.num_envs: int = config.num_envs
@@ -238,7 +235,7 @@ class PlannerLearner:
         """Writes the agent, the optimizer, the random generator and the rollouts that are kept."""
         self.actor.save(folder / AGENT_FILE, provenance)
         if self._config.teacher == "oracle":
-            arrays = {
+            arrays: dict[str, Any] = {
                 f"{number}-{size}-{name}": array.numpy()
                 for number, rollout in enumerate(self._kept)
                 for size, rows in rollout.items()
@@ -263,7 +260,7 @@ class PlannerLearner:
                     if name == _NAMES[0]:
                         self._kept += [{} for _ in range(int(number) + 1 - len(self._kept))]
                         found = [torch.from_numpy(arrays[f"{number}-{size}-{each}"]) for each in _NAMES]
-                        self._kept[-1][int(size)] = Rows(*found[:2], Situation(*found[2:5]), *found[5:])
+                        self._kept[-1][int(size)] = Rows(found[0], found[1], Situation(*found[2:5]), *found[5:])
 
 
 def advantages(

@@ -5,16 +5,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mazebench.agent import Inputs, Observation
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.tasks.task import Task
-
-if TYPE_CHECKING:
-    from mazebench.training.protocol import LearningAgent
 
 _SEEDS = 2**31
 
@@ -47,7 +44,7 @@ class Experience(NamedTuple):
 
 
 class Collector:
-    """Runs an exploring agent in B environments without end, and returns what it experiences."""
+    """Steps B environments without end, and returns what is experienced in them."""
 
     def __init__(self, task_spec: Task, num_envs: int, seed: int, num_threads: int = 0):
         self._task = task_spec
@@ -76,13 +73,8 @@ class Collector:
         distances = self._task.distances
         self._env.draw_distances([each for each in distances if each <= longest] or [min(distances)])
 
-    def play(self, agent: LearningAgent, state: Any) -> tuple[Experience, Any]:
-        """Takes the step that the exploring `agent` chooses in its `state`; returns the agent's next state, too."""
-        actions, state = agent.act(self.inputs, state, explore=True)
-        return self.step(actions, agent.notes(state)), state
-
     def step(self, action: np.ndarray, notes: Any = None) -> Experience:
-        """Takes `action` `[B]` for the current `inputs`, which those of the next step replace."""
+        """Takes `action` `[B]` for the current `inputs`, which those of the next step replace; keeps the `notes`."""
         now, rules = self.inputs, self._env.rules
         cell, pose = rules.cell.copy(), rules.pose.copy()
         before = (now.new_episode, now.new_context, self._maze, rules.start.copy(), rules.target.copy())

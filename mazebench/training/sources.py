@@ -68,8 +68,9 @@ class Player:
         """Takes one step everywhere."""
         pieces = []
         for number, (first, collector, actor) in enumerate(self._parts):
-            experience, self._states[number] = collector.play(actor, self._states[number])
-            pieces.append((first, experience))
+            actions, state = actor.act(collector.inputs, self._states[number], explore=True)
+            pieces.append((first, collector.step(actions, actor.notes(state))))
+            self._states[number] = state
         return pieces
 
     def set_parameters(self, parameters: dict[str, Any]) -> None:
