@@ -23,22 +23,13 @@ _CONTEXT, _CONTEXTS = "context", "infos/context"
 class Demonstration(NamedTuple):
     """One episode.
 
-    `T` is the number of its steps, and `K` that of its legs: one, or one to each landmark. Evaluations show no agent
-    what is privileged; training may use it. `arrays` has by name:
-
-    - observations/state `[T + 1, 12]`, observations/lidar and other sensors: what was observed, without the context.
-    - actions `[T]` int64, rewards `[T]` float32.
-    - terminations and truncations `[T]` bool: whether the step reached the goal, or used up the time.
-    - infos/context `[K, 4, M, M]` float32: the context of each leg.
-    - infos/leg `[T + 1]` int32: the number of legs done, an index of infos/context.
-    - infos/privileged/pose `[T + 1, 3]` float64: the true x and y (m) and yaw (rad).
-    - infos/privileged/way_left `[T + 1]` int32: cells of way to the goal in the true maze.
+    Those of its `arrays` that are privileged are for training; evaluations show them to no agent.
     """
 
     seed: int  # with which `reset` of an environment of the task begins the episode
     maze: str  # the name of the maze
     distance: int  # cells from start to goal
-    arrays: dict[str, np.ndarray]
+    arrays: dict[str, np.ndarray]  # by the names that docs/imitation.md lists, with shape and unit
 
 
 class StepRecorder:
