@@ -7,13 +7,12 @@ of environments.
 from __future__ import annotations
 
 import weakref
-from collections.abc import Sequence
 
 import numpy as np
 
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.maps.maze import Maze
+from mazebench.maps.drawn import Mazes
 
 from .robot.quickest import costs_of_actions, make_course
 
@@ -53,7 +52,7 @@ def labels(envs: MazeVectorEnv, costs: bool = False) -> np.ndarray:
 class Expert:
     """Costs of actions in B environments; the ways to a goal are computed once for each leg."""
 
-    def __init__(self, mazes: Sequence[Maze], num_envs: int):
+    def __init__(self, mazes: Mazes, num_envs: int):
         """Knows `mazes`, which have one size and one cell size."""
         self._mazes = mazes
         self._courses: list[tuple[int, int] | None] = [None] * num_envs  # maze and goal of each course
