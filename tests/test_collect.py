@@ -151,3 +151,10 @@ def test_the_command_takes_the_options_of_evaluations(tmp_path):
     printed = run_python("-m", "mazebench", "collect", "--agent", "oracle", *options, cwd=tmp_path).stdout
     assert printed == "2 episodes in run\n"
     assert len(episodes_of(tmp_path / "run")) == 2
+
+
+def test_without_minari_arrays_are_written(monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert CollectOptions().format_in_use == "npz"
+    with pytest.raises(InputError, match=r"--format minari needs Minari, which the extra \[minari\] brings"):
+        _ = CollectOptions(format="minari").format_in_use
