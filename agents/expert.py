@@ -11,8 +11,8 @@ import weakref
 import numpy as np
 
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.maps.drawn import FreshMazes
-from mazebench.maps.maze import Maze
+from mazebench.errors import InputError
+from mazebench.maps.drawn import Mazes
 
 from .robot.quickest import costs_of_actions, make_course
 
@@ -26,14 +26,23 @@ def labels(envs: MazeVectorEnv, costs: bool = False) -> np.ndarray:
         >>> observation, reward, terminated, truncated, info = envs.step(actions)
 
     Args:
-      envs: whose episodes are under way.
+      envs: of `mazebench.make_vec`, also in wrappers; after `reset`.
       costs: whether to return the costs of all six actions.
 
     Returns:
       `[B]` int, the best actions; with `costs`, `[B, 6]` float: the way (m) that is left some steps after each of the
-      actions, less than 0 where the goal is reached by then. Only differences between actions mean something.
+      actions, less than 0 where the goal is reached by then. Only differences between actions mean something. In the
+      hierarchical task, the goal is the next landmark.
+
+    Raises:
+      InputError: if `envs` are other environments, or were not reset.
     """
+    envs = envs.unwrapped
+    if not isinstance(envs, MazeVectorEnv):
+        raise InputError(f"expected environments of mazebench.make_vec, found {type(envs).__name__}")
     rules = envs.rules
+    if not rules.active.any():
+        raise InputError("expected a call to reset() before that of labels(), found no episode under way")
     if envs not in _experts:
         _experts[envs] = Expert(envs.task_spec.all_mazes, envs.num_envs)
     found = _experts[envs].costs(rules.maze, rules.target, rules.pose, envs.velocity())
@@ -43,7 +52,7 @@ def labels(envs: MazeVectorEnv, costs: bool = False) -> np.ndarray:
 class Expert:
     """Costs of actions in B environments; the ways to a goal are computed once for each leg."""
 
-    def __init__(self, mazes: tuple[Maze, ...] | FreshMazes, num_envs: int):
+    def __init__(self, mazes: Mazes, num_envs: int):
         """Knows `mazes`, which have one size and one cell size."""
         self._mazes = mazes
         self._courses: list[tuple[int, int] | None] = [None] * num_envs  # maze and goal of each course

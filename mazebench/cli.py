@@ -16,6 +16,7 @@ import typer
 
 from mazebench import __version__
 from mazebench.commands.bench import bench
+from mazebench.commands.collect import collect
 from mazebench.commands.compare import compare
 from mazebench.commands.eval import evaluate
 from mazebench.commands.generate import generate
@@ -42,6 +43,7 @@ app = typer.Typer(
 app.command(short_help="Make mazes: MJCF, text, picture, mesh.")(generate)
 app.command("eval", short_help="Evaluate agents on unseen mazes.")(evaluate)
 app.command(short_help="Compare two agents on the same episodes.")(compare)
+app.command(short_help="Collect demonstrations of an agent.")(collect)
 app.command(short_help="Train an agent on the training mazes.")(train)
 app.command(short_help="Make tables, figures and a page of results.")(report)
 app.command(short_help="Film or picture an episode.")(render)

@@ -82,7 +82,7 @@ BAD_INPUT = [
     ((*QUICK, "--suite", "papr"), "unknown suite 'papr'; available: paper, quick, tracks"),
     ((*RANDOM, "--track", "adrift", "--map-flip", "0.1"), "'adrift': expected no perturbation, found map_flip 0.1"),
     ((*TINY, "--out", "{bad}/file/out"), "file/out: can't write there: Not a directory"),
-    ((*TINY, "--out", "{bad}/used"), "expected an empty folder or an evaluation's, found 'thesis.tex' in it"),
+    ((*TINY, "--out", "{bad}/used"), "expected an empty folder or one of a run, found 'thesis.tex' in it"),
     ((*TINY, "--mazes", "{bad}/marked.txt"), "marked: expected '#*1@%' or a block for wall"),
     (("generate", "--kind", "pub"), "unknown kind 'pub'; available: cave, dfs, hospital, house, museum, obstacles, "),
     (("generate", "--mazes", "{bad}/binary.png"), "binary.png: expected a "),

@@ -177,6 +177,8 @@ def shortened(command: list[str]) -> list[str] | None:
     kind, *options = arguments
     if kind in ("list", "generate"):
         return arguments
+    if kind == "collect":
+        return [*arguments, "--episodes", "2"]
     if kind in ("compare", "report"):
         folders = [option for option in options if not option.startswith("--")]
         return arguments if pathlib.Path(folders[0]).exists() else None

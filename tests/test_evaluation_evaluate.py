@@ -325,7 +325,7 @@ class TestRefused:
     @pytest.mark.parametrize("resume", [False, True])
     def test_a_folder_that_holds_other_things_is_refused(self, tmp_path, resume):
         (tmp_path / "thesis.tex").touch()
-        with pytest.raises(InputError, match=r"expected an empty folder or an evaluation's, found 'thesis\.tex' in"):
+        with pytest.raises(InputError, match=r"expected an empty folder or one of a run, found 'thesis\.tex' in"):
             evaluate("random", out=tmp_path, resume=resume, **FEW)
         assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 

@@ -56,6 +56,7 @@ WALLS = {
     "torch": ("agents",),
     "gymnasium": ("mazebench/envs", "mazebench/bench"),
     "numba": ("agents/common/kernels.py",),
+    "minari": ("mazebench/evaluation/minari_data.py",),
     "ray": ("mazebench/evaluation/cluster.py", "mazebench/training/distributed.py"),
     "matplotlib": ("mazebench/report",),
     "pandas": ("mazebench/report",),

@@ -7,9 +7,11 @@ import os
 from enum import Enum
 from typing import Any
 
+import gymnasium
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
+from mazebench.constants import BENCHMARK_SIZES, TASK_VERSION
 from mazebench.maps.selection import described_maze
 from mazebench.tasks.task import Task
 
@@ -34,6 +36,13 @@ class JsonSpec:
                 kwargs["mazes"] = [described_maze(maze) for maze in self.task_spec.fixed_mazes]
             spec = dataclasses.replace(spec, kwargs=kwargs)
         self._spec = spec
+
+
+def env_spec_of(task: Task) -> EnvSpec:
+    """Returns Gymnasium's spec of the environment of a task, in plain values."""
+    name = f"{task.task.title()}-{BENCHMARK_SIZES[0]}" if task.track is None else task.track.title()
+    spec = gymnasium.spec(f"mazebench/{name}-v{TASK_VERSION}")
+    return dataclasses.replace(spec, kwargs=task.to_json())
 
 
 def _plain(value: Any) -> Any:

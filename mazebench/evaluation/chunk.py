@@ -19,7 +19,7 @@ from mazebench.errors import InputError, RunError, UnplayableError
 from mazebench.evaluation.agent_inputs import agent_seed, true_state
 from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.plan import Plan
-from mazebench.evaluation.recorder import Recorder
+from mazebench.evaluation.recorder import PoseRecorder, Recorder
 from mazebench.results.metrics import spl
 from mazebench.results.records import Record
 from mazebench.results.trajectories import Trajectory
@@ -59,7 +59,7 @@ class Outcome:
     success: bool
     steps: int
     path_length: float  # m
-    trajectory: Trajectory | None
+    recorded: Any  # what the recorder made of it; None without one
 
 
 def run_chunk(chunk: Chunk) -> Iterator[list[Ended]]:
@@ -75,9 +75,9 @@ def run_chunk(chunk: Chunk) -> Iterator[list[Ended]]:
         chunk.num_threads,
         seed=plan.options.seed,
         needs_truth=plan.agent_class.needs_truth,
-        record=chunk.record,
+        recorder=PoseRecorder() if chunk.record else None,
     ):
-        yield [Ended(_to_record(plan, outcome), outcome.trajectory) for outcome in outcomes]
+        yield [Ended(_to_record(plan, outcome), _to_trajectory(plan.task, outcome)) for outcome in outcomes]
 
 
 def run_whole_chunk(chunk: Chunk) -> list[Ended]:
@@ -102,7 +102,7 @@ def run_trials(
     *,
     seed: int = 0,
     needs_truth: bool = False,
-    record: bool = False,
+    recorder: Recorder | None = None,
 ) -> Iterator[list[Outcome]]:
     """Yields what came of the trials that ended, after each step; each once, in no fixed order.
 
@@ -114,7 +114,7 @@ def run_trials(
       num_threads: of the simulation; 0 for all cores.
       seed: of what the agent draws; with a trial's index it gives the seed of the episode's draws.
       needs_truth: whether the agent is given the true maze and pose.
-      record: whether outcomes have trajectories.
+      recorder: of the episodes.
     """
     if not trials:
         return
@@ -131,7 +131,6 @@ def run_trials(
     state = agent.initial_state(num_envs)
     active = new_episode = np.ones(num_envs, dtype=bool)
     seeds = np.zeros(num_envs, dtype=np.int64)
-    recorder = Recorder(num_envs) if record else None
     env = MazeVectorEnv(task, num_envs, num_threads=num_threads, episode_source=next_episode)
     with contextlib.closing(env):
         observation, info = env.reset()
@@ -148,21 +147,18 @@ def run_trials(
                 truth=truth,
                 active=active,
             )
-            if recorder:
-                recorder.add(info["position"], info["yaw"], observation["state"], active)
 
             # A step. An environment whose episode ends in it takes the next one; without one, it is no longer active.
             actions, state = agent.act(inputs, state)
+            if recorder:
+                recorder.add(observation, info, actions, active)
             running = list(slots)
             observation, _, terminated, truncated, info = env.step(actions)
             ended = terminated | truncated
             active = np.array([numbered is not None for numbered in slots])
             new_episode = ended & active
 
-            yield [
-                _outcome(task, *_present(running[slot]), info, slot, recorder)
-                for slot in np.flatnonzero(ended).tolist()
-            ]
+            yield [_outcome(*_present(running[slot]), info, slot, recorder) for slot in np.flatnonzero(ended).tolist()]
 
 
 def _present(numbered: tuple[int, Trial] | None) -> tuple[int, Trial]:
@@ -170,17 +166,18 @@ def _present(numbered: tuple[int, Trial] | None) -> tuple[int, Trial]:
     return numbered
 
 
-def _outcome(
-    task: Task, index: int, trial: Trial, info: dict[str, Any], slot: int, recorder: Recorder | None
-) -> Outcome:
-    final, trajectory = info["final_info"], None
-    if recorder:
-        last = final["position"][slot], final["yaw"][slot], info["final_obs"][slot]["state"]
-        pose, observed = recorder.take(slot, *last)
-        is_wrong = task.track is not None and state_errors(task, trial.episode)
-        trajectory = Trajectory(pose, observed if is_wrong else None)
+def _outcome(index: int, trial: Trial, info: dict[str, Any], slot: int, recorder: Recorder | None) -> Outcome:
+    final = info["final_info"]
+    recorded = recorder.take(slot, info["final_obs"][slot], final) if recorder else None
     success, steps = bool(final["success"][slot]), int(final["steps"][slot])
-    return Outcome(index, trial, success, steps, float(final["path_length"][slot]), trajectory)
+    return Outcome(index, trial, success, steps, float(final["path_length"][slot]), recorded)
+
+
+def _to_trajectory(task: Task, outcome: Outcome) -> Trajectory | None:
+    if outcome.recorded is None:
+        return None
+    is_wrong = task.track is not None and state_errors(task, outcome.trial.episode)
+    return Trajectory(outcome.recorded.true, outcome.recorded.observed if is_wrong else None)
 
 
 def _to_record(plan: Plan, outcome: Outcome) -> Record:

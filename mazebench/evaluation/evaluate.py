@@ -124,7 +124,7 @@ def run_plan(
     """
     num_trials, record = len(plan.trials), bool(run.record)
     if run.resume and is_finished(folder, record):
-        check_same_run(folder, plan)
+        check_same_run(folder, plan.identity)
         summary = load_result(folder).summary
         progress(num_trials, num_trials)
         return summary

@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import hashlib
 import pathlib
+from collections.abc import Sequence
 from typing import Any
 
 from mazebench.agent import Agent
@@ -119,12 +120,15 @@ class Plan:
         return CheckedAgent(options.agent, agent, interface.num_actions)
 
 
-def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> Plan:
+def make_plan(
+    options: EvalOptions, agent_class: type[Agent] | None = None, trials: Sequence[Trial] | None = None
+) -> Plan:
     """Returns the plan of an evaluation; reads what is needed and writes nothing.
 
     Args:
       options: what to evaluate.
       agent_class: the class that `options.agent` names, if it is loaded already.
+      trials: other episodes than those of the evaluation.
 
     Raises:
       InputError: if an option can't be met.
@@ -132,7 +136,8 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
     agent_class = agent_class or load_agent_class(options.agent)
     options = _with_checkpoint(_as_played(options, agent_class), agent_class)
     task = options.task
-    trials = select_trials(task, options.episodes_per_distance, options.seed)
+    if trials is None:
+        trials = select_trials(task, options.episodes_per_distance, options.seed)
     origin = provenance(options, agent_class)
     identity = {
         "agent": options.agent,

@@ -1,38 +1,61 @@
-"""Records the trajectories of episodes that run side by side."""
+"""Recorders of episodes that run side by side."""
 
 from __future__ import annotations
 
+import collections
+from typing import Any, NamedTuple, Protocol
+
 import numpy as np
+
+from mazebench.agent import Observation
 
 _POSE_IN_STATE = (0, 1, 5)  # x, y, yaw
 
 
-class Recorder:
-    """The true and the observed poses in each of B environments since its episode began."""
+class Recorder(Protocol):
+    """Notes what happens in environments, and gives it back when an episode has ended."""
 
-    def __init__(self, num_envs: int):
-        self._poses: list[list[np.ndarray]] = [[] for _ in range(num_envs)]
-
-    def add(self, position: np.ndarray, yaw: np.ndarray, state: np.ndarray, active: np.ndarray) -> None:
-        """Notes the poses of the environments that are `active`.
+    def add(self, observation: Observation, info: dict[str, Any], actions: np.ndarray, active: np.ndarray) -> None:
+        """Notes a step, before it is taken.
 
         Args:
-          position, yaw: the true ones, `[B, 2]` m and `[B]` rad.
-          state: the observed states, `[B, 12]`.
-          active: `[B]` bool.
+          observation, info: of all environments, as `MazeVectorEnv` returns them.
+          actions: `[B]` int.
+          active: `[B]` bool, the environments that have an episode.
         """
-        poses = np.column_stack([position, yaw, state[:, _POSE_IN_STATE]]).astype(np.float16)
-        for slot in np.flatnonzero(active):
-            self._poses[slot].append(poses[slot])
 
-    def take(self, slot: int, position: np.ndarray, yaw: float, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the true and the observed poses of the episode that ended in an environment, and forgets them.
+    def take(self, slot: int, observation: Observation, info: dict[str, Any]) -> Any:
+        """Returns the record of the episode that ended in an environment, and forgets it.
 
         Args:
           slot: the index of the environment.
-          position, yaw, state: as in `add`, the last ones of this environment.
+          observation: the last one, without the axis B.
+          info: the last one of all environments.
         """
-        last = np.array([*position, yaw, *state[[*_POSE_IN_STATE]]], dtype=np.float16)
-        poses = np.stack([*self._poses[slot], last])
-        self._poses[slot] = []
-        return poses[:, :3], poses[:, 3:]
+
+
+class Poses(NamedTuple):
+    """The poses of an episode: x and y in metres, yaw in rad."""
+
+    true: np.ndarray  # [L, 3] float16
+    observed: np.ndarray  # [L, 3] float16
+
+
+class PoseRecorder:
+    """Records the true and the observed poses."""
+
+    def __init__(self) -> None:
+        self._poses: collections.defaultdict[int, list[np.ndarray]] = collections.defaultdict(list)
+
+    def add(self, observation: Observation, info: dict[str, Any], actions: np.ndarray, active: np.ndarray) -> None:
+        """Notes the poses before a step."""
+        poses = np.column_stack([info["position"], info["yaw"], observation["state"][:, _POSE_IN_STATE]])
+        poses = poses.astype(np.float16)
+        for slot in np.flatnonzero(active).tolist():
+            self._poses[slot].append(poses[slot])
+
+    def take(self, slot: int, observation: Observation, info: dict[str, Any]) -> Poses:
+        """Returns the poses of the episode that ended."""
+        last = [*info["position"][slot], info["yaw"][slot], *observation["state"][[*_POSE_IN_STATE]]]
+        poses = np.stack([*self._poses.pop(slot), np.array(last, dtype=np.float16)])
+        return Poses(poses[:, :3], poses[:, 3:])

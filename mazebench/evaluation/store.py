@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import pathlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -32,17 +32,34 @@ def is_finished(folder: pathlib.Path, record: bool = False) -> bool:
     return all((folder / name).exists() for name in names) and not (folder / JOURNAL).exists()
 
 
-def check_same_run(folder: pathlib.Path, plan: Plan) -> None:
-    """Raises `InputError` unless `folder` holds the run of `plan`; the message names the first difference."""
+def check_same_run(folder: pathlib.Path, identity: Mapping[str, Any]) -> None:
+    """Raises `InputError` unless `folder` holds the run of an identity; the message names the first difference."""
     before = read_json(folder / CONFIG)
-    for key, value in json.loads(json.dumps(plan.identity)).items():
+    for key, value in json.loads(json.dumps(identity)).items():
         found = before.get(key)
         if found == value:
             continue
         if key == "agent_code_sha256" and found and value:
-            what = "file" if ":" in plan.options.agent else "package"
+            what = "file" if ":" in identity["agent"] else "package"
             raise InputError(f"{folder}: holds another run: its agent's {what} was changed since; name another folder")
         raise InputError(f"{folder}: holds another run: its {key} is {str(found)[:200]}, this one's {value}")
+
+
+def is_begun(folder: pathlib.Path, identity: Mapping[str, Any], resume: bool) -> bool:
+    """Makes a folder, and returns whether it holds a run of an identity, to go on with.
+
+    Raises:
+      InputError: if it can't be made, holds a run and `resume` is false, or holds another run or anything else.
+    """
+    make_folder(folder)
+    found = {path.name for path in folder.iterdir() if path.suffix != ".tmp"}
+    if CONFIG in found:
+        if not resume:
+            raise InputError(f"{folder}: holds a run already; go on with --resume or name another folder")
+        check_same_run(folder, identity)
+    elif found - {JOURNAL}:
+        raise InputError(f"{folder}: expected an empty folder or one of a run, found {min(found)!r} in it")
+    return CONFIG in found
 
 
 class Store:
@@ -57,15 +74,7 @@ class Store:
           InputError: if the folder can't be written, or holds another run or anything else.
         """
         self.folder, self._plan = folder, plan
-        make_folder(folder)
-        found = {path.name for path in folder.iterdir() if path.suffix != ".tmp"}
-        self._is_new = CONFIG not in found
-        if not self._is_new and resume:
-            check_same_run(folder, plan)
-        elif not self._is_new:
-            raise InputError(f"{folder}: holds a run already; go on with --resume or name another folder")
-        elif found - {JOURNAL}:
-            raise InputError(f"{folder}: expected an empty folder or an evaluation's, found {min(found)!r} in it")
+        self._is_new = not is_begun(folder, plan.identity, resume)
         # A line that a kill cut short is passed over: its episode is run again.
         ended = [_from_line(line) for line in read_lines(folder / JOURNAL)]
         self.record = record or any(each.trajectory for each in ended)

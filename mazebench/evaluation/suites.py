@@ -206,7 +206,7 @@ def _prepare(
                 )
     for (folder, part), plan in plans.items():
         if (out / folder / part / CONFIG).exists():
-            check_same_run(out / folder / part, plan)
+            check_same_run(out / folder / part, plan.identity)
     with writing_to(out):
         write_json(out / SUITE, content.model_dump())
 
