@@ -48,6 +48,7 @@ class NetworkAgent(LearningAgent):
     """An agent that acts by a network; where it explores, environment i takes random actions at Ape-X's rate i."""
 
     name: ClassVar[str]
+    shipped_size: ClassVar[int] = 13  # N of the mazes in which the checkpoint that ships was trained
     default_config: ClassVar[Any]  # a frozen dataclass that has num_envs, epsilon_base and epsilon_alpha
     learner_class: ClassVar[Any]  # called with the agent, the task to learn in and a seed
     learns_on_gpu: ClassVar[bool] = False  # whether the learner uses a GPU if there is one
@@ -157,9 +158,8 @@ class NetworkAgent(LearningAgent):
     @classmethod
     def default_checkpoint(cls) -> pathlib.Path:
         """Returns the checkpoint that ships."""
-        return pathlib.Path(
-            str(resources.files("mazebench_assets").joinpath("checkpoints", f"{cls.name}-13.safetensors"))
-        )
+        name = f"{cls.name}-{cls.shipped_size}.safetensors"
+        return pathlib.Path(str(resources.files("mazebench_assets").joinpath("checkpoints", name)))
 
     def _explored(self, actions: np.ndarray) -> np.ndarray:
         """Returns `actions` `[B]`, some of them replaced by random ones."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 import pathlib
 from collections.abc import Mapping
-from importlib import resources
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -62,6 +61,7 @@ class NeuralPlanner(NetworkAgent):
     """Plans on what its senses tell, every few steps, and acts by a policy that reads the plan."""
 
     name: ClassVar[str] = "neural-planner"
+    shipped_size = 31
     default_config: ClassVar[NeuralPlannerConfig] = NeuralPlannerConfig()
     learner_class: ClassVar[type[PlannerLearner]] = PlannerLearner
     learns_several_tasks = True
@@ -86,12 +86,6 @@ class NeuralPlanner(NetworkAgent):
         agent = cls(config, interface, seed)
         load_into(path, agent.network, tensors)
         return agent
-
-    @classmethod
-    def default_checkpoint(cls) -> pathlib.Path:
-        """Returns the checkpoint that ships, for mazes of any size."""
-        path = resources.files("mazebench_assets").joinpath("checkpoints", "neural-planner.safetensors")
-        return pathlib.Path(str(path))
 
     @classmethod
     def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:
