@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import torch
 from acting import inputs_of
-from mazebench_agents.common.layers import marked_position
+from mazebench_agents.common.layers import MapEncoder, marked_position
 from mazebench_agents.mmn import MMN
 from mazebench_agents.mmn.batches import make_batch
-from mazebench_agents.mmn.hypermodel import MMNNetwork
+from mazebench_agents.mmn.hypermodel import _FAR, MMNNetwork, WayReader
 from mazebench_agents.mmn.losses import unrolled_losses
 from mazebench_agents.mmn.mmn_config import MMNConfig
 from mazebench_agents.mmn.targets import Targets
@@ -18,7 +18,7 @@ from small_world import learn
 from mazebench.agent import Interface
 from mazebench.errors import UnplayableError
 from mazebench.maps.kinds import generate
-from mazebench.tasks.context import START
+from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.task import Task
 from mazebench.training.experience import Collector
 
@@ -245,3 +245,14 @@ def test_first_update_on_a_gpu_is_that_on_a_cpu(mazes, monkeypatch):
     found, expected = on_gpu.update(), on_cpu.update()
     for name, value in expected.items():
         assert found[name] == pytest.approx(value, rel=0.05, abs=1e-3), name
+
+
+@pytest.mark.parametrize(("reader", "sees_far"), [(WayReader(8), True), (MapEncoder(8, _FAR), False)])
+def test_only_ways_tell_a_cell_of_a_goal_that_is_far(reader, sees_far):
+    """In a corridor of 61 cells, the goal is at the left or at the right end."""
+    context = torch.zeros(2, 4, 61, 61)
+    context[:, GLOBAL_MAP] = 1.0
+    context[:, GLOBAL_MAP, 30, 1:60] = 0.0
+    context[0, GOAL, 30, 1] = context[1, GOAL, 30, 59] = 1.0
+    left, right = reader(context)[:, :, 30, 30]
+    assert (left - right).abs().max().item() > 1e-3 if sees_far else torch.equal(left, right)
