@@ -50,7 +50,7 @@ EVAL_DISTANCES = tuple(range(1, 16))
 ENDS = ("start", "goal")
 CUSTOM = "custom"  # the split in results of mazes, a start or a goal that are not the benchmark's
 MIN_CONTEXT_SIZE = 3
-NOT_IN_EVALUATIONS = ("fresh", "pairs", "num_goals", "continuous", "context_size")  # fields that they do not vary
+NOT_IN_EVALUATIONS = ("fresh", "pairs", "num_goals", "context_size")  # fields that they do not vary
 
 _NUM_CHECKED = 10  # of fresh mazes, one of which must have the distances
 _FARTHEST_SHARE = 0.9  # of the diameter of a large maze; few pairs of cells are farther apart
@@ -58,7 +58,7 @@ _LIDAR = "lidar"  # the sensor that every track offers
 _SHOWING_POSE = ("top", "chase")  # the sensors that show where the body is
 # Fields that choose the mazes, and those that an agent may choose, or is not told, while the same is played.
 _OF_MAZES = ("size", "split", "mazes", "kinds", "num_mazes", "fresh", *fields_of(ReadOptions))
-_OF_AGENTS = ("sensors", "camera_size", "textures", "hide", "exact_pose", "context_size")
+_OF_AGENTS = ("actions", "sensors", "camera_size", "textures", "hide", "exact_pose", "context_size")
 
 
 @options
@@ -88,10 +88,13 @@ class Task(TaskFields):
     def from_json(cls, content: Mapping[str, Any]) -> Task:
         """Returns the task of which `to_json` returned the content.
 
+        Checkpoints that are older than the field `actions` have the field `continuous` in their tasks.
+
         Raises:
           InputError: as `of`.
         """
-        return cls.of(**content)
+        older = {} if "continuous" not in content else {"actions": "velocity" if content["continuous"] else "six"}
+        return cls.of(**{name: value for name, value in content.items() if name != "continuous"} | older)
 
     def to_json(self) -> dict[str, Any]:
         """Returns the fields by name, in values that JSON has."""
@@ -251,6 +254,7 @@ class Task(TaskFields):
             self.task,
             self.size,
             self.context_size,
+            actions=self.actions,
             sensors=self.sensors,
             cell_size=self.cell_size,
             hidden=self.hide,

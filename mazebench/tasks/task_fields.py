@@ -9,6 +9,7 @@ from typing import Annotated, Any, TypedDict
 from annotated_types import Ge, Interval
 from pydantic import BeforeValidator, InstanceOf
 
+from mazebench.constants import VELOCITIES
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import ALL_SPLITS
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
@@ -57,7 +58,7 @@ class TaskOptions(TypedDict, total=False):
     landmark_distance: int
     pairs: str
     num_goals: int
-    continuous: bool
+    actions: str
     map_flip: float
     map_warp: float
     position_noise: float
@@ -176,7 +177,14 @@ class TaskFields(SensorOptions, ReadOptions):
             "are those of the last one."
         ),
     ] = 1
-    continuous: Annotated[bool, Doc("Actions are velocities (forward, left, turn) instead of one of six.")] = False
+    actions: Annotated[
+        str,
+        OneOf("six", *VELOCITIES),
+        Doc(
+            "six: one of the benchmark's six; velocity: (forward, left, turn), each from -1 to 1; diff: (v, omega), "
+            "forward and turn, of a robot that can't strafe. An agent that doesn't play six has its own."
+        ),
+    ] = "six"
 
     # What is shown: what is wrong with the map and the senses, and what an agent may ask for or is not told.
     map_flip: FlipShare = 0.0

@@ -27,7 +27,7 @@ UNIT_VELOCITIES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0,
 
 @pytest.fixture(scope="module")
 def field() -> Environment:
-    return Environment(Task.of(mazes=simple_mazes.field(41), distances=[30], continuous=True))
+    return Environment(Task.of(mazes=simple_mazes.field(41), distances=[30], actions="velocity"))
 
 
 def cruise(field: Environment, velocity, num_steps: int = 12) -> np.ndarray:
@@ -56,7 +56,7 @@ class TestControls:
         assert (forward, left) == pytest.approx((-0.3 * TOP_SPEED, 0.4 * TOP_SPEED), abs=1e-3)
 
     def test_no_velocity_drives_a_body_into_a_wall(self):
-        spec = Task.of("local", size=13, continuous=True)
+        spec = Task.of("local", size=13, actions="velocity")
         envs, rng = MazeVectorEnv(spec, 32, seed=0), np.random.default_rng(0)
         envs.reset(seed=0)
         depth = 0.0
@@ -80,14 +80,14 @@ def sunk_in(maze: Maze, position: np.ndarray) -> float:
 class TestEnvironments:
     def test_all_environments_declare_continuous_actions(self, field):
         assert field.action_spec() == specs.BoundedArray((3,), np.float32, -1.0, 1.0, name="action")
-        env = MazeEnv(Task.of(continuous=True))
+        env = MazeEnv(Task.of(actions="velocity"))
         assert env.action_space == gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
-        envs = MazeVectorEnv(Task.of(continuous=True), 2)
+        envs = MazeVectorEnv(Task.of(actions="velocity"), 2)
         assert envs.action_space.shape == (2, 3)
 
     @pytest.mark.parametrize("task", ["local", "hierarchical"])
     def test_unit_velocities_play_the_discrete_episode(self, task):
-        discrete, continuous = (MazeEnv(Task.of(task, continuous=choice)) for choice in (False, True))
+        discrete, continuous = (MazeEnv(Task.of(task, actions=kind)) for kind in ("six", "velocity"))
         discrete.reset(seed=5)
         continuous.reset(seed=5)
         for action in np.random.default_rng(0).integers(len(ACTIONS), size=60):
@@ -96,7 +96,7 @@ class TestEnvironments:
             assert expected[1:4] == found[1:4]
 
     def test_steps_are_the_same_in_all_environments(self):
-        spec = Task.of(mazes=load_mazes(13, "train")[:2], continuous=True, time_limit=30)
+        spec = Task.of(mazes=load_mazes(13, "train")[:2], actions="velocity", time_limit=30)
         actions = np.random.default_rng(0).uniform(-1, 1, size=(20, 2, 3)).astype(np.float32)
         envs = MazeVectorEnv(spec, 2)
         seen = [envs.reset(seed=[4, 9])[0]["state"]] + [envs.step(action)[0]["state"] for action in actions]
@@ -110,7 +110,7 @@ class TestEnvironments:
 
     @pytest.mark.filterwarnings("ignore::UserWarning")
     def test_continuous_environments_pass_the_checks(self):
-        env_checker.check_env(MazeEnv(Task.of(continuous=True)), skip_render_check=True)
+        env_checker.check_env(MazeEnv(Task.of(actions="velocity")), skip_render_check=True)
 
     def test_velocities_are_clipped(self, field):
         np.testing.assert_array_equal(cruise(field, [2, 0, -7], 3), cruise(field, [1, 0, -1], 3))
@@ -123,7 +123,7 @@ class TestEnvironments:
 
     @pytest.mark.parametrize("actions", [[0, 1], np.full((2, 3), np.inf)])
     def test_invalid_velocities_of_a_vector_are_refused(self, actions):
-        envs = MazeVectorEnv(Task.of(continuous=True), 2)
+        envs = MazeVectorEnv(Task.of(actions="velocity"), 2)
         envs.reset(seed=0)
         with pytest.raises(ValueError, match=r"expected velocities .* of shape \(2, 3\)"):
             envs.step(actions)
