@@ -11,7 +11,6 @@ from mazebench.errors import InputError
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.maze_files import read_located, read_maze
 from mazebench.maps.maze_options import ReadOptions
-from mazebench.maps.readers.moving_ai import read_scenarios
 from mazebench.maps.text import format_maze, parse_maze
 
 PLAN = """\
@@ -127,25 +126,10 @@ class TestRefusal:
         with pytest.raises(MazeError, match=message):
             read(tmp_path, content)
 
+    def test_a_map_of_movingai_is_never_taken_for_an_inverted_one(self, tmp_path):
+        rows = "type octile\nheight 4\nwidth 4\nmap\n....\n.@@.\n.@@.\n....\n"
+        assert read(tmp_path, rows).walls[2:4, 2:4].all()
+
     def test_a_missing_file_is_named(self, tmp_path):
         with pytest.raises(InputError, match=r"none\.txt: can't read the text map: No such file or directory$"):
             read_maze(tmp_path / "none.txt")
-
-
-class TestScenarios:
-    def test_ends_are_cells_of_the_maze_with_its_own_distances(self, tmp_path, remarks):
-        (tmp_path / "m.map").write_text("type octile\nheight 3\nwidth 4\nmap\n...@\n.@..\n...@\n")
-        lines = ["version 1", "0 m.map 4 3 0 0 2 2 4.0", "0 m.map 4 3 2 0 2 1 2.0", "0 m.map 4 3 0 0 1 1 1.4"]
-        (tmp_path / "m.scen").write_text("\n".join(lines) + "\n")
-        located = read_located(tmp_path / "m.map", None, ReadOptions(cell_size=2.0))
-        remarks()
-        scenarios = read_scenarios(tmp_path / "m.scen", located)
-        assert scenarios.starts.tolist() == [[1, 1], [1, 3]]
-        assert scenarios.goals.tolist() == [[3, 3], [2, 3]]
-        assert scenarios.distances.tolist() == [4, 1]
-        assert scenarios.octile_lengths.tolist() == [4.0, 2.0]
-        assert "1 of 3 scenarios left out" in remarks()[0]
-        with pytest.raises(
-            InputError, match="expected scenarios of MovingAI, which begin with 'version 1', found 'type"
-        ):
-            read_scenarios(tmp_path / "m.map", located)

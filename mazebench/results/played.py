@@ -51,10 +51,11 @@ def check_mazes(summary: Summary) -> None:
 
 
 def mazes_hash(task: Task) -> str:
-    """Returns a SHA-256 of the mazes; 1 m, the width of the benchmark's cells, does not change it."""
+    """Returns a SHA-256 of the mazes and the scenarios; 1 m, the width of the benchmark's cells, is left out."""
     scale = "" if task.cell_size == 1 else repr(task.cell_size)
     walls = b"".join(maze.walls.tobytes() for maze in task.fixed_mazes)
-    return hashlib.sha256(walls + scale.encode("ascii")).hexdigest()
+    ends = b"" if task.scenarios is None else np.stack([task.scenarios.starts, task.scenarios.goals]).tobytes()
+    return hashlib.sha256(walls + scale.encode("ascii") + ends).hexdigest()
 
 
 def shown_of(task: Task, episode: Episode) -> Shown:

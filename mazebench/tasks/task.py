@@ -24,6 +24,7 @@ from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
 from mazebench.maps.maze import MIN_CELL_SIZE, Cell, Maze, corner_cells, require_one_size
 from mazebench.maps.maze_files import read_all
 from mazebench.maps.maze_options import THIN_WALLS, ReadOptions
+from mazebench.maps.scenarios import SUFFIX, Scenarios, read_scenarios
 from mazebench.maps.selection import described_maze, own_mazes
 from mazebench.options import fields_of, options
 from mazebench.tasks.context import MAX_CONTEXT_SIZE, default_context_size
@@ -107,7 +108,7 @@ class Task(TaskFields):
         """Returns the task with other values of some fields; the mazes are not loaded again unless they change."""
         task = dataclasses.replace(self, **changes)
         if not set(changes) & set(_OF_MAZES):
-            vars(task)["all_mazes"] = self.all_mazes  # as `cached_property` keeps them
+            task._keep_mazes_of(self)
         return task
 
     def in_mazes(self, mazes: Sequence[Maze]) -> Task:
@@ -131,10 +132,10 @@ class Task(TaskFields):
         """
         if self.mazes is not None:
             mazes = self.mazes
-            if isinstance(mazes, str):  # start and goal choose the area, unless it is given
-                reading = {name: getattr(self, name) for name in fields_of(ReadOptions)}
-                reading["area"] = self.area or self.start or self.goal
-                mazes = read_all(pathlib.Path(mazes), ReadOptions(**reading))
+            if self.scenarios is not None:
+                mazes = (self.scenarios.maze,)
+            elif isinstance(mazes, str):
+                mazes = read_all(pathlib.Path(mazes), self._reading)
             for maze in mazes:
                 if self.size not in (0, maze.size):
                     raise InputError(f"expected mazes of size {self.size}, found size {maze.size}")
@@ -146,6 +147,26 @@ class Task(TaskFields):
             split = "train" if self.split == "train" else "dev"
             return draw_mazes(self._drawn_kinds, size, split, self.num_mazes or NUM_DRAWN)
         return load_mazes(size, self.split) if self.track is None else load_kind_mazes(self.split)
+
+    @functools.cached_property
+    def scenarios(self) -> Scenarios | None:
+        """The starts and goals that a file of scenarios names; None if the mazes are no such file.
+
+        Raises:
+          InputError: if the file or its map can't be read.
+        """
+        is_file = isinstance(self.mazes, str) and pathlib.Path(self.mazes).suffix.lower() == SUFFIX
+        return read_scenarios(str(self.mazes), self._reading) if is_file else None
+
+    @property
+    def _reading(self) -> ReadOptions:
+        values = {name: getattr(self, name) for name in fields_of(ReadOptions)}
+        values["area"] = self.area or self.start or self.goal  # these choose the area, unless it is given
+        return ReadOptions(**values)
+
+    def _keep_mazes_of(self, other: Task) -> None:
+        """Takes over what another task has read, as `cached_property` keeps it."""
+        vars(self).update(all_mazes=other.all_mazes, scenarios=other.scenarios)
 
     @property
     def fixed_mazes(self) -> tuple[Maze, ...]:
@@ -426,7 +447,7 @@ def _complete(given: Mapping[str, Any], default_distances: tuple[int, ...] | Non
     task = dataclasses.replace(
         asked, **found, distances=distances, time_limit=time_limit, context_size=context_size, hide=hide
     )
-    vars(task)["all_mazes"] = mazes
+    task._keep_mazes_of(asked)
     check_shown(task)
     checked: Sequence[Maze] = mazes  # type: ignore[assignment]
     if isinstance(mazes, FreshMazes):  # an episode whose maze is too small takes another one
@@ -443,6 +464,8 @@ def _distances(task: Task, mazes: Mazes, default: tuple[int, ...]) -> tuple[int,
         return of_track or default
 
     # Of given ends, that between them.
+    if task.scenarios is not None:
+        return tuple(np.unique(task.scenarios.distances).tolist())
     if task.task == "hierarchical" or task.num_ends == 2:
         return tuple(sorted({task.farthest(maze) for maze in mazes}))
 
@@ -486,6 +509,10 @@ def _check_options(task: Task) -> None:
         raise InputError("expected pairs 'random' beside a start or a goal, found 'fixed', pairs of their own")
     if task.goal is not None and task.num_goals > 1:
         raise InputError(f"expected num_goals 1 beside a goal, found {task.num_goals}")
+    if task.scenarios is not None:
+        for name, value in {"start": None, "goal": None, "pairs": "random", "num_goals": 1, "track": None}.items():
+            if (found := getattr(task, name)) != value:
+                raise InputError(f"scenarios, which have starts and goals: expected {name} {value!r}, found {found!r}")
     if task.lidar_noise is not None and _LIDAR not in task.sensors:
         found = ", ".join(task.sensors) or "none"
         raise InputError(f"lidar_noise {task.lidar_noise}: expected the sensor lidar, found {found}")
@@ -588,6 +615,14 @@ def check_maze(task: Task, maze: Maze) -> None:
 
 def check_distances(task: Task, maze: Maze) -> None:
     """Raises `InputError` if no goal of the local task is as far away in a maze as wanted."""
+    if task.scenarios is not None:
+        if not len(task.scenarios.numbers(task.distances)):
+            found = task.scenarios.distances
+            raise InputError(
+                f"{maze.name}: expected distances that scenarios have, from {found.min()} to {found.max()} cells, "
+                f"found {', '.join(map(str, task.distances))}"[:200]
+            )
+        return
     if task.task != "local" or task.num_ends == 2:
         return
     if max(task.distances) > (farthest := task.farthest(maze)):

@@ -108,7 +108,10 @@ class TaskFields(SensorOptions, ReadOptions):
     mazes: Annotated[
         str | tuple[InstanceOf[Maze], ...] | None,
         BeforeValidator(as_mazes),
-        Doc("Mazes of your own: a text, picture, array or ROS map, or a folder of them."),
+        Doc(
+            "Mazes of your own: a text, picture, array or ROS map, or a folder of them; or scenarios of MovingAI "
+            "(.scen), whose starts and goals are played on the map next to them."
+        ),
     ] = None
     kinds: Annotated[
         tuple[Annotated[str, OneOf(*DRAWN_KINDS)], ...],
