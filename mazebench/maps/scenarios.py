@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pathlib
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from mazebench.maps.readers.occupancy_grid import locate_maze
 from mazebench.maps.readers.text_map import read_text
 from mazebench.storage.files import read_at_most
 
-SUFFIX = ".scen"
+_SUFFIX = ".scen"
 _MAX_BYTES = 2**26
 _NUM_FIELDS = 9  # bucket, map, its width and height, x and y of start and goal, length
 
@@ -40,6 +40,11 @@ class Scenarios(NamedTuple):
         """Returns the start and the goal of a scenario."""
         (start_row, start_column), (goal_row, goal_column) = self.starts[number].tolist(), self.goals[number].tolist()
         return (start_row, start_column), (goal_row, goal_column)
+
+
+def are_scenarios(mazes: Any) -> bool:
+    """Returns whether mazes of one's own are the path of a file of scenarios."""
+    return isinstance(mazes, str | pathlib.Path) and pathlib.Path(mazes).suffix.lower() == _SUFFIX
 
 
 def read_scenarios(path: str | pathlib.Path, options: ReadOptions) -> Scenarios:

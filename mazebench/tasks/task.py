@@ -24,7 +24,7 @@ from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
 from mazebench.maps.maze import MIN_CELL_SIZE, Cell, Maze, corner_cells, require_one_size
 from mazebench.maps.maze_files import read_all
 from mazebench.maps.maze_options import THIN_WALLS, ReadOptions
-from mazebench.maps.scenarios import SUFFIX, Scenarios, read_scenarios
+from mazebench.maps.scenarios import Scenarios, are_scenarios, read_scenarios
 from mazebench.maps.selection import described_maze, own_mazes
 from mazebench.options import fields_of, options
 from mazebench.tasks.context import MAX_CONTEXT_SIZE, default_context_size
@@ -155,8 +155,7 @@ class Task(TaskFields):
         Raises:
           InputError: if the file or its map can't be read.
         """
-        is_file = isinstance(self.mazes, str) and pathlib.Path(self.mazes).suffix.lower() == SUFFIX
-        return read_scenarios(str(self.mazes), self._reading) if is_file else None
+        return read_scenarios(str(self.mazes), self._reading) if are_scenarios(self.mazes) else None
 
     @property
     def _reading(self) -> ReadOptions:
