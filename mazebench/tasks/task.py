@@ -24,13 +24,13 @@ from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
 from mazebench.maps.maze import MIN_CELL_SIZE, Cell, Maze, corner_cells, require_one_size
 from mazebench.maps.maze_files import read_all
 from mazebench.maps.maze_options import THIN_WALLS, ReadOptions
+from mazebench.maps.places import free_cell_of_place
 from mazebench.maps.scenarios import Scenarios, are_scenarios, read_scenarios
 from mazebench.maps.selection import described_maze, own_mazes
 from mazebench.options import fields_of, options
 from mazebench.tasks.context import MAX_CONTEXT_SIZE, default_context_size
 from mazebench.tasks.interface import Interface
 from mazebench.tasks.perturbations import PERTURBATIONS
-from mazebench.tasks.start_goal import cell_of_end
 from mazebench.tasks.task_fields import (
     DRAWN_KINDS,
     FIRST_LEVEL,
@@ -221,7 +221,7 @@ class Task(TaskFields):
           InputError: if one is not free.
         """
         given = {name: end for name in ENDS if (end := getattr(self, name)) is not None}
-        cells = {name: cell_of_end(name, end, maze) for name, end in given.items()}
+        cells = {name: free_cell_of_place(name, end, maze) for name, end in given.items()}
         corners = dict(zip(ENDS, corner_cells(maze), strict=True)) if self.task == "hierarchical" else {}
         start, goal = ((corners | cells).get(name) for name in ENDS)
         return start, goal

@@ -15,6 +15,7 @@ from mazebench.maps.benchmark import ALL_SPLITS
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.maps.maze import Cell, Maze
 from mazebench.maps.maze_options import ReadOptions
+from mazebench.maps.places import place_text
 from mazebench.maps.selection import OwnMazes, maze_as_described
 from mazebench.options import Doc, OneOf, options
 from mazebench.tasks.context import MAX_CONTEXT_SIZE
@@ -23,7 +24,6 @@ from mazebench.tasks.perturbations.noise import PositionDeviation
 from mazebench.tasks.perturbations.warp import WarpShare
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.sensor import SensorOptions
-from mazebench.tasks.start_goal import end_text
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.track import LEVELS
 
@@ -141,7 +141,7 @@ class TaskFields(SensorOptions, ReadOptions):
     ] = ()
     start: Annotated[
         str | None,
-        BeforeValidator(functools.partial(end_text, "start")),
+        BeforeValidator(functools.partial(place_text, "start")),
         Doc(
             "Where every episode begins, instead of a drawn cell, or of the upper right corner (hierarchical task): a "
             "cell 'row,column', in Python also (row, column), or a point '1.5m,2.5m' (x, y) from the map's lower left "
@@ -150,7 +150,7 @@ class TaskFields(SensorOptions, ReadOptions):
     ] = None
     goal: Annotated[
         str | None,
-        BeforeValidator(functools.partial(end_text, "goal")),
+        BeforeValidator(functools.partial(place_text, "goal")),
         Doc("Where every episode leads, as for start; instead of a drawn cell, or of the lower left corner."),
     ] = None
     time_limit: Annotated[
