@@ -10,7 +10,6 @@ import pytest
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.maze_files import read_located, read_maze
-from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.text import format_maze, parse_maze
 
 PLAN = """\
@@ -96,7 +95,7 @@ class TestReading:
         corners = [[1, 1], [5, 1], [5, 3], [3, 3], [3, 5], [1, 5]]
         house = {"id": "a", "verts": corners, "room_category": {"Kitchen": [[1, 1, 3, 3]]}}
         (tmp_path / "house.json").write_text(json.dumps(house))
-        maze, (x, y, _) = read_located(tmp_path / "house.json", None, ReadOptions(cell_size=0.5))
+        maze, (x, y, _) = read_located(tmp_path / "house.json", cell_size=0.5)
         for point, is_free in {(2, 2): True, (4, 2): True, (2, 4): True, (4, 4): False}.items():
             assert maze.is_free(maze.cell_at(point[0] - x, point[1] - y)) == is_free
 
