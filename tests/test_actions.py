@@ -194,6 +194,10 @@ class TestAgents:
         with pytest.raises(UnplayableError, match=f"^agent '{agent}': plays the actions six, found diff$"):
             evaluate(agent, **near, actions="diff")
 
+    @pytest.mark.parametrize(("older", "kind"), [(False, "six"), (True, "velocity")])
+    def test_the_task_of_an_older_checkpoint_is_read(self, older, kind):
+        assert Task.from_json({"size": 15, "continuous": older}) == Task.of(size=15, actions=kind)
+
     def test_an_unknown_kind_is_refused(self):
         with pytest.raises(InputError, match=r"^unknown actions 'four'; available: diff, six, velocity$"):
             Task.of(actions="four")

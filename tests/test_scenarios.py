@@ -43,6 +43,7 @@ class TestReading:
     @pytest.mark.parametrize(
         ("before", "after", "said"),
         [
+            ("maps/m.map", "dao\\other.map", r"other\.map: can't read the text map"),
             ("version 1", "type octile", r"m\.map\.scen: expected scenarios of MovingAI, which begin with 'version 1'"),
             (" 4 3 2 0", " 8 6 2 0", r"expected scenarios of .*m\.map, 4 x 3 cells, found 8 x 6$"),
             ("maps/m.map 4 3 2", "maps/n.map 4 3 2", r"expected scenarios of one map, found maps/m\.map, maps/n\.map$"),

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import pathlib
+import re
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -65,7 +66,7 @@ def read_scenarios(path: str | pathlib.Path, options: ReadOptions) -> Scenarios:
         raise InputError(f"{path}: expected numbers from the third field on, found {error}") from error
 
     # The map.
-    map_path = path.with_name(pathlib.PurePath(rows[0][1]).name)
+    map_path = path.with_name(re.split(r"[/\\]", rows[0][1])[-1])
     grid = read_text(map_path)
     height, width = grid.states.shape
     if (other := (numbers[:, :2] != (width, height)).any(axis=1)).any():
