@@ -39,7 +39,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "hierarchical": {"task": "hierarchical", "size": 15},
     "imperfect": {"map_flip": 0.1, "map_warp": 0.1, "position_noise": 0.5},
     "goals": {"num_goals": 3, "context_size": 25, "sensors": ("lidar",), "lidar_noise": "turtlebot3"},
-    "continuous": {"continuous": True, "odometry_noise": 0.2},
+    "continuous": {"actions": "velocity", "odometry_noise": 0.2},
     "fresh": {"kinds": ("dfs", "house", "cave"), "fresh": True, "size": 21},
     "building": {"track": "building", "level": (1, 2, 3)},
     "rough": {"track": "rough", "level": 3},

@@ -44,6 +44,8 @@ class _Declarations:
 
     needs_truth: ClassVar[bool] = False  # results of an agent that does are labelled as privileged
     needs_sensors: ClassVar[tuple[str, ...]] = ()  # an evaluation adds them to the sensors that it is given
+    # The kinds of actions that it can answer with: "six", "velocity", "diff"; without "six", it is given the first one.
+    plays_actions: ClassVar[tuple[str, ...]] = ("six",)
     needs_shown: ClassVar[tuple[str, ...]] = ()  # of "map" and "goal": what it can't play without
     learns: ClassVar[bool] = False  # an agent that does can be given a checkpoint, even if it ships with none
 
@@ -85,7 +87,7 @@ class Agent(_Declarations):
         return None
 
     def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, Any]:
-        """Returns actions `[B]` int and the next state.
+        """Returns actions and the next state: `[B]` int, or velocities `[B, 3]` or `[B, 2]` float.
 
         What an agent does in an episode must depend on that episode alone, and not on its position in the batch.
 
@@ -114,8 +116,8 @@ class SingleAgent(_Declarations):
         `act` follows with the same observation.
         """
 
-    def act(self, observation: Observation) -> int:
-        """Returns an action.
+    def act(self, observation: Observation) -> int | np.ndarray:
+        """Returns an action: one of six, or velocities `[3]` or `[2]`.
 
         Args:
           observation: "state" `[12]` and "context" `[4, M, M]`, not to be changed.
@@ -128,12 +130,13 @@ class _SingleAgents(Agent):
 
     single_class: ClassVar[type[SingleAgent]]
 
-    def __init__(self, built: SingleAgent):
-        self._built = built
+    def __init__(self, built: SingleAgent, resting: np.ndarray):
+        self._built, self._resting = built, resting  # the agent, and the action where no episode is left
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
-        return cls(cls.single_class.build(interface, seed=seed, checkpoint=checkpoint))
+        built = cls.single_class.build(interface, seed=seed, checkpoint=checkpoint)
+        return cls(built, np.zeros(interface.action_shape, dtype=np.int64))
 
     @classmethod
     def context_size(cls, size: int) -> int:
@@ -149,9 +152,9 @@ class _SingleAgents(Agent):
     def act(self, inputs: Inputs, state: list[SingleAgent], explore: bool = False) -> tuple[np.ndarray, Any]:
         return np.array([self._act_in(slot, inputs, state) for slot in range(len(state))]), state
 
-    def _act_in(self, slot: int, inputs: Inputs, state: list[SingleAgent]) -> int:
+    def _act_in(self, slot: int, inputs: Inputs, state: list[SingleAgent]) -> int | np.ndarray:
         if inputs.active is not None and not inputs.active[slot]:
-            return 0
+            return self._resting
         observation = {name: values[slot] for name, values in inputs.observation.items()}
         if inputs.new_episode[slot]:
             state[slot] = copy.deepcopy(self._built)
@@ -173,6 +176,6 @@ def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
 def _running(declared: type[SingleAgent]) -> type[Agent]:
     """Returns an `Agent` that runs a `SingleAgent`."""
     # Named as the class that it wraps, for messages and provenance.
-    names = ("__module__", "__qualname__", "__doc__", "needs_truth", "needs_sensors", "needs_shown")
+    names = ("__module__", "__qualname__", "__doc__", "needs_truth", "needs_sensors", "needs_shown", "plays_actions")
     attributes = {name: getattr(declared, name) for name in names}
     return type(declared.__name__, (_SingleAgents,), attributes | {"single_class": declared})

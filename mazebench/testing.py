@@ -8,6 +8,7 @@ import itertools
 import pathlib
 import pickle
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -45,7 +46,7 @@ def check_agent(
     Args:
       agent_class: the class, or what `--agent` takes.
       interface: what the agent is built for; by default hierarchical navigation in 7 x 7 mazes with
-        the sensors that it needs.
+        the sensors that it needs and the first actions that it plays.
       checkpoint: passed on to `build`.
 
     Raises:
@@ -70,15 +71,16 @@ def _check_acting(
 ) -> None:
     if interface is None:
         size = context_size_of(name, agent_class, _SIZE)
-        interface = Interface("hierarchical", _SIZE, size, sensors=agent_class.needs_sensors)
+        plays = agent_class.plays_actions[0]
+        interface = Interface("hierarchical", _SIZE, size, actions=plays, sensors=agent_class.needs_sensors)
     episodes = _Episodes(interface, agent_class.needs_truth)
 
     def build() -> CheckedAgent:
         with calling(name, "build"):
-            return CheckedAgent(name, agent_class.build(interface, checkpoint=checkpoint), interface.num_actions)
+            return CheckedAgent(name, agent_class.build(interface, checkpoint=checkpoint), interface.actions)
 
-    def by_turns() -> dict[int, list[int]]:
-        agent, actions = build(), dict[int, list[int]]()
+    def by_turns() -> dict[int, list[Any]]:
+        agent, actions = build(), dict[int, list[Any]]()
         batches = episodes.steps(agent, _ORDER, actions), episodes.steps(agent, _ORDER[::-1], {})
         for _ in itertools.zip_longest(*batches):
             pass
@@ -123,19 +125,20 @@ class _Episodes:
             time_limit=_TIME_LIMIT,
             landmark_distance=3,
             context_size=interface.context_size,
+            actions=interface.actions,
             sensors=interface.sensors,
         )
         self._episodes = [sample_episode(self._task_spec, rng) for _ in itertools.chain(*_ORDER)]
 
-    def play(self, agent: CheckedAgent, order: Sequence[Sequence[int]]) -> dict[int, list[int]]:
+    def play(self, agent: CheckedAgent, order: Sequence[Sequence[int]]) -> dict[int, list[Any]]:
         """Returns the agent's actions by episode; `order` has the episodes of each slot."""
-        actions: dict[int, list[int]] = {}
+        actions: dict[int, list[Any]] = {}
         for _ in self.steps(agent, order, actions):
             pass
         return actions
 
     def steps(
-        self, agent: CheckedAgent, order: Sequence[Sequence[int]], actions: dict[int, list[int]]
+        self, agent: CheckedAgent, order: Sequence[Sequence[int]], actions: dict[int, list[Any]]
     ) -> Iterator[None]:
         """As `play`, but yields after each step, and adds to `actions`."""
         running: list[int | None] = [None] * len(order)  # the episode in each slot

@@ -332,7 +332,7 @@ def act_for_three_steps(name: str, spec: Task) -> int:
     """Returns how many steps were taken, of a run of which all actions are checked."""
     agent_class = load_agent_class(name)
     interface = Interface(spec.task, spec.size, spec.context_size, sensors=spec.sensors)
-    agent = CheckedAgent(name, agent_class.build(interface), interface.num_actions)
+    agent = CheckedAgent(name, agent_class.build(interface), interface.actions)
     env = MazeVectorEnv(spec, 2, num_threads=1)
     (observation, info), state = env.reset(seed=0), agent.initial_state(2)
     new, seed = np.ones(2, dtype=bool), np.zeros(2, dtype=np.int64)

@@ -26,7 +26,7 @@ TASKS: dict[str, dict[str, Any]] = {
     "hierarchical": {"task": "hierarchical", "landmark_distance": 2, "time_limit": 9},
     "several goals": {"num_goals": 3, "time_limit": 20, "position_noise": 0.3},
     "perturbed": {"map_flip": 0.2, "map_warp": 0.1, "position_noise": 0.3, "time_limit": 40},
-    "continuous": {"continuous": True, "time_limit": 40},
+    "continuous": {"actions": "velocity", "time_limit": 40},
     "lidar": {"sensors": "lidar", "time_limit": 40},
     "fresh": {"kinds": ("dfs", "house"), "fresh": True, "sensors": "lidar", "num_goals": 2, "time_limit": 20},
     "rebuilt": {"task": "rebuilt", "level": (1, 2, 3)},

@@ -126,6 +126,6 @@ class TestCheckedAgent:
             def act(self, inputs, state, explore=False):
                 return [0] * len(inputs.seed), state + 1
 
-        agent = CheckedAgent("still", Still(), 6)
+        agent = CheckedAgent("still", Still(), "six")
         actions, state = agent.act(inputs_of({}, np.ones(2, dtype=bool)), agent.initial_state(2))
         assert (actions.tolist(), state) == ([0, 0], 3)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import pathlib
+import shutil
 import subprocess
 import sys
 
 import pytest
-from made_results import edit_records, edit_summary, make_result, read_summary
+from made_results import edit_records, edit_summary, edit_task, make_result, read_summary
 
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import TRACKS_BENCHMARK
@@ -85,6 +86,14 @@ class TestTables:
         assert row[2].startswith("0.83 [0.")
         assert row[:2] + row[3:] == ["1", "x (privileged)", "", "0.83", "made-up 1.0 cccccccc"]
         assert f"| 1 | x (privileged) |{' 1.00, 1.00 | 1.00, 1.00 | 0.50, 0.50 |' * 4}" in page.read_text()
+
+    def test_a_row_says_which_actions_were_used_unless_they_are_the_six(self, suite, tmp_path):
+        folder = pathlib.Path(shutil.copytree(suite / "x", tmp_path / "x"))
+        for part in folder.iterdir():
+            edit_task(part, actions="diff")
+        [entry] = read_entries([folder])
+        [row] = rows([entry.model_copy(update={"privileged": False})])
+        assert row[1] == "x with diff actions"
 
     def test_the_rank_is_by_time_then_success_and_the_gain_over_the_navigator_without_the_map(self, page):
         entries = [make_entry("slow", 0.9, 0.1), make_entry("never", 0.0, 0.1), make_entry("quick", 0.6, 0.5)]

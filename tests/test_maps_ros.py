@@ -23,7 +23,7 @@ from mazebench.maps.maze import Maze, MazeError, cell_to_point
 from mazebench.maps.maze_files import read_located, read_maze, read_mazes
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.pictures import draw_maze, write_image
-from mazebench.maps.readers.ros import read_occupancy, read_ros_maze, write_ros_map
+from mazebench.maps.readers.ros import read_occupancy, write_ros_map
 from mazebench.maps.text import parse_maze, write_text_maze
 from mazebench.world.formats import make_mazes, write_maze
 
@@ -120,7 +120,7 @@ def test_a_yaw_that_is_no_number_and_a_map_without_walls_get_a_line(tmp_path, re
     picture = drawn(BUILDING)
     picture[picture == 0] = 205
     path = write_map(tmp_path, picture, origin=[0.0, 0.0, float("nan")])
-    assert read_ros_maze(path).origin[2] == 0.0
+    assert read_located(path).origin[2] == 0.0
     assert remarks()[0].startswith("map: yaw nan read as 0; nothing on it is wall; ")
 
 
@@ -187,7 +187,7 @@ class TestMaze:
     )
     def test_rows_of_pixels_become_a_maze_with_a_closed_border(self, rows, metadata, options, maze, origin, tmp_path):
         path = write_map(tmp_path, drawn(rows), resolution=1.0, **metadata)
-        read = read_ros_maze(path, **options)
+        read = read_located(path, **options)
         assert read.maze == parse_maze(maze.replace(" ", "\n"))
         assert read.origin == (*origin, 0.0)
 
@@ -270,7 +270,7 @@ class TestFrame:
         origin = [*rng.uniform(-50, 50, size=2).tolist(), yaw]
         path = write_map(tmp_path_factory.mktemp("ros"), picture, resolution=resolution, origin=origin)
         try:
-            maze, (x0, y0, read_yaw) = read_ros_maze(path, cell_size=cell_size)
+            maze, (x0, y0, read_yaw) = read_located(path, cell_size=cell_size)
         except MazeError:  # nothing is left at this size of cells
             return
         points = cell_to_point(maze.free_cells, maze.size) * maze.cell_size
@@ -334,7 +334,7 @@ class TestFloorPlan:
 
     def test_the_paper_around_a_plan_is_cut_off(self, tmp_path):
         path = self.write(tmp_path, two_rooms(margin=33))
-        located = read_located(path, None, ReadOptions(pixel_size=0.02))
+        located = read_located(path, pixel_size=0.02)
         assert located.maze == read_maze(self.write(tmp_path, two_rooms(), "cut.png"), pixel_size=0.02)
         assert located.origin == pytest.approx((0.66 - 0.28, 0.66 - 1.72, 0.0))
 

@@ -10,8 +10,6 @@ import pytest
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.maze_files import read_located, read_maze
-from mazebench.maps.maze_options import ReadOptions
-from mazebench.maps.readers.moving_ai import read_scenarios
 from mazebench.maps.text import format_maze, parse_maze
 
 PLAN = """\
@@ -97,7 +95,7 @@ class TestReading:
         corners = [[1, 1], [5, 1], [5, 3], [3, 3], [3, 5], [1, 5]]
         house = {"id": "a", "verts": corners, "room_category": {"Kitchen": [[1, 1, 3, 3]]}}
         (tmp_path / "house.json").write_text(json.dumps(house))
-        maze, (x, y, _) = read_located(tmp_path / "house.json", None, ReadOptions(cell_size=0.5))
+        maze, (x, y, _) = read_located(tmp_path / "house.json", cell_size=0.5)
         for point, is_free in {(2, 2): True, (4, 2): True, (2, 4): True, (4, 4): False}.items():
             assert maze.is_free(maze.cell_at(point[0] - x, point[1] - y)) == is_free
 
@@ -127,25 +125,10 @@ class TestRefusal:
         with pytest.raises(MazeError, match=message):
             read(tmp_path, content)
 
+    def test_a_map_of_movingai_is_never_taken_for_an_inverted_one(self, tmp_path):
+        rows = "type octile\nheight 4\nwidth 4\nmap\n....\n.@@.\n.@@.\n....\n"
+        assert read(tmp_path, rows).walls[2:4, 2:4].all()
+
     def test_a_missing_file_is_named(self, tmp_path):
         with pytest.raises(InputError, match=r"none\.txt: can't read the text map: No such file or directory$"):
             read_maze(tmp_path / "none.txt")
-
-
-class TestScenarios:
-    def test_ends_are_cells_of_the_maze_with_its_own_distances(self, tmp_path, remarks):
-        (tmp_path / "m.map").write_text("type octile\nheight 3\nwidth 4\nmap\n...@\n.@..\n...@\n")
-        lines = ["version 1", "0 m.map 4 3 0 0 2 2 4.0", "0 m.map 4 3 2 0 2 1 2.0", "0 m.map 4 3 0 0 1 1 1.4"]
-        (tmp_path / "m.scen").write_text("\n".join(lines) + "\n")
-        located = read_located(tmp_path / "m.map", None, ReadOptions(cell_size=2.0))
-        remarks()
-        scenarios = read_scenarios(tmp_path / "m.scen", located)
-        assert scenarios.starts.tolist() == [[1, 1], [1, 3]]
-        assert scenarios.goals.tolist() == [[3, 3], [2, 3]]
-        assert scenarios.distances.tolist() == [4, 1]
-        assert scenarios.octile_lengths.tolist() == [4.0, 2.0]
-        assert "1 of 3 scenarios left out" in remarks()[0]
-        with pytest.raises(
-            InputError, match="expected scenarios of MovingAI, which begin with 'version 1', found 'type"
-        ):
-            read_scenarios(tmp_path / "m.map", located)

@@ -27,7 +27,7 @@ TASKS: dict[str, dict[str, Any]] = {
     "fixed pairs": {"pairs": "fixed"},
     "several goals": {"num_goals": 3, "time_limit": 4},
     "perturbed": {"map_flip": 0.1, "map_warp": 0.1, "position_noise": 0.5},
-    "velocities": {"continuous": True},
+    "velocities": {"actions": "velocity"},
     "hierarchical": {"task": "hierarchical", "time_limit": 5},
 }
 NUM_STEPS = 12
@@ -44,7 +44,7 @@ def _episode(environment: Environment) -> dict[str, Any]:
     task = environment.task
     while not time_steps[-1].last() and task.steps < NUM_STEPS:
         velocities = np.array([np.cos(task.steps), np.sin(task.steps), 0.5])
-        time_steps.append(environment.step(velocities if task.spec.continuous else task.steps**2 % 6))
+        time_steps.append(environment.step(velocities if task.spec.actions == "velocity" else task.steps**2 % 6))
     return {
         "maze": task.episode.maze,
         "seed": task.episode.seed,

@@ -89,7 +89,7 @@ class TestActions:
     @pytest.mark.parametrize("action", [None, [0, 0], [np.nan, 0, 0]])
     @pytest.mark.parametrize("make", [MazeEnv, Environment, lambda spec: MazeVectorEnv(spec, 3)])
     def test_a_wrong_velocity_is_refused_in_one_line(self, make, action):
-        env = make(mazebench.Task.of(size=13, continuous=True))
+        env = make(mazebench.Task.of(size=13, actions="velocity"))
         env.reset(seed=0)
         with pytest.raises(InputError, match=r"^expected velocities [^\n]*, found shape [^\n]*$"):
             env.step(action)

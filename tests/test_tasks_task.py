@@ -49,7 +49,7 @@ class TestValue:
             {"kinds": ("dfs", "house"), "fresh": True},
             {"mazes": dfs_mazes(), "cell_size": 0.5, "distances": 3, "hide": "goal,map"},
             {"start": (1, 1), "goal": "3.5m,1.5m", "position_noise": 0.2},
-            {"lidar_noise": ".1,.2", "sensors": "lidar", "num_goals": 3, "continuous": True},
+            {"lidar_noise": ".1,.2", "sensors": "lidar", "num_goals": 3, "actions": "velocity"},
         ],
         ids=lambda options: next(iter(options)),
     )

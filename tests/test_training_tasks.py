@@ -93,7 +93,7 @@ def test_a_learner_that_wants_an_unknown_option_is_refused(tmp_path):
         ({"pairs": "foo"}, "unknown pairs 'foo'; available: fixed, random"),
         ({"minutes": 0}, "expected minutes from 0.01 to 527040, found 0"),
         ({"task": "hierarchical"}, "expected task 'local' or a track in a training, found 'hierarchical'"),
-        ({"continuous": True}, "expected continuous False in a training, found True"),
+        ({"actions": "diff"}, "expected actions 'six' in a training, found 'diff'"),
         ({"track": "rough"}, "agent 'mah': learns only on maps of one pixel a cell .*; found track 'rough'"),
         ({"map_warp": 0.1}, "agent 'mah': learns only on maps of one pixel a cell .*; found map_warp"),
         ({"sensors": "lidar"}, "agent 'mah': reads no sensors, found lidar"),
@@ -149,3 +149,11 @@ def test_held_out_goals_are_at_five_of_the_distances(task, distances, wanted):
     spec = Task.of(**task, **({"distances": distances} if distances else {}))
     evaluation = HeldOutEvaluation(spec, 2, distances)
     assert sorted({trial.distance for _, trial in evaluation.trials}) == wanted
+
+
+def test_scenarios_have_one_goal_as_fixed_pairs_have(tmp_path):
+    (tmp_path / "m.map").write_text("type octile\nheight 3\nwidth 3\nmap\n...\n.@.\n...\n")
+    (tmp_path / "m.scen").write_text("version 1\n0 m.map 3 3 0 0 2 2 4\n0 m.map 3 3 0 0 1 0 1\n")
+    train(**tiny_options(mazes=str(tmp_path / "m.scen")), out=tmp_path / "run")
+    task = task_in(tmp_path / "run")
+    assert (task["distances"], task["num_goals"]) == ([1, 4], 1)

@@ -7,18 +7,21 @@ import pathlib
 import numpy as np
 
 from mazebench.agent import Agent, Inputs, Interface
+from mazebench.constants import NUM_ACTIONS
 
 
 class RandomAgent(Agent):
     """Acts uniformly at random; the actions of an episode depend on its seed alone."""
 
-    def __init__(self, num_actions: int):
-        self._num_actions = num_actions
+    plays_actions = ("six", "velocity", "diff")
+
+    def __init__(self, action_shape: tuple[int, ...]):
+        self._shape = action_shape  # () for one of six
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> RandomAgent:
         """Returns a new agent; `seed` and `checkpoint` have no meaning here."""
-        return cls(interface.num_actions)
+        return cls(interface.action_shape)
 
     def initial_state(self, batch_size: int) -> list[np.random.Generator]:
         """Returns a generator for each environment, which `act` replaces where an episode begins."""
@@ -27,7 +30,9 @@ class RandomAgent(Agent):
     def act(
         self, inputs: Inputs, state: list[np.random.Generator], explore: bool = False
     ) -> tuple[np.ndarray, list[np.random.Generator]]:
-        """Returns actions `[B]`, each from the generator of its episode."""
+        """Returns actions, each from the generator of its episode."""
         for slot in np.flatnonzero(inputs.new_episode):
             state[slot] = np.random.default_rng(int(inputs.seed[slot]))
-        return np.array([rng.integers(self._num_actions) for rng in state]), state
+        if self._shape:
+            return np.array([rng.uniform(-1, 1, self._shape) for rng in state]), state
+        return np.array([rng.integers(NUM_ACTIONS) for rng in state]), state

@@ -14,7 +14,7 @@ parser = argparse.ArgumentParser()
 parser.add_argument("--steps", type=int, default=20_000)
 arguments = parser.parse_args()
 
-env = gymnasium.make("mazebench/Local-13-v1", continuous=True, distances=[1])
+env = gymnasium.make("mazebench/Local-13-v1", actions="velocity", distances=[1])
 print(f"actions: {env.action_space}, forward, left and turn")
 model = SAC("MultiInputPolicy", env, learning_starts=100, buffer_size=20_000, seed=0)
 model.learn(arguments.steps)

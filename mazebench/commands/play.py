@@ -13,7 +13,7 @@ from mazebench.tasks.task import NOT_IN_EVALUATIONS, Task
 from mazebench.world.backend import has_display
 
 
-@takes_options(Task, without=[*NOT_IN_EVALUATIONS, "camera_size", "textures"], split="eval")
+@takes_options(Task, without=[*NOT_IN_EVALUATIONS, "actions", "camera_size", "textures"], split="eval")
 def play(
     values: dict[str, Any],
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode and those after it.")] = 0,

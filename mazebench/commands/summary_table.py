@@ -15,6 +15,7 @@ from mazebench.results.paper import printed_mmn
 from mazebench.results.records import Figures, Summary
 
 _ANY_WIDTH = 10_000  # characters
+_MOST_DISTANCES = 20  # of a table; scenarios may have hundreds
 _HEAD = ("n", "success rate", "on time", "SPL", "SPL by grid")
 _NOTE = f"on time: within {' and '.join(f'{k:g}' for k in ON_TIME)} times the oracle's steps"
 _ON_TIME, _NAME_OF_ON_TIME = next((metric, f"on time {k:g}") for metric, k in ON_TIME_METRICS.items())
@@ -35,7 +36,8 @@ def print_summary(summary: Summary) -> None:
     totals = []
     if task.task == "local":
         head = ["distance", *head]
-        rows = [[distance, *_with_paper(row, paper, int(distance))] for distance, row in summary.by_distance.items()]
+        by_distance = summary.by_distance if len(summary.by_distance) <= _MOST_DISTANCES else {}
+        rows = [[distance, *_with_paper(row, paper, int(distance))] for distance, row in by_distance.items()]
         totals = [
             [name, *_with_paper(row, paper)] for name, row in [*summary.by_fact.items(), ("all", summary.overall)]
         ]

@@ -11,9 +11,9 @@ import mujoco
 import numpy as np
 from dm_env import specs
 
-from mazebench.constants import ACTIONS, STEPS_PER_ACTION
+from mazebench.constants import STEPS_PER_ACTION
 from mazebench.envs.single import EnvironmentState, SingleTask
-from mazebench.tasks.actions import VELOCITY_SIZE
+from mazebench.tasks.actions import action_spec
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.observation import observation_specs
 from mazebench.tasks.rules import reward
@@ -110,9 +110,7 @@ class Task(SingleTask, control.Task):
 
     def action_spec(self, simulation: Simulation) -> specs.DiscreteArray | specs.BoundedArray:
         """Returns which actions there are."""
-        if self.spec.continuous:
-            return specs.BoundedArray((VELOCITY_SIZE,), np.float32, -1.0, 1.0, name="action")
-        return specs.DiscreteArray(len(ACTIONS), name="action")
+        return action_spec(self.spec.actions)
 
     def observation_spec(self, simulation: Simulation) -> dict[str, specs.Array]:
         """Returns shape, type and range of each observation by name."""

@@ -8,9 +8,10 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from mazebench.constants import VELOCITIES
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze
-from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_action, controls_of_velocities
+from mazebench.tasks.actions import controls_of_action, controls_of_velocities
 from mazebench.tasks.arguments import Arguments, require_task_spec
 from mazebench.tasks.episode import Episode, check_episode, sample_episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
@@ -101,8 +102,8 @@ class SingleTask:
           InputError: if there is no such action.
         """
         simulation.surround(self.rules.maze.item(), self.rules.cell.item())
-        if self.spec.continuous:
-            simulation.set_controls(controls_of_velocities(np.asarray(action), (VELOCITY_SIZE,)))
+        if self.spec.actions in VELOCITIES:
+            simulation.set_controls(controls_of_velocities(self.spec.actions, np.asarray(action)))
         else:
             simulation.set_controls(controls_of_action(action))  # type: ignore[arg-type]
 

@@ -6,8 +6,7 @@ import numpy as np
 from dm_env import specs
 from gymnasium import spaces
 
-from mazebench.constants import ACTIONS
-from mazebench.tasks.actions import VELOCITY_SIZE
+from mazebench.tasks.actions import action_spec
 from mazebench.tasks.observation import observation_specs
 from mazebench.tasks.task import Task
 
@@ -26,6 +25,7 @@ def _box(array: specs.Array) -> spaces.Box:
 
 def action_space(spec: Task) -> spaces.Discrete | spaces.Box:
     """Returns the space of the six actions, in the order of `mazebench.constants.ACTIONS`, or of velocities."""
-    if spec.continuous:
-        return spaces.Box(-1.0, 1.0, (VELOCITY_SIZE,), np.float32)
-    return spaces.Discrete(len(ACTIONS))
+    found = action_spec(spec.actions)
+    if isinstance(found, specs.DiscreteArray):
+        return spaces.Discrete(found.num_values)
+    return spaces.Box(-1.0, 1.0, found.shape, np.float32)

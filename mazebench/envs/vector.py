@@ -15,11 +15,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from mazebench.constants import STEP_TIME, STEPS_PER_ACTION
+from mazebench.constants import STEP_TIME, STEPS_PER_ACTION, VELOCITIES
 from mazebench.envs import spaces
 from mazebench.envs.env_spec import JsonSpec
 from mazebench.errors import InputError, unknown
-from mazebench.tasks.actions import VELOCITY_SIZE, controls_of_actions, controls_of_velocities
+from mazebench.tasks.actions import controls_of_actions, controls_of_velocities
 from mazebench.tasks.arguments import Arguments, require_task_spec
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.observation import observation_specs
@@ -180,7 +180,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
     def step(
         self, actions: np.ndarray
     ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Takes one agent step (0.16 s) in each environment; `actions` is `[B]` int, or `[B, 3]` float if continuous.
+        """Takes one agent step (0.16 s) in each environment; `actions` is `[B]` int, or `[B, 3]` or `[B, 2]` float.
 
         Raises:
           gymnasium.error.ResetNeeded: before the first reset; with autoreset disabled, where an episode has ended.
@@ -189,8 +189,8 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """
         self._require_open()
         self._require_reset()
-        if self.task_spec.continuous:
-            self._ctrl[:] = controls_of_velocities(actions, (self.num_envs, VELOCITY_SIZE))
+        if (kind := self.task_spec.actions) in VELOCITIES:
+            self._ctrl[:] = controls_of_velocities(kind, actions, (self.num_envs,))
         else:
             self._ctrl[:] = controls_of_actions(actions, self.num_envs)
 

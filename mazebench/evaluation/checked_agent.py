@@ -10,6 +10,7 @@ import numpy as np
 
 from mazebench.agent import Agent, Inputs
 from mazebench.agent_loading import source_line
+from mazebench.constants import ACTIONS, VELOCITIES
 from mazebench.errors import InputError, RunError, shortened
 from mazebench.maps.benchmark import SIZES
 
@@ -51,8 +52,9 @@ def only_context_size(name: str, agent_class: type[Agent], size: int) -> int | N
 class CheckedAgent(Agent):
     """An agent whose wrong answers are `AgentError`s, which call it `name`."""
 
-    def __init__(self, name: str, agent: Agent, num_actions: int):
-        self.name, self._agent, self._num_actions = name, agent, num_actions
+    def __init__(self, name: str, agent: Agent, kind: str):
+        """Expects actions of a kind: "six", "velocity" or "diff"."""
+        self.name, self._agent, self._kind = name, agent, kind
 
     def initial_state(self, batch_size: int) -> Any:
         """Returns the agent's state before the first step."""
@@ -60,16 +62,30 @@ class CheckedAgent(Agent):
             return self._agent.initial_state(batch_size)
 
     def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, Any]:
-        """Returns the agent's actions, `[B]` int in range, and its next state."""
+        """Returns the agent's actions, which are legal, and its next state."""
         with calling(self.name, "act"):
             actions, state = self._agent.act(inputs, state, explore)
             actions = np.asarray(actions)
-        batch_size = len(inputs.new_episode)
+        if self._kind in VELOCITIES:
+            self._check_velocities(actions, (len(inputs.new_episode), len(VELOCITIES[self._kind])))
+        else:
+            self._check_actions(actions, len(inputs.new_episode))
+        return actions, state
+
+    def _check_actions(self, actions: np.ndarray, batch_size: int) -> None:
         if actions.shape != (batch_size,) or not np.issubdtype(actions.dtype, np.integer):
             found = f"{actions.dtype} of shape {actions.shape}"
             raise AgentError(f"agent {self.name!r}: expected {batch_size} integer actions from act(), found {found}")
-        illegal = actions[(actions < 0) | (actions >= self._num_actions)]
+        illegal = actions[(actions < 0) | (actions >= len(ACTIONS))]
         if len(illegal):
-            expected = f"actions from 0 to {self._num_actions - 1} from act()"
+            expected = f"actions from 0 to {len(ACTIONS) - 1} from act()"
             raise AgentError(f"agent {self.name!r}: expected {expected}, found {illegal[0]}")
-        return actions, state
+
+    def _check_velocities(self, velocities: np.ndarray, shape: tuple[int, int]) -> None:
+        expected = f"velocities ({', '.join(VELOCITIES[self._kind])}) of shape {shape} from act()"
+        if velocities.shape != shape or velocities.dtype.kind not in "fiu":
+            found = f"{velocities.dtype} of shape {velocities.shape}"
+            raise AgentError(f"agent {self.name!r}: expected {expected}, found {found}")
+        illegal = velocities[~np.isfinite(velocities)]
+        if len(illegal):
+            raise AgentError(f"agent {self.name!r}: expected finite {expected}, found {illegal[0]}")

@@ -43,7 +43,7 @@ class StepRecorder:
         """Notes a step, before it is taken."""
         for slot in np.flatnonzero(active).tolist():
             self._note(slot, {name: values[slot] for name, values in observation.items()}, info)
-            self._noted[slot]["actions"].append(np.int64(actions[slot]))
+            self._noted[slot]["actions"].append(actions[slot].copy())
 
     def take(self, slot: int, observation: Observation, info: dict[str, Any]) -> dict[str, np.ndarray]:
         """Returns the arrays of the episode that ended."""

@@ -115,9 +115,13 @@ class Plan:
             )
         if needed := [name for name in self.agent_class.needs_shown if name in interface.hidden]:
             raise UnplayableError(f"agent {options.agent!r}: needs the {needed[0]}, found it hidden")
+        if interface.actions not in (plays := self.agent_class.plays_actions):
+            raise UnplayableError(
+                f"agent {options.agent!r}: plays the actions {', '.join(plays)}, found {interface.actions}"
+            )
         with calling(options.agent, "build"):
             agent = self.agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)
-        return CheckedAgent(options.agent, agent, interface.num_actions)
+        return CheckedAgent(options.agent, agent, interface.actions)
 
 
 def make_plan(
@@ -171,8 +175,10 @@ def _make_plan_once(options: EvalOptions) -> Plan:
 
 
 def _as_played(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:
-    """Returns `options` with the sensors that the agent needs and, off the tracks, maps of the size it asks for."""
-    task = options.task
+    """Returns `options` with what the agent asks for: its actions, sensors and, off the tracks, size of maps."""
+    task, plays = options.task, agent_class.plays_actions
+    if task.actions == "six" and "six" not in plays:
+        task = task.replace(actions=plays[0])
     missing = tuple(name for name in agent_class.needs_sensors if name not in task.sensors)
     task = task.replace(sensors=(*task.sensors, *missing))
     if task.track is None:

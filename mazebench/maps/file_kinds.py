@@ -30,7 +30,7 @@ _KINDS = {
     b"<?xml": ("XML", _READ),
     b"<mujoco": ("an MJCF model", "give the map it was made from"),
     b"glTF": ("a glTF mesh", "give the map it was made from"),
-    b"version 1": ("scenarios of MovingAI", "give the .map; mazebench.maps.readers.moving_ai reads scenarios"),
+    b"version 1": ("scenarios of MovingAI", "give the .map"),
 }
 # By bytes further on.
 _CONTAINED = {

@@ -47,7 +47,7 @@ def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any)
     Raises:
       InputError: if the file can't be read or holds no legal maze.
     """
-    return read_located(pathlib.Path(path), size, ReadOptions(**options)).maze
+    return read_located(path, size, **options).maze
 
 
 def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
@@ -70,12 +70,19 @@ def read_all(path: pathlib.Path, options: ReadOptions) -> tuple[Maze, ...]:
     """Reads the maze in a file, or those in a folder, as `read_mazes` does."""
     path = path.expanduser()
     files = _map_files(path) if path.is_dir() else [path]
-    return tuple(read_located(file, None, options).maze for file in files)
+    return tuple(_read_located(file, None, options).maze for file in files)
 
 
-def read_located(path: pathlib.Path, size: int | None, options: ReadOptions) -> LocatedMaze:
-    """Reads the maze in one file, as `read_maze` does, and its place in the frame of the map."""
-    path = path.expanduser()
+def read_located(path: str | pathlib.Path, size: int | None = None, **options: Any) -> LocatedMaze:
+    """Reads the maze in one file, as `read_maze` does, and its place in the frame of the map.
+
+    A point (x, y) of the maze lies at `(x0 + x cos(yaw) - y sin(yaw), y0 + x sin(yaw) + y cos(yaw))` in the map's frame
+    if (x0, y0, yaw) is the origin that is returned.
+    """
+    return _read_located(pathlib.Path(path).expanduser(), size, ReadOptions(**options))
+
+
+def _read_located(path: pathlib.Path, size: int | None, options: ReadOptions) -> LocatedMaze:
     located = locate_maze(_read_grid(path, size, options), options, path.stem)
     if size not in (None, located.maze.size):
         raise InputError(f"{path}: expected a maze of size {size}, found size {located.maze.size}")

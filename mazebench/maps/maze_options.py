@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Annotated
 
 from annotated_types import Interval
+from pydantic import BeforeValidator
 
+from mazebench.maps.places import place_text
 from mazebench.options import Doc, OneOf, options
 
 
@@ -52,6 +55,7 @@ class ReadOptions:
     ] = 0.0
     area: Annotated[
         str | None,
+        BeforeValidator(functools.partial(place_text, "area")),
         Doc(
             "The building, if a map has several separate free areas: a cell row,column or a point 1.5m,2.5m (x, y) of "
             "the maze that lies in it. If not given, the largest area, or an enclosed one if that is the ground around."

@@ -95,7 +95,7 @@ def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[l
                 truth=truth,
             )
             actions, state = agent.act(inputs, state)
-            observation, _, terminated, truncated, info = env.step(int(actions[0]))
+            observation, _, terminated, truncated, info = env.step(actions[0])
             ended = terminated or truncated
 
     ending = "reached the goal" if info["success"] else "ran out of time"

@@ -51,11 +51,15 @@ def check_mazes(summary: Summary) -> None:
 
 
 def mazes_hash(task: Task) -> str:
-    """Returns a SHA-256 of the mazes, of fresh ones of the first; 1 m, the benchmark's cell, does not change it."""
+    """Returns a SHA-256 of the mazes, of fresh ones of the first, and of the scenarios.
+
+    1 m, the width of the benchmark's cells, is left out.
+    """
     scale = "" if task.cell_size == 1 else repr(task.cell_size)
     mazes = (task.all_mazes[0],) if task.fresh else task.fixed_mazes
     walls = b"".join(maze.walls.tobytes() for maze in mazes)
-    return hashlib.sha256(walls + scale.encode("ascii")).hexdigest()
+    ends = b"" if task.scenarios is None else np.stack([task.scenarios.starts, task.scenarios.goals]).tobytes()
+    return hashlib.sha256(walls + scale.encode("ascii") + ends).hexdigest()
 
 
 def shown_of(task: Task, episode: Episode) -> Shown:

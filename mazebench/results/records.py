@@ -120,9 +120,10 @@ class Summary(_Stored):
 
     @property
     def row(self) -> str:
-        """The agent, and what it was told less or more than others: "navigator without map"."""
+        """The agent, its actions unless it has the six, and what it was told less or more: "navigator without map"."""
+        acting = "" if self.task.actions == "six" else f" with {self.task.actions} actions"
         without = f" without {' and '.join(self.task.hide)}" if self.task.hide else ""
-        return self.agent + without + (" with the true pose" if self.task.exact_pose else "")
+        return self.agent + acting + without + (" with the true pose" if self.task.exact_pose else "")
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the content of `summary.json`."""

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
-from mazebench.constants import ACTIONS
+import numpy as np
+from dm_env import specs
+
+from mazebench.constants import ACTIONS, VELOCITIES
 from mazebench.errors import InputError
 from mazebench.world.mjcf import action_controls, velocity_controls
 
-VELOCITY_SIZE = 3  # forward, left, turn to the left
-
 _CONTROLS = action_controls()
+
+
+def action_spec(kind: str) -> specs.DiscreteArray | specs.BoundedArray:
+    """Returns which actions there are, of the kind "six", "velocity" or "diff"."""
+    if kind in VELOCITIES:
+        return specs.BoundedArray((len(VELOCITIES[kind]),), np.float32, -1.0, 1.0, name="action")
+    return specs.DiscreteArray(len(ACTIONS), name="action")
 
 
 def controls_of_action(action: int) -> np.ndarray:
@@ -38,20 +46,22 @@ def controls_of_actions(actions: np.ndarray, num_envs: int) -> np.ndarray:
     return _CONTROLS[actions.astype(np.int64, copy=False)]
 
 
-def controls_of_velocities(velocities: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Returns `[..., 5]` float: the controls of continuous actions `[..., 3]`, which are clipped to [-1, 1].
+def controls_of_velocities(kind: str, velocities: np.ndarray, batch: Sequence[int] = ()) -> np.ndarray:
+    """Returns `[*batch, 5]` float: the controls of continuous actions of a kind, which are clipped to [-1, 1].
 
     Raises:
-      InputError: if `velocities` are not finite numbers of that shape.
+      InputError: if `velocities` are not finite numbers of the shape `[*batch, 3]`, or `[*batch, 2]` for "diff".
     """
-    velocities = np.asarray(velocities)
+    names, velocities = VELOCITIES[kind], np.asarray(velocities)
+    shape = (*batch, len(names))
     is_numeric = np.issubdtype(velocities.dtype, np.floating) or np.issubdtype(velocities.dtype, np.integer)
     if velocities.shape != shape or not is_numeric or not np.isfinite(velocities).all():
         raise InputError(
-            f"expected velocities (forward, left, turn) from -1 to 1 of shape {shape}, "
+            f"expected velocities ({', '.join(names)}) from -1 to 1 of shape {shape}, "
             f"found shape {velocities.shape}, values {_in_short(velocities)}"
         )
-    return velocity_controls(np.clip(velocities, -1.0, 1.0))
+    clipped = np.clip(velocities, -1.0, 1.0)
+    return velocity_controls(np.insert(clipped, 1, 0.0, axis=-1) if kind == "diff" else clipped)
 
 
 def _in_short(value: object) -> str:

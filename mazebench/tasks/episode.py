@@ -52,6 +52,8 @@ def _sample_episode(spec: Task, rng: np.random.Generator) -> Episode:
     maze = spec.all_mazes[index]
     if spec.track is not None and isinstance(spec.all_mazes, FreshMazes):
         TRACKS[spec.track].require(maze, spec.level)
+    if spec.scenarios is not None:
+        return make_episode(index, *spec.scenarios.ends(rng.choice(spec.scenarios.numbers(spec.distances))), rng)
     start, goal = spec.ends(maze)
     if start is None or goal is None:
         pair_rng = np.random.default_rng([_FIXED_PAIR_SEED, index]) if spec.pairs == "fixed" else rng

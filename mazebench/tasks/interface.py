@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+from mazebench.constants import VELOCITIES
 from mazebench.world.ray_casting import LidarModel
 
 
@@ -14,9 +15,14 @@ class Interface:
     task: str  # "local" or "hierarchical"
     size: int  # N
     context_size: int  # M
-    num_actions: int = 6
+    actions: str = "six"  # or "velocity" or "diff": which ones the agent answers with
     sensors: tuple[str, ...] = ()  # whose readings are observed beside the state and the context
     cell_size: float = 1.0  # m, the side of a cell of the mazes
     hidden: tuple[str, ...] = ()  # of "map" and "goal": what the context does not show
     lidar: LidarModel | None = None  # what the sensor lidar measures; None without it
     odometry_noise: float = 0.0  # alpha of the noise on the observed motion (`mazebench.tasks.odometry.NoisyMotion`)
+
+    @property
+    def action_shape(self) -> tuple[int, ...]:
+        """The shape of an action: () for one of six, (3,) or (2,) for velocities."""
+        return (len(VELOCITIES[self.actions]),) if self.actions in VELOCITIES else ()

@@ -24,12 +24,13 @@ from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
 from mazebench.maps.maze import MIN_CELL_SIZE, Cell, Maze, corner_cells, require_one_size
 from mazebench.maps.maze_files import read_all
 from mazebench.maps.maze_options import THIN_WALLS, ReadOptions
+from mazebench.maps.places import free_cell_of_place
+from mazebench.maps.scenarios import Scenarios, are_scenarios, read_scenarios
 from mazebench.maps.selection import described_maze, own_mazes
 from mazebench.options import fields_of, options
 from mazebench.tasks.context import MAX_CONTEXT_SIZE, default_context_size
 from mazebench.tasks.interface import Interface
 from mazebench.tasks.perturbations import PERTURBATIONS
-from mazebench.tasks.start_goal import cell_of_end
 from mazebench.tasks.task_fields import (
     DRAWN_KINDS,
     FIRST_LEVEL,
@@ -50,7 +51,7 @@ EVAL_DISTANCES = tuple(range(1, 16))
 ENDS = ("start", "goal")
 CUSTOM = "custom"  # the split in results of mazes, a start or a goal that are not the benchmark's
 MIN_CONTEXT_SIZE = 3
-NOT_IN_EVALUATIONS = ("fresh", "pairs", "num_goals", "continuous", "context_size")  # fields that they do not vary
+NOT_IN_EVALUATIONS = ("fresh", "pairs", "num_goals", "context_size")  # fields that they do not vary
 
 _NUM_CHECKED = 10  # of fresh mazes, one of which must have the distances
 _FARTHEST_SHARE = 0.9  # of the diameter of a large maze; few pairs of cells are farther apart
@@ -58,7 +59,7 @@ _LIDAR = "lidar"  # the sensor that every track offers
 _SHOWING_POSE = ("top", "chase")  # the sensors that show where the body is
 # Fields that choose the mazes, and those that an agent may choose, or is not told, while the same is played.
 _OF_MAZES = ("size", "split", "mazes", "kinds", "num_mazes", "fresh", *fields_of(ReadOptions))
-_OF_AGENTS = ("sensors", "camera_size", "textures", "hide", "exact_pose", "context_size")
+_OF_AGENTS = ("actions", "sensors", "camera_size", "textures", "hide", "exact_pose", "context_size")
 
 
 @options
@@ -88,10 +89,13 @@ class Task(TaskFields):
     def from_json(cls, content: Mapping[str, Any]) -> Task:
         """Returns the task of which `to_json` returned the content.
 
+        Checkpoints that are older than the field `actions` have the field `continuous` in their tasks.
+
         Raises:
           InputError: as `of`.
         """
-        return cls.of(**content)
+        older = {} if "continuous" not in content else {"actions": "velocity" if content["continuous"] else "six"}
+        return cls.of(**{name: value for name, value in content.items() if name != "continuous"} | older)
 
     def to_json(self) -> dict[str, Any]:
         """Returns the fields by name, in values that JSON has."""
@@ -104,7 +108,7 @@ class Task(TaskFields):
         """Returns the task with other values of some fields; the mazes are not loaded again unless they change."""
         task = dataclasses.replace(self, **changes)
         if not set(changes) & set(_OF_MAZES):
-            vars(task)["all_mazes"] = self.all_mazes  # as `cached_property` keeps them
+            task._keep_mazes_of(self)
         return task
 
     def in_mazes(self, mazes: Sequence[Maze]) -> Task:
@@ -128,10 +132,10 @@ class Task(TaskFields):
         """
         if self.mazes is not None:
             mazes = self.mazes
-            if isinstance(mazes, str):  # start and goal choose the area, unless it is given
-                reading = {name: getattr(self, name) for name in fields_of(ReadOptions)}
-                reading["area"] = self.area or self.start or self.goal
-                mazes = read_all(pathlib.Path(mazes), ReadOptions(**reading))
+            if self.scenarios is not None:
+                mazes = (self.scenarios.maze,)
+            elif isinstance(mazes, str):
+                mazes = read_all(pathlib.Path(mazes), self._reading)
             for maze in mazes:
                 if self.size not in (0, maze.size):
                     raise InputError(f"expected mazes of size {self.size}, found size {maze.size}")
@@ -143,6 +147,25 @@ class Task(TaskFields):
             split = "train" if self.split == "train" else "dev"
             return draw_mazes(self._drawn_kinds, size, split, self.num_mazes or NUM_DRAWN)
         return load_mazes(size, self.split) if self.track is None else load_kind_mazes(self.split)
+
+    @functools.cached_property
+    def scenarios(self) -> Scenarios | None:
+        """The starts and goals that a file of scenarios names; None if the mazes are no such file.
+
+        Raises:
+          InputError: if the file or its map can't be read.
+        """
+        return read_scenarios(str(self.mazes), self._reading) if are_scenarios(self.mazes) else None
+
+    @property
+    def _reading(self) -> ReadOptions:
+        values = {name: getattr(self, name) for name in fields_of(ReadOptions)}
+        values["area"] = self.area or self.start or self.goal  # these choose the area, unless it is given
+        return ReadOptions(**values)
+
+    def _keep_mazes_of(self, other: Task) -> None:
+        """Takes over what another task has read, as `cached_property` keeps it."""
+        vars(self).update(all_mazes=other.all_mazes, scenarios=other.scenarios)
 
     @property
     def fixed_mazes(self) -> tuple[Maze, ...]:
@@ -198,7 +221,7 @@ class Task(TaskFields):
           InputError: if one is not free.
         """
         given = {name: end for name in ENDS if (end := getattr(self, name)) is not None}
-        cells = {name: cell_of_end(name, end, maze) for name, end in given.items()}
+        cells = {name: free_cell_of_place(name, end, maze) for name, end in given.items()}
         corners = dict(zip(ENDS, corner_cells(maze), strict=True)) if self.task == "hierarchical" else {}
         start, goal = ((corners | cells).get(name) for name in ENDS)
         return start, goal
@@ -251,6 +274,7 @@ class Task(TaskFields):
             self.task,
             self.size,
             self.context_size,
+            actions=self.actions,
             sensors=self.sensors,
             cell_size=self.cell_size,
             hidden=self.hide,
@@ -422,7 +446,7 @@ def _complete(given: Mapping[str, Any], default_distances: tuple[int, ...] | Non
     task = dataclasses.replace(
         asked, **found, distances=distances, time_limit=time_limit, context_size=context_size, hide=hide
     )
-    vars(task)["all_mazes"] = mazes
+    task._keep_mazes_of(asked)
     check_shown(task)
     checked: Sequence[Maze] = mazes  # type: ignore[assignment]
     if isinstance(mazes, FreshMazes):  # an episode whose maze is too small takes another one
@@ -439,6 +463,8 @@ def _distances(task: Task, mazes: Mazes, default: tuple[int, ...]) -> tuple[int,
         return of_track or default
 
     # Of given ends, that between them.
+    if task.scenarios is not None:
+        return tuple(np.unique(task.scenarios.distances).tolist())
     if task.task == "hierarchical" or task.num_ends == 2:
         return tuple(sorted({task.farthest(maze) for maze in mazes}))
 
@@ -482,6 +508,10 @@ def _check_options(task: Task) -> None:
         raise InputError("expected pairs 'random' beside a start or a goal, found 'fixed', pairs of their own")
     if task.goal is not None and task.num_goals > 1:
         raise InputError(f"expected num_goals 1 beside a goal, found {task.num_goals}")
+    if task.scenarios is not None:
+        for name, value in {"start": None, "goal": None, "pairs": "random", "num_goals": 1, "track": None}.items():
+            if (found := getattr(task, name)) != value:
+                raise InputError(f"scenarios, which have starts and goals: expected {name} {value!r}, found {found!r}")
     if task.lidar_noise is not None and _LIDAR not in task.sensors:
         found = ", ".join(task.sensors) or "none"
         raise InputError(f"lidar_noise {task.lidar_noise}: expected the sensor lidar, found {found}")
@@ -584,6 +614,14 @@ def check_maze(task: Task, maze: Maze) -> None:
 
 def check_distances(task: Task, maze: Maze) -> None:
     """Raises `InputError` if no goal of the local task is as far away in a maze as wanted."""
+    if task.scenarios is not None:
+        if not len(task.scenarios.numbers(task.distances)):
+            found = task.scenarios.distances
+            raise InputError(
+                f"{maze.name}: expected distances that scenarios have, from {found.min()} to {found.max()} cells, "
+                f"found {', '.join(map(str, task.distances))}"[:200]
+            )
+        return
     if task.task != "local" or task.num_ends == 2:
         return
     if max(task.distances) > (farthest := task.farthest(maze)):

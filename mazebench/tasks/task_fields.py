@@ -9,11 +9,13 @@ from typing import Annotated, Any, TypedDict
 from annotated_types import Ge, Interval
 from pydantic import BeforeValidator, InstanceOf
 
+from mazebench.constants import VELOCITIES
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import ALL_SPLITS
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.maps.maze import Cell, Maze
 from mazebench.maps.maze_options import ReadOptions
+from mazebench.maps.places import place_text
 from mazebench.maps.selection import OwnMazes, maze_as_described
 from mazebench.options import Doc, OneOf, options
 from mazebench.tasks.context import MAX_CONTEXT_SIZE
@@ -22,7 +24,6 @@ from mazebench.tasks.perturbations.noise import PositionDeviation
 from mazebench.tasks.perturbations.warp import WarpShare
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.sensor import SensorOptions
-from mazebench.tasks.start_goal import end_text
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.track import LEVELS
 
@@ -57,7 +58,7 @@ class TaskOptions(TypedDict, total=False):
     landmark_distance: int
     pairs: str
     num_goals: int
-    continuous: bool
+    actions: str
     map_flip: float
     map_warp: float
     position_noise: float
@@ -107,7 +108,10 @@ class TaskFields(SensorOptions, ReadOptions):
     mazes: Annotated[
         str | tuple[InstanceOf[Maze], ...] | None,
         BeforeValidator(as_mazes),
-        Doc("Mazes of your own: a text, picture, array or ROS map, or a folder of them."),
+        Doc(
+            "Mazes of your own: a text, picture, array or ROS map, or a folder of them; or scenarios of MovingAI "
+            "(.scen), whose starts and goals are played on the map next to them."
+        ),
     ] = None
     kinds: Annotated[
         tuple[Annotated[str, OneOf(*DRAWN_KINDS)], ...],
@@ -137,7 +141,7 @@ class TaskFields(SensorOptions, ReadOptions):
     ] = ()
     start: Annotated[
         str | None,
-        BeforeValidator(functools.partial(end_text, "start")),
+        BeforeValidator(functools.partial(place_text, "start")),
         Doc(
             "Where every episode begins, instead of a drawn cell, or of the upper right corner (hierarchical task): a "
             "cell 'row,column', in Python also (row, column), or a point '1.5m,2.5m' (x, y) from the map's lower left "
@@ -146,7 +150,7 @@ class TaskFields(SensorOptions, ReadOptions):
     ] = None
     goal: Annotated[
         str | None,
-        BeforeValidator(functools.partial(end_text, "goal")),
+        BeforeValidator(functools.partial(place_text, "goal")),
         Doc("Where every episode leads, as for start; instead of a drawn cell, or of the lower left corner."),
     ] = None
     time_limit: Annotated[
@@ -176,7 +180,14 @@ class TaskFields(SensorOptions, ReadOptions):
             "are those of the last one."
         ),
     ] = 1
-    continuous: Annotated[bool, Doc("Actions are velocities (forward, left, turn) instead of one of six.")] = False
+    actions: Annotated[
+        str,
+        OneOf("six", *VELOCITIES),
+        Doc(
+            "six: one of the benchmark's six; velocity: (forward, left, turn), each from -1 to 1; diff: (v, omega), "
+            "forward and turn, of a robot that can't strafe. An agent that doesn't play six has its own."
+        ),
+    ] = "six"
 
     # What is shown: what is wrong with the map and the senses, and what an agent may ask for or is not told.
     map_flip: FlipShare = 0.0

@@ -89,11 +89,16 @@ def select_trials(spec: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE
 def draw_trials(spec: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
     """Draws episodes of a task, by maze and then by distance; of the hierarchical task, one in each maze.
 
-    Where start and goal are given, an episode draws its heading only.
+    Where start and goal are given, an episode draws its heading only. Of scenarios, each is one episode.
 
     Raises:
       InputError: if no two cells of a maze are a wanted distance apart.
     """
+    if spec.scenarios is not None:
+        return [
+            make_trial(spec.scenarios.maze, 0, spec.scenarios.ends(number), np.random.default_rng([seed, number]))
+            for number in spec.scenarios.numbers(spec.distances).tolist()
+        ]
     trials = []
     for index, maze in enumerate(spec.fixed_mazes):
         start, goal = spec.ends(maze)

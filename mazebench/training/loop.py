@@ -22,6 +22,7 @@ from mazebench.agent_loading import learning_agents, load_agent_class
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.checked_agent import context_size_of
 from mazebench.evaluation.provenance import code_hash
+from mazebench.maps.scenarios import are_scenarios
 from mazebench.options import fields_of
 from mazebench.results.played import mazes_hash
 from mazebench.tasks.task import Task, check_names, check_shown
@@ -288,8 +289,9 @@ def training_task(
     if given.get("task") == "hierarchical":
         raise InputError("expected task 'local' or a track in a training, found 'hierarchical'")
     values = {**defaults, **given}
-    if {values.get("track"), values.get("task", "local")} - {None, "local"} or values.get("pairs") == "fixed":
-        values["num_goals"] = 1  # a track has one goal, and so has a maze with a fixed pair
+    has_pairs = values.get("pairs") == "fixed" or are_scenarios(values.get("mazes"))
+    if {values.get("track"), values.get("task", "local")} - {None, "local"} or has_pairs:
+        values["num_goals"] = 1  # a track has one goal, and so have pairs of a start and a goal
     task = Task.of(**values)
     if needed := [name for name in agent_class.needs_shown if name in task.hide]:
         raise InputError(f"agent {agent!r}: needs the {needed[0]}, found it hidden")

@@ -12,7 +12,7 @@ from mazebench.options import Doc, OneOf, options
 from mazebench.tasks.tracks import TRACKS
 
 # Fields of a task for which trainings have one value only: the default, or the learner's.
-FIXED = ("start", "goal", "landmark_distance", "split", "context_size", "num_goals", "continuous")
+FIXED = ("start", "goal", "landmark_distance", "split", "context_size", "num_goals", "actions")
 _LONGEST_MINUTES = 366 * 24 * 60  # a year
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import pathlib
 from collections.abc import Callable, Iterator
@@ -39,7 +40,7 @@ def make_mazes(
       InputError: if the kind has no mazes of that size, or the map holds no maze.
     """
     if source is not None:
-        yield read_located(source, size, options)
+        yield read_located(source, size, **dataclasses.asdict(options))
         return
     size = _DEFAULT_SIZE if size is None else size
     for index in range(count):

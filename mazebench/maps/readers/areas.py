@@ -8,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -16,8 +15,8 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from mazebench.errors import InputError
-from mazebench.maps.maze import MAX_SIZE, Cell, cell_of_point
+from mazebench.maps.maze import MAX_SIZE
+from mazebench.maps.places import cell_of_place
 
 # Shares of the free cells: of an area that may be the building, and of one that is preferred to the ground around it.
 _WORTH_LISTING, _FAIR_SIZE = 0.02, 0.05
@@ -25,7 +24,6 @@ _GROUND_EDGE = 0.2  # share of the edge from which an area is ground; a building
 _MOST_LISTED = 5
 _MOST_PHASES = 8  # along an axis
 WORTH_SHIFTING = 1.1  # times the floor of cells from the corner on, for which they begin elsewhere
-_PLACE = re.compile(r"\s*(\d+)\s*,\s*(\d+)\s*|\s*(-?\d*\.?\d+)\s*m\s*,\s*(-?\d*\.?\d+)\s*m\s*")
 
 
 class Cells(NamedTuple):
@@ -148,7 +146,7 @@ def choose(areas: list[Area], enclosed: list[Enclosed], place: str | None, cell_
         return default, True
     for number in sorted(range(len(areas)), key=lambda number: number != default):
         walls = enclosed[number].walls
-        cell = np.array(_cell_of(place, len(walls), cell_size))
+        cell = np.array(cell_of_place(place, len(walls), cell_size))
         if (cell >= 0).all() and (cell < len(walls)).all() and not walls[tuple(cell)]:
             return number, True
     return default, False
@@ -159,20 +157,6 @@ def _building(areas: list[Area]) -> Area:
     num_cells = sum(area.num_cells for area in areas)
     inside = (area for area in areas if not area.is_ground and area.num_cells >= _FAIR_SIZE * num_cells)
     return next(inside, areas[0])
-
-
-def _cell_of(place: str, size: int, cell_size: float) -> Cell:
-    """Returns the cell of a maze that `place` names, a cell "row,column" or a point "1.5m,2m".
-
-    Raises:
-      InputError: if it names neither.
-    """
-    found = _PLACE.fullmatch(place)
-    if found is None:
-        raise InputError(f"expected area as a cell 'row,column' or a point '1.5m,2.5m' (x, y), found {place!r}")
-    if found[1] is not None:
-        return int(found[1]), int(found[2])
-    return cell_of_point(float(found[3]) / cell_size, float(found[4]) / cell_size, size)
 
 
 def describe_areas(areas: list[Area], enclosed: list[Enclosed], number: int, cell_size: float) -> str:

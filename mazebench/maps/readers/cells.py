@@ -57,7 +57,7 @@ def grid_of_characters(rows: Sequence[str], name: str, is_moving_ai: bool = Fals
     Args:
       rows: from top to bottom.
       name: of the maze, for errors.
-      is_moving_ai: if the letters are those of the MovingAI benchmarks.
+      is_moving_ai: whether the letters are those of the MovingAI benchmarks.
 
     Raises:
       MazeError: if a character is unknown, or none is a wall.
@@ -65,8 +65,8 @@ def grid_of_characters(rows: Sequence[str], name: str, is_moving_ai: bool = Fals
     found = set("".join(rows))
     if found <= set(string.digits) and not found <= set("01"):
         return grid_of_numbers(np.array([[int(digit) for digit in sorted(found)]]), name)  # refuses such codes
-    is_moving_ai |= "@" in found and not found & set(_WALL)
-    wall = _MOVING_AI_WALL if is_moving_ai else _WALL
+    has_its_walls = is_moving_ai or ("@" in found and not found & set(_WALL))
+    wall = _MOVING_AI_WALL if has_its_walls else _WALL
     if not found & set(wall):
         wall = _ASCII_BOX
     marks = {letter for letter in found - set(wall + _FREE) if letter.isascii() and (letter.isalnum() or letter == "@")}
@@ -90,4 +90,4 @@ def grid_of_characters(rows: Sequence[str], name: str, is_moving_ai: bool = Fals
     changes = [f"{', '.join(sorted(marks))} read as free"] if marks else []
     if is_short:
         changes.append("short rows filled with wall")
-    return OccupancyGrid(states, changes=tuple(changes), is_cells=True)
+    return OccupancyGrid(states, changes=tuple(changes), is_cells=True, is_defined=is_moving_ai)

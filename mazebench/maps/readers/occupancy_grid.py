@@ -51,6 +51,7 @@ class OccupancyGrid:
     changes: tuple[str, ...] = ()  # how the states differ from the file's, in words
     shades: str = ""  # of the picture, and what they mean, in words
     is_cells: bool = False  # whether each pixel is a cell, of the size that the options say
+    is_defined: bool = False  # whether the format says what is wall, so that free and wall can't be mixed up
 
 
 class LocatedMaze(NamedTuple):
@@ -74,7 +75,8 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
     """
     if grid.is_cells:
         grid = dataclasses.replace(grid, resolution=options.cell_size or 1.0)
-        _require_not_inverted(grid.states, name)
+        if not grid.is_defined:
+            _require_not_inverted(grid.states, name)
 
     # Which pixels can't be driven on, and the cells made of them.
     top, left, states = _without_unknown_margin(grid.states)

@@ -9,7 +9,7 @@ import contextlib
 import math
 import pathlib
 import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import cv2
 import numpy as np
@@ -20,9 +20,8 @@ from scipy import ndimage
 
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze, MazeError
-from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.readers.image import read_picture, to_gray
-from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, UNKNOWN, LocatedMaze, OccupancyGrid, Pose, locate_maze
+from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, Pose
 from mazebench.storage.files import open_whole, read_at_most
 
 ROS_SUFFIXES = (".yaml", ".yml")
@@ -55,19 +54,6 @@ class _Metadata(pydantic.BaseModel):
         if free_thresh > info.data.get("occupied_thresh", 1.0):
             raise ValueError
         return free_thresh
-
-
-def read_ros_maze(path: str | pathlib.Path, **options: Any) -> LocatedMaze:
-    """Reads the maze in a map of ROS, named after the YAML file at `path`, and its place in the map's frame.
-
-    A point (x, y) of the maze lies at `(x0 + x cos(yaw) - y sin(yaw), y0 + x sin(yaw) + y cos(yaw))` in the map's frame
-    if (x0, y0, yaw) is the origin that is returned. `options` are those of `ReadOptions`.
-
-    Raises:
-      InputError: if a file can't be read or an option is not allowed.
-      MazeError: if there is no legal maze in the map.
-    """
-    return locate_maze(read_occupancy(path), ReadOptions(**options), pathlib.Path(path).stem)
 
 
 def read_floor_plan(path: pathlib.Path, pixel_size: float) -> OccupancyGrid:
@@ -201,7 +187,7 @@ def write_ros_map(maze: Maze, path: str | pathlib.Path, origin: Pose = (0.0, 0.0
     """Writes `maze` as a map of ROS, with a picture of a pixel for each cell beside the YAML file at `path`.
 
     A pixel's side is the size of a cell. `origin` is x, y (m) and yaw (rad) of the maze's lower left corner in the
-    map's frame, as `read_ros_maze` returns it; if it is not given, that frame is the maze's.
+    map's frame, as `mazebench.maps.maze_files.read_located` returns it; if it is not given, that frame is the maze's.
     """
     path = pathlib.Path(path)
     picture = path.with_suffix(".pgm")

@@ -1,4 +1,4 @@
-"""Continuous actions: velocities on the same actuators, the same in all three environments."""
+"""Kinds of actions: velocities on the same actuators, the same in all three environments, and agents of each kind."""
 
 from __future__ import annotations
 
@@ -10,14 +10,19 @@ import simple_mazes
 from dm_env import specs
 from gymnasium.utils import env_checker
 
+from mazebench.agent import Agent, SingleAgent
 from mazebench.constants import ACTIONS, TOP_SPEED
 from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
+from mazebench.errors import InputError, UnplayableError
+from mazebench.evaluation.checked_agent import AgentError
+from mazebench.evaluation.evaluate import evaluate
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.maze import Maze, cell_to_point
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.task import Task
+from mazebench.testing import ConformanceError, check_agent
 from mazebench.world.mjcf import BODY_RADIUS, TURN_RATE, action_controls, velocity_controls
 
 MIDDLE = Episode(0, (20, 20), (35, 35), 0.0, 0)
@@ -27,7 +32,7 @@ UNIT_VELOCITIES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0,
 
 @pytest.fixture(scope="module")
 def field() -> Environment:
-    return Environment(Task.of(mazes=simple_mazes.field(41), distances=[30], continuous=True))
+    return Environment(Task.of(mazes=simple_mazes.field(41), distances=[30], actions="velocity"))
 
 
 def cruise(field: Environment, velocity, num_steps: int = 12) -> np.ndarray:
@@ -56,7 +61,7 @@ class TestControls:
         assert (forward, left) == pytest.approx((-0.3 * TOP_SPEED, 0.4 * TOP_SPEED), abs=1e-3)
 
     def test_no_velocity_drives_a_body_into_a_wall(self):
-        spec = Task.of("local", size=13, continuous=True)
+        spec = Task.of("local", size=13, actions="velocity")
         envs, rng = MazeVectorEnv(spec, 32, seed=0), np.random.default_rng(0)
         envs.reset(seed=0)
         depth = 0.0
@@ -78,16 +83,16 @@ def sunk_in(maze: Maze, position: np.ndarray) -> float:
 
 
 class TestEnvironments:
-    def test_all_environments_declare_continuous_actions(self, field):
-        assert field.action_spec() == specs.BoundedArray((3,), np.float32, -1.0, 1.0, name="action")
-        env = MazeEnv(Task.of(continuous=True))
-        assert env.action_space == gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
-        envs = MazeVectorEnv(Task.of(continuous=True), 2)
-        assert envs.action_space.shape == (2, 3)
+    @pytest.mark.parametrize(("kind", "size"), [("velocity", 3), ("diff", 2)])
+    def test_all_environments_declare_continuous_actions(self, kind, size):
+        task = Task.of(actions=kind)
+        assert Environment(task).action_spec() == specs.BoundedArray((size,), np.float32, -1.0, 1.0, name="action")
+        assert MazeEnv(task).action_space == gymnasium.spaces.Box(-1.0, 1.0, (size,), np.float32)
+        assert MazeVectorEnv(task, 2).action_space.shape == (2, size)
 
     @pytest.mark.parametrize("task", ["local", "hierarchical"])
     def test_unit_velocities_play_the_discrete_episode(self, task):
-        discrete, continuous = (MazeEnv(Task.of(task, continuous=choice)) for choice in (False, True))
+        discrete, continuous = (MazeEnv(Task.of(task, actions=kind)) for kind in ("six", "velocity"))
         discrete.reset(seed=5)
         continuous.reset(seed=5)
         for action in np.random.default_rng(0).integers(len(ACTIONS), size=60):
@@ -95,9 +100,18 @@ class TestEnvironments:
             np.testing.assert_array_equal(expected[0]["state"], found[0]["state"])
             assert expected[1:4] == found[1:4]
 
-    def test_steps_are_the_same_in_all_environments(self):
-        spec = Task.of(mazes=load_mazes(13, "train")[:2], continuous=True, time_limit=30)
-        actions = np.random.default_rng(0).uniform(-1, 1, size=(20, 2, 3)).astype(np.float32)
+    def test_diff_is_velocity_without_strafing(self):
+        diff, velocity = (MazeEnv(Task.of(actions=kind)) for kind in ("diff", "velocity"))
+        diff.reset(seed=5)
+        velocity.reset(seed=5)
+        for forward, turn in np.random.default_rng(0).uniform(-1.2, 1.2, size=(60, 2)):
+            found, expected = diff.step([forward, turn]), velocity.step([forward, 0, turn])
+            np.testing.assert_array_equal(expected[0]["state"], found[0]["state"])
+
+    @pytest.mark.parametrize(("kind", "size"), [("velocity", 3), ("diff", 2)])
+    def test_steps_are_the_same_in_all_environments(self, kind, size):
+        spec = Task.of(mazes=load_mazes(13, "train")[:2], actions=kind, time_limit=30)
+        actions = np.random.default_rng(0).uniform(-1, 1, size=(20, 2, size)).astype(np.float32)
         envs = MazeVectorEnv(spec, 2)
         seen = [envs.reset(seed=[4, 9])[0]["state"]] + [envs.step(action)[0]["state"] for action in actions]
         for slot, seed in enumerate((4, 9)):
@@ -110,7 +124,7 @@ class TestEnvironments:
 
     @pytest.mark.filterwarnings("ignore::UserWarning")
     def test_continuous_environments_pass_the_checks(self):
-        env_checker.check_env(MazeEnv(Task.of(continuous=True)), skip_render_check=True)
+        env_checker.check_env(MazeEnv(Task.of(actions="velocity")), skip_render_check=True)
 
     def test_velocities_are_clipped(self, field):
         np.testing.assert_array_equal(cruise(field, [2, 0, -7], 3), cruise(field, [1, 0, -1], 3))
@@ -123,7 +137,84 @@ class TestEnvironments:
 
     @pytest.mark.parametrize("actions", [[0, 1], np.full((2, 3), np.inf)])
     def test_invalid_velocities_of_a_vector_are_refused(self, actions):
-        envs = MazeVectorEnv(Task.of(continuous=True), 2)
+        envs = MazeVectorEnv(Task.of(actions="velocity"), 2)
         envs.reset(seed=0)
         with pytest.raises(ValueError, match=r"expected velocities .* of shape \(2, 3\)"):
             envs.step(actions)
+
+
+class Homing(SingleAgent):
+    """Turns to the goal, and drives the faster, the less it has to turn."""
+
+    plays_actions = ("diff", "velocity")
+
+    def act(self, observation):
+        size = observation["context"].shape[-1]
+        row, column = divmod(int(observation["context"][2].argmax()), size)
+        x, y = observation["state"][:2]
+        bearing = np.arctan2(size - row - 0.5 - y, column + 0.5 - x) - observation["state"][5]
+        bearing = (bearing + np.pi) % (2 * np.pi) - np.pi
+        return np.array([max(0.0, np.cos(bearing)), np.clip(bearing, -1, 1)])
+
+
+class Batch(Agent):
+    plays_actions = ("velocity",)
+    answer = np.zeros(3)
+
+    def act(self, inputs, state, explore=False):
+        return np.tile(self.answer, (len(inputs.seed), 1)), state
+
+
+class Planar(Batch):
+    answer = np.zeros(2)
+
+
+class Lost(Batch):
+    answer = np.full(3, np.nan)
+
+
+class TestAgents:
+    @pytest.fixture
+    def near(self, tmp_path):
+        return {"out": tmp_path / "out", "kinds": "dfs", "num_mazes": 2, "distances": (1,), "episodes_per_distance": 2}
+
+    def test_an_agent_without_the_six_has_actions_of_its_own(self, near):
+        summary = evaluate(f"{__name__}:Homing", **near)
+        assert summary.task.actions == "diff"
+        assert summary.who == f"{__name__}:Homing with diff actions"
+        assert summary.overall.success_rate == 1
+
+    def test_an_agent_of_several_kinds_plays_the_one_that_is_asked_for(self, near):
+        assert evaluate("random", **near).who == "random"
+        near["out"] = near["out"].with_name("diff")
+        assert evaluate("random", **near, actions="diff").who == "random with diff actions"
+
+    @pytest.mark.parametrize("agent", ["navigator", "planner-closed-loop"])
+    def test_an_agent_of_the_six_says_so(self, near, agent):
+        with pytest.raises(UnplayableError, match=f"^agent '{agent}': plays the actions six, found diff$"):
+            evaluate(agent, **near, actions="diff")
+
+    @pytest.mark.parametrize(("older", "kind"), [(False, "six"), (True, "velocity")])
+    def test_the_task_of_an_older_checkpoint_is_read(self, older, kind):
+        assert Task.from_json({"size": 15, "continuous": older}) == Task.of(size=15, actions=kind)
+
+    def test_an_unknown_kind_is_refused(self):
+        with pytest.raises(InputError, match=r"^unknown actions 'four'; available: diff, six, velocity$"):
+            Task.of(actions="four")
+
+    @pytest.mark.parametrize(
+        ("name", "said"),
+        [
+            ("Planar", r"expected velocities \(.*\) of shape \(4, 3\) from act\(\), found float64 of shape \(4, 2\)"),
+            ("Lost", r"expected finite velocities .* found nan"),
+        ],
+    )
+    def test_wrong_velocities_are_named_in_one_line(self, near, name, said):
+        with pytest.raises(AgentError, match=f"^agent '{__name__}:{name}': {said}$"):
+            evaluate(f"{__name__}:{name}", **near)
+
+    def test_agents_are_checked_with_their_first_kind(self):
+        check_agent(Homing)
+        check_agent(Batch)
+        with pytest.raises(ConformanceError, match=r"of shape \(3, 3\) from act\(\), found float64 of shape \(3, 2\)"):
+            check_agent(Planar)
