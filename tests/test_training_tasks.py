@@ -94,6 +94,7 @@ def test_a_learner_that_wants_an_unknown_option_is_refused(tmp_path):
         ({"minutes": 0}, "expected minutes from 0.01 to 527040, found 0"),
         ({"task": "hierarchical"}, "expected task 'local' or a track in a training, found 'hierarchical'"),
         ({"continuous": True}, "expected continuous False in a training, found True"),
+        ({"reward": "progress"}, "expected reward 'sparse' in a training, found 'progress'"),
         ({"track": "rough"}, "agent 'mah': learns only on maps of one pixel a cell .*; found track 'rough'"),
         ({"map_warp": 0.1}, "agent 'mah': learns only on maps of one pixel a cell .*; found map_warp"),
         ({"sensors": "lidar"}, "agent 'mah': reads no sensors, found lidar"),

@@ -25,7 +25,6 @@ from mazebench.results.records import Record
 from mazebench.results.trajectories import Trajectory
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.observation import state_errors
-from mazebench.tasks.shown_map import is_blocked, show_map
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import Trial
 
@@ -59,6 +58,7 @@ class Outcome:
     success: bool
     steps: int
     path_length: float  # m
+    blocked: bool  # whether a wall stands in the shortest path on the shown map
     trajectory: Trajectory | None
 
 
@@ -180,7 +180,8 @@ def _outcome(
         is_wrong = task.track is not None and state_errors(task, trial.episode)
         trajectory = Trajectory(pose, observed if is_wrong else None)
     success, steps = bool(final["success"][slot]), int(final["steps"][slot])
-    return Outcome(index, trial, success, steps, float(final["path_length"][slot]), trajectory)
+    path_length, blocked = float(final["path_length"][slot]), bool(final["blocked"][slot])
+    return Outcome(index, trial, success, steps, path_length, blocked, trajectory)
 
 
 def _to_record(plan: Plan, outcome: Outcome) -> Record:
@@ -214,8 +215,7 @@ def _to_record(plan: Plan, outcome: Outcome) -> Record:
     further |= {name: value for name, value in noise.items() if value is not None}
     further |= task.perturbations
     if task.track is not None:  # summaries report the episodes of each of these groups apart
-        shown = show_map(task, episode)
-        further["blocked"] = is_blocked(maze.walls, shown.walls, (episode.start, episode.goal))
+        further["blocked"] = outcome.blocked
         if maze.kind:
             further["kind"] = maze.kind
     return Record.model_validate(values | further)

@@ -36,6 +36,8 @@ from mazebench.tasks.task_fields import (
     HIDEABLE,
     KINDS_OF_TASK,
     NUM_DRAWN,
+    PROGRESS,
+    SPARSE,
     TaskFields,
     TaskOptions,
     as_mazes,
@@ -50,7 +52,8 @@ EVAL_DISTANCES = tuple(range(1, 16))
 ENDS = ("start", "goal")
 CUSTOM = "custom"  # the split in results of mazes, a start or a goal that are not the benchmark's
 MIN_CONTEXT_SIZE = 3
-NOT_IN_EVALUATIONS = ("fresh", "pairs", "num_goals", "continuous", "context_size")  # fields that they do not vary
+# Fields that evaluations do not vary.
+NOT_IN_EVALUATIONS = ("fresh", "pairs", "num_goals", "reward", "continuous", "context_size")
 
 _NUM_CHECKED = 10  # of fresh mazes, one of which must have the distances
 _FARTHEST_SHARE = 0.9  # of the diameter of a large maze; few pairs of cells are farther apart
@@ -94,8 +97,10 @@ class Task(TaskFields):
         return cls.of(**content)
 
     def to_json(self) -> dict[str, Any]:
-        """Returns the fields by name, in values that JSON has."""
+        """Returns the fields by name, in values that JSON has; without the reward if it is that of evaluations."""
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        if self.reward == SPARSE:
+            del values["reward"]
         if isinstance(self.mazes, tuple):
             values["mazes"] = [described_maze(maze) for maze in self.mazes]
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
@@ -217,9 +222,13 @@ class Task(TaskFields):
         return self.task == "hierarchical" or self.num_goals > 1
 
     @property
-    def longest_time_limit(self) -> int:
-        """The agent steps that a leg may take; on a track, those to the farthest goals."""
-        return self.time_limit if self.track is None else track_time_limit(self.track, max(self.distances))
+    def longest_episode(self) -> int | None:
+        """The agent steps that an episode may take; None where they depend on its landmarks."""
+        if self.task == "hierarchical":
+            return None
+        if self.track is not None:
+            return track_time_limit(self.track, max(self.distances))
+        return self.num_goals * self.time_limit
 
     # What is shown.
 
@@ -482,6 +491,8 @@ def _check_options(task: Task) -> None:
         raise InputError("expected pairs 'random' beside a start or a goal, found 'fixed', pairs of their own")
     if task.goal is not None and task.num_goals > 1:
         raise InputError(f"expected num_goals 1 beside a goal, found {task.num_goals}")
+    if task.reward == PROGRESS and task.num_goals > 1:
+        raise InputError(f"reward {PROGRESS!r}: expected num_goals 1 beside it, found {task.num_goals}")
     if task.lidar_noise is not None and _LIDAR not in task.sensors:
         found = ", ".join(task.sensors) or "none"
         raise InputError(f"lidar_noise {task.lidar_noise}: expected the sensor lidar, found {found}")
