@@ -18,7 +18,7 @@ from simple_mazes import corridor
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.registration import register_environments
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.errors import InputError
+from mazebench.errors import InputError, UnknownOptionError
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import write_text_maze
@@ -64,7 +64,8 @@ class TestRegistration:
 
     def test_an_unknown_option_is_refused_with_all_there_are(self):
         for make, own in ((gymnasium.make, "camera, "), (gymnasium.make_vec, "num_envs, ")):
-            with pytest.raises(InputError, match=f"unknown option 'mapz'; available: .*{own}") as caught:
+            message = f"unexpected keyword argument 'mapz'; available: .*{own}"
+            with pytest.raises(UnknownOptionError, match=message) as caught:
                 make("mazebench/Local-13-v1", mapz="plan.png")
             assert {"mazes", "size", "split", "seed"} <= set(str(caught.value).split(": ")[1].split(", "))
 
@@ -111,6 +112,13 @@ class TestCheckers:
     def test_environments_pass_the_check_of_stable_baselines(self, name):
         checker = pytest.importorskip("stable_baselines3.common.env_checker")
         checker.check_env(gymnasium.make(name).unwrapped)
+
+    @pytest.mark.slow
+    def test_torchrl_makes_an_environment_by_its_id(self):
+        env = pytest.importorskip("torchrl.envs").GymEnv("mazebench/Rebuilt-v1", level=(1, 2), distances=[1, 2])
+        rollout = env.rollout(150, break_when_any_done=False)
+        assert rollout["lidar"].shape == (150, 32)
+        assert rollout["next", "done"].any()
 
 
 class TestSteps:

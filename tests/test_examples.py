@@ -49,6 +49,13 @@ class TestScripts:
                 "--steps 512 --num-envs 8 --rollout 32 --batch-size 128",
                 r"\A256 steps:.*\n512 steps:.*\n16 updates; ",
             ),
+            pytest.param(
+                "torchrl",
+                "torchrl_ppo.py",
+                "--id mazebench/Rebuilt-v1 --reward progress --steps 256 --num-envs 4 --rollout 32 --batch-size 128",
+                r"\A128 steps:.*\n256 steps:.*\n8 updates; ",
+                marks=pytest.mark.slow,
+            ),
             ("stable_baselines3", "sb3_continuous.py", "--steps 110", " drove "),
         ],
     )

@@ -148,7 +148,7 @@ class TestOptions:
                 r"expected num_goals 1 unless the task is local and pairs are random, found 2",
             ),
             ({"num_goals": 2, "reward": "progress"}, r"reward 'progress': expected num_goals 1 beside it, found 2"),
-            ({"mapz": "plan.txt"}, r"unknown option 'mapz'; available: .*map_warp, mazes, .*size, split, start"),
+            ({"mapz": "plan.txt"}, r"unexpected keyword argument 'mapz'; available: .*map_warp, mazes, .*size, split"),
             ({"map_warp": 0.26}, r"expected map_warp from 0 to 0\.25, found 0\.26"),
         ],
     )

@@ -82,7 +82,7 @@ class Misspelled(MAH):
 
 
 def test_a_learner_that_wants_an_unknown_option_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"unknown option 'num_goal'; available: .*num_goals"):
+    with pytest.raises(InputError, match=r"unexpected keyword argument 'num_goal'; available: .*num_goals"):
         train(**tiny_options(agent=f"{__name__}:Misspelled"), out=tmp_path / "run")
     assert not (tmp_path / "run").exists()
 

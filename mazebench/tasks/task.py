@@ -10,7 +10,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from mazebench.errors import InputError, unknown
+from mazebench.errors import InputError, UnknownOptionError, unknown
 from mazebench.maps.benchmark import (
     FROZEN_SPLITS,
     KINDS_SIZE,
@@ -362,12 +362,13 @@ def check_names(options: Mapping[str, Any], arguments: Sequence[str] = ()) -> No
     """Checks the names of options for `Task.of`, in a call that takes `arguments` too.
 
     Raises:
-      InputError: if there is no such option; it lists all that the call takes.
+      UnknownOptionError: if there is no such option; it lists all that the call takes.
     """
     known = (*fields_of(Task), *arguments)
     for name in options:
         if name not in known:
-            raise unknown("option", name, known)
+            available = ", ".join(sorted(known))
+            raise UnknownOptionError(f"got an unexpected keyword argument {name!r}; available: {available}")
 
 
 def _asked(task: str, options: Mapping[str, Any]) -> dict[str, Any]:
