@@ -81,14 +81,13 @@ class TestScripts:
         shutil.copy(EXAMPLES / "sb3_her_agent.py", tmp_path)
         check = f"""
 import gymnasium, mazebench, numpy as np
-from mazebench.agent import Interface
 from mazebench.testing import check_agent
 from sb3_her_agent import {agent} as Agent
 
 # Also where contexts are larger than those that it was trained on.
-for context_size in ({side}, {side + 2}):
-    interface = Interface('local', {side}, context_size, sensors=Agent.needs_sensors)
-    check_agent('sb3_her_agent:{agent}', interface, 'her.zip')
+for size in ({side}, {side + 2}):
+    task = mazebench.Task.of(size=size, context_size=size, kinds='dfs')
+    check_agent('sb3_her_agent:{agent}', task, 'her.zip')
 
 # The agent sees what the goal-conditioned environment shows.
 names = ("Local", "LocalGoal")
@@ -122,9 +121,8 @@ for action in (0, 0, 2, 2, 4, 0, 0):
         run("-m", "mazebench", "eval", *which, "--track", "rough", "--out", "results", folder=tmp_path)
         assert json.loads((tmp_path / "results" / "summary.json").read_text())["episodes"] == 10
         check = (
-            "from mazebench.agent import Interface\n"
             "from mazebench.testing import check_agent\n"
-            f"check_agent('sb3_agent:{agent}', Interface('local', 13, 13, sensors=('lidar',)), 'ppo.zip')\n"
+            f"check_agent('sb3_agent:{agent}', 'rough', 'ppo.zip', level=3)\n"
         )
         run("-c", check, folder=tmp_path)
 

@@ -130,7 +130,8 @@ def make_plan(options: EvalOptions, agent_class: type[Agent] | None = None) -> P
       InputError: if an option can't be met.
     """
     agent_class = agent_class or load_agent_class(options.agent)
-    options = _with_checkpoint(_as_played(options, agent_class), agent_class)
+    played = task_as_played(options.agent, agent_class, options.task)
+    options = _with_checkpoint(dataclasses.replace(options, task=played), agent_class)
     task = options.task
     trials = select_trials(task, options.episodes_per_distance, options.seed)
     origin = provenance(options, agent_class)
@@ -165,15 +166,14 @@ def _make_plan_once(options: EvalOptions) -> Plan:
         return make_plan(options)
 
 
-def _as_played(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:
-    """Returns `options` with the sensors that the agent needs and, off the tracks, maps of the size it asks for."""
-    task = options.task
+def task_as_played(agent: str, agent_class: type[Agent], task: Task) -> Task:
+    """Returns `task` with the sensors that the agent needs and, off the tracks, maps of the size it asks for."""
     missing = tuple(name for name in agent_class.needs_sensors if name not in task.sensors)
     task = task.replace(sensors=(*task.sensors, *missing))
     if task.track is None:
-        task = task.replace(context_size=context_size_of(options.agent, agent_class, task.size))
+        task = task.replace(context_size=context_size_of(agent, agent_class, task.size))
         check_shown(task)
-    return dataclasses.replace(options, task=task)
+    return task
 
 
 def _with_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:
