@@ -126,7 +126,7 @@ class Rules:
     def _seek(self, i: int, route: Route, shown: ShownMap) -> None:
         """Measures the way to the goal of environment i, which is new."""
         maze, ends = self.spec.all_mazes[self.maze[i]], (route.cells[0], route.goal)
-        self.blocked[i] = not np.array_equal(maze.walls, shown.walls) and is_blocked(maze.walls, shown.walls, ends)
+        self.blocked[i] = shown.walls is not maze.walls and is_blocked(maze.walls, shown.walls, ends)
         self.distance[i], self.way_left[i], self._ways[i] = maze.distance(*ends), _UNKNOWN, None
         if maze.keeps_distances or self.spec.reward == PROGRESS:
             self.way_left[i], self._ways[i] = self.distance[i], maze.distances(route.goal).ravel()

@@ -25,7 +25,7 @@ from mazebench.evaluation.provenance import code_hash
 from mazebench.options import fields_of
 from mazebench.results.played import mazes_hash
 from mazebench.tasks.task import Task, check_names, check_shown
-from mazebench.tasks.task_fields import TaskOptions
+from mazebench.tasks.task_fields import PROGRESS, TaskOptions
 from mazebench.training.counters import Counters
 from mazebench.training.experience import Experience
 from mazebench.training.held_out import HeldOutEvaluation
@@ -252,8 +252,9 @@ def training_task(
     if given.get("task") == "hierarchical":
         raise InputError("expected task 'local' or a track in a training, found 'hierarchical'")
     values = {**defaults, **given}
-    if {values.get("track"), values.get("task", "local")} - {None, "local"} or values.get("pairs") == "fixed":
-        values["num_goals"] = 1  # a track has one goal, and so has a maze with a fixed pair
+    has_track = {values.get("track"), values.get("task", "local")} - {None, "local"}
+    if has_track or values.get("pairs") == "fixed" or values.get("reward") == PROGRESS:
+        values["num_goals"] = 1  # as these have one goal
     task = Task.of(**values)
     if needed := [name for name in agent_class.needs_shown if name in task.hide]:
         raise InputError(f"agent {agent!r}: needs the {needed[0]}, found it hidden")

@@ -11,7 +11,7 @@ from mazebench.errors import InputError
 from mazebench.options import Doc, options
 
 # Fields of a task for which trainings have one value only: the default, or the learner's.
-FIXED = ("start", "goal", "landmark_distance", "split", "context_size", "num_goals", "reward", "continuous")
+FIXED = ("start", "goal", "landmark_distance", "split", "context_size", "num_goals", "continuous")
 _LONGEST_MINUTES = 366 * 24 * 60  # a year
 
 
