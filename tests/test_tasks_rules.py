@@ -173,9 +173,9 @@ class TestInfosOfTheTask:
 
     def test_the_way_in_a_large_maze_is_measured_if_progress_is_rewarded_only(self):
         episode, mazes = Episode(0, (1, 1), (40, 45), 0.0, 0), field(50)
-        for rewarded, way_left in (("sparse", -1), ("progress", 39 + 44)):
+        for rewarded, way in (("sparse", -1), ("progress", 39 + 44)):
             info = begin(1, episode, mazes=mazes, reward=rewarded).info(0)
-            assert (info["way_left"], info["distance"]) == (way_left, 39 + 44)
+            assert (info["way_left"], info["distance"]) == (way, way)
 
 
 class TestObservation:

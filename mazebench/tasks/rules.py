@@ -125,11 +125,14 @@ class Rules:
 
     def _seek(self, i: int, route: Route, shown: ShownMap) -> None:
         """Measures the way to the goal of environment i, which is new."""
-        maze, ends = self.spec.all_mazes[self.maze[i]], (route.cells[0], route.goal)
-        self.blocked[i] = shown.walls is not maze.walls and is_blocked(maze.walls, shown.walls, ends)
-        self.distance[i], self.way_left[i], self._ways[i] = maze.distance(*ends), _UNKNOWN, None
+        maze, start = self.spec.all_mazes[self.maze[i]], route.cells[0]
+        self.blocked[i] = shown.walls is not maze.walls and is_blocked(maze.walls, shown.walls, (start, route.goal))
+        self.distance[i] = self.way_left[i] = _UNKNOWN
+        self._ways[i] = None
         if maze.keeps_distances or self.spec.reward == PROGRESS:
-            self.way_left[i], self._ways[i] = self.distance[i], maze.distances(route.goal).ravel()
+            distances = maze.distances(route.goal)
+            self.distance[i] = self.way_left[i] = distances[start]
+            self._ways[i] = distances.ravel()
 
     def _begin_leg(self, i: int, route: Route, shown: ShownMap) -> None:
         size = self.spec.size
@@ -240,10 +243,10 @@ class Rules:
         - success: bool. steps: since the episode began. path_length: m. landmark: the number of legs done.
         - time_limit: the agent steps of the leg; on a track they depend on the distance. steps_left: of them.
         - position: `[B, 2]` m, and yaw: rad, both the true ones.
-        - way_left: the cells of a shortest path to the goal in the true maze; -1 in a maze of more than 2,048 free
-          cells, where it would take long, unless the progress is rewarded.
-        - distance: the cells from start to goal. blocked: bool, whether a wall of the true maze stands in the shortest
-          path on the shown map. Of several goals, they are those of the present one.
+        - distance: the cells of a shortest path from start to goal in the true maze. way_left: from the body to the
+          goal. They are -1 in a maze of more than 2,048 free cells, where they take long, unless progress is rewarded.
+        - blocked: bool, whether a wall of the true maze stands in the shortest path on the shown map.
+        - Of several goals, these three are of the present one.
         - maze: index among the task's mazes. kind: of the maze's layout, "" for one of your own.
         - track: "" without one. level: of the track, 0 without one.
         """
