@@ -1,4 +1,4 @@
-"""Stable-Baselines3: many environments at once, and features of their observations (extra `[sb3]`).
+"""Stable-Baselines3: many environments at once, features of their observations, and a buffer (extra `[sb3]`).
 
 >>> envs = MazeVecEnv(mazebench.make_vec("rebuilt", 64))
 >>> model = PPO("MultiInputPolicy", envs, policy_kwargs={"features_extractor_class": MapFeatures})
@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
+from stable_baselines3 import HerReplayBuffer
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.common.type_aliases import DictReplayBufferSamples
 from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
@@ -112,3 +114,12 @@ class MapFeatures(BaseFeaturesExtractor):
         if self.reach:
             parts.append(observations["lidar"] / self.reach)
         return torch.cat(parts, dim=1)  # [B, features]
+
+
+class EndingHerReplayBuffer(HerReplayBuffer):
+    """Ends a relabelled episode where its new goal is reached; the original keeps the end of the old goal."""
+
+    def _get_virtual_samples(self, *arguments: Any, **options: Any) -> DictReplayBufferSamples:
+        samples = super()._get_virtual_samples(*arguments, **options)
+        achieved, desired = (samples.next_observations[key] for key in ("achieved_goal", "desired_goal"))
+        return samples._replace(dones=(achieved == desired).all(dim=1, keepdim=True).float())
