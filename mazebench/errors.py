@@ -19,6 +19,10 @@ class InputError(ValueError):
         super().__init__(one_line(message))
 
 
+class UnknownOptionError(InputError, TypeError):
+    """A call with an option that there is not: a `TypeError` in Python's words, by which other libraries know it."""
+
+
 class UnplayableError(InputError):
     """An agent can't play in the environments that it is to be built for. A suite leaves such a part out."""
 

@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import itertools
 import pathlib
 import pickle
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
-from mazebench.agent import Agent, Inputs, Interface, SingleAgent
+from mazebench.agent import Agent, Inputs, SingleAgent
 from mazebench.agent_loading import checked_agent_class, load_agent_class
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.evaluation.agent_inputs import agent_seed, true_state
-from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling, context_size_of
+from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling
+from mazebench.evaluation.plan import task_as_played
 from mazebench.maps.kinds import generate
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.task import Task
+from mazebench.tasks.task_fields import TaskOptions
 
 _SIZE = 7
 _NUM_MAZES = 3  # of different paths between their corners, so that episodes side by side end at different steps
 _TIME_LIMIT = 5  # steps a leg: whatever an agent does, all landmarks come up
+_NUM_STEPS = 20  # of an episode, and as many more as its number is
 _ORDER = ((0, 3), (1, 4), (2, 5))  # the episodes' numbers in three slots, each slot's one after another
 
 
@@ -34,10 +36,13 @@ class ConformanceError(AssertionError):
 
 def check_agent(
     agent_class: type[Agent] | type[SingleAgent] | str,
-    interface: Interface | None = None,
-    checkpoint: pathlib.Path | None = None,
+    task: Task | str | None = None,
+    checkpoint: pathlib.Path | str | None = None,
+    **options: Unpack[TaskOptions],
 ) -> None:
-    """Builds an agent and lets it act in a few short episodes with landmarks, as an evaluation would.
+    """Builds an agent and lets it act in a few short episodes, as an evaluation would.
+
+        >>> check_agent("my_agent:MyAgent", "rough", level=3)
 
     Checks that every answer is an action for each environment and a state, and that the agent leaves its inputs as they
     are. Then the same episodes are played again: by an agent built anew, by one agent in two batches by turns, in
@@ -45,14 +50,18 @@ def check_agent(
 
     Args:
       agent_class: the class, or what `--agent` takes.
-      interface: what the agent is built for; by default hierarchical navigation in 7 x 7 mazes with
-        the sensors that it needs and the first actions that it plays.
+      task: what is played, or its name for `Task.of`: "local", "hierarchical" or a track; by default hierarchical
+        navigation in 7 x 7 mazes, whose episodes have several legs. The agent gets sensors that it needs, and actions
+        that it plays.
       checkpoint: passed on to `build`.
+      **options: those of `Task.of`, besides a name.
 
     Raises:
       ConformanceError: at the first thing that is wrong.
-      InputError: if no agent has the given name, or the agent can't use the checkpoint.
+      InputError: if no agent has the given name, the agent can't use the checkpoint, or there is no such task.
     """
+    if options and not isinstance(task, str):
+        raise InputError(f"expected the name of a task beside {next(iter(options))}, found {type(task).__name__}")
     if isinstance(agent_class, str):
         agent_class = load_agent_class(agent_class)
     name = getattr(agent_class, "__name__", repr(agent_class))
@@ -60,20 +69,22 @@ def check_agent(
         checked = checked_agent_class(name, agent_class)
     except InputError as error:
         raise ConformanceError(str(error)) from error
+    played = _small_task() if task is None else Task.of(task, **options) if isinstance(task, str) else task
     try:
-        _check_acting(name, checked, interface, checkpoint)
+        played = task_as_played(name, checked, played)
+        _check_acting(name, checked, played, None if checkpoint is None else pathlib.Path(checkpoint))
     except AgentError as error:
         raise ConformanceError(str(error)) from error
 
 
-def _check_acting(
-    name: str, agent_class: type[Agent], interface: Interface | None, checkpoint: pathlib.Path | None
-) -> None:
-    if interface is None:
-        size = context_size_of(name, agent_class, _SIZE)
-        plays = agent_class.plays_actions[0]
-        interface = Interface("hierarchical", _SIZE, size, actions=plays, sensors=agent_class.needs_sensors)
-    episodes = _Episodes(interface, agent_class.needs_truth)
+def _small_task() -> Task:
+    rng = np.random.default_rng(0)
+    mazes = tuple(generate("dfs", _SIZE, rng, f"maze-{index}") for index in range(_NUM_MAZES))
+    return Task.of("hierarchical", mazes=mazes, time_limit=_TIME_LIMIT, landmark_distance=3)
+
+
+def _check_acting(name: str, agent_class: type[Agent], task: Task, checkpoint: pathlib.Path | None) -> None:
+    interface, episodes = task.interface, _Episodes(task, agent_class.needs_truth)
 
     def build() -> CheckedAgent:
         with calling(name, "build"):
@@ -115,20 +126,10 @@ def _check_acting(
 class _Episodes:
     """The episodes that an agent is checked in."""
 
-    def __init__(self, interface: Interface, needs_truth: bool):
+    def __init__(self, task: Task, needs_truth: bool):
         rng = np.random.default_rng(0)
-        drawn = (generate("dfs", interface.size, rng, f"maze-{index}") for index in range(_NUM_MAZES))
-        self._needs_truth = needs_truth
-        self._task_spec = Task.of(
-            "hierarchical",
-            mazes=tuple(dataclasses.replace(maze, cell_size=interface.cell_size) for maze in drawn),
-            time_limit=_TIME_LIMIT,
-            landmark_distance=3,
-            context_size=interface.context_size,
-            actions=interface.actions,
-            sensors=interface.sensors,
-        )
-        self._episodes = [sample_episode(self._task_spec, rng) for _ in itertools.chain(*_ORDER)]
+        self._task, self._needs_truth = task, needs_truth
+        self._episodes = [sample_episode(task, rng) for _ in itertools.chain(*_ORDER)]
 
     def play(self, agent: CheckedAgent, order: Sequence[Sequence[int]]) -> dict[int, list[Any]]:
         """Returns the agent's actions by episode; `order` has the episodes of each slot."""
@@ -149,7 +150,9 @@ class _Episodes:
             number = running[slot]
             return None if number is None else self._episodes[number]
 
-        env = MazeVectorEnv(self._task_spec, len(order), num_threads=1, episode_source=next_episode)
+        env = MazeVectorEnv(
+            self._task, len(order), num_threads=1, episode_source=next_episode, autoreset_mode="Disabled"
+        )
         with contextlib.closing(env):
             observation, info = env.reset()
             new_episode = np.ones(len(order), dtype=bool)
@@ -157,7 +160,7 @@ class _Episodes:
             while any(number is not None for number in running):
                 truth = None
                 if self._needs_truth:
-                    truth = true_state(self._task_spec, env.episodes, info["position"], info["yaw"])
+                    truth = true_state(self._task, env.episodes, info["position"], info["yaw"])
                 seed = np.array([agent_seed(0, number or 0) for number in running])
                 inputs = Inputs(observation, new_episode, info["is_first"], seed, truth)
 
@@ -170,5 +173,13 @@ class _Episodes:
                     if number is not None:
                         actions.setdefault(number, []).append(action)
                 observation, _, terminated, truncated, info = env.step(taken)
-                new_episode = (terminated | truncated) & [number is not None for number in running]
+                # Of episodes side by side, each is cut at another step; a slot without one rests.
+                is_long = [
+                    number is not None and steps >= _NUM_STEPS + number
+                    for number, steps in zip(running, info["steps"].tolist(), strict=True)
+                ]
+                ended = terminated | truncated | is_long
+                if ended.any():
+                    observation, info = env.reset(options={"reset_mask": ended})
+                new_episode = ended & [number is not None for number in running]
                 yield

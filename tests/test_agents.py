@@ -133,19 +133,39 @@ class TestConformance:
     @pytest.mark.parametrize("name", agent_names())
     def test_installed_agent_conforms(self, name, tmp_path):
         agent_class, checkpoint = load_agent_class(name), None
-        interface = Interface("hierarchical", 7, agent_class.context_size(7), sensors=agent_class.needs_sensors)
         if issubclass(agent_class, LearningAgent):
             # Untrained: the contract does not depend on what it learned.
             mazes = (generate("dfs", 7, np.random.default_rng(0), "m"),)
-            task = Task.of(mazes=mazes, distances=(1, 2, 3), context_size=interface.context_size)
+            task = Task.of(mazes=mazes, distances=(1, 2, 3), context_size=agent_class.context_size(7))
             agent_class.build_learner(task).save(tmp_path, {})
             checkpoint = tmp_path / "agent.safetensors"
-        check_agent(agent_class, interface, checkpoint)
+        check_agent(agent_class, checkpoint=checkpoint)
 
     @pytest.mark.parametrize("agent_class", [Counting, CountingAlone, Drawing, Sensing])
     def test_conforming_agent_passes(self, agent_class):
         check_agent(agent_class)
-        check_agent(agent_class, Interface("local", 9, 5, sensors=agent_class.needs_sensors))
+        check_agent(agent_class, Task.of("local", fresh=True))
+
+    def test_an_agent_is_built_for_the_task_that_is_named(self):
+        found = []
+
+        class Built(Counting):
+            @classmethod
+            def build(cls, interface, *, seed=0, checkpoint=None):
+                found.append(interface)
+                return cls()
+
+            def act(self, inputs, state, explore=False):
+                assert inputs.observation["context"].shape[-1] == interface.context_size
+                return super().act(inputs, state, explore)
+
+        interface = Task.of("adrift", level=3).interface
+        check_agent(Built, "adrift", level=3)
+        assert set(found) == {interface}
+
+    def test_options_belong_to_the_name_of_a_task(self):
+        with pytest.raises(InputError, match="expected the name of a task beside level, found NoneType"):
+            check_agent(Counting, level=3)
 
     @pytest.mark.parametrize(("broken", "message"), BROKEN.values(), ids=BROKEN)
     def test_fault_is_named_in_one_line(self, broken, message):

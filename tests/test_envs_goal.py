@@ -109,3 +109,7 @@ class TestEnvironment:
     def test_a_task_with_several_goals_is_refused(self, options):
         with pytest.raises(InputError, match="expected the local task, one goal, no track, no hide"):
             GoalMazeEnv(Task.of(**options))
+
+    def test_progress_which_another_goal_does_not_have_is_refused(self):
+        with pytest.raises(InputError, match="expected reward 'sparse', found 'progress'"):
+            GoalMazeEnv(Task.of(reward="progress"))

@@ -18,7 +18,7 @@ from simple_mazes import corridor
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.registration import register_environments
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.errors import InputError
+from mazebench.errors import InputError, UnknownOptionError
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import write_text_maze
@@ -64,7 +64,8 @@ class TestRegistration:
 
     def test_an_unknown_option_is_refused_with_all_there_are(self):
         for make, own in ((gymnasium.make, "camera, "), (gymnasium.make_vec, "num_envs, ")):
-            with pytest.raises(InputError, match=f"unknown option 'mapz'; available: .*{own}") as caught:
+            message = f"unexpected keyword argument 'mapz'; available: .*{own}"
+            with pytest.raises(UnknownOptionError, match=message) as caught:
                 make("mazebench/Local-13-v1", mapz="plan.png")
             assert {"mazes", "size", "split", "seed"} <= set(str(caught.value).split(": ")[1].split(", "))
 
@@ -112,6 +113,13 @@ class TestCheckers:
         checker = pytest.importorskip("stable_baselines3.common.env_checker")
         checker.check_env(gymnasium.make(name).unwrapped)
 
+    @pytest.mark.slow
+    def test_torchrl_makes_an_environment_by_its_id(self):
+        env = pytest.importorskip("torchrl.envs").GymEnv("mazebench/Rebuilt-v1", level=(1, 2), distances=[1, 2])
+        rollout = env.rollout(150, break_when_any_done=False)
+        assert rollout["lidar"].shape == (150, 32)
+        assert rollout["next", "done"].any()
+
 
 class TestSteps:
     def test_a_step_before_the_first_reset_is_refused(self):
@@ -140,10 +148,21 @@ class TestSteps:
             assert env.step(FORWARD)[1:4] == (-1.0, False, False)
         assert env.step(FORWARD)[1:4] == expected
 
+    def test_progress_is_rewarded(self):
+        env = corridor_env(reward="progress")
+        _, info = env.reset(options={"episode": Episode(0, (1, 1), (1, 4), 0.0, 0)})
+        for reached in (*[False] * 5, True):
+            way_left = info["way_left"]
+            _, reward, terminated, _, info = env.step(FORWARD)
+            assert (reward, terminated) == (reached - 1 + way_left - info["way_left"], reached)
+
     def test_the_info_tells_what_was_driven(self):
         env = corridor_env()
         _, info = env.reset(options={"episode": Episode(0, (1, 1), (1, 4), 0.0, 0)})
-        assert info.keys() == {"is_first", "success", "steps", "path_length", "position", "yaw", "maze", "landmark"}
+        assert info.keys() == {
+            *("is_first", "success", "steps", "path_length", "position", "yaw", "maze", "landmark"),
+            *("time_limit", "steps_left", "way_left", "distance", "blocked", "kind", "track", "level"),
+        }
         assert (info["is_first"], info["steps"], info["path_length"], info["landmark"]) == (True, 0, 0.0, 0)
         np.testing.assert_allclose(info["position"], (1.5, 7.5))
         _, _, _, _, info = env.step(FORWARD)
@@ -219,6 +238,34 @@ class TestSpec:
         again = gymnasium.make_vec(EnvSpec.from_json(envs.spec.to_json()))
         assert again.task_spec == envs.task_spec
         assert (again.num_envs, again.metadata) == (3, envs.metadata)
+
+    @pytest.mark.parametrize(
+        ("name", "options", "expected"),
+        [
+            ("Local-13", {}, 100),
+            ("Local-13", {"num_goals": 3}, 300),
+            ("Rough", {"distances": [20]}, 6 * 20 + 150),
+            ("Hierarchical-13", {}, None),
+        ],
+    )
+    def test_it_tells_how_long_episodes_may_be(self, name, options, expected):
+        name = f"mazebench/{name}-v1"
+        for env, make in (
+            (gymnasium.make(name, **options), gymnasium.make),
+            (gymnasium.make_vec(name, num_envs=2, **options), gymnasium.make_vec),
+        ):
+            assert env.spec.max_episode_steps == expected
+            # The task judges the limit itself, also in an environment that is made again.
+            again = make(EnvSpec.from_json(env.spec.to_json()))
+            assert again.spec.max_episode_steps == expected
+            assert "TimeLimit" not in repr(again)
+        assert gymnasium.make_vec(env.spec).spec.max_episode_steps == expected
+
+    def test_a_limit_of_gymnasiums_wrapper_is_kept(self):
+        spec = gymnasium.wrappers.TimeLimit(gymnasium.make("mazebench/Local-13-v1"), 7).spec
+        assert gymnasium.make(EnvSpec.from_json(spec.to_json())).spec.max_episode_steps == 7
+        with pytest.raises(InputError, match="expected time_limit in the place of max_episode_steps, found 7"):
+            gymnasium.make_vec("mazebench/Local-13-v1", num_envs=2, max_episode_steps=7)
 
     def test_a_path_stays_a_path(self, tmp_path):
         write_text_maze(own_mazes()[0], tmp_path / "room.txt")

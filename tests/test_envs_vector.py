@@ -25,7 +25,10 @@ from mazebench.tasks.task import Task
 NUM_STEPS = 320
 SEEDS = [3, 1000, 17, 4]
 NUM_ENVS = len(SEEDS)
-INFOS = ("is_first", "success", "steps", "path_length", "position", "maze", "landmark")
+INFOS = (
+    *("is_first", "success", "steps", "path_length", "position", "maze", "landmark"),
+    *("time_limit", "steps_left", "way_left", "distance", "blocked", "kind", "track", "level"),
+)
 FORWARD, LOOK_LEFT = 0, 4
 
 
@@ -47,6 +50,7 @@ SPECS = {
     "map_warp": Task.of(mazes=dfs_mazes(), distances=[1, 2], time_limit=25, map_warp=0.2),
     "position_noise": Task.of(mazes=dfs_mazes(), distances=[1, 2], time_limit=25, position_noise=0.4),
     "context_size": Task.of(mazes=dfs_mazes(), distances=[1, 2], time_limit=25, context_size=6),
+    "progress": Task.of(mazes=dfs_mazes(), distances=[1, 2], time_limit=25, reward="progress"),
     "num_goals": Task.of(mazes=dfs_mazes(), distances=[1, 2], time_limit=15, num_goals=3),
     "fresh": Task.of(kinds=("dfs", "obstacles"), size=13, fresh=True, distances=[1, 2], time_limit=25),
 }
@@ -203,9 +207,9 @@ class TestAutoreset:
         num_ended = 0
         for action in random_actions(150, NUM_ENVS):
             one, other = ours.step(action), theirs.step(action)
-            for expected, found in zip(other[1:4], one[1:4], strict=True):  # rewards and flags
+            for expected, found, dtype in zip(other[1:4], one[1:4], (np.float32, bool, bool), strict=True):
                 np.testing.assert_array_equal(found, expected)
-                assert found.dtype == expected.dtype
+                assert found.dtype == dtype
             self.assert_same_infos((one[0], one[4]), (other[0], other[4]))
             ended = one[2] | one[3]
             num_ended += ended.sum()

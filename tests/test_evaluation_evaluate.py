@@ -342,7 +342,7 @@ class TestRefused:
         ("options", "message"),
         [
             ({"pairs": "fixed"}, "expected pairs 'random' in an evaluation, found 'fixed'"),
-            ({"speed": 2}, "unknown option 'speed'; available: .*distances.*map_flip"),
+            ({"speed": 2}, "unexpected keyword argument 'speed'; available: .*distances.*map_flip"),
             ({"num_envs": 0}, "expected num_envs of at least 1, found 0"),
         ],
     )

@@ -17,6 +17,7 @@ from mazebench.evaluation.plan import make_plan
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations.flip import MapFlip, flip
+from mazebench.tasks.rules import Rules
 
 
 class Undoing(ClosedLoopPlanner):
@@ -32,6 +33,22 @@ class Undoing(ClosedLoopPlanner):
             rng = Episode(0, *ends, 0.0, seed).stream(MapFlip.stream)
             planes[GLOBAL_MAP] = flip(planes[GLOBAL_MAP] > 0.5, 0.1, ends, rng)
         return super().act(inputs._replace(observation={**inputs.observation, "context": context}), state, explore)
+
+
+def test_results_do_not_depend_on_what_info_tells_of_the_truth(monkeypatch, tmp_path):
+    def play(out: pathlib.Path) -> list[dict]:
+        evaluate("navigator", out=out, track="rebuilt", split="dev", distances=(15,))
+        return records_of(out)
+
+    honest, infos = play(tmp_path / "honest"), Rules.infos
+    recorded = ("is_first", "success", "steps", "path_length", "blocked")
+
+    def lying(rules: Rules) -> dict[str, np.ndarray]:
+        told = infos(rules)
+        return {name: values if name in recorded else np.zeros_like(values) for name, values in told.items()}
+
+    monkeypatch.setattr(Rules, "infos", lying)
+    assert play(tmp_path / "lying") == honest
 
 
 def test_a_planner_that_undoes_flips_with_its_seed_does_no_better(monkeypatch, tmp_path):

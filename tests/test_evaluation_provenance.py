@@ -101,4 +101,4 @@ def test_a_summary_of_a_track_has_the_time_limit_of_its_farthest_goals(tmp_path)
     evaluate("random", out=tmp_path, track="adrift", split="dev", distances=(15,))
     task = Task.from_json(summary_of(tmp_path)["task"])
     records = [json.loads(line) for line in (tmp_path / "episodes.jsonl").read_text().splitlines()]
-    assert task.longest_time_limit == max(record["steps"] for record in records) == 6 * 15 + 150
+    assert task.longest_episode == max(record["steps"] for record in records) == 6 * 15 + 150

@@ -49,6 +49,13 @@ class TestScripts:
                 "--steps 512 --num-envs 8 --rollout 32 --batch-size 128",
                 r"\A256 steps:.*\n512 steps:.*\n16 updates; ",
             ),
+            pytest.param(
+                "torchrl",
+                "torchrl_ppo.py",
+                "--id mazebench/Rebuilt-v1 --reward progress --steps 256 --num-envs 4 --rollout 32 --batch-size 128",
+                r"\A128 steps:.*\n256 steps:.*\n8 updates; ",
+                marks=pytest.mark.slow,
+            ),
             ("stable_baselines3", "sb3_continuous.py", "--steps 110", " drove "),
         ],
     )
@@ -74,14 +81,13 @@ class TestScripts:
         shutil.copy(EXAMPLES / "sb3_her_agent.py", tmp_path)
         check = f"""
 import gymnasium, mazebench, numpy as np
-from mazebench.agent import Interface
 from mazebench.testing import check_agent
 from sb3_her_agent import {agent} as Agent
 
 # Also where contexts are larger than those that it was trained on.
-for context_size in ({side}, {side + 2}):
-    interface = Interface('local', {side}, context_size, sensors=Agent.needs_sensors)
-    check_agent('sb3_her_agent:{agent}', interface, 'her.zip')
+for size in ({side}, {side + 2}):
+    task = mazebench.Task.of(size=size, context_size=size, kinds='dfs')
+    check_agent('sb3_her_agent:{agent}', task, 'her.zip')
 
 # The agent sees what the goal-conditioned environment shows.
 names = ("Local", "LocalGoal")
@@ -108,25 +114,22 @@ for action in (0, 0, 2, 2, 4, 0, 0):
     )
     def test_sb3_tracks(self, tmp_path, agent, options):
         needs("stable_baselines3", "sb3_contrib")
-        output = run(EXAMPLES / "sb3_tracks.py", *PPO_BUDGET, *options, folder=tmp_path)
-        assert output.startswith("context: [4, 31, 31]\nlidar: [32]\nstate: [12]\n")
+        run(EXAMPLES / "sb3_tracks.py", *PPO_BUDGET, *options, folder=tmp_path)
         # The policy is an agent, also where contexts are larger than those that it was trained on.
         shutil.copy(EXAMPLES / "sb3_agent.py", tmp_path)
         which = ("--agent", f"sb3_agent:{agent}", "--checkpoint", "ppo.zip", "--distances", "15")
         run("-m", "mazebench", "eval", *which, "--track", "rough", "--out", "results", folder=tmp_path)
         assert json.loads((tmp_path / "results" / "summary.json").read_text())["episodes"] == 10
         check = (
-            "from mazebench.agent import Interface\n"
             "from mazebench.testing import check_agent\n"
-            f"check_agent('sb3_agent:{agent}', Interface('local', 13, 13, sensors=('lidar',)), 'ppo.zip')\n"
+            f"check_agent('sb3_agent:{agent}', 'rough', 'ppo.zip', level=3)\n"
         )
         run("-c", check, folder=tmp_path)
 
     @pytest.mark.slow
     def test_sb3_tracks_on_a_task_without_lidar(self, tmp_path):
         needs("stable_baselines3", "sb3_contrib")
-        output = run(EXAMPLES / "sb3_tracks.py", *PPO_BUDGET, "--track", "mazebench/Local-13-v1", folder=tmp_path)
-        assert output.startswith("context: [4, 13, 13]\nstate: [12]\n")
+        run(EXAMPLES / "sb3_tracks.py", *PPO_BUDGET, "--track", "local", "--reward", "progress", folder=tmp_path)
         shutil.copy(EXAMPLES / "sb3_agent.py", tmp_path)
         which = ("--agent", "sb3_agent:MapPPOAgent", "--checkpoint", "ppo.zip", "--distances", "3", "--kinds", "dfs")
         run("-m", "mazebench", "eval", *which, "--num-mazes", "2", "--out", "results", folder=tmp_path)

@@ -37,7 +37,7 @@ LAYERS = {name: layer for layer, names in enumerate(ORDER) for name in names}
 # A folder of agents/ imports only from those of lines above it and itself: first parts, then agents. `mah` shares the
 # learner of `dqn`.
 AGENT_ORDER = (
-    {"common"},
+    {"common", "integrations"},
     {"robot", "muzero"},
     {"expert"},
     {"random_agent", "planner", "navigator", "neural_planner", "mmn", "dqn"},
@@ -60,6 +60,7 @@ WALLS = {
     "ray": ("mazebench/evaluation/cluster.py", "mazebench/training/distributed.py"),
     "matplotlib": ("mazebench/report",),
     "pandas": ("mazebench/report",),
+    "stable_baselines3": ("agents/integrations/sb3.py",),
 }
 FOLDERS = {"mazebench": "mazebench", "mazebench_agents": "agents", "mazebench_assets": "assets"}
 

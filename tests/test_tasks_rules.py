@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from simple_mazes import corridor, field
 
-from mazebench.tasks.episode import Episode
+from mazebench.tasks.episode import Episode, sample_episode
+from mazebench.tasks.imperfections import episode_level
 from mazebench.tasks.rules import Rules, reward
+from mazebench.tasks.shown_map import is_blocked, show_map
 from mazebench.tasks.task import Task
+from mazebench.tasks.time_limit import track_time_limit
 
 ROW = 1  # of the corridor, whose cells are (1, 1) to (1, 7)
 everywhere = pytest.mark.parametrize("num_envs", [1, 3])
@@ -66,9 +69,30 @@ class TestLocal:
             drive(rules, (ROW, column))
         infos = rules.infos()
         for i in range(num_envs):
-            found = {name: values[i].tolist() for name, values in infos.items()}
+            found = {name: np.asarray(values[i]).tolist() for name, values in infos.items()}
             assert found == rules.info(i) | {"position": [4.5, 7.5]}
             assert (found["steps"], found["path_length"], found["success"], found["is_first"]) == (3, 5.0, False, False)
+
+    @everywhere
+    def test_the_infos_tell_what_is_left(self, num_envs):
+        rules = begin(num_envs, along(3, 7), time_limit=50)
+        left = [(rules.info(0)["way_left"], rules.info(0)["steps_left"])]
+        for column in (2, 4, 7):
+            drive(rules, (ROW, column))
+            left.append((rules.info(0)["way_left"], rules.info(0)["steps_left"]))
+        assert left == [(4, 50), (5, 49), (3, 48), (0, 47)]
+        expected = {"distance": 4, "time_limit": 50, "blocked": False, "kind": "", "track": "", "level": 0}
+        assert {name: rules.info(0)[name] for name in expected} == expected
+
+    @everywhere
+    def test_progress_is_rewarded_besides_the_steps(self, num_envs):
+        rules = begin(num_envs, along(3, 7), reward="progress")
+        rewards = []
+        for column in (2, 2, 4, 7):
+            drive(rules, (ROW, column))
+            rewards.append(rules.reward(0))
+            np.testing.assert_array_equal(rules.rewards(), np.full(num_envs, rewards[-1], np.float32), strict=True)
+        assert rewards == [-1 - 1, -1, -1 + 2, 0 + 3]
 
     def test_an_environment_without_an_episode_stands_still(self):
         rules = begin(2, along(1, 3))
@@ -108,12 +132,50 @@ class TestHierarchical:
             np.testing.assert_array_equal(np.argwhere(local_map == 0), [[4, index] for index in free])
             drive(rules, (ROW, column - 2))
 
+    def test_progress_is_that_to_the_goal_whatever_the_landmarks(self):
+        rules = begin(1, along(7, 1), *self.OPTIONS, landmark_distance=2, time_limit=2, reward="progress")
+        rewards = [drive(rules, (ROW, column)) and rules.reward(0) for column in (6, 7, 6, 5, 4)]
+        assert rewards == [-1 + 1, -1 - 1, -1 + 1, -1 + 1, -1 + 1]
+
     @everywhere
     def test_a_goal_entered_before_the_landmarks_ends_the_episode(self, num_envs):
         episode = Episode(0, (1, 7), (7, 1), 0.0, 0)
         rules = begin(num_envs, episode, *self.OPTIONS, mazes=field(9), landmark_distance=5)
         assert rules.routes[0].cells == [(1, 7), (1, 2), (5, 1), (7, 1)]
         assert [drive(rules, (cell, 8 - cell)) for cell in (4, 7)] == [(False, False, False), (False, True, False)]
+
+
+class TestInfosOfTheTask:
+    def test_each_goal_of_several_has_its_distance(self):
+        rules = begin(1, along(1, 3), num_goals=2, distances=[4], time_limit=9)
+        drive(rules, (ROW, 3))
+        (row, column) = rules.routes[0].goal
+        assert (row, abs(column - 3)) == (ROW, 4)
+        info = rules.info(0)
+        assert (info["distance"], info["way_left"], info["steps_left"], info["landmark"]) == (4, 4, 9, 1)
+
+    @pytest.mark.parametrize("track", ["building", "rebuilt", "rough"])
+    def test_a_track_tells_its_level_and_what_records_have(self, track):
+        task = Task.of(track, level=(1, 2, 3))
+        rng, rules, seen = np.random.default_rng(0), Rules(task, 1), set()
+        for _ in range(12):
+            episode = sample_episode(task, rng)
+            rules.begin(0, episode)
+            info, maze = rules.info(0), task.all_mazes[episode.maze]
+            blocked = is_blocked(maze.walls, show_map(task, episode).walls, (episode.start, episode.goal))
+            level, distance = episode_level(task, episode), maze.distance(episode.start, episode.goal)
+            expected = {"track": track, "level": level, "kind": maze.kind, "distance": distance, "blocked": blocked}
+            expected |= {"way_left": distance, "time_limit": track_time_limit(track, distance)}
+            assert {name: info[name] for name in expected} == expected
+            seen.add((level, blocked))
+        assert len({level for level, _ in seen}) == 3
+        assert {blocked for _, blocked in seen} == ({False} if track == "building" else {False, True})
+
+    def test_the_way_in_a_large_maze_is_measured_if_progress_is_rewarded_only(self):
+        episode, mazes = Episode(0, (1, 1), (40, 45), 0.0, 0), field(50)
+        for rewarded, way in (("sparse", -1), ("progress", 39 + 44)):
+            info = begin(1, episode, mazes=mazes, reward=rewarded).info(0)
+            assert (info["way_left"], info["distance"]) == (way, way)
 
 
 class TestObservation:

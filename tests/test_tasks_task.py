@@ -50,6 +50,7 @@ class TestValue:
             {"mazes": dfs_mazes(), "cell_size": 0.5, "distances": 3, "hide": "goal,map"},
             {"start": (1, 1), "goal": "3.5m,1.5m", "position_noise": 0.2},
             {"lidar_noise": ".1,.2", "sensors": "lidar", "num_goals": 3, "actions": "velocity"},
+            {"reward": "progress"},
         ],
         ids=lambda options: next(iter(options)),
     )
@@ -58,6 +59,9 @@ class TestValue:
         again = Task.from_json(json.loads(json.dumps(task.to_json())))
         assert again == task
         assert again.all_mazes == task.all_mazes
+
+    def test_results_do_not_name_the_reward_which_is_that_of_all_evaluations(self):
+        assert "reward" not in evaluation_task().to_json()
 
     def test_mazes_of_a_file_are_the_same_when_the_task_is_read_again(self, tmp_path):
         write_text_maze(CORRIDOR, tmp_path / "corridor.txt")
@@ -78,6 +82,8 @@ class TestValue:
     def test_options_that_evaluations_do_not_vary_are_refused(self):
         with pytest.raises(InputError, match="expected num_goals 1 in an evaluation, found 2"):
             evaluation_task(num_goals=2)
+        with pytest.raises(InputError, match="expected reward 'sparse' in an evaluation, found 'progress'"):
+            evaluation_task(reward="progress")
 
 
 class TestDistances:
@@ -141,7 +147,8 @@ class TestOptions:
                 {"num_goals": 2, "task": "hierarchical"},
                 r"expected num_goals 1 unless the task is local and pairs are random, found 2",
             ),
-            ({"mapz": "plan.txt"}, r"unknown option 'mapz'; available: .*map_warp, mazes, .*size, split, start"),
+            ({"num_goals": 2, "reward": "progress"}, r"reward 'progress': expected num_goals 1 beside it, found 2"),
+            ({"mapz": "plan.txt"}, r"unexpected keyword argument 'mapz'; available: .*map_warp, mazes, .*size, split"),
             ({"map_warp": 0.26}, r"expected map_warp from 0 to 0\.25, found 0\.26"),
         ],
     )

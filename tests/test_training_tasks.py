@@ -43,6 +43,20 @@ class Near(MAH):
         return {"num_goals": 2, "distances": (1, 2), "time_limit": 50}
 
 
+class Rewarded(Near):
+    """Learns from the rewards of its steps, which this one leaves alone."""
+
+    @classmethod
+    def build_learner(cls, task, *, seed=0, overrides=None):
+        return super().build_learner(task.replace(reward="sparse"), seed=seed, overrides=overrides)
+
+
+def test_a_run_says_that_progress_was_rewarded(tmp_path):
+    train(**tiny_options(agent=f"{__name__}:Rewarded", reward="progress"), out=tmp_path)
+    task = task_in(tmp_path)
+    assert (task["reward"], task["num_goals"]) == ("progress", 1)
+
+
 def test_a_run_on_a_track_names_it_and_is_evaluated_on_it(tmp_path):
     train(**tiny_options(track="rebuilt", level=(1, 2)), out=tmp_path)
     task = task_in(tmp_path)
@@ -82,7 +96,7 @@ class Misspelled(MAH):
 
 
 def test_a_learner_that_wants_an_unknown_option_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"unknown option 'num_goal'; available: .*num_goals"):
+    with pytest.raises(InputError, match=r"unexpected keyword argument 'num_goal'; available: .*num_goals"):
         train(**tiny_options(agent=f"{__name__}:Misspelled"), out=tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
@@ -94,6 +108,7 @@ def test_a_learner_that_wants_an_unknown_option_is_refused(tmp_path):
         ({"minutes": 0}, "expected minutes from 0.01 to 527040, found 0"),
         ({"task": "hierarchical"}, "expected task 'local' or a track in a training, found 'hierarchical'"),
         ({"actions": "diff"}, "expected actions 'six' in a training, found 'diff'"),
+        ({"reward": "progress"}, "agent 'mah': computes the rewards of any goal itself, found reward 'progress'"),
         ({"track": "rough"}, "agent 'mah': learns only on maps of one pixel a cell .*; found track 'rough'"),
         ({"map_warp": 0.1}, "agent 'mah': learns only on maps of one pixel a cell .*; found map_warp"),
         ({"sensors": "lidar"}, "agent 'mah': reads no sensors, found lidar"),

@@ -12,6 +12,7 @@ from mazebench.tasks.context import build_context
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.task import Task
+from mazebench.tasks.task_fields import SPARSE
 
 from . import symmetry
 from .replay import Sample, SequenceSample
@@ -57,10 +58,12 @@ def shows_other_maps(task: Task, agent: str) -> bool:
     """Returns whether the maps that `task` shows may be others than those of its mazes.
 
     Raises:
-      InputError: if the maps are drawn or lack marks, or a sensor is asked for, which the network of `agent` does not
-        read.
+      InputError: if the maps are drawn or lack marks, or a sensor or a reward is asked for, which the learner of
+        `agent` does not read.
     """
     name = f"agent {agent!r}"
+    if task.reward != SPARSE:
+        raise InputError(f"{name}: computes the rewards of any goal itself, found reward {task.reward!r}")
     if task.track is None and task.sensors:
         raise InputError(f"{name}: reads no sensors, found {', '.join(task.sensors)}")
     if task.track is None and not task.active_perturbations:

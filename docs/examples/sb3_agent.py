@@ -1,36 +1,12 @@
-"""The policy that sb3_tracks.py saved, as an agent of mazebench, and the features that it reads."""
+"""The policy that sb3_tracks.py saved, as an agent of mazebench."""
 
 import cv2
 import numpy as np
 import torch
 from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO
-from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-from torch import nn
 
 import mazebench
-
-
-class MapFeatures(BaseFeaturesExtractor):
-    """Convolutions of the context, beside state and lidar if there is one, which are scaled to an order of 1."""
-
-    def __init__(self, observation_space, num_features=256):
-        lidar = observation_space.spaces.get("lidar")
-        super().__init__(observation_space, num_features + 12 + (lidar.shape[0] if lidar else 0))
-        channels, side, _ = observation_space["context"].shape
-        self.scale = torch.tensor([1 / side] * 3 + [1.0] * 9)  # positions are in metres
-        self.reach = float(lidar.high.max()) if lidar else None
-        layers = []
-        for wider in (32, 64, 64):
-            layers += [nn.Conv2d(channels, wider, 3, stride=2, padding=1), nn.ReLU()]
-            channels, side = wider, (side + 1) // 2
-        self.context = nn.Sequential(*layers, nn.Flatten(), nn.Linear(channels * side**2, num_features), nn.ReLU())
-
-    def forward(self, observations):
-        parts = [self.context(observations["context"]), observations["state"] * self.scale]
-        if self.reach:
-            parts.append(observations["lidar"] / self.reach)
-        return torch.cat(parts, dim=1)
 
 
 class PPOAgent(mazebench.Agent):

@@ -1,6 +1,7 @@
-"""Trains TorchRL's PPO on many environments at once.
+"""Trains TorchRL's PPO on many environments at once, of a task or a track.
 
 python docs/examples/torchrl_ppo.py --steps 300000
+python docs/examples/torchrl_ppo.py --steps 300000 --id mazebench/Rebuilt-v1 --reward progress
 """
 
 import argparse
@@ -18,6 +19,8 @@ from torchrl.objectives.value import GAE
 import mazebench  # noqa: F401  (registers the ids)
 
 parser = argparse.ArgumentParser()
+parser.add_argument("--id", default="mazebench/Local-13-v1", help="Gymnasium id of a task or a track")
+parser.add_argument("--reward", default="sparse", help="or progress, which also rewards a shorter way to the goal")
 parser.add_argument("--steps", type=int, default=300_000, help="in all environments together")
 parser.add_argument("--num-envs", type=int, default=64)
 parser.add_argument("--rollout", type=int, default=64, help="steps of each environment between updates")
@@ -30,12 +33,14 @@ arguments = parser.parse_args()
 torch.set_num_threads(1)
 torch.manual_seed(arguments.seed)
 # TorchRL resets ended episodes itself, with a mask.
-options = {"distances": [1, 2], "autoreset_mode": "Disabled"}
-envs = gymnasium.make_vec("mazebench/Local-13-v1", num_envs=arguments.num_envs, **options)
-# One vector of 12 + 4 M M numbers: the state, which TorchRL calls "observation", then the planes of the context.
+options = {"distances": [1, 2], "reward": arguments.reward, "autoreset_mode": "Disabled"}
+envs = gymnasium.make_vec(arguments.id, num_envs=arguments.num_envs, **options)
+# One vector of 12 + 4 M M numbers: the state, which TorchRL calls "observation", then the planes of the context. On a
+# track, the 32 readings of the lidar follow.
+parts = ["observation", "context", *(["lidar"] if envs.task_spec.track else [])]
 env = TransformedEnv(
     GymWrapper(envs, categorical_action_encoding=True),
-    Compose(FlattenObservation(-3, -1, ["context"]), CatTensors(["observation", "context"], "inputs")),
+    Compose(FlattenObservation(-3, -1, ["context"]), CatTensors(parts, "inputs", sort=False)),
 )
 env.set_seed(arguments.seed)
 

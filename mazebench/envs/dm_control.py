@@ -16,8 +16,8 @@ from mazebench.envs.single import EnvironmentState, SingleTask
 from mazebench.tasks.actions import action_spec
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.observation import observation_specs
-from mazebench.tasks.rules import reward
 from mazebench.tasks.task import Task as MazeTask
+from mazebench.tasks.task_fields import PROGRESS
 from mazebench.world.models import MazeModels, models_of
 from mazebench.world.simulation import FULL_STATE, Simulation
 
@@ -99,8 +99,8 @@ class Task(SingleTask, control.Task):
         return observation
 
     def get_reward(self, simulation: Simulation) -> float:
-        """Returns 0 if the goal has been reached, else -1."""
-        return reward(self.success)
+        """Returns 0 if the goal has been reached, else -1; and the progress, if it is rewarded."""
+        return self.rules.reward(0)
 
     def get_termination(self, simulation: Simulation) -> float | None:
         """Returns the last discount, 0 at the goal and 1 at the end of the time, or None if the episode goes on."""
@@ -165,5 +165,7 @@ class Environment(control.Environment):
     def close(self) -> None:
         self.task.close()
 
-    def reward_spec(self) -> specs.BoundedArray:
+    def reward_spec(self) -> specs.Array:
+        if self.task.spec.reward == PROGRESS:
+            return specs.Array((), float, name="reward")
         return specs.BoundedArray((), float, -1.0, 0.0, name="reward")

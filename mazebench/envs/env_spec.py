@@ -16,6 +16,20 @@ from mazebench.maps.selection import described_maze
 from mazebench.tasks.task import Task
 
 
+class TaskSpec(EnvSpec):
+    """A spec whose `max_episode_steps` are those of a task, which judges its time limit itself.
+
+    JSON leaves them out: Gymnasium would put a `TimeLimit` around an environment that is made of it. That would also
+    call an episode truncated that reaches its goal on the last step.
+    """
+
+    of_task: int | None = None  # the task's limit
+
+    def to_json(self) -> str:
+        own = dataclasses.replace(self, max_episode_steps=None) if self.max_episode_steps == self.of_task else self
+        return EnvSpec.to_json(own)
+
+
 class JsonSpec:
     """Base class of environments whose `spec.to_json()` describes them, mazes of one's own included."""
 
@@ -34,7 +48,9 @@ class JsonSpec:
             kwargs = {name: _plain(value) for name, value in spec.kwargs.items()}
             if not isinstance(kwargs.get("mazes"), str | None):  # else a path, or none
                 kwargs["mazes"] = [described_maze(maze) for maze in self.task_spec.fixed_mazes]
-            spec = dataclasses.replace(spec, kwargs=kwargs)
+            values = {field.name: getattr(spec, field.name) for field in dataclasses.fields(spec) if field.init}
+            spec = TaskSpec(**values | {"kwargs": kwargs, "max_episode_steps": self.task_spec.longest_episode})
+            spec.of_task = spec.max_episode_steps
         self._spec = spec
 
 

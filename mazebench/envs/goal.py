@@ -14,6 +14,7 @@ from mazebench.errors import InputError
 from mazebench.tasks.context import GOAL, NUM_PLANES
 from mazebench.tasks.rules import reward
 from mazebench.tasks.task import Task
+from mazebench.tasks.task_fields import SPARSE
 from mazebench.world.simulation import STATE_SIZE
 
 _SHOWN_PLANES = [plane for plane in range(NUM_PLANES) if plane != GOAL]
@@ -41,6 +42,8 @@ class GoalMazeEnv(MazeEnv):
         # A track may hide the body's position and has its own time limits, and the goals would tell what is hidden.
         if task_spec.has_legs or task_spec.track is not None or task_spec.hide:
             raise InputError("a goal-conditioned environment: expected the local task, one goal, no track, no hide")
+        if task_spec.reward != SPARSE:  # another goal's way is not known
+            raise InputError(f"a goal-conditioned environment: expected reward {SPARSE!r}, found {task_spec.reward!r}")
         super().__init__(task_spec, seed, render_mode, camera)
         side, num_values = task_spec.all_mazes[0].side, STATE_SIZE + len(_SHOWN_PLANES) * task_spec.context_size**2
         sensed = {name: spaces.observation_space(task_spec)[name] for name in task_spec.sensors}

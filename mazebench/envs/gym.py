@@ -15,7 +15,6 @@ from mazebench.envs.single import EnvironmentState, SingleTask
 from mazebench.errors import InputError, unknown
 from mazebench.tasks.arguments import Arguments
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.rules import reward
 from mazebench.tasks.task import Task
 from mazebench.world.models import models_of
 from mazebench.world.near_walls import near_walls_of
@@ -26,9 +25,7 @@ from mazebench.world.simulation import MujocoSimulation
 class MazeEnv(JsonSpec, gymnasium.Env):
     """One environment; observations, rewards and endings are those of `mazebench.tasks.rules.Rules`.
 
-    `info` has `is_first` (whether the context is new: an episode or the leg to the next landmark began), `success`,
-    `steps`, `path_length` (m), `position` (`[2]` m) and `yaw` (rad; both are the true ones, for records and hindsight;
-    agents must not use them), `maze` (index among the task's mazes) and `landmark` (number of legs done).
+    `info` has what `Rules.infos` returns, for training and records; agents must not use it in an evaluation.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 1 / STEP_TIME}  # noqa: RUF012
@@ -88,7 +85,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         task.after_step(simulation)
         reached, timed_out = task.rules.reached.item(), task.rules.timed_out.item()
         self._needs_reset = reached or timed_out
-        return self._observation(), reward(reached), reached, timed_out, task.rules.info(0)
+        return self._observation(), task.rules.reward(0), reached, timed_out, task.rules.info(0)
 
     def render(self) -> np.ndarray | None:
         """Returns `[480, 480, 3]` uint8 of the current state if `render_mode` is "rgb_array", else None."""

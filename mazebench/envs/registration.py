@@ -32,8 +32,8 @@ _VECTOR = ("seed", "num_envs", "num_threads", "render_mode", "autoreset_mode")
 def register_environments() -> None:
     """Registers every task, track and size; a second call changes nothing.
 
-    The ids have no `max_episode_steps`: Gymnasium's wrapper would truncate an episode that reaches its goal on the last
-    step.
+    The ids have no `max_episode_steps`, for which Gymnasium's wrapper would truncate an episode that reaches its goal
+    on the last step; the `spec` of an environment tells them.
     """
     for size in BENCHMARK_SIZES:
         for task in ("local", "hierarchical"):
@@ -120,6 +120,7 @@ def make_vec(
     num_threads: int = 0,
     render_mode: str | None = None,
     autoreset_mode: AutoresetMode | str = "SameStep",
+    max_episode_steps: int | None = None,
     id_size: int = 0,
     **options: Unpack[TaskOptions],
 ) -> MazeVectorEnv:
@@ -127,13 +128,15 @@ def make_vec(
 
         >>> envs = mazebench.make_vec("building", 64, level=(1, 2), split="train")
 
-    `autoreset_mode` says what follows the end of an episode; see `MazeVectorEnv`. `options` are those of
-    `mazebench.Task.of`.
+    `autoreset_mode` says what follows the end of an episode; see `MazeVectorEnv`. `max_episode_steps` is what Gymnasium
+    passes on from the `spec` of such environments. `options` are those of `mazebench.Task.of`.
     """
     load_mujoco()
     from mazebench.envs.vector import MazeVectorEnv
 
     chosen = _task(task, options, _VECTOR, id_size)
+    if max_episode_steps not in (None, chosen.longest_episode):
+        raise InputError(f"expected time_limit in the place of max_episode_steps, found {max_episode_steps}")
     return MazeVectorEnv(chosen, num_envs, seed, num_threads, render_mode, autoreset_mode=autoreset_mode)
 
 

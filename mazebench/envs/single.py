@@ -25,6 +25,7 @@ _Value = TypeVar("_Value")
 _RUNNING = np.ones(1, dtype=bool)
 _INDEX = np.zeros(1, dtype=np.int64)
 _NO_STATE = ("spec", "_sensors")  # attributes of the rules that no step changes
+_SHARED = ("episodes", "shown", "_ways")  # attributes whose values never change
 
 
 class SingleTask:
@@ -166,6 +167,6 @@ def _only(values: list[_Value | None]) -> _Value:
 
 
 def _copied(attributes: dict[str, Any]) -> dict[str, Any]:
-    """Returns a copy of attributes of `Rules`, with the same episodes and shown maps, which never change."""
-    shared = {id(value): value for name in ("episodes", "shown") for value in attributes[name]}
+    """Returns a copy of attributes of `Rules`, with the same episodes, shown maps and ways."""
+    shared = {id(value): value for name in _SHARED for value in attributes[name]}
     return copy.deepcopy(attributes, shared)

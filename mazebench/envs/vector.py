@@ -23,7 +23,7 @@ from mazebench.tasks.actions import controls_of_actions, controls_of_velocities
 from mazebench.tasks.arguments import Arguments, require_task_spec
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.observation import observation_specs
-from mazebench.tasks.rules import Rules, reward
+from mazebench.tasks.rules import Rules
 from mazebench.tasks.task import Task
 from mazebench.world.batch import open_batch
 from mazebench.world.models import models_of
@@ -50,10 +50,8 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
     - DISABLED: `step` returns the last observation; `reset(options={"reset_mask": mask})` must come before the next
       `step`.
 
-    The episodes are the same in all three. `info` has arrays `[B]`: `is_first` (whether the context is new: an episode
-    or the leg to the next landmark began), `success`, `steps`, `path_length` (m), `position` (`[B, 2]` m) and `yaw`
-    (rad; both are the true ones, for records and hindsight; agents must not use them), `maze` (index among the task's
-    mazes) and `landmark` (number of legs done).
+    The episodes are the same in all three. `info` has what `Rules.infos` returns, for training and records; agents must
+    not use it in an evaluation.
 
     `close` ends the threads. A process that is forked meanwhile can't use the environment, but can make its own.
     """
@@ -182,6 +180,8 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
     ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Takes one agent step (0.16 s) in each environment; `actions` is `[B]` int, or `[B, 3]` or `[B, 2]` float.
 
+        The rewards are `[B]` float32.
+
         Raises:
           gymnasium.error.ResetNeeded: before the first reset; with autoreset disabled, where an episode has ended.
           gymnasium.error.ClosedEnvironmentError: after `close`, and in a forked process.
@@ -205,7 +205,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         rules.advance(self._qpos, running)
         self._marker[:, 0] = rules.marker
         terminated, truncated = rules.reached.copy(), rules.timed_out.copy()
-        rewards = np.where(running, reward(terminated), 0.0)
+        rewards = np.where(running, rules.rewards(), np.float32(0))
 
         # With NEXT_STEP, begin the episodes that follow those that ended in the step before.
         if self._ended.any():

@@ -25,7 +25,6 @@ from mazebench.results.records import Record
 from mazebench.results.trajectories import Trajectory
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.observation import state_errors
-from mazebench.tasks.shown_map import is_blocked, show_map
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import Trial
 
@@ -59,6 +58,7 @@ class Outcome:
     success: bool
     steps: int
     path_length: float  # m
+    blocked: bool  # whether a wall stands in the shortest path on the shown map
     recorded: Any  # what the recorder made of it; None without one
 
 
@@ -170,7 +170,8 @@ def _outcome(index: int, trial: Trial, info: dict[str, Any], slot: int, recorder
     final = info["final_info"]
     recorded = recorder.take(slot, info["final_obs"][slot], final) if recorder else None
     success, steps = bool(final["success"][slot]), int(final["steps"][slot])
-    return Outcome(index, trial, success, steps, float(final["path_length"][slot]), recorded)
+    path_length, blocked = float(final["path_length"][slot]), bool(final["blocked"][slot])
+    return Outcome(index, trial, success, steps, path_length, blocked, recorded)
 
 
 def _to_trajectory(task: Task, outcome: Outcome) -> Trajectory | None:
@@ -211,8 +212,7 @@ def _to_record(plan: Plan, outcome: Outcome) -> Record:
     further |= {name: value for name, value in noise.items() if value is not None}
     further |= task.perturbations
     if task.track is not None:  # summaries report the episodes of each of these groups apart
-        shown = show_map(task, episode)
-        further["blocked"] = is_blocked(maze.walls, shown.walls, (episode.start, episode.goal))
+        further["blocked"] = outcome.blocked
         if maze.kind:
             further["kind"] = maze.kind
     return Record.model_validate(values | further)

@@ -138,7 +138,8 @@ def make_plan(
       InputError: if an option can't be met.
     """
     agent_class = agent_class or load_agent_class(options.agent)
-    options = _with_checkpoint(_as_played(options, agent_class), agent_class)
+    played = task_as_played(options.agent, agent_class, options.task)
+    options = _with_checkpoint(dataclasses.replace(options, task=played), agent_class)
     task = options.task
     if trials is None:
         trials = select_trials(task, options.episodes_per_distance, options.seed)
@@ -174,17 +175,17 @@ def _make_plan_once(options: EvalOptions) -> Plan:
         return make_plan(options)
 
 
-def _as_played(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:
-    """Returns `options` with what the agent asks for: its actions, sensors and, off the tracks, size of maps."""
-    task, plays = options.task, agent_class.plays_actions
+def task_as_played(agent: str, agent_class: type[Agent], task: Task) -> Task:
+    """Returns `task` with what the agent asks for: its actions, sensors and, off the tracks, size of maps."""
+    plays = agent_class.plays_actions
     if task.actions == "six" and "six" not in plays:
         task = task.replace(actions=plays[0])
     missing = tuple(name for name in agent_class.needs_sensors if name not in task.sensors)
     task = task.replace(sensors=(*task.sensors, *missing))
     if task.track is None:
-        task = task.replace(context_size=context_size_of(options.agent, agent_class, task.size))
+        task = task.replace(context_size=context_size_of(agent, agent_class, task.size))
         check_shown(task)
-    return dataclasses.replace(options, task=task)
+    return task
 
 
 def _with_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:

@@ -87,6 +87,11 @@ class Maze:
         """The free cells in reading order: `[F, 2]` int."""
         return np.argwhere(~self.walls)
 
+    @property
+    def keeps_distances(self) -> bool:
+        """True if the maze has so few free cells that it keeps the distances from each of them once they are known."""
+        return len(self.free_cells) <= _MAX_KEPT_ROWS
+
     def is_free(self, cell: Cell) -> bool:
         """Returns whether `cell` lies in the maze and is not a wall."""
         row, column = cell
@@ -146,7 +151,7 @@ class Maze:
         """Returns the free cells at exactly `distance` from `source`, in reading order: `[K, 2]` int."""
         self.require_free(source)
         index = int(self._index[tuple(source)])
-        if len(self.free_cells) <= _MAX_KEPT_ROWS:
+        if self.keeps_distances:
             row = self._distance_row(index)
         else:  # no farther than needed
             row = csgraph.dijkstra(self._graph, unweighted=True, indices=index, limit=distance)
@@ -162,7 +167,7 @@ class Maze:
     @functools.cached_property
     def diameter(self) -> int:
         """The largest distance of two free cells; with over 2,048 free cells, a lower bound by a double sweep."""
-        if len(self.free_cells) <= _MAX_KEPT_ROWS:
+        if self.keeps_distances:
             return int(csgraph.dijkstra(self._graph, unweighted=True).max())
         return int(self._distance_row(int(np.argmax(self._distance_row(0)))).max())
 
@@ -189,7 +194,7 @@ class Maze:
         row = self._rows.get(source)
         if row is None:
             row = csgraph.dijkstra(self._graph, unweighted=True, indices=source).astype(np.int32)
-            if len(self.free_cells) <= _MAX_KEPT_ROWS:
+            if self.keeps_distances:
                 self._rows[source] = row
         return row
 

@@ -39,7 +39,7 @@ class Route:
         self._goals_left = num_goals - 1
         self._next_goal = next_goal
         self.deadline = time_limit  # the episode's step after which the current leg has timed out
-        self._time_limit = time_limit
+        self.time_limit = time_limit  # agent steps of a leg
 
     @property
     def start(self) -> Cell:
@@ -73,7 +73,7 @@ class Route:
         else:
             self._first += 1
         self.leg += 1
-        self.deadline = step + self._time_limit
+        self.deadline = step + self.time_limit
         return Event.LANDMARK
 
 

@@ -10,14 +10,18 @@ import numpy as np
 from mazebench.maps.maze import Cell
 from mazebench.tasks.context import NUM_PLANES
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.imperfections import episode_level
 from mazebench.tasks.observation import OpenSensors, state_errors
 from mazebench.tasks.perturbations.perturbation import ShownMap, StateError
 from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.sensors.sensor import Worlds
-from mazebench.tasks.shown_map import leg_context, show_map
+from mazebench.tasks.shown_map import is_blocked, leg_context, show_map
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
+from mazebench.tasks.task_fields import PROGRESS
 from mazebench.world.angles import wrap_angle
+
+_UNKNOWN = -1  # a way that would take long to measure
 
 
 @overload
@@ -54,7 +58,8 @@ class Rules:
       at most 5, along horizontal rays; the first straight ahead, then counter-clockwise every 360 / 32 degrees. With
       `lidar_noise`, they are noisy, and may reach less far.
 
-    Reward: -1 for each step, 0 for the step that reaches the goal cell; there is no discount on the way.
+    Reward: -1 for each step, 0 for the step that reaches the goal cell; there is no discount on the way. With `reward`
+    "progress", the cells by which the way to the goal has become shorter are added.
 
     Termination: when the body's centre is in the goal cell after a step (discount 0). Otherwise the episode is
     truncated (discount 1) after `time_limit` steps, in the hierarchical task of the last leg. A goal that is
@@ -71,7 +76,10 @@ class Rules:
         self.routes: list[Route | None] = [None] * num_envs
         self._state_errors: list[list[StateError]] = [[] for _ in range(num_envs)]
         self._lidar_noise: list[np.random.Generator | None] = [None] * num_envs
-        self.maze = np.zeros(num_envs, dtype=np.int64)  # index among the task's mazes
+        self.maze, self.level, self.distance = np.zeros((3, num_envs), dtype=np.int64)  # see `infos`
+        self.kind, self.track = (np.full(num_envs, text, dtype=object) for text in ("", spec.track or ""))
+        self.blocked = np.zeros(num_envs, dtype=bool)
+        self._ways: list[np.ndarray | None] = [None] * num_envs  # [N * N] int, in cells from each cell to the goal
         self.active = np.zeros(num_envs, dtype=bool)  # whether the environment has an episode
 
         # The current legs. Cells are given as row * N + column.
@@ -79,11 +87,14 @@ class Rules:
         self.marker = np.zeros((num_envs, 3))  # m, of the goal
         self.landmark = np.zeros(num_envs, dtype=np.int64)  # number of legs done
         self.start, self.target, self._goal = np.zeros((3, num_envs), dtype=np.int64)
+        self.time_limit = np.zeros(num_envs, dtype=np.int64)  # agent steps
         self._deadline = np.zeros(num_envs, dtype=np.int64)  # the step at which the leg times out
 
         # What steps have led to.
         self.pose = np.zeros((num_envs, 3))  # x, y (m), yaw (rad, not wrapped)
         self.cell = np.zeros(num_envs, dtype=np.int64)  # of the body; agents must not use it
+        self.way_left = np.zeros(num_envs, dtype=np.int64)  # see `infos`
+        self.progress = np.zeros(num_envs)  # cells by which the last step made the way shorter, if it is rewarded
         self.path_length = np.zeros(num_envs)  # m
         self.steps = np.zeros(num_envs, dtype=np.int64)
         self.is_first, self.reached, self.timed_out = np.zeros((3, num_envs), dtype=bool)
@@ -104,11 +115,25 @@ class Rules:
         if "lidar" in spec.sensors and spec.lidar.is_random:
             self._lidar_noise[i] = episode.stream(Stream.LIDAR_NOISE)
 
-        self.maze[i] = episode.maze
-        self.pose[i] = (*spec.all_mazes[episode.maze].point(episode.start), episode.yaw)
-        self.path_length[i] = self.steps[i] = 0
+        maze = spec.all_mazes[episode.maze]
+        self.maze[i], self.kind[i] = episode.maze, maze.kind
+        self.level[i] = 0 if spec.track is None else episode_level(spec, episode)
+        self.pose[i] = (*maze.point(episode.start), episode.yaw)
+        self.path_length[i] = self.steps[i] = self.progress[i] = 0
         self.cell[i] = episode.start[0] * spec.size + episode.start[1]
+        self._seek(i, route, shown)
         self._begin_leg(i, route, shown)
+
+    def _seek(self, i: int, route: Route, shown: ShownMap) -> None:
+        """Measures the way to the goal of environment i, which is new."""
+        maze, start = self.spec.all_mazes[self.maze[i]], route.cells[0]
+        self.blocked[i] = shown.walls is not maze.walls and is_blocked(maze.walls, shown.walls, (start, route.goal))
+        self.distance[i] = self.way_left[i] = _UNKNOWN
+        self._ways[i] = None
+        if maze.keeps_distances or self.spec.reward == PROGRESS:
+            distances = maze.distances(route.goal)
+            self.distance[i] = self.way_left[i] = distances[start]
+            self._ways[i] = distances.ravel()
 
     def _begin_leg(self, i: int, route: Route, shown: ShownMap) -> None:
         size = self.spec.size
@@ -117,7 +142,7 @@ class Rules:
         cells = np.array([route.start, route.target, route.goal])
         self.start[i], self.target[i], self._goal[i] = cells @ (size, 1)
         self.marker[i, :2] = self.spec.all_mazes[self.maze[i]].point(route.goal)
-        self._deadline[i] = route.deadline
+        self.time_limit[i], self._deadline[i] = route.time_limit, route.deadline
         self.landmark[i] = route.leg
 
     def advance(self, poses: np.ndarray, running: np.ndarray) -> None:
@@ -126,8 +151,8 @@ class Rules:
         Afterwards, `is_first`, `reached` and `timed_out` (`[B]` bool) say where the step began a new leg, reached the
         goal, or used up the time. It was taken where `running` (`[B]` bool); elsewhere the body must not have moved.
         """
-        for happened in (self.is_first, self.reached, self.timed_out):
-            happened.fill(False)
+        for happened in (self.is_first, self.reached, self.timed_out, self.progress):
+            happened.fill(0)
         if len(poses) == 1 and running.item():  # plain numbers take a fourth of the time of arrays
             self._move_one(poses[0])
             return
@@ -138,9 +163,13 @@ class Rules:
         self.pose[:] = poses
         self.steps += running
 
-        # Nothing happens to a route unless one of these holds; then the route's own rules decide.
         # All mazes have one size and one cell size, so the first one converts the points of all.
-        self.cell[:] = self.spec.all_mazes[0].cell_index(self.pose[:, :2])
+        cells = self.spec.all_mazes[0].cell_index(self.pose[:, :2])
+        entered = (cells != self.cell).nonzero()[0]
+        for i, cell in zip(entered.tolist(), cells[entered].tolist(), strict=True):
+            self._enter(i, cell)
+
+        # Nothing happens to a route unless one of these holds; then the route's own rules decide.
         due = (self.cell == self.target) | (self.cell == self._goal) | (self.steps >= self._deadline)
         for i in np.flatnonzero(due & running).tolist():
             self._follow_route(i, divmod(int(self.cell[i]), self.spec.size))
@@ -153,8 +182,19 @@ class Rules:
         self.pose[0] = pose
         self.steps[0] += 1
         row, column = cell = self.spec.all_mazes[0].cell_at(x, y)
-        self.cell[0] = row * self.spec.size + column
+        index = row * self.spec.size + column
+        if index != self.cell.item(0):
+            self._enter(0, index)
         self._follow_route(0, cell)
+
+    def _enter(self, i: int, cell: int) -> None:
+        """Takes note that the body of environment i has entered a cell."""
+        self.cell[i] = cell
+        if (way := self._ways[i]) is not None:
+            way_left = way.item(cell)
+            if self.spec.reward == PROGRESS:
+                self.progress[i] = self.way_left.item(i) - way_left
+            self.way_left[i] = way_left
 
     def _follow_route(self, i: int, cell: Cell) -> None:
         """Takes note of what the step led to in environment i, whose body is in `cell`."""
@@ -167,7 +207,17 @@ class Rules:
         self.reached[i] = event is Event.REACHED
         self.timed_out[i] = event is Event.TIMEOUT
         if event is Event.LANDMARK:
+            if self.spec.num_goals > 1:
+                self._seek(i, route, shown)
             self._begin_leg(i, route, shown)
+
+    def rewards(self) -> np.ndarray:
+        """Returns the rewards `[B]` float32 of the last step."""
+        return (reward(self.reached) + self.progress).astype(np.float32)
+
+    def reward(self, i: int) -> float:
+        """Returns the reward of environment i for the last step."""
+        return reward(self.reached.item(i)) + self.progress.item(i)
 
     def observe(self, states: np.ndarray, indices: np.ndarray) -> dict[str, np.ndarray]:
         """Returns `[K, ...]` by name: all observations but the context, of the environments `indices` (`[K]` int).
@@ -186,7 +236,21 @@ class Rules:
         return observed
 
     def infos(self) -> dict[str, np.ndarray]:
-        """Returns `[B, ...]` by name: what Gymnasium's environments tell in `info`."""
+        """Returns `[B, ...]` by name: what Gymnasium's environments tell in `info`.
+
+        It is for training and for records. Agents must not use it in an evaluation, which does not give it to them.
+
+        - is_first: bool, whether the context is new: an episode or the leg to the next landmark began.
+        - success: bool. steps: since the episode began. path_length: m. landmark: the number of legs done.
+        - time_limit: the agent steps of the leg; on a track they depend on the distance. steps_left: of them.
+        - position: `[B, 2]` m, and yaw: rad, both the true ones.
+        - distance: the cells of a shortest path from start to goal in the true maze. way_left: from the body to the
+          goal. They are -1 in a maze of more than 2,048 free cells, where they take long, unless progress is rewarded.
+        - blocked: bool, whether a wall of the true maze stands in the shortest path on the shown map.
+        - Of several goals, these three are of the present one.
+        - maze: index among the task's mazes. kind: of the maze's layout, "" for one of your own.
+        - track: "" without one. level: of the track, 0 without one.
+        """
         return {
             "is_first": self.is_first.copy(),
             "success": self.reached.copy(),
@@ -196,19 +260,36 @@ class Rules:
             "yaw": wrap_angle(self.pose[:, 2]),
             "maze": self.maze.copy(),
             "landmark": self.landmark.copy(),
+            "time_limit": self.time_limit.copy(),
+            "steps_left": self._deadline - self.steps,
+            "way_left": self.way_left.copy(),
+            "distance": self.distance.copy(),
+            "blocked": self.blocked.copy(),
+            "kind": self.kind.copy(),
+            "track": self.track.copy(),
+            "level": self.level.copy(),
         }
 
     def info(self, i: int) -> dict[str, Any]:
         """Returns the `infos` of environment i as plain values, in a fraction of the time."""
+        steps = self.steps.item(i)
         return {
             "is_first": self.is_first.item(i),
             "success": self.reached.item(i),
-            "steps": self.steps.item(i),
+            "steps": steps,
             "path_length": self.path_length.item(i),
             "position": self.pose[i, :2].copy(),
             "yaw": wrap_angle(self.pose.item(i, 2)),
             "maze": self.maze.item(i),
             "landmark": self.landmark.item(i),
+            "time_limit": self.time_limit.item(i),
+            "steps_left": self._deadline.item(i) - steps,
+            "way_left": self.way_left.item(i),
+            "distance": self.distance.item(i),
+            "blocked": self.blocked.item(i),
+            "kind": self.kind[i],
+            "track": self.track[i],
+            "level": self.level.item(i),
         }
 
     def close(self) -> None:

@@ -10,7 +10,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from mazebench.errors import InputError, unknown
+from mazebench.errors import InputError, UnknownOptionError, unknown
 from mazebench.maps.benchmark import (
     FROZEN_SPLITS,
     KINDS_SIZE,
@@ -37,6 +37,8 @@ from mazebench.tasks.task_fields import (
     HIDEABLE,
     KINDS_OF_TASK,
     NUM_DRAWN,
+    PROGRESS,
+    SPARSE,
     TaskFields,
     TaskOptions,
     as_mazes,
@@ -51,7 +53,8 @@ EVAL_DISTANCES = tuple(range(1, 16))
 ENDS = ("start", "goal")
 CUSTOM = "custom"  # the split in results of mazes, a start or a goal that are not the benchmark's
 MIN_CONTEXT_SIZE = 3
-NOT_IN_EVALUATIONS = ("fresh", "pairs", "num_goals", "context_size")  # fields that they do not vary
+# Fields that evaluations do not vary.
+NOT_IN_EVALUATIONS = ("fresh", "pairs", "num_goals", "reward", "context_size")
 
 _NUM_CHECKED = 10  # of fresh mazes, one of which must have the distances
 _FARTHEST_SHARE = 0.9  # of the diameter of a large maze; few pairs of cells are farther apart
@@ -98,8 +101,10 @@ class Task(TaskFields):
         return cls.of(**{name: value for name, value in content.items() if name != "continuous"} | older)
 
     def to_json(self) -> dict[str, Any]:
-        """Returns the fields by name, in values that JSON has."""
+        """Returns the fields by name, in values that JSON has; without the reward if it is that of evaluations."""
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        if self.reward == SPARSE:
+            del values["reward"]
         if isinstance(self.mazes, tuple):
             values["mazes"] = [described_maze(maze) for maze in self.mazes]
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
@@ -240,9 +245,13 @@ class Task(TaskFields):
         return self.task == "hierarchical" or self.num_goals > 1
 
     @property
-    def longest_time_limit(self) -> int:
-        """The agent steps that a leg may take; on a track, those to the farthest goals."""
-        return self.time_limit if self.track is None else track_time_limit(self.track, max(self.distances))
+    def longest_episode(self) -> int | None:
+        """The agent steps that an episode may take; None where they depend on its landmarks."""
+        if self.task == "hierarchical":
+            return None
+        if self.track is not None:
+            return track_time_limit(self.track, max(self.distances))
+        return self.num_goals * self.time_limit
 
     # What is shown.
 
@@ -377,12 +386,13 @@ def check_names(options: Mapping[str, Any], arguments: Sequence[str] = ()) -> No
     """Checks the names of options for `Task.of`, in a call that takes `arguments` too.
 
     Raises:
-      InputError: if there is no such option; it lists all that the call takes.
+      UnknownOptionError: if there is no such option; it lists all that the call takes.
     """
     known = (*fields_of(Task), *arguments)
     for name in options:
         if name not in known:
-            raise unknown("option", name, known)
+            available = ", ".join(sorted(known))
+            raise UnknownOptionError(f"got an unexpected keyword argument {name!r}; available: {available}")
 
 
 def _asked(task: str, options: Mapping[str, Any]) -> dict[str, Any]:
@@ -512,6 +522,8 @@ def _check_options(task: Task) -> None:
         for name, value in {"start": None, "goal": None, "pairs": "random", "num_goals": 1, "track": None}.items():
             if (found := getattr(task, name)) != value:
                 raise InputError(f"scenarios, which have starts and goals: expected {name} {value!r}, found {found!r}")
+    if task.reward == PROGRESS and task.num_goals > 1:
+        raise InputError(f"reward {PROGRESS!r}: expected num_goals 1 beside it, found {task.num_goals}")
     if task.lidar_noise is not None and _LIDAR not in task.sensors:
         found = ", ".join(task.sensors) or "none"
         raise InputError(f"lidar_noise {task.lidar_noise}: expected the sensor lidar, found {found}")

@@ -30,6 +30,7 @@ from mazebench.tasks.tracks.track import LEVELS
 KINDS_OF_TASK = ("local", "hierarchical")
 DRAWN_KINDS = (*KNOWN, *CHECK)  # of mazes
 HIDEABLE = ("map", "goal")
+REWARDS = SPARSE, PROGRESS = "sparse", "progress"
 FIRST_LEVEL = LEVELS[:1]
 NUM_DRAWN = 20  # mazes of a kind, unless another number is asked for
 
@@ -58,6 +59,7 @@ class TaskOptions(TypedDict, total=False):
     landmark_distance: int
     pairs: str
     num_goals: int
+    reward: str
     actions: str
     map_flip: float
     map_warp: float
@@ -180,6 +182,14 @@ class TaskFields(SensorOptions, ReadOptions):
             "are those of the last one."
         ),
     ] = 1
+    reward: Annotated[
+        str,
+        OneOf(*REWARDS),
+        Doc(
+            "sparse: -1 for each step, 0 for the one that reaches the goal; progress: that and the cells by which the "
+            "step made the way to the goal shorter, for training, with the same best policies (one goal)."
+        ),
+    ] = SPARSE
     actions: Annotated[
         str,
         OneOf("six", *VELOCITIES),

@@ -13,6 +13,7 @@ from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.task import Task, check_distances, check_maze
+from mazebench.tasks.task_fields import SPARSE
 from mazebench.tasks.trials import draw_trials
 
 _SEED = 20_000  # of mazes that are drawn like the benchmark's, and in none of its splits
@@ -40,7 +41,7 @@ class HeldOutEvaluation:
             distances = _DISTANCES if task.track is None and kinds else task.distances
         spread = np.linspace(min(distances), max(distances), len(_DISTANCES)).round().astype(int).tolist()
         self._distances = tuple(sorted({min(distances, key=lambda each: abs(each - wanted)) for wanted in spread}))
-        plain = task.replace(distances=self._distances, num_goals=1, pairs="random")
+        plain = task.replace(distances=self._distances, num_goals=1, pairs="random", reward=SPARSE)
         streams = np.random.SeedSequence([_SEED, task.size]).spawn(num_mazes)
         drawn = [
             _draw_maze(plain, kinds[index % len(kinds)], f"held-out-{index}", stream)

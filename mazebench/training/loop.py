@@ -26,7 +26,7 @@ from mazebench.maps.scenarios import are_scenarios
 from mazebench.options import fields_of
 from mazebench.results.played import mazes_hash
 from mazebench.tasks.task import Task, check_names, check_shown
-from mazebench.tasks.task_fields import TaskOptions
+from mazebench.tasks.task_fields import PROGRESS, TaskOptions
 from mazebench.training.counters import Counters
 from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.protocol import Learner, LearningAgent
@@ -289,9 +289,10 @@ def training_task(
     if given.get("task") == "hierarchical":
         raise InputError("expected task 'local' or a track in a training, found 'hierarchical'")
     values = {**defaults, **given}
+    has_track = {values.get("track"), values.get("task", "local")} - {None, "local"}
     has_pairs = values.get("pairs") == "fixed" or are_scenarios(values.get("mazes"))
-    if {values.get("track"), values.get("task", "local")} - {None, "local"} or has_pairs:
-        values["num_goals"] = 1  # a track has one goal, and so have pairs of a start and a goal
+    if has_track or has_pairs or values.get("reward") == PROGRESS:
+        values["num_goals"] = 1  # as these have one goal
     task = Task.of(**values)
     if needed := [name for name in agent_class.needs_shown if name in task.hide]:
         raise InputError(f"agent {agent!r}: needs the {needed[0]}, found it hidden")

@@ -16,7 +16,8 @@ class LidarSensor(Sensor):
 
     @classmethod
     def observation_spec(cls, name: str, options: SensorOptions) -> specs.BoundedArray:
-        return specs.BoundedArray((NUM_RAYS,), np.float32, options.lidar.min_range, options.lidar.max_range, name)
+        # From 0, although a model may see nothing so near, because other libraries fill in zeros where nothing is.
+        return specs.BoundedArray((NUM_RAYS,), np.float32, 0.0, options.lidar.max_range, name)
 
     def __init__(self, names: tuple[str, ...], options: SensorOptions, mazes: Mazes):
         (self._name,) = names

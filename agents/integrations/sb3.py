@@ -1,0 +1,125 @@
+"""Stable-Baselines3: many environments at once, features of their observations, and a buffer (extra `[sb3]`).
+
+>>> envs = MazeVecEnv(mazebench.make_vec("rebuilt", 64))
+>>> model = PPO("MultiInputPolicy", envs, policy_kwargs={"features_extractor_class": MapFeatures})
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from stable_baselines3 import HerReplayBuffer
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.common.type_aliases import DictReplayBufferSamples
+from stable_baselines3.common.vec_env import VecEnv
+from torch import nn
+
+from mazebench.envs.vector import MazeVectorEnv
+from mazebench.errors import InputError
+from mazebench.world.simulation import STATE_SIZE
+
+if TYPE_CHECKING:
+    from gymnasium import spaces
+
+_CHANNELS = (32, 64, 64)  # of the convolutions, each of which halves the side
+
+
+class MazeVecEnv(VecEnv):
+    """A vector environment of mazebench with the interface of Stable-Baselines3.
+
+    At the end of an episode, `infos` have what mazebench's `info` told then, and what Stable-Baselines3 looks for:
+    `terminal_observation`, `TimeLimit.truncated` and `is_success`, which it logs as success_rate.
+    """
+
+    def __init__(self, envs: MazeVectorEnv):
+        """Takes over `envs`, which `close` closes.
+
+        Raises:
+          InputError: unless the next episode begins in the step that ends one.
+        """
+        if envs.autoreset_mode.value != "SameStep":
+            raise InputError(f"expected autoreset_mode 'SameStep', found {envs.autoreset_mode.value!r}")
+        self.envs = envs
+        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+
+    def reset(self) -> dict[str, np.ndarray]:
+        observations, _ = self.envs.reset(seed=self._seeds)  # those of `seed`, or None for each environment
+        self._reset_seeds()
+        return observations
+
+    def step_async(self, actions: np.ndarray) -> None:
+        self._actions = actions
+
+    def step_wait(self) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        observations, rewards, terminated, truncated, info = self.envs.step(self._actions)
+        ended = terminated | truncated
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for slot in np.flatnonzero(ended):
+            told = {name: values[slot] for name, values in info["final_info"].items() if not name.startswith("_")}
+            infos[slot] = told | {
+                "terminal_observation": info["final_obs"][slot],
+                "TimeLimit.truncated": bool(truncated[slot]),
+                "is_success": bool(terminated[slot]),
+            }
+        return observations, rewards, ended, infos
+
+    def close(self) -> None:
+        self.envs.close()
+
+    # The environments are one object, so all of them have its attributes.
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        setattr(self.envs, attr_name, value)
+
+    def env_method(self, method_name: str, *arguments: Any, indices: Any = None, **options: Any) -> list[Any]:
+        return [getattr(self.envs, method_name)(*arguments, **options) for _ in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        return [False for _ in self._get_indices(indices)]
+
+    def get_images(self) -> Sequence[np.ndarray | None]:
+        return self.envs.render()
+
+
+class MapFeatures(BaseFeaturesExtractor):
+    """Convolutions of the context, and the state and the lidar, if there is one, in values of an order of 1.
+
+    Without it, "MultiInputPolicy" flattens the context: float32 is no picture to Stable-Baselines3.
+    """
+
+    scale: torch.Tensor  # [12], by which the state is multiplied
+
+    def __init__(self, observation_space: spaces.Dict, num_features: int = 256):
+        """`num_features` are those of the context."""
+        lidar = observation_space.spaces.get("lidar")
+        num_rays = 0 if lidar is None else lidar.shape[0]  # type: ignore[index]  # a Box has a shape
+        super().__init__(observation_space, num_features + STATE_SIZE + num_rays)
+        channels, side, _ = observation_space["context"].shape  # type: ignore[misc]  # likewise
+        scale = torch.tensor([1 / side] * 3 + [1.0] * (STATE_SIZE - 3))  # positions are in metres
+        self.register_buffer("scale", scale, persistent=False)
+        self.reach = None if lidar is None else float(lidar.high.max())  # type: ignore[attr-defined]
+        layers: list[nn.Module] = []
+        for wider in _CHANNELS:
+            layers += [nn.Conv2d(channels, wider, 3, stride=2, padding=1), nn.ReLU()]
+            channels, side = wider, (side + 1) // 2
+        self.context = nn.Sequential(*layers, nn.Flatten(), nn.Linear(channels * side**2, num_features), nn.ReLU())
+
+    def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
+        parts = [self.context(observations["context"]), observations["state"] * self.scale]
+        if self.reach:
+            parts.append(observations["lidar"] / self.reach)
+        return torch.cat(parts, dim=1)  # [B, features]
+
+
+class EndingHerReplayBuffer(HerReplayBuffer):
+    """Ends a relabelled episode where its new goal is reached; the original keeps the end of the old goal."""
+
+    def _get_virtual_samples(self, *arguments: Any, **options: Any) -> DictReplayBufferSamples:
+        samples = super()._get_virtual_samples(*arguments, **options)
+        achieved, desired = (samples.next_observations[key] for key in ("achieved_goal", "desired_goal"))
+        return samples._replace(dones=(achieved == desired).all(dim=1, keepdim=True).float())

@@ -1,0 +1,59 @@
+"""Environments and features for Stable-Baselines3."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mazebench
+from mazebench.errors import InputError
+
+pytest.importorskip("stable_baselines3")
+
+import torch
+from mazebench_agents.integrations.sb3 import MapFeatures, MazeVecEnv
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import VecMonitor
+
+torch.set_num_threads(1)  # two that share a core with other tests wait for each other
+OPTIONS = {"level": (1, 2), "distances": (1, 2), "reward": "progress"}
+
+
+def test_episodes_are_those_of_the_vector_environment():
+    ours, theirs = MazeVecEnv(mazebench.make_vec("rebuilt", 3, **OPTIONS)), mazebench.make_vec("rebuilt", 3, **OPTIONS)
+    ours.seed(5)
+    found, (expected, _) = ours.reset(), theirs.reset(seed=5)
+    ends, rng = [], np.random.default_rng(0)
+    for _ in range(120):
+        np.testing.assert_equal(found, expected)
+        actions = np.where(rng.random(3) < 0.7, 0, rng.integers(6, size=3))
+        found, rewards, dones, infos = ours.step(actions)
+        expected, *others, info = theirs.step(actions)
+        for one, other in ((rewards, others[0]), (dones, others[1] | others[2])):
+            np.testing.assert_array_equal(one, other, strict=True)
+        assert [bool(told) for told in infos] == dones.tolist()
+        for slot in np.flatnonzero(dones):
+            np.testing.assert_equal(infos[slot]["terminal_observation"], info["final_obs"][slot])
+            assert infos[slot]["is_success"] == others[1][slot] != infos[slot]["TimeLimit.truncated"]
+            assert {name: infos[slot][name] for name in ("level", "distance", "steps")} == {
+                name: info["final_info"][name][slot] for name in ("level", "distance", "steps")
+            }
+            ends.append(infos[slot]["is_success"])
+    assert set(ends) == {True, False}
+
+
+def test_environments_that_do_not_go_on_by_themselves_are_refused():
+    with pytest.raises(InputError, match="expected autoreset_mode 'SameStep', found 'Disabled'"):
+        MazeVecEnv(mazebench.make_vec(autoreset_mode="Disabled"))
+
+
+@pytest.mark.parametrize("task", ["local", "rebuilt"])
+def test_a_policy_learns_from_them(task):
+    envs = VecMonitor(MazeVecEnv(mazebench.make_vec(task, 4, distances=(1, 2))))
+    policy = {"net_arch": [16], "features_extractor_class": MapFeatures}
+    model = PPO("MultiInputPolicy", envs, n_steps=32, batch_size=64, n_epochs=1, policy_kwargs=policy, device="cpu")
+    model.learn(256)
+    features = model.policy.features_extractor
+    assert features.features_dim == 256 + 12 + (32 if task == "rebuilt" else 0)
+    actions, _ = model.predict(envs.reset())
+    assert actions.shape == (4,)
