@@ -33,10 +33,10 @@ def main() -> None:
     prior, walls, _, unlikely = grid
     row, column = np.unravel_index(unlikely.argmin(), unlikely.shape)
     panels = {
-        "shown: the map, with doors that have moved": (prior / 255, "Greys"),
-        "sensed: walls by the map and the lidar": (walls / 255, "Greys"),
-        "learned: the cost of each cell, on a log scale": (np.log(plan.cost.numpy()), "viridis"),
-        "planned: the cost of the way to the goal": (np.minimum(plan.way.numpy(), 90), "viridis_r"),
+        "shown: the map, before doors moved": (prior / 255, "Greys"),
+        "known: the map and what was seen": (walls / 255, "Greys"),
+        "learned: the cost of each cell (log)": (np.log(plan.cost.numpy()), "viridis"),
+        "planned: the way to the goal": (np.minimum(plan.way.numpy(), 90), "viridis_r"),
     }
     figure = Figure(figsize=(9.6, 2.7), layout="constrained")
     for axes, (title, (picture, colours)) in zip(figure.subplots(1, 4), panels.items(), strict=True):

@@ -11,7 +11,6 @@ from mazebench_agents.neural_planner.network import PlannerNetwork, Situation, g
 from mazebench_agents.neural_planner.planner_learner import advantages, clipped_loss
 from simple_mazes import field
 
-from mazebench.agent import Interface
 from mazebench.errors import InputError
 from mazebench.evaluation.chunk import run_trials
 from mazebench.tasks.task import Task
@@ -120,12 +119,11 @@ def test_clipped_loss_by_hand():
     assert loss.item() == pytest.approx(-(1.2 - 1.5) / 2 * scaled, rel=1e-4)
 
 
-@pytest.mark.parametrize("sensors", [(), ("lidar",)])
-def test_agent_keeps_its_contract(tmp_path, sensors):
-    learner = NeuralPlanner.build_learner(Task.of(mazes=field(7), sensors=sensors), overrides=text(SMALL))
+@pytest.mark.parametrize("options", [{}, {"sensors": "lidar"}, {"task": "adrift", "level": 3}], ids=str)
+def test_agent_keeps_its_contract(tmp_path, options):
+    learner = NeuralPlanner.build_learner(Task.of(mazes=field(7)), overrides=text(SMALL))
     learner.save(tmp_path, {})
-    interface = Interface("hierarchical", 7, 7, sensors=sensors)
-    check_agent(NeuralPlanner, interface, checkpoint=tmp_path / "agent.safetensors")
+    check_agent(NeuralPlanner, **{"task": "hierarchical", **options}, checkpoint=tmp_path / "agent.safetensors")
 
 
 @pytest.mark.parametrize("teacher", ["reward", "oracle"])

@@ -322,7 +322,8 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self.rules.close()
         if self._top_camera is not None:
             self._top_camera.close()
-        del self._batch, self._sensordata, self._qpos, self._ctrl, self._marker, self._geoms  # which ends the threads
+        del self._batch, self._geoms  # with the views of its arrays, which ends the threads
+        del self._sensordata, self._qpos, self._qvel, self._ctrl, self._marker
 
 
 def _seeds(seed: Seeds, num_envs: int) -> list[int | None]:
