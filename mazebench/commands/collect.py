@@ -17,7 +17,7 @@ from mazebench.tasks.task import Task
 
 _WITHOUT = (
     *("record", "workers", "ray", "ray_address"),  # one process collects
-    *("episodes_per_distance", "num_goals", "context_size"),  # as in evaluations, which agents play
+    *("episodes_per_distance", "num_goals", "context_size", "reward"),  # as in evaluations, which agents play
 )
 
 

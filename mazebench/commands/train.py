@@ -21,7 +21,7 @@ from mazebench.training.train_options import FIXED, TrainOptions
 def train(
     agent: Annotated[
         str,
-        typer.Option(help="A learning agent: dqn, mah, mah-paper, mmn or another installed one, or module:Class."),
+        typer.Option(help="A learning agent: dqn, mah, mah-paper, mmn, neural-planner or another, or module:Class."),
     ],
     values: dict[str, Any],
     out: Annotated[
@@ -60,6 +60,7 @@ def _folder_name(options: TrainOptions, values: dict[str, Any]) -> str:
         parts.append(pathlib.Path(values["mazes"]).stem)
     track = values.get("track")
     parts += [track, *map(str, values.get("level", (1,)))] if track else [str(values.get("size", SIZES[0]))]
+    parts += options.also
     return "-".join([*parts, str(options.seed)])
 
 

@@ -85,7 +85,7 @@ class Rules:
         # The current legs. Cells are given as row * N + column.
         self.context = np.zeros((num_envs, NUM_PLANES, spec.context_size, spec.context_size), dtype=np.float32)
         self.marker = np.zeros((num_envs, 3))  # m, of the goal
-        self.landmark = np.zeros(num_envs, dtype=np.int64)  # number of legs done
+        self.landmark = np.zeros(num_envs, dtype=np.int64)  # index of the leg
         self.start, self.target, self._goal = np.zeros((3, num_envs), dtype=np.int64)
         self.time_limit = np.zeros(num_envs, dtype=np.int64)  # agent steps
         self._deadline = np.zeros(num_envs, dtype=np.int64)  # the step at which the leg times out
@@ -241,7 +241,7 @@ class Rules:
         It is for training and for records. Agents must not use it in an evaluation, which does not give it to them.
 
         - is_first: bool, whether the context is new: an episode or the leg to the next landmark began.
-        - success: bool. steps: since the episode began. path_length: m. landmark: the number of legs done.
+        - success: bool. steps: since the episode began. path_length: m. landmark: the leg's index.
         - time_limit: the agent steps of the leg; on a track they depend on the distance. steps_left: of them.
         - position: `[B, 2]` m, and yaw: rad, both the true ones.
         - distance: the cells of a shortest path from start to goal in the true maze. way_left: from the body to the
