@@ -37,7 +37,7 @@ def labels(envs: MazeVectorEnv, costs: bool = False) -> np.ndarray:
     Raises:
       InputError: if `envs` are other environments, or were not reset.
     """
-    envs = envs.unwrapped
+    envs = getattr(envs, "unwrapped", envs)
     if not isinstance(envs, MazeVectorEnv):
         raise InputError(f"expected environments of mazebench.make_vec, found {type(envs).__name__}")
     rules = envs.rules

@@ -82,6 +82,7 @@ def test_no_way_slips_between_two_walls_that_touch_at_a_corner():
 @pytest.mark.parametrize("size", [5, 12])
 def test_network_reads_ways_in_the_frame_of_the_body(size):
     """A body turned by a quarter, in a world turned by a quarter, reads the same but for the convolutions."""
+    torch.manual_seed(0)
     network = PlannerNetwork(4, 16, ways=True)
     for parameter in network.costs.parameters():
         torch.nn.init.zeros_(parameter)  # all cells cost the same
@@ -93,9 +94,9 @@ def test_network_reads_ways_in_the_frame_of_the_body(size):
     pose = torch.tensor([[x, y, 0.3], [size - y, x, 0.3 + np.pi / 2]], dtype=torch.float32)
     situation = Situation(pose, torch.ones(2, 32), torch.from_numpy(motion_features(np.ones((2, 3)), np.zeros((2, 2)))))
     logits, value = network(network.plan(torch.from_numpy(grids)), torch.arange(2), situation)
-    torch.testing.assert_close(logits[0], logits[1], rtol=1e-4, atol=1e-4)
-    torch.testing.assert_close(value[0], value[1], rtol=1e-4, atol=1e-4)
-    assert logits[0].std() > 0
+    torch.testing.assert_close(logits[0], logits[1], rtol=0, atol=2e-3)
+    torch.testing.assert_close(value[0], value[1], rtol=0, atol=2e-3)
+    assert logits[0].std() > 0.05
 
 
 def test_advantages_by_hand():
@@ -114,9 +115,8 @@ def test_advantages_by_hand():
 
 def test_clipped_loss_by_hand():
     advantage = torch.tensor([1.0, -1.0])
-    scaled = 1 / 2**0.5  # divided by the deviation of a sample of two
     loss = clipped_loss(torch.log(torch.tensor([1.5, 1.5])), advantage, 0.2)
-    assert loss.item() == pytest.approx(-(1.2 - 1.5) / 2 * scaled, rel=1e-4)
+    assert loss.item() == pytest.approx(-(1.2 - 1.5) / 2, rel=1e-4)
 
 
 @pytest.mark.parametrize("options", [{}, {"sensors": "lidar"}, {"task": "adrift", "level": 3}], ids=str)
@@ -155,23 +155,41 @@ def text(values):
     return {name: str(value) for name, value in values.items()}
 
 
-def run(out, **options):
-    """A training of four rollouts in two tracks, with a milestone in the middle; returns its last checkpoint."""
-    tracks = {"task": "building", "also": ("rebuilt",), "level": (1, 3), "kinds": ("dfs",), "fresh": True}
-    values = {"overrides": SMALL, "checkpoint_steps": 640, "eval_mazes": 1, "distances": (1, 2, 3, 4, 5)}
-    train("neural-planner", out=out, **tracks, **values, **options)
+TRACKS = {"task": "building", "also": ("rebuilt",), "level": (1, 3), "kinds": ("dfs",), "fresh": True}
+GROWING = {"distances": (1, 2, 3, 4, 5), "first_distance": 2, "widen_steps": 1000}
+
+
+def run(out, env_steps, resume=False, teacher="reward", **options):
+    """A training with a milestone every 640 steps, which are two rollouts; returns its last checkpoint."""
+    values = {"overrides": SMALL | {"teacher": teacher}, "checkpoint_steps": 640, "eval_mazes": 1}
+    train("neural-planner", out=out, env_steps=env_steps, resume=resume, **values, **options)
     return max((out / "checkpoints").iterdir())
 
 
-def test_resumed_run_is_the_unbroken_one(tmp_path):
-    whole = run(tmp_path / "whole", env_steps=1280, first_distance=2, widen_steps=1000)
-    run(tmp_path / "broken", env_steps=640, first_distance=2, widen_steps=1000)
-    resumed = run(tmp_path / "broken", env_steps=1280, first_distance=2, widen_steps=1000, resume=True)
+@pytest.mark.parametrize(
+    "options",
+    [
+        TRACKS | GROWING,
+        TRACKS | GROWING | {"teacher": "oracle"},
+        {"distances": 10, "time_limit": 5, "num_goals": 1},  # all episodes end at the milestone
+    ],
+    ids=("rewards", "oracle", "all end"),
+)
+def test_resumed_run_is_the_unbroken_one(tmp_path, options):
+    whole = run(tmp_path / "whole", 1280, **options)
+    run(tmp_path / "broken", 640, **options)
+    resumed = run(tmp_path / "broken", 1280, resume=True, **options)
     assert whole.name == resumed.name
-    for name in ("agent.safetensors", "training.safetensors", "random.json"):
+    files = {path.name for path in whole.iterdir()}
+    assert ("replay.npz" in files) == (options.get("teacher") == "oracle")
+    for name in files:
         assert (whole / name).read_bytes() == (resumed / name).read_bytes(), name
+
+
+def test_metrics_and_config_of_several_tracks(tmp_path):
+    run(tmp_path / "whole", 640, **TRACKS, **GROWING)
     lines = [json.loads(line) for line in (tmp_path / "whole" / "metrics.jsonl").read_text().splitlines()]
-    assert lines[-1]["updates"] == 4
+    assert lines[-1]["updates"] == 2
     assert {"building_success_rate_1", "rebuilt_success_rate_5"} <= set(lines[-1])
     config = json.loads((tmp_path / "whole" / "config.json").read_text())
     assert config["also"] == ["rebuilt"]
@@ -181,6 +199,35 @@ def test_resumed_run_is_the_unbroken_one(tmp_path):
 def test_other_agents_learn_one_task_at_a_time(tmp_path):
     with pytest.raises(InputError, match="agent 'dqn': learns one task at a time, found --also rebuilt"):
         train("dqn", "building", out=tmp_path, also=("rebuilt",), minutes=1)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            {"task": "building", "also": ("building",)},
+            "different tracks in --track and --also, found building, building",
+        ),
+        ({"also": ("rebuilt",)}, "expected different tracks in --track and --also, found local, rebuilt"),
+        ({"first_distance": 50}, "expected --first-distance of at most 5, the farthest goals, found more"),
+        ({"first_distance": 2, "pairs": "fixed"}, "expected starts and goals that are drawn, found given ones"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(tmp_path, options, message):
+    with pytest.raises(InputError, match=message):
+        train("neural-planner", out=tmp_path, minutes=1, **options)
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut", None], ids=("empty", "cut", "foreign"))
+def test_damaged_rollouts_are_refused(tmp_path, content):
+    learner = NeuralPlanner.build_learner(Task.of(mazes=field(7)), overrides=text(SMALL | {"teacher": "oracle"}))
+    learner.save(tmp_path, {})
+    if content is None:
+        np.savez(tmp_path / "replay.npz", foreign=np.zeros(3))
+    else:
+        (tmp_path / "replay.npz").write_bytes(content)
+    with pytest.raises(InputError, match=r"replay\.npz"):
+        learner.load(tmp_path)
 
 
 def test_goals_get_farther_as_the_run_goes_on():

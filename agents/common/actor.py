@@ -45,7 +45,7 @@ def acting(act: _Act) -> _Act:
 
 
 class NetworkAgent(LearningAgent):
-    """An agent that acts by a network; where it explores, environment i takes random actions at Ape-X's rate i."""
+    """An agent that acts by a network; by default it explores by random actions, in environment i at Ape-X's rate i."""
 
     name: ClassVar[str]
     shipped_size: ClassVar[int] = 13  # N of the mazes in which the checkpoint that ships was trained

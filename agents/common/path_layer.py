@@ -10,9 +10,9 @@ the open a diagonal costs sqrt(2) cells, and no way slips between two walls that
 values and exp(-c) for the propagation of cells, this is the fixed point of MVProp (Nardelli et al. 2019) in logarithms,
 reached without iterations.
 
-Dijkstra's algorithm finds u and a tree of cheapest ways. Where no two ways are equally cheap, u(n) is the sum of the
-costs along its way, and its gradient counts what the way enters: one sweep of the tree, from the far cells to the near
-ones, adds up all gradients.
+Dijkstra's algorithm finds u and a tree of cheapest ways. u(n) is the sum of the costs along its way. Where no other way
+is equally cheap, its gradient counts the cells that the way enters. One pass over the tree, from the far cells to the
+near ones, adds up all gradients.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ import torch
 from .kernels import compiled
 
 _DIAGONAL = math.sqrt(2.0) - 0.5  # share of the entered cell in the cost of a diagonal step
-_CORNER = 0.25  # share of each of the two cells beside it
+_CORNER = 0.25  # share of each of the two cells at the corner
 FAR = 1e6  # what it costs to end in a cell that is no goal; more than any way
 
 

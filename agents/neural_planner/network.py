@@ -35,14 +35,14 @@ _NUM_FEATURES = 3 * _NUM_POINTS + NUM_RANGES + _NUM_MOTION + 2
 _EVIDENCE = 15.0  # levels a unit of log odds, in a picture's bytes
 _UNLIKELY = 32.0  # levels a unit of the log of a goal's likelihood
 _NO_GOAL = 255
-_LARGEST = 5.0  # log of the largest cost beside the cell's length: 148 cells
-_FIRST = -0.5  # log of the cost before anything is learned
+_LARGEST = 5.0  # log of the largest cost added to the cell's length of 1: 148 cells
+_FIRST = -0.5  # log of that cost before anything is learned
 _AT_ONCE = 16  # grids, whose features then stay in the cache
 _SPEED = 3.2  # m/s, about the top speed
 
 
 class Plan(NamedTuple):
-    """What the policy reads of `G` grids."""
+    """Inputs of the policy from `G` grids."""
 
     way: torch.Tensor  # [G, L, L] float32, the cost of the cheapest way to the goal
     cost: torch.Tensor  # [G, L, L] float32, of each cell
@@ -58,16 +58,17 @@ class Situation(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """The choice of actions in B environments, and what it was made by; what a learner needs of it."""
+    """Actions chosen in B environments, with what a learner needs of the choice."""
 
+    stream: int  # the seed of the exploration, another one for other trajectories
     grids: list[np.ndarray]  # B of [4, L, L] uint8; the same object while a plan is kept
     situation: Situation  # of B states
-    log_probability: np.ndarray  # [B] float32, of the action
+    log_probability: np.ndarray  # [B] float32, of the action, at temperature 1
     value: np.ndarray  # [B] float32
 
 
 def grid_bytes(prior: np.ndarray, walls: np.ndarray, evidence: np.ndarray, goal: np.ndarray) -> np.ndarray:
-    """Returns `[4, L, L]` uint8: what the network is told of a grid, in few bytes, since it is kept for learning.
+    """Returns the network's input for a grid, `[4, L, L]` uint8: bytes, because learners keep many.
 
     Args:
       prior: `[L, L]` float, the probability of a wall by the map.
@@ -102,9 +103,10 @@ class PlannerNetwork(nn.Module):
         """Returns the plan on grids `[G, 4, L, L]` uint8 (see `grid_bytes`)."""
         prior, wall = grids[:, 0] / 255, grids[:, 1] / 255
         evidence = (grids[:, 2] - 128.0) / (4 * _EVIDENCE)
-        told = torch.stack([prior, wall, evidence.clamp(min=0), (-evidence).clamp(min=0), torch.ones_like(wall)], dim=1)
+        seen_wall, seen_free = evidence.clamp(min=0), (-evidence).clamp(min=0)
+        planes = torch.stack([prior, wall, seen_wall, seen_free, torch.ones_like(wall)], dim=1)
         # At least 1, so that far goals are as sharp as near ones; walls grow expensive by a factor, not by a sum.
-        scores = torch.cat([self.costs(some)[:, 0] for some in told.split(_AT_ONCE)])
+        scores = torch.cat([self.costs(some)[:, 0] for some in planes.split(_AT_ONCE)])
         cost = 1 + torch.exp((_FIRST + scores).clamp(max=_LARGEST))
         unlikely = grids[:, 3] / _UNLIKELY
         end = torch.where(grids[:, 3] < _NO_GOAL, nn.functional.softplus(self.goal_scale) * unlikely, FAR)
@@ -132,7 +134,7 @@ class PlannerNetwork(nn.Module):
         corners = torch.stack([corner, corner + 1, corner + size, corner + size + 1])  # [4, K, P]
         weights = torch.stack([(1 - right) * (1 - down), right * (1 - down), (1 - right) * down, right * down])
 
-        # How much nearer the goal is there than at the body. A wall outweighs no free cell beside it.
+        # How much nearer the goal is there than at the body. A wall outweighs no free cell next to it.
         here = (size - pose[:, 1:2]).long().clamp(0, size - 1) * size + pose[:, :1].long().clamp(0, size - 1)
         way_left = plan.way.flatten()[first + here]  # [K, 1]
         nearness = torch.exp(((way_left - plan.way.flatten()[corners]) / 2).clamp(-8, 8))

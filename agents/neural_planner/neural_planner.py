@@ -39,13 +39,13 @@ _OPEN = np.zeros((3, 3), dtype=bool)  # a world without walls, where an action b
 
 @dataclasses.dataclass
 class Robot:
-    """What the agent knows in one environment."""
+    """The knowledge of one environment."""
 
     memory: Memory
     noise: np.random.Generator  # of its choice of actions
     grid: np.ndarray = dataclasses.field(init=False)  # [4, L, L] uint8, of the last plan
     plan: Plan = dataclasses.field(init=False)  # of [L, L] each
-    age: int = 0  # steps of the episode
+    age: int = 0  # steps of the leg
     actions: tuple[int, int] = (-1, -1)  # the last one, and the one before
 
 
@@ -63,7 +63,6 @@ class NeuralPlanner(NetworkAgent):
     name: ClassVar[str] = "neural-planner"
     shipped_size = 31
     default_config: ClassVar[NeuralPlannerConfig] = NeuralPlannerConfig()
-    learner_class: ClassVar[type[PlannerLearner]] = PlannerLearner
     learns_several_tasks = True
     config: NeuralPlannerConfig
     network: PlannerNetwork
@@ -106,7 +105,7 @@ class NeuralPlanner(NetworkAgent):
 
     def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
         """Begins a new stream of exploration, as the environments from `first_env` on of the learner's."""
-        self._rng = np.random.default_rng([seed, first_env])
+        self._rng, self._stream = np.random.default_rng([seed, first_env]), seed
 
     def initial_state(self, batch_size: int) -> ActorState:
         """Returns no robots yet: one is made where an episode begins."""
@@ -134,11 +133,11 @@ class NeuralPlanner(NetworkAgent):
             log_probability = logits - np.log(np.exp(logits - logits.max(1, keepdims=True)).sum(1, keepdims=True))
             log_probability -= logits.max(1, keepdims=True)
             taken = np.take_along_axis(log_probability, chosen[:, None], axis=1)[:, 0]
-            state.choice = Choice([robot.grid for robot in robots], situation, taken, value)
+            state.choice = Choice(self._stream, [robot.grid for robot in robots], situation, taken, value)
         return actions, state
 
     def notes(self, state: ActorState) -> Choice | None:
-        """Returns what the last choice was made by."""
+        """Returns the last choice."""
         return state.choice
 
     def _observe(self, inputs: Inputs, slot: int, state: ActorState) -> Robot:
@@ -147,10 +146,12 @@ class NeuralPlanner(NetworkAgent):
         memory = self._senses.observe(robot.memory if robot else None, inputs, slot)
         if robot is None or robot.memory is not memory:
             robot = state.robots[slot] = Robot(memory, np.random.default_rng(int(inputs.seed[slot])))
+        if inputs.new_context[slot]:
+            robot.age = 0  # the next leg has another goal
         return robot
 
     def _plan(self, robots: list[Robot]) -> None:
-        """Plans anew for robots, those whose grids have one size at once."""
+        """Plans for robots, those whose grids have one size at once."""
         by_size: dict[int, list[Robot]] = {}
         for robot in robots:
             memory = robot.memory

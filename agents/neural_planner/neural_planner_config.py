@@ -8,7 +8,7 @@ from annotated_types import Interval
 
 from mazebench.options import options
 
-from ..common.config_values import Ahead, Count, Factor, Length, Share, Size, Steps
+from ..common.config_values import Ahead, Count, Factor, Length, Rows, Share, Size
 
 Temperature = Annotated[float, Interval(ge=0.0, le=10.0)]
 
@@ -26,12 +26,12 @@ class NeuralPlannerConfig:
     hidden: Size = 256  # units of the two layers of the policy
     ways: bool = True  # False, an ablation: all cells cost 1, so that the goal is seen as the crow flies
     plan_steps: Length = 4  # agent steps from one plan to the next
-    temperature: Temperature = 0.25  # of the policy in evaluations; at 0 it stands still now and then, for ever
+    temperature: Temperature = 0.25  # of the policy in evaluations; at 0, some episodes end in standing still
 
     # Experience
     num_envs: Count = 80  # side by side
     rollout_steps: Length = 50  # in each between two updates; the default milestones then end rollouts, too
-    total_steps: Steps = 1_000_000  # of the environment; the learning rate falls to 0 over the second half
+    total_steps: Rows = 1_000_000  # of the environment; over the second half, the learning rate falls to 2 %
 
     # Learning
     kept_rollouts: Length = 25  # that imitation learns from: on few of them, the network learns their mazes by heart
@@ -45,4 +45,5 @@ class NeuralPlannerConfig:
     clip: Share = 0.2  # of the ratio of probabilities
     value_weight: Factor = 0.5  # of the loss of values
     entropy_weight: Factor = 0.01
-    label_temperature: Temperature = 0.08  # m; an action that leaves so much more way is e times less wanted
+    # m; an action that leaves so much more way is e times less wanted.
+    label_temperature: Annotated[float, Interval(gt=0.0, le=10.0)] = 0.08

@@ -16,6 +16,8 @@ import torch
 from torch.nn import functional
 
 from mazebench.constants import NUM_ACTIONS
+from mazebench.errors import InputError
+from mazebench.storage.array_files import read_arrays
 from mazebench.storage.json_files import read_json
 from mazebench.training.experience import Experience
 
@@ -80,12 +82,22 @@ class _Collected:
         )
 
 
+class _Step(NamedTuple):
+    """A step in B environments; the parts of `Experience` that are learned from."""
+
+    choice: Choice
+    action: np.ndarray  # [B] int
+    reward: np.ndarray  # [B] float
+    terminated: np.ndarray  # [B] bool
+    ended: np.ndarray  # [B] bool
+    label: np.ndarray  # [B, 6] float32, the probabilities of actions by the oracle; without one, zeros
+
+
 @dataclasses.dataclass
 class _Rollout:
     """The last steps in the environments of one task, oldest first."""
 
-    steps: list[Experience] = dataclasses.field(default_factory=list)
-    labels: list[np.ndarray] = dataclasses.field(default_factory=list)  # [B, 6] for each step
+    steps: list[_Step] = dataclasses.field(default_factory=list)
     expert: Expert | None = None
 
 
@@ -99,13 +111,13 @@ class PlannerLearner:
         config = self._config = actor.config
         self.num_envs: int = config.num_envs
         self.steps_per_update: int = config.num_envs * config.rollout_steps
-        num_updates = max(1, config.total_steps // self.steps_per_update) * config.epochs * config.minibatches
+        num_gradients = max(1, config.total_steps // self.steps_per_update) * config.epochs * config.minibatches
         self._descent = Descent(
             actor.network,
             torch.optim.Adam(actor.network.parameters(), lr=config.learning_rate),
             max_gradient_norm=config.max_gradient_norm,
             # Constant in the first half of the run, then falling to nearly 0.
-            rate=lambda step: min(1.0, max(_LEAST_RATE, 2 - 2 * step / num_updates)),
+            rate=lambda step: min(1.0, max(_LEAST_RATE, 2 - 2 * step / num_gradients)),
         )
         self._rng = np.random.default_rng([seed, 1])
         self._rollouts: dict[int, _Rollout] = {}  # by the first environment
@@ -113,7 +125,7 @@ class PlannerLearner:
 
     @property
     def num_rows(self) -> int:
-        """The number of steps that are kept."""
+        """The number of steps of the rollout that is under way."""
         return sum(len(step.action) for rollout in self._rollouts.values() for step in rollout.steps)
 
     def config(self) -> dict[str, Any]:
@@ -127,21 +139,23 @@ class PlannerLearner:
 
     def observe(self, experience: Experience, first_env: int = 0) -> None:
         """Keeps one step in the environments from `first_env` on, with the oracle's labels if it teaches."""
-        rollout = self._rollouts.setdefault(first_env, _Rollout())
-        if rollout.steps and not (rollout.steps[-1].ended | ~experience.new_episode).all():
-            # Trajectories were begun anew, at a milestone: a run that is resumed there has no steps from before.
+        rollout, choice = self._rollouts.setdefault(first_env, _Rollout()), experience.notes
+        if rollout.steps and rollout.steps[-1].choice.stream != choice.stream:
+            # New trajectories began, at a milestone: a run that is resumed there has no steps from before.
             rollout.steps.clear()
-            rollout.labels.clear()
-        rollout.steps.append(experience)
+        label = np.zeros((len(experience.action), NUM_ACTIONS), np.float32)
         if self._config.teacher == "oracle":
-            rollout.labels.append(self._labels(rollout, experience))
+            label = self._labels(rollout, experience)
+        ends = experience.reward, experience.terminated, experience.ended
+        rollout.steps.append(_Step(choice, experience.action, *ends, label))
 
     @one_torch_thread()
     def update(self) -> dict[str, float]:
         """Learns from the rollout; returns the means of its losses and other scalars by name."""
         config, sums = self._config, {"success": self._success_rate()}
         newest = self._forget()
-        self._kept.append(newest)
+        if newest:
+            self._kept.append(newest)
         del self._kept[: -config.kept_rollouts if config.teacher == "oracle" else -1]
 
         # The steps of a plan stay together, so that each is planned once. Grids of one size are computed at once.
@@ -192,10 +206,7 @@ class PlannerLearner:
         """Returns `[B, 6]`: the probabilities of actions by the oracle's look-ahead from the true state."""
         if rollout.expert is None:
             rollout.expert = Expert(step.task.all_mazes, len(step.action))
-        cosine, sine = np.cos(step.pose[:, 2]), np.sin(step.pose[:, 2])
-        forward, left = step.state[:, 6], step.state[:, 7]
-        velocity = np.stack([cosine * forward - sine * left, sine * forward + cosine * left], axis=1)
-        costs = rollout.expert.costs(step.maze, step.goal, step.pose, velocity.astype(np.float64))
+        costs = rollout.expert.costs(step.maze, step.goal, step.pose, step.velocity)
         best = costs.min(axis=1, keepdims=True)
         weights = np.exp(-(costs - best) / self._config.label_temperature)
         return (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
@@ -209,26 +220,23 @@ class PlannerLearner:
     def _forget(self) -> dict[int, Rows]:
         """Returns the rollout's steps by the size of the grids that they are on, and forgets them.
 
-        The last step in each environment stays, for its value tells what the steps before it have led to.
+        The last step in each environment stays, for its value bootstraps the steps before it.
         """
         config = self._config
         discount, trace = 1 - 1 / config.discount_steps, 1 - 1 / config.trace_steps
         collected: dict[int, _Collected] = {}
         for rollout in self._rollouts.values():
-            choices: list[Choice] = [step.notes for step in rollout.steps]
-            value = np.stack([choice.value for choice in choices])
-            reward = config.reward_scale * np.stack([step.reward for step in rollout.steps])
-            terminated, ended = (
-                np.stack([getattr(step, name) for step in rollout.steps]) for name in ("terminated", "ended")
-            )
+            steps = rollout.steps
+            value = np.stack([step.choice.value for step in steps])
+            reward = config.reward_scale * np.stack([step.reward for step in steps])
+            terminated, ended = np.stack([step.terminated for step in steps]), np.stack([step.ended for step in steps])
             advantage = advantages(reward, value, terminated, ended, discount, trace)
-            for number, (step, choice) in enumerate(zip(rollout.steps[:-1], choices, strict=False)):
-                label = rollout.labels[number] if rollout.labels else np.zeros((len(step.action), NUM_ACTIONS))
-                found = [choice.log_probability, advantage[number], advantage[number] + value[number]]
-                for slot, grid in enumerate(choice.grids):
+            for number, step in enumerate(steps[:-1]):
+                found = [step.choice.log_probability, advantage[number], advantage[number] + value[number], step.label]
+                for slot, grid in enumerate(step.choice.grids):
                     rows = collected.setdefault(grid.shape[-1], _Collected())
-                    rows.add(grid, *(part[slot] for part in (*choice.situation, step.action, *found, label)))
-            del rollout.steps[:-1], rollout.labels[:-1]
+                    rows.add(grid, *(part[slot] for part in (*step.choice.situation, step.action, *found)))
+            del steps[:-1]
         return {size: rows.stacked() for size, rows in collected.items()}
 
     def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:
@@ -247,20 +255,27 @@ class PlannerLearner:
         (folder / _RANDOM_FILE).write_text(json.dumps(self._rng.bit_generator.state), encoding="ascii")
 
     def load(self, folder: pathlib.Path) -> None:
-        """Restores what `save` wrote."""
+        """Restores what `save` wrote; without the rollouts' file, imitation begins with new ones.
+
+        Raises:
+          InputError: if a file is damaged, or another agent's.
+        """
         self.actor.load(folder / AGENT_FILE)
         tensors, _ = load_checkpoint(folder / _TRAINING_FILE, self.actor.name)
         self._descent.load(tensors)
         self._rng.bit_generator.state = read_json(folder / _RANDOM_FILE)
         self._kept = []
-        if (folder / _REPLAY_FILE).exists():
-            with np.load(folder / _REPLAY_FILE, allow_pickle=False) as arrays:
-                for key in arrays:
-                    number, size, name = key.split("-")
-                    if name == _NAMES[0]:
-                        self._kept += [{} for _ in range(int(number) + 1 - len(self._kept))]
-                        found = [torch.from_numpy(arrays[f"{number}-{size}-{each}"]) for each in _NAMES]
-                        self._kept[-1][int(size)] = Rows(found[0], found[1], Situation(*found[2:5]), *found[5:])
+        path = folder / _REPLAY_FILE
+        if not path.exists():
+            return
+        arrays = read_arrays(path, "file of rollouts")
+        try:
+            for number, size in sorted({tuple(map(int, name.split("-")[:2])) for name in arrays}):
+                self._kept += [{} for _ in range(number + 1 - len(self._kept))]
+                found = [torch.from_numpy(arrays[f"{number}-{size}-{name}"]) for name in _NAMES]
+                self._kept[number][size] = Rows(found[0], found[1], Situation(*found[2:5]), *found[5:])
+        except (KeyError, ValueError) as error:
+            raise InputError(f"{path}: expected rollouts, found a damaged file: {error}") from error
 
 
 def advantages(
@@ -268,7 +283,7 @@ def advantages(
 ) -> np.ndarray:
     """Returns generalized advantage estimates `[T - 1, B]` (Schulman et al. 2016, eq. 16) of all steps but the last.
 
-    Where an episode was cut short, what would have followed is taken for worth the last state's value.
+    Where an episode was cut short, the value of the state before its last step stands for all rewards that follow.
 
     Args:
       reward: `[T, B]`, for each step.
@@ -288,7 +303,7 @@ def advantages(
 
 def clipped_loss(log_ratio: torch.Tensor, advantage: torch.Tensor, clip: float) -> torch.Tensor:
     """Returns PPO's loss (Schulman et al. 2017, eq. 7), with advantages scaled to a mean of 0 and a deviation of 1."""
-    scaled = (advantage - advantage.mean()) / (advantage.std() + 1e-6)
+    scaled = (advantage - advantage.mean()) / (advantage.std(correction=0) + 1e-6)
     ratio = log_ratio.exp()
     return -torch.minimum(ratio * scaled, ratio.clamp(1 - clip, 1 + clip) * scaled).mean()
 

@@ -302,7 +302,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """Draws episodes with goals at these distances (cells) from now on; those under way are not changed.
 
         Raises:
-          InputError: if distances are not allowed, or no maze has them.
+          InputError: if there are no distances. Where no maze has them, the next episode raises it.
         """
         self._drawn_task = self.task_spec.replace(distances=tuple(distances))
 

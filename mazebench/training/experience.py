@@ -26,6 +26,7 @@ class Experience(NamedTuple):
     action: np.ndarray  # [B] int
     cell: np.ndarray  # [B] int, the body's true cell before the step
     pose: np.ndarray  # [B, 3] float64, its true x and y (m) and yaw (rad)
+    velocity: np.ndarray  # [B, 2] float64, the true one on the map (m/s)
     new_episode: np.ndarray  # [B] bool, whether a trajectory begins with this step
     new_context: np.ndarray  # [B] bool, whether a trajectory or the leg to another goal begins with this step
     maze: np.ndarray  # [B] int, index among the task's mazes
@@ -76,7 +77,7 @@ class Collector:
     def step(self, action: np.ndarray, notes: Any = None) -> Experience:
         """Takes `action` `[B]` for the current `inputs`, which those of the next step replace; keeps the `notes`."""
         now, rules = self.inputs, self._env.rules
-        cell, pose = rules.cell.copy(), rules.pose.copy()
+        cell, pose, velocity = rules.cell.copy(), rules.pose.copy(), self._env.velocity()
         before = (now.new_episode, now.new_context, self._maze, rules.start.copy(), rules.target.copy())
         observation, reward, terminated, truncated, infos = self._env.step(action)
         ended = terminated | truncated
@@ -90,6 +91,7 @@ class Collector:
             action,
             cell,
             pose,
+            velocity,
             *before,
             reward,
             terminated,

@@ -135,8 +135,10 @@ def run_training(
     tasks = [
         training_task(options.agent, agent_class, agent_class.task_options(overrides), each) for each in all_options
     ]
+    _check_together(options, tasks)
     learner = agent_class.build_learner(tasks[0], seed=options.seed, overrides=overrides)
-    held_out = [HeldOutEvaluation(task, options.eval_mazes, task_options.get("distances") or ()) for task in tasks]
+    has_distances = bool(task_options.get("distances"))
+    held_out = [HeldOutEvaluation(task, options.eval_mazes, task.distances if has_distances else ()) for task in tasks]
     # The source comes first: if the cluster can't be reached, no run is begun.
     with open_source(options, tasks, learner) as source:
         folder = RunFolder(out)
@@ -265,6 +267,19 @@ def num_updates_due(learner: Learner, env_steps: int) -> int:
     if learner.num_rows < learner.min_rows:
         return 0
     return max(0, env_steps - learner.min_rows) // learner.steps_per_update
+
+
+def _check_together(options: TrainOptions, tasks: Sequence[Task]) -> None:
+    """Checks that the tasks differ, and that goals can begin near."""
+    names = [task.track or "local" for task in tasks]
+    if options.also and ("local" in names or len(set(names)) < len(names)):
+        raise InputError(f"expected different tracks in --track and --also, found {', '.join(names)}")
+    if options.first_distance is None:
+        return
+    if any(task.pairs == "fixed" or task.scenarios is not None or task.num_ends for task in tasks):
+        raise InputError("--first-distance: expected starts and goals that are drawn, found given ones")
+    if options.first_distance > (farthest := max(max(task.distances) for task in tasks)):
+        raise InputError(f"expected --first-distance of at most {farthest}, the farthest goals, found more")
 
 
 def longest_distance(options: TrainOptions, tasks: Sequence[Task], env_steps: int) -> int:

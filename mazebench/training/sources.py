@@ -83,7 +83,10 @@ class InProcessSource:
 
     def __init__(self, tasks: Sequence[Task], actor: LearningAgent, num_envs: int):
         self._player = Player(tasks, actor, num_envs)
-        self.limit_distances = self._player.limit_distances
+
+    def limit_distances(self, longest: int) -> None:
+        """Sends the agent to goals at most so many cells away from now on."""
+        self._player.limit_distances(longest)
 
     def collect(self, seed: int) -> Iterator[Pieces]:
         """Begins new trajectories everywhere and a new stream of exploration; yields steps in all environments."""
