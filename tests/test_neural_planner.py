@@ -190,7 +190,7 @@ def test_metrics_and_config_of_several_tracks(tmp_path):
     run(tmp_path / "whole", 640, **TRACKS, **GROWING)
     lines = [json.loads(line) for line in (tmp_path / "whole" / "metrics.jsonl").read_text().splitlines()]
     assert lines[-1]["updates"] == 2
-    assert {"building_success_rate_1", "rebuilt_success_rate_5"} <= set(lines[-1])
+    assert {"success_rate_building_1", "success_rate_rebuilt_5"} <= set(lines[-1])
     config = json.loads((tmp_path / "whole" / "config.json").read_text())
     assert config["also"] == ["rebuilt"]
     assert config["first_distance"] == 2

@@ -55,9 +55,9 @@ def write_learning_curves(folders: Sequence[pathlib.Path], out: pathlib.Path) ->
     if not runs:
         raise InputError("expected training runs with metrics, found none to report")
     metrics = list(dict.fromkeys(metric for run in runs for metric in run.lines))
-    rates = sorted((metric for metric in metrics if metric.startswith(SUCCESS)), key=lambda rate: (len(rate), rate))
+    rates = sorted((metric for metric in metrics if metric.startswith(SUCCESS)), key=_track_and_distance)
     losses = [metric for metric in metrics if metric.endswith(_LOSS)]
-    of_rates = [_panel(runs, rate, f"distance {rate.removeprefix(SUCCESS)}") for rate in rates]
+    of_rates = [_panel(runs, rate, _title(rate)) for rate in rates]
     of_losses = [_panel(runs, loss, loss.replace("_", " "))._replace(y_range=None) for loss in losses]
     lines = ["# Learning curves", to_markdown(_overview(runs, rates)).rstrip()]
     with new_report(out):
@@ -114,3 +114,14 @@ def _panel(runs: Sequence[Run], metric: str, title: str) -> Panel:
         if metric in run.lines
     ]
     return Panel(title, "agent steps", pd.concat(curves, ignore_index=True))
+
+
+def _track_and_distance(rate: str) -> tuple[str, int, str]:
+    """Returns what sorts the name of a success rate: by track, where there are several, then by distance."""
+    track, _, distance = rate.removeprefix(SUCCESS).rpartition("_")
+    return track, len(distance), distance
+
+
+def _title(rate: str) -> str:
+    track, _, distance = _track_and_distance(rate)
+    return f"{track}, distance {distance}" if track else f"distance {distance}"

@@ -247,7 +247,7 @@ class TrainingLoop:
             several = len(self._held_out) > 1
             actor = self._learner.actor.in_task(held_out.task) if several else self._learner.actor
             rates = held_out.success_rates(actor, self._show_evaluation)
-            name = f"{held_out.task.track or 'local'}_success_rate" if several else "success_rate"
+            name = f"success_rate_{held_out.task.track}" if several else "success_rate"
             metrics |= {f"{name}_{distance}": rate for distance, rate in rates.items()}
         self._folder.make_milestone(counters, metrics)
         self._counters = counters.at_milestone()
