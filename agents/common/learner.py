@@ -22,10 +22,42 @@ from .training_maps import TrainingMaps, shows_other_maps
 
 _TRAINING_FILE = "training.safetensors"
 _RANDOM_FILE = "random.json"
-_REPLAY_FILE = "replay.npz"
+REPLAY_FILE = "replay.npz"
 
 
-class HindsightLearner:
+class NetworkLearner:
+    """The parts of every learner: an actor, gradient steps of its network, and a random stream."""
+
+    def __init__(self, actor: NetworkAgent, seed: int, descent: Descent):
+        """`descent` is of the actor's network."""
+        self.actor = actor
+        self.num_envs: int = actor.config.num_envs
+        self.descent = descent
+        self.rng = np.random.default_rng([seed, 1])
+
+    def config(self) -> dict[str, Any]:
+        """Returns all values of the config."""
+        return dataclasses.asdict(self.actor.config)
+
+    def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:
+        """Writes the agent, the optimizer with the target network if there is one, and the random generator."""
+        self.actor.save(folder / AGENT_FILE, provenance)
+        save_checkpoint(folder / _TRAINING_FILE, self.descent.tensors(), {"agent": self.actor.name})
+        (folder / _RANDOM_FILE).write_text(json.dumps(self.rng.bit_generator.state), encoding="ascii")
+
+    def load(self, folder: pathlib.Path) -> None:
+        """Restores what `save` wrote.
+
+        Raises:
+          InputError: if a file is damaged, or another agent's.
+        """
+        self.actor.load(folder / AGENT_FILE)
+        tensors, _ = load_checkpoint(folder / _TRAINING_FILE, self.actor.name)
+        self.descent.load(tensors)
+        self.rng.bit_generator.state = read_json(folder / _RANDOM_FILE)
+
+
+class HindsightLearner(NetworkLearner):
     """Holds the parts of a learner from relabelled experience: replay, maps, gradient steps and a random stream."""
 
     def __init__(
@@ -43,9 +75,8 @@ class HindsightLearner:
         Raises:
           InputError: if the actor's network does not read the task's maps or sensors.
         """
-        self.actor = actor
+        super().__init__(actor, seed, descent)
         config = actor.config
-        self.num_envs: int = config.num_envs
         self.min_rows: int = config.min_rows
         self.steps_per_update: int = config.steps_per_update
         self.maps = TrainingMaps(task)
@@ -62,17 +93,11 @@ class HindsightLearner:
             relabel_start=config.relabel_start,
             keep_anchor=keep_anchor,
         )
-        self.descent = descent
-        self.rng = np.random.default_rng([seed, 1])
 
     @property
     def num_rows(self) -> int:
         """The number of rows that the replay holds."""
         return self.replay.num_rows
-
-    def config(self) -> dict[str, Any]:
-        """Returns all values of the config."""
-        return dataclasses.asdict(self.actor.config)
 
     def description(self) -> str:
         """Returns the size of the network and of the replay, and the device, in one line."""
@@ -86,11 +111,9 @@ class HindsightLearner:
         self.replay.add(experience, first_env)
 
     def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:
-        """Writes the agent, the target network, the optimizer, the random generator and the replay."""
-        self.actor.save(folder / AGENT_FILE, provenance)
-        save_checkpoint(folder / _TRAINING_FILE, self.descent.tensors(), {"agent": self.actor.name})
-        (folder / _RANDOM_FILE).write_text(json.dumps(self.rng.bit_generator.state), encoding="ascii")
-        self.replay.save(folder / _REPLAY_FILE)
+        """Writes what every learner does, and the replay."""
+        super().save(folder, provenance)
+        self.replay.save(folder / REPLAY_FILE)
 
     def load(self, folder: pathlib.Path) -> None:
         """Restores what `save` wrote; without the replay file, learning waits until the replay is filled again.
@@ -98,10 +121,7 @@ class HindsightLearner:
         Raises:
           InputError: if a file is damaged, or another agent's.
         """
-        self.actor.load(folder / AGENT_FILE)
-        tensors, _ = load_checkpoint(folder / _TRAINING_FILE, self.actor.name)
-        self.descent.load(tensors)
-        self.rng.bit_generator.state = read_json(folder / _RANDOM_FILE)
-        path = folder / _REPLAY_FILE
+        super().load(folder)
+        path = folder / REPLAY_FILE
         if path.exists():
             self.replay.load(path)

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import pathlib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -18,18 +17,14 @@ from torch.nn import functional
 from mazebench.constants import NUM_ACTIONS
 from mazebench.errors import InputError
 from mazebench.storage.array_files import read_arrays
-from mazebench.storage.json_files import read_json
 from mazebench.training.experience import Experience
 
 from ..common.actor import NetworkAgent, one_torch_thread
-from ..common.checkpoint import AGENT_FILE, load_checkpoint, save_checkpoint
 from ..common.descent import Descent, in_numbers
+from ..common.learner import REPLAY_FILE, NetworkLearner
 from ..expert import Expert
 from .network import Choice, Situation
 
-_TRAINING_FILE = "training.safetensors"
-_RANDOM_FILE = "random.json"
-_REPLAY_FILE = "replay.npz"
 # The arrays of `Rows`, in their order.
 _NAMES = ("grids", "grid", "pose", "ranges", "motion", "action", "log_probability", "advantage", "value", "label")
 _LEAST_RATE = 0.02  # of the learning rate, at the end
@@ -101,25 +96,23 @@ class _Rollout:
     expert: Expert | None = None
 
 
-class PlannerLearner:
+class PlannerLearner(NetworkLearner):
     """Updates the network of its actor after each rollout; imitation learns from the rollouts before it, too."""
 
     min_rows = 0
 
     def __init__(self, actor: NetworkAgent, seed: int):
-        self.actor = actor
         config = self._config = actor.config
-        self.num_envs: int = config.num_envs
         self.steps_per_update: int = config.num_envs * config.rollout_steps
         num_gradients = max(1, config.total_steps // self.steps_per_update) * config.epochs * config.minibatches
-        self._descent = Descent(
+        descent = Descent(
             actor.network,
             torch.optim.Adam(actor.network.parameters(), lr=config.learning_rate),
             max_gradient_norm=config.max_gradient_norm,
             # Constant in the first half of the run, then falling to nearly 0.
             rate=lambda step: min(1.0, max(_LEAST_RATE, 2 - 2 * step / num_gradients)),
         )
-        self._rng = np.random.default_rng([seed, 1])
+        super().__init__(actor, seed, descent)
         self._rollouts: dict[int, _Rollout] = {}  # by the first environment
         self._kept: list[dict[int, Rows]] = []  # the last rollouts, by the size of grids
 
@@ -127,10 +120,6 @@ class PlannerLearner:
     def num_rows(self) -> int:
         """The number of steps of the rollout that is under way."""
         return sum(len(step.action) for rollout in self._rollouts.values() for step in rollout.steps)
-
-    def config(self) -> dict[str, Any]:
-        """Returns all values of the config."""
-        return dataclasses.asdict(self._config)
 
     def description(self) -> str:
         """Returns the size of the network, and who teaches it."""
@@ -171,7 +160,7 @@ class PlannerLearner:
             for rows in minibatch:
                 for name, value in self._losses(rows).items():
                     losses[name] = losses.get(name, torch.zeros(())) + value * (len(rows.action) / total)
-            losses["gradient_norm"] = self._descent.step(losses["loss"])
+            losses["gradient_norm"] = self.descent.step(losses["loss"])
             for name, number in in_numbers(losses).items():
                 sums[name] = sums.get(name, 0.0) + number / num_minibatches
         return sums
@@ -179,7 +168,7 @@ class PlannerLearner:
     def _minibatches(self, rows: Rows, num_grids: int) -> Iterator[Rows]:
         """Yields the rows on so many grids at a time, again and again, each time in another order."""
         while True:
-            order = self._rng.permutation(len(rows.grids))
+            order = self.rng.permutation(len(rows.grids))
             for begin in range(0, len(order) - num_grids + 1, num_grids):
                 yield _on_grids(rows, order[begin : begin + num_grids])
 
@@ -240,8 +229,8 @@ class PlannerLearner:
         return {size: rows.stacked() for size, rows in collected.items()}
 
     def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:
-        """Writes the agent, the optimizer, the random generator and the rollouts that are kept."""
-        self.actor.save(folder / AGENT_FILE, provenance)
+        """Writes what every learner does, and the rollouts that are kept."""
+        super().save(folder, provenance)
         if self._config.teacher == "oracle":
             arrays: dict[str, Any] = {
                 f"{number}-{size}-{name}": array.numpy()
@@ -249,10 +238,8 @@ class PlannerLearner:
                 for size, rows in rollout.items()
                 for name, array in zip(_NAMES, (*rows[:2], *rows.situation, *rows[3:]), strict=True)
             }
-            with (folder / _REPLAY_FILE).open("wb") as file:
+            with (folder / REPLAY_FILE).open("wb") as file:
                 np.savez_compressed(file, **arrays)
-        save_checkpoint(folder / _TRAINING_FILE, self._descent.tensors(), {"agent": self.actor.name})
-        (folder / _RANDOM_FILE).write_text(json.dumps(self._rng.bit_generator.state), encoding="ascii")
 
     def load(self, folder: pathlib.Path) -> None:
         """Restores what `save` wrote; without the rollouts' file, imitation begins with new ones.
@@ -260,12 +247,9 @@ class PlannerLearner:
         Raises:
           InputError: if a file is damaged, or another agent's.
         """
-        self.actor.load(folder / AGENT_FILE)
-        tensors, _ = load_checkpoint(folder / _TRAINING_FILE, self.actor.name)
-        self._descent.load(tensors)
-        self._rng.bit_generator.state = read_json(folder / _RANDOM_FILE)
+        super().load(folder)
         self._kept = []
-        path = folder / _REPLAY_FILE
+        path = folder / REPLAY_FILE
         if not path.exists():
             return
         arrays = read_arrays(path, "file of rollouts")
