@@ -23,12 +23,30 @@ from typing import Any
 
 import numpy as np
 import torch
+from torch import nn
 
 from .kernels import compiled
 
 _DIAGONAL = math.sqrt(2.0) - 0.5  # share of the entered cell in the cost of a diagonal step
 _CORNER = 0.25  # share of each of the two cells at the corner
+_LARGEST = 5.0  # log of the largest cost added to a cell's length of 1: 148 cells
 FAR = 1e6  # what it costs to end in a cell that is no goal; more than any way
+
+
+def cost_layers(num_planes: int, channels: int) -> nn.Sequential:
+    """Returns convolutions that give each cell a score `[G, 1, L, L]`, from planes `[G, num_planes, L, L]`."""
+    return nn.Sequential(
+        nn.Conv2d(num_planes, channels, 3, padding=1), nn.ReLU(), nn.Conv2d(channels, channels, 3, padding=1),
+        nn.ReLU(), nn.Conv2d(channels, 1, 1),
+    )  # fmt: skip
+
+
+def cell_costs(scores: torch.Tensor) -> torch.Tensor:
+    """Returns the costs of cells with these scores: at least 1, so that far goals are as sharp as near ones.
+
+    Walls grow expensive by a factor, not by a sum.
+    """
+    return 1 + torch.exp(scores.clamp(max=_LARGEST))
 
 
 class CheapestWays(torch.autograd.Function):

@@ -28,7 +28,7 @@ from ..common.layers import (
     marked_position,
     place_code,
 )
-from ..common.path_layer import FAR, CheapestWays
+from ..common.path_layer import FAR, CheapestWays, cell_costs, cost_layers
 from .map_reader import read
 from .mmn_config import MMNConfig
 
@@ -45,7 +45,6 @@ _CHANNELS = 24  # of the map's convolutions
 _NEAR = (1, 1, 1, 1)  # dilations of the hypermodel's convolutions
 _FAR = (1, 1, 2, 2, 4, 4, 2, 1, 1)  # of the heads', which see 19 cells far, across a 13 x 13 map
 _NUM_WAY = 8 + 3  # features of a cell by the ways to the goal
-_LARGEST_COST = 5.0  # log of a cell's largest cost beside its length: 148 cells
 # Before anything is learned:
 _FIRST_VALUE = -20.0  # steps; the middle of the values
 _FIRST_GOAL = -4.0  # logit of being in the goal
@@ -282,15 +281,12 @@ class WayReader(nn.Module):
     def __init__(self, channels: int):
         """`channels` are those of the costs and of the features."""
         super().__init__()
-        self.costs = nn.Sequential(
-            nn.Conv2d(NUM_PLANES, channels, 3, padding=1), nn.ReLU(), nn.Conv2d(channels, channels, 3, padding=1),
-            nn.ReLU(), nn.Conv2d(channels, 1, 1),
-        )  # fmt: skip
+        self.costs = cost_layers(NUM_PLANES, channels)
         self.features = nn.Conv2d(_NUM_WAY, channels, 1)
 
     def forward(self, context: torch.Tensor) -> torch.Tensor:
         """Returns `[G, C, M, M]` of contexts `[G, 4, M, M]`."""
-        cost = 1 + torch.exp(self.costs(context)[:, 0].clamp(max=_LARGEST_COST))
+        cost = cell_costs(self.costs(context)[:, 0])
         way = CheapestWays.apply(cost, torch.where(context[:, GOAL] > 0, 0.0, FAR))
         # How much nearer the goal is in the eight cells around each; beyond the border, as far as beside it.
         size = way.shape[-1]

@@ -15,7 +15,7 @@ from torch import nn
 
 from mazebench.constants import NUM_ACTIONS
 
-from ..common.path_layer import FAR, CheapestWays
+from ..common.path_layer import FAR, CheapestWays, cell_costs, cost_layers
 
 NUM_RANGES = 32  # to the walls around the body
 _RADII = (0.4, 0.8, 1.2, 1.8, 2.5, 3.5)  # cells, of rings of points around the body
@@ -35,8 +35,7 @@ _NUM_FEATURES = 3 * _NUM_POINTS + NUM_RANGES + _NUM_MOTION + 2
 _EVIDENCE = 15.0  # levels a unit of log odds, in a picture's bytes
 _UNLIKELY = 32.0  # levels a unit of the log of a goal's likelihood
 _NO_GOAL = 255
-_LARGEST = 5.0  # log of the largest cost added to the cell's length of 1: 148 cells
-_FIRST = -0.5  # log of that cost before anything is learned
+_FIRST = -0.5  # score of a cell before anything is learned
 _AT_ONCE = 16  # grids, whose features then stay in the cache
 _SPEED = 3.2  # m/s, about the top speed
 
@@ -88,10 +87,7 @@ class PlannerNetwork(nn.Module):
         """`channels` are those of the costs, `hidden` units those of the policy; without `ways`, all cells cost 1."""
         super().__init__()
         self._has_ways = ways
-        self.costs = nn.Sequential(
-            nn.Conv2d(5, channels, 3, padding=1), nn.ReLU(), nn.Conv2d(channels, channels, 3, padding=1), nn.ReLU(),
-            nn.Conv2d(channels, 1, 1),
-        )  # fmt: skip
+        self.costs = cost_layers(5, channels)
         self.goal_scale = nn.Parameter(torch.tensor(1.0))  # of the cost of a goal that is less likely than another
         self.policy = nn.Sequential(
             nn.Linear(_NUM_FEATURES, hidden), nn.ReLU(), nn.Linear(hidden, hidden), nn.ReLU(),
@@ -105,9 +101,8 @@ class PlannerNetwork(nn.Module):
         evidence = (grids[:, 2] - 128.0) / (4 * _EVIDENCE)
         seen_wall, seen_free = evidence.clamp(min=0), (-evidence).clamp(min=0)
         planes = torch.stack([prior, wall, seen_wall, seen_free, torch.ones_like(wall)], dim=1)
-        # At least 1, so that far goals are as sharp as near ones; walls grow expensive by a factor, not by a sum.
         scores = torch.cat([self.costs(some)[:, 0] for some in planes.split(_AT_ONCE)])
-        cost = 1 + torch.exp((_FIRST + scores).clamp(max=_LARGEST))
+        cost = cell_costs(_FIRST + scores)
         unlikely = grids[:, 3] / _UNLIKELY
         end = torch.where(grids[:, 3] < _NO_GOAL, nn.functional.softplus(self.goal_scale) * unlikely, FAR)
         way = CheapestWays.apply(cost if self._has_ways else torch.ones_like(cost), end)
