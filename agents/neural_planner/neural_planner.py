@@ -5,9 +5,10 @@ docs/agents/neural_planner.md describes the network and both ways to train it.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import pathlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -70,6 +71,9 @@ class NeuralPlanner(NetworkAgent):
     def __init__(self, config: NeuralPlannerConfig, interface: Interface, seed: int = 0):
         """Makes an agent with a new network, for the environments of an interface."""
         super().__init__(config, interface.context_size, seed)
+        self._sense(interface)
+
+    def _sense(self, interface: Interface) -> None:
         self._senses, self._cell_size = Senses(interface, self.name), interface.cell_size
 
     @classmethod
@@ -99,8 +103,8 @@ class NeuralPlanner(NetworkAgent):
 
     def in_task(self, task: Task) -> Self:
         """Returns an agent with the same network for another task's environments."""
-        agent = type(self)(self.config, task.interface)
-        agent.network = self.network
+        agent = copy.copy(self)
+        agent._sense(task.interface)
         return agent
 
     def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
@@ -152,18 +156,15 @@ class NeuralPlanner(NetworkAgent):
 
     def _plan(self, robots: list[Robot]) -> None:
         """Plans for robots, those whose grids have one size at once."""
-        by_size: dict[int, list[Robot]] = {}
         for robot in robots:
             memory = robot.memory
             walls, goal = memory.estimate()
             robot.grid = grid_bytes(memory.prior, walls, memory.occupancy.evidence, goal)
-            by_size.setdefault(len(walls), []).append(robot)
-        for same in by_size.values():
-            plan = in_batches(
-                self.network.plan, _GRIDS_AT_ONCE, torch.from_numpy(np.stack([each.grid for each in same]))
-            )
-            for index, robot in enumerate(same):
-                robot.plan = Plan(*(part[index] for part in plan))
+        for same in _of_one_size(robots):
+            grids = torch.from_numpy(np.stack([robots[index].grid for index in same]))
+            plan = in_batches(self.network.plan, _GRIDS_AT_ONCE, grids)
+            for row, index in enumerate(same):
+                robots[index].plan = Plan(*(part[row] for part in plan))
 
     def _situation(self, robots: list[Robot], observed: np.ndarray) -> Situation:
         """Returns the states of robots, whose observed ones `[K, 12]` tell how fast they turn."""
@@ -184,10 +185,7 @@ class NeuralPlanner(NetworkAgent):
     def _read(self, robots: list[Robot], situation: Situation) -> tuple[np.ndarray, np.ndarray]:
         """Returns logits `[K, 6]` and values `[K]` of the states of robots."""
         logits, value = np.zeros((len(robots), NUM_ACTIONS), np.float32), np.zeros(len(robots), np.float32)
-        by_size: dict[int, list[int]] = {}
-        for index, robot in enumerate(robots):
-            by_size.setdefault(len(robot.plan.way), []).append(index)
-        for same in by_size.values():
+        for same in _of_one_size(robots):
             plan = (torch.stack(parts) for parts in zip(*(robots[index].plan for index in same), strict=True))
             rows = (part[same] for part in situation)
             read = in_batches(self._act, _STATES_AT_ONCE, *plan, *rows)
@@ -207,3 +205,11 @@ class NeuralPlanner(NetworkAgent):
         x, y, _, _ = moved(_OPEN, 1.0, 0.0, 0.0, vx, vy, body.yaw, action)
         robot.memory.command(action, (body.x + x / cell_size, body.y + y / cell_size))
         robot.actions, robot.age = (action, robot.actions[0]), robot.age + 1
+
+
+def _of_one_size(robots: list[Robot]) -> Iterable[list[int]]:
+    """Returns the indices of robots, those whose grids have one size together."""
+    by_size: dict[int, list[int]] = {}
+    for index, robot in enumerate(robots):
+        by_size.setdefault(robot.grid.shape[-1], []).append(index)
+    return by_size.values()

@@ -15,7 +15,7 @@ MINARI, NPZ = "minari", "npz"
 
 @options
 class CollectOptions:
-    """How many demonstrations are collected, and how they are kept.
+    """Number and format of demonstrations that are collected.
 
     Raises:
       InputError: if a value is not allowed.

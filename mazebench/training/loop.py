@@ -244,10 +244,8 @@ class TrainingLoop:
         self._save()
         metrics = counters.mean_losses()
         for held_out in self._held_out:
-            several = len(self._held_out) > 1
-            actor = self._learner.actor.in_task(held_out.task) if several else self._learner.actor
-            rates = held_out.success_rates(actor, self._show_evaluation)
-            name = f"success_rate_{held_out.task.track}" if several else "success_rate"
+            rates = held_out.success_rates(self._learner.actor.in_task(held_out.task), self._show_evaluation)
+            name = f"success_rate_{held_out.task.track}" if len(self._held_out) > 1 else "success_rate"
             metrics |= {f"{name}_{distance}": rate for distance, rate in rates.items()}
         self._folder.make_milestone(counters, metrics)
         self._counters = counters.at_milestone()

@@ -56,7 +56,7 @@ class LearningAgent(Agent):
         raise NotImplementedError
 
     def in_task(self, task: Task) -> Self:
-        """Returns the agent for the environments of `task`, one of several that it is trained in at once.
+        """Returns the agent for the environments of `task`, one of those that it is trained in.
 
         What is learned is shared with this agent. By default it is this agent.
         """

@@ -47,7 +47,7 @@ class Player:
             begin, following = max(begin, first), min(following, end)
             if begin < following:
                 collector = Collector(task, following - begin, seed=0, num_threads=num_threads)
-                self._parts.append((begin, collector, actor if len(tasks) == 1 else actor.in_task(task)))
+                self._parts.append((begin, collector, actor.in_task(task)))
         self._actor = actor
         self._states: list[Any] = []
 
