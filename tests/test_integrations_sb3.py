@@ -11,11 +11,14 @@ from mazebench.errors import InputError
 pytest.importorskip("stable_baselines3")
 
 import torch
-from mazebench_agents.integrations.sb3 import MapFeatures, MazeVecEnv
+from acting import inputs_of
+from mazebench_agents.integrations.sb3 import MapFeatures, MazeVecEnv, WayFeatures
+from mazebench_agents.neural_planner.neural_planner import NeuralPlanner
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor
 
 torch.set_num_threads(1)  # two that share a core with other tests wait for each other
+NUM_READ = 3 * 97
 OPTIONS = {"level": (1, 2), "distances": (1, 2), "reward": "progress"}
 
 
@@ -57,3 +60,33 @@ def test_a_policy_learns_from_them(task):
     assert features.features_dim == 256 + 12 + (32 if task == "rebuilt" else 0)
     actions, _ = model.predict(envs.reset())
     assert actions.shape == (4,)
+
+
+def test_ways_are_read_as_by_the_neural_planner():
+    envs = MazeVecEnv(mazebench.make_vec("building", 3, distances=(3,)))
+    agent = NeuralPlanner(NeuralPlanner.default_config, envs.envs.task_spec.interface)
+    reader = WayFeatures(envs.observation_space)
+    reader.planner.load_state_dict(agent.network.state_dict(), strict=False)
+    observation = envs.reset()
+    state = agent.initial_state(3)
+    agent.act(inputs_of(observation, np.ones(3, dtype=bool)), state, explore=True)
+    grids = torch.tensor(np.stack(state.choice.grids))
+    walls = 255 * (grids[:, 0] > 127)
+    grids[:, 0], grids[:, 1], grids[:, 2] = walls, walls, 128  # the map as it is shown, and nothing that was sensed
+    with torch.no_grad():
+        expected = agent.network.features(agent.network.plan(grids), torch.arange(3), state.choice.situation)
+    found = reader({name: torch.as_tensor(values) for name, values in observation.items()})
+    torch.testing.assert_close(found[:, :NUM_READ], expected[:, :NUM_READ])  # at points around the body
+    differ = (found - expected).abs() > 0.03  # the lidar's noise; a ray that passes a corner may differ by more
+    assert differ.sum() <= 3
+    found.sum().backward()
+    assert all(weight.grad.abs().sum() > 0 for weight in reader.planner.costs.parameters())
+
+
+def test_a_policy_with_ways_learns():
+    envs = VecMonitor(MazeVecEnv(mazebench.make_vec("building", 4, distances=(1, 2))))
+    policy = {"net_arch": [16], "features_extractor_class": WayFeatures}
+    model = PPO("MultiInputPolicy", envs, n_steps=32, batch_size=64, n_epochs=1, policy_kwargs=policy, device="cpu")
+    before = model.policy.features_extractor.planner.costs[0].weight.clone()
+    model.learn(128)
+    assert not torch.equal(before, model.policy.features_extractor.planner.costs[0].weight)

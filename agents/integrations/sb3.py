@@ -1,7 +1,7 @@
 """Stable-Baselines3: many environments at once, features of their observations, and a buffer (extra `[sb3]`).
 
 >>> envs = MazeVecEnv(mazebench.make_vec("rebuilt", 64))
->>> model = PPO("MultiInputPolicy", envs, policy_kwargs={"features_extractor_class": MapFeatures})
+>>> model = PPO("MultiInputPolicy", envs, policy_kwargs={"features_extractor_class": WayFeatures})
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ from torch import nn
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.world.simulation import STATE_SIZE
+
+from ..neural_planner.network import NUM_RANGES, REACH, CostPlanner, Situation, motion_features
+from ..neural_planner.neural_planner_config import NeuralPlannerConfig
 
 if TYPE_CHECKING:
     from gymnasium import spaces
@@ -114,6 +117,37 @@ class MapFeatures(BaseFeaturesExtractor):
         if self.reach:
             parts.append(observations["lidar"] / self.reach)
         return torch.cat(parts, dim=1)  # [B, features]
+
+
+class WayFeatures(BaseFeaturesExtractor):
+    """The cheapest ways over the context's map, by learned costs, around the body: those of `neural-planner`.
+
+    It has no memory, so the map is all that it plans on, beside the lidar's ranges to the walls that are near.
+    """
+
+    def __init__(self, observation_space: spaces.Dict, cell_size: float = 1.0, ways: bool = True):
+        """`cell_size` is the width of the map's cells in metres; without `ways`, the goal is seen as the crow flies."""
+        super().__init__(observation_space, CostPlanner.num_features)
+        self.cell_size = cell_size
+        self.planner = CostPlanner(NeuralPlannerConfig.channels, ways)
+
+    def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
+        context, state = observations["context"], observations["state"]
+        walls, goal = context[:, 0], context[:, 2]
+        # Nothing but the map is known of walls. All cells may be the goal if it is hidden.
+        goal_is_hidden = goal.amax(dim=(1, 2), keepdim=True) == 0
+        planes = [255 * walls, 255 * walls, torch.full_like(walls, 128), 255 * ((goal <= 0) & ~goal_is_hidden)]
+        plan = self.planner.plan(torch.stack(planes, dim=1).round().to(torch.uint8))
+
+        batch_size = len(state)
+        ranges = torch.full((batch_size, NUM_RANGES), REACH)
+        if "lidar" in observations:
+            ranges = (observations["lidar"] / self.cell_size).clamp(max=REACH)
+        motion = motion_features(state[:, [6, 7, 11]].numpy(), np.full((batch_size, 2), -1))
+        pose = torch.cat([state[:, :2] / self.cell_size, state[:, 5:6]], dim=1)
+        return self.planner.features(
+            plan, torch.arange(batch_size), Situation(pose, ranges, torch.from_numpy(motion))
+        )  # [B, features]
 
 
 class EndingHerReplayBuffer(HerReplayBuffer):

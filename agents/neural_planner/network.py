@@ -18,7 +18,8 @@ from mazebench.constants import NUM_ACTIONS
 from ..common.path_layer import FAR, CheapestWays, cell_costs, cost_layers
 
 NUM_RANGES = 32  # to the walls around the body
-_RADII = (0.4, 0.8, 1.2, 1.8, 2.5, 3.5)  # cells, of rings of points around the body
+REACH = 3.5  # cells, of these ranges
+_RADII = (0.4, 0.8, 1.2, 1.8, 2.5, REACH)  # cells, of rings of points around the body
 _ANGLES = 16  # points of a ring
 _POINTS = torch.tensor(  # [P, 2], the body, then points ahead of it and to its left
     [(0.0, 0.0)]
@@ -80,20 +81,17 @@ def grid_bytes(prior: np.ndarray, walls: np.ndarray, evidence: np.ndarray, goal:
     return np.rint(np.stack([255 * prior, 255 * walls, 128 + _EVIDENCE * evidence, unlikely])).astype(np.uint8)
 
 
-class PlannerNetwork(nn.Module):
-    """Plans on grids of any size, and acts by what it reads of the plan around the body."""
+class CostPlanner(nn.Module):
+    """Gives the cells of grids of any size costs, finds the cheapest ways over them, and reads both around a body."""
 
-    def __init__(self, channels: int, hidden: int, ways: bool):
-        """`channels` are those of the costs, `hidden` units those of the policy; without `ways`, all cells cost 1."""
+    num_features = _NUM_FEATURES
+
+    def __init__(self, channels: int, ways: bool = True):
+        """`channels` are those of the costs; without `ways`, all cells cost 1."""
         super().__init__()
         self._has_ways = ways
         self.costs = cost_layers(5, channels)
         self.goal_scale = nn.Parameter(torch.tensor(1.0))  # of the cost of a goal that is less likely than another
-        self.policy = nn.Sequential(
-            nn.Linear(_NUM_FEATURES, hidden), nn.ReLU(), nn.Linear(hidden, hidden), nn.ReLU(),
-            nn.Linear(hidden, NUM_ACTIONS),
-        )  # fmt: skip
-        self.value = nn.Sequential(nn.Linear(_NUM_FEATURES, hidden // 2), nn.ReLU(), nn.Linear(hidden // 2, 1))
 
     def plan(self, grids: torch.Tensor) -> Plan:
         """Returns the plan on grids `[G, 4, L, L]` uint8 (see `grid_bytes`)."""
@@ -108,13 +106,11 @@ class PlannerNetwork(nn.Module):
         way = CheapestWays.apply(cost if self._has_ways else torch.ones_like(cost), end)
         return Plan(way, cost, wall)
 
-    def forward(self, plan: Plan, grid: torch.Tensor, situation: Situation) -> tuple[torch.Tensor, torch.Tensor]:
-        """Returns logits `[K, 6]` and values `[K]` of states on the grids `grid` (`[K]` int) of a plan."""
-        features = self._features(plan, grid, situation)
-        return self.policy(features), self.value(features)[:, 0]
+    def features(self, plan: Plan, grid: torch.Tensor, situation: Situation) -> torch.Tensor:
+        """Returns `[K, F]`: what is read of the plan at points around the bodies, in their own frames, and the rest.
 
-    def _features(self, plan: Plan, grid: torch.Tensor, situation: Situation) -> torch.Tensor:
-        """Returns `[K, F]`: what is read of the plan at points around the bodies, in their own frames, and the rest."""
+        The states are on the grids `grid` (`[K]` int) of the plan.
+        """
         size = plan.way.shape[-1]
         first = grid[:, None] * size * size  # of a state's grid, among the cells of all grids
 
@@ -140,13 +136,31 @@ class PlannerNetwork(nn.Module):
                 (nearer - nearer[:, :1]).clamp(-4, 4),
                 (weights * torch.log(plan.cost).flatten()[corners]).sum(0) / 3,
                 (weights * plan.wall.flatten()[corners]).sum(0),
-                situation.ranges / _RADII[-1],
+                situation.ranges / REACH,
                 situation.motion,
                 torch.tanh(way_left / 5),
                 torch.tanh(way_left / 40),
             ],
             dim=1,
         )
+
+
+class PlannerNetwork(CostPlanner):
+    """Plans, and acts by what it reads of the plan around the body."""
+
+    def __init__(self, channels: int, hidden: int, ways: bool):
+        """`channels` are those of the costs, `hidden` units those of the policy; without `ways`, all cells cost 1."""
+        super().__init__(channels, ways)
+        self.policy = nn.Sequential(
+            nn.Linear(_NUM_FEATURES, hidden), nn.ReLU(), nn.Linear(hidden, hidden), nn.ReLU(),
+            nn.Linear(hidden, NUM_ACTIONS),
+        )  # fmt: skip
+        self.value = nn.Sequential(nn.Linear(_NUM_FEATURES, hidden // 2), nn.ReLU(), nn.Linear(hidden // 2, 1))
+
+    def forward(self, plan: Plan, grid: torch.Tensor, situation: Situation) -> tuple[torch.Tensor, torch.Tensor]:
+        """Returns logits `[K, 6]` and values `[K]` of states on the grids `grid` (`[K]` int) of a plan."""
+        features = self.features(plan, grid, situation)
+        return self.policy(features), self.value(features)[:, 0]
 
 
 def motion_features(velocity: np.ndarray, actions: np.ndarray) -> np.ndarray:

@@ -25,14 +25,13 @@ from ..common.layers import in_batches
 from ..robot.motion import moved
 from ..robot.rays import ranges_to
 from ..robot.senses import Memory, Senses
-from .network import NUM_RANGES, Choice, Plan, PlannerNetwork, Situation, grid_bytes, motion_features
+from .network import NUM_RANGES, REACH, Choice, Plan, PlannerNetwork, Situation, grid_bytes, motion_features
 from .neural_planner_config import NeuralPlannerConfig
 from .planner_learner import PlannerLearner
 
 # Grids and states are computed as many at once, always, since PyTorch rounds differently at another batch size.
 _GRIDS_AT_ONCE = 8
 _STATES_AT_ONCE = 32
-_REACH = 3.5  # cells, of the ranges to walls
 _WALL = 0.5  # probability from which a cell is a wall for these ranges
 _YAW_RATE = 11  # index in the state
 _OPEN = np.zeros((3, 3), dtype=bool)  # a world without walls, where an action brings the body as far as it can
@@ -172,7 +171,7 @@ class NeuralPlanner(NetworkAgent):
         pose = np.array([(body.x, body.y, body.yaw) for body in bodies]).reshape(-1, 3)
         velocity = np.array([(body.forward, body.left) for body in bodies]).reshape(-1, 2)
         ranges = [
-            ranges_to(robot.grid[1] > 255 * _WALL, *where, NUM_RANGES, _REACH)
+            ranges_to(robot.grid[1] > 255 * _WALL, *where, NUM_RANGES, REACH)
             for robot, where in zip(robots, pose.tolist(), strict=True)
         ]
         actions = np.array([robot.actions for robot in robots]).reshape(-1, 2)
