@@ -5,7 +5,7 @@ This module imports nothing: `import mazebench` registers an environment for eac
 
 BENCHMARK_SIZES = (13, 15, 17, 19, 21)  # cells on a side of the mazes of the paper's protocol
 
-# The version of the benchmarks and of what an episode is. Gymnasium's ids end with it. docs/release.md says when it
+# The version of the benchmarks and of what an episode is. Gymnasium's ids end with it. docs/guarantees.md says when it
 # increases.
 TASK_VERSION = 1
 TRACK_NAMES = ("building", "rebuilt", "adrift", "rough")

@@ -1,4 +1,4 @@
-"""The same bytes from the same command: docs/determinism.md says what is promised, these hold it."""
+"""The same bytes from the same command: docs/guarantees.md#determinism says what is promised, these hold it."""
 
 from __future__ import annotations
 

@@ -110,6 +110,7 @@ for action in (0, 0, 2, 2, 4, 0, 0):
         [
             ("PPOAgent", ()),
             pytest.param("RecurrentPPOAgent", ("--recurrent", "--kinds", "dfs"), marks=pytest.mark.slow),
+            pytest.param("PPOAgent", ("--features", "ways"), marks=pytest.mark.slow),
         ],
     )
     def test_sb3_tracks(self, tmp_path, agent, options):
@@ -134,10 +135,6 @@ for action in (0, 0, 2, 2, 4, 0, 0):
         which = ("--agent", "sb3_agent:MapPPOAgent", "--checkpoint", "ppo.zip", "--distances", "3", "--kinds", "dfs")
         run("-m", "mazebench", "eval", *which, "--num-mazes", "2", "--out", "results", folder=tmp_path)
         assert json.loads((tmp_path / "results" / "config.json").read_text())["sensors"] == []
-
-    def test_the_page_shows_the_agent_of_sb3_as_it_is(self):
-        page = (EXAMPLES.parent / "compete.md").read_text(encoding="utf-8")
-        assert f"\n{(EXAMPLES / 'sb3_agent.py').read_text(encoding='utf-8')}```\n" in page
 
     def test_pixels(self, tmp_path):
         needs("torch")
@@ -176,7 +173,7 @@ class TestPackage:
 
     @pytest.mark.parametrize("name", ["crow_agent.py", "pyproject.toml"])
     def test_file_when_compared_with_the_page(self, name):
-        page = (EXAMPLES.parent / "agents.md").read_text(encoding="utf-8")
+        page = (EXAMPLES.parent / "custom_agents.md").read_text(encoding="utf-8")
         assert f"\n{(EXAMPLES / 'crow_agent' / name).read_text(encoding='utf-8')}```\n" in page
 
     def test_agent_when_its_package_is_installed(self, tmp_path):

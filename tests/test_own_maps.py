@@ -163,7 +163,7 @@ class TestAgents:
         (tmp_path / "large.txt").write_text(format_maze(generate("dfs", 31, np.random.default_rng(0))))
         assert make_plan(EvalOptions.of("random", mazes=str(tmp_path / "large.txt"))).remark == (
             "random is shown the 31 x 31 cells as a map of 21 x 21; context_size() of its class chooses another one "
-            "(docs/agents.md)"
+            "(docs/custom_agents.md)"
         )
         assert make_plan(EvalOptions.of("planner", mazes=str(tmp_path / "large.txt"))).remark is None
         assert make_plan(EvalOptions.of("random", track="building")).remark is None

@@ -1,7 +1,7 @@
 """Runs that are killed, stopped, short of disk space or not alone in their folder.
 
 Each test starts the installed command as a process of its own. A disk that fills is a file system mounted in memory.
-docs/reliability.md has the promises.
+docs/guarantees.md#failures has the promises.
 """
 
 from __future__ import annotations

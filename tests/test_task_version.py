@@ -1,6 +1,6 @@
 """Episodes of task version 1 stay what they are; `python tests/test_task_version.py` rewrites the golden file.
 
-Whoever has to rewrite it has changed what an episode is, which docs/release.md allows in a new version only.
+Whoever has to rewrite it has changed what an episode is, which docs/guarantees.md allows in a new version only.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ class Plan:
         """A line of what a user should know before the evaluation; None if there is nothing."""
         task, agent, size = self.task, self.options.agent, _square(self.task.context_size)
         is_coarse = task.track is None and task.context_size < task.size
-        way_out = "; context_size() of its class chooses another one (docs/agents.md)" if is_coarse else ""
+        way_out = "; context_size() of its class chooses another one (docs/custom_agents.md)" if is_coarse else ""
         if self.untrained_scale:
             return (
                 f"{agent} learned on maps of {self._learned_scale:g} m a cell and may fail here: its map of {size} "
