@@ -17,7 +17,7 @@ import mazebench
 from mazebench.maps.benchmark import load_kind_mazes
 from mazebench.maps.maze import Cell, Maze
 from mazebench.maps.pictures import draw_grid
-from mazebench.results.played import Shown, shown_of, task_of
+from mazebench.results.played import Shown, shown_of
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.episode import Episode
@@ -57,7 +57,7 @@ def play(track: str, level: int) -> tuple[Maze, Cell, np.ndarray, Shown]:
         result = load_result(pathlib.Path(folder))
         [number] = [record.episode for record in result.records if record.maze == maze.name]
         record = result.records[number]
-        shown = shown_of(task_of(result.summary), Episode(HOUSE, record.start, record.goal, 0.0, record.seed))
+        shown = shown_of(result.summary.task, Episode(HOUSE, record.start, record.goal, 0.0, record.seed))
         pose = load_trajectories(pathlib.Path(folder) / TRAJECTORIES)[number].pose.astype(float)
         return maze, record.goal, pose, shown
 

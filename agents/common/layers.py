@@ -97,7 +97,7 @@ def state_features(state: torch.Tensor, origin: torch.Tensor) -> torch.Tensor:
     """Returns features `[..., 9]` of states `[..., 12]`.
 
     They are x and y since `origin` `[..., 2]` (m), the sine and cosine of yaw, three velocities, and x and y again,
-    in units of 5 m. The other numbers of a state never vary (docs/tasks.md).
+    in units of 5 m. The other numbers of a state never vary (docs/task.md).
     """
     yaw = state[..., 5]
     return torch.cat(

@@ -2,7 +2,7 @@
 
 Lengths are metres; 1 m stands for 100 game units of DeepMind Lab. The body slides along x and y and
 yaws; height, roll and pitch are fixed. The constants below are fitted to measurements in DeepMind Lab, which
-docs/tasks.md lists.
+docs/task.md lists.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from mazebench.maps.kinds.kind import Kind, lattice_door_slots
 from mazebench.maps.maze import Cell
 
 # Share of the walls between two corridors that are opened. With it, over 90 % of 13 x 13 mazes have 3 to 6 landmarks at
-# distance 5 from corner to corner, as in the paper (docs/maps.md has the distribution over 1,000 mazes).
+# distance 5 from corner to corner, as in the paper (docs/layouts.md).
 DFS_OPENINGS = 0.10
 
 
