@@ -1,6 +1,6 @@
-"""Draws the film of the README and a picture of each environment: `python -m benchmarks.environment_pictures [EPISODE]`.
+"""Draws the film of the README and a picture of each environment: `python -m benchmarks.environment_pictures`.
 
-The film, docs/images/rebuilt.gif, is an episode of `navigator` on the dev mazes of `rebuilt` 2, in which the shown path is
+The film, docs/images/rebuilt.gif, is an episode of `navigator` in the dev mazes of `rebuilt` 2, where the shown path is
 blocked. The pictures, docs/images/environments/NAME.png, have the shown map on the left, and on the right the maze with
 the oracle's path, of train mazes.
 """

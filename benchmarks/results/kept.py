@@ -35,11 +35,14 @@ ON_TIME_125, ON_TIME_2 = ON_TIME_METRICS  # within 1.25 and 2 times the oracle's
 # Agents, with what they were told less or more than others.
 NAVIGATOR, NO_MAP, TRUE_POSE = "navigator", "navigator without map", "navigator with the true pose"
 RANDOM = "random"
+LEARNED, REWARDED = "neural-planner", "neural-planner from rewards"  # several training runs each
 PATHS = {"path on the map open": False, "path on the map blocked": True}  # whether a record is of a blocked one
 
 _SUFFIX = ".tar.xz"
 _TRAINING = "training"  # the folder of archives of training runs
 _RUNS = f"runs{_SUFFIX}"  # evaluations of training runs, in folders NAME-SEED
+# Evaluations of several training runs on the tracks, in folders RUN/PART, by the name of their archive.
+_SEVERAL = {"tracks-neural-planner": LEARNED, "tracks-neural-planner-rewards": REWARDED}
 _KEPT_FILES = (CONFIG, EPISODES, ORACLE, SUMMARY)
 
 
@@ -52,6 +55,7 @@ class Kept:
     episodes: pd.DataFrame  # of that report
     runs: dict[str, list[Result]]  # of training runs on the part `LOCAL`, by name of the agent that was trained
     training: dict[str, list[Run]]  # what training runs logged, by name of the archive
+    several: dict[tuple[str, str], list[Result]] = dataclasses.field(default_factory=dict)  # as `results`, of each run
 
     def training_runs(self, name: str) -> list[Result]:
         """Returns the evaluations of an agent's training runs, two at least, in the same episodes.
@@ -98,11 +102,16 @@ class Kept:
             raise InputError(f"expected an evaluation of {row} on {part} among the records, found none")
         return self.results[row, part]
 
-    def levels(self, row: str, track: str) -> list[Result]:
-        """Returns an agent's evaluations at the levels of a track; none with the true pose on a track that tells it."""
+    def levels(self, row: str, track: str) -> list[list[Result]]:
+        """Returns an agent's evaluations at the levels of a track, of each training run; none where it has none.
+
+        It has none with the true pose on a track that tells it.
+        """
         if row == TRUE_POSE and not TRACKS[track].hides_pose:
             return []
-        return [self.result(row, f"{track}-{level}") for level in LEVELS]
+        if row in _SEVERAL.values():
+            return [self.several[row, part] for level in LEVELS if (row, part := f"{track}-{level}") in self.several]
+        return [[self.result(row, f"{track}-{level}")] for level in LEVELS]
 
 
 def read_kept(folder: pathlib.Path) -> Kept:
@@ -113,6 +122,7 @@ def read_kept(folder: pathlib.Path) -> Kept:
     """
     results: dict[tuple[str, str], Result] = {}
     runs: dict[str, list[Result]] = {}
+    several: dict[tuple[str, str], list[Result]] = {}
     training: dict[str, list[Run]] = {}
     with tempfile.TemporaryDirectory() as temporary:
         unpacked = pathlib.Path(temporary)
@@ -130,6 +140,9 @@ def read_kept(folder: pathlib.Path) -> Kept:
             if _RUNS in summary.parts:
                 runs.setdefault(summary.parent.name.rpartition("-")[0], []).append(result)
                 continue
+            if row := _SEVERAL.get(summary.relative_to(unpacked).parts[0].removesuffix(_SUFFIX)):
+                several.setdefault((row, summary.parent.name), []).append(result)
+                continue
             key = result.summary.row, result.summary.part or summary.parent.name
             if key in results:
                 archives = [each.folder.relative_to(unpacked).parts[0] for each in (results[key], result)]
@@ -139,7 +152,7 @@ def read_kept(folder: pathlib.Path) -> Kept:
         if not paper:
             raise InputError(f"{folder}: expected records of the suite {PAPER!r}, found none")
         episodes = join_episodes(read_results(paper))
-    return Kept(results, {table.name: table for table in build_tables(episodes)}, episodes, runs, training)
+    return Kept(results, {table.name: table for table in build_tables(episodes)}, episodes, runs, training, several)
 
 
 def keep(folder: pathlib.Path, records: pathlib.Path) -> pathlib.Path:
@@ -173,6 +186,12 @@ def _archive(folder: pathlib.Path, paths: Sequence[pathlib.Path], target: pathli
             with each.open("rb") as content:
                 archive.addfile(entry, content)
     return path
+
+
+def mean_estimate(runs: Sequence[Result], metric: str, field: str = "", values: Sequence[Any] = ()) -> float | None:
+    """Returns the mean of a metric over training runs in the same episodes; the rest as of `estimate`."""
+    found = [estimate(result, metric, field, values) for result in runs]
+    return None if None in found else float(np.mean([each.value for each in found if each]))
 
 
 def estimate(result: Result, metric: str, field: str = "", values: Sequence[Any] = ()) -> Estimate | None:

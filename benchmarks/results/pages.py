@@ -18,11 +18,11 @@ RECORDS = ROOT / "records"
 PAGES = (
     "README.md",
     "docs/results.md",
+    "docs/results_full.md",
     "docs/tracks.md",
-    "docs/agents/navigator.md",
+    "docs/baselines.md",
     "docs/agents/mmn.md",
-    "docs/experiments/dqn.md",
-    "docs/experiments/mmn.md",
+    "docs/experiments.md",
 )
 
 _BEGIN, _END = "<!-- table: ", "<!-- end of table -->"

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pathlib
-import shutil
-import tempfile
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.results.kept import (
+    LEARNED,
     LOCAL,
     NAVIGATOR,
     NO_MAP,
@@ -21,16 +21,23 @@ from benchmarks.results.kept import (
     Kept,
     estimate,
 )
-from mazebench.maps.kinds import KNOWN, NOVEL
-from mazebench.report.figures import Drawn, Panel, draw_distributions, draw_panels, draw_table, save
+from mazebench.report.figures import Drawn, Panel, draw_panels, draw_table, to_svg
 from mazebench.report.table import Table
 from mazebench.results.intervals import Estimate
+from mazebench.results.metrics import is_on_time
+from mazebench.storage.files import open_whole
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.track import LEVELS
 
 # Of the report of the suite `paper`.
 _FLIPS, _WARPS = "flip-hierarchical-13", "warp-local-13"
-_VIOLINS = "violins-noise-local-13"
+_LOCAL_AGENTS = ("mmn", "mah", "mah-paper", "dqn", "random", "MMN (paper)")  # those that do not reach every goal
+_FACTORS = np.arange(1.0, 3.01, 0.125)  # of the oracle's steps
+# Each line's place is its colour and marker, in all figures.
+_LOOKS = (
+    NAVIGATOR, LEARNED, NO_MAP, "planner-closed-loop", "mmn", "mah", "mah-paper", "dqn", "random", TRUE_POSE,
+    "mmn without model and search", "sb3_agent:PPOAgent",
+)  # fmt: skip
 
 # What a panel shows: by the name of a line, an estimate at each tick; None where there is none.
 _Lines = dict[str, list[Estimate | None]]
@@ -38,58 +45,61 @@ _Lines = dict[str, list[Estimate | None]]
 
 def figures(kept: Kept) -> list[Drawn]:
     """Returns all figures that pages show."""
-    violins = [each for each in draw_distributions(kept.episodes) if each.name == _VIOLINS]
-    of_report = [draw_table(kept.report[LOCAL], list(kept.episodes.label.cat.categories)), *violins]
-    own = [each(kept) for each in (map_worth, learning, novel_kinds, what_fails, model_and_search)]
-    return [*own, *of_report]
+    local = kept.report[LOCAL]
+    local = dataclasses.replace(local, values=local.values[local.values.column.isin(_LOCAL_AGENTS)])
+    own = [each(kept) for each in (map_worth, budget, wrong_maps, what_fails, model_and_search)]
+    return [*own, draw_table(local, list(_LOOKS))]
 
 
 def draw_figures(chosen: Sequence[Drawn], folder: pathlib.Path) -> None:
-    """Writes figures as PNG into a folder."""
-    with tempfile.TemporaryDirectory() as temporary:
-        for drawn in chosen:
-            save(drawn.figure, pathlib.Path(temporary) / drawn.name)
-            shutil.copy(pathlib.Path(temporary, f"{drawn.name}.png"), folder)
+    """Writes figures as SVG into a folder."""
+    for drawn in chosen:
+        with open_whole(folder / f"{drawn.name}.svg") as file:
+            file.write(to_svg(drawn).encode())
 
 
 def map_worth(kept: Kept) -> Drawn:
     """Returns the navigator on time with and without the map, by track and level."""
-    rows = {"navigator": NAVIGATOR, "navigator without the map": NO_MAP, "navigator with the true pose": TRUE_POSE}
-    panels = {track: {label: _levels(kept, row, track) for label, row in rows.items()} for track in TRACKS}
-    return _figure("map-worth", "What the map is worth: episodes on time (1.25)", panels)
+    rows = (NAVIGATOR, NO_MAP, TRUE_POSE)
+    panels = {track: {row: _levels(kept, row, track) for row in rows} for track in TRACKS}
+    return _figure("map-worth", "What the map is worth", panels, "on-time rate")
 
 
-def novel_kinds(kept: Kept) -> Drawn:
-    """Returns the navigator on time in known and in novel kinds of mazes, by track and level."""
-    panels = {
-        track: {
-            f"navigator, {name} kinds": _levels(kept, NAVIGATOR, track, "kind", kinds)
-            for name, kinds in (("known", KNOWN), ("novel", NOVEL))
-        }
-        for track in TRACKS
-    }
-    return _figure("novel-kinds", "What novel kinds of buildings cost: episodes on time (1.25)", panels)
+def budget(kept: Kept) -> Drawn:
+    """Returns the share of episodes that reach the goal within a budget of steps, at level 2 of each track."""
+    panels = []
+    for track in TRACKS:
+        runs = {row: [kept.result(row, f"{track}-2")] for row in (NAVIGATOR, NO_MAP, "sb3_agent:PPOAgent")}
+        if (LEARNED, f"{track}-2") in kept.several:
+            runs[LEARNED] = kept.several[LEARNED, f"{track}-2"]
+        points = [
+            {"column": row, "x": factor, "value": value, "low95": value, "high95": value}
+            for row, results in runs.items()
+            for factor in _FACTORS
+            for value in [np.mean([is_on_time(each.records, each.oracle_steps or {}, factor) for each in results])]
+        ]
+        ticks = {x: f"{x:g}" for x in (1.0, 1.25, 2.0, 3.0)}
+        panels.append(Panel(f"{track} 2", "budget, times the oracle's steps", pd.DataFrame(points), ticks))
+    title = "Success over the budget of steps"
+    return Drawn("budget", title, "", draw_panels(title, panels, _LOOKS, y_name="success rate"))
 
 
 def what_fails(kept: Kept) -> Drawn:
     """Returns the navigator on time where the shortest path on the map is open and where it is blocked."""
     panels = {
-        track: {
-            f"navigator, {name}": _levels(kept, NAVIGATOR, track, "blocked", (is_blocked,))
-            for name, is_blocked in PATHS.items()
-        }
+        track: {name: _levels(kept, NAVIGATOR, track, "blocked", (is_blocked,)) for name, is_blocked in PATHS.items()}
         for track in TRACKS
     }
-    return _figure("what-fails", "Where the navigator is late: episodes on time (1.25)", panels)
+    return _figure("what-fails", "Where the navigator is late", panels, "on-time rate")
 
 
-def learning(kept: Kept) -> Drawn:
+def wrong_maps(kept: Kept) -> Drawn:
     """Returns success rates on wrong maps of the paper's protocol, without a lidar."""
     rows = ("planner-closed-loop", "mah", "mmn", NAVIGATOR)
     tables = {"Hierarchical, share of cells flipped": _FLIPS, "Local, maps warped by": _WARPS}
     panels = {title: {row: _of_table(kept.report[name], row) for row in rows} for title, name in tables.items()}
     ticks = [list(kept.report[name].x) for name in tables.values()]
-    return _figure("learning", "Wrong maps without a lidar: success rate", panels, "", ticks)
+    return _figure("wrong-maps", "Wrong maps without a lidar", panels, "success rate", "", ticks)
 
 
 def model_and_search(kept: Kept) -> Drawn:
@@ -108,12 +118,12 @@ def model_and_search(kept: Kept) -> Drawn:
         ticks = {x: f"{x:g}" for x in (0.2, 0.4, 0.6, 0.8, 1.0)}
         panels.append(Panel(f"{distance} cells", "million agent steps", pd.DataFrame(points), ticks))
     title = "Success rate on held-out mazes over training: mean, lowest and highest run"
-    return Drawn("model-and-search", title, "", draw_panels(title, panels, list(archives)))
+    return Drawn("model-and-search", title, "", draw_panels(title, panels, _LOOKS, y_name="success rate"))
 
 
 def _levels(kept: Kept, row: str, track: str, field: str = "", values: Sequence[Any] = ()) -> list[Estimate | None]:
     """Returns the share on time at the levels of a track, of the episodes that `estimate` counts."""
-    return [estimate(result, ON_TIME_125, field, values) for result in kept.levels(row, track)]
+    return [estimate(result, ON_TIME_125, field, values) for [result] in kept.levels(row, track)]
 
 
 def _of_table(table: Table, label: str) -> list[Estimate | None]:
@@ -127,7 +137,12 @@ def _of_table(table: Table, label: str) -> list[Estimate | None]:
 
 
 def _figure(
-    name: str, title: str, panels: Mapping[str, _Lines], x_name: str = "level", ticks: Sequence[Sequence[str]] = ()
+    name: str,
+    title: str,
+    panels: Mapping[str, _Lines],
+    y_name: str,
+    x_name: str = "level",
+    ticks: Sequence[Sequence[str]] = (),
 ) -> Drawn:
     drawn = []
     for index, (panel, lines) in enumerate(panels.items()):
@@ -139,5 +154,5 @@ def _figure(
         ]
         texts = ticks[index] if ticks else map(str, LEVELS)
         drawn.append(Panel(panel, x_name, pd.DataFrame(points), dict(enumerate(texts))))
-    labels = list(dict.fromkeys(label for lines in panels.values() for label in lines))
-    return Drawn(name, title, "", draw_panels(title, drawn, labels))
+    labels = list(dict.fromkeys([*_LOOKS, *(label for lines in panels.values() for label in lines)]))
+    return Drawn(name, title, "", draw_panels(title, drawn, labels, y_name=y_name))

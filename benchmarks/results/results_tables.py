@@ -12,6 +12,7 @@ import pandas as pd
 from scipy import stats
 
 from benchmarks.results.kept import (
+    LEARNED,
     LOCAL,
     NAVIGATOR,
     NO_MAP,
@@ -20,9 +21,11 @@ from benchmarks.results.kept import (
     PAPER,
     PATHS,
     RANDOM,
+    REWARDED,
     TRUE_POSE,
     Kept,
     estimate,
+    mean_estimate,
 )
 from mazebench.errors import InputError
 from mazebench.maps.kinds import KNOWN, NOVEL
@@ -31,7 +34,7 @@ from mazebench.report.table import METRICS, to_markdown
 from mazebench.report.tables import DEFAULT_LANDMARK_DISTANCE
 from mazebench.results.comparison import compare_results
 from mazebench.results.intervals import CONFIDENCE, Estimate, runs_interval
-from mazebench.results.metrics import ON_TIME_METRICS
+from mazebench.results.metrics import ON_TIME_METRICS, scores
 from mazebench.results.reading import Result
 from mazebench.results.records import column
 from mazebench.tasks.tracks import TRACKS
@@ -99,7 +102,16 @@ _REGIMES = {
 }
 
 _PARTS = tuple((track, level) for track in TRACKS for level in LEVELS)
-_NOT_LOST = "not lost"  # of the navigator with the true pose, on tracks that tell it to all
+_NOT_RUN = "-"  # of the navigator with the true pose, on tracks that tell it to all, and of runs without results
+# The rows of the table at a glance.
+_GLANCE = {
+    "oracle": "`oracle`: knows the building",
+    NAVIGATOR: "`navigator`: a classical robot",
+    LEARNED: "`neural-planner`: learned, plans on learned costs",
+    NO_MAP: "`navigator` without the map",
+    "sb3_agent:PPOAgent": "PPO, end to end",
+    RANDOM: "`random`",
+}
 # The rows of tables of tracks, by the agent and what it was told less or more than others.
 _ROWS = {
     "oracle": "`oracle`, privileged: gets the true maze and pose",
@@ -107,6 +119,8 @@ _ROWS = {
     NO_MAP: "`navigator` without the map",
     "navigator without map and goal": "`navigator` without map and goal",
     TRUE_POSE: "`navigator` with the true pose",
+    LEARNED: "`neural-planner`, learned from the oracle",
+    REWARDED: "`neural-planner`, learned from rewards",
     "planner-closed-loop": "`planner-closed-loop`, trusts the map",
     "sb3_agent:PPOAgent": "PPO of Stable-Baselines3",
     "sb3_agent:RecurrentPPOAgent": "PPO of sb3-contrib, with an LSTM",
@@ -222,13 +236,34 @@ def mmn_runs(kept: Kept) -> str:
     return _table(["agent", "runs", *map(str, _PRINTED_DISTANCES)], rows)
 
 
-def tracks_table(metric: str, kept: Kept) -> str:
-    """Returns a metric of all agents on the tracks."""
+def tracks_table(metric: str, chosen: Mapping[str, str], kept: Kept) -> str:
+    """Returns a metric of agents on the tracks."""
+    played = _rows_of_tracks(kept)
     rows = [
         [description, *(_levels(kept, row, track, metric) for track in TRACKS)]
-        for row, description in _rows_of_tracks(kept).items()
+        for row, description in chosen.items()
+        if row in played
     ]
     return _table(["agent", *map(_code, TRACKS)], rows)
+
+
+def tracks_learned(row: str, kept: Kept) -> str:
+    """Returns a learned agent's rates over its training runs, and the paired differences to the navigator."""
+    lines = []
+    for track, level in _PARTS:
+        if runs := kept.several.get((row, f"{track}-{level}")):
+            navigator = kept.result(NAVIGATOR, f"{track}-{level}")
+            maze = column(navigator.records, "maze")
+            own, other = (
+                {metric: np.array([scores(each.records, each.oracle_steps)[metric] for each in results], dtype=float)
+                 for metric in ("success_rate", ON_TIME_125)}
+                for results in (runs, [navigator])
+            )  # fmt: skip
+            means = [_interval(runs_interval(values, maze)) for values in own.values()]
+            differences = [_interval(runs_interval(own[metric], maze, other[metric])) for metric in own]
+            lines.append([f"{_code(track)} {level}", str(len(runs)), *means, *differences])
+    header = ["setting", "runs", "success rate", "on-time rate"]
+    return _table([*header, "success - `navigator`", "on-time rate - `navigator`"], lines)
 
 
 def tracks_map_worth(kept: Kept) -> str:
@@ -290,9 +325,12 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "mah-curve": mah_curve,
     "mmn-ingredients": functools.partial(short_runs, _INGREDIENTS, {"model_error_1": ".3f", "map_ratio": ".1f"}),
     "mmn-regimes": functools.partial(short_runs, _REGIMES, {}),
-    "tracks-success": functools.partial(tracks_table, "success_rate"),
-    "tracks-on-time": functools.partial(tracks_table, ON_TIME_125),
-    "tracks-on-time-2": functools.partial(tracks_table, ON_TIME_2),
+    "tracks-glance": functools.partial(tracks_table, ON_TIME_125, _GLANCE),
+    "tracks-success": functools.partial(tracks_table, "success_rate", _ROWS),
+    "tracks-on-time": functools.partial(tracks_table, ON_TIME_125, _ROWS),
+    "tracks-on-time-2": functools.partial(tracks_table, ON_TIME_2, _ROWS),
+    "tracks-learned": functools.partial(tracks_learned, LEARNED),
+    "tracks-rewarded": functools.partial(tracks_learned, REWARDED),
     "tracks-map-worth": tracks_map_worth,
     "tracks-novel-kinds": tracks_novel_kinds,
     "tracks-blocked": tracks_blocked,
@@ -328,6 +366,7 @@ def _over_values(rates: Sequence[float]) -> str:
 def _rows_of_tracks(kept: Kept) -> dict[str, str]:
     """Returns those of `_ROWS` that are evaluated on the tracks."""
     played = {row for (row, _), result in kept.results.items() if result.summary.task.track}
+    played |= {row for row, _ in kept.several}
     if not played:
         raise InputError("expected evaluations on tracks among the records, found none")
     if unnamed := played - _ROWS.keys():
@@ -337,8 +376,8 @@ def _rows_of_tracks(kept: Kept) -> dict[str, str]:
 
 def _levels(kept: Kept, row: str, track: str, metric: str, field: str = "", values: Sequence[Any] = ()) -> str:
     """Returns the means of a metric at the levels of a track, of the episodes that `estimate` counts."""
-    means = [estimate(result, metric, field, values) for result in kept.levels(row, track)]
-    return " / ".join("none" if mean is None else _number(mean.value) for mean in means) or _NOT_LOST
+    means = [mean_estimate(runs, metric, field, values) for runs in kept.levels(row, track)]
+    return " / ".join("none" if mean is None else _number(mean) for mean in means) or _NOT_RUN
 
 
 def _interval(mean: Estimate | None) -> str:

@@ -123,7 +123,9 @@ def draw_distributions(episodes: pd.DataFrame) -> Iterator[Drawn]:
         yield Drawn(f"violins-{perturbed_name(perturbation, base)}", title, " ".join(note.split()), figure)
 
 
-def draw_panels(title: str, panels: Sequence[Panel], labels: Sequence[str], height: float = 2.2) -> Figure:
+def draw_panels(
+    title: str, panels: Sequence[Panel], labels: Sequence[str], height: float = 2.2, y_name: str = ""
+) -> Figure:
     """Returns panels of `height` inches in a grid, the title above, and one legend below them.
 
     The place in `labels` gives an agent its colour and marker, and those of the paper have theirs.
@@ -132,6 +134,7 @@ def draw_panels(title: str, panels: Sequence[Panel], labels: Sequence[str], heig
         figure, grid = _make_grid(title, [panel.title for panel in panels], height)
         for axes, panel in zip(grid, panels, strict=True):
             _draw_panel(axes, panel, labels)
+        figure.supylabel(y_name, fontsize=8)
         handles: dict[str, Any] = {}
         for axes in grid:
             handles |= dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
