@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pathlib
+import textwrap
 
 import gymnasium
 import pytest
@@ -24,7 +25,7 @@ TASKS = {
 CHOICE = {  # question: environment
     "learn to drive by a right map, first steps in RL": "building",
     "plan although the map is out of date": "rebuilt",
-    "localize without a pose": "adrift",
+    "localize by odometry and a map": "adrift",
     "read a sketch": "rough",
     "compare with the paper, short training without a lidar": "local",
     "follow sub-goals of a given path": "hierarchical",
@@ -72,7 +73,7 @@ def _page(name: str) -> str:
     sections = [
         f"# {name}\n",
         f"![{name}](../images/environments/{name}.png)\n",
-        f"{_help(name)}\n",
+        textwrap.fill(_help(name), 120) + "\n",
         "```python",
         "import gymnasium",
         "import mazebench\n",
@@ -112,7 +113,7 @@ def _levels(name: str) -> list[str]:
         "| level | what is imperfect |",
         "|---|---|",
         *lines,
-        f"\nThe pose in `state` is {pose}. The lidar is a TurtleBot3's ([Noise](../task.md#noise-on-the-senses)).\n",
+        f"\nThe pose in `state` is {pose}. The lidar is a TurtleBot3's.\n",
     ]
 
 

@@ -37,11 +37,11 @@ LAYERS = {name: layer for layer, names in enumerate(ORDER) for name in names}
 # A folder of agents/ imports only from those of lines above it and itself: first parts, then agents. `mah` shares the
 # learner of `dqn`.
 AGENT_ORDER = (
-    {"common", "integrations"},
+    {"common"},
     {"robot", "muzero"},
     {"expert"},
     {"random_agent", "planner", "navigator", "neural_planner", "mmn", "dqn"},
-    {"mah"},
+    {"mah", "integrations"},
 )
 AGENT_LAYERS = {name: layer for layer, names in enumerate(AGENT_ORDER) for name in names}
 # Where in the repository a library may be imported.

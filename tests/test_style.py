@@ -8,6 +8,8 @@ import re
 import pytest
 from pages import ROOT, name_of, read
 
+from benchmarks.results.results_tables import SATURATED
+
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
 MOST_WORDS = 19_000
 HEDGES = r"\b(may|might|perhaps|seems?|likely|unlikely|possibly|probably|unclear|not clear|to be seen|told apart)\b"
@@ -58,4 +60,5 @@ def test_words_of_a_page(page):
     text = " ".join(prose(page).split())
     assert [found[0] for pattern in BANNED for found in re.finditer(pattern, text)] == []
     assert re.findall(COMMIT, text) == []
-    assert [line for line in prose(page).splitlines() if len(line) > 125] == []
+    lines = [line for line in prose(page).splitlines() if not line.startswith(SATURATED)]  # below a table, made with it
+    assert [line for line in lines if len(line) > 120] == []
