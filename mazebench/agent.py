@@ -28,7 +28,13 @@ class Truth(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """Everything that an agent is given before one step in B environments; the caller owns the arrays."""
+    """Everything that an agent is given before one step in B environments; the caller owns the arrays.
+
+        >>> inputs.observation["state"].shape, inputs.new_episode.shape
+        ((64, 12), (64,))
+
+    Observations are arrays by name, in float32 with a first axis of B, as `mazebench.make_vec` gives them.
+    """
 
     observation: Observation
     new_episode: np.ndarray  # [B] bool, whether an episode begins with this step
@@ -80,6 +86,12 @@ class Agent(_Declarations):
 
     All that an agent remembers is in its state, which `initial_state` and `act` return. Between steps it keeps nothing
     on itself, because one agent may play several batches of episodes in turn.
+
+        >>> class Forward(mazebench.Agent):
+        ...     def act(self, inputs, state, explore=False):
+        ...         return np.zeros(len(inputs.seed), int), state  # 0 is forward
+
+    An evaluation ends with an `AgentError` that names the agent's line if a method raises or returns something else.
     """
 
     def initial_state(self, batch_size: int) -> Any:
@@ -104,6 +116,11 @@ class SingleAgent(_Declarations):
 
     Each episode is played by a fresh copy of what `build` returned, so an agent may keep on itself whatever it likes:
     nothing carries over to another episode. The attributes below are set before each call of a method.
+
+        >>> class Forward(mazebench.SingleAgent):
+        ...     def act(self, observation):
+        ...         return 0  # forward
+        >>> mazebench.evaluate(Forward, distances=(1,)).overall.success_rate
     """
 
     seed: int  # of the episode, for the agent's own random draws
