@@ -9,7 +9,7 @@ import pytest
 from processes import run_python
 
 NOTEBOOK = pathlib.Path(__file__).parent.parent / "docs" / "examples" / "first_hour.ipynb"
-SMALL_BUDGET = {"STEPS = 40_000": "STEPS = 4_000", "DISTANCES = (5, 10, 15, 20)": "DISTANCES = (2, 5)"}
+SMALL_BUDGET = {"STEPS = 40_000": "STEPS = 4_000", "range(15, 41)": "range(15, 17)"}
 
 
 @pytest.fixture(scope="module")
