@@ -99,7 +99,7 @@ class Agent(_Declarations):
         return None
 
     def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, Any]:
-        """Returns actions and the next state: `[B]` int, or velocities `[B, 3]` or `[B, 2]` float.
+        """Returns actions and the next state: `[B]` int, or velocities `[B, 3]` or `[B, 2]` float from -1 to 1.
 
         What an agent does in an episode must depend on that episode alone, and not on its position in the batch.
 
@@ -134,10 +134,14 @@ class SingleAgent(_Declarations):
         """
 
     def act(self, observation: Observation) -> int | np.ndarray:
-        """Returns an action: one of six, or velocities `[3]` or `[2]`.
+        """Returns an action: one of six, or velocities `[3]` or `[2]` from -1 to 1, as `plays_actions` declares.
+
+        The six are forward, backward, strafe left, strafe right, look left and look right, from 0 to 5. Velocities are
+        shares of the top speeds: forward, left and turn, or forward and turn.
 
         Args:
-          observation: "state" `[12]` and "context" `[4, M, M]`, not to be changed.
+          observation: "state" `[12]`, "context" `[4, M, M]`, and sensors by name, such as "lidar" `[32]` in metres; not
+            to be changed.
         """
         raise NotImplementedError
 
