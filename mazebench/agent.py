@@ -28,7 +28,13 @@ class Truth(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """Everything that an agent is given before one step in B environments; the caller owns the arrays."""
+    """Everything that an agent is given before one step in B environments; the caller owns the arrays.
+
+        >>> inputs.observation["state"].shape, inputs.new_episode.shape
+        ((64, 12), (64,))
+
+    Observations are arrays by name, in float32 with a first axis of B, as `mazebench.make_vec` gives them.
+    """
 
     observation: Observation
     new_episode: np.ndarray  # [B] bool, whether an episode begins with this step
@@ -80,6 +86,12 @@ class Agent(_Declarations):
 
     All that an agent remembers is in its state, which `initial_state` and `act` return. Between steps it keeps nothing
     on itself, because one agent may play several batches of episodes in turn.
+
+        >>> class Forward(mazebench.Agent):
+        ...     def act(self, inputs, state, explore=False):
+        ...         return np.zeros(len(inputs.seed), int), state  # 0 is forward
+
+    An evaluation ends with an `AgentError` that names the agent's line if a method raises or returns something else.
     """
 
     def initial_state(self, batch_size: int) -> Any:
@@ -87,7 +99,7 @@ class Agent(_Declarations):
         return None
 
     def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, Any]:
-        """Returns actions and the next state: `[B]` int, or velocities `[B, 3]` or `[B, 2]` float.
+        """Returns actions and the next state: `[B]` int, or velocities `[B, 3]` or `[B, 2]` float from -1 to 1.
 
         What an agent does in an episode must depend on that episode alone, and not on its position in the batch.
 
@@ -104,6 +116,11 @@ class SingleAgent(_Declarations):
 
     Each episode is played by a fresh copy of what `build` returned, so an agent may keep on itself whatever it likes:
     nothing carries over to another episode. The attributes below are set before each call of a method.
+
+        >>> class Forward(mazebench.SingleAgent):
+        ...     def act(self, observation):
+        ...         return 0  # forward
+        >>> mazebench.evaluate(Forward, distances=(1,)).overall.success_rate
     """
 
     seed: int  # of the episode, for the agent's own random draws
@@ -117,10 +134,14 @@ class SingleAgent(_Declarations):
         """
 
     def act(self, observation: Observation) -> int | np.ndarray:
-        """Returns an action: one of six, or velocities `[3]` or `[2]`.
+        """Returns an action: one of six, or velocities `[3]` or `[2]` from -1 to 1, as `plays_actions` declares.
+
+        The six are forward, backward, strafe left, strafe right, look left and look right, from 0 to 5. Velocities are
+        shares of the top speeds: forward, left and turn, or forward and turn.
 
         Args:
-          observation: "state" `[12]` and "context" `[4, M, M]`, not to be changed.
+          observation: "state" `[12]`, "context" `[4, M, M]`, and sensors by name, such as "lidar" `[32]` in metres; not
+            to be changed.
         """
         raise NotImplementedError
 

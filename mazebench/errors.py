@@ -12,7 +12,14 @@ if TYPE_CHECKING:
 
 
 class InputError(ValueError):
-    """Bad input from a user; the message says what was expected and what was found, in one line."""
+    """Bad input from a user; the message says what was expected and what was found, in one line.
+
+        >>> mazebench.make("locl")
+        Traceback (most recent call last):
+        InputError: unknown task 'locl'; available: adrift, building, hierarchical, local, rebuilt, rough
+
+    The command line prints the line and ends with status 2.
+    """
 
     def __init__(self, message: str):
         """Escapes what does not print in `message`, such as line ends in names of files."""
@@ -24,7 +31,12 @@ class UnknownOptionError(InputError, TypeError):
 
 
 class UnplayableError(InputError):
-    """An agent can't play in the environments that it is to be built for. A suite leaves such a part out."""
+    """An agent can't play in the environments that it is to be built for. A suite leaves such a task out.
+
+        >>> raise mazebench.UnplayableError("expected contexts of 13 x 13, found 31 x 31")
+
+    An agent raises it in `build`.
+    """
 
 
 class RunError(RuntimeError):

@@ -33,6 +33,9 @@ _CHANNELS = (32, 64, 64)  # of the convolutions, each of which halves the side
 class MazeVecEnv(VecEnv):
     """A vector environment of mazebench with the interface of Stable-Baselines3.
 
+        >>> envs = MazeVecEnv(mazebench.make_vec("building", 16, split="train", reward="progress"))
+        >>> PPO("MultiInputPolicy", envs, policy_kwargs={"features_extractor_class": MapFeatures})
+
     At the end of an episode, `infos` have what mazebench's `info` told then, and what Stable-Baselines3 looks for:
     `terminal_observation`, `TimeLimit.truncated` and `is_success`, which it logs as success_rate.
     """

@@ -89,7 +89,12 @@ def make(
 
         >>> env = mazebench.make("rebuilt", level=2, sensors="egocentric")
 
-    `id_size` is the size of the mazes that an id names, unless size or mazes are given.
+    Observations are a dict of float32 arrays: "state" `[12]`, "context" `[4, M, M]`, and the sensors that are asked
+    for, such as "lidar" `[32]` in metres. `id_size` is the size of the mazes that an id names, unless size or mazes
+    are given.
+
+    Raises:
+      InputError: if an option is unknown or not allowed.
     """
     load_mujoco()
     from mazebench.envs.gym import MazeEnv
@@ -129,7 +134,11 @@ def make_vec(
         >>> envs = mazebench.make_vec("building", 64, level=(1, 2), split="train")
 
     `autoreset_mode` says what follows the end of an episode; see `MazeVectorEnv`. `max_episode_steps` is what Gymnasium
-    passes on from the `spec` of such environments. `options` are those of `mazebench.Task.of`.
+    passes on from the `spec` of such environments. `options` are those of `mazebench.Task.of`. Arrays are those of
+    `make` with a first axis of `num_envs`.
+
+    Raises:
+      InputError: if an option is unknown or not allowed.
     """
     load_mujoco()
     from mazebench.envs.vector import MazeVectorEnv

@@ -38,12 +38,25 @@ _WALL_COST = 1000  # the cost, in cells, of each wall on a path through walls
 
 
 class MazeError(InputError):
-    """A grid that is not a legal maze."""
+    """A grid that is not a legal maze.
+
+        >>> mazebench.Maze(np.zeros((5, 5), bool))
+        Traceback (most recent call last):
+        MazeError: maze: expected a closed border, found cell (0, 0) free
+
+    The message names the maze or its file.
+    """
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Maze:
     """A square grid of cells, closed by walls, whose free cells are 4-connected.
+
+        >>> walls = np.ones((5, 5), bool)
+        >>> walls[1:4, 1] = walls[3, 1:4] = False
+        >>> maze = mazebench.Maze(walls)
+        >>> maze.size, maze.distance((1, 1), (3, 3))  # in cells
+        (5, 4)
 
     Raises:
       MazeError: if `walls` is not such a grid; the message names a cell that is wrong.

@@ -39,6 +39,8 @@ _MANY_CELLS, _MOSTLY_FREE = 100, 0.8
 def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any) -> Maze:
     """Reads the maze in one file: a ROS map, an array or a picture if the suffix says so, else text.
 
+        >>> maze = mazebench.read_maze("plan.png")
+
     Args:
       path: of the file; of a ROS map, of its YAML file.
       size: N that the maze must have; for a picture whose cells can't be counted, the cells on its longer side.
@@ -52,6 +54,8 @@ def read_maze(path: str | pathlib.Path, size: int | None = None, **options: Any)
 
 def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
     """Reads the maze in a file, or the mazes in a folder's map files in the order of their names.
+
+        >>> train = mazebench.make_vec("local", 64, mazes=mazebench.read_mazes("plans"))
 
     If a folder holds one map in several formats, as `mazebench generate` writes them, one of them is read: the first of
     ROS map, text, array, picture.

@@ -22,7 +22,14 @@ _FIXED_PAIR_SEED = 20210  # of the pairs of the extremely-low-data regime; any n
 
 @dataclasses.dataclass(frozen=True)
 class Episode:
-    """The values that determine an episode of a given task."""
+    """The values that determine an episode of a given task.
+
+        >>> env = mazebench.make("local", size=13, split="train")
+        >>> episode = mazebench.Episode(maze=0, start=(1, 1), goal=(3, 1), yaw=0.0, seed=7)
+        >>> observation, info = env.reset(options={"episode": episode})
+
+    Cells are (row, column) from the top left.
+    """
 
     maze: int  # index among the task's mazes
     start: Cell

@@ -69,6 +69,10 @@ _OF_AGENTS = ("actions", "sensors", "camera_size", "textures", "hide", "exact_po
 class Task(TaskFields):
     """A task in plain values: what is played, and what agents are shown of it.
 
+        >>> task = mazebench.Task.of("rebuilt", level=2, split="dev")
+        >>> task.title, task.size, len(task.all_mazes)
+        ('rebuilt 2', 31, 48)
+
     `Task.of` makes one and fills what is left open. Fields that it leaves alone: `time_limit` is 0 on a track, whose
     limit depends on the distance, and `lidar_noise` and `odometry_noise` are None where the track has its own.
     """

@@ -34,7 +34,16 @@ CHECK = ("obstacles", "cave", "warehouse")  # in which a map is worth little; ag
 
 
 def generate(kind: str, size: int, rng: np.random.Generator, name: str | None = None) -> Maze:
-    """Returns a random maze of `size` x `size` cells.
+    """Returns a random maze of `size` x `size` cells; the same `rng` gives the same maze.
+
+        >>> mazebench.generate("house", 31, np.random.default_rng(0)).size
+        31
+
+    Args:
+      kind: of the layout: "dfs", "house", "rooms" or another one of `mazebench list`.
+      size: N; `dfs` and `rooms` need an odd one.
+      rng: the random stream, which goes on.
+      name: of the maze; by default the kind and the size.
 
     Raises:
       InputError: if the kind is unknown or has no mazes of this size.

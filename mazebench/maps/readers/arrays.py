@@ -23,6 +23,9 @@ _MAX_BYTES = 2**27  # of a file
 def maze_from_array(array: np.ndarray, name: str = "maze", **options: Any) -> Maze:
     """Returns the maze in an array, whose row 0 is on top.
 
+        >>> mazebench.maze_from_array(np.array([[0, 0, 0], [1, 1, 0], [0, 0, 0]])).size  # a border is added
+        5
+
     Args:
       array: `[R, C]`: walls as bool or as 0 (free) and 1 (wall); or occupancy, -1 where unknown, as 0 (free) and 1
         (occupied) or as whole numbers from 0 to 100 per cent; or characters as a text map has them. An array that is
