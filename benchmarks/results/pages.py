@@ -22,6 +22,7 @@ PAGES = (
     "docs/tracks.md",
     "docs/baselines.md",
     "docs/agents/mmn.md",
+    "docs/agents/neural_planner.md",
     "docs/experiments.md",
 )
 
