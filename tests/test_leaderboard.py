@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import pathlib
 import shutil
 import subprocess
@@ -45,7 +46,7 @@ def make_part(folder, agent, track="adrift", level=1, successes=240, code="c" * 
 
 
 def make_entry(agent, success=1.0, on_time=0.5, checkpoints=()):
-    means = {"on_time": (on_time, 0.0, 1.0), "success": success}
+    means = {"on_time": (on_time, 0.0, 1.0), "success": success, "date": datetime.date(2026, 1, 2)}
     code = (f"made-up 1.0 {'c' * 64}",)
     return Entry(agent=agent, privileged=False, code=code, checkpoints=checkpoints, parts={}, **means)
 
@@ -84,8 +85,13 @@ class TestTables:
         [row] = rows(kept_entries(page))
         # In 8 of 12 parts all goals are reached, in 4 half of them.
         assert row[2].startswith("0.83 [0.")
-        assert row[:2] + row[3:] == ["1", "x (privileged)", "", "0.83", "made-up 1.0 cccccccc"]
-        assert f"| 1 | x (privileged) |{' 1.00, 1.00 | 1.00, 1.00 | 0.50, 0.50 |' * 4}" in page.read_text()
+        assert row[:2] + row[3:-1] == ["1", "x (privileged)", "", "0.83", "made-up 1.0 cccccccc"]
+        assert page.read_text().count(f"| 1 | x (privileged) |{' 1.00 | 1.00 | 0.50 |' * 4}") == 2  # on time, success
+
+    def test_a_row_has_the_day_of_its_entry(self, page):
+        entry = make_entry("x").model_copy(update={"parts": dict.fromkeys(PARTS, (0.5, 0.5))})
+        write_leaderboard([entry], page)
+        assert [row[-1] for row in rows(kept_entries(page))] == ["2026-01-02"]
 
     def test_a_row_says_which_actions_were_used_unless_they_are_the_six(self, suite, tmp_path):
         folder = pathlib.Path(shutil.copytree(suite / "x", tmp_path / "x"))

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 import mazebench
-from benchmarks.results.kept import Kept, keep, read_kept
+from benchmarks.results.kept import Kept, all_episodes, keep, read_kept
 from benchmarks.results.pages import PAGES, RECORDS, ROOT, with_tables
 from benchmarks.results.results_tables import make_table
 from mazebench.report.curves import Run
@@ -65,6 +65,17 @@ class TestRecords:
         with tarfile.open(path) as archive:
             inside = ("config.json", "metrics.jsonl", "checkpoints/000000000200/agent.safetensors")
             assert archive.getnames() == [f"mine/seed-3/{name}" for name in inside]
+
+
+class TestEpisodes:
+    def test_every_episode_is_a_line(self, kept):
+        episodes = all_episodes(kept)
+        navigator = episodes[(episodes.agent == "navigator") & (episodes.setting == "rebuilt-2")]
+        assert len(navigator) == 240
+        assert f"{navigator.success.mean():.2f}" == "1.00"
+        on_time = navigator.success & (navigator.steps <= 1.25 * navigator.oracle_steps)
+        assert f"{on_time.mean():.2f}" == "0.72"  # as in the tables
+        assert (episodes[episodes.agent == "oracle"].steps >= 1).all()
 
 
 class TestTrainingRuns:

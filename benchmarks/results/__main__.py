@@ -11,7 +11,7 @@ import sys
 
 import typer
 
-from benchmarks.results.kept import keep, read_kept
+from benchmarks.results.kept import all_episodes, keep, read_kept
 from benchmarks.results.pages import PAGES, RECORDS, ROOT, with_tables
 from benchmarks.results.results_figures import draw_figures, figures
 from mazebench.errors import InputError
@@ -38,6 +38,15 @@ def keep_folders(folders: list[pathlib.Path]) -> None:
     for folder in folders:
         path = keep(folder, RECORDS)
         print(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
+
+
+@app.command("episodes")
+def write_episodes(out: pathlib.Path) -> None:
+    """Write every episode that is kept as a line of a CSV file, for rliable and other tools."""
+    episodes = all_episodes(read_kept(RECORDS))
+    with open_whole(out) as file:
+        file.write(episodes.to_csv(index=False).encode())
+    print(f"{out}: {len(episodes):,} episodes")
 
 
 if __name__ == "__main__":

@@ -188,6 +188,23 @@ def _archive(folder: pathlib.Path, paths: Sequence[pathlib.Path], target: pathli
     return path
 
 
+def all_episodes(kept: Kept) -> pd.DataFrame:
+    """Returns a line for each episode of all evaluations, with the steps of the agent and of the oracle.
+
+    `run` is the first 8 digits of the checkpoint's SHA-256, empty without a checkpoint.
+    """
+    several = ((row, part, result) for (row, part), results in kept.several.items() for result in results)
+    runs = ((name, LOCAL, result) for name, results in kept.runs.items() for result in results)
+    parts = []
+    for row, part, result in (*((*key, result) for key, result in kept.results.items()), *several, *runs):
+        steps = result.oracle_steps
+        columns = {name: column(result.records, name) for name in ("episode", "maze", "success", "steps")}
+        oracle = [steps[number] if steps else None for number in columns["episode"].tolist()]
+        origin = {"agent": row, "run": (result.summary.provenance.checkpoint_sha256 or "")[:8], "setting": part}
+        parts.append(pd.DataFrame(origin | columns | {"oracle_steps": pd.array(oracle, dtype="Int64")}))
+    return pd.concat(parts, ignore_index=True)
+
+
 def mean_estimate(runs: Sequence[Result], metric: str, field: str = "", values: Sequence[Any] = ()) -> float | None:
     """Returns the mean of a metric over training runs in the same episodes; the rest as of `estimate`."""
     found = [estimate(result, metric, field, values) for result in runs]

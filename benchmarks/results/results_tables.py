@@ -266,6 +266,25 @@ def tracks_learned(row: str, kept: Kept) -> str:
     return _table([*header, "success - `navigator`", "on-time rate - `navigator`"], lines)
 
 
+def tracks_worst_tenth(kept: Kept) -> str:
+    """Returns on-time rates in the tenth of the mazes in which an agent is late most often, after JaxNav."""
+    lines = []
+    for row in (NAVIGATOR, LEARNED, NO_MAP):
+        cells = [
+            " / ".join(_number(float(np.mean([_worst_tenth(run) for run in runs]))) for runs in kept.levels(row, track))
+            for track in TRACKS
+        ]
+        if any(cells):
+            lines.append([_ROWS[row], *(cell or _NOT_RUN for cell in cells)])
+    return _table(["agent", *map(_code, TRACKS)], lines)
+
+
+def _worst_tenth(result: Result) -> float:
+    on_time = scores(result.records, result.oracle_steps)[ON_TIME_125]
+    by_maze = pd.Series(np.asarray(on_time, dtype=float)).groupby(column(result.records, "maze")).mean()
+    return float(by_maze.nsmallest(-(-len(by_maze) // 10)).mean())
+
+
 def tracks_map_worth(kept: Kept) -> str:
     """Returns the navigator's headline numbers with their intervals, and what the map is worth to it."""
     rows = []
@@ -331,6 +350,7 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "tracks-on-time-2": functools.partial(tracks_table, ON_TIME_2, _ROWS),
     "tracks-learned": functools.partial(tracks_learned, LEARNED),
     "tracks-rewarded": functools.partial(tracks_learned, REWARDED),
+    "tracks-worst-tenth": tracks_worst_tenth,
     "tracks-map-worth": tracks_map_worth,
     "tracks-novel-kinds": tracks_novel_kinds,
     "tracks-blocked": tracks_blocked,

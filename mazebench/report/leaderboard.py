@@ -1,4 +1,4 @@
-"""The leaderboard of the tracks: two tables of agents, made from an entry per agent.
+"""The leaderboard of the tracks: tables of agents, made from an entry per agent.
 
 `python -m mazebench.report.leaderboard RESULTS... docs/leaderboard.md` writes an entry of each agent in RESULTS into
 the folder docs/leaderboard, one JSON file each, and the tables of all entries there into the page, between two
@@ -8,6 +8,7 @@ comments.
 from __future__ import annotations
 
 import argparse
+import datetime
 import hashlib
 import pathlib
 import re
@@ -48,6 +49,7 @@ class Entry(pydantic.BaseModel):
     checkpoints: tuple[str, ...]  # SHA-256
     on_time: tuple[Share, Share, Share]  # of all episodes, with its 95 % interval
     success: Share  # of all episodes
+    date: datetime.date  # on which the entry was made
     parts: dict[str, tuple[Share, Share]]  # on time, and success, by track and level, as "rebuilt 1"
 
     @property
@@ -77,21 +79,24 @@ def kept_entries(page: pathlib.Path) -> list[Entry]:
 
 
 def make_tables(entries: Sequence[Entry]) -> str:
-    """Returns the leaderboard in Markdown: a table of all episodes, and one of the parts."""
+    """Returns the leaderboard in Markdown: a table of all episodes, and two of the parts, on time and success."""
     floor = next((entry.on_time[0] for entry in entries if entry.agent == _MAP_FREE), np.nan)
     names = [escape_markdown(entry.agent) + " (privileged)" * entry.privileged for entry in entries]
     overall = {
         "agent": names,
-        "on time": [f"{mean:.2f} [{low:.2f}, {high:.2f}]" for mean, low, high in (entry.on_time for entry in entries)],
+        "on-time rate": ["{:.2f} [{:.2f}, {:.2f}]".format(*entry.on_time) for entry in entries],
         "gain": [f"{entry.on_time[0] - floor:+.2f}".replace("+nan", "") for entry in entries],
         "success": [f"{entry.success:.2f}" for entry in entries],
         "code": [escape_markdown(", ".join(each[:-56] for each in entry.code)) for entry in entries],  # 8 of 64 letters
+        "date": [entry.date.isoformat() for entry in entries],
     }
-    parts = {"agent": names} | {
-        part: ["{:.2f}, {:.2f}".format(*entry.parts[part]) for entry in entries] for part in PARTS
-    }
+    on_time, success = (
+        {"agent": names} | {part: [f"{entry.parts[part][index]:.2f}" for entry in entries] for part in PARTS}
+        for index in (0, 1)
+    )
     ranks = pd.RangeIndex(1, len(entries) + 1, name="rank")
-    return "\n".join(to_markdown(pd.DataFrame(table, index=ranks)) for table in (overall, parts))
+    first, second, third = (to_markdown(pd.DataFrame(table, index=ranks)) for table in (overall, on_time, success))
+    return f"{first}\nOn-time rate by track and level:\n\n{second}\nSuccess rate by track and level:\n\n{third}"
 
 
 def write_leaderboard(entries: Iterable[Entry], page: pathlib.Path) -> None:
@@ -108,7 +113,7 @@ def write_leaderboard(entries: Iterable[Entry], page: pathlib.Path) -> None:
         raise InputError(f"{page}: expected the lines {BEGIN.strip()} and {END.strip()}, found no such lines")
     make_folder(page.with_suffix(""))
     for entry in entries:
-        write_json(page.with_suffix("") / entry.file_name, entry.model_dump())
+        write_json(page.with_suffix("") / entry.file_name, entry.model_dump(mode="json"))
     page.write_text(f"{before}{begin}{make_tables(kept_entries(page))}{end}{after}", encoding="utf-8")
 
 
@@ -132,6 +137,7 @@ def _make_entry(folder: pathlib.Path) -> Entry:
         checkpoints=tuple(sorted({origin.checkpoint_sha256 for origin in origins if origin.checkpoint_sha256})),
         on_time=(mean.value, mean.low, mean.high),
         success=episodes.success.mean(),
+        date=datetime.datetime.now(tz=datetime.UTC).date(),
         parts={part: tuple(parts.loc[part]) for part in PARTS},
     )
 
