@@ -36,7 +36,7 @@ def main() -> None:
     (FOLDER / "environments").mkdir(parents=True, exist_ok=True)
     film(int(sys.argv[1]) if len(sys.argv) > 1 else EPISODE, FOLDER / "rebuilt.gif")
     for track in TRACKS:
-        maze, goal, pose, shown = play(track, 2)
+        maze, goal, pose, _, shown = play(track, 2)
         pixels = shown.walls if shown.are_cells else shown.walls / 255
         start, mark = (None if place < 0 else divmod(place, len(pixels)) for place in (shown.start, shown.goal))
         thumbnail(track, draw_grid(pixels, 1 + 2 * THUMBNAIL // len(pixels), start, mark), maze, pose, goal)
