@@ -13,6 +13,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers import vector as wrappers
 from simple_mazes import corridor
 
+import mazebench
 from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
@@ -333,6 +334,36 @@ class TestEpisodeSource:
             ended += terminated | truncated
         np.testing.assert_array_equal(ended, [2, 1, 1])
         np.testing.assert_array_equal(infos["_final_info"], [True, False, False])
+
+
+class TestSeveralTracks:
+    @pytest.mark.parametrize("context_size", [None, 31])
+    def test_episodes_are_those_of_each_track(self, context_size):
+        tracks = ("building", "adrift", "rough")
+        envs = mazebench.make_vec(tracks, 24, level=(1, 3), context_size=context_size, seed=0)
+        observations, infos = envs.reset()
+        assert observations["context"].shape == (24, 4, context_size or 62, context_size or 62)
+        assert set(infos["track"]) == set(tracks)
+        for track in tracks:
+            i = list(infos["track"]).index(track)
+            with mazebench.make(track, level=(1, 3)) as env:
+                observation, info = env.reset(options={"episode": envs.episodes[i]})
+                for name in ("level", "maze", "distance", "time_limit", "blocked"):
+                    assert info[name] == infos[name][i], name
+                np.testing.assert_array_equal(observation["lidar"], observations["lidar"][i])
+                if len(observation["context"][0]) == len(observations["context"][i, 0]):
+                    np.testing.assert_array_equal(observation["context"], observations["context"][i])
+
+    def test_an_environment_draws_a_track_in_each_episode(self):
+        envs = mazebench.make_vec(("building", "rebuilt"), 1, kinds="dfs", fresh=True, seed=0)
+        assert {envs.reset()[1]["track"].item() for _ in range(20)} == {"building", "rebuilt"}
+        envs.draw_distances([5])
+        assert {envs.reset()[1]["distance"].item() for _ in range(4)} == {5}
+
+    @pytest.mark.parametrize("tracks", [(), ("building", "local"), ("building", "building")], ids=str)
+    def test_others_than_different_tracks_are_refused(self, tracks):
+        with pytest.raises(InputError, match="expected different tracks of building, rebuilt, adrift, rough, found"):
+            mazebench.make_vec(tracks)
 
 
 class TestArrays:

@@ -155,7 +155,7 @@ def text(values):
     return {name: str(value) for name, value in values.items()}
 
 
-TRACKS = {"task": "building", "also": ("rebuilt",), "level": (1, 3), "kinds": ("dfs",), "fresh": True}
+TRACKS = {"task": ("building", "rebuilt"), "level": (1, 3), "kinds": ("dfs",), "fresh": True}
 GROWING = {"distances": (1, 2, 3, 4, 5), "first_distance": 2, "widen_steps": 1000}
 
 
@@ -197,18 +197,15 @@ def test_metrics_and_config_of_several_tracks(tmp_path):
 
 
 def test_other_agents_learn_one_task_at_a_time(tmp_path):
-    with pytest.raises(InputError, match="agent 'dqn': learns one task at a time, found --also rebuilt"):
-        train("dqn", "building", out=tmp_path, also=("rebuilt",), minutes=1)
+    with pytest.raises(InputError, match="agent 'dqn': learns one track at a time, found building, rebuilt"):
+        train("dqn", ("building", "rebuilt"), out=tmp_path, minutes=1)
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (
-            {"task": "building", "also": ("building",)},
-            "different tracks in --track and --also, found building, building",
-        ),
-        ({"also": ("rebuilt",)}, "expected different tracks in --track and --also, found local, rebuilt"),
+        ({"task": ("building", "building")}, "expected different tracks, found building, building"),
+        ({"task": ("building", "local")}, "unknown track 'local'; available: adrift, building, rebuilt, rough"),
         ({"first_distance": 50}, "expected --first-distance of at most 5, the farthest goals, found more"),
         ({"first_distance": 2, "pairs": "fixed"}, "expected starts and goals that are drawn, found given ones"),
     ],

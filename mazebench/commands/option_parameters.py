@@ -22,15 +22,14 @@ def takes_options(
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Gives a command an option for each field of some classes that has a help, but for `without`.
 
-    The command has a parameter `values`, which receives the values by name of those that are not left at the default.
-    `given` picks those of one class. `defaults` stand in the place of those that the classes declare.
+    Of two fields of one name, that of the first class counts. The command has a parameter `values`, which receives the
+    values by name of those that are not left at the default. `given` picks those of one class. `defaults` stand in the
+    place of those that the classes declare.
     """
-    found = {name: option for each in options_classes for name, option in fields_of(each).items() if option.help}
-    options = {
-        name: option._replace(default=defaults.get(name, option.default))
-        for name, option in found.items()
-        if name not in without
-    }
+    options: dict[str, Option] = {}
+    for name, option in (item for each in options_classes for item in fields_of(each).items()):
+        if option.help and name not in without:
+            options.setdefault(name, option._replace(default=defaults.get(name, option.default)))
     added = [_parameter(name, option) for name, option in options.items()]
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:

@@ -50,7 +50,8 @@ def train(
         return (f"the checkpoint at {int(last.name):,} steps is kept in {folder}; go on{again}", "--resume")
 
     with stopping.stoppable(how_to_go_on, waits=True), progress.training() as show:
-        loop.run_training(options, given(values, Task), folder, resume, show)
+        task_options = {name: value for name, value in given(values, Task).items() if name != "track"}
+        loop.run_training(options, task_options, folder, resume, show)
     print(f"run in {folder}; evaluate it by: mazebench eval --agent {agent} --checkpoint {folder}")
 
 
@@ -58,9 +59,8 @@ def _folder_name(options: TrainOptions, values: dict[str, Any]) -> str:
     parts = [options.agent.replace(":", "-"), *values.get("kinds", ()), *(["fresh"] if "fresh" in values else [])]
     if "mazes" in values:
         parts.append(pathlib.Path(values["mazes"]).stem)
-    track = values.get("track")
-    parts += [track, *map(str, values.get("level", (1,)))] if track else [str(values.get("size", SIZES[0]))]
-    parts += options.also
+    levels = map(str, values.get("level", (1,)))
+    parts += [*options.track, *levels] if options.track else [str(values.get("size", SIZES[0]))]
     return "-".join([*parts, str(options.seed)])
 
 

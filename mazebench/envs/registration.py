@@ -118,7 +118,7 @@ def make_goal(
 
 
 def make_vec(
-    task: str = "local",
+    task: str | Sequence[str] = "local",
     num_envs: int = 1,
     *,
     seed: int | None = None,
@@ -132,6 +132,10 @@ def make_vec(
     """Returns `num_envs` environments side by side on `num_threads` threads (0: all cores).
 
         >>> envs = mazebench.make_vec("building", 64, level=(1, 2), split="train")
+        >>> envs = mazebench.make_vec(("building", "rebuilt", "adrift"), 64, level=(1, 2, 3))
+
+    Of several tracks, each episode draws one, which `info["track"]` tells. They are played in the same mazes, at the
+    same levels, and with contexts of one size: `context_size`, or the largest one of the tracks'.
 
     `autoreset_mode` says what follows the end of an episode; see `MazeVectorEnv`. `max_episode_steps` is what Gymnasium
     passes on from the `spec` of such environments. `options` are those of `mazebench.Task.of`. Arrays are those of
@@ -143,10 +147,16 @@ def make_vec(
     load_mujoco()
     from mazebench.envs.vector import MazeVectorEnv
 
-    chosen = _task(task, options, _VECTOR, id_size)
-    if max_episode_steps not in (None, chosen.longest_episode):
+    if isinstance(task, str):
+        tasks = [_task(task, options, _VECTOR, id_size)]
+    else:
+        from mazebench.tasks.task import check_names, tasks_of_tracks
+
+        check_names(options, _VECTOR)
+        tasks = [*tasks_of_tracks(task, **options)]
+    if max_episode_steps not in (None, tasks[0].longest_episode):
         raise InputError(f"expected time_limit in the place of max_episode_steps, found {max_episode_steps}")
-    return MazeVectorEnv(chosen, num_envs, seed, num_threads, render_mode, autoreset_mode=autoreset_mode)
+    return MazeVectorEnv(tasks, num_envs, seed, num_threads, render_mode, autoreset_mode=autoreset_mode)
 
 
 def _task(task: str, options: TaskOptions, arguments: Sequence[str], id_size: int = 0) -> Task:

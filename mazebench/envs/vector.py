@@ -39,7 +39,9 @@ _VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)  # makes the sensors current 
 
 
 class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
-    """B environments of one task; the same seed gives the same episode as in the dm_env and Gymnasium environments.
+    """B environments of a task; the same seed gives the same episode as in the dm_env and Gymnasium environments.
+
+    Of several tasks (`tasks_of_tracks`), each episode first draws one.
 
     `autoreset_mode` says what follows the end of an episode, as Gymnasium defines it:
 
@@ -60,7 +62,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
     def __init__(
         self,
-        task_spec: Task,
+        task_spec: Task | Sequence[Task],
         num_envs: int,
         seed: Seeds = None,
         num_threads: int = 0,
@@ -71,7 +73,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """Opens the environments.
 
         Args:
-          task_spec: the task.
+          task_spec: the task, or those of several tracks; the attribute of this name is the first one.
           num_envs: B.
           seed: of the first reset, as in `reset`.
           num_threads: of the simulation; 0 uses all cores.
@@ -82,6 +84,8 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         Raises:
           InputError: if an argument is not allowed.
         """
+        tasks = (task_spec,) if isinstance(task_spec, Task) else tuple(task_spec)
+        task_spec = tasks[0]
         require_task_spec(task_spec)
         arguments = Arguments(num_envs=num_envs, num_threads=num_threads, render_mode=render_mode)
         self.task_spec = task_spec
@@ -101,7 +105,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
         # The episodes, and what was observed of them last: [B, ...] by name.
         self._episode_source = episode_source
-        self._drawn_task = task_spec  # whose episodes are drawn
+        self._tasks = tasks  # of which each episode draws one
         self._rngs = [np.random.default_rng(value) for value in _seeds(seed, num_envs)]
         self.rules = Rules(task_spec, num_envs)
         self.episodes = self.rules.episodes
@@ -261,7 +265,9 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
             if self._episode_source:
                 self.rules.begin(i, self._episode_source(i))
             else:
-                self.rules.begin(i, sample_episode(self._drawn_task, self._rngs[i]))
+                rng = self._rngs[i]
+                task = self._tasks[rng.integers(len(self._tasks)) if len(self._tasks) > 1 else 0]
+                self.rules.begin(i, sample_episode(task, rng), task)
         self._ended[indices] = False
         began = indices[self.rules.active[indices]]
         if not len(began):
@@ -304,7 +310,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         Raises:
           InputError: if there are no distances. Where no maze has them, the next episode raises it.
         """
-        self._drawn_task = self.task_spec.replace(distances=tuple(distances))
+        self._tasks = tuple(task.replace(distances=tuple(distances)) for task in self._tasks)
 
     def velocity(self) -> np.ndarray:
         """Returns the true velocities `[B, 2]` (x and y on the map, m/s), for labels; agents must not use them."""

@@ -99,8 +99,11 @@ class Rules:
         self.steps = np.zeros(num_envs, dtype=np.int64)
         self.is_first, self.reached, self.timed_out = np.zeros((3, num_envs), dtype=bool)
 
-    def begin(self, i: int, episode: Episode | None) -> None:
-        """Begins an episode in environment i, whose body must then be moved to `pose[i]`; None takes its episode."""
+    def begin(self, i: int, episode: Episode | None, spec: Task | None = None) -> None:
+        """Begins an episode in environment i, whose body must then be moved to `pose[i]`; None takes its episode.
+
+        `spec` is its task, another of `tasks_of_tracks`; by default that of these rules.
+        """
         self.episodes[i], self.active[i] = episode, episode is not None
         self.is_first[i] = self.reached[i] = self.timed_out[i] = False
         self._state_errors[i], self._lidar_noise[i] = [], None
@@ -108,7 +111,7 @@ class Rules:
             return
 
         # What the agent is shown and senses, and where it is sent.
-        spec = self.spec
+        spec = spec or self.spec
         self.shown[i] = shown = show_map(spec, episode)
         self.routes[i] = route = plan_route(spec, episode, shown)
         self._state_errors[i] = state_errors(spec, episode)
@@ -118,6 +121,7 @@ class Rules:
         maze = spec.all_mazes[episode.maze]
         self.maze[i], self.kind[i] = episode.maze, maze.kind
         self.level[i] = 0 if spec.track is None else episode_level(spec, episode)
+        self.track[i] = spec.track or ""
         self.pose[i] = (*maze.point(episode.start), episode.yaw)
         self.path_length[i] = self.steps[i] = self.progress[i] = 0
         self.cell[i] = episode.start[0] * spec.size + episode.start[1]

@@ -386,6 +386,29 @@ def evaluation_task(task: str = "local", **options: Unpack[TaskOptions]) -> Task
     return _complete({"split": "eval"} | given, EVAL_DISTANCES)
 
 
+def tasks_of_tracks(tracks: Sequence[str], **options: Unpack[TaskOptions]) -> tuple[Task, ...]:
+    """Returns a task for each of some tracks, in the same mazes and with contexts of one size.
+
+    Args:
+      tracks: names of tracks, each once.
+      **options: those of `Task.of`. Unless `context_size` is given, it is the largest one of the tracks'.
+
+    Raises:
+      InputError: as `Task.of`, and if the tracks are not several different ones.
+    """
+    if not tracks or any(track not in TRACKS for track in tracks) or len(set(tracks)) < len(tracks):
+        raise InputError(f"expected different tracks of {', '.join(TRACKS)}, found {', '.join(tracks) or 'none'}")
+    context_size = options.pop("context_size", None) or 0
+    tasks = [Task.of(track, **options) for track in tracks]
+    context_size = context_size or max(task.context_size for task in tasks)
+    tasks = [task.replace(context_size=context_size) for task in tasks]
+    if context_size < MIN_CONTEXT_SIZE:
+        raise InputError(f"expected context_size of at least {MIN_CONTEXT_SIZE}, found {context_size}")
+    for task in tasks[1:]:
+        task._keep_mazes_of(tasks[0])
+    return tuple(tasks)
+
+
 def check_names(options: Mapping[str, Any], arguments: Sequence[str] = ()) -> None:
     """Checks the names of options for `Task.of`, in a call that takes `arguments` too.
 

@@ -49,7 +49,7 @@ class TrainingError(RunError):
 
 def train(
     agent: str,
-    task: str = "local",
+    task: str | Sequence[str] = "local",
     *,
     out: str | pathlib.Path,
     minutes: float | None = None,
@@ -59,7 +59,6 @@ def train(
     checkpoint_steps: int = 200_000,
     checkpoint_minutes: float = 5.0,
     eval_mazes: int = 20,
-    also: Sequence[str] = (),
     first_distance: int | None = None,
     widen_steps: int = 400_000,
     workers: int = 0,
@@ -77,7 +76,7 @@ def train(
 
     Args:
       agent: the name of an agent that learns, or "module:Class".
-      task: "local", or the name of a track.
+      task: "local", the name of a track, or the names of several, of which each has an equal share of the environments.
       out: the run folder.
       minutes: how long this call trains.
       env_steps: agent steps of the run, of all calls together.
@@ -86,7 +85,6 @@ def train(
       checkpoint_steps: agent steps between milestones.
       checkpoint_minutes: minutes between savepoints; 0 for none.
       eval_mazes: held-out mazes of an evaluation.
-      also: tracks to train in besides `task`.
       first_distance: cells that goals are away at most in the beginning; None for all distances.
       widen_steps: agent steps over which that grows to the farthest distance of the task.
       workers: Ray actors that collect; 0 collects in this process.
@@ -99,6 +97,9 @@ def train(
       InputError: if an option is wrong, or `out` can't be used.
       TrainingError: if a loss is not finite.
     """
+    names = (task,) if isinstance(task, str) else tuple(task)
+    if names == ("local",):
+        names = () if (track := options.pop("track", None)) is None else (track,)
     chosen = TrainOptions(
         agent,
         overrides=tuple((name, str(value)) for name, value in (overrides or {}).items()),
@@ -108,13 +109,13 @@ def train(
         checkpoint_steps=checkpoint_steps,
         checkpoint_minutes=checkpoint_minutes,
         eval_mazes=eval_mazes,
-        also=tuple(also),
+        track=names,
         first_distance=first_distance,
         widen_steps=widen_steps,
         workers=workers,
         ray_address=ray_address,
     )
-    run_training(chosen, {"task": task, **options}, pathlib.Path(out), resume, progress)
+    run_training(chosen, options, pathlib.Path(out), resume, progress)
 
 
 def run_training(
@@ -124,16 +125,17 @@ def run_training(
     resume: bool = False,
     progress: Progress = lambda status: None,
 ) -> None:
-    """Trains an agent in the task that `task_options` of `Task.of` name; as `train`, which makes the options."""
+    """Trains an agent in the tracks of `options`, or in the local task, as the `task_options` of `Task.of` say."""
     agent_class = load_agent_class(options.agent)
     if not issubclass(agent_class, LearningAgent):
         raise InputError(f"agent {options.agent!r} doesn't learn; agents that do: {', '.join(learning_agents())}")
     overrides = dict(options.overrides)
-    if options.also and not agent_class.learns_several_tasks:
-        raise InputError(f"agent {options.agent!r}: learns one task at a time, found --also {options.also[0]}")
-    all_options = [task_options, *({**task_options, "task": "local", "track": track} for track in options.also)]
+    if len(options.track) > 1 and not agent_class.learns_several_tasks:
+        raise InputError(f"agent {options.agent!r}: learns one track at a time, found {', '.join(options.track)}")
+    defaults = agent_class.task_options(overrides)
     tasks = [
-        training_task(options.agent, agent_class, agent_class.task_options(overrides), each) for each in all_options
+        training_task(options.agent, agent_class, defaults, {**task_options, "track": track})
+        for track in options.track or (None,)
     ]
     _check_together(options, tasks)
     learner = agent_class.build_learner(tasks[0], seed=options.seed, overrides=overrides)
@@ -269,9 +271,8 @@ def num_updates_due(learner: Learner, env_steps: int) -> int:
 
 def _check_together(options: TrainOptions, tasks: Sequence[Task]) -> None:
     """Checks that the tasks differ, and that goals can begin near."""
-    names = [task.track or "local" for task in tasks]
-    if options.also and ("local" in names or len(set(names)) < len(names)):
-        raise InputError(f"expected different tracks in --track and --also, found {', '.join(names)}")
+    if len(set(options.track)) < len(options.track):
+        raise InputError(f"expected different tracks, found {', '.join(options.track)}")
     if options.first_distance is None:
         return
     if any(task.pairs == "fixed" or task.scenarios is not None or task.num_ends for task in tasks):

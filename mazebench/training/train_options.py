@@ -42,9 +42,12 @@ class TrainOptions:
         Doc("Minutes between savepoints, which are saved between milestones, and when the run is stopped; 0 for none."),
     ] = 5.0
     eval_mazes: Annotated[int, Ge(1), Doc("Held-out mazes of an evaluation, with 10 episodes in each.")] = 20
-    also: Annotated[
+    track: Annotated[
         tuple[Annotated[str, OneOf(*TRACKS)], ...],
-        Doc("Tracks to train in besides --track, for agents that can; each has an equal share of the environments."),
+        Doc(
+            "A named way in which the map or the senses are imperfect (local task); of several, as building,rebuilt, "
+            "for agents that can, each has an equal share of the environments."
+        ),
     ] = ()
     first_distance: Annotated[
         int | None, Ge(1), Doc("Cells that goals are away at most in the beginning; all distances if not given.")
