@@ -50,7 +50,8 @@ class _Declarations:
 
     needs_truth: ClassVar[bool] = False  # results of an agent that does are labelled as privileged
     needs_sensors: ClassVar[tuple[str, ...]] = ()  # an evaluation adds them to the sensors that it is given
-    # The kinds of actions that it can answer with: "six", "velocity", "diff"; without "six", it is given the first one.
+    # The kinds of actions that it can answer with: "six", "four", "velocity", "diff"; without "six", it is given the
+    # first one.
     plays_actions: ClassVar[tuple[str, ...]] = ("six",)
     needs_shown: ClassVar[tuple[str, ...]] = ()  # of "map" and "goal": what it can't play without
     learns: ClassVar[bool] = False  # an agent that does can be given a checkpoint, even if it ships with none

@@ -16,7 +16,8 @@ EPISODES_PER_DISTANCE = 5  # of an evaluation, in each maze
 
 ACTIONS = ("forward", "backward", "strafe_left", "strafe_right", "look_left", "look_right")
 NUM_ACTIONS = len(ACTIONS)
-# Continuous actions, instead of one of these six: the components of each kind, from -1 to 1.
+# The kinds of actions. Discrete ones: their names. Continuous ones: their components, each from -1 to 1.
+DISCRETE = {"six": ACTIONS, "four": ("forward", "backward", "look_left", "look_right")}
 VELOCITIES = {"velocity": ("forward", "left", "turn"), "diff": ("forward", "turn")}
 PHYSICS_TIMESTEP = 0.008  # s; at 16 ms a body at top speed sinks 5 cm into a wall
 STEPS_PER_ACTION = 20  # an action repeat of 10 frames, two physics steps each

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import dm_env
 import gymnasium
 import numpy as np
@@ -11,7 +13,7 @@ from dm_env import specs
 from gymnasium.utils import env_checker
 
 from mazebench.agent import Agent, SingleAgent
-from mazebench.constants import ACTIONS, TOP_SPEED
+from mazebench.constants import ACTIONS, DISCRETE, TOP_SPEED
 from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
@@ -99,6 +101,17 @@ class TestEnvironments:
             expected, found = discrete.step(action), continuous.step(UNIT_VELOCITIES[action])
             np.testing.assert_array_equal(expected[0]["state"], found[0]["state"])
             assert expected[1:4] == found[1:4]
+
+    def test_four_are_the_six_without_strafing(self):
+        four, six = (MazeEnv(Task.of(actions=kind)) for kind in ("four", "six"))
+        four.reset(seed=5)
+        six.reset(seed=5)
+        assert four.action_space.n == 4
+        for action in np.random.default_rng(0).integers(4, size=60):
+            found, expected = four.step(action), six.step(ACTIONS.index(DISCRETE["four"][action]))
+            np.testing.assert_array_equal(expected[0]["state"], found[0]["state"])
+        with pytest.raises(InputError, match=r"from 0 to 3 \(forward, backward, look_left, look_right\), found 4"):
+            four.step(4)
 
     def test_diff_is_velocity_without_strafing(self):
         diff, velocity = (MazeEnv(Task.of(actions=kind)) for kind in ("diff", "velocity"))
@@ -189,18 +202,32 @@ class TestAgents:
         near["out"] = near["out"].with_name("diff")
         assert evaluate("random", **near, actions="diff").who == "random with diff actions"
 
-    @pytest.mark.parametrize("agent", ["navigator", "planner-closed-loop"])
+    @pytest.mark.parametrize("agent", ["planner", "oracle"])
     def test_an_agent_of_the_six_says_so(self, near, agent):
         with pytest.raises(UnplayableError, match=f"^agent '{agent}': plays the actions six, found diff$"):
             evaluate(agent, **near, actions="diff")
+
+    @pytest.mark.parametrize("agent", ["navigator", "planner-closed-loop"])
+    def test_robots_reach_the_goal_without_strafing(self, near, agent):
+        near["distances"] = (5,)
+        found = {}
+        for kind in ("four", "diff", "six", "velocity"):
+            near["out"] = near["out"].with_name(kind)
+            summary = evaluate(agent, **near, actions=kind)
+            assert summary.overall.success_rate == 1
+            lines = (near["out"] / "episodes.jsonl").read_text().splitlines()
+            found[kind] = [(episode["steps"], episode["path_length"]) for episode in map(json.loads, lines)]
+        assert found["four"] == found["diff"]
+        assert found["six"] == found["velocity"]
+        assert found["six"] != found["diff"]
 
     @pytest.mark.parametrize(("older", "kind"), [(False, "six"), (True, "velocity")])
     def test_the_task_of_an_older_checkpoint_is_read(self, older, kind):
         assert Task.from_json({"size": 15, "continuous": older}) == Task.of(size=15, actions=kind)
 
     def test_an_unknown_kind_is_refused(self):
-        with pytest.raises(InputError, match=r"^unknown actions 'four'; available: diff, six, velocity$"):
-            Task.of(actions="four")
+        with pytest.raises(InputError, match=r"^unknown actions 'five'; available: diff, four, six, velocity$"):
+            Task.of(actions="five")
 
     @pytest.mark.parametrize(
         ("name", "said"),

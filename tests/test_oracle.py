@@ -55,7 +55,7 @@ class TestMotion:
             (x, y), yaw, (vx, vy) = simulation.position(), simulation.yaw(), simulation.data.qvel[:2]
             heading = turned(yaw, (action == LOOK_LEFT) - (action == LOOK_RIGHT))
             expected = moved(walls, maze.cell_size, x, y, vx, vy, heading, action)
-            simulation.set_controls(controls_of_action(action))
+            simulation.set_controls(controls_of_action("six", action))
             simulation.step(STEPS_PER_ACTION)
             errors.append(math.dist(expected[:2], simulation.position()))
         assert np.quantile(errors, 0.95) < 0.002

@@ -11,7 +11,7 @@ import numpy as np
 from mazebench.agent import Agent, Inputs, Interface
 from mazebench.maps.maze import cell_to_point
 
-from ..robot.body import LOOK_LEFT
+from ..robot.body import LOOK_LEFT, PLAYED, WITHOUT_STRAFING, as_kind
 from ..robot.driving import Drive
 from ..robot.pilot import steer
 from ..robot.planning import plan
@@ -31,9 +31,12 @@ class _Robot:
 class Navigator(Agent):
     """Localizes itself, maps the walls that it senses, plans over walls and goal, and drives, all at each step."""
 
+    plays_actions = PLAYED
+
     def __init__(self, interface: Interface):
         """Acts in the environments of the interface, with their lidar if they have one."""
         self._senses, self._cell_size = Senses(interface, "navigator"), interface.cell_size
+        self._kind, self._strafes = interface.actions, interface.actions not in WITHOUT_STRAFING
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
@@ -60,7 +63,7 @@ class Navigator(Agent):
                 if robot is None or robot.memory is not memory:
                     robot = state[slot] = _Robot(memory)
                 actions[slot] = self._command(robot)
-        return actions, state
+        return as_kind(self._kind, actions), state
 
     def _command(self, robot: _Robot) -> int:
         """Returns the next action, and remembers it."""
@@ -71,10 +74,10 @@ class Navigator(Agent):
         # It drives along the path, and waits where there is none.
         action, point = LOOK_LEFT, body.rest()
         if len(path) == 1:
-            action = steer(body, tuple(cell_to_point(path[0], len(walls)).tolist()))
+            action = steer(body, tuple(cell_to_point(path[0], len(walls)).tolist()), self._strafes)
         elif path:
             blocked = walls > _BLOCKED
             blocked[tuple(np.transpose(path))] = False
-            action, point = robot.drive.next(blocked, path, body, self._cell_size)
+            action, point = robot.drive.next(blocked, path, body, self._cell_size, self._strafes)
         memory.command(action, point)
         return action

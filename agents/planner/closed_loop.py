@@ -10,7 +10,7 @@ from mazebench.agent import Inputs
 from mazebench.maps.maze import cell_to_point
 from mazebench.tasks.context import GLOBAL_MAP
 
-from ..robot.body import observed_body
+from ..robot.body import PLAYED, WITHOUT_STRAFING, as_kind, observed_body
 from ..robot.cells import nearest_cell, start_cell
 from ..robot.dead_reckoning import DeadReckoning
 from ..robot.pilot import Pilot
@@ -29,6 +29,8 @@ class _Drive:
 
 class ClosedLoopPlanner(MapPlanner):
     """Pure pursuit of a path that is planned once a context, from the estimated cell of the body."""
+
+    plays_actions = PLAYED
 
     def initial_state(self, batch_size: int) -> list[_Drive | None]:
         """Returns nothing yet: a drive begins with an episode."""
@@ -56,5 +58,5 @@ class ClosedLoopPlanner(MapPlanner):
                 is_wall = contexts[slot][GLOBAL_MAP][cell] > 0.5  # of the map that is shown
                 path = plan(contexts[slot], start if is_wall else cell)
                 drive.pilot = Pilot.along(path, size, self._cells_per_metre)
-            actions[slot] = drive.pilot.action(body)
-        return actions, state
+            actions[slot] = drive.pilot.action(body, self._kind not in WITHOUT_STRAFING)
+        return as_kind(self._kind, actions), state

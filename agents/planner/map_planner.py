@@ -19,13 +19,14 @@ class MapPlanner(Agent):
 
     needs_shown = ("map", "goal")
 
-    def __init__(self, cells_per_metre: float = 1.0):
+    def __init__(self, cells_per_metre: float = 1.0, kind: str = "six"):
         self._cells_per_metre = cells_per_metre  # of the map that the context shows
+        self._kind = kind  # of actions
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
         """Returns a planner for the scale of the map, which follows from M, N and the size of a cell."""
-        return cls(interface.context_size / (interface.size * interface.cell_size))
+        return cls(interface.context_size / (interface.size * interface.cell_size), interface.actions)
 
     @classmethod
     def context_size(cls, size: int) -> int:

@@ -7,21 +7,21 @@ import pathlib
 import numpy as np
 
 from mazebench.agent import Agent, Inputs, Interface
-from mazebench.constants import NUM_ACTIONS
+from mazebench.constants import DISCRETE
 
 
 class RandomAgent(Agent):
     """Acts uniformly at random; the actions of an episode depend on its seed alone."""
 
-    plays_actions = ("six", "velocity", "diff")
+    plays_actions = ("six", "four", "velocity", "diff")
 
-    def __init__(self, action_shape: tuple[int, ...]):
-        self._shape = action_shape  # () for one of six
+    def __init__(self, interface: Interface):
+        self._kind, self._shape = interface.actions, interface.action_shape
 
     @classmethod
     def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> RandomAgent:
         """Returns a new agent; `seed` and `checkpoint` have no meaning here."""
-        return cls(interface.action_shape)
+        return cls(interface)
 
     def initial_state(self, batch_size: int) -> list[np.random.Generator]:
         """Returns a generator for each environment, which `act` replaces where an episode begins."""
@@ -33,6 +33,6 @@ class RandomAgent(Agent):
         """Returns actions, each from the generator of its episode."""
         for slot in np.flatnonzero(inputs.new_episode):
             state[slot] = np.random.default_rng(int(inputs.seed[slot]))
-        if self._shape:
-            return np.array([rng.uniform(-1, 1, self._shape) for rng in state]), state
-        return np.array([rng.integers(NUM_ACTIONS) for rng in state]), state
+        if self._kind in DISCRETE:
+            return np.array([rng.integers(len(DISCRETE[self._kind])) for rng in state]), state
+        return np.array([rng.uniform(-1, 1, self._shape) for rng in state]), state

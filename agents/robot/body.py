@@ -8,14 +8,33 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from mazebench.constants import NUM_ACTIONS
+import numpy as np
+
+from mazebench.constants import ACTIONS, DISCRETE, NUM_ACTIONS
 
 X, Y, YAW, FORWARD_VELOCITY, LEFT_VELOCITY = 0, 1, 5, 6, 7  # indices in the state
 FORWARD, BACKWARD, STRAFE_LEFT, STRAFE_RIGHT, LOOK_LEFT, LOOK_RIGHT = range(NUM_ACTIONS)
 TURN_STEP = math.radians(21.12)  # of one look action
 COASTING_TIME = 0.125  # s; a body let go at speed v comes to rest after v * COASTING_TIME metres
 
+# The kinds of actions that the robots play, and those of a body that can't strafe.
+PLAYED = ("six", "four", "velocity", "diff")
+WITHOUT_STRAFING = ("four", "diff")
+
+_VELOCITIES = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], np.float64)
+_AS_KIND = {  # what each of the six is called in a kind that has it
+    "six": np.arange(NUM_ACTIONS),
+    "four": np.array([DISCRETE["four"].index(name) if name in DISCRETE["four"] else -1 for name in ACTIONS]),
+    "velocity": _VELOCITIES,
+    "diff": _VELOCITIES[:, [0, 2]],
+}
+
 Point = tuple[float, float]  # x, y
+
+
+def as_kind(kind: str, actions: np.ndarray) -> np.ndarray:
+    """Returns actions `[B]` of the six as those of a kind: `[B]` int, or velocities `[B, 3]` or `[B, 2]`."""
+    return _AS_KIND[kind][actions]
 
 
 class Body(NamedTuple):

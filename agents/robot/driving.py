@@ -19,6 +19,7 @@ from .quickest import make_course, quickest_drive
 
 _CELLS_AHEAD = 7  # of the path
 _STEPS_AHEAD = 7  # that are planned
+_STEPS_AHEAD_TURNING = 11  # if the body can't strafe: a quarter turn takes 4 or 5
 _STEPS_USED = 4  # of them
 _WIDTH = 4  # of the beam, for each heading
 _INSIDE = 0.05  # cells, from the edges of the cell that the body is in
@@ -34,7 +35,9 @@ class Drive:
     points: list[Point] = dataclasses.field(default_factory=list)  # where each action begins, m
     path: list[Cell] = dataclasses.field(default_factory=list)  # the cells ahead when it was planned
 
-    def next(self, blocked: np.ndarray, path: list[Cell], body: Body, cell_size: float) -> tuple[int, Point]:
+    def next(
+        self, blocked: np.ndarray, path: list[Cell], body: Body, cell_size: float, strafes: bool = True
+    ) -> tuple[int, Point]:
         """Returns the next action, and the point (x, y) that it should bring the body to, in cells.
 
         Args:
@@ -42,16 +45,17 @@ class Drive:
           path: to follow.
           body: in cells.
           cell_size: m.
+          strafes: whether the body can strafe.
         """
         ahead = path[: _CELLS_AHEAD + 1]
         x, y = body.x * cell_size, body.y * cell_size
         if not self.actions or math.dist(self.points[0], (x, y)) > _MOST_OFF or not _continues(self.path, ahead):
-            self._plan(blocked, ahead, body, cell_size)
+            self._plan(blocked, ahead, body, cell_size, strafes)
         before, after = self.points.pop(0), self.points[0]
         point = body.x + (after[0] - before[0]) / cell_size, body.y + (after[1] - before[1]) / cell_size
         return self.actions.pop(0), point
 
-    def _plan(self, blocked: np.ndarray, ahead: list[Cell], body: Body, cell_size: float) -> None:
+    def _plan(self, blocked: np.ndarray, ahead: list[Cell], body: Body, cell_size: float, strafes: bool) -> None:
         """Plans the drive to the last cell of `ahead` through the free cells around."""
         # The part of the grid around the path, with walls around it.
         cells, size = np.array(ahead), len(blocked)
@@ -69,7 +73,8 @@ class Drive:
         x, y = ((point - corner) * cell_size).tolist()
         velocity = np.clip(np.array(body.velocity()) * cell_size, -_FASTEST, _FASTEST).tolist()
         course = make_course(walls, cell_size, (int(ahead[-1][0] - top), int(ahead[-1][1] - left)))
-        actions, points = quickest_drive(course, (x, y), velocity, body.yaw, _STEPS_AHEAD, _WIDTH)
+        steps = _STEPS_AHEAD if strafes else _STEPS_AHEAD_TURNING
+        actions, points = quickest_drive(course, (x, y), velocity, body.yaw, steps, _WIDTH, strafes)
         self.actions, self.path = actions[:_STEPS_USED], ahead
         shift = corner * cell_size
         self.points = [(body.x * cell_size, body.y * cell_size), *(tuple(shift + each) for each in points)]

@@ -25,12 +25,15 @@ _DRIVES = (
 )
 
 
-def steer(body: Body, aim: Point) -> int:
-    """Returns the drive nearest to the direction of `aim`, or a turn if even that one is far off."""
+def steer(body: Body, aim: Point, strafes: bool = True) -> int:
+    """Returns the drive nearest to the direction of `aim`, or a turn if even that one is far off.
+
+    `strafes` says whether the body can strafe.
+    """
     # Aimed from where the body would come to rest: aimed from where it is, it would overshoot and turn back.
     x, y = body.rest()
     bearing = math.atan2(aim[1] - y, aim[0] - x) - body.yaw
-    drive, heading = min(_DRIVES, key=lambda drive: abs(wrap_angle(bearing - drive[1])))
+    drive, heading = min(_DRIVES if strafes else _DRIVES[:2], key=lambda drive: abs(wrap_angle(bearing - drive[1])))
     misalignment = wrap_angle(bearing - heading)
     if abs(misalignment) <= _LARGEST_MISALIGNMENT:
         return drive
@@ -51,9 +54,9 @@ class Pilot:
         points = [(x, y) for x, y in cell_to_point(np.array(path), size).tolist()]
         return cls(points, cells_per_metre * _LOOKAHEAD)
 
-    def action(self, body: Body) -> int:
-        """Returns the drive or turn that brings the body towards the aim."""
-        return steer(body, self._aim(*body.rest()))
+    def action(self, body: Body, strafes: bool = True) -> int:
+        """Returns the drive or turn that brings the body, which strafes or not, towards the aim."""
+        return steer(body, self._aim(*body.rest()), strafes)
 
     def _aim(self, x: float, y: float) -> Point:
         """Returns the point `lookahead` ahead of (x, y) on the path, or the path's end if that is nearer."""

@@ -16,13 +16,14 @@ import numpy as np
 from mazebench.constants import NUM_ACTIONS, STEP_TIME, TOP_SPEED
 
 from ..common.kernels import compiled
-from .body import COASTING_TIME, LOOK_LEFT, LOOK_RIGHT, Point
+from .body import COASTING_TIME, LOOK_LEFT, LOOK_RIGHT, STRAFE_LEFT, STRAFE_RIGHT, Point
 from .motion import REACH, moved, turned
 
 _NODES = 5  # a side of a cell
 _DETOUR = 3.0  # a metre of a way along which the body touches a wall counts as so many
 
 _TURNS = 2  # looks to either side of the first heading, at most: one of four drives is within 11 degrees of any way
+_TURNS_WITHOUT_STRAFING = 5  # one of the other two drives is
 _WIDTH = 12  # states of a beam for each heading
 _BEHIND = 1.0  # m that a state may be behind the best one
 _SAME = 0.04  # m between states that count as the same one
@@ -62,7 +63,13 @@ def make_course(walls: np.ndarray, cell_size: float, goal: tuple[int, int]) -> C
 
 
 def quickest_drive(
-    course: Course, point: Point, velocity: Point, yaw: float, num_steps: int = 0, width: int = _WIDTH
+    course: Course,
+    point: Point,
+    velocity: Point,
+    yaw: float,
+    num_steps: int = 0,
+    width: int = _WIDTH,
+    strafes: bool = True,
 ) -> tuple[list[int], list[Point]]:
     """Returns the actions of the quickest drive, and the points (x, y) after each of them.
 
@@ -76,13 +83,15 @@ def quickest_drive(
       yaw: of the body, in rad.
       num_steps: that are planned at most; 0 for as many as said above.
       width: states of a beam for each heading.
+      strafes: whether the body can strafe.
     """
+    turns = _TURNS if strafes else _TURNS_WITHOUT_STRAFING
     way_left = _way_left_at(course, *point)
     expected = way_left / (TOP_SPEED * STEP_TIME) if way_left < np.inf else 0.0
-    beams = np.zeros(((num_steps or int(2 * expected) + 49) + 1, width * (2 * _TURNS + 1)), _State)
+    beams = np.zeros(((num_steps or int(2 * expected) + 49) + 1, width * (2 * turns + 1)), _State)
     first = beams[0, 0]
     first["x"], first["y"], first["vx"], first["vy"] = *point, *velocity
-    last, index = _search(course, yaw, beams), 0
+    last, index = _search(course, yaw, beams, turns), 0
     drive = []
     for step in range(last, 0, -1):
         state = beams[step, index]
@@ -121,7 +130,7 @@ def costs_of_actions(
             first.driven, first.turns = 0.0, 0
             last = 0
             if int(first.x / cell_size) != course.goal_x or int(first.y / cell_size) != course.goal_y:
-                last = _search(course, yaw, beams)
+                last = _search(course, yaw, beams, _TURNS)
                 costs[body, action] = beams[last, 0].score
             if last == 0 or costs[body, action] < 0:
                 costs[body, action] = -_STEP_WAY * (_STEPS_AHEAD - last)
@@ -129,25 +138,30 @@ def costs_of_actions(
 
 
 @compiled
-def _search(course: Course, yaw: float, beams: Any) -> int:
-    """Fills the beams after the first one; returns the number of steps after which the first state has arrived."""
+def _search(course: Course, yaw: float, beams: Any, turns: int) -> int:
+    """Fills the beams after the first one; returns the number of steps after which the first state has arrived.
+
+    Headings are at most `turns` looks from the first one; beyond `_TURNS`, the body does not strafe.
+    """
     children = np.empty(beams.shape[1] * NUM_ACTIONS, beams.dtype)
     count = 1
     for step in range(1, len(beams)):
         num_children = 0
         for parent in range(count):
             for action in range(NUM_ACTIONS):
+                if turns > _TURNS and action in (STRAFE_LEFT, STRAFE_RIGHT):
+                    continue
                 child = children[num_children]
                 child.parent, child.action = parent, action
-                num_children += _drive(course, yaw, beams[step - 1, parent], child)
-        count = _keep_best(children[:num_children], beams[step])
+                num_children += _drive(course, yaw, beams[step - 1, parent], child, turns)
+        count = _keep_best(children[:num_children], beams[step], turns)
         if beams[step, 0].score < 0:
             return step
     return len(beams) - 1
 
 
 @compiled
-def _drive(course: Course, yaw: float, state: Any, child: Any) -> bool:
+def _drive(course: Course, yaw: float, state: Any, child: Any, turns: int) -> bool:
     """Makes `child` the state after an action from `state`; returns whether it turns no further than it may."""
     child.turns = state.turns + (child.action == LOOK_LEFT) - (child.action == LOOK_RIGHT)
     heading = turned(yaw, child.turns)
@@ -161,27 +175,27 @@ def _drive(course: Course, yaw: float, state: Any, child: Any) -> bool:
         if left == np.inf:  # a wall would stop the body
             left = _way_left_at(course, x, y)
         child.score = left + _DRIVEN_WEIGHT * child.driven
-    return abs(child.turns) <= _TURNS
+    return abs(child.turns) <= turns
 
 
 @compiled
-def _keep_best(children: Any, beam: Any) -> int:
+def _keep_best(children: Any, beam: Any, turns: int) -> int:
     """Puts the best children that differ into a beam, the best one first, some of each heading; returns how many."""
     order = np.argsort(children.score)
-    num_kept = np.zeros(2 * _TURNS + 1, np.int64)
+    num_kept = np.zeros(2 * turns + 1, np.int64)
     count = 0
     for index in order:
         child = children[index]
         if child.score > children[order[0]].score + _BEHIND:
             break
-        is_new = num_kept[child.turns + _TURNS] < len(beam) // len(num_kept)
+        is_new = num_kept[child.turns + turns] < len(beam) // len(num_kept)
         for other in beam[:count]:
             apart = abs(other.x - child.x) + abs(other.y - child.y)
             apart += COASTING_TIME * (abs(other.vx - child.vx) + abs(other.vy - child.vy))
             is_new = is_new and (other.turns != child.turns or apart > _SAME)
         if is_new:
             beam[count] = child
-            num_kept[child.turns + _TURNS] += 1
+            num_kept[child.turns + turns] += 1
             count += 1
     return count
 

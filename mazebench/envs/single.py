@@ -106,7 +106,7 @@ class SingleTask:
         if self.spec.actions in VELOCITIES:
             simulation.set_controls(controls_of_velocities(self.spec.actions, np.asarray(action)))
         else:
-            simulation.set_controls(controls_of_action(action))  # type: ignore[arg-type]
+            simulation.set_controls(controls_of_action(self.spec.actions, action))  # type: ignore[arg-type]
 
     def after_step(self, simulation: Simulation) -> None:
         """Takes note of what the action led to."""

@@ -24,7 +24,7 @@ def _box(array: specs.Array) -> spaces.Box:
 
 
 def action_space(spec: Task) -> spaces.Discrete | spaces.Box:
-    """Returns the space of the six actions, in the order of `mazebench.constants.ACTIONS`, or of velocities."""
+    """Returns the space of discrete actions, in the order of `mazebench.constants.DISCRETE`, or of velocities."""
     found = action_spec(spec.actions)
     if isinstance(found, specs.DiscreteArray):
         return spaces.Discrete(found.num_values)

@@ -196,7 +196,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         if (kind := self.task_spec.actions) in VELOCITIES:
             self._ctrl[:] = controls_of_velocities(kind, actions, (self.num_envs,))
         else:
-            self._ctrl[:] = controls_of_actions(actions, self.num_envs)
+            self._ctrl[:] = controls_of_actions(kind, actions, self.num_envs)
 
         # Simulate the environments whose episode is under way.
         running = self.rules.active & ~self._ended

@@ -10,7 +10,7 @@ import numpy as np
 
 from mazebench.agent import Agent, Inputs
 from mazebench.agent_loading import source_line
-from mazebench.constants import ACTIONS, VELOCITIES
+from mazebench.constants import DISCRETE, VELOCITIES
 from mazebench.errors import InputError, RunError, shortened
 from mazebench.maps.benchmark import SIZES
 
@@ -53,7 +53,7 @@ class CheckedAgent(Agent):
     """An agent whose wrong answers are `AgentError`s, which call it `name`."""
 
     def __init__(self, name: str, agent: Agent, kind: str):
-        """Expects actions of a kind: "six", "velocity" or "diff"."""
+        """Expects actions of a kind: "six", "four", "velocity" or "diff"."""
         self.name, self._agent, self._kind = name, agent, kind
 
     def initial_state(self, batch_size: int) -> Any:
@@ -76,9 +76,10 @@ class CheckedAgent(Agent):
         if actions.shape != (batch_size,) or not np.issubdtype(actions.dtype, np.integer):
             found = f"{actions.dtype} of shape {actions.shape}"
             raise AgentError(f"agent {self.name!r}: expected {batch_size} integer actions from act(), found {found}")
-        illegal = actions[(actions < 0) | (actions >= len(ACTIONS))]
+        num_actions = len(DISCRETE[self._kind])
+        illegal = actions[(actions < 0) | (actions >= num_actions)]
         if len(illegal):
-            expected = f"actions from 0 to {len(ACTIONS) - 1} from act()"
+            expected = f"actions from 0 to {num_actions - 1} from act()"
             raise AgentError(f"agent {self.name!r}: expected {expected}, found {illegal[0]}")
 
     def _check_velocities(self, velocities: np.ndarray, shape: tuple[int, int]) -> None:

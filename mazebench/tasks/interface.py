@@ -15,7 +15,7 @@ class Interface:
     task: str  # "local" or "hierarchical"
     size: int  # N
     context_size: int  # M
-    actions: str = "six"  # or "velocity" or "diff": which ones the agent answers with
+    actions: str = "six"  # or "four", "velocity" or "diff": which ones the agent answers with
     sensors: tuple[str, ...] = ()  # whose readings are observed beside the state and the context
     cell_size: float = 1.0  # m, the side of a cell of the mazes
     hidden: tuple[str, ...] = ()  # of "map" and "goal": what the context does not show
@@ -24,5 +24,5 @@ class Interface:
 
     @property
     def action_shape(self) -> tuple[int, ...]:
-        """The shape of an action: () for one of six, (3,) or (2,) for velocities."""
+        """The shape of an action: () for one of six or four, (3,) or (2,) for velocities."""
         return (len(VELOCITIES[self.actions]),) if self.actions in VELOCITIES else ()

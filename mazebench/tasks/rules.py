@@ -40,9 +40,9 @@ class Rules:
     each agent step it calls `advance` with the poses of its bodies.
 
     Actions: one of six, 0.16 s each: forward, backward, strafe_left, strafe_right, look_left, look_right. With
-    `actions="velocity"`, `[3]` velocities for 0.16 s, each in [-1, 1]: forward and left as shares of the top speed
-    (together no faster than it), turning to the left as a share of the turn rate. With `actions="diff"`, `[2]`: forward
-    and turning.
+    `actions="four"`, one of those that are no strafe. With `actions="velocity"`, `[3]` velocities for 0.16 s, each in
+    [-1, 1]: forward and left as shares of the top speed (together no faster than it), turning to the left as a share of
+    the turn rate. With `actions="diff"`, `[2]`: forward and turning.
 
     Observations:
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypedDict
 from annotated_types import Ge, Interval
 from pydantic import BeforeValidator, InstanceOf
 
-from mazebench.constants import VELOCITIES
+from mazebench.constants import DISCRETE, VELOCITIES
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import ALL_SPLITS
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
@@ -192,10 +192,11 @@ class TaskFields(SensorOptions, ReadOptions):
     ] = SPARSE
     actions: Annotated[
         str,
-        OneOf("six", *VELOCITIES),
+        OneOf(*DISCRETE, *VELOCITIES),
         Doc(
-            "six: one of the benchmark's six; velocity: (forward, left, turn), each from -1 to 1; diff: (v, omega), "
-            "forward and turn, of a robot that can't strafe. An agent that doesn't play six has its own."
+            "six: one of the benchmark's six; velocity: (forward, left, turn), each from -1 to 1; of a robot that "
+            "can't strafe, four: one of the six without strafing, and diff: (v, omega), forward and turn. An agent "
+            "that doesn't play six has its own."
         ),
     ] = "six"
 
