@@ -109,8 +109,7 @@ _GLANCE = {
     NAVIGATOR: "`navigator`: a classical robot",
     LEARNED: "`neural-planner`: learned, plans on learned costs",
     NO_MAP: "`navigator` without the map",
-    "sb3_agent:PPOAgent": "PPO, end to end",
-    RANDOM: "`random`",
+    "sb3_agent:PPOAgent": "PPO, untuned",
 }
 # The rows of tables of tracks, by the agent and what it was told less or more than others.
 _ROWS = {
