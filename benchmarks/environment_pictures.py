@@ -16,16 +16,19 @@ from PIL import Image, ImageDraw, ImageFont
 
 from benchmarks.track_pictures import play
 from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.plan import make_plan
 from mazebench.maps import colors
 from mazebench.maps.maze import Maze
 from mazebench.maps.pictures import draw_grid
 from mazebench.play.film import _run
+from mazebench.results.played import shown_of
 from mazebench.tasks.tracks import TRACKS
 
 FOLDER = pathlib.Path(__file__).parent.parent / "docs" / "images"
 EPISODE = 94  # of the dev episodes of `rebuilt` 2: the navigator finds a door closed and drives around
-VIEWS = {"map": "map given (outdated)", "lidar": "real building, lidar and path", "egocentric": "robot's view"}
+VIEWS = {"map": "map given; rings: moved doors", "lidar": "real building, lidar and path", "egocentric": "robot's view"}
 SIDE, GAP, TITLE = 256, 12, 26  # pixels; three panels and two gaps are 792 wide
+RING = (232, 135, 30)  # the colour of rings around doors that have moved
 FRAME_TIME = 80  # ms: twice as fast as the robot
 COLOURS = 128
 THUMBNAIL = 248
@@ -50,17 +53,31 @@ def film(number: int, path: pathlib.Path) -> None:
     options = EvalOptions.of("navigator", track="rebuilt", level=2, split="dev", seed=number)
     views = {title: _run(options, view, SIDE, True) for view, title in VIEWS.items()}
     print(*{ending for _, ending in views.values()})
+    for frame in (*views[VIEWS["map"]][0], *views[VIEWS["lidar"]][0]):
+        ring_moved_doors(frame, options)
     moments = [
         titled(pictures, list(views)) for pictures in zip(*(frames for frames, _ in views.values()), strict=True)
     ]
     # One palette for all frames, so that what stands still is stored once.
-    swatches = np.repeat([[colors.to_bytes(each)] for each in (colors.START, colors.GOAL)], moments[0].shape[1], axis=1)
+    swatches = np.repeat(
+        [[colors.to_bytes(colors.START)], [colors.to_bytes(colors.GOAL)], [RING]], moments[0].shape[1], axis=1
+    )
     of_some = [*moments[:: len(moments) // 6], *[swatches.astype(np.uint8)] * 40]
     palette = Image.fromarray(np.concatenate(of_some)).quantize(COLOURS)
     frames = [Image.fromarray(each).quantize(palette=palette, dither=Image.Dither.NONE) for each in moments]
     durations = [FRAME_TIME] * (len(frames) - 1) + [2000]
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=durations, loop=0, optimize=True)
     print(path, f"{path.stat().st_size / 1e6:.1f} MB, {len(frames)} frames")
+
+
+def ring_moved_doors(frame: np.ndarray, options: EvalOptions) -> None:
+    """Draws a ring around each cell in which the map and the maze of the filmed episode differ."""
+    plan = make_plan(options)
+    episode = plan.trials[options.seed].episode
+    walls = plan.task.all_mazes[episode.maze].walls
+    for row, column in np.argwhere(shown_of(plan.task, episode).walls != walls):
+        centre = tuple(int((place + 0.5) * SIDE / len(walls)) for place in (column, row))
+        cv2.circle(frame, centre, 7, RING, 2, cv2.LINE_AA)
 
 
 def titled(pictures: tuple[np.ndarray, ...], titles: list[str]) -> np.ndarray:

@@ -39,6 +39,16 @@ _LOOKS = (
     "mmn without model and search", "sb3_agent:PPOAgent",
 )  # fmt: skip
 
+# What lines are called where they end; others by their label.
+_NAMES = {
+    NO_MAP: "without the map",
+    TRUE_POSE: "with the true pose",
+    "sb3_agent:PPOAgent": "PPO, untuned",
+    "mmn without model and search": "mmn, no model and search",
+    "path on the map open": "open path",
+    "path on the map blocked": "blocked path",
+}
+
 # What a panel shows: by the name of a line, an estimate at each tick; None where there is none.
 _Lines = dict[str, list[Estimate | None]]
 
@@ -79,9 +89,9 @@ def budget(kept: Kept) -> Drawn:
             for value in [np.mean([is_on_time(each.records, each.oracle_steps or (), factor) for each in results])]
         ]
         ticks = {x: f"{x:g}" for x in (1.0, 1.25, 2.0, 3.0)}
-        panels.append(Panel(f"{track} 2", "budget, times the oracle's steps", pd.DataFrame(points), ticks))
+        panels.append(Panel(f"{track} 2", "budget, times the oracle's steps", pd.DataFrame(points), ticks, True))
     title = "Success over the budget of steps"
-    return Drawn("budget", title, "", draw_panels(title, panels, _LOOKS, y_name="success rate"))
+    return Drawn("budget", title, "", draw_panels(title, panels, _LOOKS, y_name="success rate", names=_NAMES))
 
 
 def what_fails(kept: Kept) -> Drawn:
@@ -118,7 +128,7 @@ def model_and_search(kept: Kept) -> Drawn:
         ticks = {x: f"{x:g}" for x in (0.2, 0.4, 0.6, 0.8, 1.0)}
         panels.append(Panel(f"{distance} cells", "million agent steps", pd.DataFrame(points), ticks))
     title = "Success rate on held-out mazes over training: mean, lowest and highest run"
-    return Drawn("model-and-search", title, "", draw_panels(title, panels, _LOOKS, y_name="success rate"))
+    return Drawn("model-and-search", title, "", draw_panels(title, panels, _LOOKS, y_name="success rate", names=_NAMES))
 
 
 def _levels(kept: Kept, row: str, track: str, field: str = "", values: Sequence[Any] = ()) -> list[Estimate | None]:
@@ -155,4 +165,4 @@ def _figure(
         texts = ticks[index] if ticks else map(str, LEVELS)
         drawn.append(Panel(panel, x_name, pd.DataFrame(points), dict(enumerate(texts))))
     labels = list(dict.fromkeys([*_LOOKS, *(label for lines in panels.values() for label in lines)]))
-    return Drawn(name, title, "", draw_panels(title, drawn, labels, y_name=y_name))
+    return Drawn(name, title, "", draw_panels(title, drawn, labels, y_name=y_name, names=_NAMES))

@@ -297,13 +297,13 @@ def tracks_map_worth(kept: Kept) -> str:
 
 
 def tracks_novel_kinds(kept: Kept) -> str:
-    """Returns the navigator's numbers in the kinds of all splits, and in those that are in eval alone."""
-    chosen = list(itertools.product(("success_rate", ON_TIME_125), (("known", KNOWN), ("novel", NOVEL))))
+    """Returns shares on time in the kinds of all splits, and in those that are in eval alone."""
+    chosen = list(itertools.product((NAVIGATOR, LEARNED), (("known", KNOWN), ("held-out", NOVEL))))
     rows = [
-        [_code(track), *(_levels(kept, NAVIGATOR, track, metric, "kind", kinds) for metric, (_, kinds) in chosen)]
+        [_code(track), *(_levels(kept, row, track, ON_TIME_125, "kind", kinds) for row, (_, kinds) in chosen)]
         for track in TRACKS
     ]
-    return _table(["track", *(f"{METRICS[metric]}, {name} kinds" for metric, (name, _) in chosen)], rows)
+    return _table(["track", *(f"{_code(row)}, {name} layouts" for row, (name, _) in chosen)], rows)
 
 
 def tracks_blocked(kept: Kept) -> str:
@@ -312,9 +312,13 @@ def tracks_blocked(kept: Kept) -> str:
     for track, level in _PARTS:
         if track != "building":  # whose maps are right
             result = kept.result(NAVIGATOR, f"{track}-{level}")
-            shares = [estimate(result, ON_TIME_125, "blocked", (is_blocked,)) for is_blocked in PATHS.values()]
-            rows.append([f"`{track}` {level}", *map(_interval, shares)])
-    return _table(["part", *(f"{METRICS[ON_TIME_125]}, {name}" for name in PATHS)], rows)
+            cells = [f"`{track}` {level}"]
+            for is_blocked in PATHS.values():
+                count = int((column(result.records, "blocked") == is_blocked).sum())
+                cells += [str(count), _interval(estimate(result, ON_TIME_125, "blocked", (is_blocked,)))]
+            rows.append(cells)
+    header = itertools.chain.from_iterable((f"episodes, {name}", METRICS[ON_TIME_125]) for name in PATHS)
+    return _table(["part", *header], rows)
 
 
 def tracks_navigator(kept: Kept) -> str:

@@ -49,6 +49,7 @@ _STYLE: Any = {
 }
 _BELOW: Any = "outside lower center"
 _DODGE, _DODGES = 0.12, 0.72  # of the smallest step between levels: two agents are so far apart, all of them at most
+_LINE_HEIGHT = 0.105  # of scores, that a line of text takes
 _MIN_CURVE = 4  # points of a curve with bands; fewer have bars, since bands over one point are not seen
 # Figures with a panel for each of several tables: their names, the beginning of the tables' names, their titles.
 _SEVERAL = (
@@ -124,17 +125,29 @@ def draw_distributions(episodes: pd.DataFrame) -> Iterator[Drawn]:
 
 
 def draw_panels(
-    title: str, panels: Sequence[Panel], labels: Sequence[str], height: float = 2.2, y_name: str = ""
+    title: str,
+    panels: Sequence[Panel],
+    labels: Sequence[str],
+    height: float = 2.2,
+    y_name: str = "",
+    names: Mapping[str, str] | None = None,
 ) -> Figure:
     """Returns panels of `height` inches in a grid, the title above, and one legend below them.
 
-    The place in `labels` gives an agent its colour and marker, and those of the paper have theirs.
+    The place in `labels` gives an agent its colour and marker, and those of the paper have theirs. With `names`, of
+    some lines, lines are named where they end in one of the panels on the right, in the place of the legend.
     """
     with mpl.rc_context(_STYLE):
         figure, grid = _make_grid(title, [panel.title for panel in panels], height)
         for axes, panel in zip(grid, panels, strict=True):
             _draw_panel(axes, panel, labels)
         figure.supylabel(y_name, fontsize=8)
+        if names is not None:
+            in_column = len(panels) if len(panels) <= 3 else 2
+            right = range(min(in_column, len(panels)) - 1, len(panels), in_column)
+            last = max(right, key=lambda index: panels[index].points.column.nunique())
+            _name_lines(grid[last], panels[last], labels, names)
+            return figure
         handles: dict[str, Any] = {}
         for axes in grid:
             handles |= dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
@@ -230,6 +243,20 @@ def _draw_panel(axes: Axes, panel: Panel, labels: Sequence[str]) -> None:
         axes.set_xlim(ticks[0][0] - margin, ticks[-1][0] + margin)
     else:
         axes.xaxis.set_major_formatter(EngFormatter(sep=""))
+
+
+def _name_lines(axes: Axes, panel: Panel, labels: Sequence[str], names: Mapping[str, str]) -> None:
+    """Writes the name of each line on the right of its end, in its colour, the highest one first."""
+    ends = panel.points.sort_values("x").groupby("column", observed=True).value.last().sort_values()
+    below = {label: _LINE_HEIGHT * place for place, label in enumerate(ends.index)}  # what lower names need at least
+    bottom = 1 + _LINE_HEIGHT / 2
+    for label, value in ends.iloc[::-1].items():
+        text = textwrap.fill(names.get(label, label), 18)
+        height = _LINE_HEIGHT * (text.count("\n") + 1)
+        middle = min(max(float(value), below[label]), bottom - height / 2)
+        bottom = middle - height / 2
+        look = {"color": _look(label, labels)["color"], "va": "center", "fontsize": 8}
+        axes.text(1.03, middle, text, transform=axes.get_yaxis_transform(), **look)
 
 
 def _set_ticks(axes: Axes, ticks: Mapping[float, str]) -> None:
