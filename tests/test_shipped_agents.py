@@ -9,8 +9,8 @@ from mazebench import testing
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.evaluate import evaluate
 
-SHIPPED = ("mmn", "mah", "mah-paper", "dqn", "neural-planner")
-OF_ONE_SIZE = ("mmn", "mah-paper")
+SHIPPED = ("mmn", "mmn-paths", "mah", "mah-paper", "dqn", "neural-planner")
+OF_ONE_SIZE = ("mmn", "mmn-paths", "mah-paper")
 
 
 @pytest.mark.parametrize("name", SHIPPED)

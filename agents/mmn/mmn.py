@@ -126,3 +126,10 @@ class MMN(NetworkAgent):
     @property
     def _device(self) -> torch.device:
         return self.network.support.device
+
+
+class MMNPaths(MMN):
+    """MMN whose heads read cheapest ways over learned costs, however far, in the place of convolutions."""
+
+    name: ClassVar[str] = "mmn-paths"
+    default_config: ClassVar[MMNConfig] = MMNConfig(far="paths")

@@ -138,7 +138,7 @@ def train(num_steps, seed):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    parser.add_argument("--steps", type=int, default=60_000)
+    parser.add_argument("--steps", type=int, default=60_000, help="agent steps of the training")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", default="student.pt")
     parser.add_argument("--distances", type=int, nargs="+", help="cells from start to goal in the evaluation")

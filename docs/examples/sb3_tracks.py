@@ -16,7 +16,7 @@ parser.add_argument("--track", default="rebuilt", help="or local, a task without
 parser.add_argument("--distances", type=int, nargs=2, default=[1, 6], help="cells from start to goal, from and to")
 parser.add_argument("--kinds", nargs="*", default=[], help="of a new maze in each episode, instead of the train mazes")
 parser.add_argument("--reward", default="sparse", help="or progress, which also rewards a shorter way to the goal")
-parser.add_argument("--features", default="map", help="or ways: the cheapest ways over learned costs, for building")
+parser.add_argument("--features", default="map", help="or ways: the cheapest ways over learned costs")
 parser.add_argument("--level", type=int, nargs="*", default=[1, 2, 3], help="of the track, one of them in each episode")
 parser.add_argument("--recurrent", action="store_true", help="a policy with an LSTM, by sb3-contrib, for a track")
 parser.add_argument("--steps", type=int, default=400_000)

@@ -35,8 +35,8 @@ def print_summary(summary: Summary) -> None:
     head = ["n", "success rate", *["paper"] * bool(paper), *_HEAD[2:]]
     totals = []
     if task.task == "local":
-        head = ["distance", *head]
         by_distance = summary.by_distance if len(summary.by_distance) <= _MOST_DISTANCES else {}
+        head = ["distance" if by_distance else "episodes", *head]
         rows = [[distance, *_with_paper(row, paper, int(distance))] for distance, row in by_distance.items()]
         totals = [
             [name, *_with_paper(row, paper)] for name, row in [*summary.by_fact.items(), ("all", summary.overall)]

@@ -28,9 +28,9 @@ class EvalOptions:
 
     agent: str = dataclasses.field(kw_only=False)
     task: Task = dataclasses.field(kw_only=False)
-    episodes_per_distance: Annotated[int, Ge(1), Doc("Episodes for each maze and distance (local task).")] = (
-        EPISODES_PER_DISTANCE
-    )
+    episodes_per_distance: Annotated[
+        int, Ge(1), Doc("Episodes for each maze and distance (local task); the frozen ones of a track are all played.")
+    ] = EPISODES_PER_DISTANCE
     checkpoint: Annotated[
         str | None, Doc("A learned agent's checkpoint or run folder; the shipped one if not given.")
     ] = None

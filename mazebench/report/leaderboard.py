@@ -173,7 +173,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("page", type=pathlib.Path, metavar="PAGE.md")
     options = parser.parse_args(arguments)
     try:
-        write_leaderboard(read_entries(options.results), options.page)
+        entries = read_entries(options.results)
+        write_leaderboard(entries, options.page)
+        for entry in entries:
+            print(f"{entry.agent}: on-time rate {entry.on_time[0]:.2f}, success {entry.success:.2f}; in {options.page}")
     except InputError as error:
         print(f"mazebench: {error}", file=sys.stderr)
         sys.exit(2)

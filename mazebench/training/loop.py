@@ -98,6 +98,8 @@ def train(
       TrainingError: if a loss is not finite.
     """
     names = (task,) if isinstance(task, str) else tuple(task)
+    if "hierarchical" in names:
+        raise InputError("expected task 'local' or a track in a training, found 'hierarchical'")
     if names == ("local",):
         names = () if (track := options.pop("track", None)) is None else (track,)
     chosen = TrainOptions(
@@ -300,12 +302,9 @@ def training_task(
     for name in FIXED:
         if name in given and given[name] != (wanted := fields_of(Task)[name].default):
             raise InputError(f"expected {name} {wanted!r} in a training, found {given[name]!r}")
-    if given.get("task") == "hierarchical":
-        raise InputError("expected task 'local' or a track in a training, found 'hierarchical'")
     values = {**defaults, **given}
-    has_track = {values.get("track"), values.get("task", "local")} - {None, "local"}
     has_pairs = values.get("pairs") == "fixed" or are_scenarios(values.get("mazes"))
-    if has_track or has_pairs or values.get("reward") == PROGRESS:
+    if values.get("track") or has_pairs or values.get("reward") == PROGRESS:
         values["num_goals"] = 1  # as these have one goal
     task = Task.of(**values)
     if needed := [name for name in agent_class.needs_shown if name in task.hide]:
