@@ -43,6 +43,7 @@ from mazebench.tasks.tracks.track import LEVELS
 SATURATED = "At 1.00 ["  # begins the sentence below a table
 _PAPERS_MMN = "MMN (paper)"
 _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints success rates
+_FARTHER = (12, 15)
 _MILESTONES = (0.2, 0.6, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.6)  # million agent steps
 # The rows of the paper's protocol, by the report's label.
 _PAPER_ROWS = {
@@ -60,6 +61,7 @@ _PAPER_ROWS = {
 
 _TRAINED = {  # by name of the kept runs
     "mmn": "`mmn`",
+    "mmn-paths": "`mmn-paths`",
     "mmn-model-false": "`mmn` without model and search",
     "mah": "`mah`",
     "mah-long": "`mah`, 6.6 million steps",
@@ -69,6 +71,7 @@ _TRAINED = {  # by name of the kept runs
     "sb3-ppo": "PPO of Stable-Baselines3",
 }
 _PAIRS = (
+    ("mmn-paths", "mmn"),
     ("mmn", "mmn-model-false"),
     ("mmn-model-false", "mah"),
     ("mmn", "mah"),
@@ -120,7 +123,7 @@ _ROWS = {
     TRUE_POSE: "`navigator` with the true pose",
     LEARNED: "`neural-planner`, learned from the oracle",
     REWARDED: "`neural-planner`, learned from rewards",
-    "planner-closed-loop": "`planner-closed-loop`, trusts the map",
+    "planner-closed-loop": "`planner-closed-loop`, follows the map",
     "sb3_agent:PPOAgent": "PPO of Stable-Baselines3",
     "sb3_agent:RecurrentPPOAgent": "PPO of sb3-contrib, with an LSTM",
     "sb3_her_agent:LidarHerAgent": "DQN with hindsight of Stable-Baselines3",
@@ -225,14 +228,16 @@ def short_runs(rows: Mapping[str, str], metrics: Mapping[str, str], kept: Kept) 
 
 
 def mmn_runs(kept: Kept) -> str:
-    """Returns mmn's mean success rates over its training runs, and the paper's."""
+    """Returns mean success rates of mmn and mmn-paths over their training runs, and the paper's."""
     paper = kept.report[LOCAL].wide("success_rate").loc[map(str, _PRINTED_DISTANCES), _PAPERS_MMN]
-    runs = kept.training_runs("mmn")
+    distances = (*_PRINTED_DISTANCES, *_FARTHER)
+    runs = {name: _values(kept.training_runs(name), "success") for name in ("mmn", "mmn-paths")}
     rows = [
-        [_code("mmn"), str(len(runs)), *_over_runs(kept, _values(runs, "success"))],
-        ["the paper's MMN, as printed", "", *paper],
+        *([_code(name), str(len(own)), *_over_runs(kept, own, at=distances)] for name, own in runs.items()),
+        ["`mmn-paths` - `mmn`", "", *_over_runs(kept, runs["mmn-paths"], runs["mmn"], distances)],
+        ["the paper's MMN, as printed", "", *paper, *[""] * len(_FARTHER)],
     ]
-    return _table(["agent", "runs", *map(str, _PRINTED_DISTANCES)], rows)
+    return _table(["agent", "runs", *map(str, distances)], rows)
 
 
 def tracks_table(metric: str, chosen: Mapping[str, str], kept: Kept) -> str:
@@ -367,13 +372,16 @@ def _values(runs: Sequence[Result], field: str) -> np.ndarray:
     return np.array([column(each.records, field) for each in runs], dtype=float)
 
 
-def _over_runs(kept: Kept, values: np.ndarray, others: np.ndarray | None = None) -> list[str]:
-    """Returns the mean of values `[R, E]`, or the difference to others' mean, at each distance of the paper."""
+def _over_runs(
+    kept: Kept, values: np.ndarray, others: np.ndarray | None = None, at: Sequence[int] = _PRINTED_DISTANCES
+) -> list[str]:
+    """Returns the mean of values `[R, E]`, or the difference to others' mean, at each of some distances."""
     records = kept.result(RANDOM, LOCAL).records
     maze, distance = column(records, "maze"), column(records, "distance")
-    counted = [distance == each for each in _PRINTED_DISTANCES]
+    counted = [distance == each for each in at]
     return [
-        _interval(runs_interval(values[:, at], maze[at], None if others is None else others[:, at])) for at in counted
+        _interval(runs_interval(values[:, own], maze[own], None if others is None else others[:, own]))
+        for own in counted
     ]
 
 
