@@ -151,13 +151,13 @@ def draw_panels(
         handles: dict[str, Any] = {}
         for axes in grid:
             handles |= dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
-        names = sorted(handles, key=lambda name: name in _PAPER_MARKERS)
-        lines = [name.split("\n") for name in names]
+        order = sorted(handles, key=lambda name: name in _PAPER_MARKERS)
+        lines = [name.split("\n") for name in order]
         columns = int(np.clip(13 * WIDTH / (max(len(line) for each in lines for line in each) + 7), 1, 6))
         # The legend makes the figure higher, and leaves the panels as they are.
-        height_of_legend = 0.16 * -(-len(names) // columns) * max(map(len, lines))
+        height_of_legend = 0.16 * -(-len(order) // columns) * max(map(len, lines))
         figure.set_figheight(figure.get_figheight() + height_of_legend)
-        figure.legend([handles[name] for name in names], names, loc=_BELOW, ncols=columns)
+        figure.legend([handles[name] for name in order], order, loc=_BELOW, ncols=columns)
     return figure
 
 
