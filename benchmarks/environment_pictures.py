@@ -53,8 +53,7 @@ def film(number: int, path: pathlib.Path) -> None:
     options = EvalOptions.of("navigator", track="rebuilt", level=2, split="dev", seed=number)
     views = {title: _run(options, view, SIDE, True) for view, title in VIEWS.items()}
     print(*{ending for _, ending in views.values()})
-    for frame in (*views[VIEWS["map"]][0], *views[VIEWS["lidar"]][0]):
-        ring_moved_doors(frame, options)
+    ring_moved_doors([*views[VIEWS["map"]][0], *views[VIEWS["lidar"]][0]], options)
     moments = [
         titled(pictures, list(views)) for pictures in zip(*(frames for frames, _ in views.values()), strict=True)
     ]
@@ -70,14 +69,15 @@ def film(number: int, path: pathlib.Path) -> None:
     print(path, f"{path.stat().st_size / 1e6:.1f} MB, {len(frames)} frames")
 
 
-def ring_moved_doors(frame: np.ndarray, options: EvalOptions) -> None:
+def ring_moved_doors(frames: list[np.ndarray], options: EvalOptions) -> None:
     """Draws a ring around each cell in which the map and the maze of the filmed episode differ."""
     plan = make_plan(options)
     episode = plan.trials[options.seed].episode
     walls = plan.task.all_mazes[episode.maze].walls
     for row, column in np.argwhere(shown_of(plan.task, episode).walls != walls):
         centre = tuple(int((place + 0.5) * SIDE / len(walls)) for place in (column, row))
-        cv2.circle(frame, centre, 7, RING, 2, cv2.LINE_AA)
+        for frame in frames:
+            cv2.circle(frame, centre, 7, RING, 2, cv2.LINE_AA)
 
 
 def titled(pictures: tuple[np.ndarray, ...], titles: list[str]) -> np.ndarray:

@@ -7,13 +7,13 @@ import pathlib
 import numpy as np
 
 from mazebench.agent import Agent, Inputs, Interface
-from mazebench.constants import DISCRETE
+from mazebench.constants import DISCRETE, VELOCITIES
 
 
 class RandomAgent(Agent):
     """Acts uniformly at random; the actions of an episode depend on its seed alone."""
 
-    plays_actions = ("six", "four", "velocity", "diff")
+    plays_actions = (*DISCRETE, *VELOCITIES)
 
     def __init__(self, interface: Interface):
         self._kind, self._shape = interface.actions, interface.action_shape

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mazebench.constants import ACTIONS, DISCRETE, NUM_ACTIONS
+from mazebench.constants import ACTIONS, DISCRETE, NUM_ACTIONS, VELOCITIES
 
 X, Y, YAW, FORWARD_VELOCITY, LEFT_VELOCITY = 0, 1, 5, 6, 7  # indices in the state
 FORWARD, BACKWARD, STRAFE_LEFT, STRAFE_RIGHT, LOOK_LEFT, LOOK_RIGHT = range(NUM_ACTIONS)
@@ -18,7 +18,7 @@ TURN_STEP = math.radians(21.12)  # of one look action
 COASTING_TIME = 0.125  # s; a body let go at speed v comes to rest after v * COASTING_TIME metres
 
 # The kinds of actions that the robots play, and those of a body that can't strafe.
-PLAYED = ("six", "four", "velocity", "diff")
+PLAYED = (*DISCRETE, *VELOCITIES)
 WITHOUT_STRAFING = ("four", "diff")
 
 _VELOCITIES = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], np.float64)

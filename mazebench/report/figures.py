@@ -143,8 +143,8 @@ def draw_panels(
             _draw_panel(axes, panel, labels)
         figure.supylabel(y_name, fontsize=8)
         if names is not None:
-            in_column = len(panels) if len(panels) <= 3 else 2
-            right = range(min(in_column, len(panels)) - 1, len(panels), in_column)
+            num_columns = _num_columns(len(panels))
+            right = range(num_columns - 1, len(panels), num_columns)
             last = max(right, key=lambda index: panels[index].points.column.nunique())
             _name_lines(grid[last], panels[last], labels, names)
             return figure
@@ -193,9 +193,14 @@ def to_svg(drawn: Drawn) -> str:
     return svg.replace("<svg", f'<svg role="img" aria-label="{html.escape(drawn.title)}"', 1)
 
 
+def _num_columns(num_panels: int) -> int:
+    """Returns how many panels are beside one another."""
+    return min(num_panels, 3 if num_panels != 4 else 2)
+
+
 def _make_grid(title: str, titles: Sequence[str], height: float) -> tuple[Figure, list[Axes]]:
     """Returns a figure with axes that have these titles, as many as fit beside one another."""
-    num_columns = min(len(titles), 3 if len(titles) != 4 else 2)
+    num_columns = _num_columns(len(titles))
     num_rows = -(-len(titles) // num_columns)
     width = WIDTH if num_columns > 1 else WIDTH / 1.6
     titles = [textwrap.fill(text, int(13 * (width / num_columns - 0.5))) for text in titles]

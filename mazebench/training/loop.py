@@ -100,8 +100,12 @@ def train(
     names = (task,) if isinstance(task, str) else tuple(task)
     if "hierarchical" in names:
         raise InputError("expected task 'local' or a track in a training, found 'hierarchical'")
-    if names == ("local",):
-        names = () if (track := options.pop("track", None)) is None else (track,)
+    if (track := options.pop("track", None)) is not None:
+        if names not in (("local",), (track,)):
+            raise InputError(f"expected one track, found {', '.join(map(repr, (*names, track)))}")
+        names = (track,)
+    elif names == ("local",):
+        names = ()
     chosen = TrainOptions(
         agent,
         overrides=tuple((name, str(value)) for name, value in (overrides or {}).items()),
