@@ -14,6 +14,7 @@ from mazebench.tasks.tracks.hand_drawing import (
     LARGEST_STRETCH,
     PIXELS,
     Displacement,
+    Line,
     draw_by_hand,
     draw_displacement,
     fitted_drawing,
@@ -40,10 +41,10 @@ def plain(share=(1.0, 1.0), place=(0.0, 0.0), thickening=0.0):
     return fitted_drawing(SIZE, NONE, np.array(share), np.array(place), thickening)
 
 
-def grid(step):
-    """Points (row, column) of the maze, `[2, T, T]`, every `step` cells."""
-    coordinates = np.linspace(0, SIZE, round(SIZE / step) + 1)
-    return coordinates, np.stack(np.meshgrid(coordinates, coordinates, indexing="ij"))
+def grid(per_cell):
+    """So many points per cell along an axis, and all points (row, column) of the maze on these, `[2, T, T]`."""
+    line = Line(SIZE * per_cell + 1, per_cell)
+    return line, np.stack(np.meshgrid(*2 * [line.coordinates()], indexing="ij"))
 
 
 class TestDisplacement:
@@ -51,14 +52,14 @@ class TestDisplacement:
     @hypothesis.given(levels, seeds)
     def test_largest_displacement_is_the_level(self, level, seed):
         displacement = draw_displacement(SIZE, np.random.default_rng(seed)).scaled(level)
-        lengths = np.sqrt((displacement.on_grid(grid(0.05)[0]) ** 2).sum(axis=0))
+        lengths = np.sqrt((displacement.on_grid(grid(20)[0]) ** 2).sum(axis=0))
         assert lengths.max() == pytest.approx(level, rel=0.005)
 
     @few
     @hypothesis.given(levels, seeds)
     def test_sheet_does_not_fold(self, level, seed):
-        coordinates, points = grid(0.1)
-        displaced = points + draw_displacement(SIZE, np.random.default_rng(seed)).scaled(level).on_grid(coordinates)
+        line, points = grid(10)
+        displaced = points + draw_displacement(SIZE, np.random.default_rng(seed)).scaled(level).on_grid(line)
         down, right = np.diff(displaced, axis=1)[:, :, :-1], np.diff(displaced, axis=2)[:, :-1]
         assert (down[0] > 0).all()
         assert (right[1] > 0).all()
@@ -66,16 +67,16 @@ class TestDisplacement:
 
     def test_neighbouring_points_move_alike_and_far_ones_do_not(self):
         # White noise smoothed by a Gaussian of deviation 3 has the correlation exp(-distance^2 / 36).
-        rows, rng = np.array([2.0, 3.0, 8.0]), np.random.default_rng(0)
+        rng = np.random.default_rng(0)
         noise = [Displacement(rng.standard_normal((2, SIZE + 18, SIZE + 18)), np.zeros(2)) for _ in range(2000)]
-        values = np.array([displacement.on_grid(rows)[0, :, 0] for displacement in noise])
+        values = np.array([displacement.on_grid(Line(SIZE, 1))[0, [2, 3, 8], 0] for displacement in noise])
         np.testing.assert_allclose(np.corrcoef(values.T)[0], np.exp([0, -1 / 36, -1]), atol=0.08)
 
     def test_points_move_as_the_grid_does(self):
         displacement = draw_displacement(SIZE, np.random.default_rng(0))
-        coordinates, points = grid(0.5)
+        line, points = grid(2)
         at_points = displacement.at(points.reshape(2, -1).T)
-        np.testing.assert_allclose(at_points.T.reshape(points.shape), displacement.on_grid(coordinates), atol=1e-12)
+        np.testing.assert_allclose(at_points.T.reshape(points.shape), displacement.on_grid(line), atol=1e-12)
 
 
 class TestPicture:
@@ -118,7 +119,7 @@ class TestPicture:
     @hypothesis.given(levels, seeds)
     def test_drawing_lies_on_the_sheet_in_the_size_that_was_drawn(self, level, seed):
         drawn = drawing(level, seed)
-        outline = drawn.points(grid(0.05)[1].reshape(2, -1).T, SIZE)
+        outline = drawn.points(grid(20)[1].reshape(2, -1).T, SIZE)
         np.testing.assert_array_less(-0.02, outline)
         np.testing.assert_array_less(outline, SHEET + 0.02)
         share = np.ptp(outline, axis=0) / SHEET

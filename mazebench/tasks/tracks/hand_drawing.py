@@ -10,6 +10,8 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +31,18 @@ _ROWS_AT_A_TIME = 8  # of a product of matrices
 _WHITE = 255  # the largest of the grey values, which are multiples of 1 / 255
 
 
+class Line(NamedTuple):
+    """Points at equal distances along an axis of the maze."""
+
+    number: int
+    per_cell: int
+    offset: float = 0.0  # of the first one, in distances between points
+
+    def coordinates(self) -> np.ndarray:
+        """Returns `[T]` float64, in cells; T is `number`."""
+        return (np.arange(self.number) + self.offset) / self.per_cell
+
+
 @dataclasses.dataclass(frozen=True)
 class Displacement:
     """A smooth displacement of the points of an N x N maze: Gaussian-smoothed white noise (Simard et al. 2003).
@@ -39,9 +53,9 @@ class Displacement:
     noise: np.ndarray  # [2, K, K] float64: along rows and columns; cell (i, j) has its centre at i - 8.5, j - 8.5
     mean: np.ndarray  # [2] float64, over the maze, in cells; subtracted, for a shift of the whole is no distortion
 
-    def on_grid(self, coordinates: np.ndarray) -> np.ndarray:
-        """Returns `[2, T, T]` float64: the displacements at all points of `coordinates` x `coordinates` (`[T]`)."""
-        smooth = _gaussians(coordinates, self.noise.shape[-1])
+    def on_grid(self, line: Line) -> np.ndarray:
+        """Returns `[2, T, T]` float64: the displacements at all points of `line` x `line`."""
+        smooth = _gaussians_on(line, self.noise.shape[-1])
         return _weighted(smooth, self.noise, smooth) - self.mean[:, None, None]
 
     def at(self, points: np.ndarray) -> np.ndarray:
@@ -56,8 +70,8 @@ class Displacement:
     def folds(self, size: int) -> bool:
         """Returns whether the displaced picture lies over itself somewhere, or one of its axes runs backwards."""
         nodes, count = _nodes(size), self.noise.shape[-1]
-        smooth = _gaussians(nodes, count)
-        slope = -(nodes[:, None] - _noise_centres(count)) / SIGMA**2 * smooth
+        smooth = _gaussians_on(nodes, count)
+        slope = -(nodes.coordinates()[:, None] - _noise_centres(count)) / SIGMA**2 * smooth
 
         # By how much each component changes along rows and along columns.
         row_row, column_row = _weighted(slope, self.noise, smooth)
@@ -100,10 +114,15 @@ class HandDrawing(Drawing):
         """Returns `[P, P]` float32: the share of wall in each pixel, a multiple of 1 / 255; bare paper is wall."""
         size, pixels = len(walls), PIXELS * len(walls)
         # How many samples of the maze, and how many of its walls, fall into each pixel.
-        samples = (np.arange(_SAMPLES * size) + 0.5) / _SAMPLES
-        drawn_at = self.origin[:, None, None] + self.scale[:, None, None] * _moved(samples, self.displacement)
-        row, column = np.clip(drawn_at, 0, pixels - 1, out=drawn_at).astype(np.intp)
-        place = 2 * (row * pixels + column) + self._thick_walls(walls, samples)
+        samples = Line(_SAMPLES * size, _SAMPLES, 0.5)
+        drawn_at = _moved(samples, self.displacement)
+        drawn_at *= self.scale[:, None, None]
+        drawn_at += self.origin[:, None, None]
+        row, place = np.clip(drawn_at, 0, pixels - 1, out=drawn_at).astype(np.intp)
+        row *= pixels
+        place += row
+        place *= 2
+        place += self._thick_walls(walls, samples.coordinates())
         free, wall = np.bincount(place.ravel(), minlength=2 * pixels**2).reshape(-1, 2).T
         drawn = free + wall
 
@@ -172,16 +191,21 @@ def fitted_drawing(
     return HandDrawing(displacement=displacement, scale=scale, origin=origin, thickening=thickening)
 
 
-def _moved(coordinates: np.ndarray, displacement: Displacement) -> np.ndarray:
-    """Returns `[2, T, T]` float64: where all points of `coordinates` x `coordinates` (`[T]`) are moved to."""
-    moved = displacement.on_grid(coordinates)
+def _moved(line: Line, displacement: Displacement) -> np.ndarray:
+    """Returns `[2, T, T]` float64: where all points of `line` x `line` are moved to."""
+    moved, coordinates = displacement.on_grid(line), line.coordinates()
     moved[0] += coordinates[:, None]
     moved[1] += coordinates
     return moved
 
 
-def _nodes(size: int) -> np.ndarray:
-    return np.arange(_NODES * size + 1) / _NODES
+def _nodes(size: int) -> Line:
+    return Line(_NODES * size + 1, _NODES)
+
+
+@functools.lru_cache
+def _gaussians_on(line: Line, count: int) -> np.ndarray:
+    return _gaussians(line.coordinates(), count)
 
 
 def _gaussians(coordinates: np.ndarray, count: int) -> np.ndarray:
@@ -195,7 +219,8 @@ def _weighted(rows: np.ndarray, noise: np.ndarray, columns: np.ndarray) -> np.nd
     It multiplies a few rows at a time: BLAS then starts no threads, which wait where other work keeps the cores busy.
     """
     num_rows, count = rows.shape
-    padded = np.pad(rows, ((0, -num_rows % _ROWS_AT_A_TIME), (0, 0)))
+    padded = np.zeros((num_rows + -num_rows % _ROWS_AT_A_TIME, count))  # np.pad would take as long as the products
+    padded[:num_rows] = rows
     by_rows = padded.reshape(-1, _ROWS_AT_A_TIME, count) @ noise[:, None]
     return (by_rows @ columns.T).reshape(2, len(padded), len(columns))[:, :num_rows]
 
