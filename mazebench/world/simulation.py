@@ -57,8 +57,9 @@ class Simulation(abc.ABC):
         return float(np.hypot(self.data.qvel[0], self.data.qvel[1]))
 
     def state(self) -> np.ndarray:
-        """Returns the state, `[12]` float64; see `states_from_sensors`."""
-        return states_from_sensors(self.data.sensordata)
+        """Returns the state, `[12]` float64; see `states_from_sensors`, of which plain numbers take half the time."""
+        x, y, z, yaw, *velocities = self.data.sensordata.tolist()
+        return np.array([x, y, z, 0.0, 0.0, wrap_angle(yaw), *velocities])
 
     @abc.abstractmethod
     def full_state(self) -> np.ndarray:
