@@ -83,6 +83,24 @@ for slot, seed in enumerate((5, 6)):
     np.testing.assert_array_equal(info["final_obs"][slot]["egocentric"], expected)
 """)
 
+    def test_mazes_of_too_many_boxes_for_a_model_look_the_same(self):
+        run_with_egl("""
+from mazebench.maps.kinds import generate
+from mazebench.world import mjcf
+from mazebench.world.models import MazeModels
+from mazebench.world.rendering import Cameras
+mazes = [generate("dfs", 13, np.random.default_rng(seed)) for seed in range(3)]
+places = [(index, np.array([*maze.point(maze.free_cells[0]), 0.0])) for index, maze in enumerate(mazes)]
+def pictures():
+    cameras = Cameras(MazeModels(mazes), ("top", "egocentric"))
+    return [cameras.take(index, qpos, np.zeros(3)) for index, qpos in places + places[::-1]]
+whole = pictures()
+mjcf.MAX_BOXES = sorted(len(maze.boxes) for maze in mazes)[0]  # two of them have more
+for expected, found in zip(whole, pictures(), strict=True):
+    for camera, picture in expected.items():
+        np.testing.assert_array_equal(picture, found[camera])
+""")
+
     def test_gymnasium_records_a_film_of_an_episode(self, tmp_path):
         pytest.importorskip("moviepy")
         run_with_egl(f"""

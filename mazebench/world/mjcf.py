@@ -51,15 +51,30 @@ def maze_spec(maze: Maze) -> mujoco.MjSpec:
     Raises:
       InputError: if it has more boxes than MuJoCo puts together in some seconds.
     """
-    if len(maze.boxes) > MAX_BOXES:
+    require_whole(maze)
+    spec = boxes_spec(maze, *wall_boxes(maze))
+    spec.modelname = maze.name
+    return spec
+
+
+def has_whole_model(maze: Maze) -> bool:
+    """Returns whether MuJoCo puts the whole model of a maze together in some seconds."""
+    return len(maze.boxes) <= MAX_BOXES
+
+
+def require_whole(maze: Maze) -> None:
+    """Raises `InputError` if a maze has too many boxes for that."""
+    if not has_whole_model(maze):
         raise InputError(
             f"{maze.name}: expected a maze of at most {MAX_BOXES} wall boxes for a whole model, found "
             f"{len(maze.boxes)}; the Gymnasium and vector environments take it"
         )
+
+
+def wall_boxes(maze: Maze) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the middles and half sides (`[K, 3]` m) of all wall boxes of a maze."""
     top, left, bottom, right = np.array(maze.boxes).T
-    spec = boxes_spec(maze, *placed_boxes(top, left, bottom, right, maze.size, maze.cell_size))
-    spec.modelname = maze.name
-    return spec
+    return placed_boxes(top, left, bottom, right, maze.size, maze.cell_size)
 
 
 def boxes_spec(maze: Maze, middle: np.ndarray, half: np.ndarray) -> mujoco.MjSpec:

@@ -1,54 +1,84 @@
-"""The whole models of several mazes, for pictures and for the dm_control environment."""
+"""The whole models of several mazes, for pictures and for the dm_control environment.
+
+Where a maze has too many boxes for a whole model, a picture's model has no walls: the picture is given the boxes.
+"""
 
 from __future__ import annotations
 
 import functools
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
+import numpy as np
 
 from mazebench.maps.drawn import Mazes
-from mazebench.world.mjcf import maze_spec
+from mazebench.maps.maze import Maze
+from mazebench.world.mjcf import boxes_spec, has_whole_model, maze_spec, require_whole, wall_boxes
 from mazebench.world.textures import add_textures
 
-_MOST_GEOMS = 500_000  # of the models that are kept, some 1 kB each
+_MOST_SHOWN = 500_000  # things in the models that are kept, some 1 kB each
+
+
+class Seen(NamedTuple):
+    """What shows a maze."""
+
+    model: mujoco.MjModel
+    data: mujoco.MjData  # which anybody may overwrite
+    middle: np.ndarray  # [K, 3] m, of wall boxes that the model lacks because they are too many
+    half: np.ndarray  # [K, 3] m, their half sides
+
+    @property
+    def num_shown(self) -> int:
+        """The number of things in a picture."""
+        return self.model.ngeom + self.model.nsite + len(self.middle)
 
 
 class MazeModels:
-    """The whole model of each of some mazes, with data to compute what a picture shows; those used last are kept."""
+    """What shows each of some mazes, which is its whole model if it has one; those used last are kept."""
 
     def __init__(self, mazes: Mazes, textures: bool = False):
         """With `textures`, the models have the textured look, which only pictures need."""
         self._mazes, self._textures = mazes, textures
-        self._kept: dict[int, tuple[mujoco.MjModel, mujoco.MjData]] = {}  # the one used last at the end
-        self._num_geoms = 0
+        self._kept: dict[int, Seen] = {}  # the one used last at the end
+        self._num_shown = 0
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Makes copies share the models, and pickles hold the mazes only."""
         return models_of, (self._mazes, self._textures)
 
     def __getitem__(self, index: int) -> mujoco.MjModel:
-        """Returns the model of maze number `index`; whoever changes it copies it."""
-        return self.with_data(index)[0]
-
-    def with_data(self, index: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
-        """Returns the model of maze number `index` and data of it, which anybody may overwrite.
+        """Returns the whole model of maze number `index`; whoever changes it copies it.
 
         Raises:
           InputError: if MuJoCo can't put so large a model together in some seconds.
         """
+        require_whole(self._mazes[index])
+        return self.seen(index).model
+
+    def seen(self, index: int) -> Seen:
+        """Returns what shows maze number `index`.
+
+        Raises:
+          InputError: if textures are wanted of a maze that has too many boxes for a whole model.
+        """
         if (found := self._kept.pop(index, None)) is None:
-            spec = maze_spec(self._mazes[index])
-            if self._textures:
-                add_textures(spec, self._mazes[index])
-            model = spec.compile()
-            found = model, mujoco.MjData(model)
-            self._num_geoms += model.ngeom
-            while self._kept and self._num_geoms > _MOST_GEOMS:
-                oldest, _ = self._kept.pop(next(iter(self._kept)))
-                self._num_geoms -= oldest.ngeom
+            found = self._make(self._mazes[index])
+            self._num_shown += found.num_shown
+            while self._kept and self._num_shown > _MOST_SHOWN:
+                self._num_shown -= self._kept.pop(next(iter(self._kept))).num_shown
         self._kept[index] = found
         return found
+
+    def _make(self, maze: Maze) -> Seen:
+        middle, half = wall_boxes(maze)
+        if self._textures or has_whole_model(maze):
+            spec, middle, half = maze_spec(maze), middle[:0], half[:0]
+        else:
+            spec = boxes_spec(maze, middle[:0], half[:0])
+        if self._textures:
+            add_textures(spec, maze)
+        model = spec.compile()
+        return Seen(model, mujoco.MjData(model), middle, half)
 
 
 def models_of(mazes: Mazes, textures: bool = False) -> MazeModels:

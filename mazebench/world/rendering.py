@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from mazebench.world.backend import rendering_error
-from mazebench.world.models import MazeModels
+from mazebench.world.models import MazeModels, Seen
 
 CAMERAS = ("top", "chase", "egocentric")
 _PICTURE_SIZE = 480  # pixels a side
@@ -31,6 +31,7 @@ class Cameras:
         self._models = models
         self._names, self._pixels, self._smooth = names, pixels, smooth
         self._most_shown = 0  # geoms and sites that the context has room for
+        self._added: Seen | None = None  # whose boxes the scene has
 
     def take(self, maze: int, qpos: np.ndarray, marker: np.ndarray) -> dict[str, np.ndarray]:
         """Returns `[pixels, pixels, 3]` uint8 by camera.
@@ -43,25 +44,35 @@ class Cameras:
         Raises:
           RenderingError: if no rendering context can be opened; the message says what to set.
         """
-        model, data = self._models.with_data(maze)
-        if self._renderer is None or self._most_shown < model.ngeom + model.nsite:
+        seen = self._models.seen(maze)
+        if self._renderer is None or self._most_shown < seen.num_shown:
             self.close()
-            self._renderer = self._open(2 * (model.ngeom + model.nsite))  # for mazes with more walls
-        data.qpos[:], data.mocap_pos[0] = qpos, marker
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_camlight(model, data)
-        return {name: self._render(self._renderer, model, data, name) for name in self._names}
+            self._renderer = self._open(2 * seen.num_shown)  # for mazes with more walls
+        seen.data.qpos[:], seen.data.mocap_pos[0] = qpos, marker
+        mujoco.mj_kinematics(seen.model, seen.data)
+        mujoco.mj_camlight(seen.model, seen.data)
+        return {name: self._render(self._renderer, seen, name) for name in self._names}
 
-    def _render(self, renderer: mujoco.Renderer, model: mujoco.MjModel, data: mujoco.MjData, camera: str) -> np.ndarray:
+    def _render(self, renderer: mujoco.Renderer, seen: Seen, camera: str) -> np.ndarray:
         view = mujoco.MjvCamera()
-        view.type, view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, model.camera(camera).id
+        view.type, view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, seen.model.camera(camera).id
         every = mujoco.mjtCatBit.mjCAT_ALL
-        mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, view, every, renderer.scene)
+        mujoco.mjv_updateScene(seen.model, seen.data, mujoco.MjvOption(), None, view, every, renderer.scene)
+        self._add_boxes(renderer.scene, seen)
         return renderer.render()
 
+    def _add_boxes(self, scene: mujoco.MjvScene, seen: Seen) -> None:
+        """Adds the boxes that a model lacks to the scene, behind its geoms, where the next update leaves them."""
+        first, last = scene.ngeom, scene.ngeom + len(seen.middle)
+        if self._added is not seen and first < last:
+            box, upright, colour = mujoco.mjtGeom.mjGEOM_BOX, np.eye(3).ravel(), seen.model.material("wall").rgba
+            for geom, half, middle in zip(scene.geoms[first:last], seen.half, seen.middle, strict=True):
+                mujoco.mjv_initGeom(geom, box, half, middle, upright, colour)
+        self._added, scene.ngeom = seen, last
+
     def _open(self, most_shown: int) -> mujoco.Renderer:
-        self._most_shown = most_shown
-        model = copy.copy(self._models[0])
+        self._most_shown, self._added = most_shown, None
+        model = copy.copy(self._models.seen(0).model)
         if not self._smooth:
             model.vis.quality.offsamples = 0
         try:
