@@ -306,8 +306,9 @@ def _descend(distances: np.ndarray, start: Cell, step_cost: np.ndarray | None = 
 
 def cell_to_point(cells: np.ndarray | Cell, size: int) -> np.ndarray:
     """Returns the centres (x, y) in cells, `[..., 2]` float, of `[..., 2]` cells on a map of `size` cells a side."""
-    cells = np.asarray(cells, dtype=np.float64)
-    return np.stack([cells[..., 1] + 0.5, size - cells[..., 0] - 0.5], axis=-1)
+    points = np.asarray(cells, dtype=np.float64)[..., ::-1] + 0.5
+    points[..., 1] = size - points[..., 1]
+    return points
 
 
 def point_to_cell(points: np.ndarray, size: int) -> np.ndarray:

@@ -86,8 +86,9 @@ def plan_route(spec: Task, episode: Episode, shown: ShownMap) -> Route:
         maze, time_limit = spec.all_mazes[episode.maze], spec.time_limit
         if spec.track is not None:
             time_limit = track_time_limit(spec.track, maze.distance(episode.start, episode.goal))
-        later_goals = _LaterGoals(maze, spec.distances, episode.stream(Stream.LATER_GOALS))
-        next_goal = later_goals if spec.num_goals > 1 else None
+        next_goal = None
+        if spec.num_goals > 1:
+            next_goal = _LaterGoals(maze, spec.distances, episode.stream(Stream.LATER_GOALS))
         return Route([episode.start, episode.goal], time_limit, spec.num_goals, next_goal)
     path = path_through_walls(shown.walls, episode.start, episode.goal)
     return Route([*path[: -1 : spec.landmark_distance], path[-1]], spec.time_limit)
