@@ -31,8 +31,8 @@ from torch.nn import functional
 
 import mazebench
 from mazebench.agent import Inputs, Interface
+from mazebench.maps.kinds import KNOWN
 
-KINDS = ("dfs", "house", "rooms")
 SETTINGS = (("building", 3), ("adrift", 1))
 HALF = 5  # cells from the body to the edge of its window, the lidar's reach
 WINDOW = 2 * HALF + 1
@@ -43,9 +43,9 @@ MOST_LOOKS = 48  # of an episode that are learned from
 
 
 class Look(NamedTuple):
-    """What was seen when the body entered a cell, and what the map shows there."""
+    """The evidence of walls when the body entered a cell, and the map there."""
 
-    seen: np.ndarray  # [2, W, W] float32, evidence of walls now, and when it entered the cell before
+    seen: np.ndarray  # [2, W, W] float32, evidence now, and when it entered the cell before
     shown: np.ndarray  # [H, W, W] float32, the map by each hypothesis
 
 
@@ -178,7 +178,7 @@ def true_placement(memory: Memory, walls: np.ndarray, pose: np.ndarray) -> int:
 
 
 class Sample(NamedTuple):
-    """What is learned from an episode."""
+    """An episode to learn from."""
 
     prior: torch.Tensor  # [H] float32, log weights before anything was seen
     seen: torch.Tensor  # [T, 2, W, W] float32
@@ -193,7 +193,7 @@ class Sample(NamedTuple):
 def collect(track: str, level: int, **options: Any) -> list[Sample]:
     """Returns episodes of the navigator in new mazes of the known kinds."""
     WatchedNavigator.watched.clear()
-    options = {"episodes_per_distance": 1, "kinds": KINDS, "split": "train"} | options
+    options = {"episodes_per_distance": 1, "kinds": KNOWN, "split": "train"} | options
     mazebench.evaluate(WatchedNavigator, track, level=level, **options)
     samples = []
     for belief, truth in WatchedNavigator.watched:

@@ -9,8 +9,6 @@ import pathlib
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from mazebench.agent import Agent
 from mazebench.agent_loading import load_agent_class
 from mazebench.errors import InputError, RunError, UnplayableError, held_remarks
@@ -23,7 +21,7 @@ from mazebench.results.records import Provenance
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.task import Task, check_shown
 from mazebench.tasks.trials import Trial, select_trials
-from mazebench.world.mjcf import boxes_spec, has_whole_model, maze_spec
+from mazebench.world.mjcf import largest_spec
 
 # Of a provenance: what must be the same in all processes of a run, besides the options.
 _IDENTIFYING = (
@@ -145,9 +143,8 @@ def make_plan(
     task = options.task
     if trials is None:
         trials = select_trials(task, options.episodes_per_distance, options.seed)
-    origin, maze = provenance(options, agent_class), task.all_mazes[0]
-    # The hash of the mazes tells the walls, too.
-    world = maze_spec(maze) if has_whole_model(maze) else boxes_spec(maze, *np.zeros((2, 0, 3)))
+    origin = provenance(options, agent_class)
+    world = largest_spec(task.all_mazes[0])  # the hash of the mazes tells the walls, too
     identity = {
         "agent": options.agent,
         **task.to_json(),

@@ -62,6 +62,11 @@ def has_whole_model(maze: Maze) -> bool:
     return len(maze.boxes) <= MAX_BOXES
 
 
+def largest_spec(maze: Maze) -> mujoco.MjSpec:
+    """Returns the whole model of a maze, or one without walls if it has too many boxes for that."""
+    return maze_spec(maze) if has_whole_model(maze) else boxes_spec(maze, *np.zeros((2, 0, 3)))
+
+
 def require_whole(maze: Maze) -> None:
     """Raises `InputError` if a maze has too many boxes for that."""
     if not has_whole_model(maze):

@@ -13,14 +13,14 @@ import numpy as np
 
 from mazebench.maps.drawn import Mazes
 from mazebench.maps.maze import Maze
-from mazebench.world.mjcf import boxes_spec, has_whole_model, maze_spec, require_whole, wall_boxes
+from mazebench.world.mjcf import has_whole_model, largest_spec, maze_spec, require_whole, wall_boxes
 from mazebench.world.textures import add_textures
 
 _MOST_SHOWN = 500_000  # things in the models that are kept, some 1 kB each
 
 
 class Seen(NamedTuple):
-    """What shows a maze."""
+    """A model that shows a maze, and the walls that it lacks."""
 
     model: mujoco.MjModel
     data: mujoco.MjData  # which anybody may overwrite
@@ -34,7 +34,7 @@ class Seen(NamedTuple):
 
 
 class MazeModels:
-    """What shows each of some mazes, which is its whole model if it has one; those used last are kept."""
+    """The models that show some mazes, whole where a maze has a whole model; those used last are kept."""
 
     def __init__(self, mazes: Mazes, textures: bool = False):
         """With `textures`, the models have the textured look, which only pictures need."""
@@ -70,15 +70,12 @@ class MazeModels:
         return found
 
     def _make(self, maze: Maze) -> Seen:
-        middle, half = wall_boxes(maze)
-        if self._textures or has_whole_model(maze):
-            spec, middle, half = maze_spec(maze), middle[:0], half[:0]
-        else:
-            spec = boxes_spec(maze, middle[:0], half[:0])
+        spec = maze_spec(maze) if self._textures else largest_spec(maze)
         if self._textures:
             add_textures(spec, maze)
         model = spec.compile()
-        return Seen(model, mujoco.MjData(model), middle, half)
+        lacking = np.zeros((2, 0, 3)) if has_whole_model(maze) else wall_boxes(maze)
+        return Seen(model, mujoco.MjData(model), *lacking)
 
 
 def models_of(mazes: Mazes, textures: bool = False) -> MazeModels:

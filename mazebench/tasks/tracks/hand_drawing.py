@@ -203,7 +203,7 @@ def _nodes(size: int) -> Line:
     return Line(_NODES * size + 1, _NODES)
 
 
-@functools.lru_cache
+@functools.lru_cache(maxsize=8)  # two for mazes of one size
 def _gaussians_on(line: Line, count: int) -> np.ndarray:
     return _gaussians(line.coordinates(), count)
 
