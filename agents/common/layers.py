@@ -81,6 +81,15 @@ def place_code(position: torch.Tensor, marks: torch.Tensor, size: int) -> torch.
     return torch.cat([(places - (size - 1) / 2) * (2 / size), of_position], dim=-1)
 
 
+def place_weights(any_size: bool) -> torch.Tensor:
+    """Returns the weights `[34]` of a place code: 1, or 0 for what depends on the size of the map.
+
+    What stays says where in its cell a position is, and whether row and column of the cell are even.
+    """
+    of_waves = [period <= 2 or not any_size for period in PERIODS]
+    return torch.tensor([not any_size] * 6 + of_waves * 4, dtype=torch.float32)
+
+
 def goal_code(position: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
     """Returns `[G, K, 6]`: tens of cells from positions `[G, K, 2]` to goals `[G, 2]`, and bells of the distance."""
     to_goal = goal[:, None] - position

@@ -27,6 +27,7 @@ from ..common.layers import (
     goal_code,
     marked_position,
     place_code,
+    place_weights,
 )
 from ..common.path_layer import FAR, CheapestWays, cell_costs, cost_layers
 from .map_reader import read
@@ -84,6 +85,7 @@ class MMNNetwork(nn.Module):
     """
 
     support: torch.Tensor  # [bins], the values that a categorical value weighs
+    place_weights: torch.Tensor  # [34], of the code of places
 
     def __init__(self, config: MMNConfig, context_size: int):
         super().__init__()
@@ -92,6 +94,7 @@ class MMNNetwork(nn.Module):
         self._size = context_size
         values = np.arange(-config.longest_value, 1, dtype=np.float32)
         self.register_buffer("support", torch.from_numpy(values), persistent=False)
+        self.register_buffer("place_weights", place_weights(any_size=config.any_size), persistent=False)
         self.encoder = nn.Sequential(
             nn.Linear(NUM_BODY - NUM_POSE, config.hidden),
             nn.ReLU(inplace=True),
@@ -159,7 +162,8 @@ class MMNNetwork(nn.Module):
         position = self.locate(latent, code).detach()
         table = torch.cat([code.rows, code.features], dim=-1)
         seen = read(position, table, self.hypermodel.sharpness)
-        return torch.cat([place_code(position, code.positions, self._size), seen], dim=-1)
+        places = place_code(position, code.positions, self._size) * self.place_weights
+        return torch.cat([places, seen], dim=-1)
 
     def generated(self, code: Code) -> dict[str, torch.Tensor]:
         """Returns the transition's weights by name, each `[G, rows, columns]`, but for the rows of cells."""
@@ -227,7 +231,9 @@ class MMNNetwork(nn.Module):
 
 
 class Hypermodel(nn.Module):
-    """Generates the weights from a code of the whole context, of a fixed size, and a row for each cell's position.
+    """Generates the weights from a code of the whole context, and a row for each cell's position.
+
+    The code reads all cells of a context of one size, or the mean over the cells of one of any size.
 
     At first the weights are those of an ordinary network, nearly equal for all contexts: Bias-HyperInit (Beck et al.
     2022). The rows come from convolutions, so that patterns of walls that mazes share are learned once.
@@ -237,7 +243,9 @@ class Hypermodel(nn.Module):
         super().__init__()
         self.encoder = MapEncoder(_CHANNELS, _NEAR)
         size = config.embedding
-        self.embedding = nn.Sequential(nn.Linear(_CHANNELS * context_size**2, size), nn.LayerNorm(size))
+        self._is_pooled = config.any_size
+        num_coded = 1 if config.any_size else context_size**2
+        self.embedding = nn.Sequential(nn.Linear(_CHANNELS * num_coded, size), nn.LayerNorm(size))
         self.task = nn.Linear(size, config.task_code)
         ordinary = torch.cat([_ordinary(name, shapes).flatten() for name in shapes])
         self.shared: nn.Parameter | None = None
@@ -260,7 +268,7 @@ class Hypermodel(nn.Module):
     def forward(self, context: torch.Tensor, anchor: torch.Tensor) -> Code:
         """Returns the code of contexts `[G, 4, M, M]`; displacements are measured from `anchor` `[G, 2]`."""
         encoded = self.encoder(context)
-        embedding = self.embedding(encoded.flatten(1))
+        embedding = self.embedding(encoded.mean(dim=(2, 3)) if self._is_pooled else encoded.flatten(1))
         weights = self.hyper(embedding / math.sqrt(embedding.shape[-1]))
         if self.shared is not None:  # the context's code is an input: it adds to the first layer alone
             weights = torch.cat([weights, weights.new_zeros(len(weights), len(self.shared) - weights.shape[-1])], -1)

@@ -44,6 +44,7 @@ class Weights(NamedTuple):
 
     scale: np.ndarray  # [2, 2], of the map
     steepness: np.float32
+    places: np.ndarray  # [NUM_PLACE], weights of the code of places
     num_bins: int
     body: tuple[Linear, Linear]
     heads: Linear
@@ -105,6 +106,7 @@ def weights_of(network: MMNNetwork) -> Weights:
         weights = Weights(
             scale=network.scale.detach().numpy().copy(),
             steepness=np.float32(steepness(sharpness.detach())),
+            places=network.place_weights.numpy(),
             num_bins=network.num_bins,
             body=body,
             heads=linear_of(network.heads),
@@ -194,6 +196,8 @@ def arrive(model: Model, first: int, states: np.ndarray, index: int, evaluation:
 
         # The inputs of all layers.
         write_inputs(latent, row, column, model.positions[c], size, x[b])
+        for j in range(NUM_PLACE):
+            x[b, num_latent + j] *= weights.places[j]
 
         # The first layer: a row of its weights is read from the map.
         first_layer[:] = ZERO

@@ -51,8 +51,8 @@ class MMN(NetworkAgent):
 
     @classmethod
     def serves_any_size(cls, config: MMNConfig) -> bool:
-        """Returns that it does not: the code of a context has a fixed size."""
-        return False
+        """Returns whether the cheapest ways are read: otherwise the code of a context has a fixed size."""
+        return config.any_size
 
     def initial_state(self, batch_size: int) -> ActorState:
         """Returns a state without codes: `act` encodes a context where it is new."""

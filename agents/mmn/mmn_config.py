@@ -24,7 +24,7 @@ class MMNConfig:
     rows: bool = True  # generates the first layer's weights of a position with convolutions, for each cell
     reading: bool = True  # the heads, the paper's g(s, c), read convolutions of the context at the estimated position
     # How these convolutions see far: by dilations, 19 cells, or not at all: what they read of the cheapest ways to the
-    # goal, over costs that they give to cells (beyond the paper).
+    # goal, over costs that they give to cells (beyond the paper). Contexts may then have any size.
     far: Literal["dilations", "paths"] = "dilations"
     embedding: Size = 64  # numbers of the code of a context, from which the other weights are generated
     task_code: Size = 64  # numbers of that code for the heads
@@ -81,3 +81,8 @@ class MMNConfig:
         if self.sequence_steps < self.unroll:
             raise InputError(f"expected sequence_steps of at least unroll {self.unroll}, found {self.sequence_steps}")
         check_rows(self)
+
+    @property
+    def any_size(self) -> bool:
+        """Whether contexts may have another size than in training: nothing read depends on it."""
+        return self.far == "paths"
