@@ -306,7 +306,7 @@ class TestPlanners:
         assert success_rate("oracle", 5, range(1, 16, 2), episodes_per_distance=2, map_warp=0.25) == 1.0
 
 
-OF_ONE_SIZE = ("mmn", "mmn-paths", "mah-paper")  # agents whose code of a context has a fixed size
+OF_ONE_SIZE = ("mmn", "mah-paper")  # agents whose code of a context has a fixed size
 
 
 class Small(Counting):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 from acting import inputs_of
-from mazebench_agents.common.layers import MapEncoder, marked_position
+from mazebench_agents.common.layers import NUM_PLACE, MapEncoder, marked_position
 from mazebench_agents.mmn import MMN
 from mazebench_agents.mmn.batches import make_batch
 from mazebench_agents.mmn.hypermodel import _FAR, MMNNetwork, WayReader
@@ -27,6 +27,7 @@ CONFIGS = {
     "mmn": SMALL,
     "mmn, one code": dataclasses.replace(SMALL, rows=False, reading=False),
     "mmn, no hypermodel": dataclasses.replace(SMALL, rows=False, hypermodel=False),
+    "mmn-paths": dataclasses.replace(SMALL, far="paths"),
 }
 WITHOUT_MODEL = dataclasses.replace(SMALL, model=False)
 OF_ALL = pytest.mark.parametrize("config", CONFIGS.values(), ids=CONFIGS)
@@ -160,6 +161,25 @@ def test_agent_with_one_code_a_context_says_which_sizes_it_serves(tmp_path, maze
     make_learner(mazes).save(tmp_path, {})
     with pytest.raises(UnplayableError, match=r"'mmn': its checkpoint reads maps of 7 x 7 only, found 13 x 13"):
         MMN.build(Interface("local", 13, 13), checkpoint=tmp_path / "agent.safetensors")
+
+
+def test_agent_that_reads_ways_knows_its_place_as_in_a_map_of_another_size():
+    network = MMN(CONFIGS["mmn-paths"], 7).network
+    torch.nn.init.normal_(network.scale)
+    small, large = a_context(), torch.zeros(1, 4, 15, 15)
+    large[:, :, 4:11, 4:11] = small  # four cells on: an even row stays even
+    latent = network.encode(torch.rand(1, 5, 9))
+    seen = [network.look(latent, code_of(network, context))[..., :NUM_PLACE] for context in (small, large)]
+    torch.testing.assert_close(*seen)
+    assert seen[0].std(dim=1).max() > 0.1
+
+
+def test_agent_that_reads_ways_acts_in_mazes_of_other_sizes():
+    agent = MMN(CONFIGS["mmn-paths"], 7)
+    for size in (5, 11):
+        inputs = inputs_of(an_observation(3) | {"context": a_context(size=size, batch=3).numpy()}, np.ones(3, bool))
+        actions, _ = agent.act(inputs, agent.initial_state(3))
+        assert actions.shape == (3,)
 
 
 @pytest.mark.parametrize("config", [SMALL, WITHOUT_MODEL])

@@ -10,7 +10,7 @@ from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.evaluate import evaluate
 
 SHIPPED = ("mmn", "mmn-paths", "mah", "mah-paper", "dqn", "neural-planner")
-OF_ONE_SIZE = ("mmn", "mmn-paths", "mah-paper")
+OF_ONE_SIZE = ("mmn", "mah-paper")
 
 
 @pytest.mark.parametrize("name", SHIPPED)

@@ -46,6 +46,9 @@ _CHANNELS = 24  # of the map's convolutions
 _NEAR = (1, 1, 1, 1)  # dilations of the hypermodel's convolutions
 _FAR = (1, 1, 2, 2, 4, 4, 2, 1, 1)  # of the heads', which see 19 cells far, across a 13 x 13 map
 _NUM_WAY = 8 + 3  # features of a cell by the ways to the goal
+# Near goals teach that a wall costs some ten free cells. So that far ways go around walls, what costs more than this
+# costs this many times as much where the agent does not explore.
+_DEAR, _CLOSING = 10.0, 30.0
 # Before anything is learned:
 _FIRST_VALUE = -20.0  # steps; the middle of the values
 _FIRST_GOAL = -4.0  # logit of being in the goal
@@ -265,8 +268,11 @@ class Hypermodel(nn.Module):
         self.num_features = num_encoded * config.reading
         self.sharpness = nn.Parameter(torch.tensor(0.0))
 
-    def forward(self, context: torch.Tensor, anchor: torch.Tensor) -> Code:
-        """Returns the code of contexts `[G, 4, M, M]`; displacements are measured from `anchor` `[G, 2]`."""
+    def forward(self, context: torch.Tensor, anchor: torch.Tensor, closes: bool = False) -> Code:
+        """Returns the code of contexts `[G, 4, M, M]`; displacements are measured from `anchor` `[G, 2]`.
+
+        If `closes`, cheapest ways go around cells that cost much.
+        """
         encoded = self.encoder(context)
         embedding = self.embedding(encoded.mean(dim=(2, 3)) if self._is_pooled else encoded.flatten(1))
         weights = self.hyper(embedding / math.sqrt(embedding.shape[-1]))
@@ -277,7 +283,9 @@ class Hypermodel(nn.Module):
         if self.rows is not None:
             rows = self.rows(torch.cat([encoded, context], dim=1))
         if self.reader is not None:
-            features = torch.cat([self.reader(context), context], dim=1)
+            is_way = isinstance(self.reader, WayReader)
+            seen = self.reader(context, closes) if is_way else self.reader(context)
+            features = torch.cat([seen, context], dim=1)
         rows, features = (planes.flatten(2).transpose(1, 2) for planes in (rows, features))
         positions = torch.cat([anchor, marked_position(context[:, GOAL])], dim=-1)
         return Code(positions, weights, rows, self.task(functional.relu(embedding)), features)
@@ -292,10 +300,11 @@ class WayReader(nn.Module):
         self.costs = cost_layers(NUM_PLANES, channels)
         self.features = nn.Conv2d(_NUM_WAY, channels, 1)
 
-    def forward(self, context: torch.Tensor) -> torch.Tensor:
-        """Returns `[G, C, M, M]` of contexts `[G, 4, M, M]`."""
+    def forward(self, context: torch.Tensor, closes: bool = False) -> torch.Tensor:
+        """Returns `[G, C, M, M]` of contexts `[G, 4, M, M]`; if `closes`, ways go around cells that cost much."""
         cost = cell_costs(self.costs(context)[:, 0])
-        way = CheapestWays.apply(cost, torch.where(context[:, GOAL] > 0, 0.0, FAR))
+        entering = torch.where(cost > _DEAR, _CLOSING * cost, cost) if closes else cost
+        way = CheapestWays.apply(entering, torch.where(context[:, GOAL] > 0, 0.0, FAR))
         # How much nearer the goal is in the eight cells around each; beyond the border, as far as beside it.
         size = way.shape[-1]
         padded = functional.pad(way[:, None], (1, 1, 1, 1), mode="replicate")[:, 0]

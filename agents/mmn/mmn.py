@@ -6,6 +6,7 @@ docs/agents/mmn.md describes the training, and how it departs from the paper.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import ClassVar
 
 import numpy as np
@@ -64,7 +65,7 @@ class MMN(NetworkAgent):
         # Codes of the new contexts.
         new = np.flatnonzero(inputs.new_context)
         if len(new):
-            self._encode(inputs.observation, new, inputs.new_episode[new], state)
+            self._encode(inputs.observation, new, inputs.new_episode[new], state, explore)
         assert state.code is not None, "new_context must be set in an environment's first step"
 
         # Latent states of the environments that are active.
@@ -90,7 +91,9 @@ class MMN(NetworkAgent):
         action[active] = chosen
         return action, state
 
-    def _encode(self, observation: Observation, new: np.ndarray, new_anchor: np.ndarray, state: ActorState) -> None:
+    def _encode(
+        self, observation: Observation, new: np.ndarray, new_anchor: np.ndarray, state: ActorState, explore: bool
+    ) -> None:
         """Writes the codes of the contexts at the rows `new` into `state`; where no anchor is new, the old one stays.
 
         Args:
@@ -98,6 +101,7 @@ class MMN(NetworkAgent):
           new: `[K]` int, rows of the environments with new contexts.
           new_anchor: `[K]` bool, whether displacements are measured from where these environments' bodies are now.
           state: of B environments.
+          explore: whether the agent explores, so that cheapest ways may cross what costs much.
         """
         # How far each body has moved from its anchor.
         position = observation["state"][new, :2]
@@ -113,7 +117,8 @@ class MMN(NetworkAgent):
             kept = self.network.reanchored(state.code.positions[rows, :2], moved, start)
             anchor = torch.where(torch.from_numpy(new_anchor[:, None]).to(self._device), start, kept)
 
-        code = in_batches(self.network.hypermodel, CONTEXTS_AT_ONCE, context, anchor)
+        encode = functools.partial(self.network.hypermodel, closes=not explore)
+        code = in_batches(encode, CONTEXTS_AT_ONCE, context, anchor)
         if state.code is None:
             state.code = Code(*(part.new_zeros(len(state.origin), *part.shape[1:]) for part in code))
         for whole, part in zip(state.code, code, strict=True):

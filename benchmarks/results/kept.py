@@ -35,14 +35,23 @@ ON_TIME_125, ON_TIME_2 = ON_TIME_METRICS  # within 1.25 and 2 times the oracle's
 # Agents, with what they were told less or more than others.
 NAVIGATOR, NO_MAP, TRUE_POSE = "navigator", "navigator without map", "navigator with the true pose"
 RANDOM = "random"
-LEARNED, REWARDED = "neural-planner", "neural-planner from rewards"  # several training runs each
+# Agents of several training runs each.
+LEARNED, REWARDED = "neural-planner", "neural-planner from rewards"
+REWARDED_BUILDING = "neural-planner from rewards on building"
+WAYS = "mmn-paths"
 PATHS = {"path on the map open": False, "path on the map blocked": True}  # whether a record is of a blocked one
 
 _SUFFIX = ".tar.xz"
 _TRAINING = "training"  # the folder of archives of training runs
 _RUNS = f"runs{_SUFFIX}"  # evaluations of training runs, in folders NAME-SEED
-# Evaluations of several training runs on the tracks, in folders RUN/PART, by the name of their archive.
-_SEVERAL = {"tracks-neural-planner": LEARNED, "tracks-neural-planner-rewards": REWARDED}
+# Evaluations of several training runs, in folders RUN/PART, by the name of their archive.
+_SEVERAL = {
+    "tracks-neural-planner": LEARNED,
+    "tracks-neural-planner-rewards": REWARDED,
+    "tracks-neural-planner-building": REWARDED_BUILDING,
+    "mmn-paths-sizes": WAYS,
+    "tracks-mmn-paths": WAYS,
+}
 _KEPT_FILES = (CONFIG, EPISODES, ORACLE, SUMMARY)
 
 

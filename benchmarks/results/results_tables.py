@@ -22,12 +22,15 @@ from benchmarks.results.kept import (
     PATHS,
     RANDOM,
     REWARDED,
+    REWARDED_BUILDING,
     TRUE_POSE,
+    WAYS,
     Kept,
     estimate,
     mean_estimate,
 )
 from mazebench.errors import InputError
+from mazebench.maps.benchmark import SIZES
 from mazebench.maps.kinds import KNOWN, NOVEL
 from mazebench.report.curves import SUCCESS
 from mazebench.report.table import METRICS, to_markdown
@@ -61,7 +64,7 @@ _PAPER_ROWS = {
 
 _TRAINED = {  # by name of the kept runs
     "mmn": "`mmn`",
-    "mmn-paths": "`mmn-paths`",
+    WAYS: "`mmn-paths`",
     "mmn-model-false": "`mmn` without model and search",
     "mah": "`mah`",
     "mah-long": "`mah`, 6.6 million steps",
@@ -71,7 +74,7 @@ _TRAINED = {  # by name of the kept runs
     "sb3-ppo": "PPO of Stable-Baselines3",
 }
 _PAIRS = (
-    ("mmn-paths", "mmn"),
+    (WAYS, "mmn"),
     ("mmn", "mmn-model-false"),
     ("mmn-model-false", "mah"),
     ("mmn", "mah"),
@@ -123,6 +126,7 @@ _ROWS = {
     TRUE_POSE: "`navigator` with the true pose",
     LEARNED: "`neural-planner`, learned from the oracle",
     REWARDED: "`neural-planner`, learned from rewards",
+    REWARDED_BUILDING: "`neural-planner`, learned from rewards on `building` alone",
     "planner-closed-loop": "`planner-closed-loop`, follows the map",
     "sb3_agent:PPOAgent": "PPO of Stable-Baselines3",
     "sb3_agent:RecurrentPPOAgent": "PPO of sb3-contrib, with an LSTM",
@@ -185,10 +189,11 @@ def paper_runs(field: str, kept: Kept) -> str:
     runs = {name: kept.training_runs(name) for name in _TRAINED}
     runs[RANDOM] = [kept.result(RANDOM, LOCAL)]
     found = {name: _values(each, field) for name, each in runs.items()}
+    records = runs[RANDOM][0].records
     labels = {**_TRAINED, RANDOM: _code(RANDOM)}
-    means = [[labels[name], str(len(values)), *_over_runs(kept, values)] for name, values in found.items()]
+    means = [[labels[name], str(len(values)), *_over_runs(records, values)] for name, values in found.items()]
     differences = [
-        [f"{labels[a]} - {labels[b]}", f"{len(found[a])}, {len(found[b])}", *_over_runs(kept, found[a], found[b])]
+        [f"{labels[a]} - {labels[b]}", f"{len(found[a])}, {len(found[b])}", *_over_runs(records, found[a], found[b])]
         for a, b in _PAIRS
     ]
     return _table(["agent", "runs", *map(str, _PRINTED_DISTANCES)], [*means, *differences])
@@ -231,13 +236,28 @@ def mmn_runs(kept: Kept) -> str:
     """Returns mean success rates of mmn and mmn-paths over their training runs, and the paper's."""
     paper = kept.report[LOCAL].wide("success_rate").loc[map(str, _PRINTED_DISTANCES), _PAPERS_MMN]
     distances = (*_PRINTED_DISTANCES, *_FARTHER)
-    runs = {name: _values(kept.training_runs(name), "success") for name in ("mmn", "mmn-paths")}
+    runs = {name: _values(kept.training_runs(name), "success") for name in ("mmn", WAYS)}
+    records = kept.training_runs(WAYS)[0].records
     rows = [
-        *([_code(name), str(len(own)), *_over_runs(kept, own, at=distances)] for name, own in runs.items()),
-        ["`mmn-paths` - `mmn`", "", *_over_runs(kept, runs["mmn-paths"], runs["mmn"], distances)],
+        *([_code(name), str(len(own)), *_over_runs(records, own, at=distances)] for name, own in runs.items()),
+        [f"`{WAYS}` - `mmn`", "", *_over_runs(records, runs[WAYS], runs["mmn"], distances)],
         ["the paper's MMN, as printed", "", *paper, *[""] * len(_FARTHER)],
     ]
     return _table(["agent", "runs", *map(str, distances)], rows)
+
+
+def mmn_sizes(kept: Kept) -> str:
+    """Returns mean success rates of mmn-paths over its training runs, in the mazes of each size of the benchmark."""
+    distances = (*_PRINTED_DISTANCES, *_FARTHER)
+    rows = []
+    for size in SIZES:
+        part = f"local-{size}"
+        runs = kept.training_runs(WAYS) if part == LOCAL else kept.several.get((WAYS, part), [])
+        if not runs:
+            raise InputError(f"expected evaluations of {WAYS} on {part} among the records, found none")
+        rates = _over_runs(runs[0].records, _values(runs, "success"), at=distances)
+        rows.append([f"{size} x {size}", str(len(runs)), *rates])
+    return _table(["mazes", "runs", *map(str, distances)], rows)
 
 
 def tracks_table(metric: str, chosen: Mapping[str, str], kept: Kept) -> str:
@@ -349,6 +369,7 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "paper-runs": functools.partial(paper_runs, "success"),
     "paper-runs-spl": functools.partial(paper_runs, "spl"),
     "mmn-runs": mmn_runs,
+    "mmn-sizes": mmn_sizes,
     "mah-curve": mah_curve,
     "mmn-ingredients": functools.partial(short_runs, _INGREDIENTS, {"model_error_1": ".3f", "map_ratio": ".1f"}),
     "mmn-regimes": functools.partial(short_runs, _REGIMES, {}),
@@ -358,6 +379,7 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "tracks-on-time-2": functools.partial(tracks_table, ON_TIME_2, _ROWS),
     "tracks-learned": functools.partial(tracks_learned, LEARNED),
     "tracks-rewarded": functools.partial(tracks_learned, REWARDED),
+    "tracks-rewarded-building": functools.partial(tracks_learned, REWARDED_BUILDING),
     "tracks-worst-tenth": tracks_worst_tenth,
     "tracks-map-worth": tracks_map_worth,
     "tracks-novel-kinds": tracks_novel_kinds,
@@ -373,10 +395,12 @@ def _values(runs: Sequence[Result], field: str) -> np.ndarray:
 
 
 def _over_runs(
-    kept: Kept, values: np.ndarray, others: np.ndarray | None = None, at: Sequence[int] = _PRINTED_DISTANCES
+    records: Sequence[Any], values: np.ndarray, others: np.ndarray | None = None, at: Sequence[int] = _PRINTED_DISTANCES
 ) -> list[str]:
-    """Returns the mean of values `[R, E]`, or the difference to others' mean, at each of some distances."""
-    records = kept.result(RANDOM, LOCAL).records
+    """Returns the mean of values `[R, E]`, or the difference to others' mean, at each of some distances.
+
+    `records` are those of one run, with the mazes and distances of its episodes.
+    """
     maze, distance = column(records, "maze"), column(records, "distance")
     counted = [distance == each for each in at]
     return [
