@@ -342,7 +342,7 @@ class TestTracks:
         options = {"sensors": agent_class.needs_sensors} | options if "size" in options else options
         spec = Task.of(**options)
         if name in OF_ONE_SIZE and spec.context_size != 13:
-            with pytest.raises(UnplayableError, match=r"reads maps of 13 x 13 only, found .* mah reads"):
+            with pytest.raises(UnplayableError, match=r"reads maps of 13 x 13 only, found .* mah and mmn-paths read"):
                 act_for_three_steps(name, spec)
         else:
             assert act_for_three_steps(name, spec) == 3

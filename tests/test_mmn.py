@@ -267,6 +267,22 @@ def test_first_update_on_a_gpu_is_that_on_a_cpu(mazes, monkeypatch):
         assert found[name] == pytest.approx(value, rel=0.05, abs=1e-3), name
 
 
+def test_ways_go_around_dear_cells_where_the_agent_does_not_explore():
+    """A wall of 13 cells that cost 21 each: crossing it is cheaper than the way around."""
+    reader = WayReader(8)
+    with torch.no_grad():
+        for parameter in reader.parameters():
+            parameter.zero_()
+        reader.features.weight[0, 8] = 1.0  # of the way left
+        reader.costs[0].weight[0, GLOBAL_MAP, 1, 1] = reader.costs[2].weight[0, 0, 1, 1] = 1.0
+        reader.costs[4].weight[0, 0], reader.costs[4].bias[0] = 9.0, -6.0  # walls cost 21, other cells 1
+    context = torch.zeros(1, 4, 15, 15)
+    context[0, GLOBAL_MAP, 7, :13] = context[0, GOAL, 9, 0] = 1.0
+    crossing, around = (torch.atanh(reader(context, closes)[0, 0, 5, 0]) * 5 for closes in (False, True))
+    assert 23 < crossing < 25
+    assert 25 < around < 31
+
+
 @pytest.mark.parametrize(("reader", "sees_far"), [(WayReader(8), True), (MapEncoder(8, _FAR), False)])
 def test_only_ways_tell_a_cell_of_a_goal_that_is_far(reader, sees_far):
     """In a corridor of 61 cells, the goal is at the left or at the right end."""

@@ -100,7 +100,7 @@ class NetworkAgent(LearningAgent):
         size = interface.context_size
         if size != trained_size and not cls.serves_any_size(config):
             expected = f"its checkpoint reads maps of {trained_size} x {trained_size} only, found {size} x {size}"
-            raise UnplayableError(f"agent {cls.name!r}: {expected}; mah reads maps of any size")
+            raise UnplayableError(f"agent {cls.name!r}: {expected}; mah and mmn-paths read any size")
         agent = cls(config, trained_size, seed)
         load_into(path, agent.network, tensors)
         return agent

@@ -379,6 +379,7 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "tracks-on-time-2": functools.partial(tracks_table, ON_TIME_2, _ROWS),
     "tracks-learned": functools.partial(tracks_learned, LEARNED),
     "tracks-rewarded": functools.partial(tracks_learned, REWARDED),
+    "tracks-ways": functools.partial(tracks_learned, WAYS),
     "tracks-rewarded-building": functools.partial(tracks_learned, REWARDED_BUILDING),
     "tracks-worst-tenth": tracks_worst_tenth,
     "tracks-map-worth": tracks_map_worth,
@@ -421,7 +422,7 @@ def _over_values(rates: Sequence[float]) -> str:
 def _rows_of_tracks(kept: Kept) -> dict[str, str]:
     """Returns those of `_ROWS` that are evaluated on the tracks."""
     played = {row for (row, _), result in kept.results.items() if result.summary.task.track}
-    played |= {row for row, _ in kept.several}
+    played |= {row for row, _ in kept.several} - {WAYS}  # which has tables of its own
     if not played:
         raise InputError("expected evaluations on tracks among the records, found none")
     if unnamed := played - _ROWS.keys():
