@@ -84,5 +84,5 @@ class MMNConfig:
 
     @property
     def any_size(self) -> bool:
-        """Whether contexts may have another size than in training: nothing read depends on it."""
+        """True if contexts may have another size than in training: nothing that is read depends on it."""
         return self.far == "paths"
