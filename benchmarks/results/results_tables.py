@@ -412,7 +412,7 @@ def _over_runs(
 
 def _over_values(rates: Sequence[float]) -> str:
     """Returns the mean of success rates of training runs, with Student's interval if they differ."""
-    mean = round(float(np.mean(rates)), 9)  # 0.675, not 0.67499
+    mean = float(np.mean(rates))
     if len(set(rates)) == 1:
         return _number(mean)
     low, high = np.clip(stats.t.interval(CONFIDENCE, len(rates) - 1, mean, stats.sem(rates)), 0, 1)
@@ -441,6 +441,7 @@ def _interval(mean: Estimate | None) -> str:
 
 
 def _number(value: float) -> str:
+    value = round(value, 9)  # means that differ by the order of their sum give the same two digits
     return f"{value:.2f}".replace("-0.00", "0.00")
 
 
