@@ -14,6 +14,8 @@ ON_TIME = (1.25, 2)  # an episode is on time if it takes at most so many times t
 
 EPISODES_PER_DISTANCE = 5  # of an evaluation, in each maze
 
+X, Y, YAW, FORWARD_VELOCITY, LEFT_VELOCITY, YAW_RATE = 0, 1, 5, 6, 7, 11  # indices in a state, see docs/task.md
+
 ACTIONS = ("forward", "backward", "strafe_left", "strafe_right", "look_left", "look_right")
 NUM_ACTIONS = len(ACTIONS)
 # The kinds of actions. Discrete ones: their names. Continuous ones: their components, each from -1 to 1.

@@ -13,6 +13,8 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from mazebench.constants import TOP_SPEED
+
 NUM_PLANES = 4
 NUM_WAVES = 16
 _FREQUENCIES = (0.25, 0.5, 1.0, 2.0)  # per metre, octaves
@@ -114,7 +116,7 @@ def state_features(state: torch.Tensor, origin: torch.Tensor) -> torch.Tensor:
             state[..., :2] - origin,
             torch.sin(yaw)[..., None],
             torch.cos(yaw)[..., None],
-            state[..., 6:8] / 3.2,
+            state[..., 6:8] / TOP_SPEED,
             state[..., 11:12] / 2.3,
             (state[..., :2] - origin) / DISPLACEMENT_UNIT,
         ],

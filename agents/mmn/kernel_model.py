@@ -1,4 +1,4 @@
-"""The model of MMN as kernels, for searches on a CPU; it equals `network.MMNNetwork` up to rounding.
+"""The model of MMN as kernels, for searches on a CPU; it equals `hypermodel.MMNNetwork` up to rounding.
 
 `C` is the number of contexts, `n` of neighbouring roots, `N` of nodes of a tree, `M` the side of a context, `D` the
 size of a latent state, `H` of the transition's hidden layer. A state is a latent state and the transition's first layer
@@ -31,7 +31,7 @@ _WAY_UNIT = np.float32(WAY_UNIT)
 _SCALE_RATE = np.float32(SCALE_RATE)
 _PERIODS = np.array(PERIODS, np.float32)
 _WIDTHS = np.array(WIDTHS, np.float32)
-# What the numbers of a latent state and of a step are, as in `network._moved_by`: first in the body's frame, then in
+# What the numbers of a latent state and of a step are, as in `hypermodel._moved_by`: first in the body's frame, then in
 # the map's.
 X, Y, SINE, COSINE, SPEED_FORWARD, SPEED_LEFT, SPEED_TURN = range(NUM_BODY)
 FORWARD, LEFT, TURN, NEXT_FORWARD, NEXT_LEFT, NEXT_TURN = range(NUM_FREE)
@@ -239,7 +239,7 @@ def weigh_cells(
 ) -> tuple[int, int]:
     """Writes the weights of the rows and of the columns around a position into `near` `[2, 2 * REACH]`.
 
-    Returns the first row and the first column; see `reading.read`.
+    Returns the first row and the first column; see `map_reader.read`.
     """
     first = np.empty(2, np.int64)
     for axis in range(2):
@@ -303,7 +303,7 @@ def write_way(row: np.float32, column: np.float32, positions: np.ndarray, out: n
 
 @inlined
 def move(before: np.ndarray, free: np.ndarray, change: np.ndarray, after: np.ndarray) -> None:
-    """Writes the body after a step; see `network._moved_by`."""
+    """Writes the body after a step; see `hypermodel._moved_by`."""
     sine, cosine = before[SINE], before[COSINE]
     x, y = rotated(free[FORWARD] + change[FORWARD], free[LEFT] + change[LEFT], sine, cosine)
     after[X] = before[X] + x + change[MAP_X]
@@ -342,6 +342,6 @@ def conclude(outputs: np.ndarray, num_bins: int, evaluation: Evaluation) -> None
                 weighted += weight * np.float32(j + 1 - num_bins)
         evaluation.value[b] = weighted / total
 
-        # Reward and discount of arriving there; see `network.reward_and_discount`.
+        # Reward and discount of arriving there; see `hypermodel.reward_and_discount`.
         discount = ONE / (ONE + np.float32(math.exp(outputs[b, NUM_ACTIONS + num_bins])))
         evaluation.reward[b], evaluation.discount[b] = -discount, discount

@@ -13,9 +13,10 @@ import numpy as np
 import torch
 from torch import nn
 
-from mazebench.constants import NUM_ACTIONS
+from mazebench.constants import NUM_ACTIONS, TOP_SPEED
 
 from ..common.path_layer import FAR, CheapestWays, cell_costs, cost_layers
+from ..robot.beams import MOST_EVIDENCE
 
 NUM_RANGES = 32  # to the walls around the body
 REACH = 3.5  # cells, of these ranges
@@ -33,12 +34,11 @@ _NUM_POINTS = len(_POINTS)
 _NUM_MOTION = 3 + 2 * NUM_ACTIONS
 _NUM_FEATURES = 3 * _NUM_POINTS + NUM_RANGES + _NUM_MOTION + 2
 
-_EVIDENCE = 15.0  # levels a unit of log odds, in a picture's bytes
+_EVIDENCE = 120 / MOST_EVIDENCE  # levels a unit of log odds, in a picture's bytes
 _UNLIKELY = 32.0  # levels a unit of the log of a goal's likelihood
 _NO_GOAL = 255
 _FIRST = -0.5  # score of a cell before anything is learned
 _AT_ONCE = 16  # grids, whose features then stay in the cache
-_SPEED = 3.2  # m/s, about the top speed
 
 
 class Plan(NamedTuple):
@@ -73,7 +73,7 @@ def grid_bytes(prior: np.ndarray, walls: np.ndarray, evidence: np.ndarray, goal:
     Args:
       prior: `[L, L]` float, the probability of a wall by the map.
       walls: `[L, L]` float, the same by the map and all that was sensed.
-      evidence: `[L, L]` float, log odds of a wall by what was sensed, within 8 of 0.
+      evidence: `[L, L]` float, log odds of a wall by what was sensed, within `MOST_EVIDENCE` of 0.
       goal: `[L, L]` float, weights of the goal; where all are 0, any cell may be it.
     """
     likely = goal / goal.max() if goal.any() else np.ones_like(goal)
@@ -117,7 +117,7 @@ class CostPlanner(nn.Module):
         # The points, and the four cells whose centres are around each.
         pose = situation.pose
         cosine, sine = torch.cos(pose[:, 2:]), torch.sin(pose[:, 2:])
-        ahead, left = _POINTS[:, 0], _POINTS[:, 1]
+        ahead, left = _POINTS.to(pose.device).T
         column = (pose[:, :1] + cosine * ahead - sine * left - 0.5).clamp(0, size - 1.001)
         row = (size - 0.5 - pose[:, 1:2] - sine * ahead - cosine * left).clamp(0, size - 1.001)
         right, down = column.frac(), row.frac()
@@ -164,6 +164,11 @@ class PlannerNetwork(CostPlanner):
 
 
 def motion_features(velocity: np.ndarray, actions: np.ndarray) -> np.ndarray:
-    """Returns `Situation.motion` of velocities `[K, 3]` and the last two actions `[K, 2]` int, -1 for none."""
+    """Returns `Situation.motion` of velocities and actions.
+
+    Args:
+      velocity: `[K, 3]`, forward and to the left in cells a second, and the yaw rate in rad/s.
+      actions: `[K, 2]` int, the last one and the one before, -1 for none.
+    """
     one_hots = actions[..., None] == np.arange(NUM_ACTIONS)
-    return np.concatenate([velocity / _SPEED, one_hots.reshape(len(actions), -1)], axis=1).astype(np.float32)
+    return np.concatenate([velocity / TOP_SPEED, one_hots.reshape(len(actions), -1)], axis=1).astype(np.float32)

@@ -15,14 +15,14 @@ import numpy as np
 import torch
 
 from mazebench.agent import Inputs, Interface
-from mazebench.constants import NUM_ACTIONS
+from mazebench.constants import NUM_ACTIONS, YAW_RATE
 from mazebench.tasks.task import Task
 
 from ..common.actor import NetworkAgent, acting
 from ..common.checkpoint import load_agent, load_into
 from ..common.config_values import override
 from ..common.layers import in_batches
-from ..robot.motion import moved
+from ..robot.motion import moved_in_the_open
 from ..robot.rays import ranges_to
 from ..robot.senses import Memory, Senses
 from .network import NUM_RANGES, REACH, Choice, Plan, PlannerNetwork, Situation, grid_bytes, motion_features
@@ -33,8 +33,6 @@ from .planner_learner import PlannerLearner
 _GRIDS_AT_ONCE = 8
 _STATES_AT_ONCE = 32
 _WALL = 0.5  # probability from which a cell is a wall for these ranges
-_YAW_RATE = 11  # index in the state
-_OPEN = np.zeros((3, 3), dtype=bool)  # a world without walls, where an action brings the body as far as it can
 
 
 @dataclasses.dataclass
@@ -178,7 +176,7 @@ class NeuralPlanner(NetworkAgent):
         return Situation(
             torch.from_numpy(pose.astype(np.float32)),
             torch.from_numpy(np.array(ranges, dtype=np.float32).reshape(-1, NUM_RANGES)),
-            torch.from_numpy(motion_features(np.column_stack([velocity, observed[:, _YAW_RATE]]), actions)),
+            torch.from_numpy(motion_features(np.column_stack([velocity, observed[:, YAW_RATE]]), actions)),
         )
 
     def _read(self, robots: list[Robot], situation: Situation) -> tuple[np.ndarray, np.ndarray]:
@@ -201,7 +199,7 @@ class NeuralPlanner(NetworkAgent):
         """Remembers an action, and where it should bring the body if no wall is in the way."""
         body, cell_size = robot.memory.body, self._cell_size
         vx, vy = (cell_size * speed for speed in body.velocity())
-        x, y, _, _ = moved(_OPEN, 1.0, 0.0, 0.0, vx, vy, body.yaw, action)
+        x, y, _, _ = moved_in_the_open(vx, vy, body.yaw, action)
         robot.memory.command(action, (body.x + x / cell_size, body.y + y / cell_size))
         robot.actions, robot.age = (action, robot.actions[0]), robot.age + 1
 

@@ -29,7 +29,7 @@ _WIDE = 4.0  # standard deviations, beyond which a hit is as good as impossible
 _LEAST_PASSED = 1e-3  # probability of getting so far, below which a ray is not followed
 _GRAZING = 0.15  # sine of the angle between a ray and a wall; at a smaller one, a hit is not used
 _LARGEST_STEP = 2.0  # log odds that one ray adds to a cell, for neighbouring rays share their errors
-_LARGEST = 8.0  # log odds of a cell, so that errors can be undone
+MOST_EVIDENCE = 8.0  # log odds of a cell, so that errors can be undone
 UNKNOWN = 0.4  # probability of a wall where nothing was seen, when a scan is added
 
 
@@ -171,10 +171,10 @@ def add_scan(
             if (step > 0 and may_mark[k]) or (step < 0 and may_free[k]):
                 step = min(max(step, -_LARGEST_STEP), _LARGEST_STEP)
                 changed = evidence[rows[k], columns[k]] + step
-                evidence[rows[k], columns[k]] = min(max(changed, -_LARGEST), _LARGEST)
+                evidence[rows[k], columns[k]] = min(max(changed, -MOST_EVIDENCE), MOST_EVIDENCE)
             before += passed * walls[k] * hits[k]
             passed *= 1 - walls[k]
     # The body is in a free cell.
     column, row = math.floor(x), size - 1 - math.floor(y)
     if 0 <= row < size and 0 <= column < size:
-        evidence[row, column] = max(evidence[row, column] - _LARGEST_STEP, -_LARGEST)
+        evidence[row, column] = max(evidence[row, column] - _LARGEST_STEP, -MOST_EVIDENCE)

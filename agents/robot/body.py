@@ -10,9 +10,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mazebench.constants import ACTIONS, DISCRETE, NUM_ACTIONS, VELOCITIES
+from mazebench.constants import (
+    ACTIONS,
+    DISCRETE,
+    FORWARD_VELOCITY,
+    LEFT_VELOCITY,
+    NUM_ACTIONS,
+    VELOCITIES,
+    YAW,
+    X,
+    Y,
+)
 
-X, Y, YAW, FORWARD_VELOCITY, LEFT_VELOCITY = 0, 1, 5, 6, 7  # indices in the state
 FORWARD, BACKWARD, STRAFE_LEFT, STRAFE_RIGHT, LOOK_LEFT, LOOK_RIGHT = range(NUM_ACTIONS)
 TURN_STEP = math.radians(21.12)  # of one look action
 COASTING_TIME = 0.125  # s; a body let go at speed v comes to rest after v * COASTING_TIME metres
@@ -57,7 +66,7 @@ class Body(NamedTuple):
         return self.x + COASTING_TIME * velocity_x, self.y + COASTING_TIME * velocity_y
 
 
-def observed_body(state: list[float], cells_per_metre: float = 1.0) -> Body:
+def observed_body(state: list[float], cells_per_metre: float) -> Body:
     """Returns the body as a state `[12]` has it, whose x and y are taken for a place on the map."""
     x, y, forward, left = (cells_per_metre * state[index] for index in (X, Y, FORWARD_VELOCITY, LEFT_VELOCITY))
     return Body(x=x, y=y, yaw=state[YAW], forward=forward, left=left)

@@ -5,14 +5,11 @@ Lengths are in cells but where a name says metres. The grid has `L` x `L` cells 
 
 from __future__ import annotations
 
-import numpy as np
-
 from mazebench.maps.maze import Cell
 
 from .body import Body
-from .motion import REACH, moved
+from .motion import REACH, moved_in_the_open
 
-_NO_WALLS = np.zeros((3, 3), dtype=bool)
 _STOPPED = 0.25  # m/s along an axis that the body is slower than it would be in the open, if a wall stopped it
 _SLACK = 0.04  # m from which a wall pushes more than the model says, for errors of both
 _GIVE = 0.06  # m that a wall lets the body come into its reach, at most; a body that is deeper was stopped by a corner
@@ -34,7 +31,7 @@ def felt_walls(
       size: L.
     """
     vx, vy = (cell_size * speed for speed in before.velocity())
-    _, _, *free = moved(_NO_WALLS, 1.0, 0.0, 0.0, vx, vy, before.yaw, action)
+    _, _, *free = moved_in_the_open(vx, vy, before.yaw, action)
     column, level = int(after.x), int(after.y)
     off_middle = after.x - column - 0.5, after.y - level - 0.5
     off_before = before.x - column - 0.5, before.y - level - 0.5

@@ -14,11 +14,10 @@ import numpy as np
 from mazebench.maps.maze import Cell
 
 from ..common.kernels import compiled
-from .beams import UNKNOWN, Beams, add_scan
+from .beams import MOST_EVIDENCE, UNKNOWN, Beams, add_scan
 
 SURE = 3.0  # log odds of evidence, from which a cell counts as seen
 _VISITED = 4.0  # log odds that a cell is free in which the body was
-_LARGEST = 8.0  # log odds of a cell, so that errors can be undone
 _BINS = np.array([0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98])  # of prior probabilities, within which the map errs alike
 _PRIOR_CELLS = 3.0  # seen cells that weigh as much as the prior when the map's reliability is estimated
 _LEAST = 1e-6  # count of cells of a kind, instead of none
@@ -42,11 +41,11 @@ class Occupancy:
 
     def visit(self, cell: Cell) -> None:
         """Takes in that the body is in a cell."""
-        self.evidence[cell] = max(self.evidence[cell] - _VISITED, -_LARGEST)
+        self.evidence[cell] = max(self.evidence[cell] - _VISITED, -MOST_EVIDENCE)
 
     def feel(self, cell: Cell, log_odds: float) -> None:
         """Takes in that a cell may have stopped the body, with the log odds that this adds."""
-        self.evidence[cell] = min(self.evidence[cell] + log_odds, _LARGEST)
+        self.evidence[cell] = min(self.evidence[cell] + log_odds, MOST_EVIDENCE)
 
     def seen_walls(self) -> np.ndarray:
         """Returns `[L, L]` float: the probability of a wall by what was seen alone."""

@@ -25,7 +25,7 @@ _DRIVES = (
 )
 
 
-def steer(body: Body, aim: Point, strafes: bool = True) -> int:
+def steer(body: Body, aim: Point, strafes: bool) -> int:
     """Returns the drive nearest to the direction of `aim`, or a turn if even that one is far off.
 
     `strafes` says whether the body can strafe.
@@ -54,7 +54,7 @@ class Pilot:
         points = [(x, y) for x, y in cell_to_point(np.array(path), size).tolist()]
         return cls(points, cells_per_metre * _LOOKAHEAD)
 
-    def action(self, body: Body, strafes: bool = True) -> int:
+    def action(self, body: Body, strafes: bool) -> int:
         """Returns the drive or turn that brings the body, which strafes or not, towards the aim."""
         return steer(body, self._aim(*body.rest()), strafes)
 

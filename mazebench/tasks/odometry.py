@@ -7,12 +7,11 @@ import math
 
 import numpy as np
 
-from mazebench.constants import STEP_TIME
+from mazebench.constants import FORWARD_VELOCITY, LEFT_VELOCITY, STEP_TIME, YAW, YAW_RATE, X, Y
 from mazebench.world.angles import wrap_angle
 
 _SCALES = (0.9, 1.1)  # lowest and highest of an episode's scale
 _HEADING_WALK = math.radians(2.0)  # rad per root second
-_X, _Y, _YAW, _FORWARD, _LEFT, _YAW_RATE = 0, 1, 5, 6, 7, 11  # indices in a state
 _VELOCITY = slice(6, 9)
 # The motion after which AMCL updates, and draws anew: `update_min_d` and `update_min_a` of Nav2's parameters.
 _SEGMENT, _SEGMENT_TURN = 0.25, 0.2  # m, rad
@@ -44,7 +43,7 @@ class Odometry:
 
     def __call__(self, state: np.ndarray) -> None:
         """Changes a true state `[12]` in place; each call is the observation after the next agent step."""
-        pose = x, y, yaw = state.item(_X), state.item(_Y), state.item(_YAW)
+        pose = x, y, yaw = state.item(X), state.item(Y), state.item(YAW)
         drift = 0.0
         if self._true is not None:
             drift = self.rng.normal(0.0, self.heading_walk * math.sqrt(STEP_TIME))
@@ -52,9 +51,9 @@ class Odometry:
             moved = self.scale * (x - true_x), self.scale * (y - true_y)
             self._observed = _moved_on(self._observed, moved, true_yaw, yaw, drift)
         self._true = pose
-        state[_X], state[_Y], state[_YAW] = self._observed
+        state[X], state[Y], state[YAW] = self._observed
         state[_VELOCITY] *= self.scale
-        state[_YAW_RATE] += drift / STEP_TIME
+        state[YAW_RATE] += drift / STEP_TIME
 
 
 @dataclasses.dataclass
@@ -83,7 +82,7 @@ class NoisyMotion:
 
     def __call__(self, state: np.ndarray) -> None:
         """Changes a state `[12]` in place; each call is the observation after the next agent step."""
-        pose = x, y, yaw = state.item(_X), state.item(_Y), state.item(_YAW)
+        pose = x, y, yaw = state.item(X), state.item(Y), state.item(YAW)
         if self._true is None:
             self._true = self._observed = pose
             return
@@ -106,13 +105,13 @@ class NoisyMotion:
         drift = deviation * self._about
         self._true = pose
         self._observed = _moved_on(self._observed, (moved_x + error_x, moved_y + error_y), true_yaw, yaw, drift)
-        state[_X], state[_Y], state[_YAW] = self._observed
+        state[X], state[Y], state[YAW] = self._observed
 
         # The errors of the velocities, in the body's own frame.
         cosine, sine = math.cos(yaw), math.sin(yaw)
-        state[_FORWARD] += (cosine * error_x + sine * error_y) / STEP_TIME
-        state[_LEFT] += (cosine * error_y - sine * error_x) / STEP_TIME
-        state[_YAW_RATE] += drift / STEP_TIME
+        state[FORWARD_VELOCITY] += (cosine * error_x + sine * error_y) / STEP_TIME
+        state[LEFT_VELOCITY] += (cosine * error_y - sine * error_x) / STEP_TIME
+        state[YAW_RATE] += drift / STEP_TIME
 
 
 def _moved_on(observed: Pose, moved: tuple[float, float], true_yaw: float, yaw: float, drift: float) -> Pose:
