@@ -26,7 +26,7 @@ def labels(envs: MazeVectorEnv, costs: bool = False) -> np.ndarray:
         >>> observation, reward, terminated, truncated, info = envs.step(actions)
 
     Args:
-      envs: of `mazebench.make_vec`, also in wrappers; after `reset`.
+      envs: of `mazebench.make_vec` with the six actions, also in wrappers; after `reset`.
       costs: whether to return the costs of all six actions.
 
     Returns:
@@ -35,11 +35,13 @@ def labels(envs: MazeVectorEnv, costs: bool = False) -> np.ndarray:
       hierarchical task, the goal is the next landmark.
 
     Raises:
-      InputError: if `envs` are other environments, or were not reset.
+      InputError: if `envs` are other environments, have other actions, or were not reset.
     """
     envs = getattr(envs, "unwrapped", envs)
     if not isinstance(envs, MazeVectorEnv):
         raise InputError(f"expected environments of mazebench.make_vec, found {type(envs).__name__}")
+    if envs.task_spec.actions != "six":
+        raise InputError(f"expected environments with actions 'six', found {envs.task_spec.actions!r}")
     rules = envs.rules
     if not rules.active.any():
         raise InputError("expected a call to reset() before that of labels(), found no episode under way")

@@ -76,5 +76,7 @@ def test_other_environments_are_refused(envs):
     np.testing.assert_array_equal(labels(wrapped), labels(envs))
     with pytest.raises(InputError, match=r"expected environments of mazebench\.make_vec, found MazeEnv"):
         labels(mazebench.make("building"))
+    with pytest.raises(InputError, match="expected environments with actions 'six', found 'four'"):
+        labels(mazebench.make_vec("local", 2, actions="four"))
     with pytest.raises(InputError, match=r"expected a call to reset\(\) before that of labels\(\)"):
         labels(mazebench.make_vec("building", 2))
