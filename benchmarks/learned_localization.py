@@ -23,6 +23,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import torch
+from mazebench_agents.common.path_layer import cost_layers
 from mazebench_agents.navigator import Navigator
 from mazebench_agents.robot.map_matching import MapBelief
 from mazebench_agents.robot.senses import Memory
@@ -54,10 +55,7 @@ class Model(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.layers = nn.Sequential(
-            nn.Conv2d(6, CHANNELS, 3, padding=1), nn.ReLU(), nn.Conv2d(CHANNELS, CHANNELS, 3, padding=1), nn.ReLU(),
-            nn.Conv2d(CHANNELS, 1, 1),
-        )  # fmt: skip
+        self.layers = cost_layers(6, CHANNELS)
 
     def forward(self, seen: torch.Tensor, shown: torch.Tensor) -> torch.Tensor:
         """Returns `[T, H]`, to be added to log weights, of T looks: `[T, 2, W, W]` and `[T, H, W, W]`."""
@@ -73,11 +71,11 @@ class Model(nn.Module):
 
 @dataclasses.dataclass
 class LearnedBelief(MapBelief):
-    """Weighs its hypotheses by a model; without one, by the navigator's own rule. It remembers all looks."""
+    """Weighs its hypotheses by a model; without one, by the navigator's own rule, and remembers its first looks."""
 
     model: ClassVar[Model | None] = None
 
-    looks: list[Look] = dataclasses.field(default_factory=list)
+    looks: list[Look] = dataclasses.field(default_factory=list)  # to learn from
 
     def __post_init__(self) -> None:
         self.prior = self.log_weights.copy()  # [H]
@@ -86,16 +84,17 @@ class LearnedBelief(MapBelief):
     def update(self, evidence: np.ndarray, visited: np.ndarray) -> bool:
         """Takes in what was seen, see `MapBelief`."""
         entered = np.argwhere(visited & ~self.visited)
-        is_look = len(entered) > 0 and len(self.placements) > 1
-        if is_look:
-            self.looks.append(self._look(evidence, *entered[-1].tolist()))
+        if len(entered) > 0 and len(self.placements) > 1 and len(self.looks) < MOST_LOOKS:
+            look = self._look(evidence, *entered[-1].tolist())
             self._before = evidence.copy()
+            if self.model is None:
+                self.looks.append(look)
+            else:
+                with torch.no_grad():
+                    told = self.model(*(torch.from_numpy(each[None]) for each in look))
+                self.log_weights += told[0].double().numpy()
         if self.model is None:
             return super().update(evidence, visited)
-        if is_look:
-            with torch.no_grad():
-                told = self.model(*(torch.from_numpy(each[None]) for each in self.looks[-1]))
-            self.log_weights += told[0].double().numpy()
         # Of the rule, only that the goal is in no cell that was visited.
         return super().update(np.zeros_like(evidence), visited)
 
@@ -198,7 +197,7 @@ def collect(track: str, level: int, **options: Any) -> list[Sample]:
     samples = []
     for belief, truth in WatchedNavigator.watched:
         if belief.looks:
-            seen, shown = (torch.from_numpy(np.stack(each)) for each in zip(*belief.looks[:MOST_LOOKS], strict=True))
+            seen, shown = (torch.from_numpy(np.stack(each)) for each in zip(*belief.looks, strict=True))
             samples.append(Sample(torch.from_numpy(belief.prior).float(), seen, shown, truth))
     print(f"{len(samples)} episodes of {track} {level}", flush=True)
     return samples
