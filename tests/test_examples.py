@@ -84,10 +84,18 @@ import gymnasium, mazebench, numpy as np
 from mazebench.testing import check_agent
 from sb3_her_agent import {agent} as Agent
 
-# Also where contexts are larger than those that it was trained on.
-for size in ({side}, {side + 2}):
-    task = mazebench.Task.of(size=size, context_size=size, kinds='dfs')
-    check_agent('sb3_her_agent:{agent}', task, 'her.zip')
+task = mazebench.Task.of(size={side}, context_size={side}, kinds='dfs')
+check_agent('sb3_her_agent:{agent}', task, 'her.zip')
+# Larger contexts of the same mazes are resized, but other mazes have other positions.
+task = mazebench.Task.of(size={side}, context_size={2 * side}, kinds='dfs')
+check_agent('sb3_her_agent:{agent}', task, 'her.zip')
+try:
+    task = mazebench.Task.of(size={side + 2}, context_size={side + 2}, kinds='dfs')
+    Agent.build(task.interface, checkpoint='her.zip')
+except mazebench.UnplayableError as error:
+    assert 'expected mazes of {side} x {side}, as in training, found {side + 2}' in str(error), error
+else:
+    raise AssertionError('played')
 
 # The agent sees what the goal-conditioned environment shows.
 names = ("Local", "LocalGoal")

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import cv2
 import numpy as np
 import torch
 from stable_baselines3 import HerReplayBuffer
@@ -17,8 +18,11 @@ from stable_baselines3.common.type_aliases import DictReplayBufferSamples
 from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
+from mazebench.agent import Interface
+from mazebench.constants import FORWARD_VELOCITY, LEFT_VELOCITY, YAW, YAW_RATE, X, Y
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.errors import InputError
+from mazebench.errors import InputError, UnplayableError
+from mazebench.tasks.context import GLOBAL_MAP, GOAL
 from mazebench.world.simulation import STATE_SIZE
 
 from ..neural_planner.network import NUM_RANGES, REACH, CostPlanner, Situation, motion_features
@@ -92,6 +96,16 @@ class MazeVecEnv(VecEnv):
         return self.envs.render()
 
 
+def map_layers(num_planes: int, side: int, num_features: int) -> nn.Sequential:
+    """Returns convolutions that make features `[B, num_features]` of planes `[B, num_planes, side, side]`."""
+    layers: list[nn.Module] = []
+    channels = num_planes
+    for wider in _CHANNELS:
+        layers += [nn.Conv2d(channels, wider, 3, stride=2, padding=1), nn.ReLU()]
+        channels, side = wider, (side + 1) // 2
+    return nn.Sequential(*layers, nn.Flatten(), nn.Linear(channels * side**2, num_features), nn.ReLU())
+
+
 class MapFeatures(BaseFeaturesExtractor):
     """Convolutions of the context, and the state and the lidar, if there is one, in values of an order of 1.
 
@@ -109,11 +123,7 @@ class MapFeatures(BaseFeaturesExtractor):
         scale = torch.tensor([1 / side] * 3 + [1.0] * (STATE_SIZE - 3))  # positions are in metres
         self.register_buffer("scale", scale, persistent=False)
         self.reach = None if lidar is None else float(lidar.high.max())  # type: ignore[attr-defined]
-        layers: list[nn.Module] = []
-        for wider in _CHANNELS:
-            layers += [nn.Conv2d(channels, wider, 3, stride=2, padding=1), nn.ReLU()]
-            channels, side = wider, (side + 1) // 2
-        self.context = nn.Sequential(*layers, nn.Flatten(), nn.Linear(channels * side**2, num_features), nn.ReLU())
+        self.context = map_layers(channels, side, num_features)
 
     def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
         parts = [self.context(observations["context"]), observations["state"] * self.scale]
@@ -125,32 +135,47 @@ class MapFeatures(BaseFeaturesExtractor):
 class WayFeatures(BaseFeaturesExtractor):
     """The cheapest ways over the context's map, by learned costs, around the body: those of `neural-planner`.
 
-    It has no memory, so the map is all that it plans on, beside the lidar's ranges to the walls that are near.
+    It has no memory, so the map is all that it plans on, beside the lidar's ranges to the walls that are near. It
+    reads maps whose cells are 1 m wide.
     """
 
-    def __init__(self, observation_space: spaces.Dict, cell_size: float = 1.0, ways: bool = True):
-        """`cell_size` is the width of the map's cells in metres; without `ways`, the goal is seen as the crow flies."""
+    def __init__(self, observation_space: spaces.Dict):
         super().__init__(observation_space, CostPlanner.num_features)
-        self.cell_size = cell_size
-        self.planner = CostPlanner(NeuralPlannerConfig.channels, ways)
+        self.planner = CostPlanner(NeuralPlannerConfig.channels)
 
     def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
         context, state = observations["context"], observations["state"]
-        walls, goal = context[:, 0], context[:, 2]
+        walls, goal = context[:, GLOBAL_MAP], context[:, GOAL]
         # Nothing but the map is known of walls. All cells may be the goal if it is hidden.
         goal_is_hidden = goal.amax(dim=(1, 2), keepdim=True) == 0
         planes = [255 * walls, 255 * walls, torch.full_like(walls, 128), 255 * ((goal <= 0) & ~goal_is_hidden)]
         plan = self.planner.plan(torch.stack(planes, dim=1).round().to(torch.uint8))
 
         batch_size = len(state)
-        ranges = torch.full((batch_size, NUM_RANGES), REACH)
+        ranges = state.new_full((batch_size, NUM_RANGES), REACH)
         if "lidar" in observations:
-            ranges = (observations["lidar"] / self.cell_size).clamp(max=REACH)
-        motion = motion_features(state[:, [6, 7, 11]].numpy(), np.full((batch_size, 2), -1))
-        pose = torch.cat([state[:, :2] / self.cell_size, state[:, 5:6]], dim=1)
-        return self.planner.features(
-            plan, torch.arange(batch_size), Situation(pose, ranges, torch.from_numpy(motion))
-        )  # [B, features]
+            ranges = observations["lidar"].clamp(max=REACH)
+        velocity = state[:, [FORWARD_VELOCITY, LEFT_VELOCITY, YAW_RATE]].cpu().numpy()
+        motion = torch.from_numpy(motion_features(velocity, np.full((batch_size, 2), -1)))  # no last actions
+        situation = Situation(state[:, [X, Y, YAW]], ranges, motion.to(state.device))
+        return self.planner.features(plan, torch.arange(batch_size, device=state.device), situation)  # [B, features]
+
+
+def check_side(side: int, interface: Interface) -> None:
+    """Raises `UnplayableError` unless a policy that was trained on contexts of this side can read those of mazes.
+
+    Contexts with more pixels than the maze has cells are resized, but positions in metres belong to one size of mazes.
+    """
+    if side not in (interface.size, interface.context_size):
+        raise UnplayableError(f"expected mazes of {side} x {side}, as in training, found {interface.size}")
+
+
+def resized(planes: np.ndarray, side: int) -> np.ndarray:
+    """Returns planes `[B, P, M, M]` of contexts as `[B, P, side, side]`."""
+    if planes.shape[-1] == side:
+        return planes
+    small = [[cv2.resize(plane, (side, side), interpolation=cv2.INTER_AREA) for plane in each] for each in planes]
+    return np.array(small)
 
 
 class EndingHerReplayBuffer(HerReplayBuffer):

@@ -1,8 +1,8 @@
 """The policy that sb3_tracks.py saved, as an agent of mazebench."""
 
-import cv2
 import numpy as np
 import torch
+from mazebench_agents.integrations.sb3 import check_side, resized
 from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO
 
@@ -19,7 +19,9 @@ class PPOAgent(mazebench.Agent):
     def build(cls, interface, *, seed=0, checkpoint=None):
         if checkpoint is None:
             raise mazebench.InputError("expected --checkpoint, the file that sb3_tracks.py saved, found none")
-        return cls(cls.algorithm.load(checkpoint, device="cpu").policy)
+        agent = cls(cls.algorithm.load(checkpoint, device="cpu").policy)
+        check_side(agent.side, interface)
+        return agent
 
     def __init__(self, policy):
         self.policy = policy
@@ -32,9 +34,7 @@ class PPOAgent(mazebench.Agent):
         streams, memory = state
         for slot in np.flatnonzero(inputs.new_episode):
             streams[slot] = np.random.default_rng(inputs.seed[slot])
-        observation = dict(inputs.observation)
-        if observation["context"].shape[-1] != self.side:
-            observation["context"] = np.stack([self.resized(planes) for planes in observation["context"]])
+        observation = inputs.observation | {"context": resized(inputs.observation["context"], self.side)}
         with torch.no_grad():
             observation = {name: torch.as_tensor(values) for name, values in observation.items()}
             distribution, memory = self.distribution(observation, memory, torch.as_tensor(inputs.new_episode))
@@ -47,10 +47,6 @@ class PPOAgent(mazebench.Agent):
 
     def distribution(self, observation, memory, new_episode):
         return self.policy.get_distribution(observation), memory
-
-    def resized(self, planes):
-        """Returns `[4, side, side]`: the planes of a context with another number of cells."""
-        return np.stack([cv2.resize(plane, (self.side, self.side), interpolation=cv2.INTER_AREA) for plane in planes])
 
 
 class MapPPOAgent(PPOAgent):

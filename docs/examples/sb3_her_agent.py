@@ -1,11 +1,10 @@
 """The policy that sb3_her.py saved, as an agent of mazebench, and the features that it reads."""
 
-import cv2
 import numpy as np
 import torch
+from mazebench_agents.integrations.sb3 import check_side, map_layers, resized
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.dqn.policies import MultiInputPolicy
-from torch import nn
 
 import mazebench
 from mazebench.tasks.context import GOAL
@@ -19,13 +18,9 @@ class GoalFeatures(BaseFeaturesExtractor):
         super().__init__(observation_space, num_features + 12 + (lidar.shape[0] if lidar else 0))
         self.reach = float(lidar.high.max()) if lidar else None
         self.metres = float(observation_space["desired_goal"].high[0])  # on a side of the maze
-        self.side = side = round(((observation_space["observation"].shape[0] - 12) / 3) ** 0.5)  # M of the planes
+        self.side = round(((observation_space["observation"].shape[0] - 12) / 3) ** 0.5)  # M of the planes
         self.scale = torch.tensor([1 / self.metres] * 3 + [1.0] * 9)
-        layers, channels = [], 5
-        for wider in (32, 64, 64):
-            layers += [nn.Conv2d(channels, wider, 3, stride=2, padding=1), nn.ReLU()]
-            channels, side = wider, (side + 1) // 2
-        self.planes = nn.Sequential(*layers, nn.Flatten(), nn.Linear(channels * side**2, num_features), nn.ReLU())
+        self.planes = map_layers(5, self.side, num_features)
 
     def forward(self, observations):
         state, shown = observations["observation"][:, :12], observations["observation"][:, 12:]
@@ -52,7 +47,9 @@ class HerAgent(mazebench.Agent):
         if checkpoint is None:
             raise mazebench.InputError("expected --checkpoint, the file that sb3_her.py saved, found none")
         policy = MultiInputPolicy.load(checkpoint, device="cpu")
-        return cls(policy, policy.q_net.features_extractor.side, interface.size, interface.cell_size)
+        side = policy.q_net.features_extractor.side
+        check_side(side, interface)
+        return cls(policy, side, interface.size, interface.cell_size)
 
     def __init__(self, policy, side, size, cell_size):
         """`side` is M of the contexts that the policy was trained on."""
@@ -68,8 +65,7 @@ class HerAgent(mazebench.Agent):
         row, column = np.divmod(context[:, GOAL].reshape(batch, -1).argmax(axis=1), side)
         goal = np.stack([column, side - 1 - row], axis=1) + 0.5  # x, y in pixels of the map
         planes = np.delete(context, GOAL, axis=1)
-        if side != self.side:
-            planes = np.stack([self.resized(each) for each in planes])
+        planes = resized(planes, self.side)
         shown = {
             "observation": np.hstack([state, planes.reshape(batch, -1)]),
             "achieved_goal": (state[:, :2] // self.cell_size + 0.5) * self.cell_size,
@@ -77,10 +73,6 @@ class HerAgent(mazebench.Agent):
         }
         shown |= {name: observation[name] for name in self.needs_sensors}
         return {name: values.astype(np.float32) for name, values in shown.items()}
-
-    def resized(self, planes):
-        """Returns `[3, side, side]`: the planes of a context with another number of cells."""
-        return np.stack([cv2.resize(plane, (self.side, self.side), interpolation=cv2.INTER_AREA) for plane in planes])
 
 
 class LidarHerAgent(HerAgent):

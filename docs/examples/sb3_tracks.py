@@ -24,6 +24,8 @@ parser.add_argument("--num-envs", type=int, default=64)
 parser.add_argument("--seed", type=int, default=0)
 parser.add_argument("--out", default="ppo.zip")
 arguments = parser.parse_args()
+if arguments.recurrent and arguments.track == "local":
+    parser.error("expected --recurrent with a track, found it with local")
 
 agent = MapPPOAgent if arguments.track == "local" else RecurrentPPOAgent if arguments.recurrent else PPOAgent
 nearest, farthest = arguments.distances
