@@ -64,10 +64,28 @@ class TestViewer:
         game = Game(Task.of(mazes=corridor, distances=[2], sensors="lidar"), seed=0)
         np.testing.assert_allclose(np.hypot(*(game.rays - game.path[-1]).T), game.observation["lidar"])
         scene = mujoco.MjvScene(game.env.simulation.model, maxgeom=40)
-        viewer._draw_rays(scene, game)
-        assert scene.ngeom == 32
-        middles = [geom.pos[:2] for geom in scene.geoms[:32]]
+        walls = viewer.Walls(np.ones(4, np.float32))
+        for _ in range(2):  # of each picture, all is drawn anew
+            walls.draw(scene, game.maze)
+            num_boxes = scene.ngeom
+            viewer._draw_rays(scene, game)
+        assert scene.ngeom == num_boxes + 32
+        middles = [geom.pos[:2] for geom in scene.geoms[num_boxes : scene.ngeom]]
         np.testing.assert_allclose(middles, (game.path[-1] + game.rays) / 2, atol=1e-5)
+
+    def test_all_walls_are_drawn_of_each_maze_in_turn(self, corridor):
+        room = np.ones((7, 7), dtype=bool)
+        room[1:-1, 1:-1] = False
+        scene = mujoco.MjvScene(Game(Task.of(mazes=corridor), seed=0).env.simulation.model, maxgeom=80)
+        walls = viewer.Walls(np.ones(4, np.float32))
+        for maze in (corridor, Maze(room, "room"), corridor):
+            walls.draw(scene, maze)
+            shown = np.zeros((maze.size, maze.size), dtype=bool)
+            for geom in scene.geoms[: scene.ngeom]:
+                (x, y, _), (half_x, half_y, _) = geom.pos, geom.size
+                rows = slice(round(maze.size - y - half_y), round(maze.size - y + half_y))
+                shown[rows, round(x - half_x) : round(x + half_x)] = True
+            np.testing.assert_array_equal(shown, maze.walls)
 
     def test_the_map_is_the_one_that_an_agent_is_shown(self):
         game = Game(Task.of("local", size=13, map_flip=0.3), seed=0)

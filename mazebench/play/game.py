@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from mazebench.envs.gym import MazeEnv
+from mazebench.maps.maze import Maze
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.task import Task
 from mazebench.world.ray_casting import ray_ends
@@ -56,6 +57,11 @@ class Game:
         self.num_reached += terminated
 
     @property
+    def maze(self) -> Maze:
+        """The maze of the episode."""
+        return self.task_spec.all_mazes[self.env.task.episode.maze]
+
+    @property
     def context(self) -> np.ndarray:
         """`[4, M, M]` float32: the context that an agent would get."""
         return self.observation["context"]
@@ -71,7 +77,7 @@ class Game:
     def title(self) -> str:
         """Returns a line that describes the episode."""
         task = self.env.task
-        maze, episode = self.task_spec.all_mazes[task.episode.maze], task.episode
+        maze, episode = self.maze, task.episode
         distance = maze.distance(episode.start, episode.goal)
         scale = "" if maze.cell_size == 1 else f" of {maze.cell_size:g} m"
         return f"maze {maze.name}, {self.task_spec.task}: the goal is {distance} cells{scale} away"

@@ -12,10 +12,13 @@ import mujoco
 import numpy as np
 
 from mazebench.errors import InputError
+from mazebench.maps.maze import Maze
 from mazebench.maps.pictures import draw_grid
 from mazebench.play.game import HELP, Game
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
-from mazebench.world.mjcf import BODY_HEIGHT
+from mazebench.world.mjcf import BODY_HEIGHT, wall_boxes
+from mazebench.world.ray_casting import NUM_RAYS
+from mazebench.world.rendering import set_boxes
 
 _ESCAPE = 256  # GLFW's key codes; those of letters are the codes of capital letters
 _ARROWS = {262: "right", 263: "left", 264: "down", 265: "up"}
@@ -46,9 +49,11 @@ def play(game: Game) -> None:
         viewer.cam.fixedcamid = model.camera("chase").id
         # Some of these letters toggle flags of the viewer too: the flags are reset all the time.
         flags = viewer.opt.flags.copy(), viewer.user_scn.flags.copy()
+        walls = Walls(model.material("wall").rgba)
         while viewer.is_running():
             with viewer.lock():
                 viewer.opt.flags[:], viewer.user_scn.flags[:] = flags
+                walls.draw(viewer.user_scn, game.maze)
                 _draw_rays(viewer.user_scn, game)
             _overlay(viewer, game)
             viewer.sync()
@@ -77,17 +82,35 @@ def _import_viewer() -> types.ModuleType:
     return mujoco.viewer
 
 
+class Walls:
+    """All walls of the maze, of which the simulation has those near the body only."""
+
+    def __init__(self, rgba: np.ndarray):
+        self._rgba = rgba
+        self._drawn: Maze | None = None
+        self._num_boxes = 0
+
+    def draw(self, scene: mujoco.MjvScene, maze: Maze) -> None:
+        """Makes the walls, as many as it has room for, all that is in the scene, which is always the same one."""
+        if maze is not self._drawn:
+            middle, half = wall_boxes(maze)
+            self._drawn, self._num_boxes = maze, min(len(middle), scene.maxgeom - NUM_RAYS)
+            shown = slice(self._num_boxes)
+            set_boxes(scene.geoms[shown], middle[shown], half[shown], self._rgba)
+        scene.ngeom = self._num_boxes
+
+
 def _draw_rays(scene: mujoco.MjvScene, game: Game) -> None:
-    """Draws the rays of the range sensor in the world, from the body's centre to the walls, if the task has it."""
+    """Adds the rays of the range sensor to a scene, from the body's centre to the walls, if the task has it."""
     ends = game.rays
     if ends is None:
         return
     height = BODY_HEIGHT / 2
-    for geom, end in zip(scene.geoms, ends, strict=False):
+    for geom, end in zip(scene.geoms[scene.ngeom :], ends, strict=False):
         capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
         mujoco.mjv_initGeom(geom, capsule, np.zeros(3), np.zeros(3), np.zeros(9), _RAY_COLOUR)
         mujoco.mjv_connector(geom, capsule, _RAY_RADIUS, np.array([*game.path[-1], height]), np.array([*end, height]))
-    scene.ngeom = len(ends)
+    scene.ngeom += len(ends)
 
 
 def _overlay(viewer: Any, game: Game) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import copy
 import weakref
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -64,10 +65,8 @@ class Cameras:
     def _add_boxes(self, scene: mujoco.MjvScene, seen: Seen) -> None:
         """Adds the boxes that a model lacks to the scene, behind its geoms, where the next update leaves them."""
         first, last = scene.ngeom, scene.ngeom + len(seen.middle)
-        if self._added is not seen and first < last:
-            box, upright, colour = mujoco.mjtGeom.mjGEOM_BOX, np.eye(3).ravel(), seen.model.material("wall").rgba
-            for geom, half, middle in zip(scene.geoms[first:last], seen.half, seen.middle, strict=True):
-                mujoco.mjv_initGeom(geom, box, half, middle, upright, colour)
+        if self._added is not seen:
+            set_boxes(scene.geoms[first:last], seen.middle, seen.half, seen.model.material("wall").rgba)
         self._added, scene.ngeom = seen, last
 
     def _open(self, most_shown: int) -> mujoco.Renderer:
@@ -94,6 +93,12 @@ class Cameras:
 
     def __del__(self) -> None:
         self.close()
+
+
+def set_boxes(geoms: Sequence[mujoco.MjvGeom], middle: np.ndarray, half: np.ndarray, rgba: np.ndarray) -> None:
+    """Makes boxes of the geoms of a scene, with these middles and half sides (`[K, 3]` m) and one colour (`[4]`)."""
+    for geom, size, place in zip(geoms, half, middle, strict=True):
+        mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_BOX, size, place, np.eye(3).ravel(), rgba)
 
 
 _open_cameras: weakref.WeakSet[Cameras] = weakref.WeakSet()
