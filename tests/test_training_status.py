@@ -75,3 +75,9 @@ def test_where_nothing_is_a_terminal_there_are_two_lines_a_minute_besides_those_
     clock.now += 19
     lines(Status(**STATUS))
     assert capsys.readouterr().out == "200,000 steps\n"
+
+
+def test_losses_are_means_over_the_updates_that_have_them():
+    counters = Counters().after_update({"loss": 1.0, "success": 0.5}).after_update({"success": 0.0})
+    assert counters.after_update({"loss": 3.0, "success": 1.0}).mean_losses() == {"loss": 2.0, "success": 0.5}
+    assert counters.after_line().mean_losses() == {}

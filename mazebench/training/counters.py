@@ -15,8 +15,8 @@ class Counters:
     updates: int = 0
     milestone_steps: int = 0  # env_steps of the last milestone
     logged_steps: int = 0  # env_steps of the last line of metrics
-    logged_updates: int = 0  # updates of that line
     loss_sums: Mapping[str, float] = dataclasses.field(default_factory=dict)  # over the updates since then, by name
+    loss_counts: Mapping[str, int] = dataclasses.field(default_factory=dict)  # of these updates, those with the loss
 
     @property
     def is_milestone(self) -> bool:
@@ -30,16 +30,22 @@ class Counters:
     def after_update(self, losses: Mapping[str, float]) -> Self:
         """Returns the counters after one more update, which returned `losses`."""
         sums = {name: self.loss_sums.get(name, 0.0) + value for name, value in losses.items()}
-        return dataclasses.replace(self, updates=self.updates + 1, loss_sums=sums)
+        counts = {name: self.loss_counts.get(name, 0) + 1 for name in losses}
+        return dataclasses.replace(
+            self,
+            updates=self.updates + 1,
+            loss_sums={**self.loss_sums, **sums},
+            loss_counts={**self.loss_counts, **counts},
+        )
 
     def after_line(self) -> Self:
         """Returns the counters after a line of metrics was written here."""
-        return dataclasses.replace(self, logged_steps=self.env_steps, logged_updates=self.updates, loss_sums={})
+        return dataclasses.replace(self, logged_steps=self.env_steps, loss_sums={}, loss_counts={})
 
     def at_milestone(self) -> Self:
         """Returns the counters of a milestone here, which has a line of metrics."""
         return dataclasses.replace(self.after_line(), milestone_steps=self.env_steps)
 
     def mean_losses(self) -> dict[str, float]:
-        """Returns the means over the updates since the last line of metrics, by name."""
-        return {name: value / (self.updates - self.logged_updates) for name, value in self.loss_sums.items()}
+        """Returns the means over the updates since the last line of metrics that had the loss, by name."""
+        return {name: value / self.loss_counts[name] for name, value in self.loss_sums.items()}
