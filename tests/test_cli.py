@@ -86,6 +86,9 @@ BAD_INPUT = [
     ((*TINY, "--mazes", "{bad}/marked.txt"), "marked: expected '#*1@%' or a block for wall"),
     (("generate", "--kind", "pub"), "unknown kind 'pub'; available: cave, dfs, hospital, house, museum, obstacles, "),
     (("generate", "--mazes", "{bad}/binary.png"), "binary.png: expected a "),
+    (("generate", "--mazes", "{bad}/good.txt", "--count", "2"), "expected a count of 1 beside --mazes, found 2"),
+    (("generate", "--inflate", "0.5"), "expected a map of your own (--mazes) with inflate 0.5, found none"),
+    ((*TINY, "--seed", "9007199254740992"), "expected seed from 0 to 9007199254740991, found 9007199254740992"),
     (("train", "--agent", "mah"), "expected --minutes or --env-steps, found neither"),
     (("train", "--agent", "planner", "--minutes", "1"), "agent 'planner' doesn't learn; agents that do: "),
     ((*TRAIN, "--set", "colour"), "expected --set KEY=VALUE, found 'colour'"),
@@ -207,6 +210,17 @@ class TestGenerate:
         assert read_maze(tmp_path / source).cell_size == 0.5
         said = one_line(command("generate", "--mazes", source, "--format", "ros", "--out", "ours"))
         assert "dfs-9-0-000.yaml: would overwrite the map that the maze is read from" in said
+
+    def test_the_picture_of_a_ros_map_is_not_overwritten(self, command, tmp_path):
+        assert command("generate", "--size", "9", "--format", "ros", "--out", "maps")[0] == 0
+        (tmp_path / "maps" / "dfs-9-0-000.pgm").rename(tmp_path / "maps" / "plan.pgm")
+        text = (tmp_path / "maps" / "dfs-9-0-000.yaml").read_text().replace("dfs-9-0-000.pgm", "plan.pgm")
+        (tmp_path / "maps" / "plan.yml").write_text(text)
+        before = (tmp_path / "maps" / "plan.pgm").read_bytes()
+        options = ("--mazes", "maps/plan.yml", "--out", "maps")
+        said = one_line(command("generate", *options, "--format", "ros"))
+        assert "plan.pgm: would overwrite the map that the maze is read from" in said
+        assert (tmp_path / "maps" / "plan.pgm").read_bytes() == before
 
 
 class TestEval:

@@ -6,7 +6,7 @@ from __future__ import annotations
 def list_() -> None:
     """List tasks, agents, sizes, kinds of mazes and Gymnasium ids."""
     from mazebench.agent_loading import agent_names
-    from mazebench.constants import TASK_VERSION, VELOCITIES
+    from mazebench.constants import DISCRETE, TASK_VERSION, VELOCITIES
     from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS
     from mazebench.maps.kinds import KINDS
     from mazebench.tasks.perturbations import PERTURBATIONS
@@ -23,7 +23,7 @@ def list_() -> None:
         "kinds": ", ".join(KINDS),
         "perturbed": ", ".join(PERTURBATIONS),
         "sensors": ", ".join(SENSORS),
-        "actions": ", ".join(("six", *VELOCITIES)),
+        "actions": ", ".join((*DISCRETE, *VELOCITIES)),
         "Gymnasium": f"{', '.join(ids)} and the other sizes; mazebench/Rebuilt-v{TASK_VERSION} and the other tracks",
     }
     for name, text in rows.items():

@@ -113,4 +113,6 @@ def _to_value(name: str, option: Option, given: Any) -> Any:
         return given.value
     if option.kind == tuple[int, ...]:
         return () if given is None else parse_numbers(name, given)
-    return tuple(given) if option.kind == tuple[str, ...] else given
+    if option.kind == tuple[str, ...]:
+        return tuple(part.strip() for text in given for part in text.split(","))
+    return given

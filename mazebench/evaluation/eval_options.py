@@ -6,7 +6,7 @@ import dataclasses
 import pathlib
 from typing import Annotated, Unpack
 
-from annotated_types import Ge
+from annotated_types import Ge, Interval
 
 from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.errors import InputError
@@ -34,7 +34,9 @@ class EvalOptions:
     checkpoint: Annotated[
         str | None, Doc("A learned agent's checkpoint or run folder; the shipped one if not given.")
     ] = None
-    seed: Annotated[int, Ge(0), Doc("Seed of what the agent draws, and of episodes that are not frozen.")] = 0
+    seed: Annotated[
+        int, Interval(ge=0, le=2**53 - 1), Doc("Seed of what the agent draws, and of episodes that are not frozen.")
+    ] = 0
 
     @classmethod
     def of(

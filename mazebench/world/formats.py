@@ -17,8 +17,9 @@ from mazebench.maps.maze_files import read_located
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.pictures import draw_plan, write_image
 from mazebench.maps.readers.occupancy_grid import LocatedMaze
-from mazebench.maps.readers.ros import write_ros_map
+from mazebench.maps.readers.ros import ROS_SUFFIXES, picture_of, write_ros_map
 from mazebench.maps.text import write_text_maze
+from mazebench.options import fields_of
 from mazebench.world.export import MESH_FORMATS, write_mesh, write_mjcf
 
 _DEFAULT_SIZE = 13
@@ -37,9 +38,15 @@ def make_mazes(
     """Yields `count` mazes of a kind, named after kind, size, seed and index; or the one maze in the map `source`.
 
     Raises:
-      InputError: if the kind has no mazes of that size, or the map holds no maze.
+      InputError: if the kind has no mazes of that size, the map holds no maze, or options are for the other of both.
     """
+    for name, field in fields_of(ReadOptions).items():
+        found = getattr(options, name)
+        if source is None and name != "cell_size" and found != field.default:
+            raise InputError(f"expected a map of your own (--mazes) with {name} {found}, found none")
     if source is not None:
+        if count > 1:
+            raise InputError(f"expected a count of 1 beside --mazes, found {count}")
         yield read_located(source, size, **dataclasses.asdict(options))
         return
     size = _DEFAULT_SIZE if size is None else size
@@ -64,14 +71,18 @@ def write_maze(
     """Writes a maze into `folder` in each format and returns the files; a ROS map overlays the one it was read from.
 
     Raises:
-      InputError: if the folder can't be written, or a file is `source`, the map that the maze was read from.
+      InputError: if the folder can't be written, or a file is `source`, the map that the maze was read from, or its
+        picture.
     """
     paths_of = {
         name: [folder / f"{located.maze.name}.{suffix}" for suffix in _FORMATS[name].suffixes] for name in formats
     }
     paths = [path for several in paths_of.values() for path in several]
+    read_from = [] if source is None else [source]
+    if source is not None and source.suffix.lower() in ROS_SUFFIXES:
+        read_from.append(picture_of(source))
     for path in paths:
-        if source is not None and path.exists() and path.samefile(source):
+        if path.exists() and any(path.samefile(each) for each in read_from):
             raise InputError(
                 f"{path}: would overwrite the map that the maze is read from; give another --out or --format"
             )
