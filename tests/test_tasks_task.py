@@ -207,6 +207,11 @@ class TestOptions:
         for maps in (CORRIDOR, [CORRIDOR], path, str(path), tmp_path):
             assert Task.of(mazes=maps).all_mazes == (CORRIDOR,)
 
+    def test_own_mazes_that_share_a_name_are_told_apart(self):
+        houses = [generate("house", 13, np.random.default_rng(seed)) for seed in range(2)]
+        found = Task.of(mazes=[*houses, dataclasses.replace(houses[0], name="mine")]).all_mazes
+        assert [maze.name for maze in found] == ["house-13-0", "house-13-1", "mine"]
+
 
 class TestShownMap:
     def test_an_episodes_map_follows_from_its_seed(self):

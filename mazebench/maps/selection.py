@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 import pathlib
 from collections.abc import Iterable, Mapping
@@ -22,6 +23,8 @@ OwnMazes = str | pathlib.Path | Maze | np.ndarray | Iterable[Maze | np.ndarray]
 def own_mazes(mazes: Any, options: ReadOptions) -> tuple[Maze, ...]:
     """Returns mazes that are given as values: a maze, an array, or several of these.
 
+    Mazes that share a name get their index at its end, since results tell mazes by name.
+
     Raises:
       InputError: if something else is given, or an array is no maze.
     """
@@ -29,7 +32,12 @@ def own_mazes(mazes: Any, options: ReadOptions) -> tuple[Maze, ...]:
         return (_own_maze(mazes, "maze", options),)
     if not isinstance(mazes, Iterable):
         raise InputError(f"expected mazes as values, arrays or a path, found {type(mazes).__name__}")
-    return tuple(_own_maze(item, f"maze-{index}", options) for index, item in enumerate(mazes))
+    found = [_own_maze(item, f"maze-{index}", options) for index, item in enumerate(mazes)]
+    times = collections.Counter(maze.name for maze in found)
+    return tuple(
+        maze if times[maze.name] == 1 else dataclasses.replace(maze, name=f"{maze.name}-{index}")
+        for index, maze in enumerate(found)
+    )
 
 
 def _own_maze(item: object, name: str, options: ReadOptions) -> Maze:
