@@ -405,6 +405,12 @@ class TestRefusal:
             read_maze(tmp_path / "map.yaml")
         assert message.replace("{folder}", str(tmp_path)) in str(caught.value)
 
+    def test_a_picture_in_a_folder_is_no_maze_of_its_own_however_it_is_named(self, tmp_path, monkeypatch):
+        path = write_map(tmp_path, drawn("##### #...# #...# #...# #####"), image="plan.png")
+        path.write_text(path.read_text().replace("plan.png", str(tmp_path / "plan.png")))
+        monkeypatch.chdir(tmp_path.parent)
+        assert [maze.name for maze in read_mazes(tmp_path.name)] == ["map"]
+
     def test_the_picture_alone_is_answered_with_the_file_to_give(self, tmp_path):
         path = write_map(tmp_path, drawn("##### #...# #...# #...# #####"))
         with pytest.raises(

@@ -135,14 +135,14 @@ def _map_files(folder: pathlib.Path) -> list[pathlib.Path]:
             if not is_map(file):
                 remark(f"{file}: left out, as it names no image and so is no map")
                 continue
-            pictures.add(picture_of(file))
+            pictures.add(picture_of(file).resolve())
         if file.suffix.lower() in _TABLE_SUFFIXES:
             try:
                 read_text(file)
             except InputError as error:
                 remark(f"{file}: left out, as it is no map: {error}")
                 continue
-        if file not in pictures:
+        if file.resolve() not in pictures:
             by_stem.setdefault(file.stem, file)
     if not by_stem:
         raise InputError(f"{folder}: expected maps ({' '.join(SUFFIXES)}), found none")

@@ -178,7 +178,7 @@ def map_of_picture(path: pathlib.Path) -> pathlib.Path | None:
     """Returns the YAML file of the same name that names a picture; None if there is none."""
     for suffix in ROS_SUFFIXES:
         with contextlib.suppress(InputError):  # of another YAML file, or none
-            if picture_of(path.with_suffix(suffix)) == path:
+            if picture_of(path.with_suffix(suffix)).resolve() == path.resolve():
                 return path.with_suffix(suffix)
     return None
 
