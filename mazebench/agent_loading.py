@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib
 import pathlib
 import sys
@@ -26,15 +25,6 @@ def package_of(name: str) -> str | None:
     """Returns name and version of the distribution that brings an installed agent; None if that is not known."""
     dist = _entry_points()[name].dist
     return f"{dist.name} {dist.version}" if dist else None
-
-
-def learning_agents() -> list[str]:
-    """Returns the names of the installed agents that learn; loads all whose dependencies are installed."""
-    found = []
-    for name in agent_names():
-        with contextlib.suppress(InputError):
-            found += [name] if load_agent_class(name).learns else []
-    return found
 
 
 def load_agent_class(name: str) -> type[Agent]:

@@ -21,6 +21,7 @@ from mazebench.tasks.task import Task
 from mazebench.training import loop
 from mazebench.training.experience import Collector
 from mazebench.training.loop import TrainingError, train
+from mazebench.training.run_folder import RunFolder
 
 
 def tiny_options(**changes):
@@ -85,6 +86,17 @@ def test_folder_of_a_run_is_refused_without_resume_and_for_another_config(unbrok
     other = {**TINY, "hidden": "32"}
     with pytest.raises(InputError, match="holds another run, differing in 'agent_config'"):
         train(**tiny_options(env_steps=2400, overrides=other), out=unbroken, resume=True)
+
+
+def test_a_second_training_in_the_folder_is_refused_while_the_first_writes(tmp_path):
+    with RunFolder(tmp_path):
+        half_written = tmp_path / "checkpoints" / "000000000800.tmp"
+        half_written.mkdir()
+        with pytest.raises(InputError, match="another training writes there; end it, or name another folder"):
+            train(**tiny_options(env_steps=800), out=tmp_path, resume=True)
+        assert half_written.exists()
+    with RunFolder(tmp_path):
+        assert not half_written.exists()
 
 
 @pytest.mark.parametrize(

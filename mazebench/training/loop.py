@@ -7,6 +7,7 @@ goes on unchanged; a run that is resumed from it begins new trajectories there, 
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import logging
 import math
@@ -18,7 +19,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from mazebench import stopping
-from mazebench.agent_loading import learning_agents, load_agent_class
+from mazebench.agent_loading import agent_names, load_agent_class
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.checked_agent import context_size_of
 from mazebench.evaluation.provenance import code_hash
@@ -134,7 +135,7 @@ def run_training(
     """Trains an agent in the tracks of `options`, or in the local task, as the `task_options` of `Task.of` say."""
     agent_class = load_agent_class(options.agent)
     if not issubclass(agent_class, LearningAgent):
-        raise InputError(f"agent {options.agent!r} doesn't learn; agents that do: {', '.join(learning_agents())}")
+        raise InputError(f"agent {options.agent!r} doesn't learn; agents that do: {', '.join(_learning_agents())}")
     overrides = dict(options.overrides)
     if len(options.track) > 1 and not agent_class.learns_several_tasks:
         raise InputError(f"agent {options.agent!r}: learns one track at a time, found {', '.join(options.track)}")
@@ -148,8 +149,7 @@ def run_training(
     has_distances = bool(task_options.get("distances"))
     held_out = [HeldOutEvaluation(task, options.eval_mazes, task.distances if has_distances else ()) for task in tasks]
     # The source comes first: if the cluster can't be reached, no run is begun.
-    with open_source(options, tasks, learner) as source:
-        folder = RunFolder(out)
+    with open_source(options, tasks, learner) as source, RunFolder(out) as folder:
         counters = _begin_or_resume(options, folder, learner, tasks, resume)
         if options.env_steps is not None and counters.env_steps >= options.env_steps and counters.is_milestone:
             _logger.info("%s: the run is finished, at %s steps", out, f"{counters.env_steps:,}")
@@ -160,6 +160,15 @@ def run_training(
             _logger.info("nothing to resume in %s; starting a new run", out)
         _logger.info("%s: %s", options.agent, learner.description())
         TrainingLoop(options, folder, learner, tasks, source, held_out, counters, progress).run()
+
+
+def _learning_agents() -> list[str]:
+    """Returns the names of the installed agents that can be trained; loads all whose dependencies are installed."""
+    found = []
+    for name in agent_names():
+        with contextlib.suppress(InputError):
+            found += [name] if issubclass(load_agent_class(name), LearningAgent) else []
+    return found
 
 
 @dataclasses.dataclass

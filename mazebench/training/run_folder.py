@@ -6,13 +6,14 @@ A checkpoint is a milestone, where the agent is evaluated, or a savepoint, from 
 from __future__ import annotations
 
 import dataclasses
+import fcntl
 import json
 import os
 import pathlib
 import re
 import shutil
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Self
 
 from mazebench.errors import InputError, RunError
 from mazebench.storage.files import make_folder, open_whole, writing_to
@@ -29,13 +30,13 @@ _CHECKPOINT_NAME = re.compile(r"[0-9]{12,}")  # agent steps; older checkpoints a
 
 
 class RunFolder:
-    """The folder of a run."""
+    """The folder of a run, in which no other training writes until it is closed; a context manager."""
 
     def __init__(self, path: pathlib.Path):
         """Makes the folder.
 
         Raises:
-          InputError: if it can't be written, or holds something else.
+          InputError: if it can't be written, holds something else, or another training writes there.
         """
         self.path = path
         self._board: Board | None = None
@@ -44,9 +45,16 @@ class RunFolder:
         if CONFIG not in found and set(found) - {f"{CONFIG}.tmp", CHECKPOINTS}:
             raise InputError(f"{self.path}: expected an empty folder or a training run's, found {found[0]!r} in it")
         make_folder(self.path / CHECKPOINTS)
+        self._lock = _lock(self.path / CHECKPOINTS)
         for half_written in (self.path / CHECKPOINTS).glob("*.tmp"):
             if _CHECKPOINT_NAME.fullmatch(half_written.stem):
                 shutil.rmtree(half_written, ignore_errors=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        os.close(self._lock)
 
     def checkpoints(self) -> list[pathlib.Path]:
         """Returns the complete checkpoints, oldest first."""
@@ -125,6 +133,19 @@ class RunFolder:
     def _cannot(self, do: str, what: pathlib.Path, error: OSError) -> RunError:
         last = next(reversed(self.checkpoints()), "none yet")
         return RunError(f"{what}: can't {do}: {error.strerror}; last checkpoint: {last}; go on with --resume")
+
+
+def _lock(folder: pathlib.Path) -> int:
+    """Returns a descriptor that keeps other trainings out of a folder until it is closed, or its process ends."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(descriptor)
+        raise InputError(f"{folder.parent}: another training writes there; end it, or name another folder") from error
+    except OSError:  # a file system without locks
+        pass
+    return descriptor
 
 
 def checkpoints(path: pathlib.Path) -> list[pathlib.Path]:
