@@ -198,6 +198,7 @@ def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
 def _running(declared: type[SingleAgent]) -> type[Agent]:
     """Returns an `Agent` that runs a `SingleAgent`."""
     # Named as the class that it wraps, for messages and provenance.
-    names = ("__module__", "__qualname__", "__doc__", "needs_truth", "needs_sensors", "needs_shown", "plays_actions")
+    declarations = ("needs_truth", "needs_sensors", "needs_shown", "plays_actions", "learns")
+    names = ("__module__", "__qualname__", "__doc__", *declarations)
     attributes = {name: getattr(declared, name) for name in names}
     return type(declared.__name__, (_SingleAgents,), attributes | {"single_class": declared})

@@ -217,12 +217,15 @@ class TestSingleAgent:
 
     def test_declarations_are_those_of_the_class(self):
         class Large(CountingAlone):
+            learns = True
+
             @classmethod
             def context_size(cls, size):
                 return 2 * size
 
         assert as_agent_class(Large).context_size(13) == 26
         assert as_agent_class(Large).default_checkpoint() is None
+        assert (as_agent_class(Large).learns, as_agent_class(CountingAlone).learns) == (True, False)
         assert as_agent_class(Counting) is Counting
 
 

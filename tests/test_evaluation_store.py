@@ -117,7 +117,13 @@ def test_of_two_processes_that_begin_a_run_the_second_is_refused(plan, episodes,
     with Store(tmp_path, plan, resume=False, record=False) as first:
         with pytest.raises(InputError, match=r"holds a run already; go on with --resume or name another folder$"):
             Store(tmp_path, plan, resume=False, record=False)
-        (tmp_path / "config.json").unlink()  # as if the first had just begun
-        with pytest.raises(InputError, match=r"journal\.jsonl: can't write there: File exists$"):
+        (tmp_path / "config.json").unlink()  # as if the first had just begun, or was killed then
+        with pytest.raises(InputError, match=r"holds a run already; go on with --resume or name another folder$"):
             Store(tmp_path, plan, resume=False, record=False)
         first.append(episodes[:1])
+
+
+def test_a_config_that_is_none_is_refused(plan, tmp_path):
+    (tmp_path / "config.json").write_text("[]")
+    with pytest.raises(InputError, match=r"config\.json: expected the identity of a run, found list$"):
+        Store(tmp_path, plan, resume=True, record=False)

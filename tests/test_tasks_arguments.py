@@ -11,6 +11,7 @@ from mazebench.envs.dm_control import Environment
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
+from mazebench.tasks.episode import Episode
 
 ID = "mazebench/Local-13-v1"
 MAKERS = {
@@ -67,6 +68,12 @@ class TestReset:
             InputError, match=r"expected seed of (at least 0|type int \| None)|expected 3 seeds, found 2"
         ):
             make(SPEC).reset(seed=seed)
+
+    def test_an_episode_that_ends_where_it_begins_is_refused(self):
+        cell = SPEC.all_mazes[0].free_cells[0]
+        episode = Episode(0, tuple(cell.tolist()), tuple(cell.tolist()), 0.0, 1)
+        with pytest.raises(InputError, match="expected a goal in another cell than the start, found both in"):
+            MazeEnv(SPEC).reset(options={"episode": episode})
 
     @pytest.mark.parametrize("options", [3, {"level": 2}, {"episode": 3}])
     def test_wrong_options_are_refused(self, options):

@@ -35,6 +35,8 @@ def is_finished(folder: pathlib.Path, record: bool = False) -> bool:
 def check_same_run(folder: pathlib.Path, identity: Mapping[str, Any]) -> None:
     """Raises `InputError` unless `folder` holds the run of an identity; the message names the first difference."""
     before = read_json(folder / CONFIG)
+    if not isinstance(before, dict):
+        raise InputError(f"{folder / CONFIG}: expected the identity of a run, found {type(before).__name__}")
     for key, value in json.loads(json.dumps(identity)).items():
         found = before.get(key)
         if found == value:
@@ -53,9 +55,9 @@ def is_begun(folder: pathlib.Path, identity: Mapping[str, Any], resume: bool) ->
     """
     make_folder(folder)
     found = {path.name for path in folder.iterdir() if path.suffix != ".tmp"}
+    if found & {CONFIG, JOURNAL} and not resume:  # a kill may have left the journal alone
+        raise InputError(f"{folder}: holds a run already; go on with --resume or name another folder")
     if CONFIG in found:
-        if not resume:
-            raise InputError(f"{folder}: holds a run already; go on with --resume or name another folder")
         check_same_run(folder, identity)
     elif found - {JOURNAL}:
         raise InputError(f"{folder}: expected an empty folder or one of a run, found {min(found)!r} in it")

@@ -111,10 +111,12 @@ def check_episode(spec: Task, episode: Episode) -> Episode:
     """Returns `episode` if it can be played in a task.
 
     Raises:
-      InputError: if there is no such maze, or start or goal is not free in it.
+      InputError: if there is no such maze, start or goal is not free in it, or they are one cell.
     """
     if not 0 <= episode.maze < len(spec.all_mazes):
         raise InputError(f"expected a maze from 0 to {len(spec.all_mazes) - 1}, found {episode.maze}")
     for cell in (episode.start, episode.goal):
         spec.all_mazes[episode.maze].require_free(cell)
+    if episode.start == episode.goal:
+        raise InputError(f"expected a goal in another cell than the start, found both in {episode.goal}")
     return episode
