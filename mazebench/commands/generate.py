@@ -41,14 +41,11 @@ def generate(
     """Make mazes: MJCF for MuJoCo, text, picture, ROS map, mesh."""
     load_mujoco(renders=False)
     from mazebench.maps.text import format_maze
-    from mazebench.storage.files import make_folder
     from mazebench.world.formats import make_mazes, parse_formats, write_maze
 
     mazes = make_mazes(size, count, seed, kind, mazes_file, ReadOptions(**values))
     chosen = parse_formats(formats)
     for index, placed in enumerate(mazes):
-        if index == 0:  # nothing is made for bad input
-            make_folder(out)
         for path in write_maze(placed, out, chosen, mazes_file):
             print(path)
         if index == 0 and 2 * placed.maze.size <= shutil.get_terminal_size().columns:  # the first is shown

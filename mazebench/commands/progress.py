@@ -18,7 +18,7 @@ _SECONDS_BETWEEN_LINES = 20  # so that there are two a minute even if steps take
 
 @dataclasses.dataclass
 class Kept:
-    """A progress bar or lines with the number of episodes on disk."""
+    """The number of episodes on disk, and of all."""
 
     ended: int = 0
     of: int | None = None  # None before the first is run

@@ -20,7 +20,7 @@ class Recorder(Protocol):
 
         Args:
           observation, info: of all environments, as `MazeVectorEnv` returns them.
-          actions: `[B]` int.
+          actions: `[B]` int, or `[B, 3]` or `[B, 2]` float for velocities.
           active: `[B]` bool, the environments that have an episode.
         """
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import Annotated, Any
 
@@ -10,6 +9,7 @@ import numpy as np
 import pydantic
 
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE
+from mazebench.storage.json_files import to_line
 from mazebench.tasks.task import Task
 
 _LARGEST = 2**53  # from here on, not every whole number is a float
@@ -55,7 +55,7 @@ class Record(_Stored):
 
     def to_line(self) -> str:
         """Returns the record as a line of `episodes.jsonl`."""
-        return json.dumps(self.model_dump(), separators=(",", ":"), allow_nan=False) + "\n"
+        return to_line(self.model_dump())
 
 
 class Figures(_Stored):

@@ -32,7 +32,7 @@ class Experience(NamedTuple):
     maze: np.ndarray  # [B] int, index among the task's mazes
     start: np.ndarray  # [B] int, the cell where the leg started
     goal: np.ndarray  # [B] int, the cell where the leg leads
-    reward: np.ndarray  # [B] float, for the step
+    reward: np.ndarray  # [B] float32, for the step
     terminated: np.ndarray  # [B] bool, whether the step reached the goal
     ended: np.ndarray  # [B] bool, whether the trajectory ends with this step
     final_state: np.ndarray  # [B, 12] float32, observed after the step where it ended; undefined elsewhere

@@ -20,6 +20,7 @@ from mazebench.maps.readers.occupancy_grid import LocatedMaze
 from mazebench.maps.readers.ros import ROS_SUFFIXES, picture_of, write_ros_map
 from mazebench.maps.text import write_text_maze
 from mazebench.options import fields_of
+from mazebench.storage.files import make_folder, writing_to
 from mazebench.world.export import MESH_FORMATS, write_mesh, write_mjcf
 
 _DEFAULT_SIZE = 13
@@ -86,13 +87,11 @@ def write_maze(
             raise InputError(
                 f"{path}: would overwrite the map that the maze is read from; give another --out or --format"
             )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
+    with writing_to(folder):
         for name in formats:
             frame = (located.origin,) if name == _ROS else ()
             _FORMATS[name].write(located.maze, paths_of[name][0], *frame)
-    except OSError as error:
-        raise InputError(f"{folder}: can't write there: {error.strerror}") from error
     return paths
 
 
