@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import pathlib
 import sys
@@ -15,11 +16,12 @@ from run_folders import FILES, IMPORTS, files_of, summary_of
 
 from mazebench import __version__, cli
 from mazebench.agent_loading import agent_names
-from mazebench.commands.option_parameters import parse_numbers
+from mazebench.commands.option_parameters import parse_numbers, takes_options
 from mazebench.errors import InputError
 from mazebench.evaluation.suites import SUITES
 from mazebench.maps.maze_files import read_maze
 from mazebench.maps.text import format_maze
+from mazebench.tasks.task import Task
 
 COMMANDS = typer.main.get_command(cli.app).commands
 FEW = ("--distances", "1,2", "--episodes-per-distance", "1")
@@ -145,6 +147,16 @@ def test_other_texts_are_no_numbers(text):
         parse_numbers("distances", text)
 
 
+def test_texts_are_split_at_commas_as_if_each_was_an_option():
+    @takes_options(Task)
+    def command(values):
+        assert values["sensors"] == ("egocentric", "lidar")
+
+    defaults = {name: parameter.default for name, parameter in inspect.signature(command).parameters.items()}
+    for sensors in (["egocentric, lidar"], ["egocentric", "lidar"]):
+        command(**{**defaults, "sensors": sensors})
+
+
 class TestHelp:
     def test_all_commands_are_listed(self, command):
         status, output, errors = command()
@@ -172,6 +184,7 @@ class TestHelp:
             "obstacles",
             "13, 15, 17, 19, 21",
             "Local-13-v1",
+            "six, four, velocity, diff",
         ):
             assert word in output
 
