@@ -122,6 +122,7 @@ class TestViewer:
             subprocess.run(["xdotool", "key", "--delay", "300", "--window", window, *"wsadqen", "Up"], env=display)
             subprocess.run(["xdotool", "key", "--window", window, "Escape"], env=display)
             assert game.communicate(timeout=SECONDS)[0] == "0 of 2 episodes ended at the goal\n"
+            assert game.returncode == 0
         finally:
             server.terminate()
             server.wait()

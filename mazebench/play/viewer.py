@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import queue
+import threading
 import types
 import warnings
 from typing import Any
@@ -24,6 +25,7 @@ _ESCAPE = 256  # GLFW's key codes; those of letters are the codes of capital let
 _ARROWS = {262: "right", 263: "left", 264: "down", 265: "up"}
 _MAP_PIXELS = 260  # side of the map in the corner of the window
 _SECONDS_A_FRAME = 0.02
+_SECONDS_TO_CLOSE = 10.0
 _RAY_COLOUR = np.array([0.16, 0.6, 0.75, 1], dtype=np.float32)
 _RAY_RADIUS = 0.008  # m
 _WITHOUT = "`mazebench render` films episodes without a window"
@@ -38,33 +40,46 @@ def play(game: Game) -> None:
     viewer_module = _import_viewer()
     model, data = game.env.simulation.model, game.env.simulation.data
     keys: queue.SimpleQueue[int] = queue.SimpleQueue()
+    others = set(threading.enumerate())
     try:
         viewer = viewer_module.launch_passive(
             model, data, key_callback=keys.put, show_left_ui=False, show_right_ui=False
         )
     except RuntimeError as error:  # macOS without mjpython
         raise InputError(f"can't open MuJoCo's viewer: {error}; {_WITHOUT}") from error
-    with viewer:
-        viewer.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
-        viewer.cam.fixedcamid = model.camera("chase").id
-        # Some of these letters toggle flags of the viewer too: the flags are reset all the time.
-        flags = viewer.opt.flags.copy(), viewer.user_scn.flags.copy()
-        walls = Walls(model.material("wall").rgba)
-        while viewer.is_running():
-            with viewer.lock():
-                viewer.opt.flags[:], viewer.user_scn.flags[:] = flags
-                walls.draw(viewer.user_scn, game.maze)
-                _draw_rays(viewer.user_scn, game)
-            _overlay(viewer, game)
-            viewer.sync()
-            try:
-                code = keys.get(timeout=_SECONDS_A_FRAME)
-            except queue.Empty:
-                continue
-            if code == _ESCAPE:
-                return
-            with viewer.lock():
-                game.press(_ARROWS.get(code) or (chr(code).lower() if code < 128 else ""))
+    threads = set(threading.enumerate()) - others
+    try:
+        with viewer:
+            _play(viewer, game, keys)
+    finally:
+        # A window that is still closing when Python exits would crash it.
+        for thread in threads:
+            thread.join(_SECONDS_TO_CLOSE)
+
+
+def _play(viewer: Any, game: Game, keys: queue.SimpleQueue[int]) -> None:
+    """Plays in an open window until Escape, or until it is closed."""
+    model = game.env.simulation.model
+    viewer.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
+    viewer.cam.fixedcamid = model.camera("chase").id
+    # Some of these letters toggle flags of the viewer too: the flags are reset all the time.
+    flags = viewer.opt.flags.copy(), viewer.user_scn.flags.copy()
+    walls = Walls(model.material("wall").rgba)
+    while viewer.is_running():
+        with viewer.lock():
+            viewer.opt.flags[:], viewer.user_scn.flags[:] = flags
+            walls.draw(viewer.user_scn, game.maze)
+            _draw_rays(viewer.user_scn, game)
+        _overlay(viewer, game)
+        viewer.sync()
+        try:
+            code = keys.get(timeout=_SECONDS_A_FRAME)
+        except queue.Empty:
+            continue
+        if code == _ESCAPE:
+            return
+        with viewer.lock():
+            game.press(_ARROWS.get(code) or (chr(code).lower() if code < 128 else ""))
 
 
 def _import_viewer() -> types.ModuleType:
