@@ -88,7 +88,7 @@ def options(cls: type[Options]) -> type[Options]:
     def __init__(self: Any, *args: Any, **values: Any) -> None:
         for name in values:
             is_tuple = name in fields and isinstance(fields[name].default, tuple)
-            values[name] = _plain_tuple(values[name]) if is_tuple else _plain(values[name])
+            values[name] = plain_tuple(values[name]) if is_tuple else _plain(values[name])
         try:
             check(self, *args, **values)
         except pydantic.ValidationError as error:
@@ -134,7 +134,7 @@ def _plain(value: Any) -> Any:
     return os.fspath(value) if isinstance(value, os.PathLike) else value
 
 
-def _plain_tuple(value: Any) -> tuple[Any, ...]:
+def plain_tuple(value: Any) -> tuple[Any, ...]:
     """Returns any iterable as a tuple, and a single value as a tuple of one; texts are split at their commas."""
     is_single = isinstance(value, str) or not isinstance(value, Iterable)
     parts: list[Any] = []

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.errors import InputError, held_remarks
-from mazebench.options import Option, fields_of
+from mazebench.options import Option, fields_of, plain_tuple
 from mazebench.tasks.task import Task, evaluation_task
 
 _WORTH_WATCHING = 10  # cells from start to goal
@@ -113,6 +113,4 @@ def _to_value(name: str, option: Option, given: Any) -> Any:
         return given.value
     if option.kind == tuple[int, ...]:
         return () if given is None else parse_numbers(name, given)
-    if option.kind == tuple[str, ...]:
-        return tuple(part.strip() for text in given for part in text.split(","))
-    return given
+    return plain_tuple(given) if option.kind == tuple[str, ...] else given

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
-from typing import Annotated
+from typing import Annotated, Any
 
 from annotated_types import Interval
 from pydantic import BeforeValidator
 
 from mazebench.maps.places import place_text
-from mazebench.options import Doc, OneOf, options
+from mazebench.options import Doc, OneOf, fields_of, options
 
 
 @options
@@ -61,6 +61,12 @@ class ReadOptions:
             "the maze that lies in it. If not given, the largest area, or an enclosed one if that is the ground around."
         ),
     ] = None
+
+
+def changed_reading(values: object) -> dict[str, Any]:
+    """Returns the options of reading among the fields of an object that differ from their defaults, by name."""
+    found = {name: (getattr(values, name), field.default) for name, field in fields_of(ReadOptions).items()}
+    return {name: value for name, (value, default) in found.items() if value != default}
 
 
 THIN_WALLS = "a floor plan with thin walls needs --pixel-size, its metres a pixel"  # of plans that can't be read

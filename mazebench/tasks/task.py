@@ -23,7 +23,7 @@ from mazebench.maps.benchmark import (
 from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
 from mazebench.maps.maze import MIN_CELL_SIZE, Cell, Maze, corner_cells, require_one_size
 from mazebench.maps.maze_files import read_all
-from mazebench.maps.maze_options import THIN_WALLS, ReadOptions
+from mazebench.maps.maze_options import THIN_WALLS, ReadOptions, changed_reading
 from mazebench.maps.places import free_cell_of_place
 from mazebench.maps.scenarios import Scenarios, are_scenarios, read_scenarios
 from mazebench.maps.selection import described_maze, own_mazes
@@ -533,9 +533,8 @@ def _check_options(task: Task) -> None:
         raise InputError("expected mazes of your own or mazes that are drawn, found both")
     if task.is_drawn and task.split == "eval":
         raise InputError("mazes that are drawn: expected split 'train' or 'dev', found 'eval'")
-    for name, field in fields_of(ReadOptions).items():
-        found = getattr(task, name)
-        if task.mazes is None and found != field.default and (name, found) != ("cell_size", 1):
+    for name, found in changed_reading(task).items():
+        if task.mazes is None and (name, found) != ("cell_size", 1):
             raise InputError(f"expected mazes of your own with {name}, found none")
 
     # Episodes.
