@@ -1,7 +1,7 @@
-"""Checked options: frozen dataclasses whose fields say in one place what they mean and which values they allow.
+"""Options: frozen dataclasses whose fields say in one place what they mean and which values they allow.
 
-    @options
-    class ReadOptions:
+    @dataclasses.dataclass(frozen=True, kw_only=True)
+    class ReadOptions(Options):
         inflate: Annotated[float, Interval(ge=0, le=10), Doc("Metres by which walls are thickened.")] = 0.0
         unknown: Annotated[str, OneOf("wall", "free"), Doc("What unknown cells become.")] = "wall"
 
@@ -12,23 +12,20 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 import os
 import types
 import typing
-from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple, Self
 
 import numpy as np
-import pydantic
 from annotated_types import Ge, GroupedMetadata, Le
-from pydantic_core import PydanticCustomError, core_schema
 from typing_extensions import Doc as Doc
 
-from mazebench.errors import InputError, unknown
+from mazebench.errors import InputError, UnknownOptionError, unknown
 
-Options = TypeVar("Options")
-
-_CONFIG = pydantic.ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, arbitrary_types_allowed=True)
+_LONGEST = 200  # characters of a message about a value
 
 
 class OneOf:
@@ -37,13 +34,12 @@ class OneOf:
     def __init__(self, *choices: str):
         self.choices = choices
 
-    def __get_pydantic_core_schema__(self, kind: Any, handler: Any) -> core_schema.CoreSchema:
-        return core_schema.no_info_after_validator_function(self._check, handler(kind))
 
-    def _check(self, value: str | None) -> str | None:
-        if value is not None and value not in self.choices:
-            raise PydanticCustomError("one_of", "Input should be one of {of}", {"of": ", ".join(self.choices)})
-        return value
+class ReadBy:
+    """Metadata of a field whose values a function reads: it returns the field's value or raises `InputError`."""
+
+    def __init__(self, read: Callable[[Any], Any]):
+        self.read = read
 
 
 class Option(NamedTuple):
@@ -52,9 +48,10 @@ class Option(NamedTuple):
     help: str
     default: Any
     kind: Any  # the declared type
-    lowest: float | None
-    highest: float | None
+    lowest: Any
+    highest: Any
     choices: tuple[str, ...] | None
+    read: Callable[[Any], Any] | None
 
     @property
     def range_text(self) -> str:
@@ -66,75 +63,123 @@ class Option(NamedTuple):
     @property
     def kind_text(self) -> str:
         """The type in words."""
-        is_plain = isinstance(self.kind, type) and not typing.get_args(self.kind)
-        return self.kind.__name__ if is_plain else str(self.kind)
+        return self.kind.__name__ if type(self.kind) is type else str(self.kind)
+
+    @property
+    def plain_kind(self) -> Any:
+        """The type without None; of a tuple, that of its elements."""
+        plain = next(member for member in _members(self.kind) if member is not types.NoneType)
+        plain = typing.get_args(plain)[0] if typing.get_origin(plain) is tuple else plain
+        return str if typing.get_origin(plain) is typing.Literal else plain
+
+    @property
+    def is_tuple(self) -> bool:
+        """True if the value is a tuple."""
+        return any(typing.get_origin(member) is tuple for member in _members(self.kind))
+
+    def checked(self, name: str, value: Any) -> Any:
+        """Returns a value of the option called `name` in its own type.
+
+        Raises:
+          InputError: if it is not allowed.
+        """
+        if self.read is not None:
+            return self.read(value)
+        if value is None and types.NoneType in _members(self.kind):
+            return None
+        if not self.is_tuple:
+            return self._checked_item(name, _plain(value), value)
+        values = as_tuple(value)
+        return tuple(self._checked_item(name, item, values) for item in values)
+
+    def _checked_item(self, name: str, value: Any, whole: Any) -> Any:
+        """Returns a value, or an element of the tuple `whole`, in its own type."""
+        kind = self.plain_kind
+        accepted = (int, float) if kind is float else kind
+        if not isinstance(value, accepted) or (isinstance(value, bool) and kind is not bool):
+            raise InputError(f"expected {name} of type {self.kind_text}, found {whole!r}"[:_LONGEST])
+        if self.choices is not None and value not in self.choices:
+            raise unknown(name, value, self.choices)
+        if kind is float and None in (self.lowest, self.highest) and not math.isfinite(value):
+            raise InputError(f"expected {name} as a finite number, found {value!r}")
+        is_low = self.lowest is not None and not value >= self.lowest  # not a number is no number of a range
+        if is_low or (self.highest is not None and not value <= self.highest):
+            raise InputError(f"expected {name} {self.range_text}, found {value!r}"[:_LONGEST])
+        return float(value) if kind is float else value
 
 
-@typing.dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(dataclasses.field,))
-def options(cls: type[Options]) -> type[Options]:
-    """Makes a class a frozen dataclass that checks its fields: a decorator.
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Options:
+    """Base of options. Making them checks each field, and converts its value to the declared type.
 
-    NumPy's numbers become Python's, and paths text. A field whose default is a tuple accepts any iterable, and a single
-    value for a tuple of one. None is allowed where the type allows it. `__post_init__` may check how fields go
-    together.
-
-    Raises:
-      InputError: when an object is made with a value that is not allowed.
+    NumPy's numbers become Python's, and paths text. A tuple is made of any iterable, of a single value, or of a text,
+    which is split at its commas. None is allowed where the type allows it; there it says that the option is open.
     """
-    checked: Any = pydantic.dataclasses.dataclass(frozen=True, kw_only=True, config=_CONFIG)(cls)
-    check, fields = checked.__init__, checked.__dataclass_fields__
 
-    @functools.wraps(check)
-    def __init__(self: Any, *args: Any, **values: Any) -> None:
-        for name in values:
-            is_tuple = name in fields and isinstance(fields[name].default, tuple)
-            values[name] = plain_tuple(values[name]) if is_tuple else _plain(values[name])
-        try:
-            check(self, *args, **values)
-        except pydantic.ValidationError as error:
-            raise _in_words(checked, error, values) from error
+    def __post_init__(self) -> None:
+        for name, option in fields_of(type(self)).items():
+            object.__setattr__(self, name, option.checked(name, getattr(self, name)))
 
-    checked.__init__ = __init__
-    return checked
+    @classmethod
+    def of(cls, values: Mapping[str, Any], **others: Any) -> Self:
+        """Returns the options of which `values` has the fields; None stands for the default.
+
+        Raises:
+          InputError: if there is no such option, or a value is not allowed.
+        """
+        check_names(values, cls)
+        return cls(**{name: value for name, value in values.items() if value is not None}, **others)
+
+    def replace(self, **changes: Any) -> Self:
+        """Returns the options with other values of some fields."""
+        return dataclasses.replace(self, **changes)
+
+    def changed(self) -> dict[str, Any]:
+        """Returns the fields that differ from their defaults, by name."""
+        values = {name: (getattr(self, name), option.default) for name, option in fields_of(type(self)).items()}
+        return {name: value for name, (value, default) in values.items() if value is not default and value != default}
 
 
 @functools.cache
 def fields_of(options_class: Any) -> Mapping[str, Option]:
-    """Returns the description of each field of a class that `options` made; a field that is no option has no help."""
-    kinds, extras = typing.get_type_hints(options_class), typing.get_type_hints(options_class, include_extras=True)
+    """Returns the description of each field of a class; one that no user chooses has no help."""
     described = {}
+    hints = typing.get_type_hints(options_class, include_extras=True)
+    kinds = typing.get_type_hints(options_class)
     for field in dataclasses.fields(options_class):
-        metadata = list(_metadata(extras[field.name]))
+        metadata = list(_metadata(hints[field.name]))
         described[field.name] = Option(
             help=next((item.documentation for item in metadata if isinstance(item, Doc)), ""),
             default=field.default,
             kind=kinds[field.name],
-            lowest=next((item.ge for item in metadata if isinstance(item, Ge)), None),  # type: ignore[arg-type]
-            highest=next((item.le for item in metadata if isinstance(item, Le)), None),  # type: ignore[arg-type]
-            choices=next((item.choices for item in metadata if isinstance(item, OneOf)), None),
+            lowest=next((item.ge for item in metadata if isinstance(item, Ge)), None),
+            highest=next((item.le for item in metadata if isinstance(item, Le)), None),
+            choices=next((item.choices for item in metadata if isinstance(item, OneOf)), _literals(kinds[field.name])),
+            read=next((item.read for item in metadata if isinstance(item, ReadBy)), None),
         )
     return types.MappingProxyType(described)
 
 
-def _metadata(kind: Any) -> Iterable[Any]:
-    """Yields the metadata of a declared type, and of a tuple's elements."""
-    if typing.get_origin(kind) is typing.Annotated:
-        inner, *items = typing.get_args(kind)
-        yield from _metadata(inner)
-        for item in items:
-            yield from item if isinstance(item, GroupedMetadata) else (item,)
-    elif typing.get_origin(kind) is tuple:
-        yield from _metadata(typing.get_args(kind)[0])
+def options_in(values: Mapping[str, Any], options_class: type) -> dict[str, Any]:
+    """Returns those of some values that are options of a class, by name."""
+    names = {name for name, option in fields_of(options_class).items() if option.help}
+    return {name: value for name, value in values.items() if name in names}
 
 
-def _plain(value: Any) -> Any:
-    """Returns NumPy's numbers as Python's, and a path as text."""
-    if isinstance(value, np.generic):
-        return value.item()
-    return os.fspath(value) if isinstance(value, os.PathLike) else value
+def check_names(values: Iterable[str], *options_classes: type, arguments: Iterable[str] = ()) -> None:
+    """Checks that each name is an option of one of the classes, or one of the arguments of the call.
+
+    Raises:
+      UnknownOptionError: if one is not; it lists all that the call takes.
+    """
+    known = {*arguments, *(name for each in options_classes for name, option in fields_of(each).items() if option.help)}
+    for name in values:
+        if name not in known:
+            available = ", ".join(sorted(known))
+            raise UnknownOptionError(f"got an unexpected keyword argument {name!r}; available: {available}")
 
 
-def plain_tuple(value: Any) -> tuple[Any, ...]:
+def as_tuple(value: Any) -> tuple[Any, ...]:
     """Returns any iterable as a tuple, and a single value as a tuple of one; texts are split at their commas."""
     is_single = isinstance(value, str) or not isinstance(value, Iterable)
     parts: list[Any] = []
@@ -143,24 +188,32 @@ def plain_tuple(value: Any) -> tuple[Any, ...]:
     return tuple(parts)
 
 
-def _in_words(options_class: type, error: pydantic.ValidationError, values: Mapping[str, Any]) -> InputError:
-    """Returns the first fault that pydantic found as an error in one line."""
-    fault = error.errors(include_url=False)[0]
-    if "error" in fault.get("ctx", {}):  # which `__post_init__` or a validator raised
-        raised = fault["ctx"]["error"]
-        return raised if isinstance(raised, InputError) else InputError(str(raised))
-    name, found = str(fault["loc"][0]), fault["input"]
-    if fault["type"] == "unexpected_keyword_argument":
-        return unknown("option", name, fields_of(options_class))
-    if fault["type"] == "missing":
-        return InputError(f"expected {name}, found none")
-    option = fields_of(options_class).get(name)
-    if option is None:
-        return InputError(f"expected {name} as options, found {found!r}"[:200])
-    if fault["type"] == "one_of":
-        return unknown(name, found, option.choices or ())
-    if fault["type"] == "finite_number" and not (option.lowest is not None and option.highest is not None):
-        return InputError(f"expected {name} as a finite number, found {found!r}")
-    if fault["type"] in ("greater_than_equal", "less_than_equal", "finite_number"):
-        return InputError(f"expected {name} {option.range_text}, found {found!r}")
-    return InputError(f"expected {name} of type {option.kind_text}, found {values.get(name, found)!r}"[:200])
+def _members(kind: Any) -> tuple[Any, ...]:
+    """Returns the members of a union, or the type itself."""
+    return typing.get_args(kind) if typing.get_origin(kind) in (typing.Union, types.UnionType) else (kind,)
+
+
+def _literals(kind: Any) -> tuple[str, ...] | None:
+    """Returns the values of a `Literal`; None for another type."""
+    return typing.get_args(kind) if typing.get_origin(kind) is typing.Literal else None
+
+
+def _metadata(kind: Any) -> Iterable[Any]:
+    """Yields the metadata of a declared type, of a union's members, and of a tuple's elements."""
+    if typing.get_origin(kind) is typing.Annotated:
+        inner, *items = typing.get_args(kind)
+        yield from _metadata(inner)
+        for item in items:
+            yield from item if isinstance(item, GroupedMetadata) else (item,)
+    elif typing.get_origin(kind) is tuple:
+        yield from _metadata(typing.get_args(kind)[0])
+    elif len(members := _members(kind)) > 1:
+        for member in members:
+            yield from _metadata(member)
+
+
+def _plain(value: Any) -> Any:
+    """Returns NumPy's numbers as Python's, and a path as text."""
+    if isinstance(value, np.generic):
+        return value.item()
+    return os.fspath(value) if isinstance(value, os.PathLike) else value

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Annotated
 
 from annotated_types import Interval
 
-from mazebench.options import options
+from mazebench.options import Options
 
 from ..common.config_values import Ahead, Count, Exponent, Factor, Length, Rows, Share, Size, Steps, check_rows
 
 
-@options
-class DQNConfig:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class DQNConfig(Options):
     """Ape-X DQN (Horgan et al. 2018) with hindsight (Andrychowicz et al. 2017), sized for two CPU cores."""
 
     reading: bool = True  # MAH reads the map where it is; False, the paper's: one code of the whole context
@@ -43,4 +44,5 @@ class DQNConfig:
     epsilon_alpha: Annotated[float, Interval(ge=0.0, le=1000.0)] = 7.0  # Ape-X's
 
     def __post_init__(self):
+        super().__post_init__()
         check_rows(self)

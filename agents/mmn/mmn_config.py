@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Annotated, Literal
 
 from annotated_types import Interval
 
 from mazebench.errors import InputError
-from mazebench.options import options
+from mazebench.options import Options
 
 from ..common.config_values import Ahead, Count, Factor, Length, Rows, Share, Size, Steps, Updates, check_rows
 
 
-@options
-class MMNConfig:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class MMNConfig(Options):
     """The paper's choices where it states them, unless docs/agents/mmn.md says otherwise; sized for two CPU cores."""
 
     # Networks
@@ -76,6 +77,7 @@ class MMNConfig:
     model_weight: Factor = 1.0  # of the paper's auxiliary loss; 1 in the paper
 
     def __post_init__(self):
+        super().__post_init__()
         if not self.model and not self.reading:
             raise InputError("expected reading where there is no model, for the heads see the map by it; found neither")
         if self.sequence_steps < self.unroll:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Annotated, Literal
 
 from annotated_types import Interval
 
-from mazebench.options import options
+from mazebench.options import Options
 
 from ..common.config_values import Ahead, Count, Factor, Length, Rows, Share, Size
 
 Temperature = Annotated[float, Interval(ge=0.0, le=10.0)]
 
 
-@options
-class NeuralPlannerConfig:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class NeuralPlannerConfig(Options):
     """Sized for one core: a million steps in less than an hour."""
 
     # Who teaches: "reward", by PPO (Schulman et al. 2017), or "oracle", by imitation of the oracle's look-ahead in the
@@ -46,4 +47,4 @@ class NeuralPlannerConfig:
     value_weight: Factor = 0.5  # of the loss of values
     entropy_weight: Factor = 0.01
     # m; an action that leaves so much more way is e times less wanted.
-    label_temperature: Annotated[float, Interval(gt=0.0, le=10.0)] = 0.08
+    label_temperature: Annotated[float, Interval(ge=0.001, le=10.0)] = 0.08

@@ -10,10 +10,11 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import has_camera, load_mujoco
-from mazebench.commands.option_parameters import given, takes_options
+from mazebench.commands.option_parameters import takes_options
 from mazebench.evaluation.collect_options import CollectOptions
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions
-from mazebench.tasks.task import Task
+from mazebench.options import options_in
+from mazebench.tasks.task_options import TaskOptions
 
 _WITHOUT = (
     *("record", "workers", "ray", "ray_address"),  # one process collects
@@ -21,7 +22,7 @@ _WITHOUT = (
 )
 
 
-@takes_options(CollectOptions, RunOptions, Task, EvalOptions, without=_WITHOUT)
+@takes_options(CollectOptions, RunOptions, TaskOptions, EvalOptions, without=_WITHOUT)
 def collect(
     agent: Annotated[str, typer.Option(help="An installed agent (see `mazebench list`), or module:Class.")],
     out: Annotated[pathlib.Path, typer.Option(help="Folder for the episodes, a new or an empty one.")],
@@ -31,9 +32,9 @@ def collect(
     load_mujoco(renders=has_camera(values.get("sensors", ())))
     from mazebench.evaluation.collect import collect_demonstrations, num_kept
 
-    task = Task.of(**given(values, Task))
-    options = EvalOptions(agent, task, **given(values, EvalOptions))
-    wanted, run = CollectOptions(**given(values, CollectOptions)), RunOptions(**given(values, RunOptions))
+    task = TaskOptions(**options_in(values, TaskOptions))
+    options = EvalOptions(agent=agent, task=task, **options_in(values, EvalOptions))
+    wanted, run = CollectOptions(**options_in(values, CollectOptions)), RunOptions(**options_in(values, RunOptions))
 
     def how_to_go_on() -> tuple[str, ...]:
         return (

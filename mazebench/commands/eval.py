@@ -13,14 +13,15 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import has_camera, load_mujoco
-from mazebench.commands.option_parameters import given, takes_options
+from mazebench.commands.option_parameters import takes_options
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions
-from mazebench.options import fields_of
-from mazebench.tasks.task import NOT_IN_EVALUATIONS, Task
+from mazebench.options import fields_of, options_in
+from mazebench.tasks.task import NOT_IN_EVALUATIONS
+from mazebench.tasks.task_options import TaskOptions
 
 
-@takes_options(RunOptions, Task, EvalOptions, without=NOT_IN_EVALUATIONS, split="eval")
+@takes_options(RunOptions, TaskOptions, EvalOptions, without=NOT_IN_EVALUATIONS)
 def evaluate(
     agents: Annotated[
         list[str],
@@ -50,10 +51,10 @@ def evaluate(
     if suite is None and len(agents) > 1:
         raise InputError(f"expected one --agent without --suite, found {len(agents)}")
     if suite is not None:
-        own = (*fields_of(Task), "episodes_per_distance")
+        own = (*fields_of(TaskOptions), "episodes_per_distance")
         if named := [name for name in values if name in own]:
             raise InputError(f"the suite {suite!r} has evaluations of its own; found --{named[0].replace('_', '-')}")
-    run = RunOptions(**given(values, RunOptions))
+    run = RunOptions(**options_in(values, RunOptions))
     if run.resume and out is None:
         raise InputError("--resume needs --out, the folder of the run to go on with")
     load_mujoco(renders=has_camera(values.get("sensors", ())))
@@ -62,10 +63,10 @@ def evaluate(
     from mazebench.evaluation.evaluate import run_evaluation
     from mazebench.evaluation.suites import run_suite
 
-    options = EvalOptions.of(agents[0], **given(values, Task), **given(values, EvalOptions))
-    what = options.task.track or options.task.task
-    title = f"{agents[0]}, {what}" if suite is None else f"{suite}, {', '.join(agents)}"
-    name = suite or f"{agents[0].replace(':', '-')}-{what}"
+    task = TaskOptions(**options_in(values, TaskOptions))
+    options = EvalOptions(agent=agents[0], task=task, **options_in(values, EvalOptions))
+    title = f"{agents[0]}, {task.task}" if suite is None else f"{suite}, {', '.join(agents)}"
+    name = suite or f"{agents[0].replace(':', '-')}-{task.task}"
     # The process tells runs apart that start at the same time.
     new_folder = pathlib.Path("results") / f"{name}-{datetime.datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}"
     folder = out or new_folder

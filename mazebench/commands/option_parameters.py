@@ -10,26 +10,26 @@ from typing import Annotated, Any
 
 import typer
 
-from mazebench.errors import InputError, held_remarks
-from mazebench.options import Option, fields_of, plain_tuple
-from mazebench.tasks.task import Task, evaluation_task
+from mazebench.errors import InputError
+from mazebench.options import Option, as_tuple, fields_of, options_in
+from mazebench.tasks.task import Task, resolve_for_evaluation
+from mazebench.tasks.task_options import TaskOptions
 
 _WORTH_WATCHING = 10  # cells from start to goal
 
 
 def takes_options(
-    *options_classes: type, without: Iterable[str] = (), **defaults: Any
+    *options_classes: type, without: Iterable[str] = ()
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Gives a command an option for each field of some classes that has a help, but for `without`.
 
     Of two fields of one name, that of the first class counts. The command has a parameter `values`, which receives the
-    values by name of those that are not left at the default. `given` picks those of one class. `defaults` stand in the
-    place of those that the classes declare.
+    values by name of those that are not left at the default. `options_in` picks those of one class.
     """
     options: dict[str, Option] = {}
     for name, option in (item for each in options_classes for item in fields_of(each).items()):
         if option.help and name not in without:
-            options.setdefault(name, option._replace(default=defaults.get(name, option.default)))
+            options.setdefault(name, option)
     added = [_parameter(name, option) for name, option in options.items()]
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
@@ -39,7 +39,7 @@ def takes_options(
         @functools.wraps(command)
         def run(**chosen: Any) -> None:
             values = {name: _to_value(name, option, chosen.pop(name)) for name, option in options.items()}
-            changed = {name: value for name, value in values.items() if value != options[name].default}
+            changed = {name: value for name, value in values.items() if value not in (None, options[name].default)}
             command(**chosen, values=changed)
 
         parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in [*kept, *added]]
@@ -50,25 +50,17 @@ def takes_options(
     return decorate
 
 
-def given(values: Mapping[str, Any], options_class: type) -> dict[str, Any]:
-    """Returns those of the `values` of a command that are options of a class."""
-    options = {name for name, option in fields_of(options_class).items() if option.help}
-    return {name: value for name, value in values.items() if name in options}
-
-
 def watched_task(values: Mapping[str, Any]) -> Task:
     """Returns the task of an episode that is to be looked at, of 10 cells or near to that if no distance is chosen.
 
     Raises:
       InputError: if the values name no task.
     """
-    options = given(values, Task)
-    task = evaluation_task(**options)
-    if "distances" in options or task.num_ends == 2 or task.track is not None or task.task == "hierarchical":
+    asked = TaskOptions.of(options_in(values, TaskOptions))
+    task = resolve_for_evaluation(asked)
+    if asked.distances or asked.num_ends == 2 or asked.track is not None or asked.is_hierarchical:
         return task
-    nearest = min(task.distances, key=lambda distance: abs(distance - _WORTH_WATCHING))
-    with held_remarks():  # on files that are read again
-        return evaluation_task(**options | {"distances": (nearest,)})
+    return task.replace(distances=(min(task.distances, key=lambda distance: abs(distance - _WORTH_WATCHING)),))
 
 
 def parse_numbers(name: str, text: str) -> tuple[int, ...]:
@@ -94,9 +86,9 @@ def _parameter(name: str, option: Option) -> inspect.Parameter:
     """Returns the parameter from which typer makes the option."""
     kind: Any = option.kind
     default, metavar = option.default, None
-    if kind == tuple[int, ...]:
-        kind, default = str | None, ",".join(map(str, default)) or None
-    elif kind == tuple[str, ...]:
+    if option.is_tuple and option.plain_kind is int:
+        kind = str | None
+    elif option.is_tuple:
         kind, default = list[str], list(default)
         metavar = f"<{'|'.join(option.choices)}>, repeatable" if option.choices else None
     elif option.choices:
@@ -104,13 +96,14 @@ def _parameter(name: str, option: Option) -> inspect.Parameter:
         kind, default = (choice | None, None) if default is None else (choice, choice(default))
     elif name == "mazes":  # in Python also values, on the command line a path
         kind = str | None
-    annotation = Annotated[kind, typer.Option(help=option.help, metavar=metavar)]
+    flags = ("--task", "--track") if name == "task" else ()
+    annotation = Annotated[kind, typer.Option(*flags, help=option.help, metavar=metavar)]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
 def _to_value(name: str, option: Option, given: Any) -> Any:
     if isinstance(given, enum.Enum):
         return given.value
-    if option.kind == tuple[int, ...]:
-        return () if given is None else parse_numbers(name, given)
-    return plain_tuple(given) if option.kind == tuple[str, ...] else given
+    if not option.is_tuple or given is None:
+        return given
+    return parse_numbers(name, given) if option.plain_kind is int else as_tuple(given)

@@ -9,11 +9,12 @@ import typer
 from mazebench.commands.display import load_mujoco
 from mazebench.commands.option_parameters import takes_options, watched_task
 from mazebench.errors import InputError
-from mazebench.tasks.task import NOT_IN_EVALUATIONS, Task
+from mazebench.tasks.task import NOT_IN_EVALUATIONS
+from mazebench.tasks.task_options import TaskOptions
 from mazebench.world.backend import has_display
 
 
-@takes_options(Task, without=[*NOT_IN_EVALUATIONS, "actions", "camera_size", "textures"], split="eval")
+@takes_options(TaskOptions, without=[*NOT_IN_EVALUATIONS, "actions", "camera_size", "textures"])
 def play(
     values: dict[str, Any],
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode and those after it.")] = 0,

@@ -8,14 +8,16 @@ from typing import Annotated, Any
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.option_parameters import given, takes_options, watched_task
+from mazebench.commands.option_parameters import takes_options, watched_task
 from mazebench.evaluation.eval_options import EvalOptions
-from mazebench.tasks.task import NOT_IN_EVALUATIONS, Task
+from mazebench.options import options_in
+from mazebench.tasks.task import NOT_IN_EVALUATIONS
+from mazebench.tasks.task_options import TaskOptions
 
 _DRAWN = ("map", "lidar")  # views that need no rendering
 
 
-@takes_options(Task, EvalOptions, without=[*NOT_IN_EVALUATIONS, "episodes_per_distance"], split="eval")
+@takes_options(TaskOptions, EvalOptions, without=[*NOT_IN_EVALUATIONS, "episodes_per_distance"])
 def render(
     out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
     values: dict[str, Any],
@@ -30,7 +32,7 @@ def render(
     pixels: Annotated[int, typer.Option(min=64, max=1280, help="Side of a view.")] = 360,
 ) -> None:
     """Film an episode, or picture it: from above, through the agent's eyes, on its map."""
-    options = EvalOptions(agent, watched_task(values), **given(values, EvalOptions))
+    options = EvalOptions(agent=agent, task=watched_task(values).options, **options_in(values, EvalOptions))
     load_mujoco(renders=view not in _DRAWN)
     from mazebench.play import film
 

@@ -10,14 +10,15 @@ import typer
 from mazebench import stopping
 from mazebench.commands import progress
 from mazebench.commands.display import has_camera, load_mujoco
-from mazebench.commands.option_parameters import given, takes_options
+from mazebench.commands.option_parameters import takes_options
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import SIZES
-from mazebench.tasks.task import Task
+from mazebench.options import options_in
+from mazebench.tasks.task_options import LOCAL, TaskOptions
 from mazebench.training.train_options import FIXED, TrainOptions
 
 
-@takes_options(TrainOptions, Task, without=("task", *FIXED))
+@takes_options(TrainOptions, TaskOptions, without=FIXED)
 def train(
     agent: Annotated[
         str,
@@ -38,8 +39,8 @@ def train(
     load_mujoco(renders=has_camera(values.get("sensors", ())))
     from mazebench.training import loop, run_folder
 
-    parsed = tuple(map(_parse_override, overrides or []))
-    options = TrainOptions(agent, overrides=parsed, **given(values, TrainOptions))
+    parsed = dict(map(_parse_override, overrides or []))
+    options = TrainOptions(agent=agent, **options_in(values, TrainOptions))
     folder = out or pathlib.Path("runs") / _folder_name(options, values)
 
     def how_to_go_on() -> tuple[str, ...]:
@@ -50,8 +51,8 @@ def train(
         return (f"the checkpoint at {int(last.name):,} steps is kept in {folder}; go on{again}", "--resume")
 
     with stopping.stoppable(how_to_go_on, waits=True), progress.training() as show:
-        task_options = {name: value for name, value in given(values, Task).items() if name != "track"}
-        loop.run_training(options, task_options, folder, resume, show)
+        task_options = {name: value for name, value in options_in(values, TaskOptions).items() if name != "task"}
+        loop.run_training(options, TaskOptions(**task_options), folder, resume, show, parsed)
     print(f"run in {folder}; evaluate it by: mazebench eval --agent {agent} --checkpoint {folder}")
 
 
@@ -60,7 +61,7 @@ def _folder_name(options: TrainOptions, values: dict[str, Any]) -> str:
     if "mazes" in values:
         parts.append(pathlib.Path(values["mazes"]).stem)
     levels = map(str, values.get("level", (1,)))
-    parts += [*options.track, *levels] if options.track else [str(values.get("size", SIZES[0]))]
+    parts += [str(values.get("size", SIZES[0]))] if options.task == (LOCAL,) else [*options.task, *levels]
     return "-".join([*parts, str(options.seed)])
 
 

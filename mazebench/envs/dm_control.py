@@ -12,12 +12,12 @@ import numpy as np
 from dm_env import specs
 
 from mazebench.constants import STEPS_PER_ACTION
-from mazebench.envs.single import EnvironmentState, SingleTask
+from mazebench.envs.single import EnvironmentState, TaskRunner
 from mazebench.tasks.actions import action_spec
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.observation import observation_specs
 from mazebench.tasks.task import Task as MazeTask
-from mazebench.tasks.task_fields import PROGRESS
+from mazebench.tasks.task_options import PROGRESS
 from mazebench.world.models import MazeModels, models_of
 from mazebench.world.simulation import FULL_STATE, Simulation
 
@@ -89,12 +89,12 @@ class Physics(Simulation, engine.Physics):
         mujoco.mj_step1(self.model.ptr, self.data.ptr)
 
 
-class Task(SingleTask, control.Task):
+class Task(TaskRunner, control.Task):
     """The task as dm_control asks for it; `mazebench.tasks.rules.Rules` describes it."""
 
     def get_observation(self, simulation: Simulation) -> dict[str, np.ndarray]:
         observation = super().get_observation(simulation)
-        if self.spec.has_legs:
+        if self.maze_task.has_legs:
             observation["is_first"] = np.array(self.rules.is_first.item())
         return observation
 
@@ -110,12 +110,12 @@ class Task(SingleTask, control.Task):
 
     def action_spec(self, simulation: Simulation) -> specs.DiscreteArray | specs.BoundedArray:
         """Returns which actions there are."""
-        return action_spec(self.spec.actions)
+        return action_spec(self.maze_task.actions)
 
     def observation_spec(self, simulation: Simulation) -> dict[str, specs.Array]:
         """Returns shape, type and range of each observation by name."""
-        result = observation_specs(self.spec)
-        if self.spec.has_legs:
+        result = observation_specs(self.maze_task)
+        if self.maze_task.has_legs:
             result["is_first"] = specs.Array((), bool, name="is_first")
         return result
 
@@ -125,16 +125,17 @@ class Environment(control.Environment):
 
     physics: Physics
     task: Task
+    maze_task: MazeTask  # what is played
 
-    def __init__(self, spec: MazeTask, seed: int | None = None):
+    def __init__(self, task: MazeTask, seed: int | None = None):
         """Opens the environment; `seed` is that of the first reset.
 
         Raises:
-          InputError: if `seed` is not a natural number, or `spec` not a `Task`.
+          InputError: if `seed` is not a natural number, or `task` not a `Task`.
         """
-        task = Task(spec, seed)
+        self.maze_task = task
         # The task judges the time limit itself, so that a goal reached on the last step is a termination.
-        super().__init__(Physics.of_mazes(models_of(spec.all_mazes)), task, n_sub_steps=STEPS_PER_ACTION)
+        super().__init__(Physics.of_mazes(models_of(task.mazes)), Task(task, seed), n_sub_steps=STEPS_PER_ACTION)
 
     def reset(self, seed: int | None = None, episode: Episode | None = None) -> dm_env.TimeStep:
         """Starts an episode: the next one of the environment's stream, the first one of `seed`'s, or `episode`."""
@@ -166,6 +167,6 @@ class Environment(control.Environment):
         self.task.close()
 
     def reward_spec(self) -> specs.Array:
-        if self.task.spec.reward == PROGRESS:
+        if self.maze_task.options.reward == PROGRESS:
             return specs.Array((), float, name="reward")
         return specs.BoundedArray((), float, -1.0, 0.0, name="reward")

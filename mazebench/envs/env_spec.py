@@ -33,7 +33,7 @@ class TaskSpec(EnvSpec):
 class JsonSpec:
     """Base class of environments whose `spec.to_json()` describes them, mazes of one's own included."""
 
-    task_spec: Task
+    task: Task
     _spec: EnvSpec | None = None
 
     @property
@@ -47,16 +47,16 @@ class JsonSpec:
         if spec is not None:
             kwargs = {name: _plain(value) for name, value in spec.kwargs.items()}
             if not isinstance(kwargs.get("mazes"), str | None):  # else a path, or none
-                kwargs["mazes"] = [described_maze(maze) for maze in self.task_spec.fixed_mazes]
+                kwargs["mazes"] = [described_maze(maze) for maze in self.task.fixed_mazes]
             values = {field.name: getattr(spec, field.name) for field in dataclasses.fields(spec) if field.init}
-            spec = TaskSpec(**values | {"kwargs": kwargs, "max_episode_steps": self.task_spec.longest_episode})
+            spec = TaskSpec(**values | {"kwargs": kwargs, "max_episode_steps": self.task.longest_episode})
             spec.of_task = spec.max_episode_steps
         self._spec = spec
 
 
 def env_spec_of(task: Task) -> EnvSpec:
     """Returns Gymnasium's spec of the environment of a task, in plain values."""
-    name = f"{task.task.title()}-{BENCHMARK_SIZES[0]}" if task.track is None else task.track.title()
+    name = task.name.title() + (f"-{BENCHMARK_SIZES[0]}" if task.track is None else "")
     spec = gymnasium.spec(f"mazebench/{name}-v{TASK_VERSION}")
     return dataclasses.replace(spec, kwargs=task.to_json())
 

@@ -14,7 +14,7 @@ from mazebench.errors import InputError
 from mazebench.tasks.context import GOAL, NUM_PLANES
 from mazebench.tasks.rules import reward
 from mazebench.tasks.task import Task
-from mazebench.tasks.task_fields import SPARSE
+from mazebench.tasks.task_options import SPARSE
 from mazebench.world.simulation import STATE_SIZE
 
 _SHOWN_PLANES = [plane for plane in range(NUM_PLANES) if plane != GOAL]
@@ -38,15 +38,15 @@ class GoalMazeEnv(MazeEnv):
     if the goal is `desired_goal`. They take single goals and arrays of goals.
     """
 
-    def __init__(self, task_spec: Task, seed: int | None = None, render_mode: str | None = None, camera: str = "top"):
+    def __init__(self, task: Task, seed: int | None = None, render_mode: str | None = None, camera: str = "top"):
         # A track may hide the body's position and has its own time limits, and the goals would tell what is hidden.
-        if task_spec.has_legs or task_spec.track is not None or task_spec.hide:
+        if task.has_legs or task.track is not None or task.options.hide:
             raise InputError("a goal-conditioned environment: expected the local task, one goal, no track, no hide")
-        if task_spec.reward != SPARSE:  # another goal's way is not known
-            raise InputError(f"a goal-conditioned environment: expected reward {SPARSE!r}, found {task_spec.reward!r}")
-        super().__init__(task_spec, seed, render_mode, camera)
-        side, num_values = task_spec.all_mazes[0].side, STATE_SIZE + len(_SHOWN_PLANES) * task_spec.context_size**2
-        sensed = {name: spaces.observation_space(task_spec)[name] for name in task_spec.sensors}
+        if task.options.reward != SPARSE:  # another goal's way is not known
+            raise InputError(f"a goal-conditioned environment: expected reward {SPARSE!r}, found {task.options.reward!r}")
+        super().__init__(task, seed, render_mode, camera)
+        side, num_values = task.mazes[0].side, STATE_SIZE + len(_SHOWN_PLANES) * task.context_size**2
+        sensed = {name: spaces.observation_space(task)[name] for name in task.sensors}
         self.observation_space = gymnasium.spaces.Dict(
             {
                 "observation": gymnasium.spaces.Box(-np.inf, np.inf, (num_values,), np.float32),
@@ -68,15 +68,15 @@ class GoalMazeEnv(MazeEnv):
     def compute_truncated(self, achieved_goal: np.ndarray, desired_goal: np.ndarray, info: Infos) -> np.ndarray:
         """Returns `[...]` bool: where the goal was not reached and `info["steps"]` is at the time limit."""
         steps = info["steps"] if isinstance(info, Mapping) else np.array([each["steps"] for each in info])
-        return (steps >= self.task_spec.time_limit) & ~self.compute_terminated(achieved_goal, desired_goal, info)
+        return (steps >= self.task.options.time_limit) & ~self.compute_terminated(achieved_goal, desired_goal, info)
 
     def _observation(self) -> dict[str, np.ndarray]:
         shown = super()._observation()
-        maze = self.task_spec.all_mazes[self.task.episode.maze]
+        maze = self.task.mazes[self.runner.episode.maze]
         planes = shown.pop("context")[_SHOWN_PLANES]
         return {
             "observation": np.concatenate([shown.pop("state"), planes.ravel()]),
             "achieved_goal": maze.point(maze.cell(self.simulation.position())).astype(np.float32),
-            "desired_goal": maze.point(self.task.route.goal).astype(np.float32),
+            "desired_goal": maze.point(self.runner.route.goal).astype(np.float32),
             **shown,
         }

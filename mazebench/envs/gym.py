@@ -11,7 +11,7 @@ import numpy as np
 from mazebench.constants import STEP_TIME, STEPS_PER_ACTION
 from mazebench.envs import spaces
 from mazebench.envs.env_spec import JsonSpec
-from mazebench.envs.single import EnvironmentState, SingleTask
+from mazebench.envs.single import EnvironmentState, TaskRunner
 from mazebench.errors import InputError, unknown
 from mazebench.tasks.arguments import Arguments
 from mazebench.tasks.episode import Episode
@@ -30,11 +30,11 @@ class MazeEnv(JsonSpec, gymnasium.Env):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 1 / STEP_TIME}  # noqa: RUF012
 
-    def __init__(self, task_spec: Task, seed: int | None = None, render_mode: str | None = None, camera: str = "top"):
+    def __init__(self, task: Task, seed: int | None = None, render_mode: str | None = None, camera: str = "top"):
         """Opens the environment.
 
         Args:
-          task_spec: the task.
+          task: the task.
           seed: of the first reset.
           render_mode: None or "rgb_array".
           camera: of `render`: "top", "chase" or "egocentric".
@@ -43,14 +43,14 @@ class MazeEnv(JsonSpec, gymnasium.Env):
           InputError: if an argument is not allowed.
         """
         arguments = Arguments(render_mode=render_mode, camera=camera)
-        self.task = SingleTask(task_spec, seed)
-        self.task_spec = task_spec
-        walls = near_walls_of(task_spec.all_mazes, 1)
+        self.runner = TaskRunner(task, seed)
+        self.task = task
+        walls = near_walls_of(task.mazes, 1)
         self.simulation = MujocoSimulation(walls.model, walls)
         self._needs_reset = True
         self.render_mode = render_mode
-        self.observation_space = spaces.observation_space(task_spec)
-        self.action_space = spaces.action_space(task_spec)
+        self.observation_space = spaces.observation_space(task)
+        self.action_space = spaces.action_space(task)
         self._camera = arguments.camera
         self._cameras: Cameras | None = None  # of `render`
 
@@ -64,11 +64,11 @@ class MazeEnv(JsonSpec, gymnasium.Env):
           InputError: if `options` hold anything but an episode.
         """
         super().reset(seed=seed)
-        self.task.choose_episode(seed, _episode_of(options))
+        self.runner.choose_episode(seed, _episode_of(options))
         with self.simulation.reset_context():
-            self.task.initialize_episode(self.simulation)
+            self.runner.initialize_episode(self.simulation)
         self._needs_reset = False
-        return self._observation(), self.task.rules.info(0)
+        return self._observation(), self.runner.rules.info(0)
 
     def step(self, action: int | np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         """Takes one agent step of 0.16 s.
@@ -79,31 +79,31 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         """
         if self._needs_reset:
             raise gymnasium.error.ResetNeeded("expected a call to reset() before this step()")
-        task, simulation = self.task, self.simulation
-        task.before_step(action, simulation)
+        runner, simulation = self.runner, self.simulation
+        runner.before_step(action, simulation)
         simulation.step(STEPS_PER_ACTION)
-        task.after_step(simulation)
-        reached, timed_out = task.rules.reached.item(), task.rules.timed_out.item()
+        runner.after_step(simulation)
+        reached, timed_out = runner.rules.reached.item(), runner.rules.timed_out.item()
         self._needs_reset = reached or timed_out
-        return self._observation(), task.rules.reward(0), reached, timed_out, task.rules.info(0)
+        return self._observation(), runner.rules.reward(0), reached, timed_out, runner.rules.info(0)
 
     def render(self) -> np.ndarray | None:
         """Returns `[480, 480, 3]` uint8 of the current state if `render_mode` is "rgb_array", else None."""
         if self.render_mode is None:
             return None
         if self._cameras is None:
-            self._cameras = Cameras(models_of(self.task_spec.all_mazes, self.task_spec.textures), (self._camera,))
+            self._cameras = Cameras(models_of(self.task.mazes, self.task.options.textures), (self._camera,))
         data = self.simulation.data
-        return self._cameras.take(self.task.rules.maze.item(), data.qpos, data.mocap_pos[0])[self._camera]
+        return self._cameras.take(self.runner.rules.maze.item(), data.qpos, data.mocap_pos[0])[self._camera]
 
     def close(self) -> None:
         if self._cameras is not None:
             self._cameras.close()
-        self.task.close()
+        self.runner.close()
 
     def get_state(self) -> EnvironmentState:
         """Returns this moment of the environment, to go back to with `set_state` as often as you like."""
-        return self.task.get_state(self.simulation)._replace(needs_reset=self._needs_reset)
+        return self.runner.get_state(self.simulation)._replace(needs_reset=self._needs_reset)
 
     def set_state(self, state: EnvironmentState) -> None:
         """Goes back to a state of this environment, or of another one of the same task.
@@ -113,14 +113,14 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         Raises:
           InputError: if it is a state of an environment with other mazes.
         """
-        self.task.set_state(state, self.simulation)
+        self.runner.set_state(state, self.simulation)
         self._needs_reset = state.needs_reset
 
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {"_cameras": None}  # a copy opens some of its own
 
     def _observation(self) -> dict[str, np.ndarray]:
-        return self.task.get_observation(self.simulation)
+        return self.runner.get_observation(self.simulation)
 
 
 def _episode_of(options: dict[str, Any] | None) -> Episode | None:

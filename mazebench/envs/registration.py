@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from mazebench.envs.gym import MazeEnv
     from mazebench.envs.vector import MazeVectorEnv
     from mazebench.tasks.task import Task
-    from mazebench.tasks.task_fields import TaskOptions
+    from mazebench.tasks.task_options import TaskOptions
 
 _SINGLE = ("seed", "render_mode", "camera")  # what a single environment takes besides its task's options
 _VECTOR = ("seed", "num_envs", "num_threads", "render_mode", "autoreset_mode")
@@ -54,13 +54,13 @@ def _register(name: str, make: str, make_many: str | None = None, **options: str
         )
 
 
-def load(task: str = "local", *, seed: int | None = None, **options: Unpack[TaskOptions]) -> Environment:
-    """Returns a dm_control environment of a navigation task; `options` are those of `mazebench.Task.of`.
+def load(task: str | Task | TaskOptions = "local", *, seed: int | None = None, **options: Any) -> Environment:
+    """Returns a dm_control environment of a task, or of the one that a name and the `options` of `Task.of` make.
 
         >>> env = mazebench.load("local", size=15, seed=0)
 
     Its first episode is the one of `reset(seed=seed)`. `env.physics` is a `mazebench.envs.dm_control.Physics`, and
-    `env.task` a `mazebench.envs.dm_control.Task`.
+    `env.task` a `mazebench.envs.dm_control.Task`; `env.maze_task` is the `mazebench.Task`.
 
     Raises:
       InputError: if an option is unknown or not allowed, or dm_control is not installed.
@@ -77,15 +77,15 @@ def load(task: str = "local", *, seed: int | None = None, **options: Unpack[Task
 
 
 def make(
-    task: str = "local",
+    task: str | Task | TaskOptions = "local",
     *,
     seed: int | None = None,
     render_mode: str | None = None,
     camera: str = "top",
     id_size: int = 0,
-    **options: Unpack[TaskOptions],
+    **options: Any,
 ) -> MazeEnv:
-    """Returns a Gymnasium environment, as `gymnasium.make` does; `options` are those of `mazebench.Task.of`.
+    """Returns a Gymnasium environment of a task, or of the one that a name and the `options` of `Task.of` make.
 
         >>> env = mazebench.make("rebuilt", level=2, sensors="egocentric")
 
@@ -108,7 +108,7 @@ def make_goal(
     render_mode: str | None = None,
     camera: str = "top",
     id_size: int = 0,
-    **options: Unpack[TaskOptions],
+    **options: Any,
 ) -> GoalMazeEnv:
     """Returns a goal-conditioned environment of the local task; `options` are those of `mazebench.Task.of`."""
     load_mujoco()
@@ -118,7 +118,7 @@ def make_goal(
 
 
 def make_vec(
-    task: str | Sequence[str] = "local",
+    task: str | Task | TaskOptions | Sequence[str] = "local",
     num_envs: int = 1,
     *,
     seed: int | None = None,
@@ -127,7 +127,7 @@ def make_vec(
     autoreset_mode: AutoresetMode | str = "SameStep",
     max_episode_steps: int | None = None,
     id_size: int = 0,
-    **options: Unpack[TaskOptions],
+    **options: Any,
 ) -> MazeVectorEnv:
     """Returns `num_envs` environments side by side on `num_threads` threads (0: all cores).
 
@@ -147,27 +147,32 @@ def make_vec(
     load_mujoco()
     from mazebench.envs.vector import MazeVectorEnv
 
-    if isinstance(task, str):
-        tasks = [_task(task, options, _VECTOR, id_size)]
-    else:
-        from mazebench.tasks.task import check_names, tasks_of_tracks
+    if isinstance(task, Sequence) and not isinstance(task, str):
+        from mazebench.options import check_names
+        from mazebench.tasks.task import tasks_of_tracks
+        from mazebench.tasks.task_options import TaskOptions
 
-        check_names(options, _VECTOR)
-        tasks = [*tasks_of_tracks(task, **options)]
+        check_names(options, TaskOptions, arguments=_VECTOR)
+        tasks = tasks_of_tracks(task, **options)
+    else:
+        tasks = (_task(task, options, _VECTOR, id_size),)
     if max_episode_steps not in (None, tasks[0].longest_episode):
         raise InputError(f"expected time_limit in the place of max_episode_steps, found {max_episode_steps}")
     return MazeVectorEnv(tasks, num_envs, seed, num_threads, render_mode, autoreset_mode=autoreset_mode)
 
 
-def _task(task: str, options: TaskOptions, arguments: Sequence[str], id_size: int = 0) -> Task:
+def _task(
+    task: str | Task | TaskOptions, options: dict[str, Any], arguments: Sequence[str], id_size: int = 0
+) -> Task:
     """Returns the task of an environment that takes `arguments` besides `options`.
 
     Raises:
       InputError: as `mazebench.Task.of`.
     """
-    from mazebench.tasks.task import Task, check_names
+    from mazebench.tasks.task import Task, as_options, resolve
 
-    check_names(options, arguments)
+    if isinstance(task, Task) and not options:
+        return task
     if options.get("mazes") is None and options.get("size") is None and id_size:
         options["size"] = id_size
-    return Task.of(task, **options)
+    return resolve(as_options(task, options, arguments))

@@ -12,7 +12,7 @@ from mazebench.constants import VELOCITIES
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze
 from mazebench.tasks.actions import controls_of_action, controls_of_velocities
-from mazebench.tasks.arguments import Arguments, require_task_spec
+from mazebench.tasks.arguments import Arguments, require_task
 from mazebench.tasks.episode import Episode, check_episode, sample_episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.route import Route
@@ -24,25 +24,25 @@ _Value = TypeVar("_Value")
 
 _RUNNING = np.ones(1, dtype=bool)
 _INDEX = np.zeros(1, dtype=np.int64)
-_NO_STATE = ("spec", "_sensors")  # attributes of the rules that no step changes
+_NO_STATE = ("task", "_sensors")  # attributes of the rules that no step changes
 _SHARED = ("episodes", "shown", "_ways")  # attributes whose values never change
 
 
-class SingleTask:
+class TaskRunner:
     """The rules of one environment, its stream of episodes, and what they do to its simulation.
 
     Its methods are those of a dm_control task. An environment calls them with the simulation that it steps.
     """
 
-    def __init__(self, spec: Task, seed: int | None = None):
+    def __init__(self, task: Task, seed: int | None = None):
         """`seed` is that of the stream from which episodes are drawn.
 
         Raises:
-          InputError: if `seed` is not a natural number, or `spec` not a `Task`.
+          InputError: if `seed` is not a natural number, or `task` not a `Task`.
         """
-        require_task_spec(spec)
-        self.spec = spec
-        self.rules = Rules(spec, num_envs=1)
+        require_task(task)
+        self.maze_task = task
+        self.rules = Rules(task, num_envs=1)
         self.rng = np.random.default_rng(Arguments(seed=seed).seed)
         self._next_episode: Episode | None = None
 
@@ -55,7 +55,7 @@ class SingleTask:
         if seed is not None:
             self.rng = np.random.default_rng(Arguments(seed=seed).seed)
         if episode is not None:
-            self._next_episode = check_episode(self.spec, episode)
+            self._next_episode = check_episode(self.maze_task, episode)
 
     @property
     def episode(self) -> Episode:
@@ -89,7 +89,7 @@ class SingleTask:
 
     def initialize_episode(self, simulation: Simulation) -> None:
         """Draws an episode, or takes the chosen one, and places body and goal; call it within `reset_context()`."""
-        episode = self._next_episode or sample_episode(self.spec, self.rng)
+        episode = self._next_episode or sample_episode(self.maze_task, self.rng)
         self._next_episode = None
         self.rules.begin(0, episode)
         simulation.surround(episode.maze, self.rules.cell.item())
@@ -103,10 +103,10 @@ class SingleTask:
           InputError: if there is no such action.
         """
         simulation.surround(self.rules.maze.item(), self.rules.cell.item())
-        if self.spec.actions in VELOCITIES:
-            simulation.set_controls(controls_of_velocities(self.spec.actions, np.asarray(action)))
+        if self.maze_task.actions in VELOCITIES:
+            simulation.set_controls(controls_of_velocities(self.maze_task.actions, np.asarray(action)))
         else:
-            simulation.set_controls(controls_of_action(self.spec.actions, action))  # type: ignore[arg-type]
+            simulation.set_controls(controls_of_action(self.maze_task.actions, action))  # type: ignore[arg-type]
 
     def after_step(self, simulation: Simulation) -> None:
         """Takes note of what the action led to."""
@@ -126,7 +126,7 @@ class SingleTask:
         """Returns all that the future of the task and its simulation depends on."""
         changing = {name: value for name, value in vars(self.rules).items() if name not in _NO_STATE}
         return EnvironmentState(
-            maze=self.spec.all_mazes[self.rules.maze.item()],
+            maze=self.maze_task.mazes[self.rules.maze.item()],
             simulation=simulation.full_state(),
             rng=self.rng.bit_generator.state,
             rules=_copied(changing),
@@ -139,7 +139,7 @@ class SingleTask:
           InputError: if it is of an environment with other mazes.
         """
         index = state.rules["maze"].item()
-        if index >= len(self.spec.all_mazes) or self.spec.all_mazes[index] != state.maze:
+        if index >= len(self.maze_task.mazes) or self.maze_task.mazes[index] != state.maze:
             raise InputError(f"expected a state of an environment with the same mazes, found one of {state.maze.name}")
         simulation.surround(index, state.rules["cell"].item())
         simulation.set_full_state(state.simulation)

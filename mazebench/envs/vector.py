@@ -20,7 +20,7 @@ from mazebench.envs import spaces
 from mazebench.envs.env_spec import JsonSpec
 from mazebench.errors import InputError, unknown
 from mazebench.tasks.actions import controls_of_actions, controls_of_velocities
-from mazebench.tasks.arguments import Arguments, require_task_spec
+from mazebench.tasks.arguments import Arguments, require_task
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.observation import observation_specs
 from mazebench.tasks.rules import Rules
@@ -62,7 +62,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
     def __init__(
         self,
-        task_spec: Task | Sequence[Task],
+        task: Task | Sequence[Task],
         num_envs: int,
         seed: Seeds = None,
         num_threads: int = 0,
@@ -73,7 +73,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """Opens the environments.
 
         Args:
-          task_spec: the task, or those of several tracks; the attribute of this name is the first one.
+          task: the task, or those of several tracks; the attribute of this name is the first one.
           num_envs: B.
           seed: of the first reset, as in `reset`.
           num_threads: of the simulation; 0 uses all cores.
@@ -84,11 +84,10 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         Raises:
           InputError: if an argument is not allowed.
         """
-        tasks = (task_spec,) if isinstance(task_spec, Task) else tuple(task_spec)
-        task_spec = tasks[0]
-        require_task_spec(task_spec)
+        tasks = (task,) if isinstance(task, Task) else tuple(task)
+        self.task = task = tasks[0]
+        require_task(task)
         arguments = Arguments(num_envs=num_envs, num_threads=num_threads, render_mode=render_mode)
-        self.task_spec = task_spec
         self.num_envs = num_envs = arguments.num_envs
 
         # What Gymnasium expects of a vector environment.
@@ -98,8 +97,8 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         except ValueError as error:
             raise unknown("autoreset_mode", autoreset_mode, [mode.value for mode in AutoresetMode]) from error
         self.metadata = self.metadata | {"autoreset_mode": self.autoreset_mode}
-        self.single_observation_space = spaces.observation_space(task_spec)
-        self.single_action_space = spaces.action_space(task_spec)
+        self.single_observation_space = spaces.observation_space(task)
+        self.single_action_space = spaces.action_space(task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
 
@@ -107,18 +106,18 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._episode_source = episode_source
         self._tasks = tasks  # of which each episode draws one
         self._rngs = [np.random.default_rng(value) for value in _seeds(seed, num_envs)]
-        self.rules = Rules(task_spec, num_envs)
+        self.rules = Rules(task, num_envs)
         self.episodes = self.rules.episodes
         self._was_reset = False
         self._ended = np.zeros(num_envs, dtype=bool)  # whether the episode is over and the next one has yet to begin
         self._observed = {
             name: np.zeros((num_envs, *array.shape), array.dtype)
-            for name, array in observation_specs(task_spec).items()
+            for name, array in observation_specs(task).items()
         }
         self._observed["context"] = self.rules.context
 
         # The simulation, with views of its arrays.
-        self._walls = near_walls_of(task_spec.all_mazes, num_envs)
+        self._walls = near_walls_of(task.mazes, num_envs)
         self._process = os.getpid()
         self._batch = open_batch(self._walls.model, num_envs, arguments.num_threads)
         self._geoms = WallGeoms.of_batch(self._batch)
@@ -133,7 +132,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
     def __reduce__(self) -> tuple[Any, ...]:
         raise TypeError(
             f"{type(self).__name__} can't be copied or pickled; copy dm_env or Gymnasium environments, or make another "
-            "one with the same task_spec and seed"
+            "one with the same task and seed"
         )
 
     def reset(
@@ -193,7 +192,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """
         self._require_open()
         self._require_reset()
-        if (kind := self.task_spec.actions) in VELOCITIES:
+        if (kind := self.task.actions) in VELOCITIES:
             self._ctrl[:] = controls_of_velocities(kind, actions, (self.num_envs,))
         else:
             self._ctrl[:] = controls_of_actions(kind, actions, self.num_envs)
@@ -231,7 +230,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         if os.getpid() != self._process:
             raise gymnasium.error.ClosedEnvironmentError(
                 "expected a vector environment that this process made, found one of the process that forked it; make "
-                "another one with the same task_spec and seed"
+                "another one with the same task and seed"
             )
 
     def _require_reset(self) -> None:
@@ -320,7 +319,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """Returns a picture `[480, 480, 3]` uint8 of each environment, seen from above."""
         self._require_open()
         if self._top_camera is None:
-            self._top_camera = Cameras(models_of(self.task_spec.all_mazes, self.task_spec.textures), ("top",))
+            self._top_camera = Cameras(models_of(self.task.mazes, self.task.options.textures), ("top",))
         worlds = zip(self.rules.maze.tolist(), self._qpos, self._marker[:, 0], strict=True)
         return tuple(self._top_camera.take(*world)["top"] for world in worlds)
 

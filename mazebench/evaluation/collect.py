@@ -25,6 +25,7 @@ from mazebench.results.reading import CONFIG
 from mazebench.storage.files import writing_to
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.episode import sample_episode
+from mazebench.tasks.task import resolve
 from mazebench.tasks.trials import Trial
 
 EPISODES_PER_FILE = 50
@@ -56,7 +57,7 @@ def collect_demonstrations(
     """
     if options.task.split == "eval":
         raise InputError("expected split 'train' or 'dev' to collect from, found 'eval', whose mazes are for results")
-    plan = make_plan(options, trials=())
+    plan = make_plan(options, trials=(), resolver=resolve)
     if plan.remark:
         remark(plan.remark)
     agent, count, file_format = plan.build_agent(), wanted.episodes, wanted.format_in_use
@@ -105,7 +106,7 @@ def _play(
     trials = []
     for number in numbers:
         episode = sample_episode(task, np.random.default_rng(seed + number))
-        distance = task.all_mazes[episode.maze].distance(episode.start, episode.goal)
+        distance = task.mazes[episode.maze].distance(episode.start, episode.goal)
         # Nothing is measured by the shortest path, which only orders the episodes: the way from cell to cell will do.
         trials.append((seed + number, Trial(episode, distance, shortest_path=distance * task.cell_size)))
     played: dict[int, Demonstration] = {}

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 from typing import Annotated
 
 from annotated_types import Ge
 
 from mazebench.errors import InputError
-from mazebench.options import Doc, OneOf, options
+from mazebench.options import Doc, OneOf, Options
 
 MINARI, NPZ = "minari", "npz"
 
 
-@options
-class CollectOptions:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class CollectOptions(Options):
     """Number and format of demonstrations that are collected.
 
     Raises:

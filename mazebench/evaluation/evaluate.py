@@ -6,15 +6,14 @@ import math
 import pathlib
 import tempfile
 from collections.abc import Callable
-from typing import Unpack
+from typing import Any
 
 from mazebench import stopping
 from mazebench.agent import Agent, SingleAgent
 from mazebench.agent_loading import checked_agent_class, load_agent_class
-from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.errors import InputError, remark
 from mazebench.evaluation.chunk import Chunk
-from mazebench.evaluation.eval_options import NUM_ENVS, EvalOptions, RunOptions
+from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.evaluation.measured_oracle import ORACLE, measure_oracle_steps
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import Pool, open_pool
@@ -22,8 +21,9 @@ from mazebench.evaluation.store import Store, check_same_run, is_finished
 from mazebench.results import metrics
 from mazebench.results.reading import load_result
 from mazebench.results.records import Summary
-from mazebench.tasks.task import Task
-from mazebench.tasks.task_fields import TaskOptions
+from mazebench.options import check_names, options_in
+from mazebench.tasks.task import Task, as_options
+from mazebench.tasks.task_options import TaskOptions
 
 _CHUNKS_PER_WORKER = 4  # so that no worker waits long for the last one,
 _LEAST_CHUNK = 64  # but not so many that their environments are few: agents act on all of them at once
@@ -35,19 +35,11 @@ Progress = Callable[[int, int], None]
 
 def evaluate(
     agent: str | type[Agent] | type[SingleAgent],
-    task: str | Task = "local",
+    task: str | Task | TaskOptions = "local",
     out: str | pathlib.Path | None = None,
     *,
-    episodes_per_distance: int = EPISODES_PER_DISTANCE,
-    checkpoint: str | pathlib.Path | None = None,
-    seed: int = 0,
-    resume: bool = False,
-    record: bool = False,
-    num_envs: int = NUM_ENVS,
-    workers: int = 0,
-    ray_address: str | None = None,
     progress: Progress = lambda ended, of: None,
-    **options: Unpack[TaskOptions],
+    **options: Any,
 ) -> Summary:
     """Evaluates an agent in a task and returns the summary.
 
@@ -58,32 +50,29 @@ def evaluate(
 
     Args:
       agent: the name of an installed agent, "module:Class", or a class.
-      task: a `Task`, or "local", "hierarchical" or the name of a track, as `Task.of` takes it with `options`. Those are
-        completed as evaluations are: eval mazes, distances of 1 to 15.
+      task: "local", "hierarchical" or the name of a track; or a `Task`, of which counts what was asked. What is open is
+        filled as in evaluations: eval mazes, distances of 1 to 15.
       out: the folder for records, summary and options; None keeps the summary alone.
-      resume: go on with the run that `out` holds; an empty or missing folder starts one.
-      episodes_per_distance: for each maze and distance, of the local task.
-      checkpoint: a learned agent's checkpoint or run folder; the shipped one by default.
-      seed: of what the agent draws, and of episodes that are not frozen.
-      record: write trajectories too.
-      num_envs: environments side by side in each process, at most.
-      workers: processes; 0 runs in this one, on all cores.
-      ray_address: of a Ray cluster to run the workers on; 0 of them then are as many as it has CPUs.
-      progress: called as episodes end.
-      **options: those of `Task.of`, unless `task` is a `Task`.
+      progress: called as episodes end, with their number and that of all.
+      **options: by name, as docs/options.md and docs/evaluate.md list them: those of the evaluation (`EvalOptions`:
+        episodes_per_distance, checkpoint, seed), of its run (`RunOptions`: resume, record, num_envs, workers, ray,
+        ray_address), and those of `Task.of`, unless `task` is a `Task`.
 
     Raises:
       InputError: if an option can't be met, or `out` can't be written or holds another run.
       RunError: if the agent or a worker failed; what ended until then is kept.
     """
-    run = RunOptions(resume=resume, record=record, num_envs=num_envs, workers=workers, ray_address=ray_address)
+    check_names(options, EvalOptions, RunOptions, TaskOptions)
+    if options.get("context_size") is not None:
+        raise InputError(f"expected no context_size in an evaluation, found {options['context_size']}; agents choose it")
+    of_run, of_evaluation = options_in(options, RunOptions), options_in(options, EvalOptions)
+    of_task = {name: value for name, value in options.items() if name not in of_run | of_evaluation}
+    asked, run = as_options(task, of_task), RunOptions.of(of_run)
     if not isinstance(agent, str | type):
         raise InputError(f"expected the name of an agent or its class, found an object of {type(agent).__name__}")
     name = agent if isinstance(agent, str) else f"{agent.__module__}:{agent.__qualname__}"
     agent_class = load_agent_class(name) if isinstance(agent, str) else checked_agent_class(name, agent)
-    chosen = EvalOptions.of(
-        name, task, episodes_per_distance=episodes_per_distance, checkpoint=checkpoint, seed=seed, **options
-    )
+    chosen = EvalOptions.of(of_evaluation, agent=name, task=asked)
     if (run.workers or run.cluster) and (name.startswith("__main__:") or load_agent_class(name) is not agent_class):
         raise InputError(f"expected a class that other processes can import by its name, found {name}")
     return run_evaluation(chosen, out, run, progress, agent_class)
@@ -143,12 +132,12 @@ def run_plan(
         overall, by_distance = metrics.summarize(store.records, store.oracle_steps)
         summary = Summary(
             agent=plan.options.agent,
-            task=plan.task,
+            task=plan.task.options,
             privileged=plan.agent_class.needs_truth,
             untrained_scale=plan.untrained_scale,
             suite=suite,
             part=part,
-            benchmark=plan.task.benchmark,
+            benchmark=plan.task.options.benchmark,
             episodes=num_trials,
             provenance=plan.provenance,
             overall=overall,

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import hashlib
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from mazebench.agent import Agent
@@ -19,7 +19,8 @@ from mazebench.results.frozen_oracle import frozen_oracle_steps
 from mazebench.results.metrics import Steps
 from mazebench.results.records import Provenance
 from mazebench.tasks.context import default_context_size
-from mazebench.tasks.task import Task, check_shown
+from mazebench.tasks.task import Task, resolve_for_evaluation
+from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.trials import Trial, select_trials
 from mazebench.world.mjcf import largest_spec
 
@@ -38,7 +39,8 @@ _IDENTIFYING = (
 class Plan:
     """Everything that one evaluation will run. A pickled plan is its options; unpickling makes the plan anew."""
 
-    options: EvalOptions  # with the very file of the checkpoint, and the task as the agent plays it
+    options: EvalOptions  # with the very file of the checkpoint
+    task: Task  # as the agent plays it: with its actions and sensors, and maps of the size that it asks for
     agent_class: type[Agent]
     trials: tuple[Trial, ...]  # in the protocol's order, by which they are numbered
     identity: dict[str, Any]  # the content of config.json; only runs of equal identity are resumed
@@ -47,11 +49,6 @@ class Plan:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _make_plan_once, (self.options,)
-
-    @property
-    def task(self) -> Task:
-        """The task as the agent plays it: with the sensors that it needs, and maps of the size that it asks for."""
-        return self.options.task
 
     @property
     def untrained_scale(self) -> bool:
@@ -69,7 +66,7 @@ class Plan:
                 f"{agent} learned on maps of {self._learned_scale:g} m a cell and may fail here: its map of {size} "
                 f"cells shows {_square(task.size)} cells of {task.cell_size:g} m, {self._scale:.3g} m a cell{way_out}"
             )
-        if task.mazes is not None and is_coarse:
+        if task.options.mazes is not None and is_coarse:
             return f"{agent} is shown the {_square(task.size)} cells as a map of {size}{way_out}"
         if task.track is not None:
             try:
@@ -84,7 +81,7 @@ class Plan:
 
     @property
     def _scale(self) -> float:  # m a cell of the context
-        return self.task.all_mazes[0].side / self.task.context_size
+        return self.task.mazes[0].side / self.task.context_size
 
     @property
     def _learned_scale(self) -> float | None:
@@ -125,7 +122,10 @@ class Plan:
 
 
 def make_plan(
-    options: EvalOptions, agent_class: type[Agent] | None = None, trials: Sequence[Trial] | None = None
+    options: EvalOptions,
+    agent_class: type[Agent] | None = None,
+    trials: Sequence[Trial] | None = None,
+    resolver: Callable[..., Task] = resolve_for_evaluation,
 ) -> Plan:
     """Returns the plan of an evaluation; reads what is needed and writes nothing.
 
@@ -133,22 +133,22 @@ def make_plan(
       options: what to evaluate.
       agent_class: the class that `options.agent` names, if it is loaded already.
       trials: other episodes than those of the evaluation.
+      resolver: makes the task of the options, as `mazebench.tasks.task.resolve` does.
 
     Raises:
       InputError: if an option can't be met.
     """
     agent_class = agent_class or load_agent_class(options.agent)
-    played = task_as_played(options.agent, agent_class, options.task)
-    options = _with_checkpoint(dataclasses.replace(options, task=played), agent_class)
-    task = options.task
+    task = _task_as_played(options.agent, agent_class, options.task, resolver)
+    options = _with_checkpoint(options, agent_class)
     if trials is None:
         trials = select_trials(task, options.episodes_per_distance, options.seed)
-    origin = provenance(options, agent_class)
-    world = largest_spec(task.all_mazes[0])  # the hash of the mazes tells the walls, too
+    origin = provenance(options, task, agent_class)
+    world = largest_spec(task.mazes[0])  # the hash of the mazes tells the walls, too
     identity = {
         "agent": options.agent,
         **task.to_json(),
-        "mazes": None if task.mazes is None else "own",  # which the hash tells apart
+        "mazes": None if task.options.mazes is None else "own",  # which the hash tells apart
         "episodes_per_distance": options.episodes_per_distance,
         "seed": options.seed,
         **{name: getattr(origin, name) for name in _IDENTIFYING},
@@ -157,6 +157,7 @@ def make_plan(
     }
     return Plan(
         options=options,
+        task=task,
         agent_class=agent_class,
         trials=tuple(trials),
         identity=identity,
@@ -176,17 +177,16 @@ def _make_plan_once(options: EvalOptions) -> Plan:
         return make_plan(options)
 
 
-def task_as_played(agent: str, agent_class: type[Agent], task: Task) -> Task:
-    """Returns `task` with what the agent asks for: its actions, sensors and, off the tracks, size of maps."""
+def _task_as_played(
+    agent: str, agent_class: type[Agent], asked: TaskOptions, resolver: Callable[..., Task]
+) -> Task:
+    """Returns the task with what the agent asks for: its actions, sensors and, off the tracks, size of maps."""
     plays = agent_class.plays_actions
-    if task.actions == "six" and "six" not in plays:
-        task = task.replace(actions=plays[0])
-    missing = tuple(name for name in agent_class.needs_sensors if name not in task.sensors)
-    task = task.replace(sensors=(*task.sensors, *missing))
-    if task.track is None:
-        task = task.replace(context_size=context_size_of(agent, agent_class, task.size))
-        check_shown(task)
-    return task
+    if asked.actions is None and "six" not in plays:
+        asked = asked.replace(actions=plays[0])
+    missing = tuple(name for name in agent_class.needs_sensors if name not in asked.sensors)
+    asked = asked.replace(sensors=(*asked.sensors, *missing), context_size=None)
+    return resolver(asked, context_size_of=functools.partial(context_size_of, agent, agent_class))
 
 
 def _with_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOptions:

@@ -23,6 +23,7 @@ from mazebench.maps.benchmark import manifest_hash
 from mazebench.results.played import mazes_hash
 from mazebench.results.records import Provenance
 from mazebench.storage.files import open_file
+from mazebench.tasks.task import Task
 
 _PACKAGES = (
     *("mazebench-mujoco", "mujoco", "dm-control", "dm-env", "gymnasium", "numpy", "scipy"),
@@ -32,13 +33,13 @@ _PACKAGES = (
 _MAX_HEADER_BYTES = 2**18
 
 
-def provenance(options: EvalOptions, agent_class: type[Agent]) -> Provenance:
+def provenance(options: EvalOptions, task: Task, agent_class: type[Agent]) -> Provenance:
     """Returns what lets someone else repeat the run; the version of a package that is not installed is None."""
     checkpoint = options.checkpoint
     if checkpoint and checkpoint == str(agent_class.default_checkpoint()):
         checkpoint = pathlib.Path(checkpoint).name  # the folder depends on the installation
     content = {
-        "benchmark_manifest_sha256": manifest_hash(options.task.benchmark),
+        "benchmark_manifest_sha256": manifest_hash(task.options.benchmark),
         "task_version": TASK_VERSION,
         "checkpoint": checkpoint,
         "checkpoint_sha256": file_hash(options.checkpoint),
@@ -57,7 +58,7 @@ def provenance(options: EvalOptions, agent_class: type[Agent]) -> Provenance:
             "processor": platform.machine(),
             "cores": os.cpu_count(),
         },
-        "mazes_sha256": mazes_hash(options.task),
+        "mazes_sha256": mazes_hash(task),
     }
     return Provenance.model_validate_json(json.dumps(content))  # as a reader will find it
 

@@ -23,9 +23,8 @@ from mazebench.results.reading import CONFIG, SUITE, Suite, read_suite
 from mazebench.results.records import Summary
 from mazebench.storage.files import make_folder, writing_to
 from mazebench.storage.json_files import write_json
-from mazebench.tasks.task import evaluation_task
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.track import LEVELS
+from mazebench.tasks.task_options import TaskOptions
+from mazebench.tasks.tracks import LEVELS, TRACKS
 
 _DEFAULT_RUN = RunOptions()
 _TABLE_DISTANCES = (2, 4, 6, 8, 10)  # those that the paper prints
@@ -36,27 +35,28 @@ class Part:
     """One evaluation of a suite."""
 
     name: str
-    task: str  # "local", "hierarchical" or a track
-    options: dict[str, Any]  # of the task, by name
+    task: TaskOptions
     episodes_per_distance: int = EPISODES_PER_DISTANCE
 
 
 def _hierarchical(name: str, **options: Any) -> Part:
-    return Part(name, "hierarchical", options)
+    return Part(name, TaskOptions(task="hierarchical", **options))
 
 
 def _local(name: str, distances: tuple[int, ...] = _TABLE_DISTANCES, episodes: int = 5, **options: Any) -> Part:
-    return Part(name, "local", {"distances": distances, **options}, episodes)
+    return Part(name, TaskOptions(distances=distances, **options), episodes)
 
 
 def _each_level(tracks: Iterable[str] = TRACKS, **options: Any) -> tuple[Part, ...]:
-    return tuple(Part(f"{track}-{level}", track, {"level": level, **options}) for track in tracks for level in LEVELS)
+    return tuple(
+        Part(f"{track}-{level}", TaskOptions(task=track, level=(level,), **options)) for track in tracks for level in LEVELS
+    )
 
 
 # A map flipped with probability 0 is hierarchical-13-k5; no warp and no noise are local-13: they are not run again.
 SUITES: dict[str, tuple[Part, ...]] = {
     "paper": (
-        *(Part(f"local-{size}", "local", {"size": size}) for size in SIZES),
+        *(Part(f"local-{size}", TaskOptions(size=size)) for size in SIZES),
         *(_hierarchical(f"hierarchical-13-k{cells}", landmark_distance=cells) for cells in range(1, 6)),
         *(_hierarchical(f"flip-{share}", map_flip=share) for share in (0.05, 0.1, 0.2, 0.3)),
         # The paper does not print the ratio of its transforms.
@@ -113,13 +113,18 @@ def run_suite(
         raise unknown("suite", suite, SUITES)
     if checkpoint is not None and len(agents) > 1:
         raise InputError(f"expected one agent with --checkpoint, found {len(agents)}")
-    tasks = {part: evaluation_task(part.task, **part.options) for part in SUITES[suite]}
     plans = {
         (folder, part.name): make_plan(
-            EvalOptions(agent, task, episodes_per_distance=part.episodes_per_distance, checkpoint=checkpoint, seed=seed)
+            EvalOptions(
+                agent=agent,
+                task=part.task,
+                episodes_per_distance=part.episodes_per_distance,
+                checkpoint=checkpoint,
+                seed=seed,
+            )
         )
         for agent, folder in _folders(agents).items()
-        for part, task in tasks.items()
+        for part in SUITES[suite]
     }
     plans = _playable(plans, out, suite)
     with open_pool(run) as pool:
@@ -187,7 +192,7 @@ def _prepare(
             raise InputError(f"{out}: holds a run already; go on with --resume or name another folder")
         before = read_suite(out)
     folders = _folders(list(dict.fromkeys([*(before.folders if before else ()), *agents])))
-    benchmark = next(iter(plans.values())).task.benchmark  # the parts of a suite belong to one
+    benchmark = next(iter(plans.values())).task.options.benchmark  # the parts of a suite belong to one
     content = Suite(
         suite=suite,
         parts=tuple(part.name for part in SUITES[suite]),

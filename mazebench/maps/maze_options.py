@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
-from typing import Annotated, Any
+from typing import Annotated
 
 from annotated_types import Interval
-from pydantic import BeforeValidator
 
 from mazebench.maps.places import place_text
-from mazebench.options import Doc, OneOf, fields_of, options
+from mazebench.options import Doc, OneOf, Options, ReadBy
 
 
-@options
-class ReadOptions:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ReadOptions(Options):
     """Options of reading mazes of one's own."""
 
     cell_size: Annotated[
-        float,
-        Interval(ge=0, le=100),
+        float | None,
+        Interval(ge=0.01, le=100),
         Doc(
-            "Width of a cell of your own mazes in metres. 0 stands for 1; for ROS maps and pictures with pixel_size, "
-            "which are coarsened to such cells, for the smallest possible from 0.4."
+            "Width of a cell of your own mazes in metres; if not given, 1, or for ROS maps and pictures with "
+            "pixel_size, which are coarsened to such cells, the smallest possible from 0.4."
         ),
-    ] = 0.0
+    ] = None
     walls: Annotated[
         str,
         OneOf("filled", "lines"),
@@ -55,18 +55,12 @@ class ReadOptions:
     ] = 0.0
     area: Annotated[
         str | None,
-        BeforeValidator(functools.partial(place_text, "area")),
+        ReadBy(functools.partial(place_text, "area")),
         Doc(
             "The building, if a map has several separate free areas: a cell row,column or a point 1.5m,2.5m (x, y) of "
             "the maze that lies in it. If not given, the largest area, or an enclosed one if that is the ground around."
         ),
     ] = None
-
-
-def changed_reading(values: object) -> dict[str, Any]:
-    """Returns the options of reading among the fields of an object that differ from their defaults, by name."""
-    found = {name: (getattr(values, name), field.default) for name, field in fields_of(ReadOptions).items()}
-    return {name: value for name, (value, default) in found.items() if value != default}
 
 
 THIN_WALLS = "a floor plan with thin walls needs --pixel-size, its metres a pixel"  # of plans that can't be read

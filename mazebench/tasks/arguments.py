@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Annotated
 
 from annotated_types import Ge
 
 from mazebench.errors import InputError
-from mazebench.options import OneOf, options
+from mazebench.options import OneOf, Options
 from mazebench.tasks.task import Task
 from mazebench.world.rendering import CAMERAS
 
 
-@options
-class Arguments:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Arguments(Options):
     """The arguments of an environment; each constructor gives those that it has."""
 
     seed: Annotated[int | None, Ge(0)] = None  # of the first reset
@@ -23,7 +24,7 @@ class Arguments:
     num_threads: Annotated[int, Ge(0)] = 0  # of the simulation; 0 uses all cores
 
 
-def require_task_spec(task_spec: Task) -> None:
-    """Raises `InputError` unless `task_spec` is one, which a task's name, for example, is not."""
-    if not isinstance(task_spec, Task):
-        raise InputError(f"expected a Task, as mazebench.Task.of() returns, found {type(task_spec).__name__}")
+def require_task(task: Task) -> None:
+    """Raises `InputError` unless `task` is one, which a task's name, for example, is not."""
+    if not isinstance(task, Task):
+        raise InputError(f"expected a Task, as mazebench.Task.of() returns, found {type(task).__name__}")

@@ -8,7 +8,8 @@ from typing import Annotated
 from annotated_types import Ge, Interval
 
 from mazebench.errors import InputError
-from mazebench.options import Doc, OneOf, options
+from mazebench.options import Doc, OneOf, Options
+from mazebench.tasks.task_options import LOCAL
 from mazebench.tasks.tracks import TRACKS
 
 # Fields of a task for which trainings have one value only: the default, or the learner's.
@@ -16,16 +17,22 @@ FIXED = ("start", "goal", "landmark_distance", "split", "context_size", "num_goa
 _LONGEST_MINUTES = 366 * 24 * 60  # a year
 
 
-@options
-class TrainOptions:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TrainOptions(Options):
     """Options of a training: the agent, the values of its config, and the length of the run.
 
     Raises:
       InputError: if a value is not allowed, the options don't say when to stop, or they name a cluster for no workers.
     """
 
-    agent: str = dataclasses.field(kw_only=False)
-    overrides: tuple[tuple[str, str], ...] = ()  # values of the agent's config, by name
+    agent: str
+    task: Annotated[
+        tuple[Annotated[str, OneOf(LOCAL, *TRACKS)], ...],
+        Doc(
+            "local, or a track, a named way in which the map or the senses are imperfect; of several tracks, as "
+            "building,rebuilt, for agents that can, each has an equal share of the environments."
+        ),
+    ] = (LOCAL,)
     minutes: Annotated[float | None, Interval(ge=0.01, le=_LONGEST_MINUTES), Doc("How long this command trains.")] = (
         None
     )
@@ -42,13 +49,6 @@ class TrainOptions:
         Doc("Minutes between savepoints, which are saved between milestones, and when the run is stopped; 0 for none."),
     ] = 5.0
     eval_mazes: Annotated[int, Ge(1), Doc("Held-out mazes of an evaluation, with 10 episodes in each.")] = 20
-    track: Annotated[
-        tuple[Annotated[str, OneOf(*TRACKS)], ...],
-        Doc(
-            "A named way in which the map or the senses are imperfect (local task); of several, as building,rebuilt, "
-            "for agents that can, each has an equal share of the environments."
-        ),
-    ] = ()
     first_distance: Annotated[
         int | None, Ge(1), Doc("Cells that goals are away at most in the beginning; all distances if not given.")
     ] = None
@@ -59,6 +59,9 @@ class TrainOptions:
     ray_address: Annotated[str | None, Doc("Address of a Ray cluster for the workers; local if not given.")] = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(set(self.task)) < len(self.task):
+            raise InputError(f"expected different tracks, found {', '.join(self.task)}")
         if self.minutes is None and self.env_steps is None:
             raise InputError("expected --minutes or --env-steps, found neither")
         if self.ray_address is not None and not self.workers:

@@ -6,9 +6,10 @@ from mazebench.tasks.sensors.cameras import CameraSensor
 from mazebench.tasks.sensors.lidar import LidarSensor
 from mazebench.tasks.sensors.sensor import Sensor
 
+LIDAR = "lidar"  # the sensor that every track offers
 SENSORS: dict[str, type[Sensor]] = {
     "egocentric": CameraSensor,
     "top": CameraSensor,
     "chase": CameraSensor,
-    "lidar": LidarSensor,
+    LIDAR: LidarSensor,
 }

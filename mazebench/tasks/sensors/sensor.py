@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 import abc
+import dataclasses
 from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
 import numpy as np
 from annotated_types import Interval
 from dm_env import specs
-from pydantic import BeforeValidator
 
 from mazebench.constants import MAX_PIXELS
 from mazebench.maps.drawn import Mazes
-from mazebench.options import Doc, options
+from mazebench.options import Doc, Options, ReadBy
 from mazebench.tasks.sensors.lidar_noise import model_of, noise_text
 from mazebench.world.ray_casting import LidarModel
 
 
-@options
-class SensorOptions:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class SensorOptions(Options):
     """The options that sensors read."""
 
     camera_size: Annotated[int, Interval(ge=1, le=MAX_PIXELS), Doc("Pixels on a side of a camera's picture.")] = 64
     textures: Annotated[bool, Doc("Walls in pictures have patterns and colours that tell places apart.")] = False
     lidar_noise: Annotated[
         str | None,
-        BeforeValidator(noise_text),
+        ReadBy(noise_text),
         Doc(
             "turtlebot3 (.12 to 3.5 m, noise of .01 m, steps of .015 m, 2 % of rays lost), or SIGMA,LOST: the noise in "
             "metres and the share of rays that are lost, at 5 m reach; that of the track, or exact, if not given."

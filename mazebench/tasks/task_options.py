@@ -1,0 +1,476 @@
+"""The options of a task: what was asked, in plain values, each with its type, range, default and help in one place."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import pathlib
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
+
+from annotated_types import Ge, Interval
+
+from mazebench.constants import DISCRETE, VELOCITIES
+from mazebench.errors import InputError
+from mazebench.maps.benchmark import ALL_SPLITS, FROZEN_SPLITS, KINDS_SIZE, PAPER_BENCHMARK, TRACKS_BENCHMARK
+from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
+from mazebench.maps.maze import Cell, Maze, corner_cells
+from mazebench.maps.maze_options import ReadOptions
+from mazebench.maps.places import free_cell_of_place, place_text
+from mazebench.maps.scenarios import are_scenarios
+from mazebench.maps.selection import described_maze, maze_as_described, own_mazes
+from mazebench.options import Doc, OneOf, ReadBy, fields_of, options_in
+from mazebench.tasks.context import MAX_CONTEXT_SIZE
+from mazebench.tasks.perturbations import PERTURBATIONS
+from mazebench.tasks.perturbations.flip import FlipShare
+from mazebench.tasks.perturbations.noise import PositionDeviation
+from mazebench.tasks.perturbations.warp import WarpShare
+from mazebench.tasks.sensors import LIDAR, SENSORS
+from mazebench.tasks.sensors.sensor import SensorOptions
+from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
+
+LOCAL, HIERARCHICAL = "local", "hierarchical"
+TASK_NAMES = (LOCAL, HIERARCHICAL, *TRACKS)
+DRAWN_KINDS = (*KNOWN, *CHECK)  # of mazes
+HIDEABLE = ("map", "goal")
+REWARDS = SPARSE, PROGRESS = "sparse", "progress"
+ENDS = ("start", "goal")
+CUSTOM = "custom"  # the split in results of mazes, a start or a goal that are not the benchmark's
+NUM_DRAWN = 20  # mazes of a kind, unless another number is asked for
+MIN_CONTEXT_SIZE = 3
+
+_SHOWING_POSE = ("top", "chase")  # the sensors that show where the body is
+# Fields that an agent may choose, or is not told, while the same is played.
+_OF_AGENTS = ("actions", "sensors", "camera_size", "textures", "hide", "exact_pose", "context_size")
+
+
+def _drawn_kind(kinds: Any) -> Any:
+    """Raises `InputError` if one of the kinds is of the eval split alone."""
+    for kind in kinds if isinstance(kinds, list | tuple) else (kinds,):
+        if kind in NOVEL:
+            raise InputError(f"kind {kind!r}: only the eval split has it; kinds: {', '.join(DRAWN_KINDS)}")
+    return kinds
+
+
+def _as_mazes(mazes: Any) -> Any:
+    """Returns the path of mazes as text, and mazes that JSON describes as mazes."""
+    if isinstance(mazes, pathlib.Path):
+        return str(mazes)
+    if not isinstance(mazes, list | tuple):
+        return mazes
+    return tuple(maze_as_described(maze) if isinstance(maze, Mapping) else maze for maze in mazes)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TaskOptions(SensorOptions, ReadOptions):
+    """The options of a task: what was asked. None is open; `Task` fills it.
+
+        >>> options = mazebench.Task.of("rebuilt", level=2).options
+        >>> options.title, options.size
+        ('rebuilt 2', 31)
+
+    Raises:
+      InputError: if an option is not allowed, or options contradict each other.
+    """
+
+    # What is played: the mazes, the episodes, the actions.
+    task: Annotated[
+        str,
+        OneOf(*TASK_NAMES),
+        Doc("Kind of navigation; or a track, a named way in which the map or the senses are imperfect."),
+    ] = LOCAL
+    size: Annotated[
+        int | None,
+        Ge(1),
+        Doc(
+            "Cells a side of the benchmark's mazes: 13, 15, 17, 19 or 21; of drawn mazes, any that their kinds can "
+            "make. If not given, 13, on a track 31, and that of your own mazes."
+        ),
+    ] = None
+    split: Annotated[
+        str | None,
+        OneOf(*ALL_SPLITS),
+        Doc(
+            "The benchmark's training mazes, unseen ones to choose agents on (dev, of tracks), or those for results; "
+            "train if not given, in an evaluation eval."
+        ),
+    ] = None
+    mazes: Annotated[
+        Any,
+        ReadBy(_as_mazes),
+        Doc(
+            "Mazes of your own: a text, picture, array or ROS map, or a folder of them; or scenarios of MovingAI "
+            "(.scen), whose starts and goals are played on the map next to them."
+        ),
+    ] = None
+    kinds: Annotated[
+        tuple[Annotated[str, OneOf(*DRAWN_KINDS)], ...],
+        Doc(f"Mazes that are drawn, of these kinds, as dfs,house; {DRAWN_KINDS[0]} beside the other two options."),
+    ] = ()
+    num_mazes: Annotated[int | None, Ge(1), Doc(f"Drawn mazes of each kind; {NUM_DRAWN} if not given.")] = None
+    fresh: Annotated[bool, Doc("Every episode has a new maze, of one of the kinds (not in an evaluation).")] = False
+    level: Annotated[
+        tuple[Annotated[int, Interval(ge=LEVELS[0], le=LEVELS[-1])], ...] | None,
+        Doc(
+            f"Level of the track, {LEVELS[0]} to {LEVELS[-1]} (`mazebench list` says what they mean); of several "
+            "levels, not in an evaluation, each episode draws one; 1 if not given."
+        ),
+    ] = None
+    distances: Annotated[
+        tuple[Annotated[int, Ge(1)], ...] | None,
+        Doc(
+            "Cells from start to goal, as 1-5,8,10 (not of the hierarchical task); if not given, 1-15 in evaluations "
+            "and in the benchmark's eval mazes, else 1-5; those of the track; or as far as mazes of your own reach."
+        ),
+    ] = None
+    start: Annotated[
+        str | None,
+        ReadBy(functools.partial(place_text, "start")),
+        Doc(
+            "Where every episode begins, instead of a drawn cell, or of the upper right corner (hierarchical task): a "
+            "cell 'row,column', in Python also (row, column), or a point '1.5m,2.5m' (x, y) from the map's lower left "
+            "corner."
+        ),
+    ] = None
+    goal: Annotated[
+        str | None,
+        ReadBy(functools.partial(place_text, "goal")),
+        Doc("Where every episode leads, as for start; instead of a drawn cell, or of the lower left corner."),
+    ] = None
+    time_limit: Annotated[
+        int | None,
+        Ge(1),
+        Doc(
+            "Agent steps to the goal, in the hierarchical task to each landmark; if not given, 100, or more where a "
+            "map, a start or a goal of your own needs them; a track has its own."
+        ),
+    ] = None
+    landmark_distance: Annotated[
+        int, Ge(1), Doc("Cells between landmarks, along a shortest path on the shown map (hierarchical task).")
+    ] = 5
+    pairs: Annotated[
+        str,
+        OneOf("random", "fixed"),
+        Doc(
+            "random: a new start and goal in each episode; fixed: one pair in each maze, the paper's "
+            "extremely-low-data regime (local task)."
+        ),
+    ] = "random"
+    num_goals: Annotated[
+        int,
+        Ge(1),
+        Doc(
+            "Goals of an episode, one after the other without a reset (local task, random pairs); rewards and success "
+            "are those of the last one."
+        ),
+    ] = 1
+    reward: Annotated[
+        str,
+        OneOf(*REWARDS),
+        Doc(
+            "sparse: -1 for each step, 0 for the one that reaches the goal; progress: that and the cells by which the "
+            "step made the way to the goal shorter, for training, with the same best policies (one goal)."
+        ),
+    ] = SPARSE
+    actions: Annotated[
+        str | None,
+        OneOf(*DISCRETE, *VELOCITIES),
+        Doc(
+            "six: one of the benchmark's six; velocity: (forward, left, turn), each from -1 to 1; of a robot that "
+            "can't strafe, four: one of the six without strafing, and diff: (v, omega), forward and turn. If not "
+            "given, six, or those of an agent that doesn't play six."
+        ),
+    ] = None
+
+    # What is shown: what is wrong with the map and the senses, and what an agent may ask for or is not told.
+    map_flip: FlipShare = 0.0
+    map_warp: WarpShare = 0.0
+    position_noise: PositionDeviation = 0.0
+    odometry_noise: Annotated[
+        float | None,
+        Interval(ge=0, le=1),
+        Doc(
+            "alpha of the noise on the observed motion, AMCL's omnidirectional model (.2 is its default): the observed "
+            "pose drifts away from the true one; that of the track, or 0, if not given."
+        ),
+    ] = None
+    exact_pose: Annotated[
+        bool, Doc("The observed pose is the true one on a track whose pose is odometry, as a reference.")
+    ] = False
+    hide: Annotated[
+        tuple[Annotated[str, OneOf(*HIDEABLE)], ...],
+        Doc(
+            "What the context does not show: map makes planes 0 and 1 zero, goal plane 2 (local task, one goal). "
+            "Results without the map say what the map is worth."
+        ),
+    ] = ()
+    sensors: Annotated[
+        tuple[Annotated[str, OneOf(*SENSORS)], ...],
+        Doc("Sensors that are observed besides the state and the context; a track adds the lidar."),
+    ] = ()
+    context_size: Annotated[
+        int | None,
+        Interval(ge=MIN_CONTEXT_SIZE, le=MAX_CONTEXT_SIZE),
+        Doc("M, the cells on a side of the context's planes; min(N, 21) if not given; a track has its own."),
+    ] = None
+
+    def __post_init__(self) -> None:
+        _drawn_kind(self.kinds)
+        super().__post_init__()
+        if self.mazes is not None and not isinstance(self.mazes, str):
+            object.__setattr__(self, "mazes", own_mazes(self.mazes, self.reading))
+        object.__setattr__(self, "hide", tuple(sorted(self.hide, key=HIDEABLE.index)))
+        if self.track is not None and LIDAR not in self.sensors:
+            object.__setattr__(self, "sensors", (LIDAR, *self.sensors))
+        self._check()
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> Self:
+        """Returns the options of which `to_json` returned the content.
+
+        Raises:
+          InputError: if a value is not allowed.
+        """
+        return cls.of(content)
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns the options by name, in values that JSON has; without those that are open, or as evaluations are."""
+        values = {name: value for name, value in vars(self).items() if value is not None}
+        if self.reward == SPARSE:
+            del values["reward"]
+        if isinstance(self.mazes, tuple):
+            values["mazes"] = [described_maze(maze) for maze in self.mazes]
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+
+    # What they mean.
+
+    @property
+    def reading(self) -> ReadOptions:
+        """The options of reading mazes; a start or a goal chooses the area, unless it is given."""
+        values = {name: getattr(self, name) for name in fields_of(ReadOptions)}
+        return ReadOptions(**values | {"area": self.area or self.start or self.goal})
+
+    @property
+    def track(self) -> str | None:
+        """The name of the track; None in the local and the hierarchical task."""
+        return self.task if self.task in TRACKS else None
+
+    @property
+    def is_hierarchical(self) -> bool:
+        """True if the agent is sent from landmark to landmark."""
+        return self.task == HIERARCHICAL
+
+    @property
+    def is_drawn(self) -> bool:
+        """True if mazes are drawn, of some kinds."""
+        return bool(self.kinds or self.num_mazes or self.fresh)
+
+    @property
+    def num_ends(self) -> int:
+        """The number of given ends: start and goal."""
+        return (self.start is not None) + (self.goal is not None)
+
+    @property
+    def has_own(self) -> bool:
+        """True if mazes, start or goal are a user's own."""
+        return self.mazes is not None or self.num_ends > 0
+
+    @property
+    def split_in_results(self) -> str:
+        """The split as records and summaries have it."""
+        return CUSTOM if self.has_own or self.is_drawn else self.split or "train"
+
+    @property
+    def frozen_split(self) -> str | None:
+        """The split of the benchmark whose frozen episodes are evaluated; None for other mazes."""
+        return self.split_in_results if self.split_in_results in FROZEN_SPLITS else None
+
+    @property
+    def benchmark(self) -> str:
+        """The benchmark that the task belongs to."""
+        return PAPER_BENCHMARK if self.track is None else TRACKS_BENCHMARK
+
+    @property
+    def perturbations(self) -> dict[str, float]:
+        """The strengths of all perturbations by name, in the order in which they apply."""
+        return {name: getattr(self, name) for name in PERTURBATIONS}
+
+    @property
+    def active_perturbations(self) -> tuple[tuple[str, float], ...]:
+        """The perturbations that are switched on, with their strengths."""
+        return tuple((name, strength) for name, strength in self.perturbations.items() if strength)
+
+    @property
+    def is_exact(self) -> bool:
+        """True if nothing is wrong with the map and the observed states."""
+        return self.track is None and not self.active_perturbations
+
+    @property
+    def lidar(self) -> LidarModel:
+        """The model of the sensor `lidar`: as the option says, or the track."""
+        return TURTLEBOT3 if self.lidar_noise is None and self.track is not None else super().lidar
+
+    def ends(self, maze: Maze) -> tuple[Cell | None, Cell | None]:
+        """Returns the start and the goal of all episodes in a maze; None for one that each episode draws.
+
+        Raises:
+          InputError: if one is not free.
+        """
+        given = {name: end for name in ENDS if (end := getattr(self, name)) is not None}
+        cells = {name: free_cell_of_place(name, end, maze) for name, end in given.items()}
+        corners = dict(zip(ENDS, corner_cells(maze), strict=True)) if self.is_hierarchical else {}
+        start, goal = ((corners | cells).get(name) for name in ENDS)
+        return start, goal
+
+    def farthest(self, maze: Maze) -> int:
+        """Returns the largest distance in cells that start and goal can have in a maze."""
+        start, goal = self.ends(maze)
+        if start is not None and goal is not None:
+            return maze.distance(start, goal)
+        given = start or goal
+        return maze.diameter if given is None else int(maze.distances(given).max())
+
+    # Their names in results.
+
+    @property
+    def setting(self) -> Self:
+        """The options without what an agent chooses or is not told, and without distances: results are grouped by it."""
+        left = [*_OF_AGENTS, "distances", "time_limit"]
+        left += [] if self.is_hierarchical else ["landmark_distance"]
+        left += [] if self.mazes is None else ["split"]
+        bare = {name: fields_of(type(self))[name].default for name in left}
+        return self.replace(**bare | {"sensors": (LIDAR,) if self.lidar_noise else ()})
+
+    @property
+    def title(self) -> str:
+        """The task and, of a track, its level: "rebuilt 2", "local"."""
+        return self.task if self.track is None else f"{self.task} {self._levels}"
+
+    @property
+    def slug(self) -> str:
+        """Task and size, or track and level, and the perturbations, as names of files have them."""
+        strengths = "".join(f"-{name.rpartition('_')[2]}-{value:g}" for name, value in self.active_perturbations)
+        return (self.title.replace(" ", "-") if self.track else f"{self.task}-{self.size}") + strengths
+
+    @property
+    def noise_in_words(self) -> tuple[str, ...]:
+        """The noise on the senses that a user set, in words."""
+        noise = {"lidar noise": self.lidar_noise, "odometry noise": self.odometry_noise}
+        return tuple(f"{name} {value}" for name, value in noise.items() if value is not None)
+
+    @property
+    def own_in_words(self) -> tuple[str, ...]:
+        """The choices of a user besides the mazes: the size of a cell, start and goal, noise on the senses."""
+        scale = () if self.cell_size in (None, 1) else (f"cells of {self.cell_size:g} m",)
+        ends = (f"{name} {end}" for name in ENDS if (end := getattr(self, name)) is not None)
+        return (*scale, *ends, *self.noise_in_words)
+
+    @property
+    def _levels(self) -> str:
+        return ",".join(map(str, self.level or LEVELS[:1]))
+
+    def __str__(self) -> str:
+        parts = [self.task] if self.track is None else [self.task, f"level {self._levels}"]
+        parts.append(f"{self.size} × {self.size}")
+        if self.split_in_results != "eval":
+            parts.append(f"{self.split_in_results} mazes")
+        parts += self.own_in_words
+        if self.is_hierarchical:
+            parts.append(f"landmarks every {self.landmark_distance}")
+        parts += [f"{name.replace('_', ' ')} {strength:g}" for name, strength in self.active_perturbations]
+        return ", ".join(parts)
+
+    def __lt__(self, other: TaskOptions) -> bool:
+        """Returns whether a table has these options above other ones."""
+        return self._order < other._order
+
+    @property
+    def _order(self) -> tuple[Any, ...]:
+        return (
+            *(self.track is not None, self.is_hierarchical, self.size, self.split_in_results),
+            self.landmark_distance if self.is_hierarchical else 0,
+            self.active_perturbations,
+            *(str(self.mazes or ""), self.kinds, self.num_mazes or 0, self.track or "", self.level or ()),
+            self.own_in_words,
+        )
+
+    # Which options go together.
+
+    def _check(self) -> None:
+        """Raises `InputError` if options contradict each other."""
+        for name in ("sensors", "level", "kinds", "hide"):
+            values = getattr(self, name) or ()
+            if len(set(values)) < len(values):
+                raise InputError(f"expected each {name.rstrip('s')} once, found {', '.join(map(str, values))}")
+        for name in ("level", "distances"):
+            if getattr(self, name) == ():
+                raise InputError(f"expected at least one {name.rstrip('s')}, found none")
+
+        # Mazes.
+        if self.fresh and self.num_mazes:
+            raise InputError(f"expected no num_mazes beside fresh, found {self.num_mazes}")
+        if self.is_drawn and self.mazes is not None:
+            raise InputError("expected mazes of your own or mazes that are drawn, found both")
+        if self.is_drawn and self.split == "eval":
+            raise InputError("mazes that are drawn: expected split 'train' or 'dev', found 'eval'")
+        for name, found in options_in(self.changed(), ReadOptions).items():
+            if self.mazes is None and (name, found) != ("cell_size", 1):
+                raise InputError(f"expected mazes of your own with {name}, found none")
+
+        # Episodes.
+        if self.num_goals > 1:
+            self._require(f"num_goals {self.num_goals}", task=LOCAL, pairs="random", goal=None, reward=SPARSE)
+        if self.num_ends:
+            self._require("a start or a goal", pairs="random")
+        if are_scenarios(self.mazes):
+            self._require("scenarios, which have starts and goals", start=None, goal=None, pairs="random", num_goals=1)
+            if self.track is not None:
+                raise InputError(f"scenarios, which have starts and goals: expected no track, found {self.track!r}")
+        if self.lidar_noise is not None and LIDAR not in self.sensors:
+            found = ", ".join(self.sensors) or "none"
+            raise InputError(f"lidar_noise {self.lidar_noise}: expected the sensor lidar, found {found}")
+        if self.odometry_noise:
+            self._require(f"odometry_noise {self.odometry_noise:g}", position_noise=0.0, exact_pose=False)
+        if self.hide:
+            self._check_hidden()
+
+        # Tracks.
+        if self.track is not None:
+            self._check_track()
+        elif self.exact_pose:
+            raise InputError("exact_pose: expected a track whose pose is odometry beside it, found none")
+        elif self.level is not None:
+            raise InputError(f"level {self._levels}: expected a track beside it, found none; tracks: {', '.join(TRACKS)}")
+
+    def _require(self, beside: str, **wanted: Any) -> None:
+        """Raises `InputError` unless some options have the only values that go with what is `beside` them."""
+        for name, value in wanted.items():
+            if (found := getattr(self, name)) != value:
+                raise InputError(f"{beside}: expected {name} {value!r} beside it, found {found!r}")
+
+    def _check_hidden(self) -> None:
+        """Raises `InputError` if another option would tell what is hidden."""
+        hidden = f"hide {','.join(self.hide)}"
+        if self.is_hierarchical:
+            raise InputError(f"{hidden}: expected the task 'local' or a track, found {self.task!r}")
+        self._require(hidden, num_goals=1)
+        cameras = [name for name in self.sensors if name != LIDAR]
+        telling = cameras if "goal" in self.hide else [name for name in cameras if name != "egocentric"]
+        if telling:
+            what = "where the goal is" if "goal" in self.hide else "the maze from above"
+            raise InputError(f"{hidden}: expected sensors without {telling[0]!r}, which shows {what}")
+
+    def _check_track(self) -> None:
+        """Raises `InputError` if an option contradicts the track."""
+        track, beside = TRACKS[self.task], f"track {self.task!r}"
+        if self.mazes is None and not self.is_drawn and self.size not in (None, KINDS_SIZE):
+            raise InputError(f"{beside}: expected size {KINDS_SIZE}, found {self.size}")
+        if self.time_limit is not None:
+            raise InputError(f"{beside}: has its own time limit, found time_limit {self.time_limit}")
+        self._require(beside, start=None, goal=None, pairs="random", num_goals=1, **dict.fromkeys(PERTURBATIONS, 0.0))
+        if self.exact_pose and not track.hides_pose:
+            raise InputError(f"{beside}: expected no exact_pose, for the pose is exact; it belongs to lost poses")
+        for sensor in _SHOWING_POSE if track.hides_pose else ():
+            if sensor in self.sensors:
+                raise InputError(f"{beside}: expected sensors without {sensor!r}, which shows where the body is")
