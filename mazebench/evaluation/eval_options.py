@@ -13,7 +13,7 @@ from mazebench.errors import InputError
 from mazebench.options import Doc, options
 from mazebench.tasks.task import Task, evaluation_task
 from mazebench.tasks.task_fields import TaskOptions
-from mazebench.tasks.tracks.track import DISTANCES
+from mazebench.tasks.tracks import DISTANCES
 
 NUM_ENVS = 256  # environments side by side in a process, unless another number is asked for
 

@@ -43,9 +43,8 @@ from mazebench.tasks.task_fields import (
     TaskOptions,
     as_mazes,
 )
-from mazebench.tasks.time_limit import TIME_LIMIT, fitting_time_limit, track_time_limit
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.track import DISTANCES
+from mazebench.tasks.time_limit import default_time_limit
+from mazebench.tasks.tracks import DISTANCES, TRACKS
 from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
 
 TRAIN_DISTANCES = tuple(range(1, 6))
@@ -253,9 +252,8 @@ class Task(TaskFields):
         """The agent steps that an episode may take; None where they depend on its landmarks."""
         if self.task == "hierarchical":
             return None
-        if self.track is not None:
-            return track_time_limit(self.track, max(self.distances))
-        return self.num_goals * self.time_limit
+        limit = self.time_limit or default_time_limit(max(self.distances), track=self.track)
+        return self.num_goals * limit
 
     # What is shown.
 
@@ -278,7 +276,7 @@ class Task(TaskFields):
         """Returns alpha of the noise on the observed motion at a level: as the option says, or the track."""
         if self.odometry_noise is not None or self.track is None or self.exact_pose:
             return self.odometry_noise or 0.0
-        return TRACKS[self.track].odometry_noise[level - 1]
+        return TRACKS[self.track].levels[level - 1].odometry_noise
 
     @property
     def interface(self) -> Interface:
@@ -462,12 +460,11 @@ def _complete(given: Mapping[str, Any], default_distances: tuple[int, ...] | Non
         raise InputError(f"start and goal are given; found distances {asked.distances}, which would be ignored")
     distances = asked.distances or distances
 
-    # A time limit in which goals of one's own are reached.
     time_limit = asked.time_limit
     if asked.track is None and not time_limit:
         cells = asked.landmark_distance if asked.task == "hierarchical" else max(distances)
         is_new = asked.has_own or asked.is_drawn
-        time_limit = fitting_time_limit(cells, mazes[0].cell_size) if is_new else TIME_LIMIT
+        time_limit = default_time_limit(cells, track=None, cell_size=mazes[0].cell_size, is_new=is_new)
 
     context_size = asked.context_size
     if not context_size:
