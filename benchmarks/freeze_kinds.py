@@ -35,8 +35,7 @@ from mazebench.results.frozen_oracle import oracle_file
 from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.task import Task
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.track import DISTANCES, LEVELS
+from mazebench.tasks.tracks import DISTANCES, LEVELS, TRACKS
 from mazebench.tasks.trials import Trial, episodes_file, make_trial
 
 KINDS = {"train": KNOWN, DEV: KNOWN, "eval": (*KNOWN, *NOVEL)}  # by split

@@ -21,8 +21,7 @@ from mazebench.results.played import Shown, shown_of
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.track import LEVELS
+from mazebench.tasks.tracks import LEVELS, TRACKS
 
 FOLDER = pathlib.Path(__file__).parent.parent / "docs" / "images"
 PANEL = 520  # pixels a side, about

@@ -30,10 +30,10 @@ from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.maps.maze import Cell, Maze
 from mazebench.results.intervals import Estimate, difference_interval, mean_interval
 from mazebench.tasks.episode import sample_pair
+from mazebench.tasks.perturbations.moved_doors import SWAPS_BY_PERCENT
 from mazebench.tasks.shown_map import is_blocked
 from mazebench.tasks.task import Task
-from mazebench.tasks.tracks.rebuilt import SWAPS
-from mazebench.tasks.tracks.track import DISTANCES
+from mazebench.tasks.tracks import DISTANCES
 from mazebench.tasks.trials import make_trial
 
 KINDS = (*KNOWN, *NOVEL)
@@ -58,7 +58,7 @@ def check_mazes(kind: str, count: int) -> list[Maze]:
 
 def check_swaps(kinds: Sequence[str], episodes: int) -> None:
     """Prints how many doors must move so that a share of the shortest paths on the map is blocked."""
-    shares = sorted({share for swaps in SWAPS.values() for share in swaps})
+    shares = sorted({percent / 100 for swaps in SWAPS_BY_PERCENT.values() for percent in swaps})
     print(f"\nDoors that move, and the share of {episodes} paths on the map that they block:\n")
     _print_head("kind", "doors", "open", *(f"{share:g}" for share in shares), "at most")
     for kind in kinds:

@@ -8,7 +8,6 @@ BENCHMARK_SIZES = (13, 15, 17, 19, 21)  # cells on a side of the mazes of the pa
 # The version of the benchmarks and of what an episode is. Gymnasium's ids end with it. docs/guarantees.md says when it
 # increases.
 TASK_VERSION = 1
-TRACK_NAMES = ("building", "rebuilt", "adrift", "rough")
 
 ON_TIME = (1.25, 2)  # an episode is on time if it takes at most so many times the oracle's steps
 

@@ -12,8 +12,7 @@ import mazebench
 from mazebench.constants import ACTIONS
 from mazebench.options import fields_of
 from mazebench.tasks.task import Task
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.track import LEVELS
+from mazebench.tasks.tracks import LEVELS, TRACKS
 
 FOLDER = pathlib.Path(__file__).parent.parent / "docs" / "environments"
 TASKS = {
@@ -106,7 +105,7 @@ def _page(name: str) -> str:
 
 def _levels(name: str) -> list[str]:
     track = TRACKS[name]
-    lines = [f"| {level} | {track.levels[level - 1]} |" for level in LEVELS]
+    lines = [f"| {level} | {track.levels[level - 1].meaning} |" for level in LEVELS]
     pose = "odometry from (0, 0, 0) at the first step" if track.hides_pose else "exact"
     return [
         "## Levels\n",

@@ -9,23 +9,24 @@ from hypothesis import strategies
 
 from mazebench.maps.kinds.dfs import dfs_walls
 from mazebench.maps.maze import cell_to_point
-from mazebench.tasks.tracks.hand_drawing import (
-    DISPLACEMENTS,
+from mazebench.tasks.perturbations.hand_drawing import (
     LARGEST_STRETCH,
     PIXELS,
     Displacement,
+    HandDrawnMap,
     Line,
-    draw_by_hand,
     draw_displacement,
     fitted_drawing,
 )
+from mazebench.tasks.perturbations.perturbation import ShownMap
 
 SIZE = 13
 SHEET = PIXELS * SIZE
+BENDS = (0.5, 1.0, 1.5)  # cells
 NONE = Displacement(np.zeros((2, SIZE + 18, SIZE + 18)), np.zeros(2))
 
 seeds = strategies.integers(0, 2**32 - 1)
-levels = strategies.sampled_from(DISPLACEMENTS)
+bends = strategies.sampled_from(BENDS)
 few = hypothesis.settings(max_examples=10, deadline=None)
 
 
@@ -33,8 +34,9 @@ def maze(seed):
     return dfs_walls(SIZE, np.random.default_rng(seed))
 
 
-def drawing(level, seed):
-    return draw_by_hand(SIZE, level, np.random.default_rng(seed))
+def drawing(bend, seed):
+    shown = ShownMap(maze(seed))
+    return HandDrawnMap(bend).show(shown, ((1, 1), (1, 1)), np.random.default_rng(seed)).drawing
 
 
 def plain(share=(1.0, 1.0), place=(0.0, 0.0), thickening=0.0):
@@ -49,17 +51,17 @@ def grid(per_cell):
 
 class TestDisplacement:
     @few
-    @hypothesis.given(levels, seeds)
-    def test_largest_displacement_is_the_level(self, level, seed):
-        displacement = draw_displacement(SIZE, np.random.default_rng(seed)).scaled(level)
+    @hypothesis.given(bends, seeds)
+    def test_largest_displacement_is_the_bend(self, bend, seed):
+        displacement = draw_displacement(SIZE, np.random.default_rng(seed)).scaled(bend)
         lengths = np.sqrt((displacement.on_grid(grid(20)[0]) ** 2).sum(axis=0))
-        assert lengths.max() == pytest.approx(level, rel=0.005)
+        assert lengths.max() == pytest.approx(bend, rel=0.005)
 
     @few
-    @hypothesis.given(levels, seeds)
-    def test_sheet_does_not_fold(self, level, seed):
+    @hypothesis.given(bends, seeds)
+    def test_sheet_does_not_fold(self, bend, seed):
         line, points = grid(10)
-        displaced = points + draw_displacement(SIZE, np.random.default_rng(seed)).scaled(level).on_grid(line)
+        displaced = points + draw_displacement(SIZE, np.random.default_rng(seed)).scaled(bend).on_grid(line)
         down, right = np.diff(displaced, axis=1)[:, :, :-1], np.diff(displaced, axis=2)[:, :-1]
         assert (down[0] > 0).all()
         assert (right[1] > 0).all()
@@ -84,9 +86,9 @@ class TestPicture:
         np.testing.assert_array_equal(plain().picture(maze(0)), np.kron(maze(0), np.ones((PIXELS, PIXELS))))
 
     @few
-    @hypothesis.given(levels, seeds)
-    def test_values_have_8_bits(self, level, seed):
-        picture = drawing(level, seed).picture(maze(seed))
+    @hypothesis.given(bends, seeds)
+    def test_values_have_8_bits(self, bend, seed):
+        picture = drawing(bend, seed).picture(maze(seed))
         assert picture.dtype == np.float32
         assert picture.shape == (SHEET, SHEET)
         grey = np.round(picture * 255)
@@ -94,10 +96,10 @@ class TestPicture:
         assert grey.min() >= 0
         assert grey.max() == 255
 
-    def test_same_generator_draws_the_same_field_at_all_levels(self):
-        first, *others = (drawing(level, 3) for level in DISPLACEMENTS)
-        for level, other in zip(DISPLACEMENTS[1:], others, strict=True):
-            np.testing.assert_allclose(other.displacement.noise / level, first.displacement.noise / DISPLACEMENTS[0])
+    def test_same_generator_draws_the_same_field_for_all_bends(self):
+        first, *others = (drawing(bend, 3) for bend in BENDS)
+        for bend, other in zip(BENDS[1:], others, strict=True):
+            np.testing.assert_allclose(other.displacement.noise / bend, first.displacement.noise / BENDS[0])
             assert other.thickening == first.thickening
 
     def test_pixel_across_an_edge_shows_its_share_of_wall(self):
@@ -116,9 +118,9 @@ class TestPicture:
         np.testing.assert_allclose(shares, [max(0, thickening), inside, inside, max(0, thickening)], atol=0.1)
 
     @few
-    @hypothesis.given(levels, seeds)
-    def test_drawing_lies_on_the_sheet_in_the_size_that_was_drawn(self, level, seed):
-        drawn = drawing(level, seed)
+    @hypothesis.given(bends, seeds)
+    def test_drawing_lies_on_the_sheet_in_the_size_that_was_drawn(self, bend, seed):
+        drawn = drawing(bend, seed)
         outline = drawn.points(grid(20)[1].reshape(2, -1).T, SIZE)
         np.testing.assert_array_less(-0.02, outline)
         np.testing.assert_array_less(outline, SHEET + 0.02)
@@ -129,17 +131,17 @@ class TestPicture:
 
 class TestMarks:
     @few
-    @hypothesis.given(levels, seeds)
-    def test_marks_are_never_inside_a_wall(self, level, seed):
-        walls, drawn = maze(seed), drawing(level, seed)
+    @hypothesis.given(bends, seeds)
+    def test_marks_are_never_inside_a_wall(self, bend, seed):
+        walls, drawn = maze(seed), drawing(bend, seed)
         picture = drawn.picture(walls)
         for cell in np.argwhere(~walls)[::7]:
             assert picture[drawn.pixel(tuple(cell), picture)] <= 0.5
 
     @few
-    @hypothesis.given(levels, seeds)
-    def test_marks_lie_where_the_points_lie_that_they_mark(self, level, seed):
-        walls, drawn = maze(seed), drawing(level, seed)
+    @hypothesis.given(bends, seeds)
+    def test_marks_lie_where_the_points_lie_that_they_mark(self, bend, seed):
+        walls, drawn = maze(seed), drawing(bend, seed)
         picture, cells = drawn.picture(walls), np.argwhere(~walls)[::7]
         points = drawn.points(cell_to_point(cells, SIZE), SIZE)
         for cell, (x, y) in zip(cells, points, strict=True):

@@ -11,8 +11,8 @@ from mazebench_agents.robot.map_reading import read_map
 from mazebench.maps.kinds import generate
 from mazebench.tasks.context import START, build_context
 from mazebench.tasks.episode import sample_pair
+from mazebench.tasks.perturbations.hand_drawing import HandDrawnMap
 from mazebench.tasks.perturbations.perturbation import ShownMap
-from mazebench.tasks.tracks.hand_drawing import DISPLACEMENTS, draw_by_hand
 
 SIZE = 13
 
@@ -22,7 +22,7 @@ def sketched(seed, level, kind="dfs"):
     rng = np.random.default_rng(seed)
     maze = generate(kind, SIZE, rng)
     start, goal = sample_pair(maze, 8, rng)
-    shown = ShownMap(maze.walls, draw_by_hand(maze.size, DISPLACEMENTS[level - 1], rng))
+    shown = HandDrawnMap(bend=level / 2).show(ShownMap(maze.walls), ((1, 1), (1, 1)), rng)
     return maze, start, goal, build_context(shown.seen_walls(), shown.seen_cell(start), shown.seen_cell(goal), 2 * SIZE)
 
 

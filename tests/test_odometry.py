@@ -11,7 +11,7 @@ import mazebench
 from mazebench.constants import STEP_TIME
 from mazebench.envs.goal import GoalMazeEnv
 from mazebench.errors import InputError
-from mazebench.tasks.odometry import Odometry, corrupted_odometry
+from mazebench.tasks.perturbations.odometry import Odometry, corrupted_odometry
 from mazebench.tasks.task import Task
 
 X, Y, YAW, FORWARD, LEFT, YAW_RATE = 0, 1, 5, 6, 7, 11  # indices in the state

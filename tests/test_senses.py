@@ -29,7 +29,7 @@ from mazebench.results.paper import printed_mmn
 from mazebench.results.reading import load_result
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.observation import state_errors
-from mazebench.tasks.odometry import NoisyMotion
+from mazebench.tasks.perturbations.odometry import NoisyMotion
 from mazebench.tasks.sensors.lidar_noise import model_of, noise_text, read
 from mazebench.tasks.task import Task
 from mazebench.world.angles import wrap_angle

@@ -11,18 +11,11 @@ from mazebench.maps.kinds import generate
 from mazebench.maps.maze import corner_cells
 from mazebench.tasks.perturbations.flip import flip
 from mazebench.tasks.perturbations.warp import MAX_WARP, random_homography
-from mazebench.tasks.task import Task
 
 
 @pytest.fixture(scope="module")
 def maze():
     return generate("dfs", 21, np.random.default_rng(0))
-
-
-class TestTable:
-    def test_levels_are_given_by_name(self):
-        levels = Task.of(position_noise=0.5).perturbations
-        assert {name: level for name, level in levels.items() if level} == {"position_noise": 0.5}
 
 
 class TestFlip:

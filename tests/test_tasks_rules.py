@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from simple_mazes import corridor, field
 
-from mazebench.tasks.episode import Episode, sample_episode
-from mazebench.tasks.imperfections import episode_level
+from mazebench.tasks.episode import Episode, episode_level, sample_episode
 from mazebench.tasks.rules import Rules, reward
 from mazebench.tasks.shown_map import is_blocked, show_map
 from mazebench.tasks.task import Task
-from mazebench.tasks.time_limit import track_time_limit
+from mazebench.tasks.time_limit import default_time_limit
 
 ROW = 1  # of the corridor, whose cells are (1, 1) to (1, 7)
 everywhere = pytest.mark.parametrize("num_envs", [1, 3])
@@ -165,7 +164,7 @@ class TestInfosOfTheTask:
             blocked = is_blocked(maze.walls, show_map(task, episode).walls, (episode.start, episode.goal))
             level, distance = episode_level(task, episode), maze.distance(episode.start, episode.goal)
             expected = {"track": track, "level": level, "kind": maze.kind, "distance": distance, "blocked": blocked}
-            expected |= {"way_left": distance, "time_limit": track_time_limit(track, distance)}
+            expected |= {"way_left": distance, "time_limit": default_time_limit(distance, track=track)}
             assert {name: info[name] for name in expected} == expected
             seen.add((level, blocked))
         assert len({level for level, _ in seen}) == 3

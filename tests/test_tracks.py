@@ -26,12 +26,11 @@ from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, START
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
+from mazebench.tasks.perturbations.turned_map import TurnedMap
 from mazebench.tasks.shown_map import is_blocked, leg_context, show_map
 from mazebench.tasks.task import Task
-from mazebench.tasks.time_limit import track_time_limit
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.building import TurnedMap
-from mazebench.tasks.tracks.track import LEVELS
+from mazebench.tasks.time_limit import default_time_limit
+from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.tasks.trials import frozen_trials
 from mazebench.world.ray_casting import TURTLEBOT3
 from tests.simple_mazes import field
@@ -84,7 +83,7 @@ def test_the_task_of_a_level(track, level):
     assert spec.context_size == (62 if track == "rough" else 31)
     is_lost = track in ("adrift", "rough")
     assert spec.odometry_noise_at(level) == ((0.01, 0.05, 0.2)[level - 1] if is_lost else 0.0)
-    assert track_time_limit(track, 20) == (270 if is_lost else 170)
+    assert default_time_limit(20, track=track) == (270 if is_lost else 170)
     env = mazebench.load(track, level=level, seed=0)
     state = env.reset().observation["state"]
     assert (state[[0, 1, 5]] == 0).all() == is_lost
@@ -110,7 +109,7 @@ class TestBuilding:
     def test_points_and_cells_lie_at_the_same_place_of_the_map(self, seed):
         maze = generate("house", 21, np.random.default_rng(seed))
         turned, rng = TurnedMap(turns=True, mirrors=True), np.random.default_rng(seed)
-        shown = turned.show(ShownMap(maze.walls), 1, ((1, 1), (1, 1)), rng)
+        shown = turned.show(ShownMap(maze.walls), ((1, 1), (1, 1)), rng)
         cell = tuple(maze.free_cells[seed].tolist())
         x, y = shown.seen_points(np.array([[cell[1] + 0.5, 21 - cell[0] - 0.5]]))[0]
         assert (int(21 - y), int(x)) == shown.seen_cell(cell)
@@ -143,11 +142,6 @@ class TestRebuilt:
             earlier = Maze(shown, "earlier")  # raises if its free cells are not joined
             assert all(map(earlier.is_free, (episode.start, episode.goal)))
             assert (shown != spec.all_mazes[episode.maze].walls).any()
-
-    def test_the_doors_of_a_share_are_the_same_on_adrift(self):
-        rebuilt, adrift = Task.of("rebuilt", level=2), Task.of("adrift", level=1)
-        for episode in episodes(rebuilt, 5):
-            assert (show_map(rebuilt, episode).walls == show_map(adrift, episode).walls).all()
 
     def test_a_maze_with_too_few_doors_is_refused_in_a_line(self):
         with pytest.raises(InputError, match=r"expected \d doors that can move, found 0"):

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks import tracks_checks
 from mazebench.maps.doors import door_slots, swap_doors
-from mazebench.tasks.tracks.rebuilt import MovedDoors, num_swaps
+from mazebench.tasks.perturbations.moved_doors import MovedDoors
 
 KINDS, EPISODES = ("dfs", "office"), 3
 
@@ -20,9 +20,10 @@ def rows(text: str) -> list[list[str]]:
 @pytest.mark.parametrize("kind", tracks_checks.KINDS)
 def test_as_many_doors_can_move_as_a_level_wants(kind):
     for maze in tracks_checks.check_mazes(kind, 1):
-        MovedDoors().require(maze, 0.85)
+        doors = MovedDoors(percent=85)
+        doors.require(maze)
         ends = tuple(map(tuple, maze.free_cells[[0, -1]].tolist()))
-        swap_doors(maze.walls, door_slots(maze), num_swaps(maze, 0.85), ends, np.random.default_rng(0))
+        swap_doors(maze.walls, door_slots(maze), doors.num_swaps(maze), ends, np.random.default_rng(0))
 
 
 def test_more_swaps_block_more_paths(capsys):

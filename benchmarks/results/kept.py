@@ -25,8 +25,7 @@ from mazebench.results.metrics import ON_TIME_METRICS, scores
 from mazebench.results.reading import CONFIG, EPISODES, ORACLE, SUITE, SUMMARY, Result, load_result
 from mazebench.results.records import column
 from mazebench.storage.files import make_folder, open_whole
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.track import LEVELS
+from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.training.run_folder import METRICS, checkpoints
 
 PAPER = "paper"  # the suite

@@ -26,8 +26,7 @@ from mazebench.report.table import Table
 from mazebench.results.intervals import Estimate
 from mazebench.results.metrics import is_on_time
 from mazebench.storage.files import open_whole
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.track import LEVELS
+from mazebench.tasks.tracks import LEVELS, TRACKS
 
 # Of the report of the suite `paper`.
 _FLIPS, _WARPS = "flip-hierarchical-13", "warp-local-13"

@@ -40,8 +40,7 @@ from mazebench.results.intervals import CONFIDENCE, Estimate, runs_interval
 from mazebench.results.metrics import ON_TIME_METRICS, scores
 from mazebench.results.reading import Result
 from mazebench.results.records import column
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.track import LEVELS
+from mazebench.tasks.tracks import LEVELS, TRACKS
 
 SATURATED = "At 1.00 ["  # begins the sentence below a table
 _PAPERS_MMN = "MMN (paper)"

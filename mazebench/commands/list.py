@@ -31,5 +31,5 @@ def list_() -> None:
     print("\ntracks, each with levels 1 to 3 and the sensor lidar:")
     for name, track in TRACKS.items():
         print(f"{name + ':':<12} {track.help}")
-        for level, meaning in enumerate(track.levels, 1):
-            print(f"{'':<12} {level}: {meaning}")
+        for number, level in enumerate(track.levels, 1):
+            print(f"{'':<12} {number}: {level.meaning}")

@@ -30,8 +30,7 @@ from mazebench.results.reading import SUITE, Result, find_parts, load_result, re
 from mazebench.results.records import Name, Share, column
 from mazebench.storage.files import make_folder, open_file
 from mazebench.storage.json_files import write_json
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.track import LEVELS
+from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.tasks.trials import frozen_trials
 
 BEGIN, END = "<!-- leaderboard begins -->\n", "<!-- leaderboard ends -->\n"

@@ -220,7 +220,7 @@ def _track_tables(episodes: pd.DataFrame) -> Iterator[Table]:
         rows = {f"{name} {level}": row for name in groups for level, row in levels[name].items()}
         yield make_table("tracks", "Tracks", _DISTANCES_NOTE, "track and level", rows)
     for name, group in groups.items():
-        meanings = "; ".join(f"{level}: {TRACKS[name].levels[int(level) - 1]}" for level in levels[name])
+        meanings = "; ".join(f"{level}: {TRACKS[name].levels[int(level) - 1].meaning}" for level in levels[name])
         of_facts = {
             f"{level}, {fact}": row[row[fact]] for level, row in levels[name].items() for fact in facts_of(group)
         }

@@ -10,6 +10,8 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.maze import Cell, Maze
+from mazebench.tasks.perturbations import PERTURBATIONS
+from mazebench.tasks.perturbations.perturbation import Perturbation
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
 from mazebench.tasks.tracks import TRACKS
@@ -37,9 +39,25 @@ class Episode:
     yaw: float  # rad, of the body at the start
     seed: int  # of everything else that is drawn in the episode: perturbations, and goals after the first one
 
-    def stream(self, stream: Stream) -> np.random.Generator:
+    def stream(self, stream: Stream | None) -> np.random.Generator:
         """Returns a new generator of a random stream; different streams are independent."""
-        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(int(stream),)))
+        key = () if stream is None else (int(stream),)
+        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=key))
+
+
+def episode_level(spec: Task, episode: Episode) -> int:
+    """Returns the level of the track at which `episode` is played."""
+    if len(spec.level) == 1:
+        return spec.level[0]
+    return spec.level[int(episode.stream(Stream.LEVEL).integers(len(spec.level)))]
+
+
+def perturbations_of(spec: Task, episode: Episode) -> list[tuple[Perturbation, np.random.Generator]]:
+    """Returns the perturbations of `episode`, in the order in which they apply, each with a generator of its stream."""
+    perturbations = [PERTURBATIONS[name](strength) for name, strength in spec.active_perturbations]
+    if spec.track is not None:
+        perturbations += TRACKS[spec.track].levels[episode_level(spec, episode) - 1].perturbations
+    return [(perturbation, episode.stream(perturbation.stream)) for perturbation in perturbations]
 
 
 def sample_episode(spec: Task, rng: np.random.Generator) -> Episode:

@@ -20,7 +20,7 @@ class Interface:
     cell_size: float = 1.0  # m, the side of a cell of the mazes
     hidden: tuple[str, ...] = ()  # of "map" and "goal": what the context does not show
     lidar: LidarModel | None = None  # what the sensor lidar measures; None without it
-    odometry_noise: float = 0.0  # alpha of the noise on the observed motion (`mazebench.tasks.odometry.NoisyMotion`)
+    odometry_noise: float = 0.0  # alpha of `mazebench.tasks.perturbations.odometry.NoisyMotion`
 
     @property
     def action_shape(self) -> tuple[int, ...]:

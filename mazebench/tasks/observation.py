@@ -8,9 +8,8 @@ import numpy as np
 from dm_env import specs
 
 from mazebench.tasks.context import NUM_PLANES
-from mazebench.tasks.episode import Episode
-from mazebench.tasks.imperfections import episode_level, imperfections
-from mazebench.tasks.odometry import NoisyMotion
+from mazebench.tasks.episode import Episode, episode_level, perturbations_of
+from mazebench.tasks.perturbations.odometry import NoisyMotion
 from mazebench.tasks.perturbations.perturbation import StateError
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.sensor import Sensor, Worlds
@@ -33,7 +32,7 @@ def state_errors(spec: Task, episode: Episode) -> list[StateError]:
     """Returns what is wrong with the states observed in `episode`; each has a random stream of its own."""
     if spec.exact_pose:
         return []
-    errors = [perturbation.state_error(level, rng) for perturbation, level, rng in imperfections(spec, episode)]
+    errors = [perturbation.state_error(rng) for perturbation, rng in perturbations_of(spec, episode)]
     alpha = spec.odometry_noise_at(episode_level(spec, episode))
     noise = NoisyMotion(alpha, episode.stream(Stream.MOTION_NOISE)) if alpha else None
     return [error for error in (noise, *errors) if error is not None]

@@ -13,7 +13,7 @@ from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
-from mazebench.tasks.time_limit import track_time_limit
+from mazebench.tasks.time_limit import default_time_limit
 
 # What an agent step led to.
 Event = enum.Enum("Event", ["NONE", "LANDMARK", "REACHED", "TIMEOUT"])
@@ -83,9 +83,8 @@ def plan_route(spec: Task, episode: Episode, shown: ShownMap) -> Route:
     Landmarks are cells of the maze, so they are planned before the change of perspective.
     """
     if spec.task == "local":
-        maze, time_limit = spec.all_mazes[episode.maze], spec.time_limit
-        if spec.track is not None:
-            time_limit = track_time_limit(spec.track, maze.distance(episode.start, episode.goal))
+        maze = spec.all_mazes[episode.maze]
+        time_limit = spec.time_limit or default_time_limit(maze.distance(episode.start, episode.goal), track=spec.track)
         next_goal = None
         if spec.num_goals > 1:
             next_goal = _LaterGoals(maze, spec.distances, episode.stream(Stream.LATER_GOALS))

@@ -9,8 +9,7 @@ import numpy as np
 
 from mazebench.maps.maze import Cell
 from mazebench.tasks.context import NUM_PLANES
-from mazebench.tasks.episode import Episode
-from mazebench.tasks.imperfections import episode_level
+from mazebench.tasks.episode import Episode, episode_level
 from mazebench.tasks.observation import OpenSensors, state_errors
 from mazebench.tasks.perturbations.perturbation import ShownMap, StateError
 from mazebench.tasks.route import Event, Route, plan_route

@@ -6,8 +6,7 @@ import numpy as np
 
 from mazebench.maps.maze import Cell, path_through_walls
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, build_context
-from mazebench.tasks.episode import Episode
-from mazebench.tasks.imperfections import imperfections
+from mazebench.tasks.episode import Episode, perturbations_of
 from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.task import Task
 
@@ -19,8 +18,8 @@ def show_map(spec: Task, episode: Episode) -> ShownMap:
     """Returns the map that the agent is shown in `episode`."""
     maze = spec.all_mazes[episode.maze]
     shown = ShownMap(maze.walls, kind=maze.kind)
-    for perturbation, level, rng in imperfections(spec, episode):
-        shown = perturbation.show(shown, level, (episode.start, episode.goal), rng)
+    for perturbation, rng in perturbations_of(spec, episode):
+        shown = perturbation.show(shown, (episode.start, episode.goal), rng)
     return shown
 
 

@@ -24,8 +24,7 @@ from mazebench.tasks.perturbations.noise import PositionDeviation
 from mazebench.tasks.perturbations.warp import WarpShare
 from mazebench.tasks.sensors import SENSORS
 from mazebench.tasks.sensors.sensor import SensorOptions
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.track import LEVELS
+from mazebench.tasks.tracks import LEVELS, TRACKS
 
 KINDS_OF_TASK = ("local", "hierarchical")
 DRAWN_KINDS = (*KNOWN, *CHECK)  # of mazes

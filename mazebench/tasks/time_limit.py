@@ -1,4 +1,7 @@
-"""The time limits of all tasks, in agent steps."""
+"""The time limit of a leg, in agent steps: the option `time_limit`, or else what `default_time_limit` returns.
+
+It depends on the distance of each episode on a track, else on the largest distance of the task.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +17,9 @@ _SPARE_STEPS = 50
 _LOST_SPARE_STEPS = 150  # so that a lost robot can look for its pose
 
 
-def fitting_time_limit(num_cells: int, cell_size: float) -> int:
-    """Returns the limit for a goal `num_cells` away in mazes of one's own or drawn ones, at least 100."""
-    return max(TIME_LIMIT, math.ceil((_STEPS_PER_METRE * cell_size + _STEPS_PER_CELL) * num_cells) + _SPARE_STEPS)
-
-
-def track_time_limit(track: str, num_cells: int) -> int:
-    """Returns the limit on a track for a goal `num_cells` away."""
-    spare_steps = _LOST_SPARE_STEPS if TRACKS[track].hides_pose else _SPARE_STEPS
-    return (_STEPS_PER_METRE + _STEPS_PER_CELL) * num_cells + spare_steps
+def default_time_limit(num_cells: int, *, track: str | None, cell_size: float = 1.0, is_new: bool = False) -> int:
+    """Returns the limit for a goal `num_cells` away; `is_new` says that the maze or an end is the user's, or drawn."""
+    steps = math.ceil((_STEPS_PER_METRE * cell_size + _STEPS_PER_CELL) * num_cells)
+    if track is not None:
+        return steps + (_LOST_SPARE_STEPS if TRACKS[track].hides_pose else _SPARE_STEPS)
+    return max(TIME_LIMIT, steps + _SPARE_STEPS) if is_new else TIME_LIMIT

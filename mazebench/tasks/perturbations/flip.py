@@ -21,13 +21,16 @@ FlipShare = Annotated[
 ]
 
 
+@dataclasses.dataclass(frozen=True)
 class MapFlip(Perturbation):
     """Shows free cells as walls and walls as free cells."""
 
+    probability: float
+
     stream = Stream.MAP_FLIP
 
-    def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
-        return dataclasses.replace(shown, walls=flip(shown.walls, level, ends, rng))
+    def show(self, shown: ShownMap, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
+        return dataclasses.replace(shown, walls=flip(shown.walls, self.probability, ends, rng))
 
 
 def flip(walls: np.ndarray, probability: float, keep: Iterable[Cell], rng: np.random.Generator) -> np.ndarray:

@@ -19,13 +19,16 @@ PositionDeviation = Annotated[
 ]
 
 
+@dataclasses.dataclass(frozen=True)
 class PositionNoise(Perturbation):
     """Adds normal noise to x and y of each observed state."""
 
+    deviation: float  # m, the standard deviation in x and in y
+
     stream = Stream.POSITION_NOISE
 
-    def state_error(self, level: float, rng: np.random.Generator) -> StateError:
-        return NormalNoise(level, rng)
+    def state_error(self, rng: np.random.Generator) -> StateError:
+        return NormalNoise(self.deviation, rng)
 
 
 @dataclasses.dataclass

@@ -68,18 +68,21 @@ class ShownMap:
 class Perturbation:
     """One thing that may be wrong with what the agent is shown; the world stays true.
 
-    A level says how wrong it is; at level 0 nothing is. A subclass overrides `show`, or `state_error`, or both.
+    A subclass is a frozen dataclass, whose fields say how wrong it is. It overrides `show`, or `state_error`, or both.
+    They get a new generator of `stream`.
     """
 
-    stream: ClassVar[Stream]  # that it draws from; no other one draws from it
+    stream: ClassVar[Stream | None] = None  # that no other one draws from; None if nothing is drawn
+    hides_pose: ClassVar[bool] = False  # whether the observed pose does not tell where the body is
+    pixels_per_cell: ClassVar[int] = 1  # of the shown map, along each axis
 
-    def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
+    def show(self, shown: ShownMap, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
         """Returns the map that the agent is shown instead of `shown`; `ends` are the episode's start and goal."""
         return shown
 
-    def require(self, maze: Maze, level: float) -> None:
-        """Raises `InputError` if the level can't be played in `maze`."""
+    def require(self, maze: Maze) -> None:
+        """Raises `InputError` if it can't be shown in `maze`."""
 
-    def state_error(self, level: float, rng: np.random.Generator) -> StateError | None:
+    def state_error(self, rng: np.random.Generator) -> StateError | None:
         """Returns what is wrong with the observed states of an episode that begins; None if nothing is."""
         return None

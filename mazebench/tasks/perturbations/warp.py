@@ -24,13 +24,16 @@ WarpShare = Annotated[
 ]
 
 
+@dataclasses.dataclass(frozen=True)
 class MapWarp(Perturbation):
     """Shows the map through a random perspective transform."""
 
+    share: float  # of the side, the largest shift of a corner
+
     stream = Stream.MAP_WARP
 
-    def show(self, shown: ShownMap, level: float, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
-        return dataclasses.replace(shown, drawing=Perspective(random_homography(len(shown.walls), level, rng)))
+    def show(self, shown: ShownMap, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
+        return dataclasses.replace(shown, drawing=Perspective(random_homography(len(shown.walls), self.share, rng)))
 
 
 @dataclasses.dataclass(frozen=True)

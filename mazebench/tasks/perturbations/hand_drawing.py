@@ -1,7 +1,7 @@
 """A map as it is drawn by hand: a grey picture of 2 N x 2 N pixels.
 
-- A smooth displacement bends the maze. Its largest value is the level's.
-- Each axis is scaled by 0.85 to 1.15, where 1.15 fills the picture. The drawing lies anywhere on the picture.
+- A smooth displacement bends the maze.
+- Each axis is scaled by uniform(0.85, 1.15), where 1.15 fills the picture. The drawing lies anywhere on the picture.
 - Walls are drawn up to a pixel thicker or thinner, where a cell is two pixels.
 - A pixel has the share of wall in it, to 8 bits. The paper around the maze is wall.
 - Marks are displaced as the maze is, and are never inside a wall.
@@ -16,10 +16,11 @@ from typing import NamedTuple
 import numpy as np
 
 from mazebench.maps.maze import Cell
-from mazebench.tasks.perturbations.perturbation import Drawing
+from mazebench.tasks.perturbations.perturbation import Drawing, Perturbation, ShownMap
+from mazebench.tasks.streams import Stream
 
-DISPLACEMENTS = (0.5, 1.0, 1.5)  # cells, the largest one at each level of `rough`
 PIXELS = 2  # pixels of the picture per cell of the maze, along each axis
+LARGEST_BEND = 1.5  # cells
 LARGEST_STRETCH = 0.15  # each axis is scaled by 1 - this to 1 + this
 LARGEST_THICKENING = 0.5  # cells, one pixel where a cell is PIXELS of them; negative for thin walls
 SIGMA = 3.0  # cells; the displacement is white noise on cells that is smoothed by a Gaussian of this deviation
@@ -29,6 +30,25 @@ _SAMPLES = 12  # sample points per cell along each axis that are drawn; more tha
 _NODES = 4  # points per cell along each axis where the displacement's size and folds are looked at
 _ROWS_AT_A_TIME = 8  # of a product of matrices
 _WHITE = 255  # the largest of the grey values, which are multiples of 1 / 255
+
+
+@dataclasses.dataclass(frozen=True)
+class HandDrawnMap(Perturbation):
+    """Draws the map by hand; the draws are the same for all bends."""
+
+    bend: float  # cells, the largest displacement; at most LARGEST_BEND
+
+    stream = Stream.DRAWN_SHEET
+    pixels_per_cell = PIXELS
+
+    def show(self, shown: ShownMap, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
+        size = len(shown.walls)
+        displacement = draw_displacement(size, rng).scaled(self.bend)
+        stretch = rng.uniform(1 - LARGEST_STRETCH, 1 + LARGEST_STRETCH, size=2)
+        margin = rng.uniform(size=2)
+        thickening = float(rng.uniform(-LARGEST_THICKENING, LARGEST_THICKENING))
+        drawing = fitted_drawing(size, displacement, stretch / (1 + LARGEST_STRETCH), margin, thickening)
+        return dataclasses.replace(shown, drawing=drawing)
 
 
 class Line(NamedTuple):
@@ -83,7 +103,7 @@ class Displacement:
 def draw_displacement(size: int, rng: np.random.Generator) -> Displacement:
     """Draws a displacement whose largest value in a maze of `size` cells is 1 cell.
 
-    It folds at none of the levels, so that `rng` gives the same one for all of them. Of 20,000 draws, none folded.
+    It does not fold at the largest bend, so that `rng` gives the same one for all bends. Of 20,000 draws, none folded.
     """
     count = size + 2 * int(_REACH)
     while True:
@@ -92,7 +112,7 @@ def draw_displacement(size: int, rng: np.random.Generator) -> Displacement:
         mean = moved.mean(axis=(1, 2))
         largest = np.sqrt(((moved - mean[:, None, None]) ** 2).sum(axis=0)).max()
         displacement = dataclasses.replace(noise, mean=mean).scaled(1 / float(largest))
-        if not displacement.scaled(max(DISPLACEMENTS)).folds(size):
+        if not displacement.scaled(LARGEST_BEND).folds(size):
             return displacement
 
 
@@ -162,19 +182,6 @@ class HandDrawing(Drawing):
             return by_rows[:, before] | by_rows[:, after]
         by_rows = walls[before] & walls[after]
         return by_rows[:, before] & by_rows[:, after]
-
-
-def draw_by_hand(size: int, level: float, rng: np.random.Generator) -> HandDrawing:
-    """Draws how a maze of `size` cells a side is drawn by hand; the largest displacement is `level`, in cells.
-
-    Each axis is scaled by uniform(0.85, 1.15). At the largest scale the drawing is as long as the picture, else it lies
-    anywhere on it. `rng` gives the same draws at all levels.
-    """
-    displacement = draw_displacement(size, rng).scaled(level)
-    stretch = rng.uniform(1 - LARGEST_STRETCH, 1 + LARGEST_STRETCH, size=2)
-    margin = rng.uniform(size=2)
-    thickening = float(rng.uniform(-LARGEST_THICKENING, LARGEST_THICKENING))
-    return fitted_drawing(size, displacement, stretch / (1 + LARGEST_STRETCH), margin, thickening)
 
 
 def fitted_drawing(

@@ -8,6 +8,8 @@ import math
 import numpy as np
 
 from mazebench.constants import FORWARD_VELOCITY, LEFT_VELOCITY, STEP_TIME, YAW, YAW_RATE, X, Y
+from mazebench.tasks.perturbations.perturbation import Perturbation, StateError
+from mazebench.tasks.streams import Stream
 from mazebench.world.angles import wrap_angle
 
 _SCALES = (0.9, 1.1)  # lowest and highest of an episode's scale
@@ -17,6 +19,19 @@ _VELOCITY = slice(6, 9)
 _SEGMENT, _SEGMENT_TURN = 0.25, 0.2  # m, rad
 
 Pose = tuple[float, float, float]  # x, y (m), yaw (rad)
+
+
+@dataclasses.dataclass(frozen=True)
+class LostPose(Perturbation):
+    """Counts the observed pose from the place and the heading at the first step."""
+
+    drifts: bool = False  # whether the odometry has a wrong scale and a heading that drifts
+
+    stream = Stream.LOST_POSE
+    hides_pose = True
+
+    def state_error(self, rng: np.random.Generator) -> StateError:
+        return corrupted_odometry(rng) if self.drifts else Odometry(rng)
 
 
 def corrupted_odometry(rng: np.random.Generator) -> Odometry:

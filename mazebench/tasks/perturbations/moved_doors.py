@@ -1,0 +1,50 @@
+"""Doors that have moved since the map was drawn."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from mazebench.errors import InputError
+from mazebench.maps.benchmark import KINDS_SIZE
+from mazebench.maps.doors import door_slots, num_swappable, swap_doors
+from mazebench.maps.maze import Cell, Maze
+from mazebench.tasks.perturbations.perturbation import Perturbation, ShownMap
+from mazebench.tasks.streams import Stream
+
+# How many doors of a maze of 31 x 31 cells move, by kind, so that so many per cent of the shortest paths on the map are
+# blocked in the maze (`python -m benchmarks.tracks_checks swaps`). Mazes of no kind are taken for houses.
+SWAPS_BY_PERCENT = {
+    "dfs": {45: 9, 70: 18, 85: 29},
+    "house": {45: 3, 70: 7, 85: 12},
+    "rooms": {45: 6, 70: 13, 85: 21},
+    "office": {45: 4, 70: 8, 85: 15},
+    "hospital": {45: 5, 70: 10, 85: 17},
+    "museum": {45: 3, 70: 6, 85: 10},
+}
+_DEFAULT_KIND = "house"
+
+
+@dataclasses.dataclass(frozen=True)
+class MovedDoors(Perturbation):
+    """Shows an earlier state of the building: some doors are closed that are open in the world, and as many open."""
+
+    percent: int  # of the shortest paths on the map that are blocked
+
+    stream = Stream.MOVED_DOORS
+
+    def require(self, maze: Maze) -> None:
+        needed, movable = self.num_swaps(maze), num_swappable(maze) - 2  # start and goal may be doors
+        if movable < needed:
+            raise InputError(f"{maze.name}: expected {needed} doors that can move, found {max(0, movable)}")
+
+    def show(self, shown: ShownMap, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
+        maze = Maze(shown.walls, "shown", kind=shown.kind)
+        walls = swap_doors(maze.walls, door_slots(maze), self.num_swaps(maze), ends, rng)
+        return dataclasses.replace(shown, walls=walls)
+
+    def num_swaps(self, maze: Maze) -> int:
+        """Returns how many doors of a maze move; in mazes of other sizes, as many for each cell."""
+        swaps = SWAPS_BY_PERCENT.get(maze.kind, SWAPS_BY_PERCENT[_DEFAULT_KIND])[self.percent]
+        return max(1, round(swaps * (maze.size / KINDS_SIZE) ** 2))

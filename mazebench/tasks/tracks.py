@@ -1,0 +1,125 @@
+"""The tracks: named ways in which the map or the senses are imperfect, as data."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from mazebench.maps.maze import Maze
+from mazebench.tasks.perturbations.hand_drawing import HandDrawnMap
+from mazebench.tasks.perturbations.moved_doors import MovedDoors
+from mazebench.tasks.perturbations.odometry import LostPose
+from mazebench.tasks.perturbations.perturbation import Perturbation
+from mazebench.tasks.perturbations.turned_map import HiddenStart, TurnedMap
+
+LEVELS = (1, 2, 3)
+DISTANCES = tuple(range(15, 41))  # cells between start and goal
+
+
+@dataclasses.dataclass(frozen=True)
+class Level:
+    """One setting of a track."""
+
+    meaning: str  # what is imperfect, in words
+    perturbations: tuple[Perturbation, ...] = ()  # in the order in which they apply
+    odometry_noise: float = 0.0  # alpha of `NoisyMotion`, unless the option is given
+
+
+@dataclasses.dataclass(frozen=True)
+class Track:
+    """A named way in which the map or the senses are imperfect.
+
+    A track is played as the local task with one goal, in mazes of 31 x 31 cells of several kinds. It offers the sensor
+    `lidar`, that of a TurtleBot3. Its mazes, distances, context size and time limit are fixed, so that results of one
+    track and level can be compared.
+    """
+
+    help: str  # in one line
+    levels: tuple[Level, Level, Level]
+
+    @property
+    def hides_pose(self) -> bool:
+        """True if the observed pose is odometry, which does not tell where the body is."""
+        return any(each.hides_pose for level in self.levels for each in level.perturbations)
+
+    @property
+    def pixels_per_cell(self) -> int:
+        """Pixels of the shown map per cell of the maze, along each axis."""
+        return max(each.pixels_per_cell for level in self.levels for each in level.perturbations)
+
+    def require(self, maze: Maze, levels: Sequence[int]) -> None:
+        """Raises `InputError` if the track can't be played in `maze`."""
+        for level in levels:
+            for perturbation in self.levels[level - 1].perturbations:
+                perturbation.require(maze)
+
+
+TRACKS = {
+    "building": Track(
+        "The map is right, but may be turned or mirrored.",
+        (
+            Level("the map as drawn"),
+            Level(
+                "turned by unknown quarter turns; planes 1 and 3 of the context are zero",
+                (TurnedMap(turns=True), HiddenStart()),
+            ),
+            Level("and mirrored with probability .5", (TurnedMap(turns=True, mirrors=True), HiddenStart())),
+        ),
+    ),
+    "rebuilt": Track(
+        "Doors have moved since the map was drawn.",
+        (
+            Level("doors have moved: .45 of the shortest paths on the map are blocked", (MovedDoors(percent=45),)),
+            Level("doors have moved: .7 of the paths are blocked", (MovedDoors(percent=70),)),
+            Level("doors have moved: .85 of the paths are blocked", (MovedDoors(percent=85),)),
+        ),
+    ),
+    "adrift": Track(
+        "Doors have moved since the map was drawn, and the pose is odometry, which does not tell the place on it.",
+        (
+            Level(
+                "doors have moved: .7 of the paths are blocked; the start is marked, the heading is unknown",
+                (MovedDoors(percent=70), LostPose()),
+                odometry_noise=0.01,
+            ),
+            Level(
+                "the same doors; the start is unknown, too: planes 1 and 3 of the context are zero",
+                (MovedDoors(percent=70), LostPose(), HiddenStart()),
+                odometry_noise=0.05,
+            ),
+            Level(
+                "doors have moved: .85 of the paths are blocked; the odometry drifts: its scale is off by up to 10 %, "
+                "its heading walks by 2 degrees per root second",
+                (MovedDoors(percent=85), LostPose(drifts=True), HiddenStart()),
+                odometry_noise=0.2,
+            ),
+        ),
+    ),
+    "rough": Track(
+        "The map is drawn by hand, doors have moved since, and the pose is odometry.",
+        (
+            Level(
+                "bent by up to 0.5 cells, and doors have moved: .45 of the paths are blocked; the start is marked",
+                (MovedDoors(percent=45), HandDrawnMap(bend=0.5), LostPose()),
+                odometry_noise=0.01,
+            ),
+            Level(
+                "bent by up to 1 cell, .7 of the paths are blocked; the start is unknown, too",
+                (MovedDoors(percent=70), HandDrawnMap(bend=1.0), LostPose(), HiddenStart()),
+                odometry_noise=0.05,
+            ),
+            Level(
+                "bent by up to 1.5 cells, .7 of the paths are blocked; mirrored with probability .5, and the odometry "
+                "drifts",
+                (
+                    MovedDoors(percent=70),
+                    HandDrawnMap(bend=1.5),
+                    TurnedMap(mirrors=True),
+                    LostPose(drifts=True),
+                    HiddenStart(),
+                ),
+                odometry_noise=0.2,
+            ),
+        ),
+    ),
+}
