@@ -60,7 +60,7 @@ def wrong_use() -> None:
     mazebench.Task.of(flip=0.1)  # type: ignore[call-arg]
     mazebench.make_vec("local", 4, num_goals="3")  # type: ignore[arg-type]
     mazebench.generate("dfs", 15)  # type: ignore[call-arg]
-    print(mazebench.make_vec("local", 4).task_spec.sise)  # type: ignore[attr-defined]
+    print(mazebench.make_vec("local", 4).task.sise)  # type: ignore[attr-defined]
     print(mazebench.nothing)  # type: ignore[attr-defined]
     EvalOptions(agent=Forward, task=mazebench.Task.of())  # type: ignore[arg-type]
     print(mazebench.evaluate("planner").overal)  # type: ignore[attr-defined]

@@ -40,13 +40,13 @@ def labels(envs: MazeVectorEnv, costs: bool = False) -> np.ndarray:
     envs = getattr(envs, "unwrapped", envs)
     if not isinstance(envs, MazeVectorEnv):
         raise InputError(f"expected environments of mazebench.make_vec, found {type(envs).__name__}")
-    if envs.task_spec.actions != "six":
-        raise InputError(f"expected environments with actions 'six', found {envs.task_spec.actions!r}")
+    if envs.task.actions != "six":
+        raise InputError(f"expected environments with actions 'six', found {envs.task.actions!r}")
     rules = envs.rules
     if not rules.active.any():
         raise InputError("expected a call to reset() before that of labels(), found no episode under way")
     if envs not in _experts:
-        _experts[envs] = Expert(envs.task_spec.all_mazes, envs.num_envs)
+        _experts[envs] = Expert(envs.task.mazes, envs.num_envs)
     found = _experts[envs].costs(rules.maze, rules.target, rules.pose, envs.velocity())
     return found if costs else found.argmin(axis=1)
 

@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from benchmarks.track_pictures import play
-from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.eval_options import EvalOptions, eval_options
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps import colors
 from mazebench.maps.maze import Maze
@@ -44,13 +44,13 @@ def main() -> None:
         start, mark = (None if place < 0 else divmod(place, len(pixels)) for place in (shown.start, shown.goal))
         thumbnail(track, draw_grid(pixels, 1 + 2 * THUMBNAIL // len(pixels), start, mark), maze, pose, goal)
     for task, options in (("local", {"distances": 12}), ("hierarchical", {})):
-        frames, _ = _run(EvalOptions.of("oracle", task=task, split="train", **options), "map", 2 * THUMBNAIL, True)
+        frames, _ = _run(eval_options("oracle", task=task, split="train", **options), "map", 2 * THUMBNAIL, True)
         save(task, frames[0], frames[-1])
 
 
 def film(number: int, path: pathlib.Path) -> None:
     """Films an episode of the navigator in three views."""
-    options = EvalOptions.of("navigator", track="rebuilt", level=2, split="dev", seed=number)
+    options = eval_options("navigator", task="rebuilt", level=2, split="dev", seed=number)
     views = {title: _run(options, view, SIDE, True) for view, title in VIEWS.items()}
     print(*{ending for _, ending in views.values()})
     ring_moved_doors([*views[VIEWS["map"]][0], *views[VIEWS["lidar"]][0]], options)
@@ -73,7 +73,7 @@ def ring_moved_doors(frames: list[np.ndarray], options: EvalOptions) -> None:
     """Draws a ring around each cell in which the map and the maze of the filmed episode differ."""
     plan = make_plan(options)
     episode = plan.trials[options.seed].episode
-    walls = plan.task.all_mazes[episode.maze].walls
+    walls = plan.task.mazes[episode.maze].walls
     for row, column in np.argwhere(shown_of(plan.task, episode).walls != walls):
         centre = tuple(int((place + 0.5) * SIDE / len(walls)) for place in (column, row))
         for frame in frames:

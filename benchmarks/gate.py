@@ -41,8 +41,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "goals": {"num_goals": 3, "context_size": 25, "sensors": ("lidar",), "lidar_noise": "turtlebot3"},
     "continuous": {"actions": "velocity", "odometry_noise": 0.2},
     "fresh": {"kinds": ("dfs", "house", "cave"), "fresh": True, "size": 21},
-    "building": {"track": "building", "level": (1, 2, 3)},
-    "rough": {"track": "rough", "level": 3},
+    "building": {"task": "building", "level": (1, 2, 3)},
+    "rough": {"task": "rough", "level": 3},
 }
 NUM_ENVS, NUM_STEPS = 4, 1000
 SMALL = "--env-steps 960 --checkpoint-steps 960 --eval-mazes 1 --set num_envs=16 --set min_rows=320"
@@ -63,7 +63,7 @@ def episodes() -> Iterator[tuple[str, str]]:
         if agent != "dqn" or name == "local"
     }
     runs |= {
-        f"navigator {track} {level}": ("navigator", distances | {"track": track, "level": level, "distances": (20, 30)})
+        f"navigator {track} {level}": ("navigator", distances | {"task": track, "level": level, "distances": (20, 30)})
         for track, level in TRACKS.items()
     }
     for name, (agent, options) in runs.items():
@@ -78,7 +78,7 @@ def states() -> Iterator[tuple[str, str]]:
     """Yields a name and a hash of all states and contexts in 1,000 steps of random actions for each task."""
     for name, options in VARIANTS.items():
         options = dict(options)
-        envs = mazebench.make_vec(options.pop("task", options.pop("track", "local")), NUM_ENVS, **options)
+        envs = mazebench.make_vec(options.pop("task", "local"), NUM_ENVS, **options)
         rng, digest = np.random.default_rng(0), hashlib.sha256()
         observation, _ = envs.reset(seed=0)
         for _ in range(NUM_STEPS):

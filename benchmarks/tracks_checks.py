@@ -127,7 +127,7 @@ def play(agent_name: str, kind: str, episodes: int, hide: tuple[str, ...] = ()) 
     rng = np.random.default_rng(_SEED)
     trials = [
         make_trial(maze, index, sample_pair(maze, int(rng.choice(DISTANCES)), rng), rng)
-        for index, maze in enumerate(spec.all_mazes)
+        for index, maze in enumerate(spec.mazes)
         for _ in range(_PER_MAZE)
     ]
     agent_class = load_agent_class(agent_name)

@@ -140,9 +140,13 @@ class Options:
         return {name: value for name, (value, default) in values.items() if value is not default and value != default}
 
 
-@functools.cache
-def fields_of(options_class: Any) -> Mapping[str, Option]:
+def fields_of(options_class: type) -> Mapping[str, Option]:
     """Returns the description of each field of a class; one that no user chooses has no help."""
+    return _fields_of(options_class)
+
+
+@functools.cache
+def _fields_of(options_class: Any) -> Mapping[str, Option]:
     described = {}
     hints = typing.get_type_hints(options_class, include_extras=True)
     kinds = typing.get_type_hints(options_class)

@@ -7,7 +7,7 @@ import itertools
 import pathlib
 import pickle
 from collections.abc import Iterator, Sequence
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +20,8 @@ from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling
 from mazebench.evaluation.plan import task_as_played
 from mazebench.maps.kinds import generate
 from mazebench.tasks.episode import Episode, sample_episode
-from mazebench.tasks.task import Task
-from mazebench.tasks.task_fields import TaskOptions
+from mazebench.tasks.task import Task, as_options, resolve
+from mazebench.tasks.task_options import TaskOptions
 
 _SIZE = 7
 _NUM_MAZES = 3  # of different paths between their corners, so that episodes side by side end at different steps
@@ -36,9 +36,9 @@ class ConformanceError(AssertionError):
 
 def check_agent(
     agent_class: type[Agent] | type[SingleAgent] | str,
-    task: Task | str | None = None,
+    task: Task | TaskOptions | str | None = None,
     checkpoint: pathlib.Path | str | None = None,
-    **options: Unpack[TaskOptions],
+    **options: Any,
 ) -> None:
     """Builds an agent and lets it act in a few short episodes, as an evaluation would.
 
@@ -60,8 +60,6 @@ def check_agent(
       ConformanceError: at the first thing that is wrong.
       InputError: if no agent has the given name, the agent can't use the checkpoint, or there is no such task.
     """
-    if options and not isinstance(task, str):
-        raise InputError(f"expected the name of a task beside {next(iter(options))}, found {type(task).__name__}")
     if isinstance(agent_class, str):
         agent_class = load_agent_class(agent_class)
     name = getattr(agent_class, "__name__", repr(agent_class))
@@ -69,18 +67,18 @@ def check_agent(
         checked = checked_agent_class(name, agent_class)
     except InputError as error:
         raise ConformanceError(str(error)) from error
-    played = _small_task() if task is None else Task.of(task, **options) if isinstance(task, str) else task
+    asked = as_options(_small_task() if task is None else task, options)
     try:
-        played = task_as_played(name, checked, played)
+        played = task_as_played(name, checked, asked, resolve)
         _check_acting(name, checked, played, None if checkpoint is None else pathlib.Path(checkpoint))
     except AgentError as error:
         raise ConformanceError(str(error)) from error
 
 
-def _small_task() -> Task:
+def _small_task() -> TaskOptions:
     rng = np.random.default_rng(0)
     mazes = tuple(generate("dfs", _SIZE, rng, f"maze-{index}") for index in range(_NUM_MAZES))
-    return Task.of("hierarchical", mazes=mazes, time_limit=_TIME_LIMIT, landmark_distance=3)
+    return TaskOptions(task="hierarchical", mazes=mazes, time_limit=_TIME_LIMIT, landmark_distance=3)
 
 
 def _check_acting(name: str, agent_class: type[Agent], task: Task, checkpoint: pathlib.Path | None) -> None:

@@ -17,7 +17,9 @@ from mazebench.results.records import Record
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, save_trajectories
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.observation import state_errors
-from mazebench.tasks.task import Task, evaluation_task
+from mazebench.tasks.task import Task, resolve_for_evaluation
+from mazebench.tasks.task_options import TaskOptions
+from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.trials import Trial, select_trials
 
 NASTY = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=1>"
@@ -58,7 +60,6 @@ def make_result(
     checkpoint: str | None = None,
     split: str = "eval",
     privileged: bool = False,
-    track: str | None = None,
     level: int = 1,
     **levels: float,
 ) -> pathlib.Path:
@@ -66,35 +67,35 @@ def make_result(
 
     On a track, all frozen episodes of the first `num_mazes` mazes are played.
     """
-    if track is not None:
-        options = {"track": track, "level": level}
+    if task in TRACKS:
+        options = {"level": level}
     else:
         options = {"size": size, "distances": distances, "landmark_distance": landmark_distance, **levels}
-    spec = evaluation_task(task, split=split, **options)
+    spec = resolve_for_evaluation(TaskOptions(task=task, split=split, **options))
     trials, size = select_trials(spec, episodes_per_distance), spec.size
     rng = np.random.default_rng([len(agent), size, landmark_distance, seed])
     labels = {"agent": agent, "task": task, "size": size, "split": split}
-    labels |= {} if track is None else {"track": track, "level": level}
+    labels |= {"level": level} if task in TRACKS else {}
     records, drives = [], []
     for trial in trials:
         if trial.episode.maze < num_mazes:
             success = bool(rng.random() < skill ** (trial.distance / 4))
             drives.append(_drive(spec, trial, success, rng))
-            content = labels | _outcome(len(records), trial, spec, success, drives[-1]) | spec.perturbations
+            content = labels | _outcome(len(records), trial, spec, success, drives[-1]) | spec.options.perturbations
             records.append(Record(**content))
     folder.mkdir(parents=True)
     (folder / EPISODES).write_text("".join(each.to_line() for each in records))
     if record:
         save_trajectories(folder / TRAJECTORIES, drives)
     provenance = {
-        "benchmark_manifest_sha256": manifest_hash(spec.benchmark),
+        "benchmark_manifest_sha256": manifest_hash(spec.options.benchmark),
         "checkpoint_sha256": checkpoint,
         "mazes_sha256": mazes_hash(spec),
         "seed": seed,
         "command": ["mazebench", "eval", "--agent", agent],
         "packages": {"mazebench-mujoco": "0.1.0", "numpy": np.__version__},
     }
-    content = {"agent": agent, "task": spec.to_json(), "benchmark": spec.benchmark, "episodes": len(records)}
+    content = {"agent": agent, "task": spec.to_json(), "benchmark": spec.options.benchmark, "episodes": len(records)}
     write_json(folder / SUMMARY, content | {"provenance": provenance, "privileged": privileged})
     return _set_means(folder, records)
 
@@ -162,7 +163,7 @@ def _set_means(folder: pathlib.Path, records: list[Record]) -> pathlib.Path:
 
 def _drive(spec: Task, trial: Trial, success: bool, rng: np.random.Generator) -> Trajectory:
     """Drives along the shortest path with some jitter, only a part of it without success."""
-    episode, maze = trial.episode, spec.all_mazes[trial.episode.maze]
+    episode, maze = trial.episode, spec.mazes[trial.episode.maze]
     points = cell_to_point(np.array(path_through_walls(maze.walls, episode.start, episode.goal)), spec.size)
     distances = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1]), axis=1).cumsum()
     end = distances[-1] - 0.5 if success else distances[-1] * rng.uniform(0.1, 0.8)
@@ -189,7 +190,7 @@ def _outcome(number: int, trial: Trial, spec: Task, success: bool, drive: Trajec
     scores = spl(np.array([success] * 2), shortest, np.array([driven] * 2)).tolist()
     return {
         "episode": number,
-        "maze": spec.all_mazes[trial.episode.maze].name,
+        "maze": spec.mazes[trial.episode.maze].name,
         "start": trial.episode.start,
         "goal": trial.episode.goal,
         "distance": trial.distance,

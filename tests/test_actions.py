@@ -72,7 +72,7 @@ class TestControls:
                 actions = rng.uniform(-1, 1, size=(32, 3))
             _, _, _, _, info = envs.step(actions)
             depth = max(
-                depth, *(sunk_in(spec.all_mazes[m], p) for m, p in zip(info["maze"], info["position"], strict=True))
+                depth, *(sunk_in(spec.mazes[m], p) for m, p in zip(info["maze"], info["position"], strict=True))
             )
         assert depth < 0.01
 
@@ -220,10 +220,6 @@ class TestAgents:
         assert found["four"] == found["diff"]
         assert found["six"] == found["velocity"]
         assert found["six"] != found["diff"]
-
-    @pytest.mark.parametrize(("older", "kind"), [(False, "six"), (True, "velocity")])
-    def test_the_task_of_an_older_checkpoint_is_read(self, older, kind):
-        assert Task.from_json({"size": 15, "continuous": older}) == Task.of(size=15, actions=kind)
 
     def test_an_unknown_kind_is_refused(self):
         with pytest.raises(InputError, match=r"^unknown actions 'five'; available: diff, four, six, velocity$"):

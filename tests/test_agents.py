@@ -18,7 +18,7 @@ from mazebench.errors import InputError, UnplayableError
 from mazebench.evaluation.agent_inputs import true_state
 from mazebench.evaluation.checked_agent import CheckedAgent
 from mazebench.evaluation.chunk import run_trials
-from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.kinds import generate
@@ -322,17 +322,17 @@ class Small(Counting):
 
 class TestTracks:
     def test_an_agent_that_asks_for_one_size_is_refused_where_a_track_shows_another(self):
-        assert make_plan(EvalOptions.of("mine:Small", track="building"), Small).build_agent().name == "mine:Small"
-        plan = make_plan(EvalOptions.of("mine:Small", track="rough"), Small)
+        assert make_plan(eval_options("mine:Small", task="building"), Small).build_agent().name == "mine:Small"
+        plan = make_plan(eval_options("mine:Small", task="rough"), Small)
         message = r"context_size\(\) asks for maps of 31 x 31 only; the track 'rough' shows 62 x 62$"
         with pytest.raises(UnplayableError, match=message):
             plan.build_agent()
 
     def test_a_track_that_shows_another_map_than_asked_for_is_remarked(self):
         remark = "navigator asks for a map of 31 x 31; the track 'rough' shows 62 x 62 to all agents"
-        assert make_plan(EvalOptions.of("navigator", track="rough")).remark == remark
-        assert make_plan(EvalOptions.of("navigator", track="building")).remark is None
-        assert make_plan(EvalOptions.of("random", track="rough")).remark is None
+        assert make_plan(eval_options("navigator", task="rough")).remark == remark
+        assert make_plan(eval_options("navigator", task="building")).remark is None
+        assert make_plan(eval_options("random", task="rough")).remark is None
 
     @pytest.mark.parametrize("name", agent_names())
     @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from mazebench.errors import InputError
 from mazebench.evaluation.suites import SUITES
 from mazebench.maps.maze_files import read_maze
 from mazebench.maps.text import format_maze
-from mazebench.tasks.task import Task
+from mazebench.tasks.task_options import TaskOptions
 
 COMMANDS = typer.main.get_command(cli.app).commands
 FEW = ("--distances", "1,2", "--episodes-per-distance", "1")
@@ -82,7 +82,7 @@ BAD_INPUT = [
     ((*TINY, "--distances", "one"), "expected distances like 1-3 or 2,3, found 'one'"),
     ((*TINY, "--agent", "planner"), "expected one --agent without --suite, found 2"),
     ((*QUICK, "--suite", "papr"), "unknown suite 'papr'; available: paper, quick, tracks"),
-    ((*RANDOM, "--track", "adrift", "--map-flip", "0.1"), "'adrift': expected no perturbation, found map_flip 0.1"),
+    ((*RANDOM, "--track", "adrift", "--map-flip", "0.1"), "'adrift': expected map_flip 0.0, found 0.1"),
     ((*TINY, "--out", "{bad}/file/out"), "file/out: can't write there: Not a directory"),
     ((*TINY, "--out", "{bad}/used"), "expected an empty folder or one of a run, found 'thesis.tex' in it"),
     ((*TINY, "--mazes", "{bad}/marked.txt"), "marked: expected '#*1@%' or a block for wall"),
@@ -148,7 +148,7 @@ def test_other_texts_are_no_numbers(text):
 
 
 def test_texts_are_split_at_commas_as_if_each_was_an_option():
-    @takes_options(Task)
+    @takes_options(TaskOptions)
     def command(values):
         assert values["sensors"] == ("egocentric", "lidar")
 

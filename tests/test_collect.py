@@ -23,7 +23,7 @@ NEAR = Task.of("rebuilt", level=(1, 2), distances=(15, 16), kinds=("dfs", "rooms
 
 def collect(folder: pathlib.Path, task: Task = NEAR, agent: str = "oracle", count: int = 3, **how) -> pathlib.Path:
     wanted = CollectOptions(episodes=count, format=how.pop("format", "npz"))
-    collect_demonstrations(EvalOptions(agent, task, seed=how.pop("seed", 0)), wanted, folder, **how)
+    collect_demonstrations(EvalOptions(agent=agent, task=task.asked, seed=how.pop("seed", 0)), wanted, folder, **how)
     return folder
 
 
@@ -51,9 +51,9 @@ class TestEpisodes:
         for episode in episodes_of(collect(tmp_path / "run", task, agent, seed=7)):
             arrays, leg = episode.arrays, 0
             observation, info = env.reset(seed=episode.seed)
-            assert env.unwrapped.task_spec.all_mazes[info["maze"]].name == episode.maze
-            rules = env.unwrapped.task.rules
-            way_left = env.unwrapped.task_spec.all_mazes[info["maze"]].distances(rules.episodes[0].goal).ravel()
+            assert env.unwrapped.task.mazes[info["maze"]].name == episode.maze
+            rules = env.unwrapped.runner.rules
+            way_left = env.unwrapped.task.mazes[info["maze"]].distances(rules.episodes[0].goal).ravel()
             assert arrays["infos/privileged/way_left"][0] == episode.distance
             for step in range(len(arrays["actions"]) + 1):
                 leg += step > 0 and info["is_first"]

@@ -118,7 +118,7 @@ env.reset(seed=0)
 picture = env.render()
 for copied in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
     assert np.array_equal(copied.render(), picture)
-    other = MazeEnv(env.task_spec, seed=0)
+    other = MazeEnv(env.task, seed=0)
     other.reset(seed=0)
     seen = [each.step(0)[0]["egocentric"] for each in (copied, other)]
     assert np.array_equal(*seen)

@@ -57,8 +57,8 @@ class TestRegistration:
     def test_the_size_of_an_id_yields_to_maps_and_to_a_size(self, name, size):
         name = f"mazebench/{name}-v1"
         maze = generate("dfs", 51, np.random.default_rng(0))
-        assert gymnasium.make(name, mazes=maze, distances=[40]).unwrapped.task_spec.all_mazes == (maze,)
-        assert gymnasium.make(name).unwrapped.task_spec.size == size
+        assert gymnasium.make(name, mazes=maze, distances=[40]).unwrapped.task.mazes == (maze,)
+        assert gymnasium.make(name).unwrapped.task.size == size
         with pytest.raises(InputError, match="expected mazes of size 15, found size 51"):
             gymnasium.make(name, mazes=maze, size=15)
 
@@ -79,14 +79,14 @@ class TestRegistration:
     def test_an_id_leads_to_its_task_or_track_and_size(self, name):
         assert gymnasium.spec(name).max_episode_steps is None
         title, size = name.removeprefix("mazebench/").split("-")[:2]
-        task_spec = gymnasium.make(name).unwrapped.task_spec
+        task = gymnasium.make(name).unwrapped.task
         expected = (title.removesuffix("Goal").lower(), int(size) if size.isdigit() else 31)
-        assert (task_spec.track or task_spec.task, task_spec.size) == expected
+        assert (task.name, task.size) == expected
 
     def test_an_environment_is_made_with_options(self):
         env = gymnasium.make("mazebench/Local-13-v1", split="eval", distances=[7], context_size=9, seed=3)
-        spec = env.unwrapped.task_spec
-        assert (spec.all_mazes[0].name, spec.distances, spec.context_size) == ("13-eval-00", (7,), 9)
+        spec = env.unwrapped.task
+        assert (spec.mazes[0].name, spec.distances, spec.context_size) == ("13-eval-00", (7,), 9)
         first, again = env.reset()[0], env.reset(seed=3)[0]
         np.testing.assert_array_equal(first["state"], again["state"])
 
@@ -226,8 +226,8 @@ class TestSpec:
         env = gymnasium.make(name, **options)
         again = gymnasium.make(EnvSpec.from_json(env.spec.to_json()))
         assert again.spec.to_json() == env.spec.to_json()
-        assert again.unwrapped.task_spec == env.unwrapped.task_spec
-        names = [[maze.name for maze in each.unwrapped.task_spec.all_mazes] for each in (env, again)]
+        assert again.unwrapped.task == env.unwrapped.task
+        names = [[maze.name for maze in each.unwrapped.task.mazes] for each in (env, again)]
         assert names[0] == names[1]
 
     @pytest.mark.parametrize("options", OPTIONS)
@@ -236,7 +236,7 @@ class TestSpec:
             "mazebench/Local-13-v1", num_envs=3, autoreset_mode=AutoresetMode.NEXT_STEP, **options
         )
         again = gymnasium.make_vec(EnvSpec.from_json(envs.spec.to_json()))
-        assert again.task_spec == envs.task_spec
+        assert again.task == envs.task
         assert (again.num_envs, again.metadata) == (3, envs.metadata)
 
     @pytest.mark.parametrize(
@@ -271,7 +271,7 @@ class TestSpec:
         write_text_maze(own_mazes()[0], tmp_path / "room.txt")
         env = gymnasium.make("mazebench/Local-13-v1", mazes=tmp_path / "room.txt", distances=[1])
         assert env.spec.kwargs["mazes"] == str(tmp_path / "room.txt")
-        assert gymnasium.make(EnvSpec.from_json(env.spec.to_json())).unwrapped.task_spec == env.unwrapped.task_spec
+        assert gymnasium.make(EnvSpec.from_json(env.spec.to_json())).unwrapped.task == env.unwrapped.task
 
     def test_a_description_that_lacks_something_is_refused(self):
         with pytest.raises(InputError, match="expected a maze with name, rows, cell_size and kind, found rows"):

@@ -156,7 +156,7 @@ class TestSameEpisodes:
         assert kinds["terminated"] > 0
         assert kinds["truncated"] > 0
         assert kinds["mazes"] > 0
-        assert (kinds["switches"] > 0) == (spec.task == "hierarchical" or spec.num_goals > 1)
+        assert (kinds["switches"] > 0) == spec.has_legs
 
     @pytest.mark.parametrize("name", ["hierarchical", "position_noise"])
     @pytest.mark.parametrize(("num_envs", "num_threads"), [(1, 1), (7, 2)])

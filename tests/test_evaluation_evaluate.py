@@ -17,7 +17,7 @@ from run_folders import FEW, FILES, IMPORTS, RECORDED, Killed, files_of, kill_af
 from mazebench.agent import Agent, SingleAgent
 from mazebench.errors import InputError, UnplayableError
 from mazebench.evaluation.chunk import Chunk, run_chunk
-from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import load_mazes
@@ -25,7 +25,8 @@ from mazebench.maps.kinds import generate
 from mazebench.maps.text import write_text_maze
 from mazebench.results.frozen_oracle import frozen_oracle_steps
 from mazebench.results.reading import load_result
-from mazebench.tasks.task import Task, evaluation_task
+from mazebench.tasks.task import Task, resolve_for_evaluation
+from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.trials import frozen_trials
 
 PERTURBATIONS = ("map_flip", "map_warp", "position_noise")
@@ -83,7 +84,7 @@ class TestResults:
         summary = summary_of(planner_run)
         assert {path.name for path in planner_run.iterdir()} == FILES
         assert (summary["agent"], summary["benchmark"], summary["episodes"]) == ("planner", "paper", 40)
-        assert Task.from_json(summary["task"]) == evaluation_task(distances=FEW["distances"])
+        assert Task.from_json(summary["task"]) == resolve_for_evaluation(TaskOptions(distances=FEW["distances"]))
         assert list(summary["by_distance"]) == ["1", "2"]
         for row in (summary["overall"], *summary["by_distance"].values()):
             assert row["success_rate"] == 1.0
@@ -93,7 +94,8 @@ class TestResults:
     def test_a_task_that_was_made_before_is_evaluated(self):
         task = Task.of("rebuilt", level=2, split="dev", distances=(15,))
         summary = evaluate("random", task)
-        assert (summary.task, summary.benchmark) == (task, "tracks")
+        assert (summary.task, summary.benchmark) == (task.options, "tracks")
+        assert evaluate("random", summary.task).overall == summary.overall
         with pytest.raises(InputError, match="expected no options beside a Task, found size"):
             evaluate("random", task, size=31)
 
@@ -192,7 +194,7 @@ class TestSeeds:
         assert [record["path_length"] for record in again] != [record["path_length"] for record in before]
 
     def test_agents_seeds_do_not_depend_on_the_episodes_seeds(self, monkeypatch):
-        plan = make_plan(EvalOptions.of(f"{__name__}:Witness", **FEW))
+        plan = make_plan(eval_options(f"{__name__}:Witness", **FEW))
         others = tuple(
             dataclasses.replace(trial, episode=dataclasses.replace(trial.episode, seed=1000 + index))
             for index, trial in enumerate(plan.trials)

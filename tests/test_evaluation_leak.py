@@ -11,7 +11,7 @@ from run_folders import records_of
 
 from mazebench.agent import Agent
 from mazebench.evaluation.agent_inputs import agent_seed
-from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.plan import make_plan
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
@@ -37,7 +37,7 @@ class Undoing(ClosedLoopPlanner):
 
 def test_results_do_not_depend_on_what_info_tells_of_the_truth(monkeypatch, tmp_path):
     def play(out: pathlib.Path) -> list[dict]:
-        evaluate("navigator", out=out, track="rebuilt", split="dev", distances=(15,))
+        evaluate("navigator", out=out, task="rebuilt", split="dev", distances=(15,))
         return records_of(out)
 
     honest, infos = play(tmp_path / "honest"), Rules.infos
@@ -62,7 +62,7 @@ def test_a_planner_that_undoes_flips_with_its_seed_does_no_better(monkeypatch, t
     more = successes(Undoing, tmp_path / "undoing") - honest
     assert more.mean() <= 2 * more.std(ddof=1) / len(more) ** 0.5
     # If it were told the episodes' seeds, it would do better, and this test would see that.
-    trials = make_plan(EvalOptions.of("random", **options)).trials
+    trials = make_plan(eval_options("random", **options)).trials
     told = {agent_seed(0, index): trial.episode.seed for index, trial in enumerate(trials)}
     monkeypatch.setattr(Undoing, "episode_seeds", told)
     assert successes(Undoing, tmp_path / "told").mean() >= honest.mean() + 0.2

@@ -11,9 +11,9 @@ from run_folders import FEW, IMPORTS, summary_of
 
 from mazebench import __version__
 from mazebench.agent_loading import load_agent_class
-from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.evaluation.provenance import checkpoint_metadata, code_hash, provenance
+from mazebench.evaluation.provenance import checkpoint_metadata, code_hash
 from mazebench.maps.benchmark import manifest_hash
 from mazebench.tasks.task import Task
 
@@ -47,8 +47,8 @@ def test_versions_options_and_machine_are_in_the_summary(tmp_path):
 
 def test_a_checkpoint_is_named_by_its_hash_and_tells_its_config(tmp_path):
     checkpoint = write_checkpoint(tmp_path / "x.safetensors", {"mine": json.dumps({"config": {"width": 8}})})
-    options = EvalOptions.of("mah", checkpoint=checkpoint)
-    found = provenance(options, load_agent_class("mah")).model_dump()
+    options = eval_options("mah", checkpoint=checkpoint)
+    found = make_plan(options).provenance.model_dump()
     assert found["checkpoint_sha256"] == hashlib.sha256((tmp_path / "x.safetensors").read_bytes()).hexdigest()
     assert found["checkpoint_metadata"] == {"mine": {"config": {"width": 8}}}
     assert found["checkpoint"] == checkpoint
@@ -56,8 +56,8 @@ def test_a_checkpoint_is_named_by_its_hash_and_tells_its_config(tmp_path):
 
 def test_a_checkpoint_that_ships_is_told_without_the_path_to_it():
     agent_class = load_agent_class("mah")
-    options = EvalOptions.of("mah", checkpoint=str(agent_class.default_checkpoint()))
-    found = provenance(options, agent_class).model_dump()
+    options = eval_options("mah", checkpoint=str(agent_class.default_checkpoint()))
+    found = make_plan(options).provenance.model_dump()
     assert found["checkpoint"] == "mah-13.safetensors"
 
 
@@ -66,8 +66,8 @@ def test_an_agent_at_hand_is_named_by_the_hash_of_its_file(tmp_path, monkeypatch
     (tmp_path / "provenance_at_hand.py").write_text(code)
     monkeypatch.syspath_prepend(tmp_path)
     name = "provenance_at_hand:Mine"
-    options = EvalOptions.of(name)
-    found = provenance(options, load_agent_class(name)).model_dump()
+    options = eval_options(name)
+    found = make_plan(options).provenance.model_dump()
     assert found["agent_code_sha256"] == hashlib.sha256(code.encode()).hexdigest()
     assert (found["agent_class"], found["agent_package"]) == (name, None)
 
@@ -98,7 +98,7 @@ def test_a_checkpoint_of_another_kind_tells_nothing(tmp_path, content):
 
 
 def test_a_summary_of_a_track_has_the_time_limit_of_its_farthest_goals(tmp_path):
-    evaluate("random", out=tmp_path, track="adrift", split="dev", distances=(15,))
+    evaluate("random", out=tmp_path, task="adrift", split="dev", distances=(15,))
     task = Task.from_json(summary_of(tmp_path)["task"])
     records = [json.loads(line) for line in (tmp_path / "episodes.jsonl").read_text().splitlines()]
     assert task.longest_episode == max(record["steps"] for record in records) == 6 * 15 + 150

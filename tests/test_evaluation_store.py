@@ -16,7 +16,7 @@ from run_folders import FEW, files_of, results_of
 
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.chunk import Chunk, Ended, run_chunk
-from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.store import Store
@@ -26,7 +26,7 @@ from mazebench.results.records import Summary
 
 @pytest.fixture(scope="module")
 def plan() -> Plan:
-    return make_plan(EvalOptions.of("random", **FEW))
+    return make_plan(eval_options("random", **FEW))
 
 
 @pytest.fixture(scope="module")

@@ -13,12 +13,13 @@ from mazebench.evaluation.eval_options import RunOptions
 from mazebench.evaluation.suites import SUITES, Part, run_suite
 from mazebench.maps.benchmark import SIZES
 from mazebench.results.comparison import compare_folders
-from mazebench.tasks.task import evaluation_task
+from mazebench.tasks.task import resolve_for_evaluation
+from mazebench.tasks.task_options import TaskOptions
 
 TINY = (
-    Part("near", "local", {"distances": (1, 2)}, 1),
-    Part("noise-0.5", "local", {"distances": (1,), "position_noise": 0.5}, 1),
-    Part("warp-0.2", "local", {"distances": (3,), "map_warp": 0.2}, 1),
+    Part("near", TaskOptions(distances=(1, 2)), 1),
+    Part("noise-0.5", TaskOptions(distances=(1,), position_noise=0.5), 1),
+    Part("warp-0.2", TaskOptions(distances=(3,), map_warp=0.2), 1),
 )
 PARTS = [part.name for part in TINY]
 BOTH = ["planner", "random"]
@@ -43,11 +44,11 @@ class TestParts:
     def test_no_part_is_run_twice(self, suite):
         parts = SUITES[suite]
         assert len({part.name for part in parts}) == len(parts)
-        tasks = {(evaluation_task(part.task, **part.options), part.episodes_per_distance) for part in parts}
+        tasks = {(resolve_for_evaluation(part.task), part.episodes_per_distance) for part in parts}
         assert len(tasks) == len(parts)
 
     def test_the_suite_paper_is_the_papers_protocol(self):
-        paper = {part.name: evaluation_task(part.task, **part.options) for part in SUITES["paper"]}
+        paper = {part.name: resolve_for_evaluation(part.task) for part in SUITES["paper"]}
         assert list(paper) == [
             *(f"local-{size}" for size in SIZES),
             *(f"hierarchical-13-k{cells}" for cells in range(1, 6)),
@@ -139,8 +140,8 @@ class TestPartsThatCannotBePlayed:
     def mixed(self, monkeypatch):
         parts = (
             *TINY[:2],
-            Part("corners", "hierarchical", {}),
-            Part("flips", "hierarchical", {"map_flip": 0.1}),
+            Part("corners", TaskOptions(task="hierarchical")),
+            Part("flips", TaskOptions(task="hierarchical", map_flip=0.1)),
         )
         monkeypatch.setitem(SUITES, "mixed", parts)
 

@@ -35,7 +35,7 @@ def test_drives_by_the_labels_are_about_as_quick_as_the_oracles(envs):
         first = terminated & (steps == 0)
         if first.any():
             steps[first] = info["final_info"]["steps"][first]
-    assert steps.sum() < 1.05 * sum(measure_oracle_steps(envs.task_spec, trials))
+    assert steps.sum() < 1.05 * sum(measure_oracle_steps(envs.task, trials))
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_labels_follow_from_the_state_whoever_has_driven_to_it(task, options):
     for step in range(100):
         found, rules = labels(envs), envs.rules
         if step % 10 == 0:
-            new = Expert(envs.task_spec.all_mazes, NUM_ENVS)
+            new = Expert(envs.task.mazes, NUM_ENVS)
             costs = new.costs(rules.maze, rules.target, rules.pose, envs.velocity())
             np.testing.assert_array_equal(found, costs.argmin(axis=1))
             np.testing.assert_array_equal(labels(envs, costs=True), costs)

@@ -18,7 +18,7 @@ from mazebench.envs.env_spec import JsonSpec
 from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps import drawn
 from mazebench.maps.drawn import FreshMazes, draw_mazes
@@ -76,12 +76,12 @@ class TestDrawnMazes:
         assert "\n" not in str(caught.value)
 
     def test_an_evaluation_draws_other_mazes_than_a_training(self):
-        options = EvalOptions.of("random", kinds="house", num_mazes=2, distances=(3,), episodes_per_distance=1)
+        options = eval_options("random", kinds="house", num_mazes=2, distances=(3,), episodes_per_distance=1)
         plan = make_plan(options)
-        assert [maze.name for maze in plan.task.all_mazes] == ["house-13-dev-00", "house-13-dev-01"]
-        assert plan.task.split_in_results == "custom"
+        assert [maze.name for maze in plan.task.mazes] == ["house-13-dev-00", "house-13-dev-01"]
+        assert plan.task.options.split_in_results == "custom"
         with pytest.raises(InputError, match="expected no fresh mazes in an evaluation"):
-            EvalOptions.of("random", fresh=True)
+            make_plan(eval_options("random", fresh=True))
 
 
 class TestFreshMazes:
@@ -97,8 +97,8 @@ class TestFreshMazes:
         env = MazeEnv(spec, seed=5)
         env.reset()
         env.reset()
-        episode = env.task.episode
-        compiled = MazeEnv(Task.of(mazes=spec.all_mazes[episode.maze], distances=1, time_limit=300))
+        episode = env.runner.episode
+        compiled = MazeEnv(Task.of(mazes=spec.mazes[episode.maze], distances=1, time_limit=300))
         compiled.reset(options={"episode": dataclasses.replace(episode, maze=0)})
         rng = np.random.default_rng(0)
         for _ in range(60):
@@ -121,7 +121,7 @@ class TestFreshMazes:
     def test_a_maze_that_is_too_small_for_the_distance_is_drawn_again(self):
         spec = Task.of(kinds="house", fresh=True, distances=max(each.diameter for each in small_houses()))
         episode = sample_episode(spec, np.random.default_rng(0))
-        assert spec.all_mazes[episode.maze].distance(episode.start, episode.goal) == spec.distances[0]
+        assert spec.mazes[episode.maze].distance(episode.start, episode.goal) == spec.distances[0]
 
     def test_pictures_show_the_maze_of_the_episode(self):
         run_with_egl("""
@@ -149,8 +149,8 @@ class TestEnvironments:
         env, other = MazeEnv(spec, seed=1), MazeEnv(spec, seed=2)
         first, _ = env.reset()
         other.reset()
-        second, info = other.reset(options={"episode": env.task.episode})
-        assert info["maze"] == env.task.episode.maze
+        second, info = other.reset(options={"episode": env.runner.episode})
+        assert info["maze"] == env.runner.episode.maze
         for name, value in first.items():
             np.testing.assert_array_equal(value, second[name], err_msg=name)
 
@@ -190,11 +190,11 @@ class TestTraining:
 
     def test_held_out_mazes_are_of_the_kinds_that_are_trained_in(self):
         evaluation = HeldOutEvaluation(Task.of(kinds=KINDS, fresh=True), 4)
-        assert [maze.kind for maze in evaluation.task.all_mazes] == ["dfs", "house"] * 2
+        assert [maze.kind for maze in evaluation.task.mazes] == ["dfs", "house"] * 2
 
     def test_maps_of_your_own_are_trained_and_evaluated_in(self, tmp_path):
         path = tmp_path / "plan.txt"
         path.write_text(format_maze(draw_mazes(("house",), 13, "dev", 1)[0]))
         train(**options(mazes=str(path), kinds=(), fresh=False, env_steps=480), out=tmp_path / "run")
         assert "sha256" in json.loads((tmp_path / "run" / "config.json").read_text())["task"]["mazes"]
-        assert HeldOutEvaluation(Task.of(mazes=str(path)), 4).task.all_mazes[0].name == "plan"
+        assert HeldOutEvaluation(Task.of(mazes=str(path)), 4).task.mazes[0].name == "plan"

@@ -64,7 +64,7 @@ def test_a_policy_learns_from_them(task):
 
 def test_ways_are_read_as_by_the_neural_planner():
     envs = MazeVecEnv(mazebench.make_vec("building", 3, distances=(3,)))
-    agent = NeuralPlanner(NeuralPlanner.default_config, envs.envs.task_spec.interface)
+    agent = NeuralPlanner(NeuralPlanner.default_config, envs.envs.task.interface)
     reader = WayFeatures(envs.observation_space)
     reader.planner.load_state_dict(agent.network.state_dict(), strict=False)
     envs.seed(0)

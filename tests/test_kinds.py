@@ -166,7 +166,7 @@ def test_mazes_of_13_cells_mostly_have_3_to_6_landmarks():
     rng = np.random.default_rng(0)
     spec = Task.of("hierarchical", mazes=[generate("dfs", 13, rng) for _ in range(300)], landmark_distance=5)
     num_landmarks = []
-    for index, maze in enumerate(spec.all_mazes):
+    for index, maze in enumerate(spec.mazes):
         episode = Episode(index, *corner_cells(maze), yaw=0.0, seed=0)
         num_landmarks.append(
             len(plan_route(spec, episode, show_map(spec, episode)).cells) - 2

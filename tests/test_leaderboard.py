@@ -29,10 +29,10 @@ from mazebench.storage.json_files import write_json
 PAGE = pathlib.Path(__file__).parent.parent / "docs" / "leaderboard.md"
 
 
-def make_part(folder, agent, track="adrift", level=1, successes=240, code="c" * 64, num_mazes=48, **options):
+def make_part(folder, agent, task="adrift", level=1, successes=240, code="c" * 64, num_mazes=48, **options):
     """Writes the result of an agent that reaches the first `successes` of the 240 goals."""
     part = make_result(
-        folder / f"{track}-{level}", agent, track=track, level=level, record=False, num_mazes=num_mazes, **options
+        folder / f"{task}-{level}", agent, task, level=level, record=False, num_mazes=num_mazes, **options
     )
     origin = {"agent_package": "made-up 1.0", "agent_code_sha256": code}
     edit_summary(part, provenance=read_summary(part)["provenance"] | origin)

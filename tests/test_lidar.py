@@ -142,7 +142,7 @@ class TestSensor:
         env = mazebench.load(sensors="lidar", position_noise=0.5, map_flip=0.2, map_warp=0.2, seed=3)
         time_step = env.reset()
         for action in (4, 0, 0, 2, 5, 0):
-            maze, pose = env.task.spec.all_mazes[env.task.episode.maze], env.physics.data.qpos
+            maze, pose = env.maze_task.mazes[env.task.episode.maze], env.physics.data.qpos
             np.testing.assert_array_equal(time_step.observation["lidar"], ranges_of(maze, *pose))
             time_step = env.step(action)
 

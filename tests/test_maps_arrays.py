@@ -131,12 +131,12 @@ class TestFile:
 class TestTasks:
     def test_an_array_is_a_task(self):
         env = mazebench.load(mazes=WALLS, distances=[2])
-        assert env.task.spec.all_mazes == (Maze(WALLS),)
+        assert env.maze_task.mazes == (Maze(WALLS),)
 
     def test_several_arrays_are_a_task(self):
         other = WALLS.T.copy()
         for maps in ([WALLS, other], (Maze(WALLS), other), np.stack([WALLS, other])):
-            assert mazebench.Task.of(mazes=maps, distances=[2]).all_mazes == (Maze(WALLS), Maze(other))
+            assert mazebench.Task.of(mazes=maps, distances=[2]).mazes == (Maze(WALLS), Maze(other))
 
     def test_rows_that_are_no_array_are_answered_with_how_to_make_one(self):
         with pytest.raises(InputError, match=r"found list; wrap rows of numbers in np\.array$"):

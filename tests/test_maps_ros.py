@@ -439,4 +439,4 @@ def test_a_folder_of_maps_reads_each_once(tmp_path):
     (tmp_path / "b.yaml").write_text(content.replace("b.pgm", "c.pgm"))
     found = read_mazes(tmp_path)
     assert [(maze.name, maze.cell_size) for maze in found] == [("a", 0.5), ("b", 0.5)]
-    assert mazebench.Task.of(mazes=tmp_path, distances=[2]).all_mazes == found
+    assert mazebench.Task.of(mazes=tmp_path, distances=[2]).mazes == found

@@ -229,7 +229,7 @@ def test_damaged_rollouts_are_refused(tmp_path, content):
 
 def test_goals_get_farther_as_the_run_goes_on():
     task = Task.of(mazes=field(7), distances=(2, 4, 6))
-    options = TrainOptions("neural-planner", minutes=1, first_distance=3, widen_steps=300)
+    options = TrainOptions(agent="neural-planner", minutes=1, first_distance=3, widen_steps=300)
     assert [longest_distance(options, [task], steps) for steps in (0, 100, 299, 300, 10**6)] == [3, 4, 5, 6, 6]
     learner = NeuralPlanner.build_learner(task, overrides=text(SMALL))
     player = Player([task], learner.actor, 16)

@@ -145,7 +145,7 @@ class TestTrack:
         env = mazebench.load("adrift", seed=3, odometry_noise=0.0, lidar_noise="0,0")
         time_step = env.reset()
         (x, y), yaw = env.physics.position(), env.physics.yaw()
-        walls = env.task.spec.all_mazes[env.task.episode.maze].walls
+        walls = env.maze_task.mazes[env.task.episode.maze].walls
         for action in self.ACTIONS:
             own_x, own_y, own_yaw = time_step.observation["state"][[X, Y, YAW]].astype(float)
             # Where the rays end in the frame of odometry, turned and shifted into the maze by the pose at the start.

@@ -6,10 +6,11 @@ import pathlib
 import re
 from collections.abc import Iterable
 
+from mazebench.tasks.task_fields import TaskFields
+
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.options import Option, fields_of
 from mazebench.tasks.task import Task
-from mazebench.tasks.task_fields import TaskFields
 
 PAGE = pathlib.Path(__file__).parent.parent / "docs" / "options.md"
 DERIVED_TABLE = re.compile(r"\| option \| default \| values \| what \|\n(?:\|.*\n)+")

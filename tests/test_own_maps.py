@@ -17,7 +17,7 @@ from mazebench.agent_loading import load_agent_class
 from mazebench.constants import STEPS_PER_ACTION
 from mazebench.errors import InputError, Remark
 from mazebench.evaluation.chunk import run_trials
-from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, corner_cells
@@ -97,7 +97,7 @@ class TestEnvironments:
             steps = single.step(action), gym.step(action), vector.step(np.full(2, action))
             observed = [steps[0].observation, steps[1][0], steps[2][0]]
         start = single.task.episode.start
-        assert vector.task_spec.all_mazes[0].cell_at(*single.physics.position()) != start
+        assert vector.task.mazes[0].cell_at(*single.physics.position()) != start
         vector.close()
 
     def test_the_goal_is_reached_in_its_cell(self):
@@ -156,17 +156,17 @@ class TestAgents:
     @pytest.mark.parametrize("name", ["mah", "dqn"])
     def test_learned_agents_that_read_any_map_get_one_of_the_mazes_own_cells(self, tmp_path, name):
         (tmp_path / "large.txt").write_text(format_maze(generate("dfs", 31, np.random.default_rng(0))))
-        plan = make_plan(EvalOptions.of(name, mazes=str(tmp_path / "large.txt")))
+        plan = make_plan(eval_options(name, mazes=str(tmp_path / "large.txt")))
         assert (plan.task.context_size, plan.untrained_scale, plan.remark) == (31, False, None)
 
     def test_a_map_that_is_coarser_than_the_mazes_is_remarked(self, tmp_path):
         (tmp_path / "large.txt").write_text(format_maze(generate("dfs", 31, np.random.default_rng(0))))
-        assert make_plan(EvalOptions.of("random", mazes=str(tmp_path / "large.txt"))).remark == (
+        assert make_plan(eval_options("random", mazes=str(tmp_path / "large.txt"))).remark == (
             "random is shown the 31 x 31 cells as a map of 21 x 21; context_size() of its class chooses another one "
             "(docs/custom_agents.md)"
         )
-        assert make_plan(EvalOptions.of("planner", mazes=str(tmp_path / "large.txt"))).remark is None
-        assert make_plan(EvalOptions.of("random", track="building")).remark is None
+        assert make_plan(eval_options("planner", mazes=str(tmp_path / "large.txt"))).remark is None
+        assert make_plan(eval_options("random", task="building")).remark is None
 
 
 class TestEnds:
@@ -183,7 +183,7 @@ class TestEnds:
         for seed in range(20):
             episode = sample_episode(spec, np.random.default_rng(seed))
             assert episode.goal == (7, 7)
-            assert spec.all_mazes[0].distance(episode.start, episode.goal) in (2, 5)
+            assert spec.mazes[0].distance(episode.start, episode.goal) in (2, 5)
 
     def test_landmarks_lead_from_the_start_to_the_goal(self):
         env = mazebench.load("hierarchical", mazes=dfs(), start=(7, 7))
@@ -204,9 +204,9 @@ class TestEnds:
             ({"start": (1, 1), "goal": "1,1"}, r"dfs-0: expected start and goal in different cells, found both in"),
             ({"start": (1, 1), "distances": (60,)}, r"dfs-0: expected distances of at most \d+ cells.*--distances"),
             ({"start": (1, 1), "goal": (7, 7), "distances": (2,)}, r"found distances \(2,\), which would be ignored"),
-            ({"start": (1, 1), "pairs": "fixed"}, r"expected pairs 'random' beside a start or a goal, found 'fixed'"),
-            ({"goal": (1, 1), "num_goals": 2}, r"expected num_goals 1 beside a goal, found 2"),
-            ({"start": (1, 1), "track": "building"}, r"track 'building': expected start None, found '1,1'"),
+            ({"start": (1, 1), "pairs": "fixed"}, r"a start or a goal: expected pairs 'random', found 'fixed'"),
+            ({"goal": (1, 1), "num_goals": 2}, r"num_goals 2: expected goal None, found '1,1'"),
+            ({"start": (1, 1), "task": "building"}, r"track 'building': expected start None, found '1,1'"),
         ],
     )
     def test_ends_that_contradict_are_refused_in_a_line(self, options, message):
@@ -228,17 +228,17 @@ class TestDefaults:
         spec = Task.of(mazes=maze)
         if time_limit is None:
             assert (len(spec.distances), spec.distances[0], spec.distances[-1]) == (15, 3, 39)
-            assert spec.time_limit == 6 * 39 + 50
+            assert spec.options.time_limit == 6 * 39 + 50
         else:
-            assert (spec.distances, spec.time_limit) == (tuple(distances), time_limit)
+            assert (spec.distances, spec.options.time_limit) == (tuple(distances), time_limit)
 
     @pytest.mark.parametrize(("cell_size", "steps_a_cell"), [(0.5, 5), (1.0, 6), (3.0, 10)])
     def test_the_time_limit_grows_with_the_way(self, cell_size, steps_a_cell):
         maze = dataclasses.replace(field(25), cell_size=cell_size)
-        assert Task.of(mazes=maze, distances=(20, 40)).time_limit == steps_a_cell * 40 + 50
-        assert Task.of(mazes=maze, start=(1, 1), goal=(1, 21)).time_limit == steps_a_cell * 20 + 50
-        assert Task.of("hierarchical", mazes=maze, landmark_distance=20).time_limit == steps_a_cell * 20 + 50
-        assert Task.of(mazes=maze, time_limit=7).time_limit == 7
+        assert Task.of(mazes=maze, distances=(20, 40)).options.time_limit == steps_a_cell * 40 + 50
+        assert Task.of(mazes=maze, start=(1, 1), goal=(1, 21)).options.time_limit == steps_a_cell * 20 + 50
+        assert Task.of("hierarchical", mazes=maze, landmark_distance=20).options.time_limit == steps_a_cell * 20 + 50
+        assert Task.of(mazes=maze, time_limit=7).options.time_limit == 7
 
 
 class TestEvaluation:

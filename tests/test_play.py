@@ -32,7 +32,7 @@ def corridor() -> Maze:
 def game(corridor) -> Game:
     """From (1, 1), where the body looks at the goal in (1, 3)."""
     game = Game(Task.of(mazes=corridor, distances=[2]), seed=0)
-    game.env.task.choose_episode(episode=Episode(0, (1, 1), (1, 3), 0.0, 0))
+    game.env.runner.choose_episode(episode=Episode(0, (1, 1), (1, 3), 0.0, 0))
     game.begin()
     return game
 
@@ -42,10 +42,10 @@ class TestGame:
         for key, name, action in (("w", "up", 0), ("s", "down", 1), ("q", "left", 4), ("e", "right", 5)):
             states = []
             for pressed in (key, name):
-                game.begin(game.env.task.episode)
+                game.begin(game.env.runner.episode)
                 game.press(pressed)
                 states.append(game.observation["state"])
-            game.begin(game.env.task.episode)
+            game.begin(game.env.runner.episode)
             np.testing.assert_array_equal(states, [game.env.step(action)[0]["state"]] * 2)
         assert (LETTERS["a"], LETTERS["d"]) == (2, 3)
 
@@ -55,7 +55,7 @@ class TestGame:
         assert game.status().startswith("GOAL REACHED after 4 steps")
         assert game.outcome() == "1 of 2 episodes ended at the goal"
         game.press("r")
-        assert (game.env.task.episode.start, game.env.task.steps) == ((1, 1), 0)
+        assert (game.env.runner.episode.start, game.env.runner.steps) == ((1, 1), 0)
         assert len(game.path) == 1
 
 
@@ -91,7 +91,7 @@ class TestViewer:
         game = Game(Task.of("local", size=13, map_flip=0.3), seed=0)
         picture = viewer._map_picture(game.context, 260)
         seen = picture[2::20, 2::20].max(axis=-1) < 128  # beside the marks, which are discs
-        np.testing.assert_array_equal(seen, game.env.task.shown_map.walls)
+        np.testing.assert_array_equal(seen, game.env.runner.shown_map.walls)
 
     def test_a_display_that_does_not_open_is_named_in_one_line(self):
         command = [sys.executable, "-m", "mazebench", "play"]

@@ -127,10 +127,10 @@ class TestValues:
 class TestTracks:
     def test_a_row_for_each_track_and_level_and_a_column_for_each_agent(self, tmp_path):
         for agent in AGENTS:
-            make_result(tmp_path / agent / "adrift-1", agent, track="adrift", level=1, num_mazes=2, record=False)
+            make_result(tmp_path / agent / "adrift-1", agent, task="adrift", level=1, num_mazes=2, record=False)
             make_result(tmp_path / agent / "paper", agent, num_mazes=2, record=False)
         for level in (1, 2):
-            make_result(tmp_path / f"rebuilt-{level}", "mah", track="rebuilt", level=level, num_mazes=2, record=False)
+            make_result(tmp_path / f"rebuilt-{level}", "mah", task="rebuilt", level=level, num_mazes=2, record=False)
         tables = tables_of(tmp_path)
         assert list(column(tables["tracks"], "spl", "mah")) == ["rebuilt 1", "rebuilt 2", "adrift 1"]
         assert list(column(tables["tracks"], "spl", "random")) == ["adrift 1"]
@@ -138,7 +138,7 @@ class TestTracks:
         assert column(tables["local-13"], "spl", "mah", "episodes")["2"] == 2
 
     def test_episodes_with_a_blocked_path_and_others_have_rows(self, tmp_path):
-        folder = make_result(tmp_path / "a", "mah", track="rebuilt", level=2, num_mazes=2, record=False)
+        folder = make_result(tmp_path / "a", "mah", task="rebuilt", level=2, num_mazes=2, record=False)
         edit_records(folder, lambda record: record | {"blocked": record["episode"] % 4 == 0})
         count = read_summary(folder)["episodes"]
         set_outcomes(folder, [index % 4 > 0 for index in range(count)])
@@ -148,9 +148,9 @@ class TestTracks:
         assert rates["2"] == pytest.approx(1 - -(-count // 4) / count)
 
     def test_a_map_scale_that_an_agent_was_never_trained_on_is_marked(self, tmp_path):
-        folder = make_result(tmp_path / "a", "mah", track="adrift", num_mazes=2, record=False)
+        folder = make_result(tmp_path / "a", "mah", task="adrift", num_mazes=2, record=False)
         edit_summary(folder, untrained_scale=True)
-        make_result(tmp_path / "b", "random", track="adrift", num_mazes=2, record=False)
+        make_result(tmp_path / "b", "random", task="adrift", num_mazes=2, record=False)
         table = tables_of(tmp_path)["tracks"]
         assert re.search(r"\| adrift 1 \| \d\.\d\d\* \[.*\] \| \d\.\d\d \[", to_markdown(table.wide("success_rate")))
         assert table.note.endswith("* The agent was never trained on maps of this scale.")

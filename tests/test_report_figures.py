@@ -65,7 +65,7 @@ def test_many_distances_have_bands_and_few_have_bars_beside_one_another(tmp_path
 
 
 def test_a_scale_that_an_agent_was_never_trained_on_has_a_star(tmp_path):
-    folder = make_result(tmp_path / "mah", "mah", track="adrift", num_mazes=2, record=False)
+    folder = make_result(tmp_path / "mah", "mah", task="adrift", num_mazes=2, record=False)
     edit_summary(folder, untrained_scale=True)
     assert [text.get_text() for text in draw(tmp_path, "track-adrift").axes[0].texts] == ["*"]
 

@@ -97,10 +97,10 @@ def track_page(tmp_path_factory):
     for agent in ("mah", "random"):
         here = folder / "results" / agent
         for level in (1, 2):
-            make_result(here / f"adrift-{level}", agent, skill=0.8, track="adrift", level=level, num_mazes=2)
-        make_result(here / "rough", agent, skill=0.8, track="rough", num_mazes=1)
+            make_result(here / f"adrift-{level}", agent, skill=0.8, task="adrift", level=level, num_mazes=2)
+        make_result(here / "rough", agent, skill=0.8, task="rough", num_mazes=1)
         make_result(here / "local", agent, num_mazes=2)
-        rebuilt = make_result(here / "rebuilt", agent, skill=0.9, track="rebuilt", num_mazes=4)
+        rebuilt = make_result(here / "rebuilt", agent, skill=0.9, task="rebuilt", num_mazes=4)
         edit_records(rebuilt, lambda record: record | {"blocked": record["episode"] % 4 == 0})
     write_report([folder / "results"], folder / "report")
     return folder / "report" / "report.html"

@@ -25,7 +25,7 @@ def result(folder, records: list[Record], **changes) -> Result:
     provenance = {"benchmark_manifest_sha256": changes.pop("manifest", "0f"), "mazes_sha256": "a1"}
     content = {
         "agent": "x",
-        "task": Task.of(changes.pop("task", "local"), split="eval"),
+        "task": Task.of(changes.pop("task", "local"), split="eval").options,
         "benchmark": "paper",
         "episodes": len(records),
         "provenance": Provenance.model_validate(provenance),
@@ -106,18 +106,18 @@ class TestResults:
 
     def test_two_levels_of_a_track_are_compared_on_the_same_pairs(self, tmp_path):
         for level in (1, 2):
-            make_result(tmp_path / str(level), "mah", track="adrift", level=level, num_mazes=2, record=False)
+            make_result(tmp_path / str(level), "mah", task="adrift", level=level, num_mazes=2, record=False)
         found = compare_folders(tmp_path / "1", tmp_path / "2")
         assert found.title == (
             f"A is mah (track adrift, level 1) in {tmp_path / '1'}, "
-            f"B is mah (track adrift, level 2) in {tmp_path / '2'}; local, eval mazes 31 x 31"
+            f"B is mah (track adrift, level 2) in {tmp_path / '2'}; adrift 1, eval mazes 31 x 31"
         )
         assert found.parts[""].overall.num_episodes == 10
 
     def test_the_title_says_what_an_agent_was_told_less_or_more(self, tmp_path):
         told = {"shown": {}, "hidden": {"hide": ["map", "goal"]}, "exact": {"exact_pose": True}}
         for name, changes in told.items():
-            make_result(tmp_path / name, "navigator", track="adrift", num_mazes=2, record=False)
+            make_result(tmp_path / name, "navigator", task="adrift", num_mazes=2, record=False)
             edit_task(tmp_path / name, **changes)
         for name, who in (("hidden", "navigator without map and goal"), ("exact", "navigator with the true pose")):
             title = compare_folders(tmp_path / "shown", tmp_path / name).title

@@ -11,7 +11,7 @@ from mazebench.tasks.task import Task
 def a_summary(privileged: bool = False, **options) -> Summary:
     figures = {"n": 4, "success_rate": 1.0, "spl": 0.9, "spl_grid": 0.95}
     figures |= {f"{name}_ci95": (0.5, 1.0) for name in ("success_rate", "spl", "spl_grid")}
-    task = Task.of(**{"split": "eval"} | options)
+    task = Task.of(**{"split": "eval"} | options).options
     defaults = {"agent": "mmn", "task": task, "benchmark": "paper", "episodes": 4, "provenance": {}}
     return Summary(**defaults, privileged=privileged, overall=figures, by_distance={"2": figures, "3": figures})
 

@@ -9,7 +9,7 @@ from made_results import make_result
 from mazebench.errors import InputError
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.report.episodes import read_results
-from mazebench.results.played import check_mazes, shown_of
+from mazebench.results.played import played_task, shown_of
 from mazebench.results.reading import load_result
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.shown_map import leg_context, show_map
@@ -32,13 +32,13 @@ def test_the_map_is_the_one_that_the_agent_was_shown(tmp_path, level):
             shown.seen_cell(cell) @ np.array((13, 1)) for cell in ((1, 11), (11, 1))
         )
         assert len(found.landmarks) > 2
-        num_changed += ((found.walls > 0) != spec.all_mazes[trial.episode.maze].walls).sum()
+        num_changed += ((found.walls > 0) != spec.mazes[trial.episode.maze].walls).sum()
     assert num_changed > 25
 
 
 @pytest.mark.parametrize(("track", "level"), [("rebuilt", 1), ("adrift", 2), ("rough", 3)])
 def test_on_a_track_it_is_what_the_agent_was_given(tmp_path, track, level):
-    task = load_result(make_result(tmp_path / "made", track=track, level=level, num_mazes=1)).summary.task
+    task = played_task(load_result(make_result(tmp_path / "made", task=track, level=level, num_mazes=1)).summary)
     spec = Task.of(track, split="eval", level=level)
     for trial in select_trials(spec, 1)[:2]:
         found = shown_of(task, trial.episode)
@@ -60,7 +60,7 @@ def test_of_maps_that_are_gone_a_report_has_no_paths(tmp_path, remarks):
     assert result.walls("room").sum() == 16
     (tmp_path / "room.txt").write_text(ROOM.replace("#...#", "#.#.#", 1))
     with pytest.raises(InputError, match="expected the mazes that were played, found others"):
-        check_mazes(load_result(tmp_path / "out").summary)
+        played_task(load_result(tmp_path / "out").summary)
     remarks()
     [result] = read_results([tmp_path / "out"])
     assert (result.trajectories, result.walls("room")) == (None, None)

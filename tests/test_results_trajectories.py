@@ -81,7 +81,7 @@ class TestRecording:
             assert np.abs(found.pose[:, 2]).max() <= np.pi
 
     def test_the_observed_path_is_the_true_one_in_the_frame_of_the_first_pose(self, tmp_path):
-        evaluate("random", out=tmp_path, record=True, track="adrift", distances=(15,), odometry_noise=0.0)
+        evaluate("random", out=tmp_path, record=True, task="adrift", distances=(15,), odometry_noise=0.0)
         for found in load_trajectories(tmp_path / TRAJECTORIES):
             true, observed = found.pose.astype(float), found.observed.astype(float)
             assert not observed[0].any()

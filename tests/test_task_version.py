@@ -12,13 +12,12 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from mazebench_agents.random_agent import RandomAgent
 
 import mazebench
 from mazebench.constants import TASK_VERSION
 from mazebench.envs.dm_control import Environment
-from mazebench.evaluation.eval_options import EvalOptions
-from mazebench.evaluation.provenance import provenance
+from mazebench.evaluation.eval_options import eval_options
+from mazebench.evaluation.plan import make_plan
 
 GOLDEN = pathlib.Path(__file__).parent / "golden" / "episodes.json"
 TASKS: dict[str, dict[str, Any]] = {
@@ -44,7 +43,7 @@ def _episode(environment: Environment) -> dict[str, Any]:
     task = environment.task
     while not time_steps[-1].last() and task.steps < NUM_STEPS:
         velocities = np.array([np.cos(task.steps), np.sin(task.steps), 0.5])
-        time_steps.append(environment.step(velocities if task.spec.actions == "velocity" else task.steps**2 % 6))
+        time_steps.append(environment.step(velocities if task.maze_task.actions == "velocity" else task.steps**2 % 6))
     return {
         "maze": task.episode.maze,
         "seed": task.episode.seed,
@@ -82,10 +81,9 @@ def test_version_when_environments_are_asked():
     assert gymnasium.make("mazebench/Building-v1").spec.version == TASK_VERSION
 
 
-@pytest.mark.parametrize("track", [None, "building"])
-def test_version_when_a_result_says_what_it_came_from(track):
-    options = EvalOptions.of("random", track=track)
-    assert provenance(options, RandomAgent).task_version == TASK_VERSION
+@pytest.mark.parametrize("name", ["local", "building"])
+def test_version_when_a_result_says_what_it_came_from(name):
+    assert make_plan(eval_options("random", name)).provenance.task_version == TASK_VERSION
 
 
 if __name__ == "__main__":

@@ -51,11 +51,11 @@ class TestArguments:
     def test_numbers_of_numpy_count_as_those_of_python(self, maker):
         numbers = {"time_limit": np.int32(50), "distances": np.arange(1, 4), "map_flip": np.float32(0.5)}
         env = maker(seed=np.int64(3), **numbers)
-        spec = env.task.spec if maker is mazebench.load else env.unwrapped.task_spec
+        spec = env.maze_task if maker is mazebench.load else env.unwrapped.task
         assert spec == mazebench.Task.of(time_limit=50, distances=(1, 2, 3), map_flip=0.5)
 
     @pytest.mark.parametrize("make", [Environment, MazeEnv, lambda spec: MazeVectorEnv(spec, 2)])
-    def test_anything_but_a_task_spec_is_refused(self, make):
+    def test_anything_but_a_task_is_refused(self, make):
         with pytest.raises(InputError, match=r"expected a Task, as mazebench.Task.of\(\) returns, found str"):
             make("local")
 
@@ -70,7 +70,7 @@ class TestReset:
             make(SPEC).reset(seed=seed)
 
     def test_an_episode_that_ends_where_it_begins_is_refused(self):
-        cell = SPEC.all_mazes[0].free_cells[0]
+        cell = SPEC.mazes[0].free_cells[0]
         episode = Episode(0, tuple(cell.tolist()), tuple(cell.tolist()), 0.0, 1)
         with pytest.raises(InputError, match="expected a goal in another cell than the start, found both in"):
             MazeEnv(SPEC).reset(options={"episode": episode})

@@ -30,7 +30,7 @@ def begin(num_envs: int, episode: Episode, *options, mazes=None, **named) -> Rul
 def drive(rules: Rules, cell: tuple[int, int]) -> tuple[bool, bool, bool]:
     """Steps all bodies into the middle of `cell`; returns whether a leg began, the goal was reached, time was out."""
     num_envs = len(rules.episodes)
-    pose = (*rules.spec.mazes[0].point(cell), 0.0)
+    pose = (*rules.task.mazes[0].point(cell), 0.0)
     rules.advance(np.tile(pose, (num_envs, 1)), np.ones(num_envs, dtype=bool))
     happened = np.array([rules.is_first, rules.reached, rules.timed_out])
     assert (happened == happened[:, :1]).all()
@@ -160,7 +160,7 @@ class TestInfosOfTheTask:
         for _ in range(12):
             episode = sample_episode(task, rng)
             rules.begin(0, episode)
-            info, maze = rules.info(0), task.all_mazes[episode.maze]
+            info, maze = rules.info(0), task.mazes[episode.maze]
             blocked = is_blocked(maze.walls, show_map(task, episode).walls, (episode.start, episode.goal))
             level, distance = episode_level(task, episode), maze.distance(episode.start, episode.goal)
             expected = {"track": track, "level": level, "kind": maze.kind, "distance": distance, "blocked": blocked}

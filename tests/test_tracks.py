@@ -10,7 +10,7 @@ import pytest
 import mazebench
 from benchmarks.freeze_kinds import freeze_kinds
 from mazebench.errors import InputError
-from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import (
@@ -79,7 +79,7 @@ class TestFiles:
 @pytest.mark.parametrize(("track", "level"), PLAYED)
 def test_the_task_of_a_level(track, level):
     spec = Task.of(track, level=level)
-    assert (spec.size, spec.lidar, spec.sensors) == (31, TURTLEBOT3, ("lidar",))
+    assert (spec.size, spec.options.lidar, spec.sensors) == (31, TURTLEBOT3, ("lidar",))
     assert spec.context_size == (62 if track == "rough" else 31)
     is_lost = track in ("adrift", "rough")
     assert spec.odometry_noise_at(level) == ((0.01, 0.05, 0.2)[level - 1] if is_lost else 0.0)
@@ -95,7 +95,7 @@ class TestBuilding:
         spec = Task.of("building", level=level)
         seen = set()
         for episode in episodes(spec, 100):
-            maze, planes = spec.all_mazes[episode.maze], context(spec, episode)
+            maze, planes = spec.mazes[episode.maze], context(spec, episode)
             assert not planes[[LOCAL_MAP, START]].any()
             marked = maze.walls.astype(int)
             marked[episode.goal] = 2
@@ -119,11 +119,9 @@ class TestBuilding:
 class TestRebuilt:
     @pytest.mark.parametrize(("level", "share"), [(1, 0.45), (2, 0.7), (3, 0.9)])
     def test_so_many_doors_moved_that_the_share_of_paths_is_blocked(self, level, share):
-        plan = make_plan(EvalOptions.of("random", track="rebuilt", level=level, split=DEV))
+        plan = make_plan(eval_options("random", task="rebuilt", level=level, split=DEV))
         blocked = [
-            is_blocked(
-                plan.task.all_mazes[trial.episode.maze].walls, show_map(plan.task, trial.episode).walls, ends(trial)
-            )
+            is_blocked(plan.task.mazes[trial.episode.maze].walls, show_map(plan.task, trial.episode).walls, ends(trial))
             for trial in plan.trials
         ]
         assert abs(np.mean(blocked) - share) < 0.08
@@ -141,7 +139,7 @@ class TestRebuilt:
             shown = show_map(spec, episode).walls
             earlier = Maze(shown, "earlier")  # raises if its free cells are not joined
             assert all(map(earlier.is_free, (episode.start, episode.goal)))
-            assert (shown != spec.all_mazes[episode.maze].walls).any()
+            assert (shown != spec.mazes[episode.maze].walls).any()
 
     def test_a_maze_with_too_few_doors_is_refused_in_a_line(self):
         with pytest.raises(InputError, match=r"expected \d doors that can move, found 0"):
@@ -177,7 +175,7 @@ class TestAdriftAndRough:
 
 
 def test_summaries_have_the_figures_of_each_kind_and_of_blocked_episodes(tmp_path):
-    summary = evaluate("planner-closed-loop", out=tmp_path / "run", track="rebuilt", split=DEV, distances=(15,))
+    summary = evaluate("planner-closed-loop", out=tmp_path / "run", task="rebuilt", split=DEV, distances=(15,))
     assert list(summary.by_fact) == ["blocked", "not blocked", *KNOWN]
     assert sum(summary.by_fact[kind].n for kind in KNOWN) == summary.episodes
     assert summary.benchmark == "tracks"

@@ -58,9 +58,9 @@ def test_a_run_says_that_progress_was_rewarded(tmp_path):
 
 
 def test_a_run_on_a_track_names_it_and_is_evaluated_on_it(tmp_path):
-    train(**tiny_options(track="rebuilt", level=(1, 2)), out=tmp_path)
+    train(**tiny_options(task="rebuilt", level=(1, 2)), out=tmp_path)
     task = task_in(tmp_path)
-    assert (task["track"], task["level"], task["num_goals"], task["sensors"]) == ("rebuilt", [1, 2], 1, ["lidar"])
+    assert (task["task"], task["level"], task["num_goals"], task["sensors"]) == ("rebuilt", [1, 2], 1, ["lidar"])
     last = json.loads((tmp_path / "metrics.jsonl").read_text().splitlines()[-1])
     assert [name for name in last if "success" in name] == [f"success_rate_{each}" for each in (15, 21, 28, 34, 40)]
 
@@ -106,10 +106,10 @@ def test_a_learner_that_wants_an_unknown_option_is_refused(tmp_path):
     [
         ({"pairs": "foo"}, "unknown pairs 'foo'; available: fixed, random"),
         ({"minutes": 0}, "expected minutes from 0.01 to 527040, found 0"),
-        ({"task": "hierarchical"}, "expected task 'local' or a track in a training, found 'hierarchical'"),
+        ({"task": "hierarchical"}, "unknown task 'hierarchical'; available: adrift, building, local"),
         ({"actions": "diff"}, "expected actions 'six' in a training, found 'diff'"),
         ({"reward": "progress"}, "agent 'mah': computes the rewards of any goal itself, found reward 'progress'"),
-        ({"track": "rough"}, "agent 'mah': learns only on maps of one pixel a cell .*; found track 'rough'"),
+        ({"task": "rough"}, "agent 'mah': learns only on maps of one pixel a cell .*; found track 'rough'"),
         ({"map_warp": 0.1}, "agent 'mah': learns only on maps of one pixel a cell .*; found map_warp"),
         ({"sensors": "lidar"}, "agent 'mah': reads no sensors, found lidar"),
         ({"distances": 60}, "expected distances of at most "),
@@ -137,7 +137,7 @@ def test_goals_are_relabelled_on_the_maps_that_were_shown():
     sample = learner.replay.sample(200, 4, 3, hindsight=Hindsight(ratio=1.0), rng=rng)
     contexts = learner.maps.contexts(sample, 0).numpy()
     assert {context[GLOBAL_MAP].tobytes() for context in contexts} <= shown
-    true = np.stack([task.all_mazes[maze].walls for maze in sample.maze])
+    true = np.stack([task.mazes[maze].walls for maze in sample.maze])
     assert ((contexts[:, GLOBAL_MAP] != true).sum(axis=(1, 2)) == 2).all(), "a door closed, a door opened"
 
 
@@ -157,7 +157,7 @@ def test_experience_has_what_the_sensors_read_before_a_step_and_after_the_last_o
     [
         ({}, (), [2, 4, 6, 8, 10]),
         ({}, (1, 2, 3, 4, 12), [1, 4, 12]),
-        ({"track": "building"}, (), [15, 21, 28, 34, 40]),
+        ({"task": "building"}, (), [15, 21, 28, 34, 40]),
     ],
 )
 def test_held_out_goals_are_at_five_of_the_distances(task, distances, wanted):

@@ -12,7 +12,7 @@ from mazebench.tasks.context import build_context
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.task import Task
-from mazebench.tasks.task_fields import SPARSE
+from mazebench.tasks.task_options import SPARSE
 
 from . import symmetry
 from .replay import Sample, SequenceSample
@@ -24,8 +24,8 @@ class TrainingMaps:
     """The maps of a task's mazes; a symmetry of 0 leaves them as they are. `G` is the number of a sample's groups."""
 
     def __init__(self, task: Task):
-        self.mazes = task.all_mazes
-        self._bits = functools.lru_cache(_NUM_KEPT)(lambda maze: np.packbits(task.all_mazes[maze].walls))
+        self.mazes = task.mazes
+        self._bits = functools.lru_cache(_NUM_KEPT)(lambda maze: np.packbits(task.mazes[maze].walls))
         self.size = task.size  # N
         self._context_size = task.context_size  # M
 
@@ -62,15 +62,15 @@ def shows_other_maps(task: Task, agent: str) -> bool:
         `agent` does not read.
     """
     name = f"agent {agent!r}"
-    if task.reward != SPARSE:
-        raise InputError(f"{name}: computes the rewards of any goal itself, found reward {task.reward!r}")
+    if task.options.reward != SPARSE:
+        raise InputError(f"{name}: computes the rewards of any goal itself, found reward {task.options.reward!r}")
     if task.track is None and task.sensors:
         raise InputError(f"{name}: reads no sensors, found {', '.join(task.sensors)}")
-    if task.track is None and not task.active_perturbations:
+    if task.track is None and not task.options.active_perturbations:
         return False
 
     episode = sample_episode(task, np.random.default_rng(0))
-    shown = [show_map(task.replace(level=(level,)), episode) for level in task.level]
+    shown = [show_map(task.replace(level=level), episode) for level in task.levels or (None,)]
     if any(each.drawing is not None or each.hidden for each in shown):
         found = "map_warp" if task.track is None else f"track {task.track!r}"
         raise InputError(f"{name}: learns only on maps of one pixel a cell with start and goal marked; found {found}")

@@ -194,7 +194,7 @@ class PlannerLearner(NetworkLearner):
     def _labels(self, rollout: _Rollout, step: Experience) -> np.ndarray:
         """Returns `[B, 6]`: the probabilities of actions by the oracle's look-ahead from the true state."""
         if rollout.expert is None:
-            rollout.expert = Expert(step.task.all_mazes, len(step.action))
+            rollout.expert = Expert(step.task.mazes, len(step.action))
         costs = rollout.expert.costs(step.maze, step.goal, step.pose, step.velocity)
         best = costs.min(axis=1, keepdims=True)
         weights = np.exp(-(costs - best) / self._config.label_temperature)

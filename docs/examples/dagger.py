@@ -106,7 +106,7 @@ def train(num_steps, seed):
     network = make_network()
     optimizer = torch.optim.Adam(network.parameters(), 1e-3)
     envs = mazebench.make_vec("building", NUM_ENVS, kinds=("dfs", "house", "rooms"), fresh=True)
-    maps = Maps(NUM_ENVS, envs.task_spec.context_size)
+    maps = Maps(NUM_ENVS, envs.task.context_size)
     observation, info = envs.reset(seed=seed)
     rows, labels, reached = [], [], []
     num_rounds = max(2, num_steps // (STEPS_PER_ROUND * NUM_ENVS))

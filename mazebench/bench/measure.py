@@ -5,7 +5,6 @@ Each ratio is the median over rounds in which the two sides take turns, so that 
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import statistics
 import subprocess
@@ -78,7 +77,7 @@ def run(quick: bool = False, say: Callable[[str], None] = print) -> dict[str, An
     say("pictures")
     results["pictures"] = _picture_rows(spec, seconds * rounds)
     say("the range sensor")
-    sensing = dataclasses.replace(spec, sensors=("lidar",))
+    sensing = spec.replace(sensors=("lidar",))
     results["lidar"] = [_vector_row(sensing, num_envs, seconds, rounds) for num_envs in _LIDAR_NUM_ENVS]
     say("cost against size")
     results["sizes"] = _size_rows(_SIZES, seconds, rounds)
@@ -111,16 +110,16 @@ def bare_simulation(task: Task, num_envs: int, num_threads: int = 0) -> Callable
       num_envs: B.
       num_threads: 0 uses all cores.
     """
-    walls = near_walls_of(task.all_mazes, num_envs)
+    walls = near_walls_of(task.mazes, num_envs)
     batch = open_batch(walls.model, num_envs, num_threads)
     geoms, qpos, ctrl = WallGeoms.of_batch(batch), batch.bind("qpos"), batch.bind("ctrl")
-    maze, around, controls = np.arange(num_envs) % len(task.all_mazes), np.full(num_envs, -1), action_controls()
+    maze, around, controls = np.arange(num_envs) % len(task.mazes), np.full(num_envs, -1), action_controls()
     batch.reset()
-    qpos[:, :2] = [task.all_mazes[index].point(task.all_mazes[index].free_cells[0]) for index in maze.tolist()]
+    qpos[:, :2] = [task.mazes[index].point(task.mazes[index].free_cells[0]) for index in maze.tolist()]
 
     def step(actions: np.ndarray) -> None:
         nonlocal around
-        cell = task.all_mazes[0].cell_index(qpos[:, :2])
+        cell = task.mazes[0].cell_index(qpos[:, :2])
         moved = np.flatnonzero(cell != around)
         walls.write(geoms, moved, maze[moved], cell[moved])
         around = cell
@@ -170,7 +169,7 @@ def _stepping(env: MazeVectorEnv) -> Step:
 
 def _bare_loop(spec: Task, actions: list[int]) -> Step:
     """Returns a step of one simulation by mj_step, and nothing else."""
-    walls, maze = near_walls_of(spec.all_mazes, 1), spec.all_mazes[0]
+    walls, maze = near_walls_of(spec.mazes, 1), spec.mazes[0]
     simulation = MujocoSimulation(walls.model, walls)
     model, data, controls = simulation.model, simulation.data, action_controls()
     data.qpos[:2] = maze.point(maze.free_cells[0])
@@ -220,7 +219,7 @@ def _training_rows(spec: Task, seconds: float) -> list[dict[str, Any]]:
 
 
 def _training_row(name: str, agent_class: Any, spec: Task, seconds: float) -> dict[str, Any]:
-    spec = dataclasses.replace(spec, **agent_class.task_options())
+    spec = spec.replace(**agent_class.task_options())
     try:
         learner = agent_class.build_learner(spec, overrides={"num_envs": "256"})
     except InputError:  # it calls its number of environments by another name, or has none
@@ -266,7 +265,7 @@ def _picture_rows(spec: Task, seconds: float) -> list[dict[str, Any]]:
     """Returns the cost of a step of the vector environment with each camera, and with none."""
     rows = []
     for cameras in ((), ("egocentric",), ("top",), ("egocentric", "top")):
-        env = MazeVectorEnv(dataclasses.replace(spec, sensors=cameras), _PICTURE_ENVS, seed=0)
+        env = MazeVectorEnv(spec.replace(sensors=cameras), _PICTURE_ENVS, seed=0)
         try:
             env.reset()
         except RenderingError:

@@ -11,13 +11,13 @@ def list_() -> None:
     from mazebench.maps.kinds import KINDS
     from mazebench.tasks.perturbations import PERTURBATIONS
     from mazebench.tasks.sensors import SENSORS
-    from mazebench.tasks.task_fields import KINDS_OF_TASK
+    from mazebench.tasks.task_options import HIERARCHICAL, LOCAL
     from mazebench.tasks.tracks import TRACKS
 
     ids = (f"mazebench/{kind}-{SIZES[0]}-v{TASK_VERSION}" for kind in ("Local", "Hierarchical", "LocalGoal"))
     rows = {
         "agents": ", ".join(agent_names()),
-        "tasks": f"{', '.join(KINDS_OF_TASK)} (version {TASK_VERSION})",
+        "tasks": f"{LOCAL}, {HIERARCHICAL} (version {TASK_VERSION})",
         "sizes": f"{', '.join(map(str, SIZES))} "
         f"(the paper's protocol, {MAZES_PER_SPLIT} mazes in each of {', '.join(SPLITS)})",
         "kinds": ", ".join(KINDS),

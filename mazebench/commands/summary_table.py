@@ -27,14 +27,14 @@ def print_summary(summary: Summary) -> None:
     What the paper's MMN reached stands beside it where it can be compared.
     """
     task = summary.task
-    scale = "" if task.cell_size == 1 else f" cells of {task.cell_size:g} m"
+    scale = "" if task.cell_size in (None, 1) else f" cells of {task.cell_size:g} m"
     title = f"{summary.who}: {task.title}, {task.split_in_results} mazes {task.size} x {task.size}{scale}"
     perturbations = [f"{name} {value}" for name, value in task.perturbations.items() if value]
     perturbed = ", ".join([*perturbations, *task.noise_in_words])
     paper = printed_mmn(summary)
     head = ["n", "success rate", *["paper"] * bool(paper), *_HEAD[2:]]
     totals = []
-    if task.task == "local":
+    if not task.is_hierarchical:
         by_distance = summary.by_distance if len(summary.by_distance) <= _MOST_DISTANCES else {}
         head = ["distance" if by_distance else "episodes", *head]
         rows = [[distance, *_with_paper(row, paper, int(distance))] for distance, row in by_distance.items()]

@@ -52,7 +52,8 @@ def train(
 
     with stopping.stoppable(how_to_go_on, waits=True), progress.training() as show:
         task_options = {name: value for name, value in options_in(values, TaskOptions).items() if name != "task"}
-        loop.run_training(options, TaskOptions(**task_options), folder, resume, show, parsed)
+        asked = TaskOptions(task=options.task[0], **task_options)
+        loop.run_training(options, asked, folder, resume, show, parsed)
     print(f"run in {folder}; evaluate it by: mazebench eval --agent {agent} --checkpoint {folder}")
 
 

@@ -14,6 +14,7 @@ from dm_env import specs
 from mazebench.constants import STEPS_PER_ACTION
 from mazebench.envs.single import EnvironmentState, TaskRunner
 from mazebench.tasks.actions import action_spec
+from mazebench.tasks.arguments import require_task
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.observation import observation_specs
 from mazebench.tasks.task import Task as MazeTask
@@ -133,6 +134,7 @@ class Environment(control.Environment):
         Raises:
           InputError: if `seed` is not a natural number, or `task` not a `Task`.
         """
+        require_task(task)
         self.maze_task = task
         # The task judges the time limit itself, so that a goal reached on the last step is a termination.
         super().__init__(Physics.of_mazes(models_of(task.mazes)), Task(task, seed), n_sub_steps=STEPS_PER_ACTION)

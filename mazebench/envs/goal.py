@@ -43,7 +43,9 @@ class GoalMazeEnv(MazeEnv):
         if task.has_legs or task.track is not None or task.options.hide:
             raise InputError("a goal-conditioned environment: expected the local task, one goal, no track, no hide")
         if task.options.reward != SPARSE:  # another goal's way is not known
-            raise InputError(f"a goal-conditioned environment: expected reward {SPARSE!r}, found {task.options.reward!r}")
+            raise InputError(
+                f"a goal-conditioned environment: expected reward {SPARSE!r}, found {task.options.reward!r}"
+            )
         super().__init__(task, seed, render_mode, camera)
         side, num_values = task.mazes[0].side, STATE_SIZE + len(_SHOWN_PLANES) * task.context_size**2
         sensed = {name: spaces.observation_space(task)[name] for name in task.sensors}

@@ -161,9 +161,7 @@ def make_vec(
     return MazeVectorEnv(tasks, num_envs, seed, num_threads, render_mode, autoreset_mode=autoreset_mode)
 
 
-def _task(
-    task: str | Task | TaskOptions, options: dict[str, Any], arguments: Sequence[str], id_size: int = 0
-) -> Task:
+def _task(task: str | Task | TaskOptions, options: dict[str, Any], arguments: Sequence[str], id_size: int = 0) -> Task:
     """Returns the task of an environment that takes `arguments` besides `options`.
 
     Raises:

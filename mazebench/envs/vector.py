@@ -111,8 +111,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._was_reset = False
         self._ended = np.zeros(num_envs, dtype=bool)  # whether the episode is over and the next one has yet to begin
         self._observed = {
-            name: np.zeros((num_envs, *array.shape), array.dtype)
-            for name, array in observation_specs(task).items()
+            name: np.zeros((num_envs, *array.shape), array.dtype) for name, array in observation_specs(task).items()
         }
         self._observed["context"] = self.rules.context
 

@@ -19,16 +19,16 @@ def agent_seed(run_seed: int, number: int) -> int:
     return int(np.random.SeedSequence([run_seed, number]).generate_state(1)[0])
 
 
-def true_state(task_spec: Task, episodes: Sequence[Episode | None], position: np.ndarray, yaw: np.ndarray) -> Truth:
+def true_state(task: Task, episodes: Sequence[Episode | None], position: np.ndarray, yaw: np.ndarray) -> Truth:
     """Returns the truth of B environments.
 
     Args:
-      task_spec: the task, with the mazes that the episodes index.
+      task: the task, with the mazes that the episodes index.
       episodes: the running ones; None where an environment rests, where the truth is a maze without a goal.
       position: `[B, 2]` m, true.
       yaw: `[B]` rad, true.
     """
-    mazes = [task_spec.all_mazes[episode.maze if episode else 0] for episode in episodes]
+    mazes = [task.mazes[episode.maze if episode else 0] for episode in episodes]
     goals = [episode.goal if episode else (0, 0) for episode in episodes]
     pose = np.column_stack([position, yaw]).astype(np.float64)
     return Truth(np.stack([maze.walls for maze in mazes]), pose, np.array(goals, dtype=np.int64))

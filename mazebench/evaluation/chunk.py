@@ -183,15 +183,15 @@ def _to_trajectory(task: Task, outcome: Outcome) -> Trajectory | None:
 
 def _to_record(plan: Plan, outcome: Outcome) -> Record:
     task, trial, episode = plan.task, outcome.trial, outcome.trial.episode
-    maze = task.all_mazes[episode.maze]
+    maze = task.mazes[episode.maze]
     # Of the body as a disc, and from cell to cell; both in metres.
     shortest = np.array([trial.shortest_path, trial.distance * task.cell_size])
     spl_of_disc, spl_grid = spl(np.array([outcome.success]), shortest, np.array([outcome.path_length])).tolist()
     values = {
         "agent": plan.options.agent,
-        "task": task.task,
+        "task": task.name,
         "size": task.size,
-        "split": task.split_in_results,
+        "split": task.options.split_in_results,
         "episode": outcome.index,
         "maze": maze.name,
         "start": episode.start,
@@ -207,10 +207,10 @@ def _to_record(plan: Plan, outcome: Outcome) -> Record:
     }
     further: dict[str, Any] = {} if task.cell_size == 1 else {"cell_size": task.cell_size}
     if task.track is not None:
-        further |= {"track": task.track, "level": task.level[0]}
-    noise = {"lidar_noise": task.lidar_noise, "odometry_noise": task.odometry_noise}
+        further["level"] = task.options.track_level
+    noise = {"lidar_noise": task.options.lidar_noise, "odometry_noise": task.options.odometry_noise}
     further |= {name: value for name, value in noise.items() if value is not None}
-    further |= task.perturbations
+    further |= task.options.perturbations
     if task.track is not None:  # summaries report the episodes of each of these groups apart
         further["blocked"] = outcome.blocked
         if maze.kind:

@@ -64,7 +64,7 @@ class StepRecorder:
 def make_demonstration(task: Task, outcome: Outcome) -> Demonstration:
     """Returns the demonstration of an episode whose steps `StepRecorder` has recorded; its index is its seed."""
     episode, recorded = outcome.trial.episode, outcome.recorded
-    maze = task.all_mazes[episode.maze]
+    maze = task.mazes[episode.maze]
     is_last = np.arange(outcome.steps) == outcome.steps - 1
     terminations, truncations = is_last & outcome.success, is_last & (not outcome.success)
     cells = maze.cell_index(recorded["infos/privileged/pose"][:, :2])

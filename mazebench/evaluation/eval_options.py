@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Annotated
+from typing import Annotated, Any
 
 from annotated_types import Ge, Interval
 
 from mazebench.constants import EPISODES_PER_DISTANCE
-from mazebench.options import Doc, Options
+from mazebench.options import Doc, Options, options_in
+from mazebench.tasks.task import Task, as_options
 from mazebench.tasks.task_options import TaskOptions
 
 NUM_ENVS = 256  # environments side by side in a process, unless another number is asked for
@@ -33,6 +34,17 @@ class EvalOptions(Options):
     seed: Annotated[
         int, Interval(ge=0, le=2**53 - 1), Doc("Seed of what the agent draws, and of episodes that are not frozen.")
     ] = 0
+
+
+def eval_options(agent: str, task: str | Task | TaskOptions = "local", **options: Any) -> EvalOptions:
+    """Returns the options of an evaluation, given by name with those of its task.
+
+    Raises:
+      InputError: if there is no such option, or a value is not allowed.
+    """
+    of_evaluation = options_in(options, EvalOptions)
+    of_task = {name: value for name, value in options.items() if name not in of_evaluation}
+    return EvalOptions.of(of_evaluation, agent=agent, task=as_options(task, of_task))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -13,16 +13,16 @@ from mazebench.agent import Agent, SingleAgent
 from mazebench.agent_loading import checked_agent_class, load_agent_class
 from mazebench.errors import InputError, remark
 from mazebench.evaluation.chunk import Chunk
-from mazebench.evaluation.eval_options import EvalOptions, RunOptions
+from mazebench.evaluation.eval_options import EvalOptions, RunOptions, eval_options
 from mazebench.evaluation.measured_oracle import ORACLE, measure_oracle_steps
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import Pool, open_pool
 from mazebench.evaluation.store import Store, check_same_run, is_finished
+from mazebench.options import check_names, options_in
 from mazebench.results import metrics
 from mazebench.results.reading import load_result
 from mazebench.results.records import Summary
-from mazebench.options import check_names, options_in
-from mazebench.tasks.task import Task, as_options
+from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import TaskOptions
 
 _CHUNKS_PER_WORKER = 4  # so that no worker waits long for the last one,
@@ -64,15 +64,15 @@ def evaluate(
     """
     check_names(options, EvalOptions, RunOptions, TaskOptions)
     if options.get("context_size") is not None:
-        raise InputError(f"expected no context_size in an evaluation, found {options['context_size']}; agents choose it")
-    of_run, of_evaluation = options_in(options, RunOptions), options_in(options, EvalOptions)
-    of_task = {name: value for name, value in options.items() if name not in of_run | of_evaluation}
-    asked, run = as_options(task, of_task), RunOptions.of(of_run)
+        raise InputError(
+            f"expected no context_size in an evaluation, found {options['context_size']}; agents choose it"
+        )
+    run = RunOptions.of(of_run := options_in(options, RunOptions))
     if not isinstance(agent, str | type):
         raise InputError(f"expected the name of an agent or its class, found an object of {type(agent).__name__}")
     name = agent if isinstance(agent, str) else f"{agent.__module__}:{agent.__qualname__}"
     agent_class = load_agent_class(name) if isinstance(agent, str) else checked_agent_class(name, agent)
-    chosen = EvalOptions.of(of_evaluation, agent=name, task=asked)
+    chosen = eval_options(name, task, **{key: value for key, value in options.items() if key not in of_run})
     if (run.workers or run.cluster) and (name.startswith("__main__:") or load_agent_class(name) is not agent_class):
         raise InputError(f"expected a class that other processes can import by its name, found {name}")
     return run_evaluation(chosen, out, run, progress, agent_class)

@@ -18,7 +18,7 @@ ORACLE = "oracle"
 def measure_oracle_steps(task: Task, trials: Sequence[Trial], num_envs: int = NUM_ENVS) -> Steps:
     """Returns the oracle's steps in each trial; None where it does not reach the goal."""
     # The oracle has the six actions and observes nothing; tracks have the lidar all the same.
-    task = task.replace(actions="six", sensors=tuple(name for name in task.sensors if name == "lidar"))
+    task = task.replace(actions="six", sensors=(), lidar_noise=None)
     agent = load_agent_class(ORACLE).build(task.interface)
     steps: list[int | None] = [None] * len(trials)
     for outcomes in run_trials(agent, task, list(enumerate(trials)), num_envs, needs_truth=True):

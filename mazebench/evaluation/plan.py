@@ -139,7 +139,7 @@ def make_plan(
       InputError: if an option can't be met.
     """
     agent_class = agent_class or load_agent_class(options.agent)
-    task = _task_as_played(options.agent, agent_class, options.task, resolver)
+    task = task_as_played(options.agent, agent_class, options.task, resolver)
     options = _with_checkpoint(options, agent_class)
     if trials is None:
         trials = select_trials(task, options.episodes_per_distance, options.seed)
@@ -177,9 +177,7 @@ def _make_plan_once(options: EvalOptions) -> Plan:
         return make_plan(options)
 
 
-def _task_as_played(
-    agent: str, agent_class: type[Agent], asked: TaskOptions, resolver: Callable[..., Task]
-) -> Task:
+def task_as_played(agent: str, agent_class: type[Agent], asked: TaskOptions, resolver: Callable[..., Task]) -> Task:
     """Returns the task with what the agent asks for: its actions, sensors and, off the tracks, size of maps."""
     plays = agent_class.plays_actions
     if asked.actions is None and "six" not in plays:

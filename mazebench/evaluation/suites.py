@@ -49,7 +49,9 @@ def _local(name: str, distances: tuple[int, ...] = _TABLE_DISTANCES, episodes: i
 
 def _each_level(tracks: Iterable[str] = TRACKS, **options: Any) -> tuple[Part, ...]:
     return tuple(
-        Part(f"{track}-{level}", TaskOptions(task=track, level=(level,), **options)) for track in tracks for level in LEVELS
+        Part(f"{track}-{level}", TaskOptions(task=track, level=(level,), **options))
+        for track in tracks
+        for level in LEVELS
     )
 
 

@@ -238,8 +238,8 @@ def require_one_size(mazes: Sequence[Maze]) -> None:
             raise MazeError(f"expected mazes of {what}, found {', '.join(map(str, sorted(found)))}")
 
 
-def resized(maze: Maze, cell_size: float) -> Maze:
-    """Returns `maze` with cells of `cell_size` m; itself if that is 0."""
+def resized(maze: Maze, cell_size: float | None) -> Maze:
+    """Returns `maze` with cells of `cell_size` m; itself if that is None."""
     return maze if not cell_size else dataclasses.replace(maze, cell_size=cell_size)
 
 

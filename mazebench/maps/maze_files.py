@@ -67,7 +67,7 @@ def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
     Raises:
       InputError: if there is no map or one can't be read.
     """
-    return read_all(pathlib.Path(path), ReadOptions(**options))
+    return read_all(pathlib.Path(path), ReadOptions.of(options))
 
 
 def read_all(path: pathlib.Path, options: ReadOptions) -> tuple[Maze, ...]:
@@ -83,7 +83,7 @@ def read_located(path: str | pathlib.Path, size: int | None = None, **options: A
     A point (x, y) of the maze lies at `(x0 + x cos(yaw) - y sin(yaw), y0 + x sin(yaw) + y cos(yaw))` in the map's frame
     if (x0, y0, yaw) is the origin that is returned.
     """
-    return _read_located(pathlib.Path(path).expanduser(), size, ReadOptions(**options))
+    return _read_located(pathlib.Path(path).expanduser(), size, ReadOptions.of(options))
 
 
 def _read_located(path: pathlib.Path, size: int | None, options: ReadOptions) -> LocatedMaze:

@@ -69,7 +69,7 @@ def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[l
     number = options.seed % len(plan.trials)
     trial = plan.trials[number]
     episode = trial.episode
-    maze = plan.task.all_mazes[episode.maze]
+    maze = plan.task.mazes[episode.maze]
 
     agent = plan.build_agent()
     state = agent.initial_state(1)
@@ -116,7 +116,7 @@ class _Scene:
     def __post_init__(self) -> None:
         self._path: list[np.ndarray] = []
         names = tuple(view for view in self.views if view in CAMERAS)
-        models = models_of(self.env.task_spec.all_mazes, self.env.task_spec.textures)
+        models = models_of(self.env.task.mazes, self.env.task.options.textures)
         self._cameras = Cameras(models, names, self.pixels) if names else None
 
     def record_position(self) -> None:
@@ -131,7 +131,7 @@ class _Scene:
         pictures = {}
         if self._cameras is not None:
             data = self.env.simulation.data
-            pictures = self._cameras.take(self.env.task.episode.maze, data.qpos, data.mocap_pos[0])
+            pictures = self._cameras.take(self.env.runner.episode.maze, data.qpos, data.mocap_pos[0])
         pictures |= {view: self._drawing(view, observation) for view in self.views if view not in pictures}
         return np.concatenate([pictures[view] for view in self.views], axis=1)
 
@@ -145,19 +145,19 @@ class _Scene:
 
     def _map(self) -> np.ndarray:
         """Returns a picture of the map that the agent is shown, some two times as large as a view."""
-        task, side = self.env.task, self.env.task_spec.context_size
-        seen = task.shown_map.seen_walls()
+        runner, side = self.env.runner, self.env.task.context_size
+        seen = runner.shown_map.seen_walls()
         size = len(seen)
         walls = resized_map(seen, side)
-        pixels = (task.shown_map.seen_cell(cell) for cell in (task.episode.start, task.episode.goal))
+        pixels = (runner.shown_map.seen_cell(cell) for cell in (runner.episode.start, runner.episode.goal))
         start, goal = ((row * side // size, column * side // size) for row, column in pixels)
-        path = task.shown_map.seen_points(self._to_cells(self._path)) * (side / size)
+        path = runner.shown_map.seen_points(self._to_cells(self._path)) * (side / size)
         return draw_grid(walls, self._cell_pixels(walls), start, goal, path)
 
     def _rays(self, ranges: np.ndarray) -> np.ndarray:
         """Returns a picture of the true maze with the rays of the range sensor, some two times as large as a view."""
-        simulation, episode = self.env.simulation, self.env.task.episode
-        walls = self.env.task_spec.all_mazes[episode.maze].walls
+        simulation, episode = self.env.simulation, self.env.runner.episode
+        walls = self.env.task.mazes[episode.maze].walls
         cell_pixels = self._cell_pixels(walls)
         picture = draw_grid(walls, cell_pixels, episode.start, episode.goal, self._to_cells(self._path))
         pose = np.array([*simulation.position(), simulation.yaw()])
@@ -165,7 +165,7 @@ class _Scene:
         return picture
 
     def _to_cells(self, points: ArrayLike) -> np.ndarray:  # [..., 2] m
-        return np.asarray(points) / self.env.task_spec.cell_size
+        return np.asarray(points) / self.env.task.cell_size
 
     def _cell_pixels(self, walls: np.ndarray) -> int:
         return 2 * self.pixels // len(walls) + 1

@@ -23,10 +23,10 @@ HELP = "w s a d  drive   q e  turn   arrows too   r  again   n  next   Esc  quit
 class Game:
     """An environment, the path driven in the current episode, and the number of episodes and of goals reached."""
 
-    def __init__(self, task_spec: Task, seed: int):
+    def __init__(self, task: Task, seed: int):
         """Begins the first episode of `seed`."""
-        self.task_spec = task_spec
-        self.env = MazeEnv(task_spec, seed)
+        self.task = task
+        self.env = MazeEnv(task, seed)
         self.num_episodes = 0
         self.num_reached = 0
         self.begin()
@@ -34,7 +34,7 @@ class Game:
     def press(self, key: str) -> None:
         """Does what a key stands for: a letter, or an arrow by its name. Other keys do nothing."""
         if key == RESTART:
-            self.begin(self.env.task.episode)
+            self.begin(self.env.runner.episode)
         elif key == NEXT:
             self.begin()
         elif key in LETTERS or key in ARROWS:
@@ -59,7 +59,7 @@ class Game:
     @property
     def maze(self) -> Maze:
         """The maze of the episode."""
-        return self.task_spec.all_mazes[self.env.task.episode.maze]
+        return self.task.mazes[self.env.runner.episode.maze]
 
     @property
     def context(self) -> np.ndarray:
@@ -69,31 +69,31 @@ class Game:
     @property
     def rays(self) -> np.ndarray | None:
         """`[32, 2]` m: where the rays of the range sensor end; None if the task does not have it."""
-        if LIDAR not in self.task_spec.sensors:
+        if LIDAR not in self.task.sensors:
             return None
         pose = np.array([*self.path[-1], self.env.simulation.yaw()])
         return ray_ends(pose, self.observation[LIDAR])
 
     def title(self) -> str:
         """Returns a line that describes the episode."""
-        task = self.env.task
-        maze, episode = self.maze, task.episode
+        runner = self.env.runner
+        maze, episode = self.maze, runner.episode
         distance = maze.distance(episode.start, episode.goal)
         scale = "" if maze.cell_size == 1 else f" of {maze.cell_size:g} m"
-        return f"maze {maze.name}, {self.task_spec.task}: the goal is {distance} cells{scale} away"
+        return f"maze {maze.name}, {self.task.name}: the goal is {distance} cells{scale} away"
 
     def status(self) -> str:
         """Returns a line that describes the state of the episode."""
-        task, simulation = self.env.task, self.env.simulation
-        driven = f"{task.steps} steps, {task.path_length:.2f} m"
+        runner, simulation = self.env.runner, self.env.simulation
+        driven = f"{runner.steps} steps, {runner.path_length:.2f} m"
         if self.ended:
-            return f"GOAL REACHED after {driven}" if task.success else f"OUT OF TIME after {driven}"
+            return f"GOAL REACHED after {driven}" if runner.success else f"OUT OF TIME after {driven}"
         x, y = self.observation["state"][:2]
         heading = math.degrees(simulation.yaw())
-        left = task.route.deadline - task.steps
+        left = runner.route.deadline - runner.steps
         where = f"x {x:.2f}  y {y:.2f} m  heading {heading:+.0f} deg  {simulation.speed():.2f} m/s"
-        to_landmark = self.task_spec.task == "hierarchical" and task.route.leg < len(task.route.cells) - 2
-        return f"{where}  {driven}, {left} steps left" + (f", landmark {task.route.leg + 1}" if to_landmark else "")
+        to_landmark = self.task.options.is_hierarchical and runner.route.leg < len(runner.route.cells) - 2
+        return f"{where}  {driven}, {left} steps left" + (f", landmark {runner.route.leg + 1}" if to_landmark else "")
 
     def outcome(self) -> str:
         """Returns a line that says how many episodes ended at the goal."""

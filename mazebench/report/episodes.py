@@ -13,12 +13,13 @@ import pandas as pd
 
 from mazebench.errors import InputError, remark, unknown
 from mazebench.results.metrics import ON_TIME_METRICS, by_fact, scores
-from mazebench.results.played import Shown, check_mazes, shown_of
+from mazebench.results.played import Shown, played_task, shown_of
 from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, Result, load_result
 from mazebench.results.records import Summary
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, load_trajectories
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.task import CUSTOM, Task
+from mazebench.tasks.task import Task
+from mazebench.tasks.task_options import CUSTOM, HIERARCHICAL, LOCAL, TaskOptions
 
 # What `ReportedResult.episodes` says of each episode: fields of its record. Facts of a track are further columns.
 _OF_RECORDS = [
@@ -36,7 +37,7 @@ class ReportedResult:
     folder: pathlib.Path
     summary: Summary
     label: str  # the agent's name in the report, with more where the name alone is ambiguous
-    setting: Task  # of which results are compared, see `Task.setting`
+    setting: TaskOptions  # of which results are compared, see `TaskOptions.setting`
     episodes: pd.DataFrame  # a row for each episode in protocol order; the metrics are columns
     facts: tuple[str, ...]  # columns of bools: what a track says of episodes, as "blocked" and "not blocked"
     task: Task | None  # None if its mazes are gone
@@ -80,7 +81,7 @@ class ReportedResult:
 
     def walls(self, maze: str) -> np.ndarray | None:
         """Returns `[N, N]` bool, a maze; None if the task is not known."""
-        return self.task.all_mazes[self.mazes[maze]].walls if self.task else None
+        return self.task.mazes[self.mazes[maze]].walls if self.task else None
 
 
 def read_results(paths: Iterable[pathlib.Path], names: Sequence[tuple[str, str]] = ()) -> list[ReportedResult]:
@@ -129,12 +130,12 @@ def join_episodes(results: Sequence[ReportedResult]) -> pd.DataFrame:
                 is_untrained=result.summary.untrained_scale,
                 setting=pd.Categorical([result.setting] * len(result.episodes), settings, ordered=True),
                 is_exact=result.setting.is_exact,
-                task=result.setting.task,
+                task=HIERARCHICAL if result.setting.is_hierarchical else LOCAL,
                 size=result.setting.size,
                 split=result.setting.split_in_results,
-                landmark_distance=result.setting.landmark_distance if result.setting.task == "hierarchical" else 0,
+                landmark_distance=result.setting.landmark_distance if result.setting.is_hierarchical else 0,
                 track=result.setting.track or "",
-                level=result.setting.level[0] if result.setting.track else 0,
+                level=result.setting.track_level,
             )
             for result in results
         ],
@@ -152,7 +153,7 @@ def facts_of(episodes: pd.DataFrame) -> list[str]:
     return list(dict.fromkeys(fact for result in episodes.result.unique() for fact in result.facts))
 
 
-def settings_of(episodes: pd.DataFrame) -> list[Task]:
+def settings_of(episodes: pd.DataFrame) -> list[TaskOptions]:
     """Returns the settings of which there are episodes, sorted."""
     return sorted(episodes.setting.unique())
 
@@ -201,19 +202,18 @@ def _rank(label: str) -> tuple[int, str]:
 def _read_result(folder: pathlib.Path) -> ReportedResult:
     result = load_result(folder)
     summary = result.summary
-    task: Task | None = summary.task
+    task: Task | None = None
     try:
-        check_mazes(summary)
+        task = played_task(summary)
     except InputError as error:
         if summary.task.split_in_results != CUSTOM:
             raise InputError(f"{folder}: {error}") from error
-        task = None
         remark(f"{folder}: {error}; reported without mazes and paths")
     episodes, facts = _to_table(result)
     trajectories = _read_trajectories(folder, episodes) if task else None
     setting = summary.task.setting
     if setting.mazes is not None:  # by their names, wherever the files were
-        setting = dataclasses.replace(setting, mazes=", ".join(sorted(episodes.maze.unique())))
+        setting = setting.replace(mazes=", ".join(sorted(episodes.maze.unique())))
     return ReportedResult(folder, summary, summary.agent, setting, episodes, facts, task, trajectories)
 
 
@@ -281,7 +281,7 @@ def _label(results: list[ReportedResult]) -> list[ReportedResult]:
 
 def _drop_repeats(results: list[ReportedResult]) -> list[ReportedResult]:
     """Returns one result for each agent and setting: the one with the most episodes, the first of equals."""
-    kept: dict[tuple[str, Task], ReportedResult] = {}
+    kept: dict[tuple[str, TaskOptions], ReportedResult] = {}
     for result in results:
         other = kept.setdefault((result.label, result.setting), result)
         if other is result:

@@ -29,7 +29,7 @@ from mazebench.report.trajectory_figures import CELL_COLORS, TIME_COLORS
 from mazebench.results.paper import citation, reference
 from mazebench.results.played import Shown
 from mazebench.results.trajectories import Trajectory
-from mazebench.tasks.task import Task
+from mazebench.tasks.task_options import TaskOptions
 from mazebench.world.mjcf import BODY_RADIUS
 from mazebench.world.ray_casting import NUM_RAYS
 
@@ -156,7 +156,7 @@ def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int
 
 def _trials(result: ReportedResult) -> dict[str, Any]:
     """Returns by columns what results of one task have in common, and the shown maps where they are not the mazes."""
-    episodes, size = result.episodes, result.setting.size
+    episodes, size = result.episodes, result.setting.size or 0
     columns: dict[str, Any] = {
         "maze": pd.factorize(episodes.maze)[0].tolist(),
         "start": _indices(episodes.start, size),
@@ -246,9 +246,9 @@ def _mazes(results: Sequence[ReportedResult]) -> tuple[list[dict[str, Any]], lis
     return mazes, places
 
 
-def _names(setting: Task) -> dict[str, Any]:
+def _names(setting: TaskOptions) -> dict[str, Any]:
     """Returns what the explorer calls a setting: the levels of a track share a name."""
-    split, level = setting.split_in_results, setting.level[0] if setting.track else 0
+    split, level = setting.split_in_results, setting.track_level
     of_split = "" if split == "eval" else f", {split} mazes"
     return {"name": f"track {setting.track}{of_split}" if setting.track else str(setting), "level": level}
 
@@ -264,7 +264,7 @@ def _describe(result: ReportedResult) -> dict[str, Any]:
         "picture": 0
         if not maps or maps[0].are_cells
         else len(maps[0].walls),  # pixels on a side, where they are no cells
-        "lidar": task.lidar.max_range if task and "lidar" in task.sensors else 0,  # m
+        "lidar": task.options.lidar.max_range if task and "lidar" in task.sensors else 0,  # m
         "groups": result.facts,
     }
 
@@ -276,7 +276,7 @@ def _first(results: Sequence[ReportedResult]) -> int:
         key=lambda number: (
             results[number].trajectories is None,
             not results[number].setting.is_exact,
-            results[number].setting.task != "hierarchical",
+            not results[number].setting.is_hierarchical,
             results[number].setting.size,
             -results[number].setting.landmark_distance,
         ),

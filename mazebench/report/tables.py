@@ -15,7 +15,7 @@ from mazebench.report.episodes import at_common_distances, common_distances, fac
 from mazebench.report.table import METRICS, UNTRAINED_NOTE, Table, make_values
 from mazebench.results.intervals import Estimate, mean_interval, pool_runs
 from mazebench.results.paper import printed
-from mazebench.tasks.task import CUSTOM, Task
+from mazebench.tasks.task_options import CUSTOM, TaskOptions
 from mazebench.tasks.tracks import TRACKS
 
 DEFAULT_LANDMARK_DISTANCE = 5  # cells; the paper's choice wherever it varies something else
@@ -90,7 +90,7 @@ def measure(episodes: pd.DataFrame) -> dict[str, Estimate]:
 
 def maze_sets(episodes: pd.DataFrame) -> Iterator[tuple[pd.DataFrame, str, str]]:
     """Yields the episodes of each set of mazes, a prefix for names of files, and a suffix for titles; eval first."""
-    sets: dict[tuple[str, tuple[str, ...], tuple[str, ...]], list[Task]] = {}
+    sets: dict[tuple[str, tuple[str, ...], tuple[str, ...]], list[TaskOptions]] = {}
     for setting, group in episodes.groupby("setting", observed=True):
         split = setting.split_in_results
         names = tuple(sorted(group.maze.unique())) if split == CUSTOM else ()
@@ -111,7 +111,7 @@ def maze_sets(episodes: pd.DataFrame) -> Iterator[tuple[pd.DataFrame, str, str]]
         yield episodes[episodes.setting.isin(sets[split, mazes, own])], prefix, suffix
 
 
-def perturbed_groups(episodes: pd.DataFrame) -> Iterator[tuple[str, Task, pd.DataFrame]]:
+def perturbed_groups(episodes: pd.DataFrame) -> Iterator[tuple[str, TaskOptions, pd.DataFrame]]:
     """Yields each perturbation, a setting without it, and the episodes of that setting at all levels.
 
     The column `strength` has the level of the perturbation. Only settings without other perturbations count, and only
@@ -127,8 +127,8 @@ def perturbed_groups(episodes: pd.DataFrame) -> Iterator[tuple[str, Task, pd.Dat
         yield perturbation, base, group[group.label.isin(group.label[group.strength > 0])]
 
 
-def _without(setting: Task, perturbation: str) -> Task:
-    return dataclasses.replace(setting, **{perturbation: 0.0})  # type: ignore[arg-type]
+def _without(setting: TaskOptions, perturbation: str) -> TaskOptions:
+    return setting.replace(**{perturbation: 0.0})
 
 
 def level_name(perturbation: str) -> str:
@@ -138,13 +138,13 @@ def level_name(perturbation: str) -> str:
 
 def level_help(perturbation: str) -> str:
     """Returns in a sentence what a level means."""
-    return fields_of(Task)[perturbation].help
+    return fields_of(TaskOptions)[perturbation].help
 
 
-def perturbed_name(perturbation: str, base: Task) -> str:
+def perturbed_name(perturbation: str, base: TaskOptions) -> str:
     """Returns the name of files on the levels of a perturbation in a setting that is else `base`."""
     is_usual = base.landmark_distance == DEFAULT_LANDMARK_DISTANCE
-    return f"{perturbation.rpartition('_')[2]}-{base.name}" + ("" if is_usual else f"-k{base.landmark_distance}")
+    return f"{perturbation.rpartition('_')[2]}-{base.slug}" + ("" if is_usual else f"-k{base.landmark_distance}")
 
 
 def format_distances(distances: Sequence[int]) -> str:
@@ -194,7 +194,7 @@ def _tables_of(episodes: pd.DataFrame) -> Iterator[Table]:
         if (perturbation, base.task) == ("map_warp", "local"):
             for level, warped in group[group.strength > 0].groupby("strength"):
                 title = f"Local navigation, {base.size} × {base.size}, on maps warped by up to {level:g} of their side"
-                yield _by_distance(f"warp-{level:g}-{base.name}", title, warped, is_warped=True)
+                yield _by_distance(f"warp-{level:g}-{base.slug}", title, warped, is_warped=True)
     yield from _track_tables(episodes)
 
 
@@ -239,7 +239,7 @@ def _overview(episodes: pd.DataFrame) -> Table:
     return make_table("all", "All results", _DISTANCES_NOTE, "setting", rows)
 
 
-def _setting_in_words(setting: Task, episodes: pd.DataFrame, has_namesake: bool) -> str:
+def _setting_in_words(setting: TaskOptions, episodes: pd.DataFrame, has_namesake: bool) -> str:
     """Returns the setting with what tells it from others and which episodes count."""
     parts = [str(setting)]
     if has_namesake and setting.split_in_results == CUSTOM:
@@ -248,7 +248,7 @@ def _setting_in_words(setting: Task, episodes: pd.DataFrame, has_namesake: bool)
     common = common_distances(episodes)
     if common and episodes.distance.nunique() > len(common):
         parts.append(f"distances {format_distances(common)}")
-    elif setting.task == "local" and not common:
+    elif not setting.is_hierarchical and not common:
         parts.append("no distances in common")
     return ", ".join(parts)
 
@@ -270,21 +270,21 @@ def _pooled_tables(episodes: pd.DataFrame) -> Iterator[Table]:
         what = f"{kind.task.capitalize()} navigation, {kind.size} × {kind.size}"
         if kind.track:
             what, row_name, rows = f"Track {kind.track}", "level", _rows_by_level(runs)
-        elif kind.task == "local":
+        elif not kind.is_hierarchical:
             row_name, rows = "distance", _rows_by_distance(runs)
         lines = [line for row, own in rows.items() for metric in METRICS for line in _pool(own, metric, row)]
         if lines:
             parts = [what, *(f"{level_name(name)} {level:g}" for name, level in kind.active_perturbations)]
             title = ", ".join([*parts, "pooled over training runs"])
             values = make_values(lines, rows, dict.fromkeys(line["column"] for line in lines))
-            yield Table(f"pooled-{kind.track or kind.name}", title, _POOLED_NOTE, row_name, values)
+            yield Table(f"pooled-{kind.track or kind.slug}", title, _POOLED_NOTE, row_name, values)
 
 
-def _kind(setting: Task) -> Task:
+def _kind(setting: TaskOptions) -> TaskOptions:
     """Returns what all rows of a pooled table have in common."""
     if setting.track is not None:
-        return dataclasses.replace(setting, size=0, level=(1,))
-    return dataclasses.replace(setting, landmark_distance=DEFAULT_LANDMARK_DISTANCE)
+        return setting.replace(size=None, level=None)
+    return setting.replace(landmark_distance=DEFAULT_LANDMARK_DISTANCE)
 
 
 def _pool(episodes: pd.DataFrame, metric: str, row: str) -> Iterator[dict[str, Any]]:

@@ -20,7 +20,7 @@ from mazebench.maps.maze import cell_to_point
 from mazebench.report.episodes import ReportedResult, settings_of
 from mazebench.report.figures import WIDTH, Drawn
 from mazebench.report.tables import maze_sets, perturbed_groups
-from mazebench.tasks.task import Task
+from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import TRACKS
 
 # The page has the same: floor, wall, wall that only the map shows, wall that the map does not show, landmark.
@@ -56,10 +56,10 @@ def draw_trajectories(episodes: pd.DataFrame) -> Iterator[Drawn]:
             if chosen:
                 title = f"Trajectories: {setting}"
                 figure = _draw(title, own[own.trial.isin(chosen)], labels)
-                yield Drawn(f"trajectories-{prefix}{setting.name}", title, _NOTE, figure)
+                yield Drawn(f"trajectories-{prefix}{setting.slug}", title, _NOTE, figure)
 
 
-def _pick_settings(episodes: pd.DataFrame) -> Iterator[Task]:
+def _pick_settings(episodes: pd.DataFrame) -> Iterator[TaskOptions]:
     settings = settings_of(episodes)
     for task in ("hierarchical", "local"):
         plain = [setting for setting in settings if setting.task == task and setting.is_exact]
@@ -115,7 +115,7 @@ def _draw_episode(axes: Axes, episode: pd.Series) -> None:
     walls = result.walls(episode.maze)
     assert result.trajectories is not None
     assert walls is not None
-    size, shown = result.setting.size, result.shown[episode.number]
+    size, shown = len(walls), result.shown[episode.number]
     cells = walls.astype(int)
     if shown.are_cells:  # another frame than the maze's would make the comparison meaningless
         cells[shown.walls & ~walls] = 2
@@ -123,7 +123,7 @@ def _draw_episode(axes: Axes, episode: pd.Series) -> None:
     for landmark in shown.landmarks:
         cells[divmod(landmark, size)] = 4
     axes.imshow(cells, cmap=_CELL_COLORS, vmin=0, vmax=4, extent=(0, size, 0, size), interpolation="none")
-    points = result.trajectories[episode.number].pose[:, :2].astype(np.float64) / result.setting.cell_size
+    points = result.trajectories[episode.number].pose[:, :2].astype(np.float64) / (result.setting.cell_size or 1.0)
     segments = np.stack([points[:-1], points[1:]], axis=1)
     path = LineCollection(list(segments), cmap=TIME_COLORS, linewidths=1.3, capstyle="round", zorder=3)
     path.set_array(np.linspace(0, 1, len(segments)))

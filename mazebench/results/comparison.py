@@ -83,11 +83,11 @@ def compare_folders(a: pathlib.Path, b: pathlib.Path) -> Comparison:
     ours, theirs = (result.summary for result in pairs[common[0]])
     task = ours.task
     title = f"A is {_who(ours, common)} in {a}, B is {_who(theirs, common)} in {b}"
-    title += f"; {task.task}, {task.split_in_results} mazes {task.size} x {task.size}" if common == [""] else ""
+    title += f"; {task.title}, {task.split_in_results} mazes {task.size} x {task.size}" if common == [""] else ""
     return Comparison(
         title=title,
         parts={name: compare_results(*pair) for name, pair in pairs.items()},
-        has_distances=task.task == "local",
+        has_distances=not task.is_hierarchical,
         notes=notes,
     )
 
@@ -163,7 +163,7 @@ def _who(summary: Summary, parts: list[str]) -> str:
     task = summary.task
     wrong = [*(f"{key} {value}" for key, value in task.perturbations.items() if value), *task.noise_in_words]
     if task.track is not None:
-        wrong.insert(0, f"track {task.track}, level {task.level[0]}")
+        wrong.insert(0, f"track {task.title.replace(' ', ', level ')}")
     return summary.row + (f" ({', '.join(wrong)})" if wrong and parts == [""] else "")
 
 

@@ -20,9 +20,9 @@ _SHA256 = "de3d76f36e3ee498c6d15bea88dcf52d2c5f88d3df90d956691048694976f274"
 
 def frozen_oracle_steps(task: Task, trials: Sequence[Trial]) -> Steps | None:
     """Returns the oracle's steps in some trials; None unless all of them are frozen, and the oracle's steps, too."""
-    if task.frozen_split is None:
+    if task.options.frozen_split is None:
         return None
-    steps = _steps_by_seed(task.benchmark, task.task, task.size, task.frozen_split)
+    steps = _steps_by_seed(task.options.benchmark, task.interface.task, task.size, task.options.frozen_split)
     seeds = [trial.episode.seed for trial in trials]
     return tuple(steps[seed] for seed in seeds) if all(seed in steps for seed in seeds) else None
 

@@ -39,4 +39,4 @@ def printed_mmn(summary: Summary) -> dict[int, float]:
     task = summary.task
     if task.split_in_results != "eval" or not task.is_exact or task.noise_in_words:
         return {}
-    return printed(task.task, task.size).get("MMN", {}).get("success_rate", {})
+    return printed(task.task, task.size or 0).get("MMN", {}).get("success_rate", {})

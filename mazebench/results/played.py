@@ -17,7 +17,7 @@ from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.route import plan_route
 from mazebench.tasks.shown_map import leg_context, show_map
-from mazebench.tasks.task import Task
+from mazebench.tasks.task import Task, resolve
 
 
 class Shown(NamedTuple):
@@ -34,8 +34,8 @@ class Shown(NamedTuple):
         return self.walls.dtype == bool
 
 
-def check_mazes(summary: Summary) -> None:
-    """Checks that the mazes of an evaluation are there, as they were played.
+def played_task(summary: Summary) -> Task:
+    """Returns the task of an evaluation, whose mazes are there as they were played.
 
     Raises:
       InputError: if this version of the benchmark has others, or the mazes are gone or were changed.
@@ -46,8 +46,10 @@ def check_mazes(summary: Summary) -> None:
         raise InputError(
             f"expected results of benchmark {summary.benchmark!r}, manifest {installed[:8]}, found manifest {found[:8]}"
         )
-    if mazes_hash(summary.task) != provenance.mazes_sha256:
+    task = resolve(summary.task)
+    if mazes_hash(task) != provenance.mazes_sha256:
         raise InputError("expected the mazes that were played, found others")
+    return task
 
 
 def mazes_hash(task: Task) -> str:
@@ -56,7 +58,7 @@ def mazes_hash(task: Task) -> str:
     1 m, the width of the benchmark's cells, is left out.
     """
     scale = "" if task.cell_size == 1 else repr(task.cell_size)
-    mazes = (task.all_mazes[0],) if task.fresh else task.fixed_mazes
+    mazes = (task.mazes[0],) if task.options.fresh else task.fixed_mazes
     walls = b"".join(maze.walls.tobytes() for maze in mazes)
     ends = b"" if task.scenarios is None else np.stack([task.scenarios.starts, task.scenarios.goals]).tobytes()
     return hashlib.sha256(walls + scale.encode("ascii") + ends).hexdigest()

@@ -10,7 +10,7 @@ import pydantic
 
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE
 from mazebench.storage.json_files import to_line
-from mazebench.tasks.task import Task
+from mazebench.tasks.task_options import TaskOptions
 
 _LARGEST = 2**53  # from here on, not every whole number is a float
 
@@ -19,6 +19,11 @@ Length = Annotated[float, pydantic.Field(ge=0, lt=_LARGEST)]
 Share = Annotated[float, pydantic.Field(ge=0, le=1)]
 Size = Annotated[int, pydantic.Field(ge=MIN_SIZE, le=MAX_SIZE)]
 Cell = tuple[Count, Count]
+# The options of a task, as JSON has them.
+StoredTask = Annotated[
+    pydantic.InstanceOf[TaskOptions],
+    pydantic.BeforeValidator(lambda task: TaskOptions.of(task) if isinstance(task, dict) else task),
+]
 Name = Annotated[str, pydantic.Field(min_length=1, max_length=1000)]
 
 
@@ -31,13 +36,13 @@ class _Stored(pydantic.BaseModel):
 class Record(_Stored):
     """The result of one episode.
 
-    The levels of the perturbations follow as further keys; on a track also `track`, `level` and its facts, such as
+    The strengths of the perturbations follow as further keys; on a track also `level` and its facts, such as
     `blocked`; in mazes whose cells are not 1 m wide also `cell_size`, in metres; where a user set them, `lidar_noise`
     and `odometry_noise`.
     """
 
     agent: Name
-    task: Name
+    task: Name  # "local", "hierarchical" or the track
     size: Size  # N, cells a side of the maze
     split: Name  # "train", "eval", or "custom" for mazes, a start or a goal of one's own
     episode: Count  # index in the protocol's order
@@ -103,7 +108,7 @@ class Summary(_Stored):
     agent: Name
     privileged: bool = False  # whether the agent was given the true maze and pose
     untrained_scale: bool = False  # whether the agent learned on maps of another scale, in metres a cell of the context
-    task: Task  # as this agent played it
+    task: StoredTask  # as this agent played it
     suite: str | None = None  # of a part of a suite, with the part's name
     part: str | None = None
     benchmark: Name
@@ -121,7 +126,7 @@ class Summary(_Stored):
     @property
     def row(self) -> str:
         """The agent, its actions unless it has the six, and what it was told less or more: "navigator without map"."""
-        acting = "" if self.task.actions == "six" else f" with {self.task.actions} actions"
+        acting = "" if self.task.actions in (None, "six") else f" with {self.task.actions} actions"
         without = f" without {' and '.join(self.task.hide)}" if self.task.hide else ""
         return self.agent + acting + without + (" with the true pose" if self.task.exact_pose else "")
 

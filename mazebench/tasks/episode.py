@@ -14,7 +14,7 @@ from mazebench.tasks.perturbations import PERTURBATIONS
 from mazebench.tasks.perturbations.perturbation import Perturbation
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
-from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks import LEVELS, TRACKS
 
 _SEEDS = 2**31
 _MAX_TRIES = 1000
@@ -45,44 +45,44 @@ class Episode:
         return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=key))
 
 
-def episode_level(spec: Task, episode: Episode) -> int:
+def episode_level(task: Task, episode: Episode) -> int:
     """Returns the level of the track at which `episode` is played."""
-    if len(spec.level) == 1:
-        return spec.level[0]
-    return spec.level[int(episode.stream(Stream.LEVEL).integers(len(spec.level)))]
+    if len(task.levels) < 2:
+        return task.levels[0] if task.levels else LEVELS[0]
+    return task.levels[int(episode.stream(Stream.LEVEL).integers(len(task.levels)))]
 
 
-def perturbations_of(spec: Task, episode: Episode) -> list[tuple[Perturbation, np.random.Generator]]:
+def perturbations_of(task: Task, episode: Episode) -> list[tuple[Perturbation, np.random.Generator]]:
     """Returns the perturbations of `episode`, in the order in which they apply, each with a generator of its stream."""
-    perturbations = [PERTURBATIONS[name](strength) for name, strength in spec.active_perturbations]
-    if spec.track is not None:
-        perturbations += TRACKS[spec.track].levels[episode_level(spec, episode) - 1].perturbations
+    perturbations = [PERTURBATIONS[name](strength) for name, strength in task.options.active_perturbations]
+    if task.track is not None:
+        perturbations += TRACKS[task.track].levels[episode_level(task, episode) - 1].perturbations
     return [(perturbation, episode.stream(perturbation.stream)) for perturbation in perturbations]
 
 
-def sample_episode(spec: Task, rng: np.random.Generator) -> Episode:
+def sample_episode(task: Task, rng: np.random.Generator) -> Episode:
     """Draws an episode of a task; of fresh mazes, in one in which the task can be played.
 
     Raises:
       InputError: if no such maze is found.
     """
-    for _ in range(_MAX_REDRAWS if isinstance(spec.all_mazes, FreshMazes) else 0):
+    for _ in range(_MAX_REDRAWS if isinstance(task.mazes, FreshMazes) else 0):
         with contextlib.suppress(InputError):
-            return _sample_episode(spec, rng)
-    return _sample_episode(spec, rng)
+            return _sample_episode(task, rng)
+    return _sample_episode(task, rng)
 
 
-def _sample_episode(spec: Task, rng: np.random.Generator) -> Episode:
-    index = int(rng.integers(len(spec.all_mazes)))
-    maze = spec.all_mazes[index]
-    if spec.track is not None and isinstance(spec.all_mazes, FreshMazes):
-        TRACKS[spec.track].require(maze, spec.level)
-    if spec.scenarios is not None:
-        return make_episode(index, *spec.scenarios.ends(rng.choice(spec.scenarios.numbers(spec.distances))), rng)
-    start, goal = spec.ends(maze)
+def _sample_episode(task: Task, rng: np.random.Generator) -> Episode:
+    index = int(rng.integers(len(task.mazes)))
+    maze = task.mazes[index]
+    if task.track is not None and isinstance(task.mazes, FreshMazes):
+        TRACKS[task.track].require(maze, task.levels)
+    if task.scenarios is not None:
+        return make_episode(index, *task.scenarios.ends(rng.choice(task.scenarios.numbers(task.distances))), rng)
+    start, goal = task.options.ends(maze)
     if start is None or goal is None:
-        pair_rng = np.random.default_rng([_FIXED_PAIR_SEED, index]) if spec.pairs == "fixed" else rng
-        distance = spec.distances[pair_rng.integers(len(spec.distances))]
+        pair_rng = np.random.default_rng([_FIXED_PAIR_SEED, index]) if task.options.pairs == "fixed" else rng
+        distance = task.distances[pair_rng.integers(len(task.distances))]
         start, goal = sample_pair(maze, distance, pair_rng, start, goal)
     return make_episode(index, start, goal, rng)
 
@@ -125,16 +125,16 @@ def sample_pair(
     raise InputError(f"{maze.name}: found no two cells {distance} cells apart; the farthest are {maze.diameter}")
 
 
-def check_episode(spec: Task, episode: Episode) -> Episode:
+def check_episode(task: Task, episode: Episode) -> Episode:
     """Returns `episode` if it can be played in a task.
 
     Raises:
       InputError: if there is no such maze, start or goal is not free in it, or they are one cell.
     """
-    if not 0 <= episode.maze < len(spec.all_mazes):
-        raise InputError(f"expected a maze from 0 to {len(spec.all_mazes) - 1}, found {episode.maze}")
+    if not 0 <= episode.maze < len(task.mazes):
+        raise InputError(f"expected a maze from 0 to {len(task.mazes) - 1}, found {episode.maze}")
     for cell in (episode.start, episode.goal):
-        spec.all_mazes[episode.maze].require_free(cell)
+        task.mazes[episode.maze].require_free(cell)
     if episode.start == episode.goal:
         raise InputError(f"expected a goal in another cell than the start, found both in {episode.goal}")
     return episode

@@ -18,22 +18,22 @@ from mazebench.tasks.task import Task
 from mazebench.world.simulation import STATE_SIZE
 
 
-def observation_specs(spec: Task) -> dict[str, specs.Array]:
+def observation_specs(task: Task) -> dict[str, specs.Array]:
     """Returns shape, type and range of each observation by name: the state, the context, and that of each sensor."""
-    size = spec.context_size
+    size = task.context_size
     return {
         "state": specs.Array((STATE_SIZE,), np.float32, name="state"),
         "context": specs.BoundedArray((NUM_PLANES, size, size), np.float32, 0.0, 1.0, name="context"),
-        **{name: SENSORS[name].observation_spec(name, spec) for name in spec.sensors},
+        **{name: SENSORS[name].observation_spec(name, task.options) for name in task.sensors},
     }
 
 
-def state_errors(spec: Task, episode: Episode) -> list[StateError]:
+def state_errors(task: Task, episode: Episode) -> list[StateError]:
     """Returns what is wrong with the states observed in `episode`; each has a random stream of its own."""
-    if spec.exact_pose:
+    if task.options.exact_pose:
         return []
-    errors = [perturbation.state_error(rng) for perturbation, rng in perturbations_of(spec, episode)]
-    alpha = spec.odometry_noise_at(episode_level(spec, episode))
+    errors = [perturbation.state_error(rng) for perturbation, rng in perturbations_of(task, episode)]
+    alpha = task.odometry_noise_at(episode_level(task, episode))
     noise = NoisyMotion(alpha, episode.stream(Stream.MOTION_NOISE)) if alpha else None
     return [error for error in (noise, *errors) if error is not None]
 
@@ -41,16 +41,16 @@ def state_errors(spec: Task, episode: Episode) -> list[StateError]:
 class OpenSensors:
     """The sensors of a task, opened for one environment."""
 
-    def __init__(self, spec: Task):
-        self._spec = spec
+    def __init__(self, task: Task):
+        self._task = task
         names: dict[type[Sensor], list[str]] = {}
-        for name in spec.sensors:
+        for name in task.sensors:
             names.setdefault(SENSORS[name], []).append(name)
-        self._sensors = [kind(tuple(of_kind), spec, spec.all_mazes) for kind, of_kind in names.items()]
+        self._sensors = [kind(tuple(of_kind), task.options, task.mazes) for kind, of_kind in names.items()]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Makes copies open sensors of their own."""
-        return OpenSensors, (self._spec,)
+        return OpenSensors, (self._task,)
 
     def read(self, worlds: Worlds) -> dict[str, np.ndarray]:
         """Returns `[K, ...]` by the sensor's name, for K >= 1 worlds."""

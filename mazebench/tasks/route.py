@@ -77,20 +77,23 @@ class Route:
         return Event.LANDMARK
 
 
-def plan_route(spec: Task, episode: Episode, shown: ShownMap) -> Route:
+def plan_route(task: Task, episode: Episode, shown: ShownMap) -> Route:
     """Returns the route of an episode; in the hierarchical task its landmarks are planned on the shown map.
 
     Landmarks are cells of the maze, so they are planned before the change of perspective.
     """
-    if spec.task == "local":
-        maze = spec.all_mazes[episode.maze]
-        time_limit = spec.time_limit or default_time_limit(maze.distance(episode.start, episode.goal), track=spec.track)
+    maze, options = task.mazes[episode.maze], task.options
+    if not options.is_hierarchical:
+        time_limit = options.time_limit or default_time_limit(
+            maze.distance(episode.start, episode.goal), track=task.track
+        )
         next_goal = None
-        if spec.num_goals > 1:
-            next_goal = _LaterGoals(maze, spec.distances, episode.stream(Stream.LATER_GOALS))
-        return Route([episode.start, episode.goal], time_limit, spec.num_goals, next_goal)
+        if options.num_goals > 1:
+            next_goal = _LaterGoals(maze, task.distances, episode.stream(Stream.LATER_GOALS))
+        return Route([episode.start, episode.goal], time_limit, options.num_goals, next_goal)
     path = path_through_walls(shown.walls, episode.start, episode.goal)
-    return Route([*path[: -1 : spec.landmark_distance], path[-1]], spec.time_limit)
+    assert options.time_limit is not None  # a task that is no track has one
+    return Route([*path[: -1 : options.landmark_distance], path[-1]], options.time_limit)
 
 
 @dataclasses.dataclass

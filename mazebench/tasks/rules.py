@@ -17,7 +17,7 @@ from mazebench.tasks.sensors.sensor import Worlds
 from mazebench.tasks.shown_map import is_blocked, leg_context, show_map
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
-from mazebench.tasks.task_fields import PROGRESS
+from mazebench.tasks.task_options import PROGRESS
 from mazebench.world.angles import wrap_angle
 
 _UNKNOWN = -1  # a way that would take long to measure
@@ -65,9 +65,9 @@ class Rules:
     entered on the last step is reached.
     """
 
-    def __init__(self, spec: Task, num_envs: int):
-        self.spec = spec
-        self._sensors = OpenSensors(spec)
+    def __init__(self, task: Task, num_envs: int):
+        self.task = task
+        self._sensors = OpenSensors(task)
 
         # The episodes; those of an environment that has none, or none yet, are None.
         self.episodes: list[Episode | None] = [None] * num_envs
@@ -76,13 +76,13 @@ class Rules:
         self._state_errors: list[list[StateError]] = [[] for _ in range(num_envs)]
         self._lidar_noise: list[np.random.Generator | None] = [None] * num_envs
         self.maze, self.level, self.distance = np.zeros((3, num_envs), dtype=np.int64)  # see `infos`
-        self.kind, self.track = (np.full(num_envs, text, dtype=object) for text in ("", spec.track or ""))
+        self.kind, self.track = (np.full(num_envs, text, dtype=object) for text in ("", task.track or ""))
         self.blocked = np.zeros(num_envs, dtype=bool)
         self._ways: list[np.ndarray | None] = [None] * num_envs  # [N * N] int, in cells from each cell to the goal
         self.active = np.zeros(num_envs, dtype=bool)  # whether the environment has an episode
 
         # The current legs. Cells are given as row * N + column.
-        self.context = np.zeros((num_envs, NUM_PLANES, spec.context_size, spec.context_size), dtype=np.float32)
+        self.context = np.zeros((num_envs, NUM_PLANES, task.context_size, task.context_size), dtype=np.float32)
         self.marker = np.zeros((num_envs, 3))  # m, of the goal
         self.landmark = np.zeros(num_envs, dtype=np.int64)  # index of the leg
         self.start, self.target, self._goal = np.zeros((3, num_envs), dtype=np.int64)
@@ -98,10 +98,10 @@ class Rules:
         self.steps = np.zeros(num_envs, dtype=np.int64)
         self.is_first, self.reached, self.timed_out = np.zeros((3, num_envs), dtype=bool)
 
-    def begin(self, i: int, episode: Episode | None, spec: Task | None = None) -> None:
+    def begin(self, i: int, episode: Episode | None, task: Task | None = None) -> None:
         """Begins an episode in environment i, whose body must then be moved to `pose[i]`; None takes its episode.
 
-        `spec` is its task, another of `tasks_of_tracks`; by default that of these rules.
+        `task` is its task, another of `tasks_of_tracks`; by default that of these rules.
         """
         self.episodes[i], self.active[i] = episode, episode is not None
         self.is_first[i] = self.reached[i] = self.timed_out[i] = False
@@ -110,41 +110,41 @@ class Rules:
             return
 
         # What the agent is shown and senses, and where it is sent.
-        spec = spec or self.spec
-        self.shown[i] = shown = show_map(spec, episode)
-        self.routes[i] = route = plan_route(spec, episode, shown)
-        self._state_errors[i] = state_errors(spec, episode)
-        if "lidar" in spec.sensors and spec.lidar.is_random:
+        task = task or self.task
+        self.shown[i] = shown = show_map(task, episode)
+        self.routes[i] = route = plan_route(task, episode, shown)
+        self._state_errors[i] = state_errors(task, episode)
+        if "lidar" in task.sensors and task.options.lidar.is_random:
             self._lidar_noise[i] = episode.stream(Stream.LIDAR_NOISE)
 
-        maze = spec.all_mazes[episode.maze]
+        maze = task.mazes[episode.maze]
         self.maze[i], self.kind[i] = episode.maze, maze.kind
-        self.level[i] = 0 if spec.track is None else episode_level(spec, episode)
-        self.track[i] = spec.track or ""
+        self.level[i] = 0 if task.track is None else episode_level(task, episode)
+        self.track[i] = task.track or ""
         self.pose[i] = (*maze.point(episode.start), episode.yaw)
         self.path_length[i] = self.steps[i] = self.progress[i] = 0
-        self.cell[i] = episode.start[0] * spec.size + episode.start[1]
+        self.cell[i] = episode.start[0] * task.size + episode.start[1]
         self._seek(i, route, shown)
         self._begin_leg(i, route, shown)
 
     def _seek(self, i: int, route: Route, shown: ShownMap) -> None:
         """Measures the way to the goal of environment i, which is new."""
-        maze, start = self.spec.all_mazes[self.maze[i]], route.cells[0]
+        maze, start = self.task.mazes[self.maze[i]], route.cells[0]
         self.blocked[i] = shown.walls is not maze.walls and is_blocked(maze.walls, shown.walls, (start, route.goal))
         self.distance[i] = self.way_left[i] = _UNKNOWN
         self._ways[i] = None
-        if maze.keeps_distances or self.spec.reward == PROGRESS:
+        if maze.keeps_distances or self.task.options.reward == PROGRESS:
             distances = maze.distances(route.goal)
             self.distance[i] = self.way_left[i] = distances[start]
             self._ways[i] = distances.ravel()
 
     def _begin_leg(self, i: int, route: Route, shown: ShownMap) -> None:
-        size = self.spec.size
+        size = self.task.size
         self.is_first[i] = True
-        self.context[i] = leg_context(self.spec, shown, route.start, route.target)
+        self.context[i] = leg_context(self.task, shown, route.start, route.target)
         cells = np.array([route.start, route.target, route.goal])
         self.start[i], self.target[i], self._goal[i] = cells @ (size, 1)
-        self.marker[i, :2] = self.spec.all_mazes[self.maze[i]].point(route.goal)
+        self.marker[i, :2] = self.task.mazes[self.maze[i]].point(route.goal)
         self.time_limit[i], self._deadline[i] = route.time_limit, route.deadline
         self.landmark[i] = route.leg
 
@@ -167,7 +167,7 @@ class Rules:
         self.steps += running
 
         # All mazes have one size and one cell size, so the first one converts the points of all.
-        cells = self.spec.all_mazes[0].cell_index(self.pose[:, :2])
+        cells = self.task.mazes[0].cell_index(self.pose[:, :2])
         entered = (cells != self.cell).nonzero()[0]
         for i, cell in zip(entered.tolist(), cells[entered].tolist(), strict=True):
             self._enter(i, cell)
@@ -175,7 +175,7 @@ class Rules:
         # Nothing happens to a route unless one of these holds; then the route's own rules decide.
         due = (self.cell == self.target) | (self.cell == self._goal) | (self.steps >= self._deadline)
         for i in np.flatnonzero(due & running).tolist():
-            self._follow_route(i, divmod(int(self.cell[i]), self.spec.size))
+            self._follow_route(i, divmod(int(self.cell[i]), self.task.size))
 
     def _move_one(self, pose: np.ndarray) -> None:
         """Does what `advance` does, for a single environment."""
@@ -186,8 +186,8 @@ class Rules:
         self.path_length[0] += math.sqrt(moved_x * moved_x + moved_y * moved_y)
         self.pose[0] = pose
         self.steps[0] = steps = self.steps.item(0) + 1
-        row, column = cell = self.spec.all_mazes[0].cell_at(x, y)
-        index = row * self.spec.size + column
+        row, column = cell = self.task.mazes[0].cell_at(x, y)
+        index = row * self.task.size + column
         if index != self.cell.item(0):
             self._enter(0, index)
         if index == self.target.item(0) or index == self._goal.item(0) or steps >= self._deadline.item(0):
@@ -198,7 +198,7 @@ class Rules:
         self.cell[i] = cell
         if (way := self._ways[i]) is not None:
             way_left = way.item(cell)
-            if self.spec.reward == PROGRESS:
+            if self.task.options.reward == PROGRESS:
                 self.progress[i] = self.way_left.item(i) - way_left
             self.way_left[i] = way_left
 
@@ -213,7 +213,7 @@ class Rules:
         self.reached[i] = event is Event.REACHED
         self.timed_out[i] = event is Event.TIMEOUT
         if event is Event.LANDMARK:
-            if self.spec.num_goals > 1:
+            if self.task.options.num_goals > 1:
                 self._seek(i, route, shown)
             self._begin_leg(i, route, shown)
 
@@ -235,7 +235,7 @@ class Rules:
                 for add_error in self._state_errors[i]:
                     add_error(state)
         observed = {"state": states.astype(np.float32)}
-        if self.spec.sensors:
+        if self.task.sensors:
             noise = [self._lidar_noise[i] for i in indices.tolist()]
             worlds = Worlds(self.maze[indices], self.pose[indices], self.marker[indices], noise)
             observed |= self._sensors.read(worlds)

@@ -14,11 +14,11 @@ _GREY_LEVELS = np.float32(255)
 _PLANES = {"map": (GLOBAL_MAP, LOCAL_MAP), "goal": (GOAL,)}  # of the context, by what `hide` names
 
 
-def show_map(spec: Task, episode: Episode) -> ShownMap:
+def show_map(task: Task, episode: Episode) -> ShownMap:
     """Returns the map that the agent is shown in `episode`."""
-    maze = spec.all_mazes[episode.maze]
+    maze = task.mazes[episode.maze]
     shown = ShownMap(maze.walls, kind=maze.kind)
-    for perturbation, rng in perturbations_of(spec, episode):
+    for perturbation, rng in perturbations_of(task, episode):
         shown = perturbation.show(shown, (episode.start, episode.goal), rng)
     return shown
 
@@ -28,15 +28,15 @@ def is_blocked(walls: np.ndarray, shown: np.ndarray, ends: tuple[Cell, Cell]) ->
     return bool(walls[tuple(np.transpose(path_through_walls(shown, *ends)))].any())
 
 
-def leg_context(spec: Task, shown: ShownMap, start: Cell, goal: Cell) -> np.ndarray:
+def leg_context(task: Task, shown: ShownMap, start: Cell, goal: Cell) -> np.ndarray:
     """Returns `[4, M, M]` float32: the context of the leg between two cells of the maze (see `build_context`).
 
     On a track, the values of the maps have 8 bits.
     """
-    context = build_context(shown.seen_walls(), shown.seen_cell(start), shown.seen_cell(goal), spec.context_size)
-    if spec.track is not None:
+    context = build_context(shown.seen_walls(), shown.seen_cell(start), shown.seen_cell(goal), task.context_size)
+    if task.track is not None:
         maps = context[[GLOBAL_MAP, LOCAL_MAP]]
         context[[GLOBAL_MAP, LOCAL_MAP]] = np.rint(maps * _GREY_LEVELS) / _GREY_LEVELS
-    for plane in (*shown.hidden, *(plane for name in spec.hide for plane in _PLANES[name])):
+    for plane in (*shown.hidden, *(plane for name in task.options.hide for plane in _PLANES[name])):
         context[plane] = 0
     return context

@@ -87,7 +87,8 @@ class Task:
     def replace(self, **changes: Any) -> Task:
         """Returns the task with other values of some options; the mazes are not read again unless they change."""
         read = None if set(changes) & set(_OF_MAZES) else (self.mazes, self.scenarios)
-        return resolve(self.options.replace(**changes), read=read)
+        task = resolve(self.options.replace(**changes), read=read)
+        return dataclasses.replace(task, context_size=self.context_size) if "context_size" not in changes else task
 
     @property
     def name(self) -> str:
@@ -120,16 +121,13 @@ class Task:
         """True if the context may change within an episode: at landmarks, or where one goal follows another."""
         return self.options.is_hierarchical or self.options.num_goals > 1
 
-    def time_limit(self, num_cells: int) -> int:
-        """Returns the agent steps of a leg; on a track they depend on how far its goal is away, in cells."""
-        return self.options.time_limit or default_time_limit(num_cells, track=self.track)
-
     @property
     def longest_episode(self) -> int | None:
         """The agent steps that an episode may take; None where they depend on its landmarks."""
         if self.options.is_hierarchical:
             return None
-        return self.options.num_goals * self.time_limit(max(self.distances))
+        time_limit = self.options.time_limit or default_time_limit(max(self.distances), track=self.track)
+        return self.options.num_goals * time_limit
 
     def odometry_noise_at(self, level: int) -> float:
         """Returns alpha of the noise on the observed motion at a level: as the option says, or the track."""
@@ -242,7 +240,9 @@ def resolve_for_evaluation(asked: TaskOptions, context_size_of: Callable[[int], 
     return resolve(asked, distances=EVAL_DISTANCES, context_size_of=context_size_of)
 
 
-def as_options(task: str | Task | TaskOptions, options: Mapping[str, Any], arguments: Sequence[str] = ()) -> TaskOptions:
+def as_options(
+    task: str | Task | TaskOptions, options: Mapping[str, Any], arguments: Sequence[str] = ()
+) -> TaskOptions:
     """Returns what was asked: a task or its options, or the name of a task with options beside it.
 
     Args:
@@ -262,19 +262,20 @@ def as_options(task: str | Task | TaskOptions, options: Mapping[str, Any], argum
 
 
 def tasks_of_tracks(tracks: Sequence[str], **options: Any) -> tuple[Task, ...]:
-    """Returns a task for each of some tracks, in the same mazes and with contexts of one size, the largest of theirs.
+    """Returns a task for each of some tracks, in the same mazes and with contexts of one size.
 
     Args:
       tracks: names of tracks, each once.
-      **options: those of `Task.of`.
+      **options: those of `Task.of`; `context_size` is the largest one of the tracks' if it is not given.
 
     Raises:
       InputError: as `Task.of`, and if the tracks are not several different ones.
     """
     if not tracks or any(track not in TRACKS for track in tracks) or len(set(tracks)) < len(tracks):
         raise InputError(f"expected different tracks of {', '.join(TRACKS)}, found {', '.join(tracks) or 'none'}")
+    wanted = TaskOptions.of({"context_size": options.pop("context_size", None)}).context_size
     tasks = [Task.of(track, **options) for track in tracks]
-    context_size = max(task.context_size for task in tasks)
+    context_size = wanted or max(task.context_size for task in tasks)
     return tuple(
         dataclasses.replace(task, context_size=context_size, mazes=tasks[0].mazes, scenarios=tasks[0].scenarios)
         for task in tasks

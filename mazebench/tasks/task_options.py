@@ -257,6 +257,11 @@ class TaskOptions(SensorOptions, ReadOptions):
         return self.task if self.task in TRACKS else None
 
     @property
+    def track_level(self) -> int:
+        """The level of the track, in an evaluation, which has one; 0 without a track."""
+        return 0 if self.track is None else (self.level or LEVELS)[0]
+
+    @property
     def is_hierarchical(self) -> bool:
         """True if the agent is sent from landmark to landmark."""
         return self.task == HIERARCHICAL
@@ -335,7 +340,7 @@ class TaskOptions(SensorOptions, ReadOptions):
 
     @property
     def setting(self) -> Self:
-        """The options without what an agent chooses or is not told, and without distances: results are grouped by it."""
+        """The options without distances and what an agent chooses or is not told, by which results are grouped."""
         left = [*_OF_AGENTS, "distances", "time_limit"]
         left += [] if self.is_hierarchical else ["landmark_distance"]
         left += [] if self.mazes is None else ["split"]
@@ -388,7 +393,7 @@ class TaskOptions(SensorOptions, ReadOptions):
     @property
     def _order(self) -> tuple[Any, ...]:
         return (
-            *(self.track is not None, self.is_hierarchical, self.size, self.split_in_results),
+            *(self.track is not None, self.is_hierarchical, self.size or 0, self.split_in_results),
             self.landmark_distance if self.is_hierarchical else 0,
             self.active_perturbations,
             *(str(self.mazes or ""), self.kinds, self.num_mazes or 0, self.track or "", self.level or ()),
@@ -441,13 +446,15 @@ class TaskOptions(SensorOptions, ReadOptions):
         elif self.exact_pose:
             raise InputError("exact_pose: expected a track whose pose is odometry beside it, found none")
         elif self.level is not None:
-            raise InputError(f"level {self._levels}: expected a track beside it, found none; tracks: {', '.join(TRACKS)}")
+            raise InputError(
+                f"level {self._levels}: expected a track beside it, found none; tracks: {', '.join(TRACKS)}"
+            )
 
     def _require(self, beside: str, **wanted: Any) -> None:
         """Raises `InputError` unless some options have the only values that go with what is `beside` them."""
         for name, value in wanted.items():
             if (found := getattr(self, name)) != value:
-                raise InputError(f"{beside}: expected {name} {value!r} beside it, found {found!r}")
+                raise InputError(f"{beside}: expected {name} {value!r}, found {found!r}")
 
     def _check_hidden(self) -> None:
         """Raises `InputError` if another option would tell what is hidden."""

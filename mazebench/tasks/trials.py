@@ -55,38 +55,38 @@ def _trial_of_row(row: dict[str, str]) -> Trial:
     return Trial(episode, distance=int(row["distance"]), shortest_path=float(row["shortest_path"]))
 
 
-def select_trials(spec: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
+def select_trials(task: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
     """Returns the episodes to evaluate, by maze and then by distance.
 
     In the benchmark's mazes its frozen episodes are taken as far as they go: of a track all of the task's distances,
     else at most five for each maze and distance. Elsewhere episodes are drawn.
 
     Args:
-      spec: the task; its distances are those of the pairs.
+      task: the task; its distances are those of the pairs.
       episodes_per_distance: for each maze and distance.
       seed: of what is drawn.
 
     Raises:
       InputError: if no two cells of a maze are a wanted distance apart.
     """
-    frozen_split = spec.frozen_split
-    if frozen_split is not None and spec.track is not None:
-        trials = frozen_trials("local", spec.size, TRACKS_BENCHMARK, frozen_split)
-        return [trial for trial in trials if trial.distance in spec.distances]
-    if frozen_split is not None and spec.task == "hierarchical":
-        return list(frozen_trials(spec.task, spec.size))
-    has_all = set(spec.distances) <= set(EVAL_DISTANCES) and episodes_per_distance <= EPISODES_PER_DISTANCE
+    frozen_split = task.options.frozen_split
+    if frozen_split is not None and task.track is not None:
+        trials = frozen_trials("local", task.size, TRACKS_BENCHMARK, frozen_split)
+        return [trial for trial in trials if trial.distance in task.distances]
+    if frozen_split is not None and task.options.is_hierarchical:
+        return list(frozen_trials(task.name, task.size))
+    has_all = set(task.distances) <= set(EVAL_DISTANCES) and episodes_per_distance <= EPISODES_PER_DISTANCE
     if frozen_split is not None and has_all:
         # The frozen episodes of a maze and a distance follow each other, EPISODES_PER_DISTANCE of them.
         return [
             trial
-            for index, trial in enumerate(frozen_trials(spec.task, spec.size))
-            if index % EPISODES_PER_DISTANCE < episodes_per_distance and trial.distance in spec.distances
+            for index, trial in enumerate(frozen_trials(task.name, task.size))
+            if index % EPISODES_PER_DISTANCE < episodes_per_distance and trial.distance in task.distances
         ]
-    return draw_trials(spec, episodes_per_distance, seed)
+    return draw_trials(task, episodes_per_distance, seed)
 
 
-def draw_trials(spec: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
+def draw_trials(task: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
     """Draws episodes of a task, by maze and then by distance; of the hierarchical task, one in each maze.
 
     Where start and goal are given, an episode draws its heading only. Of scenarios, each is one episode.
@@ -94,19 +94,19 @@ def draw_trials(spec: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, 
     Raises:
       InputError: if no two cells of a maze are a wanted distance apart.
     """
-    if spec.scenarios is not None:
+    if task.scenarios is not None:
         return [
-            make_trial(spec.scenarios.maze, 0, spec.scenarios.ends(number), np.random.default_rng([seed, number]))
-            for number in spec.scenarios.numbers(spec.distances).tolist()
+            make_trial(task.scenarios.maze, 0, task.scenarios.ends(number), np.random.default_rng([seed, number]))
+            for number in task.scenarios.numbers(task.distances).tolist()
         ]
     trials = []
-    for index, maze in enumerate(spec.fixed_mazes):
-        start, goal = spec.ends(maze)
-        if spec.task == "hierarchical":
+    for index, maze in enumerate(task.fixed_mazes):
+        start, goal = task.options.ends(maze)
+        if task.options.is_hierarchical:
             rng = np.random.default_rng([seed, maze.size, index])
             trials.append(make_trial(maze, index, sample_pair(maze, 0, rng, start, goal), rng))
             continue
-        distances = sorted(set(spec.distances))
+        distances = sorted(set(task.distances))
         if start is not None and goal is not None:
             distances = [maze.distance(start, goal)]
         for distance in distances:

@@ -47,10 +47,10 @@ class Experience(NamedTuple):
 class Collector:
     """Steps B environments without end, and returns what is experienced in them."""
 
-    def __init__(self, task_spec: Task, num_envs: int, seed: int, num_threads: int = 0):
-        self._task = task_spec
-        self._any_maze = task_spec.all_mazes[0]  # all have one size and one cell size
-        self._env = MazeVectorEnv(task_spec, num_envs, num_threads=num_threads)
+    def __init__(self, task: Task, num_envs: int, seed: int, num_threads: int = 0):
+        self._task = task
+        self._any_maze = task.mazes[0]  # all have one size and one cell size
+        self._env = MazeVectorEnv(task, num_envs, num_threads=num_threads)
         self.restart(seed)
 
     def restart(self, seed: int) -> None:

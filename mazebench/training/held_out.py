@@ -12,8 +12,8 @@ from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
-from mazebench.tasks.task import Task, check_distances, check_maze
-from mazebench.tasks.task_fields import SPARSE
+from mazebench.tasks.task import Task
+from mazebench.tasks.task_options import SPARSE
 from mazebench.tasks.trials import draw_trials
 
 _SEED = 20_000  # of mazes that are drawn like the benchmark's, and in none of its splits
@@ -34,7 +34,7 @@ class HeldOutEvaluation:
         Raises:
           InputError: if no such mazes are found.
         """
-        mazes = task.all_mazes
+        mazes = task.mazes
         all_kinds = mazes.kinds if isinstance(mazes, FreshMazes) else (maze.kind for maze in mazes if maze.kind)
         kinds = tuple(dict.fromkeys(all_kinds))  # each once; mazes of one's own have none
         if not distances:
@@ -47,7 +47,7 @@ class HeldOutEvaluation:
             _draw_maze(plain, kinds[index % len(kinds)], f"held-out-{index}", stream)
             for index, stream in enumerate(streams if kinds else ())
         ]
-        self.task = plain.in_mazes(drawn) if drawn else plain
+        self.task = _in_mazes(plain, *drawn) if drawn else plain
         self.trials = list(enumerate(draw_trials(self.task, _EPISODES)))
 
     def success_rates(self, agent: Agent, progress: Callable[[int, int], None]) -> dict[int, float]:
@@ -71,11 +71,19 @@ def _draw_maze(task: Task, kind: str, name: str, stream: np.random.SeedSequence)
     for draw in range(_MAX_DRAWS):
         maze = generate(kind, task.size, rng, name)
         try:
-            check_maze(task, maze)
-            check_distances(task, maze)
+            _in_mazes(task, maze)
         except InputError:
             if draw == _MAX_DRAWS - 1:
                 raise
         else:
             break
     return maze
+
+
+def _in_mazes(task: Task, *mazes: Maze) -> Task:
+    """Returns the same task in some mazes.
+
+    Raises:
+      InputError: if it can't be played in one of them.
+    """
+    return task.replace(mazes=mazes, kinds=(), num_mazes=None, fresh=False, split=None)

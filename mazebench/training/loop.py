@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import logging
 import math
 import pathlib
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 
@@ -24,10 +25,10 @@ from mazebench.errors import InputError, RunError
 from mazebench.evaluation.checked_agent import context_size_of
 from mazebench.evaluation.provenance import code_hash
 from mazebench.maps.scenarios import are_scenarios
-from mazebench.options import fields_of
+from mazebench.options import check_names, fields_of, options_in
 from mazebench.results.played import mazes_hash
-from mazebench.tasks.task import Task, check_names, check_shown
-from mazebench.tasks.task_fields import PROGRESS, TaskOptions
+from mazebench.tasks.task import Task, as_options, resolve
+from mazebench.tasks.task_options import PROGRESS, TaskOptions
 from mazebench.training.counters import Counters
 from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.protocol import Learner, LearningAgent
@@ -50,23 +51,13 @@ class TrainingError(RunError):
 
 def train(
     agent: str,
-    task: str | Sequence[str] = "local",
+    task: str | Sequence[str] | Task | TaskOptions = "local",
     *,
     out: str | pathlib.Path,
-    minutes: float | None = None,
-    env_steps: int | None = None,
     overrides: Mapping[str, Any] | None = None,
-    seed: int = 0,
-    checkpoint_steps: int = 200_000,
-    checkpoint_minutes: float = 5.0,
-    eval_mazes: int = 20,
-    first_distance: int | None = None,
-    widen_steps: int = 400_000,
-    workers: int = 0,
-    ray_address: str | None = None,
     resume: bool = False,
     progress: Progress = lambda status: None,
-    **options: Unpack[TaskOptions],
+    **options: Any,
 ) -> None:
     """Trains an agent, as `mazebench train` does.
 
@@ -77,77 +68,48 @@ def train(
 
     Args:
       agent: the name of an agent that learns, or "module:Class".
-      task: "local", the name of a track, or the names of several, of which each has an equal share of the environments.
+      task: "local", the name of a track, or the names of several, of which each has an equal share of the environments;
+        or a `Task`, of which counts what was asked.
       out: the run folder.
-      minutes: how long this call trains.
-      env_steps: agent steps of the run, of all calls together.
       overrides: values of the agent's config by name.
-      seed: of everything that is drawn.
-      checkpoint_steps: agent steps between milestones.
-      checkpoint_minutes: minutes between savepoints; 0 for none.
-      eval_mazes: held-out mazes of an evaluation.
-      first_distance: cells that goals are away at most in the beginning; None for all distances.
-      widen_steps: agent steps over which that grows to the farthest distance of the task.
-      workers: Ray actors that collect; 0 collects in this process.
-      ray_address: of a Ray cluster for the workers.
       resume: go on from the last checkpoint in `out`.
       progress: called with the status after each step.
-      **options: those of `Task.of`.
+      **options: by name, as docs/options.md and docs/training.md list them: those of the training (`TrainOptions`:
+        minutes, env_steps, seed, checkpoint_steps, ...), and those of `Task.of`, unless `task` is a `Task`.
 
     Raises:
       InputError: if an option is wrong, or `out` can't be used.
       TrainingError: if a loss is not finite.
     """
-    names = (task,) if isinstance(task, str) else tuple(task)
-    if "hierarchical" in names:
-        raise InputError("expected task 'local' or a track in a training, found 'hierarchical'")
-    if (track := options.pop("track", None)) is not None:
-        if names not in (("local",), (track,)):
-            raise InputError(f"expected one track, found {', '.join(map(repr, (*names, track)))}")
-        names = (track,)
-    elif names == ("local",):
-        names = ()
-    chosen = TrainOptions(
-        agent,
-        overrides=tuple((name, str(value)) for name, value in (overrides or {}).items()),
-        minutes=minutes,
-        env_steps=env_steps,
-        seed=seed,
-        checkpoint_steps=checkpoint_steps,
-        checkpoint_minutes=checkpoint_minutes,
-        eval_mazes=eval_mazes,
-        track=names,
-        first_distance=first_distance,
-        widen_steps=widen_steps,
-        workers=workers,
-        ray_address=ray_address,
-    )
-    run_training(chosen, options, pathlib.Path(out), resume, progress)
+    check_names(options, TrainOptions, TaskOptions)
+    of_training = {name: value for name, value in options_in(options, TrainOptions).items() if name != "task"}
+    of_task = {name: value for name, value in options.items() if name not in of_training}
+    names: Sequence[str] = (task,) if isinstance(task, str) else task if isinstance(task, Sequence) else ()
+    asked = as_options(names[0] if names else task, of_task)  # type: ignore[arg-type]
+    chosen = TrainOptions.of(of_training, agent=agent, task=tuple(names) or (asked.task,))
+    run_training(chosen, asked, pathlib.Path(out), resume, progress, overrides)
 
 
 def run_training(
     options: TrainOptions,
-    task_options: Mapping[str, Any],
+    asked: TaskOptions,
     out: pathlib.Path,
     resume: bool = False,
     progress: Progress = lambda status: None,
+    overrides: Mapping[str, Any] | None = None,
 ) -> None:
-    """Trains an agent in the tracks of `options`, or in the local task, as the `task_options` of `Task.of` say."""
+    """Trains an agent in the tasks that `options` name, as `asked` says."""
     agent_class = load_agent_class(options.agent)
     if not issubclass(agent_class, LearningAgent):
         raise InputError(f"agent {options.agent!r} doesn't learn; agents that do: {', '.join(_learning_agents())}")
-    overrides = dict(options.overrides)
-    if len(options.track) > 1 and not agent_class.learns_several_tasks:
-        raise InputError(f"agent {options.agent!r}: learns one track at a time, found {', '.join(options.track)}")
+    overrides = {name: str(value) for name, value in (overrides or {}).items()}
+    if len(options.task) > 1 and not agent_class.learns_several_tasks:
+        raise InputError(f"agent {options.agent!r}: learns one track at a time, found {', '.join(options.task)}")
     defaults = agent_class.task_options(overrides)
-    tasks = [
-        training_task(options.agent, agent_class, defaults, {**task_options, "track": track})
-        for track in options.track or (None,)
-    ]
+    tasks = [training_task(options.agent, agent_class, defaults, asked.replace(task=name)) for name in options.task]
     _check_together(options, tasks)
     learner = agent_class.build_learner(tasks[0], seed=options.seed, overrides=overrides)
-    has_distances = bool(task_options.get("distances"))
-    held_out = [HeldOutEvaluation(task, options.eval_mazes, task.distances if has_distances else ()) for task in tasks]
+    held_out = [HeldOutEvaluation(task, options.eval_mazes, asked.distances or ()) for task in tasks]
     # The source comes first: if the cluster can't be reached, no run is begun.
     with open_source(options, tasks, learner) as source, RunFolder(out) as folder:
         counters = _begin_or_resume(options, folder, learner, tasks, resume)
@@ -262,7 +224,7 @@ class TrainingLoop:
         metrics = counters.mean_losses()
         for held_out in self._held_out:
             rates = held_out.success_rates(self._learner.actor.in_task(held_out.task), self._show_evaluation)
-            name = f"success_rate_{held_out.task.track}" if len(self._held_out) > 1 else "success_rate"
+            name = f"success_rate_{held_out.task.name}" if len(self._held_out) > 1 else "success_rate"
             metrics |= {f"{name}_{distance}": rate for distance, rate in rates.items()}
         self._folder.make_milestone(counters, metrics)
         self._counters = counters.at_milestone()
@@ -285,12 +247,12 @@ def num_updates_due(learner: Learner, env_steps: int) -> int:
 
 
 def _check_together(options: TrainOptions, tasks: Sequence[Task]) -> None:
-    """Checks that the tasks differ, and that goals can begin near."""
-    if len(set(options.track)) < len(options.track):
-        raise InputError(f"expected different tracks, found {', '.join(options.track)}")
+    """Checks that tasks of several are tracks, and that goals can begin near."""
+    if len(tasks) > 1 and any(task.track is None for task in tasks):
+        raise InputError(f"expected different tracks, found {', '.join(options.task)}")
     if options.first_distance is None:
         return
-    if any(task.pairs == "fixed" or task.scenarios is not None or task.num_ends for task in tasks):
+    if any(task.options.pairs == "fixed" or task.scenarios is not None or task.options.num_ends for task in tasks):
         raise InputError("--first-distance: expected starts and goals that are drawn, found given ones")
     if options.first_distance > (farthest := max(max(task.distances) for task in tasks)):
         raise InputError(f"expected --first-distance of at most {farthest}, the farthest goals, found more")
@@ -303,30 +265,27 @@ def longest_distance(options: TrainOptions, tasks: Sequence[Task], env_steps: in
 
 
 def training_task(
-    agent: str, agent_class: type[LearningAgent], defaults: Mapping[str, Any], options: Mapping[str, Any]
+    agent: str, agent_class: type[LearningAgent], defaults: Mapping[str, Any], asked: TaskOptions
 ) -> Task:
-    """Returns the task that `options` of `Task.of` name; `defaults` are the learner's, for what the user left open.
+    """Returns the task of a training; `defaults` are the learner's, for what `asked` leaves open.
 
     Raises:
-      InputError: if trainings don't have such a task, or `Task.of` refuses it.
+      InputError: if trainings don't have such a task, or it can't be played.
     """
-    check_names(defaults)
-    given = {name: value for name, value in options.items() if value is not None}
+    check_names(defaults, TaskOptions)
+    given = asked.changed()
     for name in FIXED:
-        if name in given and given[name] != (wanted := fields_of(Task)[name].default):
+        wanted = {"split": "train", "actions": "six"}.get(name, fields_of(TaskOptions)[name].default)
+        if given.get(name, wanted) != wanted:
             raise InputError(f"expected {name} {wanted!r} in a training, found {given[name]!r}")
-    values = {**defaults, **given}
-    has_pairs = values.get("pairs") == "fixed" or are_scenarios(values.get("mazes"))
-    if values.get("track") or has_pairs or values.get("reward") == PROGRESS:
-        values["num_goals"] = 1  # as these have one goal
-    task = Task.of(**values)
-    if needed := [name for name in agent_class.needs_shown if name in task.hide]:
+    has_one_goal = asked.track is not None or asked.pairs == "fixed" or are_scenarios(asked.mazes)
+    one_goal = {"num_goals": 1} if has_one_goal or asked.reward == PROGRESS else {}
+    asked = asked.replace(**{name: value for name, value in defaults.items() if name not in given} | one_goal)
+    task = resolve(asked, context_size_of=functools.partial(context_size_of, agent, agent_class))
+    if needed := [name for name in agent_class.needs_shown if name in task.options.hide]:
         raise InputError(f"agent {agent!r}: needs the {needed[0]}, found it hidden")
     if task.cell_size != 1:
         raise InputError(f"expected mazes with cells of 1 m in a training, found {task.cell_size:g} m (--cell-size)")
-    if task.track is None:
-        task = task.replace(context_size=context_size_of(agent, agent_class, task.size))
-        check_shown(task)
     return task
 
 
@@ -379,10 +338,10 @@ def _save(
 def _origin(options: TrainOptions, tasks: Sequence[Task]) -> dict[str, Any]:
     """Returns what is trained, and in which tasks."""
     task, *others = tasks
-    values = task.to_json() | {"mazes": None if task.mazes is None else {"sha256": mazes_hash(task)}}
+    values = task.to_json() | {"mazes": None if task.options.mazes is None else {"sha256": mazes_hash(task)}}
     origin = {"agent": options.agent, "size": task.size, "task": values, "seed": options.seed}
     if others:
-        origin["also"] = [other.track for other in others]
+        origin["also"] = [other.name for other in others]
     if options.first_distance is not None:
         origin |= {"first_distance": options.first_distance, "widen_steps": options.widen_steps}
     return origin

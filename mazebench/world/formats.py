@@ -14,7 +14,7 @@ from mazebench.errors import InputError, unknown
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import resized
 from mazebench.maps.maze_files import read_located
-from mazebench.maps.maze_options import ReadOptions, changed_reading
+from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.pictures import draw_plan, write_image
 from mazebench.maps.readers.occupancy_grid import LocatedMaze
 from mazebench.maps.readers.ros import ROS_SUFFIXES, picture_of, write_ros_map
@@ -40,7 +40,7 @@ def make_mazes(
     Raises:
       InputError: if the kind has no mazes of that size, the map holds no maze, or options are for the other of both.
     """
-    for name, found in changed_reading(options).items():
+    for name, found in options.changed().items():
         if source is None and name != "cell_size":
             raise InputError(f"expected a map of your own (--mazes) with {name} {found}, found none")
     if source is not None:

@@ -37,7 +37,7 @@ def maze_from_array(array: np.ndarray, name: str = "maze", **options: Any) -> Ma
       InputError: if an option is not allowed.
       MazeError: if the array holds something else, or no legal maze.
     """
-    return read_array(np.asarray(array), name, ReadOptions(**options))
+    return read_array(np.asarray(array), name, ReadOptions.of(options))
 
 
 def read_array(array: np.ndarray, name: str, options: ReadOptions) -> Maze:
