@@ -13,6 +13,7 @@ from mazebench import __version__
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.evaluate import evaluate
+from mazebench.evaluation.plan import make_plan
 from mazebench.evaluation.provenance import checkpoint_metadata, code_hash
 from mazebench.maps.benchmark import manifest_hash
 from mazebench.tasks.task import Task

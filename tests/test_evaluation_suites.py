@@ -58,10 +58,10 @@ class TestParts:
         assert paper["local-13"].distances == tuple(range(1, 16))
         assert paper["local-21"].size == 21
         corners, flipped = paper["hierarchical-13-k2"], paper["flip-0.3"]
-        assert (corners.task, corners.landmark_distance) == ("hierarchical", 2)
-        assert (flipped.task, flipped.map_flip) == ("hierarchical", 0.3)
-        assert (paper["warp-0.1"].distances, paper["warp-0.1"].map_warp) == ((2, 4, 6, 8, 10), 0.1)
-        assert (paper["noise-1.0"].distances, paper["noise-1.0"].position_noise) == ((2, 4, 6, 8, 10), 1.0)
+        assert (corners.name, corners.options.landmark_distance) == ("hierarchical", 2)
+        assert (flipped.name, flipped.options.map_flip) == ("hierarchical", 0.3)
+        assert (paper["warp-0.1"].distances, paper["warp-0.1"].options.map_warp) == ((2, 4, 6, 8, 10), 0.1)
+        assert (paper["noise-1.0"].distances, paper["noise-1.0"].options.position_noise) == ((2, 4, 6, 8, 10), 1.0)
 
 
 class TestRun:

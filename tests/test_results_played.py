@@ -21,7 +21,7 @@ ROOM = "#####\n#...#\n#...#\n#...#\n#####\n"
 
 @pytest.mark.parametrize("level", [{"map_flip": 0.2}, {"map_warp": 0.2}], ids=["flip", "warp"])
 def test_the_map_is_the_one_that_the_agent_was_shown(tmp_path, level):
-    task = load_result(make_result(tmp_path / "made", task="hierarchical", **level)).summary.task
+    task = played_task(load_result(make_result(tmp_path / "made", task="hierarchical", **level)).summary)
     spec = Task.of("hierarchical", size=13, split="eval", **level)
     num_changed = 0
     for trial in frozen_trials("hierarchical", 13)[:5]:

@@ -42,7 +42,7 @@ def write_dataset(folder: pathlib.Path, task: Task, agent: str, files: Iterable[
         )
         storage.update_metadata(
             {
-                "dataset_id": "mazebench/{}-v0".format(re.sub(r"[^-\w]", "-", f"{task.name}-{agent}")),
+                "dataset_id": "mazebench/{}-v0".format(re.sub(r"[^-\w]", "-", f"{task.options.slug}-{agent}")),
                 "minari_version": minari.__version__,
                 "algorithm_name": agent,
                 "description": f"{task}, driven by {agent}",
