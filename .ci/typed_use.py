@@ -44,7 +44,7 @@ def right_use() -> None:
     env = mazebench.load("local", mazes=maze, distances=[len(cells) - 1], seed=0)
     success: bool = env.task.success
     position: np.ndarray = env.physics.position()
-    envs: MazeVectorEnv = mazebench.make_vec("local", 4, size=13)
+    envs: MazeVectorEnv = mazebench.make_vec(mazebench.TaskOptions(task="local", size=13), 4)
     observations, infos = envs.reset(seed=[1, 2, 3, 4])
     agent: Agent = Forward()
     check_agent(Forward)
@@ -56,12 +56,12 @@ def right_use() -> None:
 
 
 def wrong_use() -> None:
-    mazebench.load("local", size="13")  # type: ignore[arg-type]
-    mazebench.Task.of(flip=0.1)  # type: ignore[call-arg]
-    mazebench.make_vec("local", 4, num_goals="3")  # type: ignore[arg-type]
+    mazebench.TaskOptions(size="13")  # type: ignore[arg-type]
+    mazebench.TaskOptions(flip=0.1)  # type: ignore[call-arg]
+    mazebench.make_vec(13, 4)  # type: ignore[arg-type]
     mazebench.generate("dfs", 15)  # type: ignore[call-arg]
     print(mazebench.make_vec("local", 4).task.sise)  # type: ignore[attr-defined]
     print(mazebench.nothing)  # type: ignore[attr-defined]
-    EvalOptions(agent=Forward, task=mazebench.Task.of())  # type: ignore[arg-type]
+    EvalOptions(agent=Forward, task=mazebench.TaskOptions())  # type: ignore[arg-type]
     print(mazebench.evaluate("planner").overal)  # type: ignore[attr-defined]
     check_agent(Sideways)  # type: ignore[arg-type]

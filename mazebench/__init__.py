@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from mazebench.maps.readers.arrays import maze_from_array as maze_from_array
     from mazebench.tasks.episode import Episode as Episode
     from mazebench.tasks.task import Task as Task
+    from mazebench.tasks.task_options import TaskOptions as TaskOptions
     from mazebench.training.loop import train as train
 
 __version__ = "0.1.0"
@@ -46,6 +47,7 @@ _HOMES = {
     "MazeError": "mazebench.maps.maze",
     "SingleAgent": "mazebench.agent",
     "Task": "mazebench.tasks.task",
+    "TaskOptions": "mazebench.tasks.task_options",
     "UnplayableError": "mazebench.errors",
     "evaluate": "mazebench.evaluation.evaluate",
     "generate": "mazebench.maps.kinds",

@@ -12,6 +12,7 @@ import mazebench
 from mazebench.constants import ACTIONS
 from mazebench.options import fields_of
 from mazebench.tasks.task import Task
+from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
 
 FOLDER = pathlib.Path(__file__).parent.parent / "docs" / "environments"
@@ -68,7 +69,11 @@ def _page(name: str) -> str:
     observed = {"state": (12,), "context": (4, task.context_size, task.context_size)}
     observed |= {"lidar": (32,)} if "lidar" in task.sensors else {}
     options = ", level=2" if name in TRACKS else ""
-    limit = "6 steps a cell and more, by the distance" if name in TRACKS else f"{task.time_limit} steps for each goal"
+    limit = (
+        "6 steps a cell and more, by the distance"
+        if name in TRACKS
+        else f"{task.options.time_limit} steps for each goal"
+    )
     sections = [
         f"# {name}\n",
         f"![{name}](../images/environments/{name}.png)\n",
@@ -94,7 +99,7 @@ def _page(name: str) -> str:
         "| option | default | meaning |",
         "|---|---|---|",
         *(
-            f"| `{each}` | `{fields_of(Task)[each].default!r}` | {fields_of(Task)[each].help} |"
+            f"| `{each}` | `{fields_of(TaskOptions)[each].default!r}` | {fields_of(TaskOptions)[each].help} |"
             for each in (_OF_TRACKS if name in TRACKS else _OPTIONS[name])
         ),
         "\n[Options](../options.md) lists all of them.",

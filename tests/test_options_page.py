@@ -6,11 +6,9 @@ import pathlib
 import re
 from collections.abc import Iterable
 
-from mazebench.tasks.task_fields import TaskFields
-
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.options import Option, fields_of
-from mazebench.tasks.task import Task
+from mazebench.tasks.task_options import TaskOptions
 
 PAGE = pathlib.Path(__file__).parent.parent / "docs" / "options.md"
 DERIVED_TABLE = re.compile(r"\| option \| default \| values \| what \|\n(?:\|.*\n)+")
@@ -21,8 +19,8 @@ OF_MAZES = ("size", "split", "mazes", "kinds", "num_mazes", "fresh")
 
 def derived_tables() -> list[str]:
     """Returns the tables of the options of mazes, of reading them and of tasks, in the order of the page."""
-    others = [name for name in fields_of(Task) if name not in (*OF_MAZES, *fields_of(ReadOptions))]
-    of_sensors = [name for name in others if name not in TaskFields.__annotations__]
+    others = [name for name in fields_of(TaskOptions) if name not in (*OF_MAZES, *fields_of(ReadOptions))]
+    of_sensors = [name for name in others if name not in TaskOptions.__annotations__]
     others = [name for name in others if name not in of_sensors] + of_sensors
     return [derived_table(OF_MAZES), derived_table(fields_of(ReadOptions)), derived_table(others)]
 
@@ -31,7 +29,7 @@ def derived_table(names: Iterable[str]) -> str:
     """Returns the table of some fields of a task."""
     lines = ["| option | default | values | what |\n", "|---|---|---|---|\n"]
     for name in names:
-        option = fields_of(Task)[name]
+        option = fields_of(TaskOptions)[name]
         lines.append(f"| `{name}` | `{option.default!r}` | {values(option)} | {option.help} |\n")
     return "".join(lines)
 
