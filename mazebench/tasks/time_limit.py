@@ -1,6 +1,6 @@
 """The time limit of a leg, in agent steps: the option `time_limit`, or else what `default_time_limit` returns.
 
-It depends on the distance of each episode on a track, else on the largest distance of the task.
+On a track, `plan_route` takes it by the distance of each episode. Else `Task.of` takes it by the largest distance.
 """
 
 from __future__ import annotations
