@@ -6,7 +6,6 @@ import functools
 import pathlib
 import tarfile
 import tempfile
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import pandas as pd
@@ -22,6 +21,7 @@ from mazebench.results.metrics import scores
 from mazebench.results.reading import CONFIG, EPISODES, ORACLE, SUITE, SUMMARY, Result, load_result
 from mazebench.results.records import column
 from mazebench.storage.files import make_folder, open_whole
+from mazebench.tasks.tracks.track import LEVELS
 from mazebench.training.run_folder import METRICS, checkpoints
 
 PAPER = "paper"  # the suite
@@ -34,7 +34,6 @@ _AGENTS = {
     "tracks-neural-planner-rewards": "neural-planner from rewards",
     "tracks-neural-planner-building": "neural-planner from rewards on building",
 }
-_FACTS = ("kind", "blocked")  # of an episode, on tracks
 
 
 class Kept(NamedTuple):
@@ -56,6 +55,11 @@ class Kept(NamedTuple):
         found = self.episodes.loc[agent, setting]
         runs = found[found.archive == _RUNS]
         return found if runs.empty else runs
+
+    def levels(self, agent: str, track: str) -> list[pd.DataFrame]:
+        """Returns the episodes at each level of a track where an agent was evaluated."""
+        settings = (f"{track}-{level}" for level in LEVELS)
+        return [self.of(agent, setting) for setting in settings if self.has(agent, setting)]
 
     def milestones(self, archive: str) -> pd.DataFrame:
         """Returns what an archive's training runs logged at the milestones that all of them reached, a line each.
@@ -112,7 +116,7 @@ def _episodes(result: Result, archive: str) -> pd.DataFrame:
     agent, setting = _AGENTS.get(archive, summary.row), summary.part or result.folder.name
     if archive == _RUNS:
         agent, setting = result.folder.name.rpartition("-")[0], LOCAL
-    facts = [name for name in _FACTS if name in (records[0].model_extra or {})]
+    facts = {"kind", "blocked"} & {*(records[0].model_extra or {})}  # on tracks
     fields = ("episode", "maze", "distance", "success", "steps", *facts)
     oracle = pd.array(result.oracle_steps or [None] * len(records), dtype="Int64")
     run = (summary.provenance.checkpoint_sha256 or "")[:8]
@@ -125,33 +129,25 @@ def _episodes(result: Result, archive: str) -> pd.DataFrame:
 
 
 def keep(folder: pathlib.Path, records: pathlib.Path) -> pathlib.Path:
-    """Writes an archive of the finished evaluations in `folder` into `records`, in the place of one of its name.
+    """Writes an archive of the evaluations in `folder` into `records`, in the place of one of its name.
 
     A folder without any may hold training runs. Their configs, curves and last checkpoints go to `records/training`.
     Equal contents give equal bytes.
     """
     folder = folder.resolve()
-    finished = sorted(path.parent for path in folder.rglob(SUMMARY))
-    runs = sorted(path.parent for path in folder.rglob(METRICS))
-    if finished:
-        kept = (CONFIG, EPISODES, ORACLE, SUMMARY)
-        paths = [path for each in finished for name in kept if (path := each / name).exists()]
-        return _archive(folder, [*paths, *sorted(folder.rglob(SUITE))], records)
-    if runs:
-        paths = [run / name for run in runs for name in (CONFIG, METRICS)]
-        paths += [last / AGENT_FILE for run in runs for last in checkpoints(run)[-1:]]
-        return _archive(folder, paths, records / _TRAINING)
-    raise InputError(f"{folder}: expected finished evaluations or training runs, found neither")
-
-
-def _archive(folder: pathlib.Path, paths: Sequence[pathlib.Path], target: pathlib.Path) -> pathlib.Path:
-    """Writes files of `folder` into an archive of its name in the folder `target`."""
+    are_evaluations = any(folder.rglob(SUMMARY))
+    names = (CONFIG, EPISODES, ORACLE, SUMMARY, SUITE) if are_evaluations else (CONFIG, METRICS)
+    paths = sorted(path for name in names for path in folder.rglob(name))
+    paths += [last / AGENT_FILE for path in paths if path.name == METRICS for last in checkpoints(path.parent)[-1:]]
+    if not paths:
+        raise InputError(f"{folder}: expected evaluations or training runs, found neither")
+    target = records if are_evaluations else records / _TRAINING
     make_folder(target)
-    path = target / f"{folder.name}{_SUFFIX}"
-    with open_whole(path) as file, tarfile.open(fileobj=file, mode="w:xz", preset=9) as archive:
-        for each in paths:
-            entry = tarfile.TarInfo(f"{folder.name}/{each.relative_to(folder).as_posix()}")
-            entry.size = each.stat().st_size
-            with each.open("rb") as content:
+    archive_path = target / f"{folder.name}{_SUFFIX}"
+    with open_whole(archive_path) as file, tarfile.open(fileobj=file, mode="w:xz", preset=9) as archive:
+        for path in paths:
+            entry = tarfile.TarInfo(f"{folder.name}/{path.relative_to(folder).as_posix()}")
+            entry.size = path.stat().st_size
+            with path.open("rb") as content:
                 archive.addfile(entry, content)
-    return path
+    return archive_path

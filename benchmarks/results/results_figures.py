@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from benchmarks.results.kept import LOCAL, Kept, estimate
+from benchmarks.results.results_tables import ON_TIME_125
 from mazebench.report.figures import Drawn, Panel, draw_panels, draw_table
-from mazebench.results.metrics import ON_TIME_METRICS
 from mazebench.tasks.tracks import TRACKS
 from mazebench.tasks.tracks.track import LEVELS
 
-_ON_TIME_125 = next(iter(ON_TIME_METRICS))
 # Of the report of the suite `paper`.
 _WRONG = {"Hierarchical, share of cells flipped": "flip-hierarchical-13", "Local, maps warped by": "warp-local-13"}
 _LOCAL_AGENTS = ("mmn", "mah", "mah-paper", "dqn", "random", "MMN (paper)")  # those that do not reach every goal
@@ -45,8 +43,8 @@ def figures(kept: Kept) -> list[Drawn]:
 
 def map_worth(kept: Kept) -> Drawn:
     """Returns the navigator on time with and without the map, by track and level."""
-    rows = ("navigator", "navigator without map", "navigator with the true pose")
-    panels = [_levels(track, {row: _of_levels(kept, row, track) for row in rows}) for track in TRACKS]
+    agents = ("navigator", "navigator without map", "navigator with the true pose")
+    panels = [_on_time(track, {agent: kept.levels(agent, track) for agent in agents}) for track in TRACKS]
     return _figure("map-worth", "What the map is worth", panels, "on-time rate")
 
 
@@ -70,12 +68,9 @@ def what_fails(kept: Kept) -> Drawn:
     """Returns the navigator on time where the shortest path on the map is open and where it is blocked."""
     panels = []
     for track in TRACKS:
-        levels = _of_levels(kept, "navigator", track)
-        lines = {
-            name: [own[own.blocked == is_blocked] for own in levels]
-            for name, is_blocked in (("open path", False), ("blocked path", True))
-        }
-        panels.append(_levels(track, lines))
+        levels = kept.levels("navigator", track)
+        open_path, blocked = ([own[own.blocked == is_blocked] for own in levels] for is_blocked in (False, True))
+        panels.append(_on_time(track, {"open path": open_path, "blocked path": blocked}))
     return _figure("what-fails", "Where the navigator is late", panels, "on-time rate")
 
 
@@ -98,35 +93,25 @@ def model_and_search(kept: Kept) -> Drawn:
     Bars reach from the lowest to the highest run. Milestones count as the nearest tenth of a million steps.
     """
     archives = {"mmn": "mmn", "mmn without model and search": "mmn-model-false", "mah": "mah"}
-    panels = []
+    ticks, panels = {x: f"{x:g}" for x in (0.2, 0.4, 0.6, 0.8, 1.0)}, []
     for distance in (6, 8, 10):
-        curves = [
-            kept.success_rates(archive, distance).set_axis(["value", "low95", "high95"], axis=1).assign(column=label)
-            for label, archive in archives.items()
-        ]
+        curves = [kept.success_rates(archive, distance).assign(column=label) for label, archive in archives.items()]
         points = pd.concat(curves).rename_axis("x").reset_index()
-        panels.append(
-            Panel(f"{distance} cells", "million agent steps", points, {x: f"{x:g}" for x in np.arange(2, 11, 2) / 10})
-        )
-    return _figure(
-        "model-and-search", "Success rate on held-out mazes over training: mean, lowest and highest run", panels
-    )
+        points = points.rename(columns={"mean": "value", "min": "low95", "max": "high95"})
+        panels.append(Panel(f"{distance} cells", "million agent steps", points, ticks))
+    title = "Success rate on held-out mazes over training: mean, lowest and highest run"
+    return _figure("model-and-search", title, panels)
 
 
-def _of_levels(kept: Kept, agent: str, track: str) -> list[pd.DataFrame]:
-    """Returns the episodes at the levels of a track where an agent was evaluated."""
-    settings = [f"{track}-{level}" for level in LEVELS]
-    return [kept.of(agent, setting) for setting in settings if kept.has(agent, setting)]
-
-
-def _levels(track: str, lines: Mapping[str, Sequence[pd.DataFrame]]) -> Panel:
+def _on_time(track: str, lines: Mapping[str, Sequence[pd.DataFrame]]) -> Panel:
     """Returns the share on time at each level of a track."""
-    points: list[dict[str, Any]] = []
-    for label, levels in lines.items():
-        for x, own in enumerate(levels):
-            if len(own):
-                mean = estimate(own, _ON_TIME_125)
-                points.append({"column": label, "x": x, "value": mean.value, "low95": mean.low, "high95": mean.high})
+    points = [
+        {"column": label, "x": x, "value": mean.value, "low95": mean.low, "high95": mean.high}
+        for label, levels in lines.items()
+        for x, own in enumerate(levels)
+        if len(own)
+        for mean in [estimate(own, ON_TIME_125)]
+    ]
     return Panel(track, "level", pd.DataFrame(points), dict(enumerate(map(str, LEVELS))))
 
 

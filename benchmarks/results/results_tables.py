@@ -220,8 +220,7 @@ def tracks_worst_tenth(kept: Kept) -> str:
         return by_maze.groupby("run").apply(lambda of_run: of_run.nsmallest(-(-len(of_run) // 10)).mean()).mean()
 
     rows = [
-        [_ROWS[agent]]
-        + [" / ".join(_number(worst(kept.of(agent, f"{track}-{level}"))) for level in LEVELS) for track in TRACKS]
+        [_ROWS[agent], *(" / ".join(_number(worst(own)) for own in kept.levels(agent, track)) for track in TRACKS)]
         for agent in ("navigator", "neural-planner", "navigator without map")
     ]
     return _table(["agent", *_TRACKS], rows)
@@ -308,9 +307,8 @@ def _by_distance(
 
 def _levels(kept: Kept, track: str, agent: str, metric: str, kinds: Sequence[str] = (*KNOWN, *NOVEL)) -> str:
     """Returns the means of a metric at the levels of a track, in mazes of some kinds; "-" without evaluations."""
-    settings = [f"{track}-{level}" for level in LEVELS if kept.has(agent, f"{track}-{level}")]
-    found = [kept.of(agent, setting) for setting in settings]
-    return " / ".join(_number(own[own.kind.isin(kinds)][metric].mean()) for own in found) or "-"
+    means = [own[own.kind.isin(kinds)][metric].mean() for own in kept.levels(agent, track)]
+    return " / ".join(map(_number, means)) or "-"
 
 
 def _over_values(rates: pd.Series) -> str:
