@@ -1,4 +1,4 @@
-"""Draws the pictures of README.md and docs from episodes: `python -m benchmarks.pictures`.
+"""Draws the pictures of README.md and docs from episodes: `MUJOCO_GL=egl python -m benchmarks.pictures`.
 
 The film is an episode of `navigator` in the dev mazes of `rebuilt` 2, in which the path on the map is blocked. All
 other episodes are in train mazes, or in mazes of no split.

@@ -71,16 +71,15 @@ def sizes(chosen: Sequence[int] = SIZES, num_envs: int = 256) -> list[Side]:
 
 def measure(sides: Sequence[Side], seconds: float, rounds: int) -> list[dict[str, Any]]:
     """Returns for each side its agent steps per second, and the ratio to the first side's; all take turns."""
-    rng = np.random.default_rng(0)
-    actions = [rng.integers(len(ACTIONS), size=(512, side.num_envs)) for side in sides]
-    rates = np.array([[_rate(*each, seconds) for each in zip(sides, actions, strict=True)] for _ in range(rounds)])
+    rates = np.array([[_rate(side, seconds) for side in sides] for _ in range(rounds)])
     return [
         {"name": side.name, "steps/s": round(np.median(own)), "ratio": float(np.median(own / rates[:, 0]))}
         for side, own in zip(sides, rates.T, strict=True)
     ]
 
 
-def _rate(side: Side, actions: np.ndarray, seconds: float) -> float:
+def _rate(side: Side, seconds: float) -> float:
+    actions = np.random.default_rng(0).integers(len(ACTIONS), size=(512, side.num_envs))
     side.step(actions[0])
     count, begin = 0, time.perf_counter()
     while (elapsed := time.perf_counter() - begin) < seconds:
