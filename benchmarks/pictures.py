@@ -20,7 +20,7 @@ from PIL import Image, ImageDraw, ImageFont
 import mazebench
 from mazebench.agent import Inputs
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps import colors
 from mazebench.maps.benchmark import load_kind_mazes, load_mazes
@@ -32,9 +32,8 @@ from mazebench.results.played import Shown, shown_of
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.task import Task
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.track import LEVELS
+from mazebench.tasks.task import Task, resolve
+from mazebench.tasks.tracks import LEVELS, TRACKS
 
 FOLDER = pathlib.Path(__file__).parent.parent / "docs" / "images"
 HOUSE = 17  # index of the train maze
@@ -52,11 +51,11 @@ THUMBNAIL = 248  # pixels a side
 
 def film() -> None:
     """Films an episode in three views, with a ring around each door that has moved."""
-    options = EvalOptions.of("navigator", track="rebuilt", level=2, split="dev", seed=FILMED)
+    options = eval_options("navigator", task="rebuilt", level=2, split="dev", seed=FILMED)
     views = [_run(options, view, SIDE, is_film=True)[0] for view in VIEWS]
     plan = make_plan(options)
     episode = plan.trials[FILMED].episode
-    walls = plan.task.all_mazes[episode.maze].walls
+    walls = plan.task.mazes[episode.maze].walls
     moved = np.argwhere(shown_of(plan.task, episode).walls != walls)
 
     # All frames are a copy of one canvas with the titles.
@@ -87,7 +86,7 @@ def film() -> None:
 
 def draw_environments() -> None:
     """Draws for each environment the map that is shown, and the oracle's path in the maze."""
-    tracks = {name: {"track": name, "level": 2, "distances": DISTANCE} for name in TRACKS}
+    tracks = {name: {"task": name, "level": 2, "distances": DISTANCE} for name in TRACKS}
     tasks: dict[str, dict[str, Any]] = {"local": {"distances": 12}, "hierarchical": {"task": "hierarchical"}}
     for name, options in (tracks | tasks).items():
         maze = load_kind_mazes("train")[HOUSE] if name in TRACKS else load_mazes(13, "train")[0]
@@ -104,7 +103,7 @@ def draw_tracks() -> None:
     maze = load_kind_mazes("train")[HOUSE]
     for row, track in zip(figure.subplots(len(TRACKS), 1 + len(LEVELS)), TRACKS, strict=True):
         for level in LEVELS:
-            played = play(maze, split="train", track=track, level=level, distances=DISTANCE)
+            played = play(maze, split="train", task=track, level=level, distances=DISTANCE)
             _show(row[level], _shown_map(played.shown), f"{track} {level}")
             if track == "rebuilt":
                 # A cross where a door is closed, a ring where it is open.
@@ -151,15 +150,15 @@ def play(maze: Maze, **options: Any) -> Played:
         mazebench.evaluate("oracle", out=folder, record=True, episodes_per_distance=1, **options)
         result, trajectories = load_result(folder), load_trajectories(folder / TRAJECTORIES)
     number, record = next((record.episode, record) for record in result.records if record.maze == maze.name)
-    task, pose, observed = result.summary.task, *trajectories[number]
-    index = [each.name for each in task.all_mazes].index(maze.name)
+    task, (pose, observed) = resolve(result.summary.task), trajectories[number]
+    index = [each.name for each in task.mazes].index(maze.name)
     shown = shown_of(task, Episode(index, record.start, record.goal, float(pose[0, 2]), record.seed))
     return Played(record.start, record.goal, pose.astype(float), observed, shown)
 
 
 def draw_planner() -> None:
     """Draws what the neural planner knows, pays and plans in the middle of an episode."""
-    task = Task.of("rebuilt", level=2, split="train", distances=35).in_mazes([load_kind_mazes("train")[HOUSE]])
+    task = Task.of("rebuilt", level=2, mazes=[load_kind_mazes("train")[HOUSE]], distances=35)
     agent, envs = NeuralPlanner.build(task.interface), MazeVectorEnv(task, 1)
     state, new, steps = agent.initial_state(1), np.ones(1, dtype=bool), []
     observation, info = envs.reset(seed=4)

@@ -32,8 +32,7 @@ from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.perturbations.moved_doors import SWAPS_BY_PERCENT
 from mazebench.tasks.shown_map import is_blocked
 from mazebench.tasks.task import Task
-from mazebench.tasks.tracks.rebuilt import SWAPS
-from mazebench.tasks.tracks.track import DISTANCES
+from mazebench.tasks.tracks import DISTANCES
 from mazebench.tasks.trials import Trial, make_trial
 
 KINDS = ",".join((*KNOWN, *NOVEL))
@@ -60,7 +59,7 @@ def check_mazes(kind: str, count: int) -> list[Maze]:
 @app.command()
 def swaps(kinds: Kinds = KINDS, episodes: Episodes = 40) -> None:
     """Print how many doors must move so that a share of the shortest paths on the map is blocked."""
-    shares = sorted({share for of_track in SWAPS.values() for share in of_track})
+    shares = sorted({percent / 100 for counts in SWAPS_BY_PERCENT.values() for percent in counts})
     print(f"\nDoors that move, and the share of {episodes} paths on the map that they block:\n")
     _print_head("kind", "doors", "open", *(f"{share:g}" for share in shares), "at most")
     for kind in kinds.split(","):

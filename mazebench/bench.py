@@ -90,7 +90,7 @@ def _rate(side: Side, seconds: float) -> float:
 
 def _bare_loop(task: Task) -> Callable[[np.ndarray], None]:
     """Returns agent steps of one simulation by mj_step alone: no task, observations or resets."""
-    maze, walls, controls = task.all_mazes[0], near_walls_of(task.all_mazes, 1), action_controls()
+    maze, walls, controls = task.mazes[0], near_walls_of(task.mazes, 1), action_controls()
     simulation = MujocoSimulation(walls.model, walls)
     model, data = simulation.model, simulation.data
     data.qpos[:2] = maze.point(maze.free_cells[0])

@@ -21,7 +21,7 @@ from mazebench.results.metrics import scores
 from mazebench.results.reading import CONFIG, EPISODES, ORACLE, SUITE, SUMMARY, Result, load_result
 from mazebench.results.records import column
 from mazebench.storage.files import make_folder, open_whole
-from mazebench.tasks.tracks.track import LEVELS
+from mazebench.tasks.tracks import LEVELS
 from mazebench.training.run_folder import METRICS, checkpoints
 
 PAPER = "paper"  # the suite

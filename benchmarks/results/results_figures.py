@@ -11,8 +11,7 @@ import pandas as pd
 from benchmarks.results.kept import LOCAL, Kept, estimate
 from benchmarks.results.results_tables import ON_TIME_125
 from mazebench.report.figures import Drawn, Panel, draw_panels, draw_table
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.track import LEVELS
+from mazebench.tasks.tracks import LEVELS, TRACKS
 
 # Of the report of the suite `paper`.
 _WRONG = {"Hierarchical, share of cells flipped": "flip-hierarchical-13", "Local, maps warped by": "warp-local-13"}

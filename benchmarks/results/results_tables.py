@@ -22,8 +22,7 @@ from mazebench.report.curves import SUCCESS
 from mazebench.report.table import METRICS, to_markdown
 from mazebench.results.intervals import CONFIDENCE, Estimate
 from mazebench.results.metrics import ON_TIME_METRICS
-from mazebench.tasks.tracks import TRACKS
-from mazebench.tasks.tracks.track import LEVELS
+from mazebench.tasks.tracks import LEVELS, TRACKS
 
 ROOT = pathlib.Path(__file__).parent.parent.parent
 RECORDS = ROOT / "records"
