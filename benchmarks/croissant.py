@@ -1,8 +1,8 @@
 """Describes the frozen mazes and episodes as a Croissant data set: `python -m benchmarks.croissant`.
 
-Writes assets/croissant.json (Croissant 1.1 with the fields of its RAI vocabulary) from the manifests of the two
-benchmarks. The address of the data set is `Source` of `[project.urls]` in pyproject.toml and its date of publication
-`date-released` of CITATION.cff; the file has neither as long as these lack them.
+It brings assets/croissant.json (Croissant 1.1 with the fields of its RAI vocabulary) up to date with the manifests of
+the two benchmarks, with CITATION.cff and with `Source` of `[project.urls]` in pyproject.toml. The texts of the data set
+are in the file itself. It has no address and no date of publication as long as the other files have none.
 """
 
 from __future__ import annotations
@@ -22,69 +22,6 @@ ROOT = pathlib.Path(__file__).parent.parent
 ASSETS = ROOT / "assets"
 OUT = ASSETS / "croissant.json"
 FOLDERS = {PAPER_BENCHMARK: "paper_mazes", TRACKS_BENCHMARK: "tracks"}
-CREATED = "2026-11-24"  # the day on which the last split, eval of the tracks, was drawn
-
-_DESCRIPTION = """\
-Mazes and episodes of mazebench, a benchmark on MuJoCo for navigation with an abstract top-down map that may be wrong. \
-`paper_mazes` follows the protocol of arXiv:2412.12024: 20 train and 20 eval mazes of 13, 15, 17, 19 and 21 cells a \
-side, and for each size 1,500 local and 20 hierarchical eval episodes. `tracks` has 48 train, 48 dev and 48 eval mazes \
-of 31 x 31 cells and 240 episodes each for dev and eval. The maps shown to an agent follow from a maze and the seed of \
-an episode."""
-
-# Terms of http://mlcommons.org/croissant/RAI/ but for the prefix.
-_RESPONSIBLE_AI = {
-    "hasSyntheticData": True,
-    "dataCollection": "Generators drew all mazes and episodes from seeds. Nothing was collected or scraped. The seed "
-    "of the eval split of the tracks is the hash of a commit that holds all generators.",
-    "dataCollectionType": ["Synthetic"],
-    "dataPreprocessingProtocol": [
-        "No two mazes of a size of paper_mazes, and no two of tracks, are alike under rotations and mirror images. "
-        "Mazes of tracks have two free cells at least 40 cells apart."
-    ],
-    "dataAnnotationProtocol": [
-        "No annotation by persons. Programs compute the distance on the grid, the exact shortest path of a disc of "
-        "0.15 m radius, and the steps of a privileged oracle."
-    ],
-    "dataUseCases": [
-        "Measuring zero-shot navigation to a goal in unseen mazes with a right, outdated, turned or drawn map, and "
-        "how much driving time the map saves.",
-        "Training and choosing agents on the splits train and dev. The split eval is for measurement alone.",
-    ],
-    "dataLimitations": [
-        "Layouts come from generators, not from real buildings: square grids of 1 m cells, one floor, static.",
-        "A score shows nothing about real robots, cameras, moving obstacles or other bodies.",
-        "The eval mazes are public, so only a rule keeps them out of training.",
-    ],
-    "dataBiases": [
-        "Depth-first mazes are all of paper_mazes and a sixth of the eval mazes of tracks.",
-        "Distances to the goal are equally frequent from 1 to 15 cells in the local episodes of paper_mazes and nearly "
-        "so from 15 to 40 cells in tracks, unlike trips in buildings.",
-    ],
-    "dataSocialImpact": "The data tells nothing about any person or place. Methods of navigation that it helps to "
-    "measure serve civil and military robots alike.",
-    "personalSensitiveInformation": ["None. The data describes no person and no real place."],
-    "dataReleaseMaintenancePlan": "The files are frozen, and the SHA-256 of each is in a manifest. A change of mazes, "
-    "episodes or metrics is a new version. docs/criteria.md has the rule for retirement.",
-}
-
-_CROISSANT_TERMS = (
-    *("citeAs", "column", "equivalentProperty", "extract", "field", "fileProperty", "fileObject", "fileSet", "format"),
-    *("includes", "isLiveDataset", "jsonPath", "key", "md5", "parentField", "path", "recordSet", "references", "regex"),
-    *("repeated", "replace", "samplingRate", "separator", "source", "subField", "transform"),
-)
-_CONTEXT = {  # the official one, with the prefix of the RAI vocabulary
-    "@language": "en",
-    "@vocab": "https://schema.org/",
-    "sc": "https://schema.org/",
-    "cr": "http://mlcommons.org/croissant/",
-    "rai": "http://mlcommons.org/croissant/RAI/",
-    "dct": "http://purl.org/dc/terms/",
-    "conformsTo": "dct:conformsTo",
-    "data": {"@id": "cr:data", "@type": "@json"},
-    "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
-    "examples": {"@id": "cr:examples", "@type": "@json"},
-    **{term: f"cr:{term}" for term in _CROISSANT_TERMS},
-}
 
 # Of a file of episodes: what each column means, and its type.
 _COLUMNS = {
@@ -102,30 +39,29 @@ _COLUMNS = {
 
 def describe() -> dict[str, Any]:
     """Returns the description of the data set, as JSON-LD."""
+    description = json.loads(OUT.read_text(encoding="ascii"))
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     authors = [author["name"] for author in citation["authors"]]
-    files = [(FOLDERS[benchmark], name) for benchmark in FOLDERS for name in (MANIFEST, *manifest(benchmark)["files"])]
-    description = {
-        "@context": _CONTEXT,
-        "@type": "sc:Dataset",
-        "conformsTo": ["http://mlcommons.org/croissant/1.1", "http://mlcommons.org/croissant/RAI/1.0"],
-        "name": "mazebench",
-        "description": _DESCRIPTION,
+    bibtex = {
+        "title": citation["title"],
+        "author": " and ".join(f"{{{name}}}" for name in authors),
+        "version": citation["version"],
+    }
+    fields = ", ".join(f"{name}={{{value}}}" for name, value in bibtex.items())
+    paths = [
+        (benchmark, f"{folder}/{name}")
+        for benchmark, folder in FOLDERS.items()
+        for name in (MANIFEST, *manifest(benchmark)["files"])
+    ]
+    description |= {
         "license": f"https://spdx.org/licenses/{citation['license']}.html",
         "creator": [{"@type": "sc:Organization", "name": name} for name in authors],
         "keywords": citation["keywords"],
         "version": f"{manifest(TRACKS_BENCHMARK)['version']}.0.0",  # of the benchmarks, not of the package
-        "dateCreated": CREATED,
-        "isLiveDataset": False,
-        "citeAs": _bibtex(citation["title"], authors, citation["version"]),
-        **{f"rai:{name}": value for name, value in _RESPONSIBLE_AI.items()},
-        "distribution": [_file(folder, name) for folder, name in files],
-        "recordSet": [
-            (_episodes if name.startswith("episodes-") else _maze_rows)(folder, name)
-            for folder, name in files
-            if name.startswith(("episodes-", "mazes-"))
-        ],
+        "citeAs": f"@software{{mazebench, {fields}, year={{{description['dateCreated'][:4]}}}}}",
+        "distribution": [_file(*each) for each in paths],
+        "recordSet": [_record_set(path) for _, path in paths if "/episodes-" in path or "/mazes-" in path],
     }
     if "Source" in project["urls"]:
         description["url"] = project["urls"]["Source"]
@@ -134,82 +70,51 @@ def describe() -> dict[str, Any]:
     return description
 
 
-def _bibtex(title: str, authors: list[str], version: str) -> str:
-    names = " and ".join(f"{{{name}}}" for name in authors)
-    return (
-        f"@software{{mazebench, title={{{title}}}, author={{{names}}}, version={{{version}}}, year={{{CREATED[:4]}}}}}"
-    )
-
-
-def _file(folder: str, name: str) -> dict[str, Any]:
-    """Returns a file of the distribution; its address is relative to croissant.json."""
-    path = f"{folder}/{name}"
-    kind = {".csv": "text/csv", ".json": "application/json", ".txt": "text/plain"}[pathlib.Path(name).suffix]
-    content = (ASSETS / path).read_bytes()
+def _file(benchmark: str, path: str) -> dict[str, Any]:
+    """Returns a file of the distribution, which must have the manifest's hash; its address is relative to `OUT`."""
+    content, name = (ASSETS / path).read_bytes(), path.rpartition("/")[2]
+    found = hashlib.sha256(content).hexdigest()
+    if found != manifest(benchmark)["files"].get(name, found):
+        raise InputError(f"{path}: expected the SHA-256 of the manifest, found {found}")
     return {
         "@type": "cr:FileObject",
         "@id": path,
         "name": name,
         "contentUrl": path,
         "contentSize": f"{len(content)} B",
-        "encodingFormat": kind,
-        "sha256": _sha256(folder, name, content),
+        "encodingFormat": {"csv": "text/csv", "json": "application/json", "txt": "text/plain"}[name.rpartition(".")[2]],
+        "sha256": found,
     }
 
 
-def _sha256(folder: str, name: str, content: bytes) -> str:
-    """Returns the manifest's hash of a file, which must be that of its content; a manifest's own is computed."""
-    found = hashlib.sha256(content).hexdigest()
-    benchmark = next(each for each in FOLDERS if FOLDERS[each] == folder)
-    expected = manifest(benchmark)["files"].get(name, found)
-    if found != expected:
-        raise InputError(f"{folder}/{name}: expected SHA-256 {expected}, found {found}")
-    return found
-
-
-def _episodes(folder: str, name: str) -> dict[str, Any]:
-    path = f"{folder}/{name}"
-    fields = [
-        {
-            "@type": "cr:Field",
-            "@id": f"{_set_name(path)}/{column}",
-            "name": column,
-            "description": meaning,
-            "dataType": f"sc:{kind}",
-            "source": {"fileObject": {"@id": path}, "extract": {"column": column}},
-        }
-        for column, (meaning, kind) in _COLUMNS.items()
-    ]
-    return _record_set(path, "The frozen episodes of a task, size and split, one a record.", fields)
-
-
-def _maze_rows(folder: str, name: str) -> dict[str, Any]:
-    path = f"{folder}/{name}"
-    field = {
-        "@type": "cr:Field",
-        "@id": f"{_set_name(path)}/row",
-        "name": "row",
-        "description": "A row of cells, from left to right: # is a wall, . is free.",
-        "dataType": "sc:Text",
-        "source": {"fileObject": {"@id": path}, "extract": {"fileProperty": "lines"}},
+def _record_set(path: str) -> dict[str, Any]:
+    """Returns the records of a file: frozen episodes, or the rows of mazes."""
+    name, _, suffix = path.replace("/", "-").rpartition(".")
+    if suffix == "csv":
+        text = "The frozen episodes of a task, size and split, one a record."
+        fields = [(column, meaning, kind, {"column": column}) for column, (meaning, kind) in _COLUMNS.items()]
+    else:
+        text = "The mazes of a split, row by row from the top. A maze has as many rows as a row has characters."
+        meaning = "A row of cells, from left to right: # is a wall, . is free."
+        fields = [("row", meaning, "Text", {"fileProperty": "lines"})]
+    return {
+        "@type": "cr:RecordSet",
+        "@id": name,
+        "name": name,
+        "description": text,
+        "field": [
+            {
+                "@type": "cr:Field",
+                "@id": f"{name}/{field}",
+                "name": field,
+                "description": meaning,
+                "dataType": f"sc:{kind}",
+                "source": {"fileObject": {"@id": path}, "extract": extract},
+            }
+            for field, meaning, kind, extract in fields
+        ],
     }
-    text = "The mazes of a split, row by row from the top. A maze has as many rows as a row has characters."
-    return _record_set(path, text, [field])
-
-
-def _record_set(path: str, description: str, fields: list[dict[str, Any]]) -> dict[str, Any]:
-    name = _set_name(path)
-    return {"@type": "cr:RecordSet", "@id": name, "name": name, "description": description, "field": fields}
-
-
-def _set_name(path: str) -> str:
-    return path.rpartition(".")[0].replace("/", "-")
-
-
-def main() -> None:
-    """Writes the file."""
-    OUT.write_text(json.dumps(describe(), indent=1) + "\n", encoding="ascii")
 
 
 if __name__ == "__main__":
-    main()
+    OUT.write_text(json.dumps(describe(), indent=1) + "\n", encoding="ascii")

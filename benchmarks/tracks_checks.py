@@ -10,7 +10,6 @@ split.
 from __future__ import annotations
 
 import bisect
-import enum
 import functools
 import math
 from collections.abc import Callable, Sequence
@@ -34,12 +33,16 @@ from mazebench.tasks.perturbations.moved_doors import SWAPS_BY_PERCENT
 from mazebench.tasks.shown_map import is_blocked
 from mazebench.tasks.task import Task
 from mazebench.tasks.tracks import DISTANCES
-from mazebench.tasks.trials import make_trial
+from mazebench.tasks.trials import Trial, make_trial
 
-KINDS = (*KNOWN, *NOVEL)
+KINDS = ",".join((*KNOWN, *NOVEL))
 _TRACK = "building"  # whose maps are right
 _SEED = 7_900  # of the check mazes and their episodes
 _PER_MAZE = 5  # episodes
+
+Kinds = Annotated[str, typer.Option(help="Kinds of mazes.")]
+Episodes = Annotated[int, typer.Option(min=1, help="Of each kind.")]
+app = typer.Typer(help="Check the tracks.")
 
 
 def check_mazes(kind: str, count: int) -> list[Maze]:
@@ -53,15 +56,13 @@ def check_mazes(kind: str, count: int) -> list[Maze]:
     return mazes
 
 
-# Doors
-
-
-def check_swaps(kinds: Sequence[str], episodes: int) -> None:
-    """Prints how many doors must move so that a share of the shortest paths on the map is blocked."""
-    shares = sorted({percent / 100 for swaps in SWAPS_BY_PERCENT.values() for percent in swaps})
+@app.command()
+def swaps(kinds: Kinds = KINDS, episodes: Episodes = 40) -> None:
+    """Print how many doors must move so that a share of the shortest paths on the map is blocked."""
+    shares = sorted({percent / 100 for counts in SWAPS_BY_PERCENT.values() for percent in counts})
     print(f"\nDoors that move, and the share of {episodes} paths on the map that they block:\n")
     _print_head("kind", "doors", "open", *(f"{share:g}" for share in shares), "at most")
-    for kind in kinds:
+    for kind in kinds.split(","):
         rng = np.random.default_rng(_SEED)
         cases = [
             _Case(maze, door_slots(maze), sample_pair(maze, int(rng.choice(DISTANCES)), rng))
@@ -73,7 +74,7 @@ def check_swaps(kinds: Sequence[str], episodes: int) -> None:
         numbers = range(min(num_swappable(case.maze) for case in cases) + 2)  # the last one is too many
         found = [_nearest(blocked, bisect.bisect_left(numbers, share, key=blocked), share) for share in shares]
         most = bisect.bisect_left(numbers, math.inf, key=blocked) - 1
-        cells = [f"{swaps}: {blocked(swaps):.2f}" if swaps <= most else "-" for swaps in (*found, most)]
+        cells = [f"{count}: {blocked(count):.2f}" if count <= most else "-" for count in (*found, most)]
         _print_row(kind, f"{doors:.0f}", f"{num_open:.0f}", *cells)
 
 
@@ -104,64 +105,45 @@ def _blocked_share(cases: list[_Case], num_swaps: int) -> float:
     return float(np.mean(blocked))
 
 
-# Agents
-
-
-class Episodes(NamedTuple):
-    """Results of the episodes of a run; `E` is their number."""
-
-    mazes: np.ndarray  # [E] int
-    steps: np.ndarray  # [E] float, until the goal was reached; infinite where it was not
-    oracle: np.ndarray  # [E] float, the oracle's steps
-    cells: np.ndarray  # [E] int, of the shortest path
-
-    def on_time(self) -> np.ndarray:
-        """Returns `[E]` float: 1 where the goal was reached within 1.25 times the oracle's steps, else 0."""
-        return 1.0 * (np.isfinite(self.steps) & (self.steps <= ON_TIME[0] * self.oracle))
-
-
-def play(agent_name: str, kind: str, episodes: int, hide: tuple[str, ...] = ()) -> Episodes:
-    """Runs an agent with right maps of a kind, in episodes that are the same ones for all agents."""
-    mazes = check_mazes(kind, -(-episodes // _PER_MAZE))
-    spec = Task.of(_TRACK, mazes=mazes, level=1, distances=DISTANCES, hide=hide, sensors=("lidar",))
-    rng = np.random.default_rng(_SEED)
-    trials = [
-        make_trial(maze, index, sample_pair(maze, int(rng.choice(DISTANCES)), rng), rng)
-        for index, maze in enumerate(spec.mazes)
-        for _ in range(_PER_MAZE)
-    ]
-    agent_class = load_agent_class(agent_name)
-    agent = agent_class.build(spec.interface)
-    steps = np.full(len(trials), np.inf)
-    numbered = list(enumerate(trials))
-    for outcomes in run_trials(agent, spec, numbered, len(trials), 1, needs_truth=agent_class.needs_truth):
-        for outcome in outcomes:
-            steps[outcome.index] = outcome.steps if outcome.success else np.inf
-    return Episodes(
-        np.array([trial.episode.maze for trial in trials]),
-        steps,
-        np.array([each or np.inf for each in measure_oracle_steps(spec, trials)]),
-        np.array([trial.distance for trial in trials]),
-    )
-
-
-def check_worth(kinds: Sequence[str], episodes: int) -> None:
-    """Prints what the oracle reaches, and what an exact map is worth to the navigator."""
+@app.command()
+def worth(kinds: Kinds = KINDS, episodes: Episodes = 40) -> None:
+    """Print what the oracle reaches, and what an exact map is worth to the navigator."""
     print(f"\nRight maps, {episodes} episodes of each kind; on time is within {ON_TIME[0]:g} oracle steps:\n")
     _print_head("kind", "oracle: success", "steps a cell", "navigator on time", "without map", "map worth")
-    for kind in kinds:
-        best, shown = play("oracle", kind, episodes), play("navigator", kind, episodes)
-        hidden = play("navigator", kind, episodes, hide=("map",))
-        success = mean_interval(1.0 * np.isfinite(best.steps), best.mazes)
-        with_map, without = shown.on_time(), hidden.on_time()
+    for kind in kinds.split(","):
+        mazes = check_mazes(kind, -(-episodes // _PER_MAZE))
+        rng = np.random.default_rng(_SEED)
+        trials = [
+            make_trial(maze, index, sample_pair(maze, int(rng.choice(DISTANCES)), rng), rng)
+            for index, maze in enumerate(mazes)
+            for _ in range(_PER_MAZE)
+        ]
+        played = np.array([trial.episode.maze for trial in trials])
+        cells = np.array([trial.distance for trial in trials])
+
+        shown, hidden = (
+            Task.of(_TRACK, mazes=mazes, level=1, distances=DISTANCES, hide=hide, sensors=("lidar",))
+            for hide in ((), ("map",))
+        )
+        oracle = np.array([steps or np.inf for steps in measure_oracle_steps(shown, trials)])
+        with_map, without = (_on_time(task, trials, oracle) for task in (shown, hidden))
         _print_row(
             kind,
-            _show(success),
-            f"{np.mean(best.steps / best.cells):.2f}",
+            _show(mean_interval(1.0 * np.isfinite(oracle), played)),
+            f"{np.mean(oracle / cells):.2f}",
             f"{with_map.mean():.2f}",
             f"{without.mean():.2f}",
-            _show(difference_interval(with_map - without, shown.mazes)),
+            _show(difference_interval(with_map - without, played)),
         )
+
+
+def _on_time(task: Task, trials: Sequence[Trial], oracle: np.ndarray) -> np.ndarray:
+    """Returns `[E]` float: 1 where the navigator reaches the goal within 1.25 times the oracle's steps, else 0."""
+    agent, on_time = load_agent_class("navigator").build(task.interface), np.zeros(len(trials))
+    for outcomes in run_trials(agent, task, list(enumerate(trials)), len(trials), 1):
+        for outcome in outcomes:
+            on_time[outcome.index] = outcome.success and outcome.steps <= ON_TIME[0] * oracle[outcome.index]
+    return on_time
 
 
 def _show(estimate: Estimate) -> str:
@@ -177,24 +159,5 @@ def _print_row(*cells: str) -> None:
     print("|", " | ".join(cells), "|", flush=True)
 
 
-class Check(enum.StrEnum):
-    """The checks by name."""
-
-    SWAPS = "swaps"
-    WORTH = "worth"
-
-
-def main(
-    check: Annotated[Check, typer.Argument()],
-    kinds: Annotated[str, typer.Option(help="Kinds of mazes.")] = ",".join(KINDS),
-    episodes: Annotated[int, typer.Option(min=1, help="Of each kind.")] = 40,
-) -> None:
-    """Check the tracks."""
-    if check is Check.SWAPS:
-        check_swaps(kinds.split(","), episodes)
-    else:
-        check_worth(kinds.split(","), episodes)
-
-
 if __name__ == "__main__":
-    typer.run(main)
+    app()

@@ -50,11 +50,11 @@ WALLS = {
         "mazebench/world",
         "mazebench/envs",
         "mazebench/play/viewer.py",
-        "mazebench/bench",
+        "mazebench/bench.py",
     ),
     "dm_control": ("mazebench/envs/dm_control.py",),
     "torch": ("agents",),
-    "gymnasium": ("mazebench/envs", "mazebench/bench"),
+    "gymnasium": ("mazebench/envs",),
     "numba": ("agents/common/kernels.py",),
     "minari": ("mazebench/evaluation/minari_data.py",),
     "ray": ("mazebench/evaluation/cluster.py", "mazebench/training/distributed.py"),
@@ -168,7 +168,7 @@ class TestImports:
         assert json.loads(run_python("-c", program).stdout) == [True, []]
 
     def test_the_command_line_starts_without_mujoco(self):
-        # `render` and `bench` choose a backend before MuJoCo reads it.
+        # `render` chooses a backend before MuJoCo reads it.
         program = "import sys, mazebench.cli; print({'mujoco', 'dm_control', 'torch'} & set(sys.modules))"
         assert run_python("-c", program).stdout == "set()\n"
 

@@ -8,11 +8,10 @@ import pytest
 import torch
 from mazebench_agents.muzero.search import Root, considered_visits, gumbel_muzero_policy
 from mazebench_agents.muzero.tree import Evaluation
-from processes import run_python
 
 torch.set_num_threads(1)  # two that share a core with other tests wait for each other
 
-GOLDEN = np.load(pathlib.Path(__file__).parent / "golden" / "search.npz")
+GOLDEN = np.load(pathlib.Path(__file__).parent / "golden" / "search.npz")  # from mctx 0.0.71, on random tables
 CASES = {case["name"]: case for case in json.loads(str(GOLDEN["cases"]))}
 
 
@@ -182,12 +181,3 @@ def test_considered_visits_by_hand():
     assert considered_visits(6, 16) == [0] * 6 + [1] * 3 + [2, 2, 3, 3] + [4, 4, 5]
     assert considered_visits(1, 3) == [0, 1, 2]
     assert considered_visits(6, 4) == [0] * 4
-
-
-@pytest.mark.slow
-def test_speed_of_the_search_is_measured_beside_that_of_mctx():
-    script = pathlib.Path(__file__).parent.parent / "benchmarks" / "search_and_mctx.py"
-    said = run_python(script, "--seconds", "0.01").stdout
-    rows = [line.split(" | ") for line in said.splitlines() if line.startswith("| ")][1:]
-    assert [row[0] for row in rows] == ["| 1", "| 64", "| 256"]
-    assert all(float(row[1].replace(",", "")) > 0 for row in rows)

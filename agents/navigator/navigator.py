@@ -13,7 +13,6 @@ from mazebench.maps.maze import cell_to_point
 
 from ..robot.body import LOOK_LEFT, PLAYED, WITHOUT_STRAFING, as_kind
 from ..robot.driving import Drive
-from ..robot.map_matching import MapBelief
 from ..robot.pilot import steer
 from ..robot.planning import plan
 from ..robot.senses import Memory, Senses
@@ -34,9 +33,9 @@ class Navigator(Agent):
 
     plays_actions = PLAYED
 
-    def __init__(self, interface: Interface, belief: type[MapBelief] = MapBelief):
-        """Acts in the environments of the interface, with their lidar if they have one; keeps a `belief` of the map."""
-        self._senses, self._cell_size = Senses(interface, "navigator", belief), interface.cell_size
+    def __init__(self, interface: Interface):
+        """Acts in the environments of the interface, with their lidar if they have one."""
+        self._senses, self._cell_size = Senses(interface, "navigator"), interface.cell_size
         self._kind, self._strafes = interface.actions, interface.actions not in WITHOUT_STRAFING
 
     @classmethod

@@ -82,14 +82,11 @@ class Memory:
 class Senses:
     """The senses of a robot in the environments of one interface, with their lidar if they have one."""
 
-    def __init__(self, interface: Interface, agent: str, belief: type[MapBelief] = MapBelief):
-        """`belief` is kept of how the map lies.
-
-        Raises `UnplayableError`, in the name of `agent`, if maps are shown with less than a pixel per cell.
-        """
+    def __init__(self, interface: Interface, agent: str):
+        """Raises `UnplayableError`, in the name of `agent`, if maps are shown with less than a pixel per cell."""
         if interface.context_size < interface.size:
             raise UnplayableError(f"agent {agent!r}: expected maps of at least a pixel per cell, found fewer")
-        self._size, self._cell_size, self._belief = interface.size, interface.cell_size, belief
+        self._size, self._cell_size = interface.size, interface.cell_size
         self._odometry_noise = interface.odometry_noise
         self._has_lidar = "lidar" in interface.sensors
         self._beams = beams_of(interface.lidar or LidarModel(), 1 / self._cell_size)
@@ -120,14 +117,14 @@ class Senses:
         if start is not None:
             # The grid is the maze. A start that is known but not marked says that the map may lie in any way.
             num_turns = 1 if context[START].any() else 8
-            belief = self._belief.begin(reading.walls, reading.goal, num_turns, None, self._size)
+            belief = MapBelief.begin(reading.walls, reading.goal, num_turns, None, self._size)
             if ranges is None or self._odometry_noise == 0:
                 return Memory(belief, observed, _EXACT)
             return Memory(belief, observed, _TRACKED, Tracker(odometry, odometry, self._odometry_noise))
         if ranges is None:
             # The grid is the maze, and the start is where it is marked.
             x, y = cell_to_point(marked_cell(reading.start), self._size).tolist()
-            belief = self._belief.begin(reading.walls, reading.goal, 1, None, self._size)
+            belief = MapBelief.begin(reading.walls, reading.goal, 1, None, self._size)
             dead_reckoning = DeadReckoning((x, y), observed.velocity(), _GAIN)
             return Memory(belief, observed._replace(x=x, y=y), _RECKONED, None, dead_reckoning)
 
@@ -138,7 +135,7 @@ class Senses:
             reckoning = DeadReckoning((observed.x, observed.y), observed.velocity())
         else:
             pose, num_turns = aligned(size, ranges, self._beams), 8
-        belief = self._belief.begin(reading.walls, reading.goal, num_turns, reading.start, size)
+        belief = MapBelief.begin(reading.walls, reading.goal, num_turns, reading.start, size)
         x, y, yaw = pose.tolist()
         tracker = Tracker(pose, odometry, self._odometry_noise)
         return Memory(belief, observed._replace(x=x, y=y, yaw=yaw), _TRACKED, tracker, reckoning)

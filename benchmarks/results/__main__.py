@@ -7,14 +7,13 @@ folder that `mazebench report` and `mazebench compare` read. `python -m benchmar
 from __future__ import annotations
 
 import pathlib
-import sys
 
 import typer
 
-from benchmarks.results.kept import all_episodes, keep, read_kept
-from benchmarks.results.pages import PAGES, RECORDS, ROOT, with_tables
-from benchmarks.results.results_figures import draw_figures, figures
-from mazebench.errors import InputError
+from benchmarks.results.kept import keep, read_kept
+from benchmarks.results.results_figures import figures
+from benchmarks.results.results_tables import PAGES, RECORDS, ROOT, with_tables
+from mazebench.report.figures import to_svg
 from mazebench.storage.files import open_whole
 
 app = typer.Typer(help="Write the tables and figures of results into the pages, from the records that are kept.")
@@ -22,12 +21,12 @@ app = typer.Typer(help="Write the tables and figures of results into the pages, 
 
 @app.callback(invoke_without_command=True)
 def write(context: typer.Context) -> None:
-    """Write all tables and figures anew."""
+    """Write all tables and figures."""
     if context.invoked_subcommand is None:
         kept = read_kept(RECORDS)
-        pages = {name: with_tables((ROOT / name).read_text(encoding="utf-8"), kept) for name in PAGES}
-        draw_figures(figures(kept), ROOT / "docs" / "images")
-        for name, text in pages.items():
+        files = {name: with_tables((ROOT / name).read_text(encoding="utf-8"), kept) for name in PAGES}
+        files |= {f"docs/images/{drawn.name}.svg": to_svg(drawn) for drawn in figures(kept)}
+        for name, text in files.items():
             with open_whole(ROOT / name) as file:
                 file.write(text.encode())
 
@@ -43,15 +42,9 @@ def keep_folders(folders: list[pathlib.Path]) -> None:
 @app.command("episodes")
 def write_episodes(out: pathlib.Path) -> None:
     """Write every episode that is kept as a line of a CSV file, for rliable and other tools."""
-    episodes = all_episodes(read_kept(RECORDS))
-    with open_whole(out) as file:
-        file.write(episodes.to_csv(index=False).encode())
-    print(f"{out}: {len(episodes):,} episodes")
+    columns = ["agent", "run", "setting", "episode", "maze", "success", "steps", "oracle_steps"]
+    read_kept(RECORDS).episodes.reset_index()[columns].to_csv(out, index=False)
 
 
 if __name__ == "__main__":
-    try:
-        app()
-    except InputError as error:
-        print(f"benchmarks.results: {error}", file=sys.stderr)
-        sys.exit(2)
+    app()

@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 import json
-import sys
 from typing import Annotated
 
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.errors import remark
-from mazebench.world.backend import RenderingError
+from mazebench.commands.summary_table import print_table
 
 
 def bench(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Shorter runs, noisier figures.")] = False,
 ) -> None:
-    """Measure speed on this machine, as ratios to the bare simulation taken in the same run."""
-    try:
-        load_mujoco(renders=True)
-    except RenderingError as error:
-        remark(f"{error}; pictures are not measured")
-        load_mujoco(renders=False)
-    from mazebench.bench import measure
+    """Measure speed on this machine in a minute, as ratios taken in the same run."""
+    load_mujoco(renders=False)
+    from mazebench.bench import run
 
-    results = measure.run(quick=quick, say=lambda line: print(line, file=sys.stderr))
+    results = run(quick)
     if as_json:
         print(json.dumps(results, indent=1))
-    else:
-        measure.print_tables(results)
+        return
+    print(f"{results.pop('cores')} cores, MuJoCo {results.pop('mujoco')}")
+    for name, rows in results.items():
+        cells = [[row["name"], f"{row['steps/s']:,}", f"{row['ratio']:.2f}"] for row in rows]
+        print_table(f"{name}: agent steps per second, and their ratio to the first row's", list(rows[0]), cells)

@@ -1,1 +1,0 @@
-"""Speed of the simulation, the environments and the learners, for `mazebench bench`."""
