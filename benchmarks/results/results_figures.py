@@ -64,7 +64,7 @@ def draw_figures(chosen: Sequence[Drawn], folder: pathlib.Path) -> None:
     """Writes figures as SVG into a folder."""
     for drawn in chosen:
         with open_whole(folder / f"{drawn.name}.svg") as file:
-            file.write(to_svg(drawn).encode())
+            file.write(to_svg(drawn.figure))
 
 
 def map_worth(kept: Kept) -> Drawn:
