@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import datetime
 import pathlib
-import shutil
-import subprocess
-import sys
 
 import pytest
-from made_results import edit_records, edit_summary, edit_task, make_result, read_summary
+from made_results import edit_records, edit_summary, make_result, read_summary
 
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import TRACKS_BENCHMARK
@@ -19,6 +16,7 @@ from mazebench.report.leaderboard import (
     PARTS,
     Entry,
     kept_entries,
+    main,
     make_tables,
     read_entries,
     write_leaderboard,
@@ -86,20 +84,8 @@ class TestTables:
         # In 8 of 12 parts all goals are reached, in 4 half of them.
         assert row[2].startswith("0.83 [0.")
         assert row[:2] + row[3:-1] == ["1", "x (privileged)", "", "0.83", "made-up 1.0 cccccccc"]
+        assert row[-1] == entries[0].date.isoformat()
         assert page.read_text().count(f"| 1 | x (privileged) |{' 1.00 | 1.00 | 0.50 |' * 4}") == 2  # on time, success
-
-    def test_a_row_has_the_day_of_its_entry(self, page):
-        entry = make_entry("x").model_copy(update={"parts": dict.fromkeys(PARTS, (0.5, 0.5))})
-        write_leaderboard([entry], page)
-        assert [row[-1] for row in rows(kept_entries(page))] == ["2026-01-02"]
-
-    def test_a_row_says_which_actions_were_used_unless_they_are_the_six(self, suite, tmp_path):
-        folder = pathlib.Path(shutil.copytree(suite / "x", tmp_path / "x"))
-        for part in folder.iterdir():
-            edit_task(part, actions="diff")
-        [entry] = read_entries([folder])
-        [row] = rows([entry.model_copy(update={"privileged": False})])
-        assert row[1] == "x with diff actions"
 
     def test_the_rank_is_by_time_then_success_and_the_gain_over_the_navigator_without_the_map(self, page):
         entries = [make_entry("slow", 0.9, 0.1), make_entry("never", 0.0, 0.1), make_entry("quick", 0.6, 0.5)]
@@ -130,47 +116,35 @@ class TestPage:
         assert [path.name for path in tmp_path.iterdir()] == ["page.md"]
         assert page.read_text() == "nothing\n"
 
-    def test_bad_input_ends_the_command_with_one_line_and_status_2(self, tmp_path):
-        command = [sys.executable, "-m", "mazebench.report.leaderboard", str(tmp_path / "none"), "page.md"]
-        run = subprocess.run(command, capture_output=True, text=True)
+    def test_bad_input_ends_the_command_with_one_line_and_status_2(self, tmp_path, capsys):
+        with pytest.raises(SystemExit) as caught:
+            main([str(tmp_path / "none"), "page.md"])
         said = f"mazebench: {tmp_path}/none: expected a finished evaluation, found nothing there\n"
-        assert (run.returncode, run.stderr) == (2, said)
+        assert (caught.value.code, capsys.readouterr().err) == (2, said)
 
 
-class TestRefused:
-    @pytest.mark.parametrize(
-        ("options", "message"),
-        [
-            ({}, r"one result of each of the 12 parts, found none of building 1, .*, adrift 2, adrift 3, rough 1"),
-            ({"code": None}, "the hash of the agent's code, found none"),
-            ({"split": "train"}, "eval episodes of a track, with its senses, found train adrift 1"),
-            ({"num_mazes": 3}, "the 240 frozen episodes, found others"),
-        ],
-    )
-    def test_a_result_of_other_episodes_than_all_frozen_ones(self, tmp_path, options, message):
-        make_part(tmp_path, "x", **options)
-        with pytest.raises(InputError, match=f"expected {message}"):
-            read_entries([tmp_path])
+def with_provenance(folder, **changes):
+    edit_summary(folder, provenance=read_summary(folder)["provenance"] | changes)
 
-    def test_a_result_with_another_seed(self, tmp_path):
-        part = make_part(tmp_path, "x")
-        edit_records(part, lambda record: record | {"seed": record["seed"] + (record["episode"] == 7)})
-        with pytest.raises(InputError, match="adrift-1: expected the 240 frozen episodes, found others"):
-            read_entries([tmp_path])
 
-    def test_a_result_that_is_not_of_a_track(self, tmp_path):
-        make_result(tmp_path / "run", record=False)
-        with pytest.raises(InputError, match=r"run: expected eval episodes of a track, .*, found eval local"):
-            read_entries([tmp_path / "run"])
+FAULTS = {  # of an agent's folder with its result of a part
+    "one result of each of building 1, .*, rough 3, found adrift 1": lambda part: None,
+    "eval episodes of a track, with its senses, found eval local": lambda part: make_result(
+        part.parent / "local", "x", record=False
+    ),
+    "the 240 frozen episodes, found others": lambda part: edit_records(
+        part, lambda record: record | {"seed": record["seed"] + (record["episode"] == 7)}
+    ),
+    "results of one agent, found those of x, y": lambda part: make_part(part.parent, "y", level=2),
+    "the hash of the agent's code, found none": lambda part: with_provenance(part, agent_code_sha256=None),
+    "results of the installed benchmark, found those of another one": lambda part: with_provenance(
+        part, benchmark_manifest_sha256="0" * 64
+    ),
+}
 
-    def test_a_result_of_another_benchmark(self, tmp_path):
-        part = make_part(tmp_path, "x")
-        edit_summary(part, provenance=read_summary(part)["provenance"] | {"benchmark_manifest_sha256": "0" * 64})
-        with pytest.raises(InputError, match=r"adrift-1: expected results of the installed benchmark, found those of"):
-            read_entries([tmp_path])
 
-    def test_a_folder_with_two_agents_results(self, tmp_path):
-        make_part(tmp_path, "x")
-        make_part(tmp_path, "y", level=2)
-        with pytest.raises(InputError, match="expected results of one agent, found those of x, y"):
-            read_entries([tmp_path])
+@pytest.mark.parametrize("message", FAULTS)
+def test_other_results_than_one_agents_in_all_frozen_episodes_are_refused(tmp_path, message):
+    FAULTS[message](make_part(tmp_path, "x"))
+    with pytest.raises(InputError, match=f"expected {message}"):
+        read_entries([tmp_path])

@@ -86,11 +86,3 @@ class TestCommand:
         status, output, errors = self.command(monkeypatch, capsys, tmp_path / "all", "--out", tmp_path / "out")
         assert (status, output.partition(":")[0]) == (0, "1 result of mah")
         assert errors == "mazebench: 1 training run left out beside results; report them by themselves\n"
-
-    def test_names_of_agents_are_read_from_the_command_line(self, tmp_path, monkeypatch, capsys):
-        make_result(tmp_path / "result", "lab:Bold", num_mazes=1, record=False)
-        arguments = (tmp_path / "result", "--out", tmp_path / "out", "--name")
-        status, output, _ = self.command(monkeypatch, capsys, *arguments, "ours=lab:Bold")
-        assert (status, output.partition(":")[0]) == (0, "1 result of ours")
-        status, _, errors = self.command(monkeypatch, capsys, *arguments, "ours")
-        assert (status, errors) == (2, "mazebench: expected --name NAME=AGENT, found 'ours'\n")

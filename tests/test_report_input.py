@@ -8,13 +8,13 @@ import sys
 import warnings
 
 import pytest
-from made_results import edit_summary, edit_task, make_result, of_own_mazes, read_summary
+from made_results import edit_summary, make_result, of_own_mazes, read_summary
 
 from mazebench import cli
 from mazebench.errors import InputError, Remark
 from mazebench.report.episodes import read_results
 from mazebench.report.write_report import write_report
-from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY
+from mazebench.results.reading import EPISODES, SUMMARY
 from mazebench.results.trajectories import TRAJECTORIES
 
 
@@ -33,28 +33,12 @@ def read(*paths):
     return [result.label for result in results], [str(warning.message) for warning in caught]
 
 
-def cut_records(folder):
-    path = folder / EPISODES
-    path.write_bytes(path.read_bytes()[:-20])
-
-
-def unfinish(folder):
-    (folder / SUMMARY).unlink()
-    (folder / EPISODES).rename(folder / JOURNAL)
-
-
-def change_provenance(folder, **changes):
-    edit_summary(folder, provenance=read_summary(folder)["provenance"] | changes)
-
-
 FAULTS = {
-    "task.level.0: Input should be less than or equal to 3, found '4'": lambda folder: edit_task(folder, level=[4]),
-    "line 4": cut_records,
-    "expected a finished evaluation": unfinish,
-    "of benchmark 'paper', manifest 23359df5, found manifest 00": lambda folder: change_provenance(
-        folder, benchmark_manifest_sha256="00"
+    "line 4": lambda folder: (folder / EPISODES).write_bytes((folder / EPISODES).read_bytes()[:-20]),
+    "expected a finished evaluation": lambda folder: (folder / SUMMARY).unlink(),
+    "of benchmark 'paper', manifest 23359df5, found manifest 00": lambda folder: edit_summary(
+        folder, provenance=read_summary(folder)["provenance"] | {"benchmark_manifest_sha256": "00"}
     ),
-    "task.split: Input should be one of train, dev, eval, found 'test'": lambda folder: edit_task(folder, split="test"),
 }
 
 
@@ -80,16 +64,12 @@ class TestSkipped:
         assert labels == ["mah"]
         assert warning == f"{run / 'later'}: mah, local, 13 × 13 again, as in {run / 'good'}; skipped"
 
-    def test_a_result_with_damaged_trajectories_is_reported_without_paths(self, run):
-        (run / "good" / TRAJECTORIES).write_bytes(b"PK\x03\x04 no archive")
-        [result] = read_results([run])
-        assert result.trajectories is None
-        assert read(run)[1][0].endswith("reported without paths")
-
-    def test_trajectories_of_another_run_are_left_out(self, run):
+    def test_a_result_with_trajectories_of_another_run_is_reported_without_paths(self, run):
         make_result(run / "other", "mah", num_mazes=2, position_noise=0.5, skill=0.1)
         shutil.copy(run / "other" / TRAJECTORIES, run / "good" / TRAJECTORIES)
-        assert "expected a pose for the start and for each step" in read(run)[1][0]
+        [warning] = read(run)[1]
+        assert "expected a pose for the start and for each step" in warning
+        assert warning.endswith("reported without paths")
 
 
 class TestLabels:
@@ -99,36 +79,11 @@ class TestLabels:
         make_result(tmp_path / "c", "random", num_mazes=1, seed=0)
         make_result(tmp_path / "d", "random", num_mazes=1, seed=1)
         make_result(tmp_path / "e", "dqn", num_mazes=1)
-        assert read(tmp_path) == (["mah aa11bb", "mah cc33dd", "dqn", "random seed 0", "random seed 1"], [])
-
-    def test_names_replace_those_of_agents_everywhere(self, run, tmp_path):
-        make_result(run / "other", "lab.agents:Bold", num_mazes=2)
-        write_report([run], tmp_path / "out", [("ours", "lab.agents:Bold")])
-        files = [path for path in (tmp_path / "out").rglob("*") if path.suffix in (".md", ".csv", ".tex", ".html")]
-        assert len(files) > 5
-        for path in files:
-            text = path.read_text()
-            assert "ours" in text
-            assert text.count("lab.agents:Bold") == (path.name == "report.html")  # in the command
-
-    def test_results_of_one_agent_get_names_by_their_folders(self, tmp_path):
-        for name, checkpoint in (("a", "aa11bb22"), ("b", "cc33dd44")):
-            make_result(tmp_path / name / "local-13", "mah", num_mazes=1, checkpoint=checkpoint)
-        names = [("first", str(tmp_path / "a")), ("second", str(tmp_path / "b" / "local-13"))]
-        results = read_results([tmp_path], names)
-        assert [result.label for result in results] == ["first", "second"]
-
-    def test_a_name_of_nothing_and_one_of_two_agents_are_refused(self, run):
-        make_result(run / "other", "dqn", num_mazes=2)
-        with pytest.raises(InputError, match="unknown agent or folder 'mmn'; available: dqn, mah"):
-            read_results([run], [("ours", "mmn")])
-        for names in ([("ours", "dqn"), ("ours", "mah")], [("dqn", "mah")], [("ours", str(run))]):
-            with pytest.raises(InputError, match=rf"expected one agent called '{names[0][0]}', found dqn, mah"):
-                read_results([run], names)
+        assert read(tmp_path) == (["mah aa11bb22", "mah cc33dd44", "random seed 0", "random seed 1", "dqn"], [])
 
     def test_privileged_agents_are_marked(self, run):
         make_result(run / "oracle", "oracle", num_mazes=2, privileged=True)
-        assert read(run) == (["oracle (privileged)", "mah"], [])
+        assert read(run) == (["mah", "oracle (privileged)"], [])
 
 
 class TestRefused:
@@ -158,7 +113,7 @@ def test_results_on_mazes_of_ones_own_are_reported_with_their_walls(tmp_path):
     folder = of_own_mazes(make_result(tmp_path / "own", "mah", num_mazes=2), "office")
     [result] = write_report([folder], tmp_path / "out")
     assert result.setting.mazes == "office-00, office-01"
-    assert (tmp_path / "out" / "tables" / "custom-1-local-13.md").exists()
+    assert (tmp_path / "out" / "tables" / "local-13-mazes-1.md").exists()
     data = (tmp_path / "out" / "report.html").read_text().split('id="data">')[1].split("</script>")[0]
     mazes = json.loads(data)["mazes"]
     assert [maze["name"] for maze in mazes] == ["office-00", "office-01"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 
@@ -29,18 +30,13 @@ def data_of(page):
 class TestContent:
     def test_the_page_asks_no_network_for_anything(self, page):
         text = page.read_text()
-        names = {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}  # not places
-        assert set(re.findall(r"https?://[^\s\"']+", text)) == names
+        assert not re.search(r"https?://", text)
         assert "default-src 'none'" in text
-
-    def test_no_two_elements_have_one_id(self, page):
-        ids = re.findall(r' id="([^"]+)"', page.read_text())
-        assert len(set(ids)) == len(ids) > 100
 
     def test_an_agent_named_like_a_script_is_shown_as_text(self, page):
         text = page.read_text()
         assert "window.hacked=1</script>" not in text
-        assert "<img" not in text
+        assert "<img src=x" not in text
         assert NASTY in [result["label"] for result in data_of(page)["results"]]
         for path in (page.parent / "tables").glob("*.md"):
             assert not re.search(r"(?<!\\)<", path.read_text())
@@ -54,25 +50,21 @@ def browser(tmp_path_factory):
         yield browser
 
 
-def load_anew(browser, page):
-    """Opens the page and waits until the explorer shows an episode."""
+@contextlib.contextmanager
+def loaded(browser, page):
+    """The browser with the page loaded anew and an episode in the explorer; checks that the page raised no error."""
     browser.errors.clear()
     browser.open(page)
     browser.wait_for("document.getElementById('clock').value.startsWith('step')")
-
-
-def loaded(browser, page):
-    """Yields the browser with the page loaded anew; then checks that the page raised no error."""
-    load_anew(browser, page)
     yield browser
     assert browser.errors == []
+    assert browser.run("window.hacked === undefined")
 
 
 @pytest.fixture
 def opened(browser, page):
-    """The browser with the page loaded anew and an episode in the explorer."""
-    yield from loaded(browser, page)
-    assert browser.run("window.hacked === undefined")
+    with loaded(browser, page):
+        yield browser
 
 
 PIXELS = "document.getElementById('driven').toDataURL()"
@@ -108,8 +100,8 @@ def track_page(tmp_path_factory):
 
 @pytest.fixture
 def on_tracks(browser, track_page):
-    """The browser with the page of tracks loaded anew."""
-    yield from loaded(browser, track_page)
+    with loaded(browser, track_page):
+        yield browser
 
 
 def is_seen(name):
@@ -118,7 +110,7 @@ def is_seen(name):
 
 class TestTracks:
     def test_failures_are_found_by_track_level_and_group(self, on_tracks):
-        choose_setting(on_tracks, "track rebuilt")
+        choose_setting(on_tracks, "rebuilt, level 1, 31 × 31")
         on_tracks.wait_for(is_seen("group"))
         on_tracks.run(set_value("group", "blocked"))
         assert on_tracks.run("document.getElementById('count').textContent") == "5 of 20 episodes"
@@ -127,38 +119,33 @@ class TestTracks:
         assert all(text.startswith("✗") for text in texts)
         assert len(texts) < 5
 
-    def test_the_level_changes_what_is_shown_of_the_same_episode(self, on_tracks):
-        choose_setting(on_tracks, "track adrift")
-        on_tracks.wait_for(is_seen("odometry"))
+    def test_another_level_shows_the_map_of_the_same_episode(self, on_tracks):
+        choose_setting(on_tracks, "adrift, level 1, 31 × 31")
+        on_tracks.wait_for("view.current.observed")
         on_tracks.run(set_value("episodes", 7))
         shown = "document.getElementById('shown').toDataURL()"
         with_start = on_tracks.run(shown)
-        levels = on_tracks.run("[...document.getElementById('level').options].map(o => [o.text, o.value])")
-        assert [text for text, _ in levels] == ["1", "2"]
-        on_tracks.run(set_value("level", levels[1][1]))
+        choose_setting(on_tracks, "adrift, level 2, 31 × 31")
         on_tracks.wait_for(f"{shown} !== '{with_start}'")  # without the start
         assert on_tracks.run("document.getElementById('episodes').value") == "7"
 
-    def test_the_path_by_odometry_stands_beside_the_true_one(self, on_tracks):
-        choose_setting(on_tracks, "track adrift")
-        on_tracks.wait_for(is_seen("odometry"))
+    def test_the_path_by_odometry_is_laid_on_the_first_true_pose(self, on_tracks):
+        choose_setting(on_tracks, "adrift, level 1, 31 × 31")
+        on_tracks.wait_for("view.current.observed")
         assert "odometry" in on_tracks.run("document.getElementById('key').textContent")
-        # It is laid on the first true pose, and drifts from there.
         apart = on_tracks.run("view.current.path.x.map((x, index) => Math.abs(x - view.current.observed.x[index]))")
         assert apart[0] == 0
         assert max(apart) > 2  # 32 are a metre
-        choose_setting(on_tracks, "track rebuilt")
-        on_tracks.wait_for(f"!{is_seen('odometry')}")
 
     def test_a_drawn_map_is_shown_as_it_was_given(self, on_tracks):
-        choose_setting(on_tracks, "track rough")
+        choose_setting(on_tracks, "rough, level 1, 31 × 31")
         on_tracks.wait_for("view.current.side === 62")
         greys = on_tracks.run("[...new Set(view.current.shown)]")
         assert len(greys) > 10
         assert not on_tracks.run("differs(view.current)")
 
     def test_the_rays_are_those_of_the_sensor(self, on_tracks):
-        choose_setting(on_tracks, "track rebuilt")
+        choose_setting(on_tracks, "rebuilt, level 1, 31 × 31")
         on_tracks.wait_for(is_seen("lidar"))
         with_rays = on_tracks.run(PIXELS)
         maze, x, y, yaw, *ranges = on_tracks.run(
@@ -171,13 +158,11 @@ class TestTracks:
         np.testing.assert_allclose(ranges, Lidar(mazes, 3.5).ranges(np.array([index]), pose)[0], atol=1e-4)
         on_tracks.run("document.getElementById('lidar').click()")
         assert on_tracks.run(PIXELS) != with_rays
-
-    def test_without_lidar_there_are_no_rays(self, on_tracks):
-        choose_setting(on_tracks, "local, 13 × 13")
-        on_tracks.wait_for(f"!{is_seen('lidar')} && !{is_seen('level')} && !{is_seen('group')}")
+        choose_setting(on_tracks, "local, 13 × 13")  # without lidar
+        on_tracks.wait_for(f"!{is_seen('lidar')} && !{is_seen('group')}")
 
     def test_it_fits_a_narrow_window(self, on_tracks):
-        choose_setting(on_tracks, "track adrift")
+        choose_setting(on_tracks, "adrift, level 1, 31 × 31")
         on_tracks.resize(360, 800)
         on_tracks.wait_for("document.documentElement.clientWidth === 360")
         assert on_tracks.run("document.documentElement.scrollWidth") <= 360
@@ -190,12 +175,10 @@ class TestOwnMaps:
         hall = {"mazes": str(tmp_path / "hall.txt"), "distances": [5], "episodes_per_distance": 1}
         evaluate("random", out=tmp_path / "results", record=True, **hall)
         write_report([tmp_path / "results"], tmp_path / "report")
-        load_anew(browser, tmp_path / "report" / "report.html")
-        assert browser.run("view.current.side") == 21
-        walls = np.array([[cell == "#" for cell in row] for row in rows])
-        assert np.allclose(browser.run("view.current.shown"), resized_map(walls, 21).ravel(), atol=1 / 255)
-        assert browser.run("document.getElementById('shown').width % 21") == 0
-        assert browser.errors == []
+        with loaded(browser, tmp_path / "report" / "report.html"):
+            assert browser.run("view.current.side") == 21
+            walls = np.array([[cell == "#" for cell in row] for row in rows])
+            assert np.allclose(browser.run("view.current.shown"), resized_map(walls, 21).ravel(), atol=1 / 255)
 
 
 class TestReading:
@@ -250,20 +233,15 @@ class TestReading:
         browser.wait_for("document.getElementById('episodes').value === '1'")
         assert browser.run("location.hash") == "#episode=1-1"
 
-    def test_a_figure_fills_its_section_and_is_dark_on_white_in_either_scheme(self, opened):
+    def test_figures_fill_their_sections(self, opened):
         opened.resize(1200, 800)
-        assert opened.run("document.querySelectorAll('#figures svg[role=img]').length") >= 5
-        for scheme in ("light", "dark"):
-            opened.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
-            svg = "document.querySelector('#figures svg')"
-            assert opened.run(f"getComputedStyle({svg}).backgroundColor") == "rgb(255, 255, 255)"
-            assert opened.run(f"getComputedStyle({svg}.querySelector('text')).fill") == "rgb(0, 0, 0)"
-            assert opened.run(f"{svg}.getBoundingClientRect().width") > 600
-        opened.call("Emulation.setEmulatedMedia", features=[])
+        images = "[...document.querySelectorAll('#figures img')]"
+        assert opened.run(f"{images}.length") >= 5
+        assert opened.run(f"{images}.every(image => image.alt && image.naturalWidth && image.clientWidth > 600)")
 
     def test_every_control_has_a_name_for_screen_readers(self, opened):
         unnamed = opened.run(
-            "[...document.querySelectorAll('select, input, button, canvas, svg[role]')].filter(node =>"
+            "[...document.querySelectorAll('select, input, button, canvas')].filter(node =>"
             "!(node.labels && node.labels.length) && !node.textContent.trim() && !node.getAttribute('aria-label')"
             ").map(node => node.outerHTML)"
         )

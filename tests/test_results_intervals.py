@@ -10,9 +10,7 @@ from scipy import stats
 
 from mazebench.results.intervals import (
     difference_interval,
-    interquartile_mean,
     mean_interval,
-    pool_runs,
     runs_interval,
     wilson_interval,
 )
@@ -124,28 +122,6 @@ class TestDifferences:
         assert -1 <= found.low <= found.value <= found.high <= 1
         assert found.high - found.low > 0
         assert (found.low, found.high) == pytest.approx((-mirrored.high, -mirrored.low), abs=1e-9)
-
-
-class TestRuns:
-    def test_interquartile_mean_by_hand(self):
-        # Of 8 scores the two lowest and the two highest go.
-        assert interquartile_mean(np.array([[0.0, 0.1, 0.4, 0.5], [0.6, 0.7, 0.9, 1.0]])) == pytest.approx(2.2 / 4)
-        # Of 6 one at either end, as rliable has it: a quarter of 6, rounded down.
-        assert interquartile_mean(np.array([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])) == pytest.approx(0.5)
-
-    def test_two_runs_of_two_mazes(self):
-        # The example of docs/metrics.md. A quarter of the resamples are the first run twice, a quarter the second.
-        mean, trimmed = pool_runs(np.array([[0.5, 1.0], [1.0, 1.0]]))
-        assert (mean.value, mean.low, mean.high) == (0.875, 0.75, 1.0)
-        assert (trimmed.value, trimmed.low, trimmed.high) == (1.0, 0.75, 1.0)
-
-    def test_whole_runs_are_drawn(self):
-        # Each run has 0 in one maze and 1 in the other: were the mazes drawn by themselves, means would differ.
-        mean, _ = pool_runs(np.array([[0.0, 1.0], [1.0, 0.0]]))
-        assert (mean.low, mean.high) == (0.5, 0.5)
-        # One run is better in all mazes, and this is not averaged away.
-        mean, trimmed = pool_runs(np.array([[0.0] * 20, [1.0] * 20]))
-        assert (mean.low, mean.high, trimmed.low, trimmed.high) == (0.0, 1.0, 0.0, 1.0)
 
 
 class TestRunsAndMazes:

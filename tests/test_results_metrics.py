@@ -73,4 +73,3 @@ class TestOnTime:
     def test_figures_without_the_oracles_steps_tell_nothing(self):
         figures = summarize(RECORDS)[0]
         assert (figures.on_time, figures.on_time_ci95) == (None, None)
-        assert list(figures.means) == ["success_rate", "spl", "spl_grid"]

@@ -24,11 +24,11 @@ def write(context: typer.Context) -> None:
     """Write all tables and figures."""
     if context.invoked_subcommand is None:
         kept = read_kept(RECORDS)
-        files = {name: with_tables((ROOT / name).read_text(encoding="utf-8"), kept) for name in PAGES}
-        files |= {f"docs/images/{drawn.name}.svg": to_svg(drawn) for drawn in figures(kept)}
-        for name, text in files.items():
+        files = {name: with_tables((ROOT / name).read_text(encoding="utf-8"), kept).encode() for name in PAGES}
+        files |= {f"docs/images/{drawn.name}.svg": to_svg(drawn.figure) for drawn in figures(kept)}
+        for name, content in files.items():
             with open_whole(ROOT / name) as file:
-                file.write(text.encode())
+                file.write(content)
 
 
 @app.command("keep")

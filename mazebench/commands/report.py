@@ -17,12 +17,6 @@ def report(
         typer.Argument(help="Evaluation folders, runs of suites, training runs, or folders above them."),
     ],
     out: Annotated[pathlib.Path, typer.Option(help="Folder for the report; an earlier report in it is replaced.")],
-    name: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=AGENT", help="What the report calls an agent, or the agent of a folder; repeatable."
-        ),
-    ] = None,
 ) -> None:
     """Make tables, figures and a page to explore every episode from results of `mazebench eval`.
 
@@ -30,30 +24,19 @@ def report(
     """
     try:
         from mazebench.report.curves import find_runs, write_learning_curves
-        from mazebench.report.episodes import folders_below
+        from mazebench.report.episodes import find_evaluations
         from mazebench.report.report_files import DOCUMENT, PAGE
         from mazebench.report.write_report import counted, write_report
     except ImportError as error:
         raise InputError(f"the report needs {error.name}, which the extra [report] installs (docs/start.md)") from error
-    names = [_parse_name(text) for text in name or ()]
     runs = find_runs(results)
     with stopping.stoppable(lambda: (f"the report in {out} is not whole; make it again",)):
-        if runs and not any(map(folders_below, results)):
-            if names:
-                raise InputError("expected --name with results of `mazebench eval`, found training runs")
+        if runs and not find_evaluations(results):
             drawn = write_learning_curves(runs, out)
             print(f"{counted(len(drawn), 'training run')}: {out / DOCUMENT}")
             return
         if runs:
             remark(f"{counted(len(runs), 'training run')} left out beside results; report them by themselves")
-        reported = write_report(results, out, names)
+        reported = write_report(results, out)
     agents = sorted({result.label for result in reported})
     print(f"{counted(len(reported), 'result')} of {', '.join(agents)}: {out / PAGE}")
-
-
-def _parse_name(text: str) -> tuple[str, str]:
-    """Returns the name and what it is of."""
-    name, _, what = text.partition("=")
-    if not name or not what:
-        raise InputError(f"expected --name NAME=AGENT, found {text!r}")
-    return name, what

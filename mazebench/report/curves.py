@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from mazebench.errors import InputError, remark
+from mazebench.report.episodes import folders_below
 from mazebench.report.figures import Panel, draw_panels, save
-from mazebench.report.report_files import DOCUMENT, FIGURES, new_report, write_text
+from mazebench.report.report_files import DOCUMENT, FIGURES, new_report
 from mazebench.report.table import escape_markdown, to_markdown
 from mazebench.storage.json_files import read_json, read_lines
 from mazebench.training.run_folder import CHECKPOINTS, CONFIG, METRICS
@@ -29,14 +30,8 @@ class Run(NamedTuple):
 
 
 def find_runs(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
-    """Returns the folders of training runs at or below `paths`, each once. Hidden folders are left out."""
-    found = {}
-    for path in paths:
-        for folder, subfolders, files in os.walk(path):
-            if CONFIG in files and CHECKPOINTS in subfolders:
-                found[pathlib.Path(folder).resolve()] = pathlib.Path(folder)
-            subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
-    return list(found.values())
+    """Returns the folders of training runs at or below `paths`."""
+    return folders_below(paths, lambda names: names >= {CONFIG, CHECKPOINTS})
 
 
 def write_learning_curves(folders: Sequence[pathlib.Path], out: pathlib.Path) -> list[Run]:
@@ -51,24 +46,26 @@ def write_learning_curves(folders: Sequence[pathlib.Path], out: pathlib.Path) ->
     Raises:
       InputError: if no run has logged anything, or `out` can't be used.
     """
-    runs = [run for folder, name in zip(folders, _names(folders), strict=True) if (run := read_run(folder, name))]
+    # Names are as short as they can be while no two are alike.
+    whole = [folder.resolve() for folder in folders]
+    common = os.path.commonpath(whole) if len(whole) > 1 else whole[0].parent
+    runs = [run for folder in whole if (run := read_run(folder, str(folder.relative_to(common))))]
     if not runs:
         raise InputError("expected training runs with metrics, found none to report")
-    metrics = list(dict.fromkeys(metric for run in runs for metric in run.lines))
+    metrics = dict.fromkeys(metric for run in runs for metric in run.lines)
     rates = sorted((metric for metric in metrics if metric.startswith(SUCCESS)), key=_track_and_distance)
     losses = [metric for metric in metrics if metric.endswith(_LOSS)]
-    of_rates = [_panel(runs, rate, _title(rate)) for rate in rates]
-    of_losses = [_panel(runs, loss, loss.replace("_", " "))._replace(y_range=None) for loss in losses]
     lines = ["# Learning curves", to_markdown(_overview(runs, rates)).rstrip()]
     with new_report(out):
-        for name, title, note, panels in (
-            ("success", "Success rate by distance", "On held-out mazes, at each milestone.", of_rates),
-            ("losses", "Losses", f"Of the training, as {METRICS} has them.", of_losses),
+        for name, title, note, shown in (
+            ("success", "Success rate by distance", "On held-out mazes, at each milestone.", rates),
+            ("losses", "Losses", f"Of the training, as {METRICS} has them.", losses),
         ):
-            if panels:
+            if shown:
+                panels = [_panel(runs, metric) for metric in shown]
                 save(draw_panels(title, panels, [run.name for run in runs], height=1.9), out / FIGURES / name)
                 lines += [f"## {title}", note, f"![{title}]({FIGURES}/{name}.png)"]
-        write_text(out / DOCUMENT, "\n\n".join(lines) + "\n")
+        (out / DOCUMENT).write_text("\n\n".join(lines) + "\n", "utf-8")
     return runs
 
 
@@ -86,42 +83,33 @@ def read_run(folder: pathlib.Path, name: str) -> Run | None:
     return Run(name, config, pd.DataFrame(lines))
 
 
-def _names(folders: Sequence[pathlib.Path]) -> list[str]:
-    """Returns the folders' names, as short as they can be while no two are alike."""
-    whole = [folder.resolve() for folder in folders]
-    common = whole[0].parent if len(whole) == 1 else os.path.commonpath(whole)
-    return [str(folder.relative_to(common)) for folder in whole]
-
-
 def _overview(runs: Sequence[Run], rates: Sequence[str]) -> pd.DataFrame:
-    """Returns a row for each run: whose it is, its steps and updates, and its last success rates."""
+    """Returns a row for each run: whose it is, and its last steps, updates and success rates."""
     rows = {}
     for run in runs:
+        last = run.lines.ffill().iloc[-1]
         rows[run.name] = {key: escape_markdown(str(run.config.get(key, ""))) for key in ("agent", "seed")}
-        for metric, name in ((_STEPS, "agent steps"), ("updates", "updates")):
-            rows[run.name][name] = f"{run.lines.get(metric, pd.Series([0])).iloc[-1]:,.0f}"
-        for rate in rates:
-            found = run.lines.get(rate, pd.Series(dtype=float)).dropna()
-            rows[run.name][f"success, {rate.removeprefix(SUCCESS)}"] = f"{found.iloc[-1]:.3f}" if len(found) else ""
-    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("run")
+        rows[run.name] |= {"agent steps": f"{last[_STEPS]:,.0f}", "updates": f"{last.get('updates', 0):,.0f}"}
+        rows[run.name] |= {
+            f"success, {rate.removeprefix(SUCCESS)}": f"{last[rate]:.3f}" if rate in last else "" for rate in rates
+        }
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis(columns="run")
 
 
-def _panel(runs: Sequence[Run], metric: str, title: str) -> Panel:
+def _panel(runs: Sequence[Run], metric: str) -> Panel:
     """Returns a curve for each run."""
     curves = [
         pd.DataFrame({"column": run.name, "x": run.lines[_STEPS], "value": run.lines[metric]}).dropna()
         for run in runs
         if metric in run.lines
     ]
-    return Panel(title, "agent steps", pd.concat(curves, ignore_index=True))
+    is_rate, title = metric.startswith(SUCCESS), metric.replace("_", " ")
+    if is_rate:
+        title = "{}, distance {}".format(*_track_and_distance(metric)).removeprefix(", ")
+    return Panel(title, "agent steps", pd.concat(curves, ignore_index=True), is_score=is_rate)
 
 
-def _track_and_distance(rate: str) -> tuple[str, int, str]:
+def _track_and_distance(rate: str) -> tuple[str, int]:
     """Returns what sorts the name of a success rate: by track, where there are several, then by distance."""
     track, _, distance = rate.removeprefix(SUCCESS).rpartition("_")
-    return track, len(distance), distance
-
-
-def _title(rate: str) -> str:
-    track, _, distance = _track_and_distance(rate)
-    return f"{track}, distance {distance}" if track else f"distance {distance}"
+    return track, int(distance)

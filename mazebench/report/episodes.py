@@ -6,12 +6,12 @@ import dataclasses
 import functools
 import os
 import pathlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 import pandas as pd
 
-from mazebench.errors import InputError, remark, unknown
+from mazebench.errors import InputError, remark
 from mazebench.results.metrics import ON_TIME_METRICS, by_fact, scores
 from mazebench.results.played import Shown, played_task, shown_of
 from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, Result, load_result
@@ -26,8 +26,7 @@ _OF_RECORDS = [
     *("maze", "start", "goal", "distance", "success", "steps", "path_length", "shortest_path", "spl", "spl_grid"),
     "seed",
 ]
-# Where well-known agents stand among others.
-_AGENT_ORDER = ("oracle", "navigator", "mmn", "mah", "mah-paper", "dqn", "planner-closed-loop", "planner", "random")
+_MOST_MAZES = 3  # that are named
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -36,7 +35,7 @@ class ReportedResult:
 
     folder: pathlib.Path
     summary: Summary
-    label: str  # the agent's name in the report, with more where the name alone is ambiguous
+    label: str  # the agent's name, with the training run if results are of several
     setting: TaskOptions  # of which results are compared, see `TaskOptions.setting`
     episodes: pd.DataFrame  # a row for each episode in protocol order; the metrics are columns
     facts: tuple[str, ...]  # columns of bools: what a track says of episodes, as "blocked" and "not blocked"
@@ -44,24 +43,10 @@ class ReportedResult:
     trajectories: list[Trajectory] | None  # None if none were recorded, or the task is not known
 
     @property
-    def name(self) -> str:
-        """The agent's name, with what sets the result apart from the agent's others."""
-        return self.summary.who
-
-    @property
-    def checkpoint(self) -> str | None:
-        """The SHA-256 of the checkpoint."""
-        return self.summary.provenance.checkpoint_sha256
-
-    @property
-    def seed(self) -> int:
-        """The seed of the run."""
-        return self.summary.provenance.seed
-
-    @property
     def run(self) -> str:
-        """The key of a training run of an agent: the checkpoint, or the seed where there is none."""
-        return self.checkpoint or f"seed {self.seed}"
+        """The training run of the agent: the checkpoint, or the seed where there is none."""
+        checkpoint = self.summary.provenance.checkpoint_sha256
+        return checkpoint[:8] if checkpoint else f"seed {self.summary.provenance.seed}"
 
     @functools.cached_property
     def mazes(self) -> dict[str, int]:
@@ -84,20 +69,22 @@ class ReportedResult:
         return self.task.mazes[self.mazes[maze]].walls if self.task else None
 
 
-def read_results(paths: Iterable[pathlib.Path], names: Sequence[tuple[str, str]] = ()) -> list[ReportedResult]:
-    """Returns all results at or below `paths`, one for each setting and agent, in this order; at least one.
+def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
+    """Returns all results at or below `paths`, one for each setting and training run, sorted by setting; at least one.
 
     It warns with a `Remark` of each thing that is skipped.
 
     Args:
       paths: evaluation folders, or folders above them.
-      names: what agents are called in the report: pairs of a name and an agent, or the folder of an agent's results.
 
     Raises:
-      InputError: if there is no result, or a name fits no agent.
+      InputError: if there is no result.
     """
     results = []
-    for folder in _find_folders(paths):
+    for path in paths:
+        if not find_evaluations([path]):
+            remark(f"{path}: expected results of `mazebench eval`, found none; skipped")
+    for folder in find_evaluations(paths):
         try:
             results.append(_read_result(folder))
         except InputError as error:
@@ -105,18 +92,18 @@ def read_results(paths: Iterable[pathlib.Path], names: Sequence[tuple[str, str]]
     if not results:
         where = ", ".join(map(str, paths))
         raise InputError(f"expected results of `mazebench eval` or `mazebench train` in {where}, found none to report")
-    results = _drop_repeats(_label(_rename(results, names)))
-    return sorted(results, key=lambda result: (result.setting, _rank(result.label)))
+    return sorted(_drop_repeats(_label(results)), key=lambda result: result.setting)
 
 
 def join_episodes(results: Sequence[ReportedResult]) -> pd.DataFrame:
-    """Returns the episodes of all results below one another, in the order of `results`.
+    """Returns the episodes of all results below one another.
 
     It adds columns to those of `ReportedResult.episodes`: the `result` and the `number` of the episode in it; the
-    agent's `label` (ordered), `agent` (its name), `run` and `run_seed`; the `setting` (ordered) and its fields; and
-    numbers of the maze and of the `trial`: episodes with one maze, start, goal and seed are one trial.
+    agent's `label` (ordered as `results`), `agent` (its name) and `run`; the `setting` (ordered), its fields and
+    perturbations, and its `mazes` in words; and numbers of the maze and of the `trial`: episodes with one maze, start,
+    goal and seed are one trial.
     """
-    labels = sorted({result.label for result in results}, key=_rank)
+    labels = list(dict.fromkeys(result.label for result in results))
     settings = sorted({result.setting for result in results})
     episodes = pd.concat(
         [
@@ -124,18 +111,18 @@ def join_episodes(results: Sequence[ReportedResult]) -> pd.DataFrame:
                 result=result,
                 number=range(len(result.episodes)),
                 label=pd.Categorical([result.label] * len(result.episodes), labels, ordered=True),
-                agent=result.name,
+                agent=result.summary.who,
                 run=result.run,
-                run_seed=result.seed,
                 is_untrained=result.summary.untrained_scale,
                 setting=pd.Categorical([result.setting] * len(result.episodes), settings, ordered=True),
+                mazes=_mazes_in_words(result),
                 is_exact=result.setting.is_exact,
                 task=HIERARCHICAL if result.setting.is_hierarchical else LOCAL,
                 size=result.setting.size,
-                split=result.setting.split_in_results,
                 landmark_distance=result.setting.landmark_distance if result.setting.is_hierarchical else 0,
                 track=result.setting.track or "",
                 level=result.setting.track_level,
+                **result.setting.perturbations,
             )
             for result in results
         ],
@@ -153,11 +140,6 @@ def facts_of(episodes: pd.DataFrame) -> list[str]:
     return list(dict.fromkeys(fact for result in episodes.result.unique() for fact in result.facts))
 
 
-def settings_of(episodes: pd.DataFrame) -> list[TaskOptions]:
-    """Returns the settings of which there are episodes, sorted."""
-    return sorted(episodes.setting.unique())
-
-
 def common_distances(episodes: pd.DataFrame) -> list[int]:
     """Returns the distances from start to goal that every result has, in cells; none for the hierarchical task."""
     if episodes.task.eq("hierarchical").any():
@@ -172,31 +154,20 @@ def at_common_distances(episodes: pd.DataFrame) -> pd.DataFrame:
     return episodes[episodes.distance.isin(common)] if common else episodes
 
 
-def folders_below(path: pathlib.Path) -> list[pathlib.Path]:
-    """Returns the evaluation folders at or below a path, by name. Hidden folders are left out."""
-    folders = []
-    for folder, subfolders, files in os.walk(path):
-        subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
-        if {SUMMARY, EPISODES, JOURNAL} & set(files):
-            folders.append(pathlib.Path(folder))
-    return folders
-
-
-def _find_folders(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
-    """Returns the evaluation folders at or below `paths`, each once."""
+def folders_below(paths: Iterable[pathlib.Path], is_one: Callable[[set[str]], bool]) -> list[pathlib.Path]:
+    """Returns the folders at or below `paths` whose content `is_one`, by its names; each once, and no hidden ones."""
     found: dict[pathlib.Path, pathlib.Path] = {}
     for path in paths:
-        folders = folders_below(path)
-        if not folders:
-            remark(f"{path}: expected results of `mazebench eval`, found none; skipped")
-        for folder in folders:
-            found.setdefault(folder.resolve(), folder)
+        for folder, subfolders, files in os.walk(path):
+            if is_one({*subfolders, *files}):
+                found.setdefault(pathlib.Path(folder).resolve(), pathlib.Path(folder))
+            subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
     return list(found.values())
 
 
-def _rank(label: str) -> tuple[int, str]:
-    name = label.partition(" ")[0]
-    return (_AGENT_ORDER.index(name) if name in _AGENT_ORDER else len(_AGENT_ORDER), label)
+def find_evaluations(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
+    """Returns the evaluation folders at or below `paths`, also those that are not finished."""
+    return folders_below(paths, lambda names: not names.isdisjoint({SUMMARY, EPISODES, JOURNAL}))
 
 
 def _read_result(folder: pathlib.Path) -> ReportedResult:
@@ -214,7 +185,7 @@ def _read_result(folder: pathlib.Path) -> ReportedResult:
     setting = summary.task.setting
     if setting.mazes is not None:  # by their names, wherever the files were
         setting = setting.replace(mazes=", ".join(sorted(episodes.maze.unique())))
-    return ReportedResult(folder, summary, summary.agent, setting, episodes, facts, task, trajectories)
+    return ReportedResult(folder, summary, summary.who, setting, episodes, facts, task, trajectories)
 
 
 def _to_table(result: Result) -> tuple[pd.DataFrame, tuple[str, ...]]:
@@ -234,59 +205,39 @@ def _read_trajectories(folder: pathlib.Path, episodes: pd.DataFrame) -> list[Tra
         return None
     try:
         trajectories = load_trajectories(path)
+        if [len(each.pose) for each in trajectories] != (episodes.steps + 1).tolist():
+            raise InputError(f"{path}: expected a pose for the start and for each step, found others")
     except InputError as error:
         remark(f"{error}; reported without paths")
-        return None
-    if [len(each.pose) for each in trajectories] != (episodes.steps + 1).tolist():
-        remark(f"{path}: expected a pose for the start and for each step, found others; reported without paths")
         return None
     return trajectories
 
 
-def _rename(results: list[ReportedResult], names: Sequence[tuple[str, str]]) -> list[ReportedResult]:
-    agents = [result.summary.agent for result in results]
-    renamed = list(agents)
-    for name, what in names:
-        folder = pathlib.Path(what).resolve()
-        chosen = [place for place, agent in enumerate(agents) if agent == what] or [
-            place for place, result in enumerate(results) if result.folder.resolve().is_relative_to(folder)
-        ]
-        if not chosen:
-            raise unknown("agent or folder", what, set(agents))
-        for place in chosen:
-            renamed[place] = name
-    for name, _ in names:
-        called = sorted({agent for agent, now in zip(agents, renamed, strict=True) if now == name})
-        if len(called) > 1:
-            raise InputError(f"expected one agent called {name!r}, found {', '.join(called)}")
+def _label(results: Sequence[ReportedResult]) -> list[ReportedResult]:
+    """Returns the results with labels that tell the training runs of an agent apart, where there are several."""
+    runs = pd.DataFrame([(result.label, result.run) for result in results]).groupby(0)[1].nunique()
     return [
-        dataclasses.replace(result, summary=result.summary.model_copy(update={"agent": name}))
-        for result, name in zip(results, renamed, strict=True)
+        dataclasses.replace(result, label=f"{result.label} {result.run}") if runs[result.label] > 1 else result
+        for result in results
     ]
 
 
-def _label(results: list[ReportedResult]) -> list[ReportedResult]:
-    """Returns the results with labels that tell all agents apart: by checkpoint and seed where names are equal."""
-    labelled = []
-    for result in results:
-        namesakes = [other for other in results if other.name == result.name]
-        label = result.name
-        if len({other.checkpoint for other in namesakes}) > 1:
-            label += f" {result.checkpoint[:6]}" if result.checkpoint else " without checkpoint"
-        if len({other.seed for other in namesakes}) > 1:
-            label += f" seed {result.seed}"
-        labelled.append(dataclasses.replace(result, label=label))
-    return labelled
-
-
-def _drop_repeats(results: list[ReportedResult]) -> list[ReportedResult]:
-    """Returns one result for each agent and setting: the one with the most episodes, the first of equals."""
+def _drop_repeats(results: Sequence[ReportedResult]) -> list[ReportedResult]:
+    """Returns one result for each label and setting: the one with the most episodes, the first of equals."""
     kept: dict[tuple[str, TaskOptions], ReportedResult] = {}
-    for result in results:
+    for result in sorted(results, key=lambda each: -len(each.episodes)):
         other = kept.setdefault((result.label, result.setting), result)
-        if other is result:
-            continue
-        more, less = (result, other) if len(result.episodes) > len(other.episodes) else (other, result)
-        remark(f"{less.folder}: {less.label}, {less.setting} again, as in {more.folder}; skipped")
-        kept[result.label, result.setting] = more
-    return list(kept.values())
+        if other is not result:
+            remark(f"{result.folder}: {result.label}, {result.setting} again, as in {other.folder}; skipped")
+    return [result for result in results if result in kept.values()]
+
+
+def _mazes_in_words(result: ReportedResult) -> str:
+    """Returns the set of mazes, and what else a user chose; an empty text for the benchmark's eval mazes."""
+    split, words = result.setting.split_in_results, result.setting.own_in_words
+    if split == CUSTOM:
+        first, more = (names := sorted(result.episodes.maze.unique()))[:_MOST_MAZES], len(names) - _MOST_MAZES
+        words = (f"mazes {', '.join(first)}" + (f" and {more} more" if more > 0 else ""), *words)
+    elif split != "eval":
+        words = (f"{split} mazes", *words)
+    return ", ".join(words)

@@ -2,6 +2,7 @@
 // The episode explorer. Text from results goes through textContent. A result's episodes and paths are packed and unpacked only when picked.
 
 const MAX_LISTED = 2000;
+const OF_EPISODES = ["start", "goal", "distance", "success", "steps", "driven", "shortest", "spl", "splGrid", "seed"];
 const data = JSON.parse(document.getElementById("data").textContent);
 
 function element(tag, attributes = {}, ...children) {
@@ -17,10 +18,7 @@ const unpacked = new Map(); // promises by the number of a result
 const view = { result: -1, episode: -1, time: 0, timer: 0, packed: null };
 
 function bytesOfBase64(text) {
-  const characters = atob(text);
-  const bytes = new Uint8Array(characters.length);
-  for (let index = 0; index < bytes.length; index++) bytes[index] = characters.charCodeAt(index);
-  return bytes;
+  return Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
 }
 
 // The episodes of a result by columns, and its poses.
@@ -73,21 +71,12 @@ function episodeOf(packed, number, index) {
     maze: maze.name,
     real,
     ...shownMap(packed, result, index, real),
-    start: columns.start[index],
-    goal: columns.goal[index],
+    ...Object.fromEntries(OF_EPISODES.map((name) => [name, columns[name][index]])),
     landmarks: columns.landmarks ? columns.landmarks[index] : [],
     path: partOf(packed.path, first, poses),
     observed: packed.observed && partOf(packed.observed, first, poses),
     lidar: result.lidar > 0 && real !== null,
     groups: result.groups.filter((group) => columns.groups[group][index]),
-    distance: columns.distance[index],
-    success: Boolean(columns.success[index]),
-    steps: columns.steps[index],
-    driven: columns.driven[index],
-    shortest: columns.shortest[index],
-    spl: columns.spl[index],
-    splGrid: columns.splGrid[index],
-    seed: columns.seed[index],
   };
 }
 
@@ -119,18 +108,9 @@ function resultsOf(setting) {
   return data.results.flatMap((result, number) => (result.setting === setting ? [number] : []));
 }
 
-// The settings that differ from one only in the level of its track, and that one.
-function levelsOf(setting) {
-  const isLike = (other) => other === setting || (data.settings[other].level && data.settings[other].name === data.settings[setting].name);
-  return data.settings.map((_, other) => other).filter(isLike);
-}
-
 function chooseResult(number) {
   const { setting } = data.results[number];
-  const levels = levelsOf(setting);
-  byId("setting").value = String(levels[0]);
-  fill(byId("level"), levels.map((other) => [other, data.settings[other].level]), setting);
-  byId("level-label").hidden = !data.settings[setting].level;
+  byId("setting").value = String(setting);
   fill(byId("agent"), resultsOf(setting).map((other) => [other, data.results[other].label]), number);
 }
 
@@ -190,7 +170,7 @@ function showNothing(text) {
   byId("clock").value = "";
   byId("time").disabled = byId("play").disabled = true;
   for (const id of ["numbers", "others"]) byId(id).hidden = true;
-  for (const id of ["shown", "driven", "odometry-figure", "lidar-label"]) byId(id).hidden = true;
+  for (const id of ["shown", "driven", "lidar-label"]) byId(id).hidden = true;
   byId("key").replaceChildren();
 }
 
@@ -203,21 +183,13 @@ function openEpisode(index) {
   byId("time").max = String(Math.max(poses - 1, 0));
   byId("time").disabled = byId("play").disabled = poses < 2;
   for (const id of ["numbers", "others", "shown", "driven"]) byId(id).hidden = false;
-  byId("odometry-figure").hidden = !current.observed;
   byId("lidar-label").hidden = !current.lidar || !poses;
   writeOutcome();
   writeNumbers();
   writeKey();
   writeOthers();
   moveTo(Math.max(poses - 1, 0));
-  const options = byId("episodes").options;
-  byId("previous").disabled = byId("episodes").selectedIndex <= 0;
-  byId("next").disabled = byId("episodes").selectedIndex >= options.length - 1;
-  remember();
-}
-
-function remember() {
-  history.replaceState(null, "", `#episode=${view.result}-${view.episode}`);
+  history.replaceState(null, "", `#episode=${view.result}-${index}`);
 }
 
 // --- words and numbers ---
@@ -263,8 +235,6 @@ async function writeOthers() {
     const index = columns.success.findIndex((_, other) => keyOf(columns, other, data.results[number].mazes) === wanted);
     if (index >= 0) rows.push(otherRow(number, index, columns));
   }
-  const names = ["agent", "outcome", "steps", "SPL"].map((name) => element("th", { scope: "col" }, name));
-  byId("others").tHead.replaceChildren(element("tr", {}, ...names));
   byId("others").tBodies[0].replaceChildren(...rows);
 }
 
@@ -306,7 +276,6 @@ function draw() {
   const ranges = current.lidar && current.path.x.length && byId("lidar").checked ? rangesOf(current.real, current.size, current.path, view.time, current.sensor) : [];
   drawShown(current, color);
   drawDriven(current, ranges, color);
-  if (current.observed) drawOdometry(current, ranges, color);
   describe();
 }
 
@@ -334,26 +303,6 @@ function drawDriven(current, ranges, color) {
   if (current.observed) drawDashed(pen, current.observed, view.time, size, color("odometry"));
 }
 
-// The path that was observed, turned so that the first heading points to the right, in the middle of the canvas.
-function drawOdometry(current, ranges, color) {
-  const { size, observed: path } = current;
-  const turn = angleOf(path, 0);
-  const [cosine, sine] = [Math.cos(turn), Math.sin(turn)];
-  const points = Array.from(path.x, (_, index) => {
-    const [x, y] = placeOf(path, index, size);
-    return [cosine * x - sine * y, sine * x + cosine * y];
-  });
-  const [low, high] = [Math.min, Math.max].map((pick) => [0, 1].map((axis) => pick(...points.map((point) => point[axis]))));
-  const extent = Math.ceil(Math.max(size, high[0] - low[0] + 2, high[1] - low[1] + 2));
-  const pen = prepare(byId("odometry"), extent);
-  pen.fillStyle = color("floor");
-  pen.fillRect(0, 0, extent, extent);
-  pen.translate(...[0, 1].map((axis) => (extent - low[axis] - high[axis]) / 2));
-  pen.rotate(turn);
-  drawRays(pen, path, view.time, size, ranges, current.sensor.range, color);
-  drawPath(pen, path, view.time, size, color);
-}
-
 // Small squares where map and maze disagree; the map itself is drawn beside it as it was shown.
 function markDifferences(pen, current, color) {
   const { size } = current;
@@ -371,7 +320,6 @@ function describe() {
     ? "The maze; the path was not recorded (eval --record)"
     : current.real ? "The maze, and the path driven in it" : "The true maze is not in the results; the path driven, on the map";
   byId("shown").setAttribute("aria-label", `Map of ${current.side} by ${current.side} pixels as shown to the agent`);
-  byId("odometry").setAttribute("aria-label", `The path by the agent's odometry up to step ${view.time} of ${current.steps}`);
   byId("driven").setAttribute("aria-label", `Maze ${current.maze} with the path driven up to step ${view.time} of ${current.steps}`);
 }
 
@@ -416,14 +364,6 @@ function play() {
   view.timer = requestAnimationFrame(frame);
 }
 
-function step(by) {
-  const list = byId("episodes");
-  const place = list.selectedIndex + by;
-  if (place < 0 || place >= list.options.length) return;
-  list.selectedIndex = place;
-  openEpisode(Number(list.value));
-}
-
 // --- the start ---
 
 function linkedEpisode() {
@@ -434,23 +374,17 @@ function linkedEpisode() {
 
 function listen() {
   const on = (id, event, action) => byId(id).addEventListener(event, action);
-  const openSetting = (setting) => {
-    const numbers = resultsOf(setting);
+  on("setting", "change", () => {
+    for (const id of ["maze", "distance", "group"]) byId(id).value = "";
+    const numbers = resultsOf(Number(byId("setting").value));
     const sameAgent = numbers.find((number) => data.results[number].label === data.results[view.result].label);
     const number = sameAgent === undefined ? numbers[0] : sameAgent;
     chooseResult(number);
     openResult(number);
-  };
-  on("setting", "change", () => {
-    for (const id of ["maze", "distance", "group"]) byId(id).value = "";
-    openSetting(Number(byId("setting").value));
   });
-  on("level", "change", () => openSetting(Number(byId("level").value)));
   on("agent", "change", () => openResult(Number(byId("agent").value)));
   for (const id of ["maze", "distance", "group", "failures"]) on(id, "change", () => listEpisodes(null));
   on("episodes", "change", () => openEpisode(Number(byId("episodes").value)));
-  on("previous", "click", () => step(-1));
-  on("next", "click", () => step(1));
   on("time", "input", () => {
     stop();
     moveTo(Number(byId("time").value));
@@ -462,14 +396,9 @@ function listen() {
 }
 
 function startExplorer() {
-  if (typeof DecompressionStream === "undefined") {
-    byId("explorer").replaceChildren(byId("explorer-title"), element("p", { class: "notice" }, "This browser is too old for the episode explorer, which needs DecompressionStream (Chrome 80, Firefox 113, Safari 16.4). The figures and tables are complete."));
-    return;
-  }
   const linked = linkedEpisode();
   const [result, episode] = linked || [data.first, null];
-  const settings = data.settings.map((_, setting) => setting).filter((setting) => levelsOf(setting)[0] === setting);
-  fill(byId("setting"), settings.map((setting) => [setting, data.settings[setting].name]), levelsOf(data.results[result].setting)[0]);
+  fill(byId("setting"), data.settings.map((name, setting) => [setting, name]), data.results[result].setting);
   listen();
   chooseResult(result);
   openResult(result, episode).then(() => linked && byId("explorer").scrollIntoView());

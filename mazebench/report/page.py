@@ -7,29 +7,27 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import html
 import json
 import math
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any
 
+import jinja2
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
 
 from mazebench.constants import STEP_TIME
 from mazebench.maps import colors
-from mazebench.maps.maze import Cell
 from mazebench.report.episodes import ReportedResult
 from mazebench.report.figures import Drawn, to_svg
-from mazebench.report.table import METRICS, Table
-from mazebench.report.trajectory_figures import CELL_COLORS, TIME_COLORS
+from mazebench.report.table import Table
+from mazebench.report.trajectory_figures import TIME_COLORS
 from mazebench.results.paper import citation, reference
 from mazebench.results.played import Shown
 from mazebench.results.trajectories import Trajectory
-from mazebench.tasks.task_options import TaskOptions
 from mazebench.world.mjcf import BODY_RADIUS
 from mazebench.world.ray_casting import NUM_RAYS
 
@@ -56,35 +54,30 @@ def build_page(
       provenance: where the results come from.
       warnings: lines about the results.
     """
-    style = f":root {{ {' '.join(f'--{name}: {color};' for name, color in _colors().items())} }}\n{_read('page.css')}"
-    script = "".join(map(_read, ("canvas.js", "explorer.js")))
+    marks = f":root {{ --start: {colors.to_hex(colors.START)}; --goal: {colors.to_hex(colors.GOAL)}; }}\n"
+    style, script = marks + _read("page.css"), _read("canvas.js") + _read("explorer.js")
     columns: dict[str, int] = {}  # packed, with their numbers
     used = [
         [columns.setdefault(_pack(part), len(columns)) for part in (_trials(result), _outcomes(result))]
         for result in results
     ]
-    parts = {
-        # Figures have attributes `style`.
-        "POLICY": f"default-src 'none'; style-src '{_hash(style)}'; style-src-attr 'unsafe-inline'; "
-        f"script-src '{_hash(script)}'",
-        "STYLE": style,
-        "SUBTITLE": html.escape(head),
-        "NOTES": _notes(warnings),
-        "CITATION": html.escape(f"{citation()}. {reference()['note']}"),
-        "FIGURES": "\n".join(_sections(tables, figures)),
-        "PROVENANCE": provenance.to_html(index=False, border=0),
-        "DATA": _json(_explorer_data(results, used)),
-        "EPISODES": "\n".join(
-            f'<script type="text/plain" id="columns-{number}">{text}</script>' for text, number in columns.items()
-        ),
-        "SCRIPT": script,
-    }
-    pieces = _read("page.html").split("@")  # names of parts stand between the odd and even @
-    return "".join(parts[piece] if index % 2 else piece for index, piece in enumerate(pieces))
-
-
-def _colors() -> dict[str, str]:
-    return {"start": colors.to_hex(colors.START), "goal": colors.to_hex(colors.GOAL), **CELL_COLORS}
+    # Each figure with the table of its name, then the tables that have no figure.
+    without = {table.name: table for table in tables}
+    drawn = [(each, without.pop(each.name, None), _base64(to_svg(each.figure))) for each in figures]
+    undrawn = [(table, table, "") for table in without.values()]
+    return jinja2.Template(_read("page.html"), autoescape=True).render(
+        style=style,
+        style_hash=_hash(style),
+        subtitle=head,
+        warnings=warnings,
+        citation=f"{citation()}. {reference()['note']}",
+        sections=[*drawn, *undrawn],
+        provenance=provenance.to_html(index=False, border=0),
+        data=_explorer_data(results, used),
+        columns=columns,
+        script=script,
+        script_hash=_hash(script),
+    )
 
 
 def _read(name: str) -> str:
@@ -95,62 +88,33 @@ def _hash(text: str) -> str:
     return f"sha256-{_base64(hashlib.sha256(text.encode('utf-8')).digest())}"
 
 
-def _json(content: Any) -> str:
-    """Returns JSON for a script element: no text in it can end the element or open a comment."""
-    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-
-
 def _base64(content: bytes) -> str:
     return base64.b64encode(content).decode("ascii")
-
-
-def _notes(warnings: Sequence[str]) -> str:
-    if not warnings:
-        return ""
-    lines = "".join(f"<li>{html.escape(line)}</li>" for line in warnings)
-    return (
-        f'<details class="notice"><summary>Notes on the results ({len(warnings)})</summary><ul>{lines}</ul></details>'
-    )
-
-
-def _sections(tables: Sequence[Table], figures: Sequence[Drawn]) -> Iterator[str]:
-    """Yields each figure with the table of its name, then the tables that have no figure."""
-    by_name = {table.name: table for table in tables}
-    for drawn in figures:
-        yield _section(drawn.title, drawn.note, by_name.pop(drawn.name, None), to_svg(drawn))
-    for table in by_name.values():
-        yield _section(table.title, table.note, table)
-
-
-def _section(title: str, note: str, table: Table | None, svg: str = "") -> str:
-    parts = [f"<h3{' class=hidden' * bool(svg)}>{html.escape(title)}</h3>", svg]  # a figure has its title
-    if note:
-        parts.append(f'<p class="note">{html.escape(note)}</p>')
-    if table is not None:
-        forms = [table.wide(metric).rename_axis(None).to_html(border=0) for metric in table.metrics]
-        named = "".join(
-            f'<h4>{html.escape(METRICS[metric])}, by {html.escape(table.row_name)}</h4><div class="scroll">{form}</div>'
-            for metric, form in zip(table.metrics, forms, strict=True)
-        )
-        parts.append(f"<details{' open' * (not svg)}><summary>The values as a table</summary>{named}</details>")
-    return f'<section class="figure">{"".join(parts)}</section>'
 
 
 def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int]]) -> dict[str, Any]:
     """Returns what explorer.js knows of all results before it unpacks the episodes of one, `columns` of each."""
     settings = sorted({result.setting for result in results})
-    mazes, places = _mazes(results)
+    mazes: dict[tuple[str, str | None], int] = {}  # names and walls, with their numbers
+    described = []
+    for result, used in zip(results, columns, strict=True):
+        own = [(name, _walls(result, name)) for name in result.episodes.maze.unique()]
+        numbers = {"setting": settings.index(result.setting), "columns": used}
+        described.append(
+            {**_describe(result), **numbers, "mazes": [mazes.setdefault(each, len(mazes)) for each in own]}
+        )
+    # The explorer opens with a result that has paths, hierarchical if there is such a one.
+    first = min(
+        results, key=lambda each: (not each.trajectories, not each.setting.is_exact, not each.setting.is_hierarchical)
+    )
     return {
-        "settings": [_names(setting) for setting in settings],
+        "settings": list(map(str, settings)),
         "rays": NUM_RAYS,
         "units": {"position": _POSITION_UNITS, "yaw": _YAW_UNITS, "step": STEP_TIME, "body": BODY_RADIUS},
         "timeColors": [mpl.colors.to_hex(TIME_COLORS(n / (_NUM_TIME_COLORS - 1))) for n in range(_NUM_TIME_COLORS)],
-        "mazes": mazes,
-        "results": [
-            {**_describe(result), "setting": settings.index(result.setting), "mazes": here, "columns": used}
-            for result, here, used in zip(results, places, columns, strict=True)
-        ],
-        "first": _first(results),
+        "mazes": [{"name": name, "walls": walls} for name, walls in mazes],
+        "results": described,
+        "first": results.index(first),
     }
 
 
@@ -159,8 +123,8 @@ def _trials(result: ReportedResult) -> dict[str, Any]:
     episodes, size = result.episodes, result.setting.size or 0
     columns: dict[str, Any] = {
         "maze": pd.factorize(episodes.maze)[0].tolist(),
-        "start": _indices(episodes.start, size),
-        "goal": _indices(episodes.goal, size),
+        "start": [row * size + column for row, column in episodes.start],
+        "goal": [row * size + column for row, column in episodes.goal],
         "distance": episodes.distance.tolist(),
         "shortest": episodes.shortest_path.round(2).tolist(),
         "seed": episodes.seed.tolist(),
@@ -188,7 +152,7 @@ def _outcomes(result: ReportedResult) -> dict[str, Any]:
         "splGrid": episodes.spl_grid.round(2).tolist(),
     }
     if trajectories:
-        scale = [result.setting.cell_size] * 2 + [1.0]
+        scale = [result.setting.cell_size or 1.0] * 2 + [1.0]
         columns["path"] = _changes(np.concatenate([each.pose for each in trajectories]) / scale)
         if trajectories[0].observed is not None:
             columns["observed"] = _changes(np.concatenate([lay_on_first_pose(each) for each in trajectories]) / scale)
@@ -223,34 +187,9 @@ def _pack(columns: Mapping[str, Any]) -> str:
     return _base64(zlib.compress(json.dumps(columns, separators=(",", ":")).encode("ascii"), 9))
 
 
-def _indices(cells: Iterable[Cell], size: int) -> list[int]:
-    return [int(row * size + column) for row, column in cells]
-
-
-def _mazes(results: Sequence[ReportedResult]) -> tuple[list[dict[str, Any]], list[list[int]]]:
-    """Returns all mazes once, with walls where they are known, and the indices of each result's mazes."""
-    index: dict[tuple[Any, ...], int] = {}
-    mazes: list[dict[str, Any]] = []
-    places: list[list[int]] = []
-    for result in results:
-        setting = result.setting
-        here = []
-        for name in result.episodes.maze.unique():
-            key = (setting.split_in_results, setting.mazes, setting.kinds, setting.num_mazes, setting.size, name)
-            if key not in index:
-                index[key] = len(mazes)
-                walls = result.walls(name)
-                mazes.append({"name": name, "walls": None if walls is None else _base64(np.packbits(walls).tobytes())})
-            here.append(index[key])
-        places.append(here)
-    return mazes, places
-
-
-def _names(setting: TaskOptions) -> dict[str, Any]:
-    """Returns what the explorer calls a setting: the levels of a track share a name."""
-    split, level = setting.split_in_results, setting.track_level
-    of_split = "" if split == "eval" else f", {split} mazes"
-    return {"name": f"track {setting.track}{of_split}" if setting.track else str(setting), "level": level}
+def _walls(result: ReportedResult, maze: str) -> str | None:
+    walls = result.walls(maze)
+    return None if walls is None else _base64(np.packbits(walls).tobytes())
 
 
 def _describe(result: ReportedResult) -> dict[str, Any]:
@@ -258,27 +197,10 @@ def _describe(result: ReportedResult) -> dict[str, Any]:
     return {
         "label": result.label,
         "size": setting.size,
-        "cellSize": setting.cell_size,
+        "cellSize": setting.cell_size or 1.0,
         "episodes": len(result.episodes),
         "exact": setting.is_exact,
-        "picture": 0
-        if not maps or maps[0].are_cells
-        else len(maps[0].walls),  # pixels on a side, where they are no cells
+        "picture": 0 if not maps or maps[0].are_cells else len(maps[0].walls),  # pixels on a side, if they are no cells
         "lidar": task.options.lidar.max_range if task and "lidar" in task.sensors else 0,  # m
         "groups": result.facts,
     }
-
-
-def _first(results: Sequence[ReportedResult]) -> int:
-    """Returns the result that the explorer opens with: one with paths, hierarchical if there is such a one."""
-    order = sorted(
-        range(len(results)),
-        key=lambda number: (
-            results[number].trajectories is None,
-            not results[number].setting.is_exact,
-            not results[number].setting.is_hierarchical,
-            results[number].setting.size,
-            -results[number].setting.landmark_distance,
-        ),
-    )
-    return order[0]

@@ -1,7 +1,7 @@
-"""95 % intervals of means over episodes, of paired differences, and of scores pooled over training runs.
+"""95 % intervals of means over episodes, of paired differences, and of means over training runs.
 
-`E` is the number of episodes, `R` of training runs, `T` of tasks; a task is a maze. docs/metrics.md has worked examples
-and a simulation of the coverage.
+`E` is the number of episodes, `R` of training runs. docs/metrics.md has worked examples and
+a simulation of the coverage.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from scipy import special, stats
+from scipy import special
 
 CONFIDENCE = 0.95
 
@@ -19,8 +19,6 @@ DEFAULT_CORRELATION = 0.1
 # kind. With 2 or more, the lower bound never falls when a last failure becomes a success (docs/metrics.md).
 _DEFAULT_WEIGHT = 2.0
 _UPPER_TAIL = (1 + CONFIDENCE) / 2
-_NUM_RESAMPLES = 2000
-_BOOTSTRAP_SEED = 0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,23 +126,6 @@ def runs_interval(values: np.ndarray, mazes: np.ndarray, others: np.ndarray | No
     return Estimate(value, float(max(value - low, lowest)), float(min(value + high, 1)))
 
 
-def interquartile_mean(scores: np.ndarray) -> float:
-    """Returns the mean of the middle half of all scores (Agarwal et al. 2021): a quarter goes at either end."""
-    return float(stats.trim_mean(scores, 0.25, axis=None))
-
-
-def pool_runs(scores: np.ndarray) -> tuple[Estimate, Estimate]:
-    """Returns the mean and the interquartile mean of `scores` `[R, T]`, R >= 2, with bootstrap intervals over runs.
-
-    A resample draws R whole runs with replacement, each with its scores in all mazes, because one network plays them
-    all. The intervals speak of other training runs on the same mazes.
-    """
-    runs = _resampled(len(scores))
-    means = scores.mean(axis=1)[runs].mean(axis=1)
-    trimmed = stats.trim_mean(scores[runs].reshape(len(runs), -1), 0.25, axis=1)
-    return _percentiles(float(scores.mean()), means), _percentiles(interquartile_mean(scores), trimmed)
-
-
 def _clusters(mazes: np.ndarray) -> np.ndarray:
     """Returns `[E]` int, which episodes hang together: those of a maze; none where there is only one maze."""
     _, clusters = np.unique(mazes, return_inverse=True)
@@ -176,13 +157,3 @@ def _squares_by_maze(residuals: np.ndarray, clusters: np.ndarray) -> float:
     sums = np.bincount(clusters, weights=residuals)
     squares = few**2 * num_clusters / (num_clusters - 1) * (sums**2).sum()
     return float(np.clip(squares, independent, _mean_size(clusters) * independent))
-
-
-def _resampled(num_runs: int) -> np.ndarray:
-    """Returns `[resamples, R]` int, runs drawn with replacement."""
-    return np.random.default_rng(_BOOTSTRAP_SEED).integers(num_runs, size=(_NUM_RESAMPLES, num_runs))
-
-
-def _percentiles(value: float, resampled: np.ndarray) -> Estimate:
-    low, high = np.quantile(resampled, [1 - _UPPER_TAIL, _UPPER_TAIL])
-    return Estimate(value, float(low), float(high))

@@ -77,12 +77,6 @@ class Figures(_Stored):
     on_time: dict[str, Share] | None = None
     on_time_ci95: dict[str, tuple[Share, Share]] | None = None
 
-    @property
-    def means(self) -> dict[str, float]:
-        """The means by the names of their metrics, such as "spl" and "on_time_1.25"."""
-        on_time = {f"on_time_{factor}": share for factor, share in (self.on_time or {}).items()}
-        return {"success_rate": self.success_rate, "spl": self.spl, "spl_grid": self.spl_grid} | on_time
-
 
 class Provenance(_Stored):
     """The provenance of a result: versions, checkpoint, seed, command, machine."""
