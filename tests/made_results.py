@@ -180,8 +180,8 @@ def _drive(spec: Task, trial: Trial, success: bool, rng: np.random.Generator) ->
         for error in errors:
             for state in states:
                 error(state)
-        observed = states[:, [0, 1, 5]].astype(np.float16)
-    return Trajectory(np.column_stack([place, heading]).astype(np.float16), observed)
+        observed = states[:, [0, 1, 5]].astype(np.float32)
+    return Trajectory(np.column_stack([place, heading]).astype(np.float32), observed)
 
 
 def _outcome(number: int, trial: Trial, spec: Task, success: bool, drive: Trajectory) -> dict[str, Any]:

@@ -158,7 +158,7 @@ def _from_line(line: dict[str, Any]) -> Ended:
     record = Record.model_validate_json(json.dumps(line["record"]))  # lists are tuples in JSON only
     if not line["trajectory"]:
         return Ended(record, None)
-    pose, observed = (None if poses is None else np.array(poses, dtype=np.float16) for poses in line["trajectory"])
+    pose, observed = (None if poses is None else np.array(poses, dtype=np.float32) for poses in line["trajectory"])
     assert pose is not None
     return Ended(record, Trajectory(pose, observed))
 
