@@ -34,7 +34,6 @@ from mazebench.maps.benchmark import (
     load_kind_mazes,
     load_mazes,
 )
-from mazebench.results.frozen_oracle import _steps_by_seed
 from mazebench.tasks.trials import benchmark_task_sizes, frozen_trials
 
 PAPER_AGENTS = ("planner", "planner-closed-loop", "oracle", "random", "mah", "dqn", "mmn", "navigator")
@@ -130,11 +129,8 @@ def frozen() -> Iterator[tuple[str, str]]:
         trials = frozen_trials(task, size, benchmark, split)
         rows = [(*dataclasses.astuple(trial.episode), trial.distance, trial.shortest_path) for trial in trials]
         yield f"frozen: episodes {task} {size} {split}", _hash(json.dumps(rows).encode())
-        steps = _steps_by_seed(benchmark, task, size, split)
-        yield (
-            f"frozen: oracle {task} {size} {split}",
-            _hash(json.dumps([steps[trial.episode.seed] for trial in trials]).encode()),
-        )
+        steps = [trial.oracle_steps for trial in trials]
+        yield f"frozen: oracle {task} {size} {split}", _hash(json.dumps(steps).encode())
 
 
 def _hash(*contents: bytes) -> str:

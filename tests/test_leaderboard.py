@@ -152,9 +152,10 @@ class TestRefused:
         with pytest.raises(InputError, match=f"expected {message}"):
             read_entries([tmp_path])
 
-    def test_a_result_with_another_seed(self, tmp_path):
+    @pytest.mark.parametrize("field", ["seed", "oracle_steps"])
+    def test_a_result_with_another_seed_or_limit_of_time(self, tmp_path, field):
         part = make_part(tmp_path, "x")
-        edit_records(part, lambda record: record | {"seed": record["seed"] + (record["episode"] == 7)})
+        edit_records(part, lambda record: record | {field: record[field] + (record["episode"] == 7)})
         with pytest.raises(InputError, match="adrift-1: expected the 240 frozen episodes, found others"):
             read_entries([tmp_path])
 

@@ -51,7 +51,7 @@ FAULTS = {
     "task.level.0: Input should be less than or equal to 3, found '4'": lambda folder: edit_task(folder, level=[4]),
     "line 4": cut_records,
     "expected a finished evaluation": unfinish,
-    "of benchmark 'paper', manifest 23359df5, found manifest 00": lambda folder: change_provenance(
+    "of benchmark 'paper', manifest 2fd24efc, found manifest 00": lambda folder: change_provenance(
         folder, benchmark_manifest_sha256="00"
     ),
     "task.split: Input should be one of train, dev, eval, found 'test'": lambda folder: edit_task(folder, split="test"),

@@ -22,7 +22,7 @@ from mazebench.report.tables import build_tables
 from mazebench.results.comparison import check_pairs
 from mazebench.results.intervals import Estimate, mean_interval
 from mazebench.results.metrics import ON_TIME_METRICS, scores
-from mazebench.results.reading import CONFIG, EPISODES, ORACLE, SUITE, SUMMARY, Result, load_result
+from mazebench.results.reading import CONFIG, EPISODES, SUITE, SUMMARY, Result, load_result
 from mazebench.results.records import column
 from mazebench.storage.files import make_folder, open_whole
 from mazebench.tasks.tracks import LEVELS, TRACKS
@@ -51,7 +51,7 @@ _SEVERAL = {
     "mmn-paths-sizes": WAYS,
     "tracks-mmn-paths": WAYS,
 }
-_KEPT_FILES = (CONFIG, EPISODES, ORACLE, SUMMARY)
+_KEPT_FILES = (CONFIG, EPISODES, SUMMARY)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -205,9 +205,8 @@ def all_episodes(kept: Kept) -> pd.DataFrame:
     runs = ((name, LOCAL, result) for name, results in kept.runs.items() for result in results)
     parts = []
     for row, part, result in (*((*key, result) for key, result in kept.results.items()), *several, *runs):
-        steps = result.oracle_steps
         columns = {name: column(result.records, name) for name in ("episode", "maze", "success", "steps")}
-        oracle = [steps[number] if steps else None for number in columns["episode"].tolist()]
+        oracle = [record.oracle_steps for record in result.records]
         origin = {"agent": row, "run": (result.summary.provenance.checkpoint_sha256 or "")[:8], "setting": part}
         parts.append(pd.DataFrame(origin | columns | {"oracle_steps": pd.array(oracle, dtype="Int64")}))
     return pd.concat(parts, ignore_index=True)
@@ -231,6 +230,4 @@ def estimate(result: Result, metric: str, field: str = "", values: Sequence[Any]
     counted = np.isin(column(result.records, field), values) if field else np.ones(len(result.records), dtype=bool)
     if not counted.any():
         return None
-    return mean_interval(
-        scores(result.records, result.oracle_steps)[metric][counted], column(result.records, "maze")[counted]
-    )
+    return mean_interval(scores(result.records)[metric][counted], column(result.records, "maze")[counted])

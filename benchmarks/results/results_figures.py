@@ -85,7 +85,7 @@ def budget(kept: Kept) -> Drawn:
             {"column": row, "x": factor, "value": value, "low95": value, "high95": value}
             for row, results in runs.items()
             for factor in _FACTORS
-            for value in [np.mean([is_on_time(each.records, each.oracle_steps or (), factor) for each in results])]
+            for value in [np.mean([is_on_time(each.records, factor) for each in results])]
         ]
         ticks = {x: f"{x:g}" for x in (1.0, 1.25, 2.0, 3.0)}
         panels.append(Panel(f"{track} 2", "budget, times the oracle's steps", pd.DataFrame(points), ticks, True))

@@ -278,7 +278,7 @@ def tracks_learned(row: str, kept: Kept) -> str:
             navigator = kept.result(NAVIGATOR, f"{track}-{level}")
             maze = column(navigator.records, "maze")
             own, other = (
-                {metric: np.array([scores(each.records, each.oracle_steps)[metric] for each in results], dtype=float)
+                {metric: np.array([scores(each.records)[metric] for each in results], dtype=float)
                  for metric in ("success_rate", ON_TIME_125)}
                 for results in (runs, [navigator])
             )  # fmt: skip
@@ -303,7 +303,7 @@ def tracks_worst_tenth(kept: Kept) -> str:
 
 
 def _worst_tenth(result: Result) -> float:
-    on_time = scores(result.records, result.oracle_steps)[ON_TIME_125]
+    on_time = scores(result.records)[ON_TIME_125]
     by_maze = pd.Series(np.asarray(on_time, dtype=float)).groupby(column(result.records, "maze")).mean()
     return float(by_maze.nsmallest(-(-len(by_maze) // 10)).mean())
 

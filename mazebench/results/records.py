@@ -57,6 +57,8 @@ class Record(_Stored):
     spl: Share  # by `shortest_path`
     spl_grid: Share  # by `distance`, in metres
     seed: Count  # of the episode: flips, warp, noise
+    leg: Annotated[int, pydantic.Field(ge=1, lt=_LARGEST)]  # of the episode's goals, counted from 1
+    oracle_steps: Annotated[int, pydantic.Field(ge=1, lt=_LARGEST)] | None  # None where the oracle missed the goal
 
     def to_line(self) -> str:
         """Returns the record as a line of `episodes.jsonl`."""
@@ -73,14 +75,13 @@ class Figures(_Stored):
     spl_ci95: tuple[Share, Share]
     spl_grid: Share
     spl_grid_ci95: tuple[Share, Share]
-    # Episodes that are on time, by the factor as text ("1.25", "2"); None if the oracle's steps are not known.
-    on_time: dict[str, Share] | None = None
-    on_time_ci95: dict[str, tuple[Share, Share]] | None = None
+    on_time: dict[str, Share]  # by the factor of the oracle's steps as text: "1.25", "2"
+    on_time_ci95: dict[str, tuple[Share, Share]]
 
     @property
     def means(self) -> dict[str, float]:
         """The means by the names of their metrics, such as "spl" and "on_time_1.25"."""
-        on_time = {f"on_time_{factor}": share for factor, share in (self.on_time or {}).items()}
+        on_time = {f"on_time_{factor}": share for factor, share in self.on_time.items()}
         return {"success_rate": self.success_rate, "spl": self.spl, "spl_grid": self.spl_grid} | on_time
 
 
