@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.constants import TASK_VERSION
+from mazebench.evaluation.eval_options import eval_options
+from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import load_mazes, manifest_hash
 from mazebench.maps.maze import cell_to_point, path_through_walls
 from mazebench.results.metrics import spl, summarize, summarize_facts
@@ -26,21 +27,7 @@ from mazebench.tasks.trials import Trial, select_trials
 NASTY = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=1>"
 MADE_AGENTS = ("mah", "random", NASTY)
 _STEP = 0.3  # m
-PROVENANCE = {
-    "seed": 0,
-    "episodes_per_distance": 5,
-    "task_version": TASK_VERSION,
-    "benchmark_manifest_sha256": "0f",
-    "mazes_sha256": "a1",
-    "checkpoint_sha256": None,
-    "agent_class": "made_up:Agent",
-    "agent_package": "made-up 1.0",
-    "agent_code_sha256": "c0",
-    "packages": {"mazebench-mujoco": "0.1.0", "numpy": np.__version__},
-    "command": ["mazebench", "eval"],
-    "python": "3.11.7",
-    "machine": {"system": "Linux"},
-}
+PROVENANCE = make_plan(eval_options("random")).provenance.model_dump()
 
 
 def make_record(index: int, **values: Any) -> Record:
@@ -105,15 +92,17 @@ def make_result(
     (folder / EPISODES).write_text("".join(each.to_line() for each in records))
     if record:
         save_trajectories(folder / TRAJECTORIES, drives)
-    provenance = PROVENANCE | {
+    origin = PROVENANCE | {
         "benchmark_manifest_sha256": manifest_hash(spec.options.benchmark),
         "checkpoint_sha256": checkpoint,
         "mazes_sha256": mazes_hash(spec),
         "seed": seed,
         "command": ["mazebench", "eval", "--agent", agent],
+        "packages": {"mazebench-mujoco": "0.1.0", "numpy": np.__version__},
+        "python": "3.11.7",
     }
     content = {"agent": agent, "task": spec.to_json(), "benchmark": spec.options.benchmark, "episodes": len(records)}
-    write_json(folder / SUMMARY, content | {"provenance": provenance, "privileged": privileged})
+    write_json(folder / SUMMARY, content | {"provenance": origin, "privileged": privileged})
     return _set_means(folder, records)
 
 
