@@ -34,6 +34,7 @@ _COLUMNS = {
     "yaw": ("heading at the start, in radians", "Float"),
     "seed": ("seed of all else that the episode draws, such as errors of the map and noise", "Integer"),
     "shortest_path": ("metres that a disc of 0.15 m radius drives at least to the goal cell", "Float"),
+    "oracle_steps": ("steps to the goal that the agent oracle takes, empty where it misses the goal", "Integer"),
 }
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from mazebench.constants import TASK_VERSION
+from mazebench.evaluation.measured_oracle import measure_oracle_steps
 from mazebench.maps.benchmark import MANIFEST, MAZES_PER_SPLIT, PAPER_BENCHMARK, SIZES, SPLITS, mazes_file
 from mazebench.maps.kinds.dfs import DFS_OPENINGS, dfs_walls
 from mazebench.maps.maze import Maze, canonical_bytes
@@ -34,8 +35,8 @@ def freeze(folder: pathlib.Path) -> None:
             chosen = mazes[size][index * MAZES_PER_SPLIT : (index + 1) * MAZES_PER_SPLIT]
             files[mazes_file(size, split)] = "\n".join(map(format_maze, chosen))
     for task, size, _ in benchmark_task_sizes():
-        trials = draw_trials(_task(task, mazes[size][MAZES_PER_SPLIT:]), seed=_EPISODE_SEED)
-        files[episodes_file(task, size)] = format_trials(trials)
+        spec = _task(task, mazes[size][MAZES_PER_SPLIT:])
+        files[episodes_file(task, size)] = format_trials(spec, draw_trials(spec, seed=_EPISODE_SEED))
     generator = {"style": "dfs", "openings": DFS_OPENINGS, "seed": _MAZE_SEED, "episode_seed": _EPISODE_SEED}
     files[MANIFEST] = format_manifest(PAPER_BENCHMARK, generator, files)
     for name, text in files.items():
@@ -56,17 +57,16 @@ def draw_mazes(size: int) -> list[Maze]:
     return [Maze(walls, f"{size}-{index}") for index, walls in enumerate(unique.values())]
 
 
-def format_trials(trials: list[Trial]) -> str:
-    """Returns the text of a file of frozen episodes."""
+def format_trials(spec: Task, trials: list[Trial]) -> str:
+    """Returns the text of a file of frozen episodes, with the steps that the oracle takes in each."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for trial in trials:
+    for trial, steps in zip(trials, measure_oracle_steps(spec, trials), strict=True):
         episode = trial.episode
         shortest = f"{trial.shortest_path:.9f}"  # nanometres: the same on every machine
-        writer.writerow(
-            [episode.maze, *episode.start, *episode.goal, trial.distance, repr(episode.yaw), episode.seed, shortest]
-        )
+        drawn = [episode.maze, *episode.start, *episode.goal, trial.distance, repr(episode.yaw), episode.seed]
+        writer.writerow([*drawn, shortest, steps])
     return text.getvalue()
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-import json
 import pathlib
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any
@@ -19,7 +18,6 @@ import numpy as np
 import typer
 
 from benchmarks.freeze import format_manifest, format_trials
-from mazebench.evaluation.measured_oracle import measure_oracle_steps
 from mazebench.maps.benchmark import (
     DEV,
     FROZEN_SPLITS,
@@ -31,7 +29,6 @@ from mazebench.maps.benchmark import (
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
-from mazebench.results.frozen_oracle import oracle_file
 from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.shown_map import leg_context, show_map
 from mazebench.tasks.task import Task
@@ -58,9 +55,7 @@ def freeze_kinds(folder: pathlib.Path, commit: str) -> None:
             files[kind_mazes_file(kind, split)] = "\n".join(format_maze(maze) for maze in mazes if maze.kind == kind)
         if split in FROZEN_SPLITS:
             trials = draw_kind_trials(mazes, rng)
-            files[episodes_file("local", KINDS_SIZE, split)] = format_trials(trials)
-            steps = measure_oracle_steps(_task("building", 1, mazes), trials)
-            files[oracle_file("local", KINDS_SIZE, split)] = json.dumps({"steps": steps}) + "\n"
+            files[episodes_file("local", KINDS_SIZE, split)] = format_trials(_task("building", 1, mazes), trials)
             generator["contexts_sha256"][split] = {
                 f"{track}-{level}": contexts_hash(track, level, mazes, trials)
                 for track, level in itertools.product(TRACKS, LEVELS)

@@ -1,4 +1,4 @@
-"""Hashes what no change of the code may move: episodes, states, weights and the frozen mazes.
+"""Hashes what no change of the code may move: episodes, states, weights, and the values that are frozen.
 
     python -m benchmarks.gate before.json             writes the hashes
     python -m benchmarks.gate --against before.json   makes them again and names those that differ
@@ -9,6 +9,7 @@ Weights depend on the processor, so both runs must be on one machine.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import hashlib
 import json
 import pathlib
@@ -16,13 +17,24 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from importlib import resources
 from typing import Any
 
 import numpy as np
 from safetensors.numpy import load_file
 
 import mazebench
+from mazebench.maps.benchmark import (
+    ALL_SPLITS,
+    FROZEN_SPLITS,
+    KINDS_SIZE,
+    PAPER_BENCHMARK,
+    SIZES,
+    SPLITS,
+    TRACKS_BENCHMARK,
+    load_kind_mazes,
+    load_mazes,
+)
+from mazebench.tasks.trials import benchmark_task_sizes, frozen_trials
 
 PAPER_AGENTS = ("planner", "planner-closed-loop", "oracle", "random", "mah", "dqn", "mmn", "navigator")
 PAPER_SETTINGS: dict[str, dict[str, Any]] = {
@@ -50,7 +62,6 @@ TRAININGS = {
     "dqn": f"{SMALL} --set steps_per_update=32",
     "mmn": f"{SMALL} --set steps_per_update=80",
 }
-FROZEN = ("paper_mazes", "tracks")  # folders of mazebench_assets
 
 
 def episodes() -> Iterator[tuple[str, str]]:
@@ -106,12 +117,20 @@ def weights() -> Iterator[tuple[str, str]]:
 
 
 def frozen() -> Iterator[tuple[str, str]]:
-    """Yields the name and a hash of each frozen file of mazes and episodes."""
-    for folder in FROZEN:
-        files = resources.files("mazebench_assets").joinpath(folder).iterdir()
-        for file in sorted(files, key=lambda file: file.name):
-            if file.name.startswith(("mazes", "episodes", "oracle")):
-                yield f"frozen: {file.name}", _hash(file.read_bytes())
+    """Yields a name and a hash of the frozen values: walls of mazes, episodes, and the oracle's steps in them."""
+    mazes = {f"{size} {split}": load_mazes(size, split) for size in SIZES for split in SPLITS}
+    mazes |= {f"tracks {split}": load_kind_mazes(split) for split in ALL_SPLITS}
+    for name, group in mazes.items():
+        yield f"frozen: mazes {name}", _hash(*(maze.walls.tobytes() for maze in group))
+
+    episodes = [(task, size, PAPER_BENCHMARK, "eval") for task, size, _ in benchmark_task_sizes()]
+    episodes += [("local", KINDS_SIZE, TRACKS_BENCHMARK, split) for split in FROZEN_SPLITS]
+    for task, size, benchmark, split in episodes:
+        trials = frozen_trials(task, size, benchmark, split)
+        rows = [(*dataclasses.astuple(trial.episode), trial.distance, trial.shortest_path) for trial in trials]
+        yield f"frozen: episodes {task} {size} {split}", _hash(json.dumps(rows).encode())
+        steps = [trial.oracle_steps for trial in trials]
+        yield f"frozen: oracle {task} {size} {split}", _hash(json.dumps(steps).encode())
 
 
 def _hash(*contents: bytes) -> str:

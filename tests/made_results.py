@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from mazebench.evaluation.eval_options import eval_options
+from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import load_mazes, manifest_hash
 from mazebench.maps.maze import cell_to_point, path_through_walls
 from mazebench.results.metrics import spl, summarize, summarize_facts
@@ -25,6 +27,7 @@ from mazebench.tasks.trials import Trial, select_trials
 NASTY = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=1>"
 MADE_AGENTS = ("mah", "random", NASTY)
 _STEP = 0.3  # m
+PROVENANCE = make_plan(eval_options("random")).provenance.model_dump()
 
 
 def make_record(index: int, **values: Any) -> Record:
@@ -38,6 +41,8 @@ def make_record(index: int, **values: Any) -> Record:
         "episode": index,
         "maze": "m",
         "seed": index,
+        "leg": 1,
+        "oracle_steps": 4,
     }
     outcome = {"distance": 1, "success": True, "steps": 5, "path_length": 2.0, "shortest_path": 1.0, "spl": 1.0}
     return Record.model_validate(
@@ -87,16 +92,17 @@ def make_result(
     (folder / EPISODES).write_text("".join(each.to_line() for each in records))
     if record:
         save_trajectories(folder / TRAJECTORIES, drives)
-    provenance = {
+    origin = PROVENANCE | {
         "benchmark_manifest_sha256": manifest_hash(spec.options.benchmark),
         "checkpoint_sha256": checkpoint,
         "mazes_sha256": mazes_hash(spec),
         "seed": seed,
         "command": ["mazebench", "eval", "--agent", agent],
         "packages": {"mazebench-mujoco": "0.1.0", "numpy": np.__version__},
+        "python": "3.11.7",
     }
     content = {"agent": agent, "task": spec.to_json(), "benchmark": spec.options.benchmark, "episodes": len(records)}
-    write_json(folder / SUMMARY, content | {"provenance": provenance, "privileged": privileged})
+    write_json(folder / SUMMARY, content | {"provenance": origin, "privileged": privileged})
     return _set_means(folder, records)
 
 
@@ -180,8 +186,8 @@ def _drive(spec: Task, trial: Trial, success: bool, rng: np.random.Generator) ->
         for error in errors:
             for state in states:
                 error(state)
-        observed = states[:, [0, 1, 5]].astype(np.float16)
-    return Trajectory(np.column_stack([place, heading]).astype(np.float16), observed)
+        observed = states[:, [0, 1, 5]].astype(np.float32)
+    return Trajectory(np.column_stack([place, heading]).astype(np.float32), observed)
 
 
 def _outcome(number: int, trial: Trial, spec: Task, success: bool, drive: Trajectory) -> dict[str, Any]:
@@ -201,4 +207,6 @@ def _outcome(number: int, trial: Trial, spec: Task, success: bool, drive: Trajec
         "spl": scores[0],
         "spl_grid": scores[1],
         "seed": trial.episode.seed,
+        "leg": 1,
+        "oracle_steps": trial.oracle_steps,
     }

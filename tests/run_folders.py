@@ -7,7 +7,7 @@ import pathlib
 from typing import Any
 
 FEW = {"distances": (1, 2), "episodes_per_distance": 1}  # 40 episodes, two in each of 20 mazes
-FILES = {"config.json", "oracle.json", "episodes.jsonl", "summary.json"}
+FILES = {"config.json", "episodes.jsonl", "summary.json"}
 RECORDED = {*FILES, "trajectories.npz"}
 
 # Agents in a module of its own, with which it begins: `module_at_hand` adds what follows.

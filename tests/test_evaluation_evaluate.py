@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
 import pathlib
 import shutil
@@ -23,7 +22,6 @@ from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.kinds import generate
 from mazebench.maps.text import write_text_maze
-from mazebench.results.frozen_oracle import frozen_oracle_steps
 from mazebench.results.reading import load_result
 from mazebench.tasks.task import Task, resolve_for_evaluation
 from mazebench.tasks.task_options import TaskOptions
@@ -112,11 +110,11 @@ class TestResults:
         records = records_of(planner_run)
         assert list(records[0]) == [
             *("agent", "task", "size", "split", "episode", "maze", "start", "goal", "distance", "success", "steps"),
-            *("path_length", "shortest_path", "spl", "spl_grid", "seed", *PERTURBATIONS),
+            *("path_length", "shortest_path", "spl", "spl_grid", "seed", "leg", "oracle_steps", *PERTURBATIONS),
         ]
         for index, (record, trial) in enumerate(zip(records, trials, strict=True)):
             episode = trial.episode
-            expected = {"episode": index, "maze": names[episode.maze], "seed": episode.seed}
+            expected = {"episode": index, "maze": names[episode.maze], "seed": episode.seed, "leg": 1}
             expected |= {"start": list(episode.start), "goal": list(episode.goal)}
             expected |= {"distance": trial.distance, "shortest_path": trial.shortest_path}
             assert expected.items() <= record.items()
@@ -264,41 +262,29 @@ class TestOracle:
 
     def test_frozen_ones_are_copied(self, planner_run):
         trials = [trial for trial in frozen_trials("local", 13) if trial.distance <= 2][::5]
-        steps = frozen_oracle_steps(Task.of(split="eval"), trials)
         result = load_result(planner_run)
-        assert result.oracle_steps == steps
-        on_time = [record.steps <= 2 * limit for record, limit in zip(result.records, steps, strict=True)]
+        assert [record.oracle_steps for record in result.records] == [trial.oracle_steps for trial in trials]
+        on_time = [record.steps <= 2 * record.oracle_steps for record in result.records]
         assert result.summary.overall.on_time["2"] == np.mean(on_time)
 
-    def test_it_plays_first_where_none_are_frozen(self, tmp_path):
+    def test_it_plays_last_where_none_are_frozen(self, tmp_path):
         with pytest.raises(Killed):
-            evaluate("planner", out=tmp_path / "planner", split="train", progress=kill_after(0), **FEW)
-        with pytest.raises(Killed):
-            evaluate("planner", out=tmp_path / "planner", split="train", resume=True, progress=kill_after(1), **FEW)
+            evaluate("planner", out=tmp_path / "planner", split="train", progress=kill_after(40), **FEW)
+        evaluate("planner", out=tmp_path / "planner", split="train", resume=True, **FEW)
         summary = evaluate("oracle", out=tmp_path / "oracle", split="train", **FEW)
         assert summary.overall.on_time == {"1.25": 1.0, "2": 1.0}
         steps = [record["steps"] for record in records_of(tmp_path / "oracle")]
         for folder in tmp_path.iterdir():
-            assert json.loads((folder / "oracle.json").read_text()) == {"steps": steps}
-
-    def test_it_does_not_play_again_in_a_run_that_goes_on(self, tmp_path):
-        with pytest.raises(Killed):
-            evaluate("planner", out=tmp_path, split="train", progress=kill_after(1), **FEW)
-        (tmp_path / "oracle.json").write_text(json.dumps({"steps": [None] * 40}))  # unlike the true ones
-        summary = evaluate("planner", out=tmp_path, split="train", resume=True, **FEW)
-        assert summary.overall.on_time == {"1.25": 1.0, "2": 1.0}
+            assert [record["oracle_steps"] for record in records_of(folder)] == steps
 
     def test_what_is_wrong_with_the_map_and_the_senses_does_not_change_them(self, tmp_path):
         wrong = {"map_flip": 0.3, "odometry_noise": 0.2, "sensors": ("lidar",), "hide": ("map",)}
         evaluate("random", out=tmp_path / "right", split="train", **FEW)
         evaluate("random", out=tmp_path / "wrong", split="train", **FEW | wrong)
-        assert (tmp_path / "right" / "oracle.json").read_bytes() == (tmp_path / "wrong" / "oracle.json").read_bytes()
-
-    def test_those_of_other_episodes_are_refused(self, planner_run, tmp_path):
-        shutil.copytree(planner_run, tmp_path / "run")
-        (tmp_path / "run" / "oracle.json").write_text('{"steps": [4, 5]}')
-        with pytest.raises(InputError, match=r"oracle\.json: expected the oracle's steps in 40 episodes, found 2$"):
-            load_result(tmp_path / "run")
+        right, wrong = (
+            [record["oracle_steps"] for record in records_of(tmp_path / name)] for name in ("right", "wrong")
+        )
+        assert right == wrong
 
 
 class TestRefused:

@@ -62,12 +62,11 @@ def files_of_at_most(num_bytes: int) -> Iterator[None]:
 def test_episodes_that_end_in_any_order_are_written_in_the_protocols(plan, episodes, summary, unbroken, tmp_path):
     order = np.random.default_rng(0).permutation(40).tolist()
     with Store(tmp_path / "run", plan, resume=False, record=True) as store:
-        store.keep_oracle_steps(plan.oracle_steps)
         for index in order:
             store.append([episodes[index]])
         assert store.missing == []
         assert store.records == [ended.record for ended in episodes]
-        store.finish(summary)
+        store.finish(store.records, summary)
     assert files_of(tmp_path / "run") == files_of(unbroken)
 
 
@@ -87,7 +86,7 @@ def test_a_journal_that_was_cut_anywhere_is_gone_on_with(plan, episodes, summary
         # What was appended last is lost.
         assert set(store.missing) == set(order[store.num_ended :])
         store.append([episodes[index] for index in store.missing])
-        store.finish(summary)
+        store.finish(store.records, summary)
     names = ["config.json", "episodes.jsonl"] + ["trajectories.npz"] * record
     assert results_of(folder) == {name: (unbroken / name).read_bytes() for name in names}
 
@@ -96,7 +95,7 @@ def test_a_journal_that_was_cut_anywhere_is_gone_on_with(plan, episodes, summary
 def test_what_was_written_before_the_disk_is_full_is_kept(plan, episodes, summary, unbroken, tmp_path, record):
     ended = [each if record else each._replace(trajectory=None) for each in episodes]
     said = r"can't write there: File too large; what was written is kept, go on with --resume$"
-    with Store(tmp_path, plan, resume=False, record=record) as store, files_of_at_most(6000):
+    with Store(tmp_path, plan, resume=False, record=record) as store, files_of_at_most(12000):
         for each in ended[:3]:
             store.append([each])
         with pytest.raises(RunError, match=said):
@@ -104,12 +103,12 @@ def test_what_was_written_before_the_disk_is_full_is_kept(plan, episodes, summar
     with Store(tmp_path, plan, resume=True, record=record) as store:
         assert store.num_ended >= 3
         store.append([ended[index] for index in store.missing])
-        with files_of_at_most(6000), pytest.raises(RunError, match=said):
-            store.finish(summary)
+        with files_of_at_most(12000), pytest.raises(RunError, match=said):
+            store.finish(store.records, summary)
         # No file that a reader would take for a whole one.
         assert set(files_of(tmp_path)) == {"config.json", "journal.jsonl"}
     evaluate("random", out=tmp_path, resume=True, **FEW)
-    names = ["config.json", "oracle.json", "episodes.jsonl"] + ["trajectories.npz"] * record
+    names = ["config.json", "episodes.jsonl"] + ["trajectories.npz"] * record
     assert results_of(tmp_path) == {name: (unbroken / name).read_bytes() for name in names}
 
 

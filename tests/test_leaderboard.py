@@ -135,6 +135,9 @@ FAULTS = {  # of an agent's folder with its result of a part
     "the 240 frozen episodes, found others": lambda part: edit_records(
         part, lambda record: record | {"seed": record["seed"] + (record["episode"] == 7)}
     ),
+    "240 frozen episodes, found others": lambda part: edit_records(
+        part, lambda record: record | {"oracle_steps": record["oracle_steps"] + (record["episode"] == 7)}
+    ),
     "results of one agent, found those of x, y": lambda part: make_part(part.parent, "y", level=2),
     "the hash of the agent's code, found none": lambda part: with_provenance(part, agent_code_sha256=None),
     "results of the installed benchmark, found those of another one": lambda part: with_provenance(

@@ -36,7 +36,7 @@ def read(*paths):
 FAULTS = {
     "line 4": lambda folder: (folder / EPISODES).write_bytes((folder / EPISODES).read_bytes()[:-20]),
     "expected a finished evaluation": lambda folder: (folder / SUMMARY).unlink(),
-    "of benchmark 'paper', manifest 23359df5, found manifest 00": lambda folder: edit_summary(
+    "of benchmark 'paper', manifest 2fd24efc, found manifest 00": lambda folder: edit_summary(
         folder, provenance=read_summary(folder)["provenance"] | {"benchmark_manifest_sha256": "00"}
     ),
 }

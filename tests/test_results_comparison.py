@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_results import edit_task, make_record, make_result
+from made_results import PROVENANCE, edit_task, make_record, make_result
 
 from mazebench.errors import InputError
 from mazebench.results.comparison import Comparison, compare_folders, compare_results, to_json
@@ -22,9 +22,10 @@ def record(index: int, maze: str, distance: int, success: bool, spl: float) -> R
 
 def result(folder, records: list[Record], **changes) -> Result:
     overall, by_distance = summarize(records)
-    provenance = {"benchmark_manifest_sha256": changes.pop("manifest", "0f"), "mazes_sha256": "a1"}
+    provenance = PROVENANCE | {"benchmark_manifest_sha256": changes.pop("manifest", "0f")}
     content = {
         "agent": "x",
+        "privileged": False,
         "task": Task.of(changes.pop("task", "local"), split="eval").options,
         "benchmark": "paper",
         "episodes": len(records),
@@ -76,7 +77,7 @@ class TestResults:
         assert to_json(Comparison("", {"near": found}, True, [])) == {"near": single}
         assert list(single["by_distance"]) == ["2", "10"]
         keys = {"n", "win_share", "win_share_ci95"}
-        for metric in ("success_rate", "spl", "spl_grid"):
+        for metric in ("success_rate", "spl", "spl_grid", "on_time_1.25", "on_time_2"):
             keys |= {f"{metric}_{end}" for end in ("a", "b", "difference", "difference_ci95")}
         for row in (single["overall"], *single["by_distance"].values()):
             assert set(row) == keys

@@ -56,20 +56,19 @@ def test_figures_worked_by_hand():
 class TestOnTime:
     def test_on_time_worked_by_hand(self):
         # The worked example of docs/metrics.md: five successes in 10 steps, then a failure.
-        records = [make_record(index, steps=10, success=index < 5) for index in range(6)]
         oracle_steps = (8, 7, 5, 4, None, 10)  # 10 is 1.25 x 8 and 2 x 5; the oracle missed the fifth goal
-        assert is_on_time(records, oracle_steps, 1.25).tolist() == [True, False, False, False, True, False]
-        assert is_on_time(records, oracle_steps, 2).tolist() == [True, True, True, False, True, False]
-        assert is_on_time(records[3:5], oracle_steps, 2).tolist() == [False, True]  # records keep their numbers
+        records = [
+            make_record(index, steps=10, success=index < 5, oracle_steps=steps)
+            for index, steps in enumerate(oracle_steps)
+        ]
+        assert is_on_time(records, 1.25).tolist() == [True, False, False, False, True, False]
+        assert is_on_time(records, 2).tolist() == [True, True, True, False, True, False]
 
     def test_figures_tell_it_by_factor(self):
-        overall, by_distance = summarize(RECORDS, (4, 4, 4, 2))  # records of 5 steps, the third a failure
+        records = [*RECORDS[:3], RECORDS[3].model_copy(update={"oracle_steps": 2})]  # the others have 4
+        overall, by_distance = summarize(records)  # of records of 5 steps, the third a failure
         assert overall.on_time == {"1.25": 0.5, "2": 0.5}
         assert by_distance["10"].on_time == {"1.25": 1.0, "2": 1.0}
         assert by_distance["2"].on_time == {"1.25": pytest.approx(1 / 3), "2": pytest.approx(1 / 3)}
         both = mean_interval(np.array([1.0, 1.0, 0.0, 0.0]), np.array(["a", "a", "b", "b"]))
         assert overall.on_time_ci95["2"] == (both.low, both.high)
-
-    def test_figures_without_the_oracles_steps_tell_nothing(self):
-        figures = summarize(RECORDS)[0]
-        assert (figures.on_time, figures.on_time_ci95) == (None, None)

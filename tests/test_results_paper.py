@@ -1,6 +1,7 @@
 """The paper's printed figures beside ours."""
 
 import pytest
+from made_results import PROVENANCE
 
 from mazebench.commands.summary_table import print_summary
 from mazebench.results.paper import printed, printed_mmn
@@ -11,8 +12,9 @@ from mazebench.tasks.task import Task
 def a_summary(privileged: bool = False, **options) -> Summary:
     figures = {"n": 4, "success_rate": 1.0, "spl": 0.9, "spl_grid": 0.95}
     figures |= {f"{name}_ci95": (0.5, 1.0) for name in ("success_rate", "spl", "spl_grid")}
+    figures |= {"on_time": {"2": 1.0}, "on_time_ci95": {"2": (0.5, 1.0)}}
     task = Task.of(**{"split": "eval"} | options).options
-    defaults = {"agent": "mmn", "task": task, "benchmark": "paper", "episodes": 4, "provenance": {}}
+    defaults = {"agent": "mmn", "task": task, "benchmark": "paper", "episodes": 4, "provenance": PROVENANCE}
     return Summary(**defaults, privileged=privileged, overall=figures, by_distance={"2": figures, "3": figures})
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from run_folders import FEW, FILES, RECORDED, records_of
+from simple_mazes import field
 
 from mazebench.agent import SingleAgent
 from mazebench.errors import InputError
@@ -13,7 +16,7 @@ from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.maze import cell_to_point, point_to_cell
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, load_trajectories, save_trajectories
 
-POSES = np.arange(15, dtype=np.float16).reshape(5, 3)
+POSES = np.arange(15, dtype=np.float32).reshape(5, 3)
 
 
 @pytest.mark.parametrize("observed", [None, -POSES], ids=["paper", "track"])
@@ -70,13 +73,10 @@ class TestRecording:
             position = found.pose[:, :2].astype(float)
             assert len(position) == record["steps"] + 1
             np.testing.assert_array_equal(position[0], cell_to_point(tuple(record["start"]), 13))
-            # As it truly was, without the noise; float16 rounds to 4 mm at most here, at either end of a step.
+            # As it truly was, without the noise.
             driven = np.linalg.norm(np.diff(position, axis=0), axis=1).sum()
-            assert driven == pytest.approx(record["path_length"], abs=0.012 * record["steps"])
-            last = tuple(point_to_cell(position[-1], 13).tolist())
-            # A rounded position may lie on the border of the cell.
-            is_there = last == tuple(record["goal"]) or np.abs(position[-1] - np.round(position[-1])).min() < 0.01
-            assert is_there or not record["success"]
+            assert driven == pytest.approx(record["path_length"], abs=1e-5 * record["steps"])
+            assert point_to_cell(position[-1], 13).tolist() == record["goal"] or not record["success"]
             assert not walls[record["maze"]][tuple(point_to_cell(position, 13).T)].any()
             assert np.abs(found.pose[:, 2]).max() <= np.pi
 
@@ -95,6 +95,16 @@ class TestRecording:
         turned = np.angle(np.exp(1j * np.diff(yaw)))
         # To the left by 21.12 degrees a step, once it has got going.
         np.testing.assert_allclose(np.degrees(turned[2:]), 21.12, atol=0.25)
+
+    def test_positions_in_a_large_maze_are_exact_to_a_millimetre(self, tmp_path):
+        maze = dataclasses.replace(field(71), cell_size=100.0)
+        options = {"start": (1, 69), "goal": (1, 68), "episodes_per_distance": 1, "time_limit": 5}
+        evaluate("random", out=tmp_path, record=True, mazes=maze, **options)
+        [trajectory] = load_trajectories(tmp_path / TRAJECTORIES)
+        [record] = records_of(tmp_path)
+        assert trajectory.pose[0, :2].tolist() == [6950, 6950]
+        driven = np.linalg.norm(np.diff(trajectory.pose[:, :2].astype(float), axis=0), axis=1).sum()
+        assert driven == pytest.approx(record["path_length"], abs=1e-3 * record["steps"])
 
     def test_records_are_the_same_without_trajectories(self, tmp_path):
         for name, record, files in (("with", True, RECORDED), ("without", False, FILES)):

@@ -18,7 +18,7 @@ from mazebench.report.table import Table
 from mazebench.report.tables import build_tables
 from mazebench.results.intervals import Estimate, runs_interval
 from mazebench.results.metrics import scores
-from mazebench.results.reading import CONFIG, EPISODES, ORACLE, SUITE, SUMMARY, Result, load_result
+from mazebench.results.reading import CONFIG, EPISODES, SUITE, SUMMARY, Result, load_result
 from mazebench.results.records import column
 from mazebench.storage.files import make_folder, open_whole
 from mazebench.tasks.tracks import LEVELS
@@ -118,13 +118,13 @@ def _episodes(result: Result, archive: str) -> pd.DataFrame:
         agent, setting = result.folder.name.rpartition("-")[0], LOCAL
     facts = {"kind", "blocked"} & {*(records[0].model_extra or {})}  # on tracks
     fields = ("episode", "maze", "distance", "success", "steps", *facts)
-    oracle = pd.array(result.oracle_steps or [None] * len(records), dtype="Int64")
+    oracle = pd.array([record.oracle_steps for record in records], dtype="Int64")
     run = (summary.provenance.checkpoint_sha256 or "")[:8]
     return pd.DataFrame(
         {"archive": archive, "agent": agent, "run": run, "setting": setting}
         | {name: column(records, name) for name in fields}
         | {"oracle_steps": oracle}
-        | scores(records, result.oracle_steps)
+        | scores(records)
     )
 
 
@@ -136,7 +136,7 @@ def keep(folder: pathlib.Path, records: pathlib.Path) -> pathlib.Path:
     """
     folder = folder.resolve()
     are_evaluations = any(folder.rglob(SUMMARY))
-    names = (CONFIG, EPISODES, ORACLE, SUMMARY, SUITE) if are_evaluations else (CONFIG, METRICS)
+    names = (CONFIG, EPISODES, SUMMARY, SUITE) if are_evaluations else (CONFIG, METRICS)
     paths = sorted(path for name in names for path in folder.rglob(name))
     paths += [last / AGENT_FILE for path in paths if path.name == METRICS for last in checkpoints(path.parent)[-1:]]
     if not paths:

@@ -59,8 +59,7 @@ def print_suite(summaries: Sequence[Summary]) -> None:
 
 def print_comparison(title: str, name: str, rows: Mapping[str, Row]) -> None:
     """Prints what A has more than B, with 95 % intervals; the keys of `rows` go in the column `name`."""
-    has_on_time = all(_ON_TIME in row.metrics for row in rows.values())
-    metrics = {"success_rate": "success rate", **({_ON_TIME: _NAME_OF_ON_TIME} if has_on_time else {}), "spl": "SPL"}
+    metrics = {"success_rate": "success rate", _ON_TIME: _NAME_OF_ON_TIME, "spl": "SPL"}
     head = (name, "A", "B", *(f"A - B, {metric}" for metric in metrics.values()), "A wins")
     cells = []
     for key, row in rows.items():
@@ -103,5 +102,5 @@ def _cells(row: Figures) -> list[str]:
         f"{value:.2f} [{low:.2f}, {high:.2f}]"
         for value, (low, high) in ((row.success_rate, row.success_rate_ci95), (row.spl, row.spl_ci95))
     )
-    on_time = "-" if row.on_time is None else ", ".join(f"{share:.2f}" for share in row.on_time.values())
+    on_time = ", ".join(f"{share:.2f}" for share in row.on_time.values())
     return [str(row.n), success_rate, on_time, spl, f"{row.spl_grid:.2f}"]

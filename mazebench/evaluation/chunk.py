@@ -204,6 +204,8 @@ def _to_record(plan: Plan, outcome: Outcome) -> Record:
         "spl": spl_of_disc,
         "spl_grid": spl_grid,
         "seed": episode.seed,
+        "leg": 1,
+        "oracle_steps": trial.oracle_steps,
     }
     further: dict[str, Any] = {} if task.cell_size == 1 else {"cell_size": task.cell_size}
     if task.track is not None:

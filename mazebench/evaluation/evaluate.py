@@ -14,7 +14,7 @@ from mazebench.agent_loading import checked_agent_class, load_agent_class
 from mazebench.errors import InputError, remark
 from mazebench.evaluation.chunk import Chunk
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions, eval_options
-from mazebench.evaluation.measured_oracle import ORACLE, measure_oracle_steps
+from mazebench.evaluation.measured_oracle import with_oracle_steps
 from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.pool import Pool, open_pool
 from mazebench.evaluation.store import Store, check_same_run, is_finished
@@ -119,17 +119,13 @@ def run_plan(
         return summary
     with Store(folder, plan, resume=run.resume, record=record) as store:
         progress(store.num_ended, num_trials)
-        is_oracle = plan.options.agent == ORACLE
-        if store.oracle_steps is None and (plan.oracle_steps or not is_oracle):
-            _keep_oracle_steps(plan, store, run.num_envs)
         for ended in pool.run(_cut(plan, store, pool, run.num_envs)):
             if ended:
                 store.append(ended)
                 progress(store.num_ended, num_trials)
             stopping.check()
-        if store.oracle_steps is None and is_oracle:
-            store.keep_oracle_steps([each.steps if each.success else None for each in store.records])
-        overall, by_distance = metrics.summarize(store.records, store.oracle_steps)
+        records = with_oracle_steps(plan, store.records, run.num_envs)
+        overall, by_distance = metrics.summarize(records)
         summary = Summary(
             agent=plan.options.agent,
             task=plan.task.options,
@@ -142,22 +138,10 @@ def run_plan(
             provenance=plan.provenance,
             overall=overall,
             by_distance=by_distance,
-            by_fact=metrics.summarize_facts(store.records, store.oracle_steps),
+            by_fact=metrics.summarize_facts(records),
         )
-        store.finish(summary)
+        store.finish(records, summary)
     return summary
-
-
-def _keep_oracle_steps(plan: Plan, store: Store, num_envs: int) -> None:
-    """Puts the oracle's steps into the store: the frozen ones, else those of a run of its own."""
-    steps = plan.oracle_steps
-    if steps is None:
-        try:
-            steps = measure_oracle_steps(plan.task, plan.trials, num_envs)
-        except InputError as error:  # the oracle is not installed
-            remark(f"no episode is on time, since the oracle can't play: {error}")
-            return
-    store.keep_oracle_steps(steps)
 
 
 def _cut(plan: Plan, store: Store, pool: Pool, num_envs: int) -> list[Chunk]:

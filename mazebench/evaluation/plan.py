@@ -15,8 +15,6 @@ from mazebench.errors import InputError, RunError, UnplayableError, held_remarks
 from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of, only_context_size
 from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.provenance import provenance
-from mazebench.results.frozen_oracle import frozen_oracle_steps
-from mazebench.results.metrics import Steps
 from mazebench.results.records import Provenance
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.task import Task, resolve_for_evaluation
@@ -45,7 +43,6 @@ class Plan:
     trials: tuple[Trial, ...]  # in the protocol's order, by which they are numbered
     identity: dict[str, Any]  # the content of config.json; only runs of equal identity are resumed
     provenance: Provenance  # where the result will come from
-    oracle_steps: Steps | None  # the oracle's steps in each trial, if those are frozen
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _make_plan_once, (self.options,)
@@ -162,7 +159,6 @@ def make_plan(
         trials=tuple(trials),
         identity=identity,
         provenance=origin,
-        oracle_steps=frozen_oracle_steps(task, trials),
     )
 
 

@@ -37,8 +37,8 @@ class Recorder(Protocol):
 class Poses(NamedTuple):
     """The poses of an episode: x and y in metres, yaw in rad."""
 
-    true: np.ndarray  # [L, 3] float16
-    observed: np.ndarray  # [L, 3] float16
+    true: np.ndarray  # [L, 3] float32
+    observed: np.ndarray  # [L, 3] float32
 
 
 class PoseRecorder:
@@ -50,12 +50,12 @@ class PoseRecorder:
     def add(self, observation: Observation, info: dict[str, Any], actions: np.ndarray, active: np.ndarray) -> None:
         """Notes the poses before a step."""
         poses = np.column_stack([info["position"], info["yaw"], observation["state"][:, _POSE_IN_STATE]])
-        poses = poses.astype(np.float16)
+        poses = poses.astype(np.float32)
         for slot in np.flatnonzero(active).tolist():
             self._poses[slot].append(poses[slot])
 
     def take(self, slot: int, observation: Observation, info: dict[str, Any]) -> Poses:
         """Returns the poses of the episode that ended."""
         last = [*info["position"][slot], info["yaw"][slot], *observation["state"][[*_POSE_IN_STATE]]]
-        poses = np.stack([*self._poses.pop(slot), np.array(last, dtype=np.float16)])
+        poses = np.stack([*self._poses.pop(slot), np.array(last, dtype=np.float32)])
         return Poses(poses[:, :3], poses[:, 3:])

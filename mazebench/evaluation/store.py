@@ -1,7 +1,8 @@
 """The folder of an evaluation while it runs. What has ended survives a kill at any moment.
 
-An episode that ends becomes a line of `journal.jsonl`, in any order. When all have ended, `episodes.jsonl`,
-`trajectories.npz` and last `summary.json` are written, and the journal is removed.
+An episode that ends becomes a line of `journal.jsonl`, in any order, without the oracle's steps where they are not
+frozen. When all have ended, `episodes.jsonl`, `trajectories.npz` and last `summary.json` are written, and the journal
+is removed.
 """
 
 from __future__ import annotations
@@ -17,8 +18,7 @@ import numpy as np
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.chunk import Ended
 from mazebench.evaluation.plan import Plan
-from mazebench.results.metrics import Steps
-from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, ORACLE, SUMMARY, read_oracle_steps
+from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, SUMMARY
 from mazebench.results.records import Record, Summary
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, save_trajectories
 from mazebench.storage.files import make_folder, open_whole, writing_to
@@ -87,7 +87,6 @@ class Store:
             self._journal.write("\n")  # ends a line that a kill cut short
             if self._is_new:
                 write_json(folder / CONFIG, plan.identity)
-        self.oracle_steps = read_oracle_steps(folder, len(plan.trials))  # None if they are not known yet
 
     @property
     def num_ended(self) -> int:
@@ -104,12 +103,6 @@ class Store:
         """The records of the episodes that have ended, in protocol order."""
         return [self._ended[index].record for index in sorted(self._ended)]
 
-    def keep_oracle_steps(self, steps: Steps) -> None:
-        """Writes the oracle's steps in all episodes."""
-        with self._keeping_what_is_written():
-            write_json(self.folder / ORACLE, {"steps": steps}, indent=None)
-        self.oracle_steps = steps
-
     def append(self, ended: Sequence[Ended]) -> None:
         """Adds episodes that ended.
 
@@ -121,14 +114,14 @@ class Store:
             self._journal.flush()
         self._ended |= {each.record.episode: each for each in ended}
 
-    def finish(self, summary: Summary) -> None:
-        """Writes the results; all episodes must have ended."""
-        ended = [self._ended[index] for index in range(len(self._plan.trials))]
+    def finish(self, records: Sequence[Record], summary: Summary) -> None:
+        """Writes the results; `records` are those of all episodes in protocol order, with the oracle's steps."""
+        trajectories = [self._ended[index].trajectory for index in range(len(self._plan.trials))]
         with self._keeping_what_is_written():
             with open_whole(self.folder / EPISODES) as file:
-                file.write("".join(each.record.to_line() for each in ended).encode("utf-8"))
+                file.write("".join(each.to_line() for each in records).encode("utf-8"))
             if self.record:
-                save_trajectories(self.folder / TRAJECTORIES, [each.trajectory for each in ended if each.trajectory])
+                save_trajectories(self.folder / TRAJECTORIES, [each for each in trajectories if each])
             write_json(self.folder / SUMMARY, summary.to_dict())
             (self.folder / JOURNAL).unlink(missing_ok=True)
 
@@ -149,7 +142,7 @@ class Store:
             self._journal.close()
         if self._is_new and not self._ended:  # such as a run that the agent can't play
             with contextlib.suppress(OSError):
-                for name in (JOURNAL, ORACLE, CONFIG):
+                for name in (JOURNAL, CONFIG):
                     (self.folder / name).unlink(missing_ok=True)
                 self.folder.rmdir()
 
@@ -158,7 +151,7 @@ def _from_line(line: dict[str, Any]) -> Ended:
     record = Record.model_validate_json(json.dumps(line["record"]))  # lists are tuples in JSON only
     if not line["trajectory"]:
         return Ended(record, None)
-    pose, observed = (None if poses is None else np.array(poses, dtype=np.float16) for poses in line["trajectory"])
+    pose, observed = (None if poses is None else np.array(poses, dtype=np.float32) for poses in line["trajectory"])
     assert pose is not None
     return Ended(record, Trajectory(pose, observed))
 

@@ -100,6 +100,6 @@ def manifest_hash(benchmark: str = PAPER_BENCHMARK) -> str:
 
 
 def _folder(benchmark: str) -> resources.abc.Traversable:
-    if benchmark not in _FOLDERS:  # as a result of an earlier version says it
+    if benchmark not in _FOLDERS:  # as a damaged result names it
         raise unknown("benchmark", benchmark, _FOLDERS)
     return resources.files("mazebench_assets").joinpath(_FOLDERS[benchmark])

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from mazebench.errors import InputError, remark
-from mazebench.results.metrics import ON_TIME_METRICS, by_fact, scores
+from mazebench.results.metrics import by_fact, scores
 from mazebench.results.played import Shown, played_task, shown_of
 from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, Result, load_result
 from mazebench.results.records import Summary
@@ -189,13 +189,12 @@ def _read_result(folder: pathlib.Path) -> ReportedResult:
 
 
 def _to_table(result: Result) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """Returns the episodes, and which columns are facts; metrics that are not known have no values."""
+    """Returns the episodes, and which columns are facts."""
     episodes = pd.DataFrame(
         [[getattr(record, name) for name in _OF_RECORDS] for record in result.records], columns=_OF_RECORDS
     )
     facts = by_fact(result.records)
-    metrics = dict.fromkeys(ON_TIME_METRICS, np.nan) | scores(result.records, result.oracle_steps)
-    return episodes.assign(**metrics, **facts), tuple(facts)
+    return episodes.assign(**scores(result.records), **facts), tuple(facts)
 
 
 def _read_trajectories(folder: pathlib.Path, episodes: pd.DataFrame) -> list[Trajectory] | None:

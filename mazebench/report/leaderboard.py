@@ -23,14 +23,12 @@ from mazebench.constants import ON_TIME
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import KINDS_SIZE, load_kind_mazes, manifest_hash
 from mazebench.report.table import escape_markdown, to_markdown
-from mazebench.results.frozen_oracle import frozen_oracle_steps
 from mazebench.results.intervals import mean_interval
 from mazebench.results.metrics import is_on_time
 from mazebench.results.reading import SUITE, Result, find_parts, load_result, read_suite
 from mazebench.results.records import Name, Share, column
 from mazebench.storage.files import make_folder, open_file
 from mazebench.storage.json_files import write_json
-from mazebench.tasks.task import resolve
 from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.tasks.trials import frozen_trials
 
@@ -157,14 +155,12 @@ def _read_episodes(result: Result) -> pd.DataFrame:
     if provenance.agent_code_sha256 is None:
         raise InputError(f"{result.folder}: expected the hash of the agent's code, found none; evaluate it again")
     mazes, trials = load_kind_mazes("eval"), frozen_trials("local", KINDS_SIZE, task.benchmark, "eval")
-    episodes = [trial.episode for trial in trials]
-    frozen = [(mazes[episode.maze].name, episode.start, episode.goal, episode.seed) for episode in episodes]
-    if [(record.maze, record.start, record.goal, record.seed) for record in records] != frozen:
+    episodes = [(trial.episode, trial.oracle_steps) for trial in trials]
+    frozen = [(mazes[each.maze].name, each.start, each.goal, each.seed, steps) for each, steps in episodes]
+    if [(each.maze, each.start, each.goal, each.seed, each.oracle_steps) for each in records] != frozen:
         raise InputError(f"{result.folder}: expected the {len(frozen)} frozen episodes, found others")
 
-    steps = frozen_oracle_steps(resolve(task), trials)
-    assert steps is not None, "the oracle's steps are frozen with the episodes"
-    success, on_time = column(records, "success"), is_on_time(records, steps, ON_TIME[0])
+    success, on_time = column(records, "success"), is_on_time(records, ON_TIME[0])
     return pd.DataFrame({"part": task.title, "maze": column(records, "maze"), "success": success, "on_time": on_time})
 
 

@@ -101,8 +101,8 @@ def compare_results(a: Result, b: Result) -> PairedResults:
     check_pairs(a, b)
     ours, theirs = by_distance(a.records), by_distance(b.records)
     return PairedResults(
-        overall=_compare(a, b, a.records, b.records),
-        by_distance={distance: _compare(a, b, ours[distance], theirs[distance]) for distance in ours},
+        overall=_compare(a.records, b.records),
+        by_distance={distance: _compare(ours[distance], theirs[distance]) for distance in ours},
     )
 
 
@@ -110,9 +110,8 @@ def to_json(comparison: Comparison) -> dict[str, Any]:
     """Returns what `mazebench compare --json` prints: of a suite by part, of two single evaluations without a part.
 
     Returns:
-      dict: {"overall": {"n", "win_share", "win_share_ci95", and of each metric M of success_rate, spl and spl_grid
-       "M_a", "M_b", "M_difference" and "M_difference_ci95"}, "by_distance": {"1": {the same}, ...}}; further metrics
-       are on_time_1.25 and on_time_2 if both folders tell the oracle's steps
+      dict: {"overall": {"n", "win_share", "win_share_ci95", and of each metric M of `metrics.scores`
+       "M_a", "M_b", "M_difference" and "M_difference_ci95"}, "by_distance": {"1": {the same}, ...}}
     """
     parts = {
         name: {
@@ -124,10 +123,10 @@ def to_json(comparison: Comparison) -> dict[str, Any]:
     return parts.get("", parts)
 
 
-def _compare(a: Result, b: Result, a_records: Sequence[Record], b_records: Sequence[Record]) -> Row:
+def _compare(a: Sequence[Record], b: Sequence[Record]) -> Row:
     """Returns the row of some records of two evaluations."""
-    mazes = column(a_records, "maze")
-    ours, theirs = scores(a_records, a.oracle_steps), scores(b_records, b.oracle_steps)
+    mazes = column(a, "maze")
+    ours, theirs = scores(a), scores(b)
     metrics = {
         metric: Paired(
             a=float(ours[metric].mean()),
@@ -135,12 +134,11 @@ def _compare(a: Result, b: Result, a_records: Sequence[Record], b_records: Seque
             difference=difference_interval(ours[metric] - theirs[metric], mazes),
         )
         for metric in ours
-        if metric in theirs
     }
     # Won is 1, lost is -1 and a tie 0: the share of wins is half of their mean, and a half.
     outcome = difference_interval(np.sign(ours["spl"] - theirs["spl"]), mazes)
     win_share = Estimate(*(0.5 + share / 2 for share in (outcome.value, outcome.low, outcome.high)))
-    return Row(len(a_records), metrics, win_share)
+    return Row(len(a), metrics, win_share)
 
 
 def _row_to_json(row: Row) -> dict[str, Any]:

@@ -19,7 +19,6 @@ from mazebench.results.records import Figures, Record, column
 METRICS = {"success_rate": "success", "spl": "spl", "spl_grid": "spl_grid"}
 ON_TIME_METRICS = {f"on_time_{k:g}": k for k in ON_TIME}  # by the name in comparisons and reports
 
-Steps = Sequence[int | None]  # of each episode, in its order; None where the oracle did not reach the goal
 _KIND = "kind"  # the field of a record that names the kind of its maze
 
 
@@ -46,48 +45,31 @@ def by_distance(records: Sequence[Record]) -> dict[int, list[Record]]:
     }
 
 
-def is_on_time(records: Sequence[Record], oracle_steps: Steps, factor: float) -> np.ndarray:
+def is_on_time(records: Sequence[Record], factor: float) -> np.ndarray:
     """Returns `[E]` bool: whether the goal is reached within `factor` times the oracle's steps in the episode.
 
     Where the oracle did not reach the goal itself, any success is on time.
-
-    Args:
-      records: of an evaluation or some of its episodes.
-      oracle_steps: of the episodes of the evaluation, by which the records are numbered.
-      factor: of the oracle's steps.
     """
-    limits = [oracle_steps[record.episode] for record in records]
-    limit = np.array([math.inf if steps is None else factor * steps for steps in limits])
-    return column(records, "success") & (column(records, "steps") <= limit)
+    limits = [math.inf if record.oracle_steps is None else factor * record.oracle_steps for record in records]
+    return column(records, "success") & (column(records, "steps") <= limits)
 
 
-def scores(records: Sequence[Record], oracle_steps: Steps | None) -> dict[str, np.ndarray]:
-    """Returns `[E]` float by metric: of `METRICS`, and of `ON_TIME_METRICS` if the oracle's steps are known."""
+def scores(records: Sequence[Record]) -> dict[str, np.ndarray]:
+    """Returns `[E]` float by metric, of `METRICS` and `ON_TIME_METRICS`."""
     found = {metric: column(records, name).astype(float) for metric, name in METRICS.items()}
-    if oracle_steps is not None:
-        found |= {name: is_on_time(records, oracle_steps, k).astype(float) for name, k in ON_TIME_METRICS.items()}
-    return found
+    return found | {name: is_on_time(records, k).astype(float) for name, k in ON_TIME_METRICS.items()}
 
 
-def summarize(records: Sequence[Record], oracle_steps: Steps | None = None) -> tuple[Figures, dict[str, Figures]]:
-    """Returns the figures of all records, and those of each distance from start to goal.
-
-    Args:
-      records: of an evaluation, at least one.
-      oracle_steps: the oracle's steps in the evaluation's episodes; None if they are not known.
-    """
-    groups = {str(distance): _figures(group, oracle_steps) for distance, group in by_distance(records).items()}
-    return _figures(records, oracle_steps), groups
+def summarize(records: Sequence[Record]) -> tuple[Figures, dict[str, Figures]]:
+    """Returns the figures of some records, at least one, and those of each distance from start to goal."""
+    groups = {str(distance): _figures(group) for distance, group in by_distance(records).items()}
+    return _figures(records), groups
 
 
-def summarize_facts(records: Sequence[Record], oracle_steps: Steps | None = None) -> dict[str, Figures]:
-    """Returns the figures of the records in which a fact holds, such as "blocked", and where it does not.
-
-    Args:
-      records, oracle_steps: as for `summarize`; on some tracks, records tell facts.
-    """
+def summarize_facts(records: Sequence[Record]) -> dict[str, Figures]:
+    """Returns the figures of the records in which a fact holds, such as "blocked", and where it does not."""
     return {
-        name: _figures([records[index] for index in np.flatnonzero(holds).tolist()], oracle_steps)
+        name: _figures([records[index] for index in np.flatnonzero(holds).tolist()])
         for name, holds in by_fact(records).items()
         if holds.any()
     }
@@ -107,14 +89,13 @@ def by_fact(records: Sequence[Record]) -> dict[str, np.ndarray]:
     return groups | {kind: kinds == kind for kind in dict.fromkeys(kinds.tolist())}
 
 
-def _figures(records: Sequence[Record], oracle_steps: Steps | None) -> Figures:
+def _figures(records: Sequence[Record]) -> Figures:
     mazes = column(records, "maze")
-    means = {metric: mean_interval(values, mazes) for metric, values in scores(records, oracle_steps).items()}
+    means = {metric: mean_interval(values, mazes) for metric, values in scores(records).items()}
     values: dict[str, Any] = {"n": len(records)}
     for metric in METRICS:
         values |= {metric: means[metric].value, f"{metric}_ci95": (means[metric].low, means[metric].high)}
-    if oracle_steps is not None:
-        on_time = {f"{k:g}": means[metric] for metric, k in ON_TIME_METRICS.items()}
-        values["on_time"] = {k: mean.value for k, mean in on_time.items()}
-        values["on_time_ci95"] = {k: (mean.low, mean.high) for k, mean in on_time.items()}
+    on_time = {f"{k:g}": means[metric] for metric, k in ON_TIME_METRICS.items()}
+    values["on_time"] = {k: mean.value for k, mean in on_time.items()}
+    values["on_time_ci95"] = {k: (mean.low, mean.high) for k, mean in on_time.items()}
     return Figures.model_validate(values)

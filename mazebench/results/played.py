@@ -41,7 +41,7 @@ def played_task(summary: Summary) -> Task:
       InputError: if this version of the benchmark has others, or the mazes are gone or were changed.
     """
     provenance = summary.provenance
-    installed, found = manifest_hash(summary.benchmark), provenance.benchmark_manifest_sha256 or "unknown"
+    installed, found = manifest_hash(summary.benchmark), provenance.benchmark_manifest_sha256
     if installed != found:
         raise InputError(
             f"expected results of benchmark {summary.benchmark!r}, manifest {installed[:8]}, found manifest {found[:8]}"

@@ -9,7 +9,6 @@ from typing import Annotated, TypeVar
 import pydantic
 
 from mazebench.errors import InputError, describe_fault
-from mazebench.results.metrics import Steps
 from mazebench.results.records import Record, Summary
 from mazebench.storage.files import open_file
 
@@ -17,7 +16,6 @@ CONFIG = "config.json"
 JOURNAL = "journal.jsonl"
 EPISODES = "episodes.jsonl"
 SUMMARY = "summary.json"
-ORACLE = "oracle.json"
 SUITE = "suite.json"
 
 _Model = TypeVar("_Model", bound=pydantic.BaseModel)
@@ -30,15 +28,6 @@ class Result:
     folder: pathlib.Path
     summary: Summary
     records: tuple[Record, ...]  # in protocol order
-    oracle_steps: Steps | None = None  # the oracle's steps in these episodes; None in folders of earlier versions
-
-
-class _OracleSteps(pydantic.BaseModel):
-    """The content of `oracle.json`."""
-
-    model_config = pydantic.ConfigDict(strict=True)
-
-    steps: tuple[Annotated[int, pydantic.Field(ge=1)] | None, ...]  # of each episode; None where it missed the goal
 
 
 FolderName = Annotated[str, pydantic.Field(pattern=r"^[\w-][\w.-]*$")]
@@ -68,25 +57,9 @@ def load_result(folder: pathlib.Path) -> Result:
         raise InputError(f"{folder}: expected a finished evaluation, found {_describe_content(folder)}")
     summary = _read_model(folder / SUMMARY, Summary, "an evaluation's summary")
     records = _read_records(folder / EPISODES)
-    oracle_steps = read_oracle_steps(folder, summary.episodes)
     if len(records) != summary.episodes:
         raise InputError(f"{folder / EPISODES}: expected {summary.episodes} records, found {len(records)}")
-    return Result(folder, summary, records, oracle_steps)
-
-
-def read_oracle_steps(folder: pathlib.Path, num_episodes: int) -> Steps | None:
-    """Returns the oracle's steps in the episodes of an evaluation; None if its folder does not tell them.
-
-    Raises:
-      InputError: if the file is damaged or of another number of episodes.
-    """
-    path = folder / ORACLE
-    if not path.exists():
-        return None
-    steps = _read_model(path, _OracleSteps, "the oracle's steps").steps
-    if len(steps) != num_episodes:
-        raise InputError(f"{path}: expected the oracle's steps in {num_episodes} episodes, found {len(steps)}")
-    return steps
+    return Result(folder, summary, records)
 
 
 def read_suite(folder: pathlib.Path) -> Suite:

@@ -57,6 +57,8 @@ class Record(_Stored):
     spl: Share  # by `shortest_path`
     spl_grid: Share  # by `distance`, in metres
     seed: Count  # of the episode: flips, warp, noise
+    leg: Annotated[int, pydantic.Field(ge=1, lt=_LARGEST)]  # of the episode's goals, counted from 1
+    oracle_steps: Annotated[int, pydantic.Field(ge=1, lt=_LARGEST)] | None  # None where the oracle missed the goal
 
     def to_line(self) -> str:
         """Returns the record as a line of `episodes.jsonl`."""
@@ -73,34 +75,33 @@ class Figures(_Stored):
     spl_ci95: tuple[Share, Share]
     spl_grid: Share
     spl_grid_ci95: tuple[Share, Share]
-    # Episodes that are on time, by the factor as text ("1.25", "2"); None if the oracle's steps are not known.
-    on_time: dict[str, Share] | None = None
-    on_time_ci95: dict[str, tuple[Share, Share]] | None = None
+    on_time: dict[str, Share]  # by the factor of the oracle's steps as text: "1.25", "2"
+    on_time_ci95: dict[str, tuple[Share, Share]]
 
 
 class Provenance(_Stored):
     """The provenance of a result: versions, checkpoint, seed, command, machine."""
 
-    seed: Count = 0
-    episodes_per_distance: Count | None = None
-    task_version: int | None = None
-    benchmark_manifest_sha256: str | None = None
-    mazes_sha256: str | None = None
-    checkpoint_sha256: str | None = None
-    agent_class: str | None = None  # as module:Class
-    agent_package: str | None = None  # name and version; None for a `module:Class`
-    agent_code_sha256: str | None = None  # of the package of an installed agent, of the file of a `module:Class`
-    packages: dict[str, str | None] = {}
-    command: list[str] = []
-    python: str = "unknown"
-    machine: dict[str, Any] = {}
+    seed: Count
+    episodes_per_distance: Count
+    task_version: int
+    benchmark_manifest_sha256: str
+    mazes_sha256: str
+    checkpoint_sha256: str | None
+    agent_class: str  # as module:Class
+    agent_package: str | None  # name and version; None for a `module:Class`
+    agent_code_sha256: str | None  # of the package of an installed agent, of the file of a `module:Class`
+    packages: dict[str, str | None]
+    command: list[str]
+    python: str
+    machine: dict[str, Any]
 
 
 class Summary(_Stored):
     """The result of one evaluation."""
 
     agent: Name
-    privileged: bool = False  # whether the agent was given the true maze and pose
+    privileged: bool  # whether the agent was given the true maze and pose
     untrained_scale: bool = False  # whether the agent learned on maps of another scale, in metres a cell of the context
     task: StoredTask  # as this agent played it
     suite: str | None = None  # of a part of a suite, with the part's name

@@ -24,8 +24,8 @@ TRAJECTORIES = "trajectories.npz"
 class Trajectory(NamedTuple):
     """One episode."""
 
-    pose: np.ndarray  # [L, 3] float16: true x, y in metres in the maze's frame, yaw in rad
-    observed: np.ndarray | None = None  # [L, 3] float16: the observed pose, on tracks where it is not the true one
+    pose: np.ndarray  # [L, 3] float32: true x, y in metres in the maze's frame, yaw in rad
+    observed: np.ndarray | None = None  # [L, 3] float32: the observed pose, on tracks where it is not the true one
 
 
 def load_trajectories(path: pathlib.Path) -> list[Trajectory]:
@@ -48,10 +48,10 @@ def save_trajectories(path: pathlib.Path, episodes: Sequence[Trajectory]) -> Non
     """Writes them all or nothing: a reader finds the old file or the new one. The same content gives the same bytes."""
     arrays = {
         "length": np.array([len(episode.pose) for episode in episodes], dtype="<i4"),
-        "pose": np.concatenate([episode.pose for episode in episodes], dtype="<f2"),
+        "pose": np.concatenate([episode.pose for episode in episodes], dtype="<f4"),
     }
     observed = [episode.observed for episode in episodes if episode.observed is not None]
     if observed:
-        arrays["observed"] = np.concatenate(observed, dtype="<f2")
+        arrays["observed"] = np.concatenate(observed, dtype="<f4")
     with open_whole(path) as file:
         np.savez_compressed(file, allow_pickle=False, **arrays)

@@ -15,10 +15,10 @@ def to_line(record: dict[str, Any]) -> str:
     return json.dumps(record, separators=(",", ":"), allow_nan=False) + "\n"
 
 
-def write_json(path: pathlib.Path, content: Any, indent: int | None = 1) -> None:
-    """Writes `content` all or nothing: a reader finds the old file or the new one. Without `indent`, it is one line."""
+def write_json(path: pathlib.Path, content: Any) -> None:
+    """Writes `content` all or nothing: a reader finds the old file or the new one."""
     with open_whole(path) as file:
-        file.write((json.dumps(content, indent=indent, allow_nan=False) + "\n").encode("utf-8"))
+        file.write((json.dumps(content, indent=1, allow_nan=False) + "\n").encode("utf-8"))
 
 
 def read_json(path: pathlib.Path) -> Any:

@@ -16,7 +16,11 @@ from mazebench.tasks.episode import Episode, make_episode, sample_pair
 from mazebench.tasks.task import EVAL_DISTANCES, Task
 from mazebench.world.mjcf import BODY_RADIUS
 
-COLUMNS = ("maze", "start_row", "start_column", "goal_row", "goal_column", "distance", "yaw", "seed", "shortest_path")
+# Of a file of frozen episodes.
+COLUMNS = (
+    *("maze", "start_row", "start_column", "goal_row", "goal_column", "distance", "yaw", "seed", "shortest_path"),
+    "oracle_steps",  # empty where the oracle missed the goal
+)
 
 _MAX_DRAWS = 100  # for a pair not drawn before
 
@@ -28,6 +32,7 @@ class Trial:
     episode: Episode
     distance: int  # cells, of start and goal on the true map
     shortest_path: float  # m, of the body as a disc from the start point to the goal cell
+    oracle_steps: int | None = None  # of the agent `oracle`; None where they are not frozen, or it missed the goal
 
 
 def episodes_file(task: str, size: int, split: str = "eval") -> str:
@@ -52,7 +57,12 @@ def _trial_of_row(row: dict[str, str]) -> Trial:
         yaw=float(row["yaw"]),
         seed=int(row["seed"]),
     )
-    return Trial(episode, distance=int(row["distance"]), shortest_path=float(row["shortest_path"]))
+    return Trial(
+        episode,
+        distance=int(row["distance"]),
+        shortest_path=float(row["shortest_path"]),
+        oracle_steps=int(row["oracle_steps"]) if row["oracle_steps"] else None,
+    )
 
 
 def select_trials(task: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
