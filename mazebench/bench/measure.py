@@ -26,9 +26,9 @@ from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
 from mazebench.tasks.task import TRAIN_DISTANCES, Task
+from mazebench.training.collector import Collector
 from mazebench.training.loop import num_updates_due
 from mazebench.training.protocol import LearningAgent
-from mazebench.training.sources import Player
 from mazebench.world.backend import RenderingError
 from mazebench.world.batch import open_batch
 from mazebench.world.mjcf import action_controls
@@ -224,15 +224,13 @@ def _training_row(name: str, agent_class: Any, spec: Task, seconds: float) -> di
         learner = agent_class.build_learner(spec, overrides={"num_envs": "256"})
     except InputError:  # it calls its number of environments by another name, or has none
         learner = agent_class.build_learner(spec)
-    player = Player([spec], learner.actor, learner.num_envs)
-    player.restart(seed=0)
+    experience = Collector(spec, learner.num_envs).collect(learner.actor, seed=0)
     steps = updates = 0
     collecting = learning = 0.0  # seconds
     while collecting < seconds or learning < seconds or updates == 0:
         begin = time.perf_counter()
-        for first_env, experience in player.play():
-            learner.observe(experience, first_env)
-            steps += len(experience.action)
+        learner.observe(next(experience))
+        steps += learner.num_envs
         collecting += time.perf_counter() - begin
         due = num_updates_due(learner, steps)
         begin = time.perf_counter()
