@@ -81,12 +81,11 @@ def _task(distance: int, given: argparse.Namespace) -> Task:
 
 def _outcomes(agent: Agent, task: Task) -> tuple[np.ndarray, np.ndarray]:
     """Returns the success and the maze of each episode, in the order of the trials."""
-    trials = list(enumerate(draw_trials(task, _EPISODES)))
-    ended = [outcome for some in run_trials(agent, task, trials, len(trials)) for outcome in some]
-    ended.sort(key=lambda outcome: outcome.index)
+    trials = dict(enumerate(draw_trials(task, _EPISODES)))
+    ended = sorted(result for some in run_trials(agent, task, trials, len(trials)) for result in some)
     return (
-        np.array([outcome.success for outcome in ended], dtype=float),
-        np.array([outcome.trial.episode.maze for outcome in ended]),
+        np.array([result.success for result in ended], dtype=float),
+        np.array([trials[result.number].episode.maze for result in ended]),
     )
 
 

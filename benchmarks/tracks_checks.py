@@ -133,10 +133,10 @@ def play(agent_name: str, kind: str, episodes: int, hide: tuple[str, ...] = ()) 
     agent_class = load_agent_class(agent_name)
     agent = agent_class.build(spec.interface)
     steps = np.full(len(trials), np.inf)
-    numbered = list(enumerate(trials))
-    for outcomes in run_trials(agent, spec, numbered, len(trials), 1, needs_truth=agent_class.needs_truth):
-        for outcome in outcomes:
-            steps[outcome.index] = outcome.steps if outcome.success else np.inf
+    numbered = dict(enumerate(trials))
+    for results in run_trials(agent, spec, numbered, len(trials), 1, needs_truth=agent_class.needs_truth):
+        for result in results:
+            steps[result.number] = result.steps if result.success else np.inf
     return Episodes(
         np.array([trial.episode.maze for trial in trials]),
         steps,
