@@ -6,7 +6,7 @@ import contextlib
 import itertools
 import pathlib
 import pickle
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,10 @@ from mazebench.agent import Agent, Inputs, SingleAgent
 from mazebench.agent_loading import checked_agent_class, load_agent_class
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.evaluation.agent_inputs import agent_seed, true_state
 from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling
 from mazebench.evaluation.plan import task_as_played
 from mazebench.maps.kinds import generate
+from mazebench.rollout import agent_seed, rollout
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.task import Task, as_options, resolve
 from mazebench.tasks.task_options import TaskOptions
@@ -82,102 +82,86 @@ def _small_task() -> TaskOptions:
 
 
 def _check_acting(name: str, agent_class: type[Agent], task: Task, checkpoint: pathlib.Path | None) -> None:
-    interface, episodes = task.interface, _Episodes(task, agent_class.needs_truth)
+    interface, rng = task.interface, np.random.default_rng(0)
+    episodes = [sample_episode(task, rng) for _ in itertools.chain(*_ORDER)]
 
     def build() -> CheckedAgent:
         with calling(name, "build"):
-            return CheckedAgent(name, agent_class.build(interface, checkpoint=checkpoint), interface.actions)
+            return _CarefulAgent(name, agent_class.build(interface, checkpoint=checkpoint), interface.actions)
 
-    def by_turns() -> dict[int, list[Any]]:
-        agent, actions = build(), dict[int, list[Any]]()
-        batches = episodes.steps(agent, _ORDER, actions), episodes.steps(agent, _ORDER[::-1], {})
-        for _ in itertools.zip_longest(*batches):
-            pass
-        return actions
+    def play(agent: CheckedAgent, *orders: Sequence[Sequence[int]]) -> dict[int, list[Any]]:
+        """Returns the agent's actions by episode in the first of some batches that it plays by turns."""
+        with contextlib.ExitStack() as stack:
+            batches = [
+                stack.enter_context(contextlib.closing(_ShortEpisodes(task, episodes, order))) for order in orders
+            ]
+            truth = agent_class.needs_truth
+            rollouts = [rollout(agent, envs, envs.reset(), envs.seeds, needs_truth=truth) for envs in batches]
+            for _ in itertools.zip_longest(*rollouts):
+                pass
+        return batches[0].actions
 
-    expected = episodes.play(build(), _ORDER)
+    expected = play(build(), _ORDER)
     own_slot = "let an action depend on nothing but the inputs and the state of its own slot"
     for when, found, advice in (
         (
             "when built anew from the same seed",
-            episodes.play(build(), _ORDER),
+            play(build(), _ORDER),
             "make weights in build() from its seed, and draw random numbers only from generators made of inputs.seed",
         ),
         (
             "when another batch is played by turns",
-            by_turns(),
+            play(build(), _ORDER, _ORDER[::-1]),
             "keep all memory, generators too, in the state that act() returns, and nothing on self",
         ),
         (
             "after another episode",
-            episodes.play(build(), [numbers[::-1] for numbers in _ORDER]),
+            play(build(), [numbers[::-1] for numbers in _ORDER]),
             "begin anew where inputs.new_episode is set",
         ),
-        ("in another slot of the batch", episodes.play(build(), _ORDER[::-1]), own_slot),
-        ("alone", episodes.play(build(), _ORDER[:1]), own_slot),
+        ("in another slot of the batch", play(build(), _ORDER[::-1]), own_slot),
+        ("alone", play(build(), _ORDER[:1]), own_slot),
     ):
         if found != {number: expected[number] for number in found}:
             same = f"expected the same actions in an episode {when}, found others"
             raise ConformanceError(f"agent {name!r}: {same}; {advice}")
 
 
-class _Episodes:
-    """The episodes that an agent is checked in."""
+class _CarefulAgent(CheckedAgent):
+    """A checked agent that must leave its inputs as they are."""
 
-    def __init__(self, task: Task, needs_truth: bool):
-        rng = np.random.default_rng(0)
-        self._task, self._needs_truth = task, needs_truth
-        self._episodes = [sample_episode(task, rng) for _ in itertools.chain(*_ORDER)]
+    def act(self, inputs: Inputs, state: Any, explore: bool = False) -> tuple[np.ndarray, Any]:
+        before = pickle.dumps(inputs)
+        actions, state = super().act(inputs, state, explore)
+        if pickle.dumps(inputs) != before:
+            raise ConformanceError(f"agent {self.name!r}: expected act() to leave its inputs; change a copy")
+        return actions, state
 
-    def play(self, agent: CheckedAgent, order: Sequence[Sequence[int]]) -> dict[int, list[Any]]:
-        """Returns the agent's actions by episode; `order` has the episodes of each slot."""
-        actions: dict[int, list[Any]] = {}
-        for _ in self.steps(agent, order, actions):
-            pass
-        return actions
 
-    def steps(
-        self, agent: CheckedAgent, order: Sequence[Sequence[int]], actions: dict[int, list[Any]]
-    ) -> Iterator[None]:
-        """As `play`, but yields after each step, and adds to `actions`."""
-        running: list[int | None] = [None] * len(order)  # the episode in each slot
-        waiting = [list(numbers) for numbers in order]
+class _ShortEpisodes(MazeVectorEnv):
+    """Some of the episodes that an agent is checked in; of those side by side, each is cut at another step."""
 
-        def next_episode(slot: int) -> Episode | None:
-            running[slot] = waiting[slot].pop(0) if waiting[slot] else None
-            number = running[slot]
-            return None if number is None else self._episodes[number]
+    def __init__(self, task: Task, episodes: Sequence[Episode], order: Sequence[Sequence[int]]):
+        """`order` has the numbers of the episodes in each environment, one after another."""
+        self._all_episodes, self._waiting = episodes, [list(numbers) for numbers in order]
+        self._numbers = np.full(len(order), -1)  # of the episodes under way; -1 where none is left
+        self.actions: dict[int, list[Any]] = {}  # by the numbers of the episodes
+        super().__init__(task, len(order), num_threads=1, episode_source=self._next_episode, autoreset_mode="Disabled")
 
-        env = MazeVectorEnv(
-            self._task, len(order), num_threads=1, episode_source=next_episode, autoreset_mode="Disabled"
-        )
-        with contextlib.closing(env):
-            observation, info = env.reset()
-            new_episode = np.ones(len(order), dtype=bool)
-            state = agent.initial_state(len(order))
-            while any(number is not None for number in running):
-                truth = None
-                if self._needs_truth:
-                    truth = true_state(self._task, env.episodes, info["position"], info["yaw"])
-                seed = np.array([agent_seed(0, number or 0) for number in running])
-                inputs = Inputs(observation, new_episode, info["is_first"], seed, truth)
+    def _next_episode(self, slot: int) -> Episode | None:
+        self._numbers[slot] = number = self._waiting[slot].pop(0) if self._waiting[slot] else -1
+        return None if number < 0 else self._all_episodes[number]
 
-                before = pickle.dumps(inputs)
-                taken, state = agent.act(inputs, state)
-                if pickle.dumps(inputs) != before:
-                    raise ConformanceError(f"agent {agent.name!r}: expected act() to leave its inputs; change a copy")
+    def seeds(self, slots: np.ndarray) -> list[int]:
+        """Returns the seeds of the agent's own draws in the episodes of environments `slots`."""
+        return [agent_seed(0, number) for number in self._numbers[slots].tolist()]
 
-                for number, action in zip(running, taken.tolist(), strict=True):
-                    if number is not None:
-                        actions.setdefault(number, []).append(action)
-                observation, _, terminated, truncated, info = env.step(taken)
-                # Of episodes side by side, each is cut at another step; a slot without one rests.
-                is_long = [
-                    number is not None and steps >= _NUM_STEPS + number
-                    for number, steps in zip(running, info["steps"].tolist(), strict=True)
-                ]
-                ended = terminated | truncated | is_long
-                if ended.any():
-                    observation, info = env.reset(options={"reset_mask": ended})
-                new_episode = ended & [number is not None for number in running]
-                yield
+    def step(self, actions: np.ndarray) -> tuple[Any, ...]:
+        """Takes a step, and begins the next episodes where one ended or was cut."""
+        for slot in np.flatnonzero(self.rules.active).tolist():
+            self.actions.setdefault(self._numbers.item(slot), []).append(actions[slot].tolist())
+        observation, reward, terminated, truncated, info = super().step(actions)
+        truncated = truncated | (self.rules.active & (info["steps"] >= _NUM_STEPS + self._numbers))
+        if (ended := terminated | truncated).any():
+            observation, info = self.reset(options={"reset_mask": ended})
+        return observation, reward, terminated, truncated, info

@@ -11,8 +11,8 @@ from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.maze import Maze
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
+from mazebench.training.collector import Collector
 from mazebench.training.loop import num_updates_due
-from mazebench.training.sources import Player
 
 TIME_LIMIT = 25
 
@@ -26,12 +26,10 @@ def learn(
     overrides = {key: str(value) for key, value in values.items()}
     learner = agent_class.build_learner(spec, overrides=overrides)
     before = _success_rate(learner.actor, maze, distances)
-    player = Player([spec], learner.actor, learner.num_envs)
-    player.restart(seed=0)
+    experience = Collector(spec, learner.num_envs).collect(learner.actor, seed=0)
     steps = updates = 0
     while updates < num_updates:
-        for first_env, experience in player.play():
-            learner.observe(experience, first_env)
+        learner.observe(next(experience))
         steps += learner.num_envs
         while updates < num_updates_due(learner, steps):
             learner.update()
@@ -42,5 +40,5 @@ def learn(
 def _success_rate(actor: Any, maze: Maze, distances: tuple[int, ...]) -> float:
     """Of acting greedily, over 32 episodes a distance."""
     spec = Task.of(mazes=maze, distances=distances, time_limit=TIME_LIMIT)
-    trials = list(enumerate(draw_trials(spec, 32, seed=7)))
-    return np.mean([outcome.success for outcomes in run_trials(actor, spec, trials, 64) for outcome in outcomes])
+    trials = dict(enumerate(draw_trials(spec, 32, seed=7)))
+    return np.mean([result.success for results in run_trials(actor, spec, trials, 64) for result in results])

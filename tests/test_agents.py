@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import sys
 
 import numpy as np
@@ -15,13 +16,13 @@ from mazebench.agent import Agent, Inputs, Interface, SingleAgent, Truth, as_age
 from mazebench.agent_loading import agent_names, load_agent_class
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError, UnplayableError
-from mazebench.evaluation.agent_inputs import true_state
 from mazebench.evaluation.checked_agent import CheckedAgent
 from mazebench.evaluation.chunk import run_trials
 from mazebench.evaluation.eval_options import eval_options
-from mazebench.evaluation.plan import make_plan
+from mazebench.evaluation.plan import build_agent, make_plan
 from mazebench.maps.benchmark import load_mazes
 from mazebench.maps.kinds import generate
+from mazebench.rollout import rollout
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
 from mazebench.testing import ConformanceError, check_agent
@@ -322,11 +323,12 @@ class Small(Counting):
 
 class TestTracks:
     def test_an_agent_that_asks_for_one_size_is_refused_where_a_track_shows_another(self):
-        assert make_plan(eval_options("mine:Small", task="building"), Small).build_agent().name == "mine:Small"
+        plan = make_plan(eval_options("mine:Small", task="building"), Small)
+        assert build_agent(plan.options, plan.task, Small).name == "mine:Small"
         plan = make_plan(eval_options("mine:Small", task="rough"), Small)
         message = r"context_size\(\) asks for maps of 31 x 31 only; the track 'rough' shows 62 x 62$"
         with pytest.raises(UnplayableError, match=message):
-            plan.build_agent()
+            build_agent(plan.options, plan.task, Small)
 
     def test_a_track_that_shows_another_map_than_asked_for_is_remarked(self):
         remark = "navigator asks for a map of 31 x 31; the track 'rough' shows 62 x 62 to all agents"
@@ -357,14 +359,9 @@ def act_for_three_steps(name: str, spec: Task) -> int:
     interface = Interface(spec.task, spec.size, spec.context_size, sensors=spec.sensors)
     agent = CheckedAgent(name, agent_class.build(interface), interface.actions)
     env = MazeVectorEnv(spec, 2, num_threads=1)
-    (observation, info), state = env.reset(seed=0), agent.initial_state(2)
-    new, seed = np.ones(2, dtype=bool), np.zeros(2, dtype=np.int64)
-    for _ in range(3):
-        truth = true_state(spec, env.episodes, info["position"], info["yaw"]) if agent_class.needs_truth else None
-        actions, state = agent.act(Inputs(observation, new, info["is_first"], seed, truth), state)
-        observation, _, _, _, info = env.step(actions)
-        new = np.zeros(2, dtype=bool)
-    return int(info["steps"][0])
+    steps = rollout(agent, env, env.reset(seed=0), np.zeros_like, needs_truth=agent_class.needs_truth)
+    *_, last = itertools.islice(steps, 3)
+    return int(last.next_info["steps"][0])
 
 
 def success_rate(
@@ -373,9 +370,9 @@ def success_rate(
     agent_class = load_agent_class(name)
     spec = Task.of("local", mazes=load_mazes(13, "train")[:num_mazes], distances=distances, **perturbation)
     spec = dataclasses.replace(spec, context_size=context_size)
-    trials = list(enumerate(draw_trials(spec, episodes_per_distance)))
+    trials = dict(enumerate(draw_trials(spec, episodes_per_distance)))
     agent = agent_class.build(Interface("local", 13, spec.context_size))
     played = run_trials(agent, spec, trials, 64, needs_truth=agent_class.needs_truth)
-    ended = [outcome for outcomes in played for outcome in outcomes]
+    ended = [result for results in played for result in results]
     assert len(ended) == len(trials)
-    return float(np.mean([outcome.success for outcome in ended]))
+    return float(np.mean([result.success for result in ended]))

@@ -200,10 +200,8 @@ class TestSeeds:
         found = []
         for trials in (plan.trials, others):
             monkeypatch.setattr(Witness, "inputs", [])
-            chunk = Chunk(
-                dataclasses.replace(plan, trials=trials), tuple(range(40)), record=False, num_envs=1, num_threads=1
-            )
-            list(run_chunk(chunk))
+            numbered = dict(enumerate(trials))
+            list(run_chunk(Chunk(plan.options, plan.task, Witness, numbered, record=False, num_envs=1, num_threads=1)))
             found.append([int(given["seed"][0]) for _, given, *_ in Witness.inputs if given["new_episode"][0]])
         assert found[0] == found[1]
         assert len(set(found[0])) == 40

@@ -10,10 +10,10 @@ from mazebench_agents.planner import ClosedLoopPlanner
 from run_folders import records_of
 
 from mazebench.agent import Agent
-from mazebench.evaluation.agent_inputs import agent_seed
 from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.plan import make_plan
+from mazebench.rollout import agent_seed
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations.flip import MapFlip, flip

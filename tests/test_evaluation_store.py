@@ -15,7 +15,7 @@ from hypothesis import strategies
 from run_folders import FEW, files_of, results_of
 
 from mazebench.errors import InputError, RunError
-from mazebench.evaluation.chunk import Chunk, Ended, run_chunk
+from mazebench.evaluation.chunk import Chunk, Result, run_chunk, to_record
 from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.plan import Plan, make_plan
@@ -30,10 +30,11 @@ def plan() -> Plan:
 
 
 @pytest.fixture(scope="module")
-def episodes(plan) -> list[Ended]:
-    """All episodes of the plan, in its order."""
-    chunk = Chunk(plan, tuple(range(40)), record=True, num_envs=40, num_threads=0)
-    return sorted((ended for step in run_chunk(chunk) for ended in step), key=lambda ended: ended.record.episode)
+def episodes(plan) -> list[Result]:
+    """The results of all episodes of the plan, in its order."""
+    trials = dict(enumerate(plan.trials))
+    chunk = Chunk(plan.options, plan.task, plan.agent_class, trials, record=True, num_envs=40, num_threads=0)
+    return sorted(result for results in run_chunk(chunk) for result in results)
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +66,7 @@ def test_episodes_that_end_in_any_order_are_written_in_the_protocols(plan, episo
         for index in order:
             store.append([episodes[index]])
         assert store.missing == []
-        assert store.records == [ended.record for ended in episodes]
+        assert store.records == [to_record(plan, result) for result in episodes]
         store.finish(store.records, summary)
     assert files_of(tmp_path / "run") == files_of(unbroken)
 
@@ -79,7 +80,7 @@ def test_a_journal_that_was_cut_anywhere_is_gone_on_with(plan, episodes, summary
     order = rng.permutation(40).tolist()
     with Store(folder, plan, resume=False, record=record) as store:
         for index in order:
-            store.append([episodes[index] if record else episodes[index]._replace(trajectory=None)])
+            store.append([episodes[index] if record else episodes[index]._replace(kept=())])
     journal = folder / "journal.jsonl"
     journal.write_bytes(journal.read_bytes()[: int(rng.integers(journal.stat().st_size + 1))] + b"\0" * (seed % 3))
     with Store(folder, plan, resume=True, record=record) as store:
@@ -93,7 +94,7 @@ def test_a_journal_that_was_cut_anywhere_is_gone_on_with(plan, episodes, summary
 
 @pytest.mark.parametrize("record", [False, True])
 def test_what_was_written_before_the_disk_is_full_is_kept(plan, episodes, summary, unbroken, tmp_path, record):
-    ended = [each if record else each._replace(trajectory=None) for each in episodes]
+    ended = [each if record else each._replace(kept=()) for each in episodes]
     said = r"can't write there: File too large; what was written is kept, go on with --resume$"
     with Store(tmp_path, plan, resume=False, record=record) as store, files_of_at_most(12000):
         for each in ended[:3]:

@@ -13,7 +13,7 @@ from mazebench.envs.goal import GoalMazeEnv
 from mazebench.errors import InputError, UnplayableError
 from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.evaluate import evaluate
-from mazebench.evaluation.plan import make_plan
+from mazebench.evaluation.plan import build_agent, make_plan
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, START
 from mazebench.tasks.task import Task
 
@@ -58,14 +58,19 @@ def test_the_agent_and_the_summary_are_told(tmp_path):
     assert "hide" not in line  # records do not change
 
 
+def build(agent, **options):
+    plan = make_plan(eval_options(agent, **options))
+    return build_agent(plan.options, plan.task, plan.agent_class)
+
+
 @pytest.mark.parametrize("agent", ["planner", "planner-closed-loop"])
 def test_agents_that_need_what_is_hidden_are_refused(agent):
     with pytest.raises(UnplayableError, match=f"agent '{agent}': needs the map, found it hidden"):
-        make_plan(eval_options(agent, hide=("map",))).build_agent()
+        build(agent, hide=("map",))
 
 
 def test_the_navigator_plays_without_map_and_goal():
-    make_plan(eval_options("navigator", task="building", split="dev", hide=("map", "goal"))).build_agent()
+    build("navigator", task="building", split="dev", hide=("map", "goal"))
 
 
 @pytest.mark.parametrize(

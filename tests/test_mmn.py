@@ -1,11 +1,12 @@
 """MMN: its transition is generated from the map; its learner, and how it acts."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
 import torch
-from acting import inputs_of
+from acting import RandomActor, inputs_of
 from mazebench_agents.common.layers import NUM_PLACE, MapEncoder, marked_position
 from mazebench_agents.mmn import MMN
 from mazebench_agents.mmn.batches import make_batch
@@ -20,7 +21,7 @@ from mazebench.errors import UnplayableError
 from mazebench.maps.kinds import generate
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.task import Task
-from mazebench.training.experience import Collector
+from mazebench.training.collector import Collector
 
 SMALL = MMNConfig(hidden=16, head_hidden=16, latent=8, embedding=8, task_code=8, groups=4, num_envs=8, min_rows=100)
 CONFIGS = {
@@ -57,10 +58,9 @@ def make_learner(mazes, config=SMALL, seed=0, steps=100):
     overrides = {name: str(value) for name, value in dataclasses.asdict(config).items()}
     spec = Task.of(mazes=mazes, distances=(1, 2, 3), num_goals=config.num_goals)
     learner = MMN.build_learner(spec, seed=seed, overrides=overrides)
-    collector = Collector(spec, learner.num_envs, seed=seed)
-    rng = np.random.default_rng(seed)
-    for _ in range(steps):
-        learner.observe(collector.step(rng.integers(6, size=learner.num_envs)))
+    experience = Collector(spec, learner.num_envs).collect(RandomActor(), seed)
+    for step in itertools.islice(experience, steps):
+        learner.observe(step)
     return learner
 
 

@@ -10,7 +10,7 @@ from mazebench_agents.robot.driving import Drive
 
 from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
-from mazebench.evaluation.chunk import Outcome, run_trials
+from mazebench.evaluation.chunk import Result, run_trials
 from mazebench.maps.benchmark import load_kind_mazes, load_mazes
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
@@ -62,8 +62,8 @@ class TestDriving:
         assert drive.next(blocked, path, body, 1.0) == (action, (x, y))
 
 
-def play(spec: Task, trials: list) -> list[Outcome]:
-    """The outcomes of the navigator, in the order of the trials."""
+def play(spec: Task, trials: list) -> list[Result]:
+    """The results of the navigator, in the order of the trials."""
     agent_class = load_agent_class("navigator")
     interface = Interface(
         spec.task,
@@ -74,12 +74,12 @@ def play(spec: Task, trials: list) -> list[Outcome]:
         odometry_noise=spec.odometry_noise_at(spec.level[0]),
     )
     agent = agent_class.build(interface)
-    played = run_trials(agent, spec, list(enumerate(trials)), 64)
-    return sorted((outcome for outcomes in played for outcome in outcomes), key=lambda outcome: outcome.index)
+    played = run_trials(agent, spec, dict(enumerate(trials)), 64)
+    return sorted(result for results in played for result in results)
 
 
-def success_rate(outcomes: list[Outcome]) -> float:
-    return float(np.mean([outcome.success for outcome in outcomes]))
+def success_rate(results: list[Result]) -> float:
+    return float(np.mean([result.success for result in results]))
 
 
 def track_success_rate(track: str, level: int, distances: tuple[int, ...], num_mazes: int = 9, **options) -> float:

@@ -15,7 +15,7 @@ from simple_mazes import corridor, field
 from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.constants import NUM_ACTIONS, STEPS_PER_ACTION
-from mazebench.evaluation.chunk import Outcome, run_trials
+from mazebench.evaluation.chunk import Result, run_trials
 from mazebench.evaluation.measured_oracle import measure_oracle_steps
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
@@ -30,14 +30,14 @@ def dfs(seed: int, size: int = 13, cell_size: float = 1.0) -> Maze:
     return dataclasses.replace(generate("dfs", size, np.random.default_rng(seed)), cell_size=cell_size)
 
 
-def play(agent: str, task, trials) -> list[Outcome]:
+def play(agent: str, task, trials) -> list[Result]:
     """The result of each trial."""
     interface = Interface(task.task, task.size, task.context_size, cell_size=task.cell_size)
     agent_class = load_agent_class(agent)
     steps = run_trials(
-        agent_class.build(interface), task, list(enumerate(trials)), 32, needs_truth=agent_class.needs_truth
+        agent_class.build(interface), task, dict(enumerate(trials)), 32, needs_truth=agent_class.needs_truth
     )
-    return sorted((outcome for outcomes in steps for outcome in outcomes), key=lambda outcome: outcome.index)
+    return sorted(result for results in steps for result in results)
 
 
 class TestMotion:
@@ -81,11 +81,11 @@ class TestOracle:
         task = Task.of(mazes=[dfs(seed) for seed in range(4)], distances=(3, 8, 14))
         trials = draw_trials(task, 3)
         ours, others = play("oracle", task, trials), play("planner-closed-loop", task, trials)
-        assert all(outcome.success for outcome in ours)
+        assert all(result.success for result in ours)
         assert all(mine.steps <= other.steps for mine, other in zip(ours, others, strict=True))
         assert np.mean([other.steps / mine.steps for mine, other in zip(ours, others, strict=True)]) > 1.2
         # The episode ends within a step of the goal cell's edge; l ends there.
-        assert all(outcome.path_length <= 1.2 * outcome.trial.shortest_path + 0.512 for outcome in ours)
+        assert all(result.path_length <= 1.2 * trials[result.number].shortest_path + 0.512 for result in ours)
 
     @pytest.mark.parametrize("cell_size", [0.4, 0.5, 2.0])
     def test_it_reaches_goals_in_cells_of_other_widths(self, cell_size):

@@ -130,15 +130,12 @@ class TestAgents:
         agent_class, maze = load_agent_class(name), dfs(9, cell_size)
         spec = Task.of(mazes=maze, context_size=agent_class.context_size(9), sensors=("lidar",))
         interface = Interface("local", 9, spec.context_size, sensors=spec.sensors, cell_size=cell_size)
-        trials = list(enumerate(draw_trials(spec, 1)))
+        trials = dict(enumerate(draw_trials(spec, 1)))
         agent = agent_class.build(interface)
-        outcomes = [
-            outcome
-            for ended in run_trials(agent, spec, trials, 16, needs_truth=agent_class.needs_truth)
-            for outcome in ended
-        ]
-        assert len(outcomes) == len(trials)
-        assert all(outcome.success for outcome in outcomes)
+        played = run_trials(agent, spec, trials, 16, needs_truth=agent_class.needs_truth)
+        results = [result for ended in played for result in ended]
+        assert len(results) == len(trials)
+        assert all(result.success for result in results)
 
     def test_a_scale_on_which_an_agent_did_not_learn_is_remarked(self, tmp_path):
         (tmp_path / "fine.txt").write_text(format_maze(generate("dfs", 13, np.random.default_rng(0))))

@@ -125,25 +125,6 @@ class TestKill:
 class TestRay:
     """Ray prints lines of its own among a command's errors, so these tests only look for ours."""
 
-    @slow
-    def test_training_goes_on_when_actors_are_killed(self, tmp_path):
-        pytest.importorskip("ray")
-        many = 50_000  # as it goes on while an actor is replaced, which takes seconds
-        process = start(*TRAIN, "--env-steps", str(many), "--workers", "2", "--out", tmp_path / "run")
-        for kill in range(2):
-            wait_until(lambda kill=kill: num_metrics(tmp_path) > kill, process)
-            wait_until(lambda: len(busy_actors(process)) == 2, process)
-            os.kill(busy_actors(process)[kill], signal.SIGKILL)
-        _, errors = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 0, errors
-        # Ray itself replaces an actor that is killed before it is ready.
-        assert 0 < errors.count("died; it is replaced") <= 2, errors
-        metrics = metrics_of(tmp_path / "run")
-        steps = [line["env_steps"] for line in metrics]
-        assert steps == sorted(set(steps))
-        assert steps[-1] >= many
-        assert metrics[-1]["updates"] == (steps[-1] - 400) // 32
-
     def test_nothing_is_left_running_when_stopped_while_ray_starts(self, tmp_path):
         pytest.importorskip("ray")
         process = start(*LONG, "--ray", "--workers", "2", "--out", "run", cwd=tmp_path)
@@ -154,16 +135,6 @@ class TestRay:
         assert process.returncode == 143, errors
         assert "mazebench: terminated; " in errors
         wait_for_ends(started)
-
-
-def busy_actors(process: subprocess.Popen) -> list[int]:
-    """The Ray actors that work below a process, without Ray's own helpers."""
-    names = {pid: command_line(pid) for pid in descendants(process.pid)}
-    return [
-        pid
-        for pid, name in names.items()
-        if name.startswith("ray::") and not name.startswith("ray::IDLE") and "Agent" not in name
-    ]
 
 
 class TestFullDisk:

@@ -13,7 +13,7 @@ from mazebench_agents.common.replay import Hindsight, Replay
 from mazebench.training.experience import Experience
 
 # What the replay doesn't read: it makes rewards and ends for the goals that it relabels.
-UNREAD = dict.fromkeys(("pose", "velocity", "reward", "terminated", "task", "notes"))
+UNREAD = dict.fromkeys(("pose", "velocity", "reward", "terminated", "notes"))
 NO_HINDSIGHT = Hindsight(ratio=0.0)
 ALWAYS = Hindsight(ratio=1.0, mean_offset=2.0, window=10)
 WINDOW = 5
@@ -127,7 +127,6 @@ def played(seed: int, num_envs: int, length: int, num_steps: int) -> tuple[Repla
                 final_cell=final_cell,
                 context=context,
                 sensors={},
-                final_sensors={},
                 **UNREAD,
             )
         )
@@ -249,7 +248,6 @@ def filled(cells: list[int], goal: int, final_cell: int, priority_exponent: floa
                 final_cell=np.array([final_cell]),
                 context=np.zeros((1, 4, 3, 3), dtype=np.float32),
                 sensors={},
-                final_sensors={},
                 **UNREAD,
             )
         )

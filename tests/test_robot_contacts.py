@@ -72,5 +72,5 @@ def test_what_is_felt_on_random_drives_are_walls():
 def test_a_robot_without_lidar_reaches_goals(options, least):
     spec = Task.of(mazes=load_mazes(13, "train")[:8], distances=(4, 8, 12), **options)
     agent = load_agent_class("navigator").build(Interface("local", 13, 13))
-    played = run_trials(agent, spec, list(enumerate(draw_trials(spec, 2))), 64)
-    assert np.mean([outcome.success for outcomes in played for outcome in outcomes]) >= least
+    played = run_trials(agent, spec, dict(enumerate(draw_trials(spec, 2))), 64)
+    assert np.mean([result.success for results in played for result in results]) >= least

@@ -1,4 +1,4 @@
-"""The training loop: run folders, resuming, faults, and collecting on Ray."""
+"""The training loop: run folders, resuming, faults, and collecting."""
 
 import itertools
 import json
@@ -10,16 +10,17 @@ import time
 import numpy as np
 import pytest
 import torch
+from acting import RandomActor
 from faults import TINY
 from simple_mazes import field
 
 from mazebench import stopping
-from mazebench.agent import Agent
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.tasks.task import Task
+from mazebench.tasks.context import GLOBAL_MAP
+from mazebench.tasks.task import Task, tasks_of_tracks
 from mazebench.training import loop
-from mazebench.training.experience import Collector
+from mazebench.training.collector import Collector
 from mazebench.training.loop import TrainingError, train
 from mazebench.training.run_folder import RunFolder
 
@@ -131,7 +132,7 @@ def checkpoints(folder):
 
 def test_stopped_run_leaves_a_savepoint_and_goes_on_from_it_to_its_next_milestone(unbroken, tmp_path, caplog):
     caplog.set_level(logging.INFO, "mazebench.training")
-    stopped(tiny_options(env_steps=2400), tmp_path, lambda status: status.env_steps == 1208)
+    stopped(tiny_options(env_steps=2400), tmp_path, lambda status: status.counters.env_steps == 1208)
     assert checkpoints(tmp_path) == [800, 1208]
     assert metrics(tmp_path) == metrics(unbroken)[:1]
     train(**tiny_options(env_steps=2400), out=tmp_path, resume=True)
@@ -142,10 +143,17 @@ def test_stopped_run_leaves_a_savepoint_and_goes_on_from_it_to_its_next_mileston
 
 
 def test_run_that_is_stopped_while_it_is_evaluated_is_resumed_to_the_same_bytes(unbroken, tmp_path):
-    stopped(tiny_options(env_steps=2400), tmp_path, lambda status: status.evaluated and status.env_steps == 1600)
+    stopped(
+        tiny_options(env_steps=2400), tmp_path, lambda status: status.evaluated and status.counters.env_steps == 1600
+    )
     assert checkpoints(tmp_path) == [800, 1600]
     assert metrics(tmp_path) == metrics(unbroken)[:1]
-    stopped(tiny_options(env_steps=2400), tmp_path, lambda status: status.evaluated and status.env_steps == 2400, True)
+    stopped(
+        tiny_options(env_steps=2400),
+        tmp_path,
+        lambda status: status.evaluated and status.counters.env_steps == 2400,
+        True,
+    )
     train(**tiny_options(env_steps=2400), out=tmp_path, resume=True)
     assert_same_run(tmp_path, unbroken)
 
@@ -157,7 +165,7 @@ def test_savepoints_do_not_change_the_run_that_saves_them(unbroken, tmp_path):
 
 def test_without_savepoints_a_stopped_run_goes_on_from_its_last_milestone_to_the_same_bytes(unbroken, tmp_path):
     options = tiny_options(env_steps=2400, checkpoint_minutes=0)
-    stopped(options, tmp_path, lambda status: status.env_steps == 1208)
+    stopped(options, tmp_path, lambda status: status.counters.env_steps == 1208)
     assert checkpoints(tmp_path) == [0, 800]
     train(**options, out=tmp_path, resume=True)
     assert_same_run(tmp_path, unbroken)
@@ -175,7 +183,7 @@ def test_metrics_have_a_line_every_so_many_steps_with_the_losses_since_the_line_
     of_milestone = (updates[3] - updates[2]) * lines[3]["td_loss"] + (updates[2] - updates[1]) * lines[2]["td_loss"]
     assert math.isclose(of_milestone / (updates[3] - updates[1]), metrics(unbroken)[1]["td_loss"])
 
-    stopped(options, tmp_path / "stopped", lambda status: status.env_steps == 1304)
+    stopped(options, tmp_path / "stopped", lambda status: status.counters.env_steps == 1304)
     train(**options, out=tmp_path / "stopped", resume=True)
     resumed = metrics(tmp_path / "stopped")
     assert resumed[:3] == lines[:3]
@@ -209,12 +217,15 @@ def test_minutes_limit_a_command(tmp_path):
     assert metrics(tmp_path)[-1]["env_steps"] > 0
 
 
+def collect(actor, num_steps, **options):
+    """The steps of an agent in four environments of a field."""
+    spec = Task.of(mazes=field(7), distances=(1, 2), num_goals=3, **options)
+    return list(itertools.islice(Collector(spec, 4).collect(actor, seed=1), num_steps))
+
+
 def test_collector_gives_trajectories_that_hang_together():
     """Each next state follows the one before it, and cells, legs and ends are those of the environments."""
-    spec = Task.of(mazes=field(7), distances=(1, 2), time_limit=10, num_goals=3)
-    collector = Collector(spec, 4, seed=1)
-    rng = np.random.default_rng(0)
-    steps = [collector.step(rng.integers(6, size=4)) for _ in range(80)]
+    steps = collect(RandomActor(), 80, time_limit=10)
     for before, after in itertools.pairwise(steps):
         np.testing.assert_array_equal(after.new_episode, before.ended)
         assert (after.new_context | ~after.new_episode).all()
@@ -230,63 +241,30 @@ def test_collector_gives_trajectories_that_hang_together():
     assert legs > sum(int(step.new_episode.sum()) for step in steps) > 4, "several goals an episode, several episodes"
 
 
-class Rolling(Agent):
-    """Goes forward, and returns the inputs it was given as its state."""
-
-    def initial_state(self, batch_size):
-        return []
+class Witness(RandomActor):
+    """Explores at random; what it notes of a step is the seeds that it was given."""
 
     def act(self, inputs, state, explore=False):
-        return np.zeros(len(inputs.seed), dtype=np.int64), [*state, inputs]
+        return super().act(inputs, inputs.seed, explore)
 
-
-def roll(seed):
-    """The inputs of 40 steps in four environments, the steps, and the seeds of the environments' first episodes."""
-    spec = Task.of(mazes=field(7), distances=(1, 2), time_limit=6, num_goals=3)
-    collector, state, steps = Collector(spec, 4, seed=seed), [], []
-    env = MazeVectorEnv(spec, 4)  # the same environments, to look at their episodes
-    observation, _ = env.reset(seed=np.random.SeedSequence(seed).generate_state(4).tolist())
-    np.testing.assert_array_equal(observation["state"], collector.inputs.observation["state"])
-    first = [episode.seed for episode in env.episodes]
-    for _ in range(40):
-        actions, state = Rolling().act(collector.inputs, state, explore=True)
-        steps.append(collector.step(actions))
-    return state, steps, first
+    def notes(self, state):
+        return state
 
 
 def test_collector_gives_every_episode_a_seed_of_its_own_that_is_not_the_episodes():
-    given, steps, first = roll(seed=1)
-    for inputs, step in zip(given, steps, strict=True):
-        np.testing.assert_array_equal(inputs.new_episode, step.new_episode)
-        np.testing.assert_array_equal(inputs.new_context, step.new_context)
-    seeds = [seed for inputs in given for seed in inputs.seed[inputs.new_episode].tolist()]
+    steps = collect(Witness(), 40, time_limit=6)
+    env = MazeVectorEnv(Task.of(mazes=field(7), distances=(1, 2), num_goals=3, time_limit=6), 4)
+    observation, _ = env.reset(seed=np.random.SeedSequence(1).generate_state(4).tolist())  # the same environments
+    np.testing.assert_array_equal(observation["state"], steps[0].state)
+    seeds = [seed for step in steps for seed in step.notes[step.new_episode].tolist()]
     assert len(set(seeds)) == len(seeds) > 4
-    assert not set(seeds) & set(first)
-    for before, after in itertools.pairwise(given):
-        np.testing.assert_array_equal(before.seed != after.seed, after.new_episode)
+    assert not set(seeds) & {episode.seed for episode in env.episodes}
+    for before, after in itertools.pairwise(steps):
+        np.testing.assert_array_equal(before.notes != after.notes, after.new_episode)
 
 
-ray = pytest.importorskip("ray")
-
-
-@pytest.fixture(scope="module")
-def cluster():
-    """A local Ray cluster, as small as it gets."""
-    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, object_store_memory=100 * 2**20)
-    yield
-    ray.shutdown()
-
-
-@pytest.mark.filterwarnings("ignore")
-@pytest.mark.slow
-def test_training_on_ray_keeps_the_replay_ratio(cluster, tmp_path):
-    train(**tiny_options(env_steps=1600, workers=2), out=tmp_path)
-    last = metrics(tmp_path)[-1]
-    assert last["env_steps"] >= 1600
-    assert last["updates"] == (last["env_steps"] - 400) // 32
-    assert math.isfinite(last["td_loss"])
-
-
-def test_more_workers_than_environments_are_refused(cluster, tmp_path):
-    with pytest.raises(InputError, match="at most 8 workers"):
-        train(**tiny_options(env_steps=100, workers=9), out=tmp_path)
+def test_of_several_tracks_each_episode_draws_one():
+    tasks = tasks_of_tracks(("building", "rough"), kinds=("dfs",), fresh=True, size=13, distances=(3,))
+    first = next(Collector(tasks, 16).collect(RandomActor(), seed=0))
+    drawn_by_hand = ((first.context[:, GLOBAL_MAP] % 1) > 0).any(axis=(1, 2))
+    assert 0 < drawn_by_hand.sum() < 16

@@ -70,7 +70,7 @@ class NetworkAgent(LearningAgent):
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             self.network = self.make_network(config, context_size).to(device)
-        self.explore_from(0, config.num_envs, seed)
+        self.explore_from(seed)
 
     @classmethod
     def make_network(cls, config: Any, context_size: int) -> torch.nn.Module:
@@ -117,24 +117,16 @@ class NetworkAgent(LearningAgent):
         device = "cuda" if cls.learns_on_gpu and torch.cuda.is_available() else "cpu"
         return cls.learner_class(cls(config, task.context_size, seed, device), task, seed)
 
-    def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
-        """Begins a new stream of exploration, as the environments from `first_env` on of the learner's.
+    def explore_from(self, seed: int) -> None:
+        """Begins a new stream of exploration.
 
         The rate of random actions falls from the first environment to the last (Horgan et al. 2018), and so does the
         scale of the noise in the choice of actions, where an agent has such noise.
         """
-        rung = (first_env + np.arange(num_envs)) / max(1, self.config.num_envs - 1)
+        rung = np.arange(self.config.num_envs) / max(1, self.config.num_envs - 1)
         self._epsilon = self.config.epsilon_base ** (1 + self.config.epsilon_alpha * rung)
         self._noise_scale = 1.0 - rung
         self._rng = np.random.default_rng(seed)
-
-    def parameters(self) -> dict[str, np.ndarray]:
-        """Returns the network's, by name."""
-        return {name: value.cpu().numpy().copy() for name, value in self.network.state_dict().items()}
-
-    def set_parameters(self, parameters: dict[str, np.ndarray]) -> None:
-        """Takes over the parameters of another network."""
-        self.network.load_state_dict({name: torch.from_numpy(value.copy()) for name, value in parameters.items()})
 
     def save(self, path: pathlib.Path, provenance: Mapping[str, Any]) -> None:
         """Writes the checkpoint that `build` reads."""

@@ -106,9 +106,9 @@ class HindsightLearner(NetworkLearner):
         rows, megabytes = self.actor.config.replay_capacity, self.replay.num_bytes / 2**20
         return f"{weights:,} weights on {parameters[0].device}; replay of {rows:,} rows, {megabytes:.0f} MiB"
 
-    def observe(self, experience: Experience, first_env: int = 0) -> None:
-        """Stores one step in the environments from `first_env` on."""
-        self.replay.add(experience, first_env)
+    def observe(self, experience: Experience) -> None:
+        """Stores one step in all environments."""
+        self.replay.add(experience)
 
     def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:
         """Writes what every learner does, and the replay."""

@@ -160,11 +160,11 @@ class Replay:
         """The memory of all rows, used or not, and of maps."""
         return self._rows.nbytes + self._maps.nbytes
 
-    def add(self, experience: Experience, first_env: int = 0) -> None:
-        """Stores one step of each of the environments from `first_env` on."""
-        envs = first_env + np.arange(len(experience.action))
+    def add(self, experience: Experience) -> None:
+        """Stores one step of each environment."""
+        envs = np.arange(self._num_envs)
         begins, begins_leg = experience.new_episode, experience.new_context
-        current = self._current[envs]
+        current = self._current
         current["trajectory"] += begins
         current["leg"] += begins_leg
         current["origin"][begins_leg] = experience.state[begins_leg, :2]
@@ -172,7 +172,6 @@ class Replay:
         current["anchor"][begins] = experience.start[begins]
         for name in ("start", "goal", "maze"):
             current[name] = getattr(experience, name)
-        self._current[envs] = current
         if self._map_size:
             walls = experience.context[begins, GLOBAL_MAP].reshape(-1, self._map_size**2) > 0.5
             self._maps[envs[begins], current["trajectory"][begins] % self._length] = np.packbits(walls, axis=-1)

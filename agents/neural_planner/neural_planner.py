@@ -96,17 +96,17 @@ class NeuralPlanner(NetworkAgent):
     def build_learner(cls, task: Task, *, seed: int = 0, overrides: Mapping[str, str] | None = None) -> PlannerLearner:
         """Returns a learner for an agent of this class."""
         config = override(cls.default_config, overrides or {})
-        return PlannerLearner(cls(config, task.interface, seed), seed)
+        return PlannerLearner(cls(config, task.interface, seed), task.mazes, seed)
 
-    def in_task(self, task: Task) -> Self:
-        """Returns an agent with the same network for another task's environments."""
+    def for_interface(self, interface: Interface) -> Self:
+        """Returns an agent with the same network for other environments."""
         agent = copy.copy(self)
-        agent._sense(task.interface)
+        agent._sense(interface)
         return agent
 
-    def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
-        """Begins a new stream of exploration, as the environments from `first_env` on of the learner's."""
-        self._rng, self._stream = np.random.default_rng([seed, first_env]), seed
+    def explore_from(self, seed: int) -> None:
+        """Begins a new stream of exploration."""
+        self._rng, self._stream = np.random.default_rng([seed, 0]), seed
 
     def initial_state(self, batch_size: int) -> ActorState:
         """Returns no robots yet: one is made where an episode begins."""

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import pathlib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -16,6 +15,7 @@ from torch.nn import functional
 
 from mazebench.constants import NUM_ACTIONS
 from mazebench.errors import InputError
+from mazebench.maps.drawn import Mazes
 from mazebench.storage.array_files import read_arrays
 from mazebench.training.experience import Experience
 
@@ -88,20 +88,13 @@ class _Step(NamedTuple):
     label: np.ndarray  # [B, 6] float32, the probabilities of actions by the oracle; without one, zeros
 
 
-@dataclasses.dataclass
-class _Rollout:
-    """The last steps in the environments of one task, oldest first."""
-
-    steps: list[_Step] = dataclasses.field(default_factory=list)
-    expert: Expert | None = None
-
-
 class PlannerLearner(NetworkLearner):
     """Updates the network of its actor after each rollout; imitation learns from the rollouts before it, too."""
 
     min_rows = 0
 
-    def __init__(self, actor: NetworkAgent, seed: int):
+    def __init__(self, actor: NetworkAgent, mazes: Mazes, seed: int):
+        """The steps are taken in the `mazes`."""
         config = self._config = actor.config
         self.steps_per_update: int = config.num_envs * config.rollout_steps
         num_gradients = max(1, config.total_steps // self.steps_per_update) * config.epochs * config.minibatches
@@ -113,30 +106,31 @@ class PlannerLearner(NetworkLearner):
             rate=lambda step: min(1.0, max(_LEAST_RATE, 2 - 2 * step / num_gradients)),
         )
         super().__init__(actor, seed, descent)
-        self._rollouts: dict[int, _Rollout] = {}  # by the first environment
+        self._steps: list[_Step] = []  # of the rollout that is under way, oldest first
+        self._expert = Expert(mazes, config.num_envs)
         self._kept: list[dict[int, Rows]] = []  # the last rollouts, by the size of grids
 
     @property
     def num_rows(self) -> int:
         """The number of steps of the rollout that is under way."""
-        return sum(len(step.action) for rollout in self._rollouts.values() for step in rollout.steps)
+        return sum(len(step.action) for step in self._steps)
 
     def description(self) -> str:
         """Returns the size of the network, and who teaches it."""
         weights = sum(parameter.numel() for parameter in self.actor.network.parameters())
         return f"{weights:,} weights, taught by {'rewards' if self._config.teacher == 'reward' else 'the oracle'}"
 
-    def observe(self, experience: Experience, first_env: int = 0) -> None:
-        """Keeps one step in the environments from `first_env` on, with the oracle's labels if it teaches."""
-        rollout, choice = self._rollouts.setdefault(first_env, _Rollout()), experience.notes
-        if rollout.steps and rollout.steps[-1].choice.stream != choice.stream:
+    def observe(self, experience: Experience) -> None:
+        """Keeps one step in all environments, with the oracle's labels if it teaches."""
+        choice = experience.notes
+        if self._steps and self._steps[-1].choice.stream != choice.stream:
             # New trajectories began, at a milestone: a run that is resumed there has no steps from before.
-            rollout.steps.clear()
+            self._steps.clear()
         label = np.zeros((len(experience.action), NUM_ACTIONS), np.float32)
         if self._config.teacher == "oracle":
-            label = self._labels(rollout, experience)
+            label = self._labels(experience)
         ends = experience.reward, experience.terminated, experience.ended
-        rollout.steps.append(_Step(choice, experience.action, *ends, label))
+        self._steps.append(_Step(choice, experience.action, *ends, label))
 
     @one_torch_thread()
     def update(self) -> dict[str, float]:
@@ -191,18 +185,16 @@ class PlannerLearner(NetworkLearner):
         loss = policy_loss + config.value_weight * value_loss - config.entropy_weight * entropy
         return {"loss": loss, "policy_loss": policy_loss, "value_loss": value_loss, **scalars}
 
-    def _labels(self, rollout: _Rollout, step: Experience) -> np.ndarray:
+    def _labels(self, step: Experience) -> np.ndarray:
         """Returns `[B, 6]`: the probabilities of actions by the oracle's look-ahead from the true state."""
-        if rollout.expert is None:
-            rollout.expert = Expert(step.task.mazes, len(step.action))
-        costs = rollout.expert.costs(step.maze, step.goal, step.pose, step.velocity)
+        costs = self._expert.costs(step.maze, step.goal, step.pose, step.velocity)
         best = costs.min(axis=1, keepdims=True)
         weights = np.exp(-(costs - best) / self._config.label_temperature)
         return (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
 
     def _success_rate(self) -> float:
         """Returns the share of the rollout's episodes that ended in the goal; 0 if none ended."""
-        steps = [step for rollout in self._rollouts.values() for step in rollout.steps[:-1]]
+        steps = self._steps[:-1]
         num_ended = sum(int(step.ended.sum()) for step in steps)
         return sum(int(step.terminated.sum()) for step in steps) / max(1, num_ended)
 
@@ -214,18 +206,17 @@ class PlannerLearner(NetworkLearner):
         config = self._config
         discount, trace = 1 - 1 / config.discount_steps, 1 - 1 / config.trace_steps
         collected: dict[int, _Collected] = {}
-        for rollout in self._rollouts.values():
-            steps = rollout.steps
-            value = np.stack([step.choice.value for step in steps])
-            reward = config.reward_scale * np.stack([step.reward for step in steps])
-            terminated, ended = np.stack([step.terminated for step in steps]), np.stack([step.ended for step in steps])
-            advantage = advantages(reward, value, terminated, ended, discount, trace)
-            for number, step in enumerate(steps[:-1]):
-                found = [step.choice.log_probability, advantage[number], advantage[number] + value[number], step.label]
-                for slot, grid in enumerate(step.choice.grids):
-                    rows = collected.setdefault(grid.shape[-1], _Collected())
-                    rows.add(grid, *(part[slot] for part in (*step.choice.situation, step.action, *found)))
-            del steps[:-1]
+        steps = self._steps
+        value = np.stack([step.choice.value for step in steps])
+        reward = config.reward_scale * np.stack([step.reward for step in steps])
+        terminated, ended = np.stack([step.terminated for step in steps]), np.stack([step.ended for step in steps])
+        advantage = advantages(reward, value, terminated, ended, discount, trace)
+        for number, step in enumerate(steps[:-1]):
+            found = [step.choice.log_probability, advantage[number], advantage[number] + value[number], step.label]
+            for slot, grid in enumerate(step.choice.grids):
+                rows = collected.setdefault(grid.shape[-1], _Collected())
+                rows.add(grid, *(part[slot] for part in (*step.choice.situation, step.action, *found)))
+        del steps[:-1]
         return {size: rows.stacked() for size, rows in collected.items()}
 
     def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:

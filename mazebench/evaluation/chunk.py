@@ -8,21 +8,24 @@ from __future__ import annotations
 import collections
 import contextlib
 import dataclasses
-from collections.abc import Iterator, Sequence
+import functools
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from mazebench.agent import Agent, Inputs
+from mazebench.agent import Agent, Observation
+from mazebench.agent_loading import load_agent_class
+from mazebench.constants import YAW, X, Y
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError, RunError, UnplayableError
-from mazebench.evaluation.agent_inputs import agent_seed, true_state
 from mazebench.evaluation.checked_agent import AgentError
-from mazebench.evaluation.plan import Plan
-from mazebench.evaluation.recorder import PoseRecorder, Recorder
+from mazebench.evaluation.eval_options import EvalOptions
+from mazebench.evaluation.plan import Plan, build_agent
 from mazebench.results.metrics import spl
 from mazebench.results.records import Record
 from mazebench.results.trajectories import Trajectory
+from mazebench.rollout import agent_seed, rollout
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.observation import state_errors
 from mazebench.tasks.task import Task
@@ -30,64 +33,72 @@ from mazebench.tasks.trials import Trial
 
 PATIENCE = 0.5  # seconds that a pool waits for a chunk to end before it lets the caller look for signals
 
-
-@dataclasses.dataclass(frozen=True)
-class Chunk:
-    """Some episodes of an evaluation, for one process to run."""
-
-    plan: Plan
-    episodes: tuple[int, ...]  # their indices in the plan
-    record: bool  # whether trajectories are wanted
-    num_envs: int  # environments side by side
-    num_threads: int  # of the simulation; 0 for all cores
+# Returns B values to keep of a moment, from what is observed and the infos of B environments, and from the actions that
+# follow; None after the last one.
+Keep = Callable[[Observation, dict[str, Any], np.ndarray | None], Sequence[Any]]
 
 
-class Ended(NamedTuple):
-    """An episode that ended."""
+class Result(NamedTuple):
+    """The result of an episode."""
 
-    record: Record
-    trajectory: Trajectory | None  # None where none is wanted
-
-
-@dataclasses.dataclass(frozen=True)
-class Outcome:
-    """The result of a trial."""
-
-    index: int  # of the trial
-    trial: Trial
+    number: int  # of the trial
     success: bool
     steps: int
     path_length: float  # m
     blocked: bool  # whether a wall stands in the shortest path on the shown map
-    recorded: Any  # what the recorder made of it; None without one
+    kept: Sequence[Any] | np.ndarray  # of each moment, the last one included; empty if nothing is kept
 
 
-def run_chunk(chunk: Chunk) -> Iterator[list[Ended]]:
-    """Yields the episodes that ended, after each step; each once, in no fixed order."""
-    plan = chunk.plan
-    trials = [(index, plan.trials[index]) for index in chunk.episodes]
-    agent = plan.build_agent()
-    for outcomes in run_trials(
-        agent,
-        plan.task,
-        trials,
+@dataclasses.dataclass(frozen=True, eq=False)
+class Chunk:
+    """Some episodes of an evaluation, for one process to run."""
+
+    options: EvalOptions  # of the plan
+    task: Task  # of the plan
+    agent_class: type[Agent]
+    trials: Mapping[int, Trial]  # by their numbers in the plan
+    record: bool  # whether trajectories are wanted
+    num_envs: int  # environments side by side
+    num_threads: int  # of the simulation; 0 for all cores
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Leaves out the class, which may have been made of a `SingleAgent`: a worker loads it by its name."""
+        return _unpickled, (self.options, self.task, self.trials, self.record, self.num_envs, self.num_threads)
+
+
+def _unpickled(options: EvalOptions, task: Task, *others: Any) -> Chunk:
+    return Chunk(options, _shared(task), load_agent_class(options.agent), *others)
+
+
+@functools.lru_cache(maxsize=1)
+def _shared(task: Task) -> Task:
+    """Returns the same object for all chunks of an evaluation that a process runs, so that they share the mazes."""
+    return task
+
+
+def run_chunk(chunk: Chunk) -> Iterator[list[Result]]:
+    """Yields the results of the episodes that ended, after each step; each once, in no fixed order."""
+    for results in run_trials(
+        build_agent(chunk.options, chunk.task, chunk.agent_class),
+        chunk.task,
+        chunk.trials,
         chunk.num_envs,
         chunk.num_threads,
-        seed=plan.options.seed,
-        needs_truth=plan.agent_class.needs_truth,
-        recorder=PoseRecorder() if chunk.record else None,
+        seed=chunk.options.seed,
+        needs_truth=chunk.agent_class.needs_truth,
+        keep=_poses if chunk.record else None,
     ):
-        yield [Ended(_to_record(plan, outcome), _to_trajectory(plan.task, outcome)) for outcome in outcomes]
+        yield [result._replace(kept=np.array(result.kept)) for result in results] if chunk.record else results
 
 
-def run_whole_chunk(chunk: Chunk) -> list[Ended]:
-    """Returns all episodes of a chunk.
+def run_whole_chunk(chunk: Chunk) -> list[Result]:
+    """Returns the results of all episodes of a chunk.
 
     Raises:
       InputError, RunError: of the plain kinds, since what caused them need not survive the way to another process.
     """
     try:
-        return [ended for step in run_chunk(chunk) for ended in step]
+        return [result for results in run_chunk(chunk) for result in results]
     except (InputError, RunError) as error:
         kinds = (UnplayableError, InputError, AgentError, RunError)
         raise next(kind for kind in kinds if isinstance(error, kind))(str(error)) from None
@@ -96,110 +107,108 @@ def run_whole_chunk(chunk: Chunk) -> list[Ended]:
 def run_trials(
     agent: Agent,
     task: Task,
-    trials: Sequence[tuple[int, Trial]],
+    trials: Mapping[int, Trial],
     num_envs: int,
     num_threads: int = 0,
     *,
     seed: int = 0,
     needs_truth: bool = False,
-    recorder: Recorder | None = None,
-) -> Iterator[list[Outcome]]:
-    """Yields what came of the trials that ended, after each step; each once, in no fixed order.
+    keep: Keep | None = None,
+) -> Iterator[list[Result]]:
+    """Yields the results of the trials that ended, after each step; each once, in no fixed order.
 
     Args:
       agent: acts without exploring.
       task: the task, with the mazes that the trials index.
-      trials: the episodes to run, each with its index.
-      num_envs: environments side by side, at most; outcomes of an agent that keeps its contract do not depend on it.
+      trials: the episodes to run, by their numbers.
+      num_envs: environments side by side, at most; results of an agent that keeps its contract do not depend on it.
       num_threads: of the simulation; 0 for all cores.
-      seed: of what the agent draws; with a trial's index it gives the seed of the episode's draws.
+      seed: of what the agent draws; with a trial's number it gives the seed of the episode's draws.
       needs_truth: whether the agent is given the true maze and pose.
-      recorder: of the episodes.
+      keep: what to keep of each moment of the episodes.
     """
     if not trials:
         return
 
     num_envs = min(num_envs, len(trials))
     # The longest ways first, so that no environment is left alone with one at the end.
-    queue = collections.deque(sorted(trials, key=lambda numbered: -numbered[1].shortest_path))
-    slots: list[tuple[int, Trial] | None] = [None] * num_envs
+    queue = collections.deque(sorted(trials, key=lambda number: -trials[number].shortest_path))
+    running = [-1] * num_envs  # the number of the trial in each environment; -1 where none is left
 
     def next_episode(slot: int) -> Episode | None:
-        slots[slot] = numbered = queue.popleft() if queue else None
-        return None if numbered is None else numbered[1].episode
+        running[slot] = queue.popleft() if queue else -1
+        return None if running[slot] < 0 else trials[running[slot]].episode
 
-    state = agent.initial_state(num_envs)
-    active = new_episode = np.ones(num_envs, dtype=bool)
-    seeds = np.zeros(num_envs, dtype=np.int64)
+    def seeds(slots: np.ndarray) -> list[int]:
+        return [agent_seed(seed, running[slot]) for slot in slots]
+
+    kept: list[list[Any]] = [[] for _ in range(num_envs)]
     env = MazeVectorEnv(task, num_envs, num_threads=num_threads, episode_source=next_episode)
     with contextlib.closing(env):
-        observation, info = env.reset()
-        while active.any():
-            # What the agent is told: each episode has a seed of its own.
-            for slot in np.flatnonzero(new_episode):
-                seeds[slot] = agent_seed(seed, _present(slots[slot])[0])
-            truth = true_state(task, env.episodes, info["position"], info["yaw"]) if needs_truth else None
-            inputs = Inputs(
-                observation=observation,
-                new_episode=new_episode,
-                new_context=info["is_first"],
-                seed=seeds,
-                truth=truth,
-                active=active,
-            )
-
-            # A step. An environment whose episode ends in it takes the next one; without one, it is no longer active.
-            actions, state = agent.act(inputs, state)
-            if recorder:
-                recorder.add(observation, info, actions, active)
-            running = list(slots)
-            observation, _, terminated, truncated, info = env.step(actions)
-            ended = terminated | truncated
-            active = np.array([numbered is not None for numbered in slots])
-            new_episode = ended & active
-
-            yield [_outcome(*_present(running[slot]), info, slot, recorder) for slot in np.flatnonzero(ended).tolist()]
-
-
-def _present(numbered: tuple[int, Trial] | None) -> tuple[int, Trial]:
-    assert numbered is not None
-    return numbered
+        first, numbers = env.reset(), list(running)
+        for step in rollout(agent, env, first, seeds, needs_truth=needs_truth):
+            if keep:
+                moments = keep(step.inputs.observation, step.info, step.actions)
+                for slot, number in enumerate(numbers):
+                    if number >= 0:
+                        kept[slot].append(moments[slot])
+            results = []
+            for slot in np.flatnonzero(step.ended).tolist():
+                final = {name: values[slot : slot + 1] for name, values in step.next_info["final_info"].items()}
+                if keep:
+                    observation = step.next_info["final_obs"][slot]
+                    kept[slot].extend(keep({name: value[None] for name, value in observation.items()}, final, None))
+                results.append(
+                    Result(
+                        number=numbers[slot],
+                        success=final["success"].item(),
+                        steps=final["steps"].item(),
+                        path_length=final["path_length"].item(),
+                        blocked=final["blocked"].item(),
+                        kept=kept[slot],
+                    )
+                )
+                kept[slot] = []
+            yield results
+            numbers = list(running)
 
 
-def _outcome(index: int, trial: Trial, info: dict[str, Any], slot: int, recorder: Recorder | None) -> Outcome:
-    final = info["final_info"]
-    recorded = recorder.take(slot, info["final_obs"][slot], final) if recorder else None
-    success, steps = bool(final["success"][slot]), int(final["steps"][slot])
-    path_length, blocked = float(final["path_length"][slot]), bool(final["blocked"][slot])
-    return Outcome(index, trial, success, steps, path_length, blocked, recorded)
+def _poses(observation: Observation, info: dict[str, Any], actions: np.ndarray | None) -> Sequence[Any]:
+    """Returns `[B, 6]` float32: the true and the observed poses, x and y in metres and yaw in rad."""
+    poses = np.column_stack([info["position"], info["yaw"], observation["state"][:, (X, Y, YAW)]])
+    return poses.astype(np.float32)  # type: ignore[return-value]  # an array is as good as a sequence
 
 
-def _to_trajectory(task: Task, outcome: Outcome) -> Trajectory | None:
-    if outcome.recorded is None:
+def to_trajectory(plan: Plan, result: Result) -> Trajectory | None:
+    """Returns the trajectory of an episode of a plan; None if it was not kept."""
+    if not len(result.kept):
         return None
-    is_wrong = task.track is not None and state_errors(task, outcome.trial.episode)
-    return Trajectory(outcome.recorded.true, outcome.recorded.observed if is_wrong else None)
+    task, poses = plan.task, np.asarray(result.kept)
+    is_wrong = task.track is not None and state_errors(task, plan.trials[result.number].episode)
+    return Trajectory(poses[:, :3], poses[:, 3:] if is_wrong else None)
 
 
-def _to_record(plan: Plan, outcome: Outcome) -> Record:
-    task, trial, episode = plan.task, outcome.trial, outcome.trial.episode
+def to_record(plan: Plan, result: Result) -> Record:
+    """Returns the record of an episode of a plan."""
+    task, trial = plan.task, plan.trials[result.number]
+    episode = trial.episode
     maze = task.mazes[episode.maze]
     # Of the body as a disc, and from cell to cell; both in metres.
     shortest = np.array([trial.shortest_path, trial.distance * task.cell_size])
-    spl_of_disc, spl_grid = spl(np.array([outcome.success]), shortest, np.array([outcome.path_length])).tolist()
+    spl_of_disc, spl_grid = spl(np.array([result.success]), shortest, np.array([result.path_length])).tolist()
     values = {
         "agent": plan.options.agent,
         "task": task.name,
         "size": task.size,
         "split": task.options.split_in_results,
-        "episode": outcome.index,
+        "episode": result.number,
         "maze": maze.name,
         "start": episode.start,
         "goal": episode.goal,
         "distance": trial.distance,
-        "success": outcome.success,
-        "steps": outcome.steps,
-        "path_length": outcome.path_length,
+        "success": result.success,
+        "steps": result.steps,
+        "path_length": result.path_length,
         "shortest_path": trial.shortest_path,
         "spl": spl_of_disc,
         "spl_grid": spl_grid,
@@ -214,7 +223,7 @@ def _to_record(plan: Plan, outcome: Outcome) -> Record:
     further |= {name: value for name, value in noise.items() if value is not None}
     further |= task.options.perturbations
     if task.track is not None:  # summaries report the episodes of each of these groups apart
-        further["blocked"] = outcome.blocked
+        further["blocked"] = result.blocked
         if maze.kind:
             further["kind"] = maze.kind
     return Record.model_validate(values | further)

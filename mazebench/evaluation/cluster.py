@@ -10,7 +10,7 @@ from typing import Any
 
 from mazebench import stopping
 from mazebench.errors import InputError, RunError, shortened
-from mazebench.evaluation.chunk import PATIENCE, Chunk, Ended, run_whole_chunk
+from mazebench.evaluation.chunk import PATIENCE, Chunk, Result, run_whole_chunk
 
 try:
     import ray
@@ -34,11 +34,11 @@ class Cluster:
         """
         self._started = not ray.is_initialized()
         if self._started:
-            connect(address)
+            _connect(address)
         self.num_workers = workers or max(1, int(ray.cluster_resources().get("CPU", 0)))
 
-    def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Ended]]:
-        """Yields the episodes of each chunk that has ended; Ray runs the chunk of a worker that died again.
+    def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Result]]:
+        """Yields the results of each chunk that has ended; Ray runs the chunk of a worker that died again.
 
         Raises:
           InputError, RunError: what a chunk raised.
@@ -52,7 +52,7 @@ class Cluster:
                 running.append(task.remote(waiting.pop(0)))
             ended, running = ray.wait(running, num_returns=1, timeout=PATIENCE)
             try:
-                yield [episode for chunk in ray.get(ended) for episode in chunk]
+                yield [result for chunk in ray.get(ended) for result in chunk]
             except ray.exceptions.RayTaskError as error:
                 cause = error.cause
                 if isinstance(cause, (InputError, RunError)):
@@ -69,7 +69,7 @@ class Cluster:
             ray.shutdown()
 
 
-def connect(address: str) -> None:
+def _connect(address: str) -> None:
     """Connects this process to the cluster at `address`, as `Cluster` does."""
     handler, is_terminated = signal.getsignal(signal.SIGTERM), False
     try:

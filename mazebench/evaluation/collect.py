@@ -1,120 +1,155 @@
-"""Collects demonstrations of an agent, as files of arrays or as a Minari data set.
+"""Collects demonstrations of an agent as a Minari data set.
 
-Episode i is the one that `reset(seed=SEED + i)` of an environment of the task begins. The folder gets `config.json`
-and a file of arrays for each 50 episodes; a run that was stopped goes on after them. Minari's data set is made of these
-files when all are there, and takes their place.
+Episode i is the one that `reset(seed=SEED + i)` of an environment of the task begins. docs/imitation.md lists the
+arrays; those that are privileged are for training.
 """
 
 from __future__ import annotations
 
 import pathlib
+import re
+import shutil
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from mazebench import stopping
-from mazebench.agent import Agent
+from mazebench import __version__
+from mazebench.agent import Observation
+from mazebench.envs.env_spec import env_spec_of
+from mazebench.envs.spaces import action_space, observation_space
 from mazebench.errors import InputError, remark
-from mazebench.evaluation.chunk import run_trials
-from mazebench.evaluation.collect_options import MINARI, CollectOptions
-from mazebench.evaluation.demonstrations import Demonstration, StepRecorder, make_demonstration, save_demonstrations
+from mazebench.evaluation.chunk import Result, run_trials
 from mazebench.evaluation.eval_options import NUM_ENVS, EvalOptions
-from mazebench.evaluation.plan import Plan, make_plan
-from mazebench.evaluation.store import is_begun
-from mazebench.results.reading import CONFIG
+from mazebench.evaluation.plan import Plan, build_agent, make_plan
 from mazebench.storage.files import writing_to
-from mazebench.storage.json_files import write_json
 from mazebench.tasks.episode import sample_episode
-from mazebench.tasks.task import resolve
+from mazebench.tasks.rules import reward
+from mazebench.tasks.task import Task, resolve
 from mazebench.tasks.trials import Trial
 
-EPISODES_PER_FILE = 50
-DATASET = "data"  # the folder of Minari's data set, as Minari calls it
+try:
+    import minari
+    from minari.data_collector import EpisodeBuffer
+    from minari.dataset.minari_storage import MinariStorage
+except ModuleNotFoundError as error:
+    raise InputError("mazebench collect needs Minari, which the extra [minari] brings (docs/start.md)") from error
 
 
 def collect_demonstrations(
     options: EvalOptions,
-    wanted: CollectOptions,
+    num_episodes: int,
     folder: pathlib.Path,
     *,
-    resume: bool = False,
     num_envs: int = NUM_ENVS,
     progress: Callable[[int, int], None] = lambda ended, of: None,
 ) -> None:
-    """Writes demonstrations of an agent into a folder.
+    """Writes demonstrations of an agent as the data set `folder`, all or nothing.
 
     Args:
       options: the agent, the task, and the seed of the first episode.
-      wanted: how many, and in which format.
-      folder: a new or an empty one, or one to go on with.
-      resume: whether to go on with the run that `folder` holds.
+      num_episodes: how many.
+      folder: a new or an empty one.
       num_envs: environments side by side, at most.
       progress: called as episodes end, with their number and that of all.
 
     Raises:
-      InputError: if an option can't be met, the mazes are those of the split eval, or `folder` holds anything else.
-      RunError: if the agent failed; the files that were written are kept.
+      InputError: if an option can't be met, the mazes are those of the split eval, or `folder` is not empty or can't be
+        written.
+      RunError: if the agent failed.
     """
     if options.task.split == "eval":
         raise InputError("expected split 'train' or 'dev' to collect from, found 'eval', whose mazes are for results")
-    plan = make_plan(options, trials=(), resolver=resolve)
-    if plan.remark:
-        remark(plan.remark)
-    agent, count, file_format = plan.build_agent(), wanted.episodes, wanted.format_in_use
-    identity = {name: value for name, value in plan.identity.items() if name != "episodes_per_distance"}
-    identity |= {"episodes": count, "format": file_format}
-    if not is_begun(folder, identity, resume):
-        with writing_to(folder):
-            write_json(folder / CONFIG, identity)
-
-    files = _files(folder, count)
-    is_whole = (folder / DATASET).exists()
-    for path, numbers in files.items():
-        if not is_whole and not path.exists():
-            episodes = _play(plan, agent, numbers, num_envs, lambda number: progress(number, count))
-            with writing_to(folder):
-                save_demonstrations(path, episodes)
-        progress(numbers.stop, count)
-    if file_format == MINARI:
-        from mazebench.evaluation.minari_data import write_dataset  # Minari is an extra
-
-        if not is_whole:
-            write_dataset(folder / DATASET, plan.task, options.agent, files)
-        for path in files:
-            path.unlink(missing_ok=True)
+    temporary = folder.absolute().with_name(folder.name + ".tmp")  # Minari can't make it at a relative path
+    with writing_to(folder):
+        if folder.exists() and (found := sorted(path.name for path in folder.iterdir())):
+            raise InputError(f"{folder}: expected a new or an empty folder, found {found[0]!r} in it")
+        plan = make_plan(options, trials=(), resolver=resolve)
+        if plan.remark:
+            remark(plan.remark)
+        shutil.rmtree(temporary, ignore_errors=True)
+        try:
+            storage = _open_storage(temporary, plan)
+            storage.update_episodes(_play(plan, num_episodes, num_envs, progress))
+            temporary.rename(folder)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
 
 
-def num_kept(folder: pathlib.Path, count: int) -> int:
-    """Returns how many of the `count` episodes of a run are in files."""
-    is_whole = (folder / DATASET).exists()
-    return sum(len(numbers) for path, numbers in _files(folder, count).items() if is_whole or path.exists())
+def _open_storage(folder: pathlib.Path, plan: Plan) -> MinariStorage:
+    """Returns an empty data set, whose observations have no context: it is in the infos, once for each leg."""
+    task, agent = plan.task, plan.options.agent
+    space = observation_space(task)
+    del space.spaces["context"]
+    storage = MinariStorage.new(
+        folder,
+        observation_space=space,
+        action_space=action_space(task),
+        env_spec=env_spec_of(task),
+        jpeg_encoding=False,  # which would change pictures
+    )
+    storage.update_metadata(
+        {
+            "dataset_id": "mazebench/{}-v0".format(re.sub(r"[^-\w]", "-", f"{task.options.slug}-{agent}")),
+            "minari_version": minari.__version__,
+            "algorithm_name": agent,
+            "description": f"{task}, driven by {agent}",
+            "requirements": [f"mazebench-mujoco=={__version__}"],
+        }
+    )
+    return storage
 
 
-def _files(folder: pathlib.Path, count: int) -> dict[pathlib.Path, range]:
-    """Returns the files of `count` episodes, and the numbers of the episodes in each."""
-    firsts = range(0, count, EPISODES_PER_FILE)
-    return {
-        folder / f"episodes-{first:06}.npz": range(first, min(first + EPISODES_PER_FILE, count)) for first in firsts
-    }
-
-
-def _play(
-    plan: Plan, agent: Agent, numbers: range, num_envs: int, progress: Callable[[int], None]
-) -> list[Demonstration]:
-    """Returns the episodes of some numbers; calls `progress` with the number of the next one as episodes end."""
+def _play(plan: Plan, num_episodes: int, num_envs: int, progress: Callable[[int, int], None]) -> list[EpisodeBuffer]:
+    """Returns the episodes, each under its seed; calls `progress` as they end."""
     task, seed = plan.task, plan.options.seed
-    trials = []
-    for number in numbers:
-        episode = sample_episode(task, np.random.default_rng(seed + number))
+    trials = {}
+    for number in range(seed, seed + num_episodes):
+        episode = sample_episode(task, np.random.default_rng(number))
         distance = task.mazes[episode.maze].distance(episode.start, episode.goal)
         # Nothing is measured by the shortest path, which only orders the episodes: the way from cell to cell will do.
-        trials.append((seed + number, Trial(episode, distance, shortest_path=distance * task.cell_size)))
-    played: dict[int, Demonstration] = {}
-    for outcomes in run_trials(
-        agent, task, trials, num_envs, seed=seed, needs_truth=plan.agent_class.needs_truth, recorder=StepRecorder()
-    ):
-        stopping.check()
-        if outcomes:
-            played |= {outcome.index: make_demonstration(task, outcome) for outcome in outcomes}
-            progress(numbers.start + len(played))
-    return [played[index] for index, _ in trials]
+        trials[number] = Trial(episode, distance, shortest_path=distance * task.cell_size)
+    agent, truth = build_agent(plan.options, plan.task, plan.agent_class), plan.agent_class.needs_truth
+    played: dict[int, EpisodeBuffer] = {}
+    for results in run_trials(agent, task, trials, num_envs, seed=seed, needs_truth=truth, keep=_moments):
+        played |= {result.number: _demonstration(task, trials[result.number], result) for result in results}
+        progress(len(played), num_episodes)
+    return [played[number] for number in trials]
+
+
+def _moments(observation: Observation, info: dict[str, Any], actions: np.ndarray | None) -> list[dict[str, Any]]:
+    """Returns what is observed, done and true in each environment; a context only where it is new."""
+    pose = np.column_stack([info["position"], info["yaw"]])
+    return [
+        {
+            "observed": {name: values[slot] for name, values in observation.items() if name != "context"},
+            "context": [observation["context"][slot].copy()] if info["is_first"][slot] else [],
+            "leg": info["landmark"][slot],
+            "pose": pose[slot],
+            "action": [] if actions is None else [actions[slot]],
+        }
+        for slot in range(len(pose))
+    ]
+
+
+def _demonstration(task: Task, trial: Trial, result: Result) -> EpisodeBuffer:
+    """Returns an episode of which `_moments` were kept."""
+    moments, maze = result.kept, task.mazes[trial.episode.maze]
+    is_last = np.arange(result.steps) == result.steps - 1
+    terminations, truncations = is_last & result.success, is_last & (not result.success)
+    pose = np.stack([moment["pose"] for moment in moments])
+    way_left = maze.distances(trial.episode.goal).ravel()[maze.cell_index(pose[:, :2])]
+    return EpisodeBuffer(
+        seed=result.number,
+        options={"maze": maze.name, "distance": trial.distance},
+        observations={name: np.stack([each["observed"][name] for each in moments]) for name in moments[0]["observed"]},
+        actions=np.stack([action for moment in moments for action in moment["action"]]),
+        rewards=reward(terminations).astype(np.float32),
+        terminations=terminations,
+        truncations=truncations,
+        infos={
+            "context": np.stack([context for moment in moments for context in moment["context"]]),
+            "leg": np.array([moment["leg"] for moment in moments], dtype=np.int32),
+            "privileged": {"pose": pose, "way_left": way_left},
+        },
+    )

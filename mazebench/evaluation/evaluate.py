@@ -119,9 +119,9 @@ def run_plan(
         return summary
     with Store(folder, plan, resume=run.resume, record=record) as store:
         progress(store.num_ended, num_trials)
-        for ended in pool.run(_cut(plan, store, pool, run.num_envs)):
-            if ended:
-                store.append(ended)
+        for results in pool.run(_cut(plan, store, pool, run.num_envs)):
+            if results:
+                store.append(results)
                 progress(store.num_ended, num_trials)
             stopping.check()
         records = with_oracle_steps(plan, store.records, run.num_envs)
@@ -146,18 +146,21 @@ def run_plan(
 
 def _cut(plan: Plan, store: Store, pool: Pool, num_envs: int) -> list[Chunk]:
     """Returns what is left to run as chunks of one size and mixture."""
-    missing = tuple(store.missing)
-    if not pool.num_workers:
-        return [Chunk(plan, missing, store.record, num_envs, pool.num_threads)] if missing else []
-    wanted = min(_CHUNKS_PER_WORKER * pool.num_workers, len(missing) // _LEAST_CHUNK)
-    pieces = min(len(missing), max(pool.num_workers, wanted))
+    missing = store.missing
+    num_chunks = min(1, len(missing))
+    if pool.num_workers and missing:
+        wanted = min(_CHUNKS_PER_WORKER * pool.num_workers, len(missing) // _LEAST_CHUNK)
+        num_chunks = min(len(missing), max(pool.num_workers, wanted))
+        num_envs = min(num_envs, math.ceil(len(missing) / num_chunks / _EPISODES_PER_ENV))
     return [
         Chunk(
-            plan,
-            missing[piece::pieces],
+            plan.options,
+            plan.task,
+            plan.agent_class,
+            {index: plan.trials[index] for index in missing[first::num_chunks]},
             store.record,
-            min(num_envs, math.ceil(len(missing) / pieces / _EPISODES_PER_ENV)),
+            num_envs,
             pool.num_threads,
         )
-        for piece in range(pieces)
+        for first in range(num_chunks)
     ]

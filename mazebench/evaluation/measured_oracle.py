@@ -33,8 +33,8 @@ def measure_oracle_steps(task: Task, trials: Sequence[Trial], num_envs: int = NU
     task = task.replace(actions="six", sensors=(), lidar_noise=None)
     agent = load_agent_class(_ORACLE).build(task.interface)
     steps: list[int | None] = [None] * len(trials)
-    for outcomes in run_trials(agent, task, list(enumerate(trials)), num_envs, needs_truth=True):
+    for results in run_trials(agent, task, dict(enumerate(trials)), num_envs, needs_truth=True):
         stopping.check()
-        for outcome in outcomes:
-            steps[outcome.index] = outcome.steps if outcome.success else None
+        for result in results:
+            steps[result.number] = result.steps if result.success else None
     return steps

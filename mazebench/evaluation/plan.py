@@ -11,7 +11,7 @@ from typing import Any
 
 from mazebench.agent import Agent
 from mazebench.agent_loading import load_agent_class
-from mazebench.errors import InputError, RunError, UnplayableError, held_remarks
+from mazebench.errors import InputError, RunError, UnplayableError
 from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of, only_context_size
 from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.provenance import provenance
@@ -35,7 +35,7 @@ _IDENTIFYING = (
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Plan:
-    """Everything that one evaluation will run. A pickled plan is its options; unpickling makes the plan anew."""
+    """Everything that one evaluation will run."""
 
     options: EvalOptions  # with the very file of the checkpoint
     task: Task  # as the agent plays it: with its actions and sensors, and maps of the size that it asks for
@@ -43,9 +43,6 @@ class Plan:
     trials: tuple[Trial, ...]  # in the protocol's order, by which they are numbered
     identity: dict[str, Any]  # the content of config.json; only runs of equal identity are resumed
     provenance: Provenance  # where the result will come from
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _make_plan_once, (self.options,)
 
     @property
     def untrained_scale(self) -> bool:
@@ -92,30 +89,31 @@ class Plan:
                 return None if size is None else size / told["context_size"]
         return None
 
-    def build_agent(self) -> CheckedAgent:
-        """Returns a new agent for the task, held to its contract.
 
-        Raises:
-          InputError: if the agent can't use its checkpoint.
-          UnplayableError: if the agent can't play the task.
-        """
-        options, interface = self.options, self.task.interface
-        checkpoint = None if options.checkpoint is None else pathlib.Path(options.checkpoint)
-        only = only_context_size(options.agent, self.agent_class, interface.size)
-        if only is not None and only != interface.context_size:
-            raise UnplayableError(
-                f"agent {options.agent!r}: its context_size() asks for maps of {_square(only)} only; the track "
-                f"{self.task.track!r} shows {_square(interface.context_size)}"
-            )
-        if needed := [name for name in self.agent_class.needs_shown if name in interface.hidden]:
-            raise UnplayableError(f"agent {options.agent!r}: needs the {needed[0]}, found it hidden")
-        if interface.actions not in (plays := self.agent_class.plays_actions):
-            raise UnplayableError(
-                f"agent {options.agent!r}: plays the actions {', '.join(plays)}, found {interface.actions}"
-            )
-        with calling(options.agent, "build"):
-            agent = self.agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)
-        return CheckedAgent(options.agent, agent, interface.actions)
+def build_agent(options: EvalOptions, task: Task, agent_class: type[Agent]) -> CheckedAgent:
+    """Returns a new agent of a plan, for its task, held to its contract.
+
+    Raises:
+      InputError: if the agent can't use its checkpoint.
+      UnplayableError: if the agent can't play the task.
+    """
+    interface = task.interface
+    checkpoint = None if options.checkpoint is None else pathlib.Path(options.checkpoint)
+    only = only_context_size(options.agent, agent_class, interface.size)
+    if only is not None and only != interface.context_size:
+        raise UnplayableError(
+            f"agent {options.agent!r}: its context_size() asks for maps of {_square(only)} only; the track "
+            f"{task.track!r} shows {_square(interface.context_size)}"
+        )
+    if needed := [name for name in agent_class.needs_shown if name in interface.hidden]:
+        raise UnplayableError(f"agent {options.agent!r}: needs the {needed[0]}, found it hidden")
+    if interface.actions not in (plays := agent_class.plays_actions):
+        raise UnplayableError(
+            f"agent {options.agent!r}: plays the actions {', '.join(plays)}, found {interface.actions}"
+        )
+    with calling(options.agent, "build"):
+        agent = agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)
+    return CheckedAgent(options.agent, agent, interface.actions)
 
 
 def make_plan(
@@ -164,13 +162,6 @@ def make_plan(
 
 def _square(side: int) -> str:
     return f"{side} x {side}"
-
-
-@functools.lru_cache(maxsize=1)
-def _make_plan_once(options: EvalOptions) -> Plan:
-    """Returns the plan of `options`, the same one for all chunks of an evaluation that a process runs."""
-    with held_remarks():  # the process that made the plan first has shown them
-        return make_plan(options)
 
 
 def task_as_played(agent: str, agent_class: type[Agent], asked: TaskOptions, resolver: Callable[..., Task]) -> Task:

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from typing import Protocol
 
 from mazebench.errors import RunError
-from mazebench.evaluation.chunk import PATIENCE, Chunk, Ended, run_chunk, run_whole_chunk
+from mazebench.evaluation.chunk import PATIENCE, Chunk, Result, run_chunk, run_whole_chunk
 from mazebench.evaluation.eval_options import RunOptions
 
 
@@ -24,8 +24,8 @@ class Pool(Protocol):
     num_workers: int  # chunks that run at a time in other processes; 0 for this process, which yields each step
     num_threads: int  # of a chunk's simulation; 0 for all cores
 
-    def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Ended]]:
-        """Yields the episodes that ended, in any order; now and then none.
+    def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Result]]:
+        """Yields the results of the episodes that ended, in any order; now and then none.
 
         Raises:
           InputError, RunError: what a chunk raised.
@@ -52,7 +52,7 @@ class _ThisProcess:
     num_workers = 0
     num_threads = 0
 
-    def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Ended]]:
+    def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Result]]:
         for chunk in chunks:
             yield from run_chunk(chunk)
 
@@ -69,7 +69,7 @@ class _Processes:
         self._executor = concurrent.futures.ProcessPoolExecutor(workers, context, initializer=_begin_worker)
         self._processes: set[multiprocessing.process.BaseProcess] = set()
 
-    def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Ended]]:
+    def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Result]]:
         # Workers start here. They inherit that SIGINT is blocked, and so leave Ctrl-C to this process. The tracker,
         # which would start with the first of them, undoes the mask.
         multiprocessing.resource_tracker.ensure_running()

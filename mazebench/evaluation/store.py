@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from mazebench.errors import InputError, RunError
-from mazebench.evaluation.chunk import Ended
+from mazebench.evaluation.chunk import Result, to_record, to_trajectory
 from mazebench.evaluation.plan import Plan
 from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, SUMMARY
 from mazebench.results.records import Record, Summary
@@ -79,8 +79,8 @@ class Store:
         self._is_new = not is_begun(folder, plan.identity, resume)
         # A line that a kill cut short is passed over: its episode is run again.
         ended = [_from_line(line) for line in read_lines(folder / JOURNAL)]
-        self.record = record or any(each.trajectory for each in ended)
-        self._ended = {each.record.episode: each for each in ended if each.trajectory or not self.record}
+        self.record = record or any(trajectory for _, trajectory in ended)
+        self._ended = {each.episode: (each, trajectory) for each, trajectory in ended if trajectory or not self.record}
         with writing_to(folder):
             # Of two processes that begin a run, the second one fails here.
             self._journal = (folder / JOURNAL).open("a" if resume else "x", encoding="utf-8")
@@ -101,22 +101,23 @@ class Store:
     @property
     def records(self) -> list[Record]:
         """The records of the episodes that have ended, in protocol order."""
-        return [self._ended[index].record for index in sorted(self._ended)]
+        return [self._ended[index][0] for index in sorted(self._ended)]
 
-    def append(self, ended: Sequence[Ended]) -> None:
+    def append(self, results: Sequence[Result]) -> None:
         """Adds episodes that ended.
 
         Raises:
           RunError: if the disk is full or can't be written any more.
         """
+        ended = {each.number: (to_record(self._plan, each), to_trajectory(self._plan, each)) for each in results}
         with self._keeping_what_is_written():
-            self._journal.write("".join(map(_to_line, ended)))
+            self._journal.write("".join(_to_line(*each) for each in ended.values()))
             self._journal.flush()
-        self._ended |= {each.record.episode: each for each in ended}
+        self._ended |= ended
 
     def finish(self, records: Sequence[Record], summary: Summary) -> None:
         """Writes the results; `records` are those of all episodes in protocol order, with the oracle's steps."""
-        trajectories = [self._ended[index].trajectory for index in range(len(self._plan.trials))]
+        trajectories = [self._ended[index][1] for index in range(len(self._plan.trials))]
         with self._keeping_what_is_written():
             with open_whole(self.folder / EPISODES) as file:
                 file.write("".join(each.to_line() for each in records).encode("utf-8"))
@@ -147,15 +148,15 @@ class Store:
                 self.folder.rmdir()
 
 
-def _from_line(line: dict[str, Any]) -> Ended:
+def _from_line(line: dict[str, Any]) -> tuple[Record, Trajectory | None]:
     record = Record.model_validate_json(json.dumps(line["record"]))  # lists are tuples in JSON only
     if not line["trajectory"]:
-        return Ended(record, None)
+        return record, None
     pose, observed = (None if poses is None else np.array(poses, dtype=np.float32) for poses in line["trajectory"])
     assert pose is not None
-    return Ended(record, Trajectory(pose, observed))
+    return record, Trajectory(pose, observed)
 
 
-def _to_line(ended: Ended) -> str:
-    trajectory = [None if poses is None else poses.tolist() for poses in ended.trajectory or ()]
-    return to_line({"record": ended.record.model_dump(), "trajectory": trajectory})
+def _to_line(record: Record, trajectory: Trajectory | None) -> str:
+    poses = [None if each is None else each.tolist() for each in trajectory or ()]
+    return to_line({"record": record.model_dump(), "trajectory": poses})

@@ -15,7 +15,7 @@ from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.errors import InputError, RunError, UnplayableError, remark, unknown
 from mazebench.evaluation.eval_options import EvalOptions, RunOptions
 from mazebench.evaluation.evaluate import Progress, run_plan
-from mazebench.evaluation.plan import Plan, make_plan
+from mazebench.evaluation.plan import Plan, build_agent, make_plan
 from mazebench.evaluation.pool import open_pool
 from mazebench.evaluation.store import check_same_run, is_finished
 from mazebench.maps.benchmark import DEV, SIZES, manifest_hash
@@ -173,7 +173,7 @@ def _playable(plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str)
 def _refusal(plan: Plan) -> str | None:
     """Returns why the agent of a plan can't play it; None if it can, or fails in another way when its turn comes."""
     try:
-        plan.build_agent()
+        build_agent(plan.options, plan.task, plan.agent_class)
     except UnplayableError as error:
         return str(error)
     except (InputError, RunError):

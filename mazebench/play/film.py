@@ -12,16 +12,18 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mazebench.agent import Inputs
 from mazebench.constants import STEP_TIME
-from mazebench.envs.gym import MazeEnv
+from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError, unknown
-from mazebench.evaluation.agent_inputs import agent_seed, true_state
 from mazebench.evaluation.eval_options import EvalOptions
-from mazebench.evaluation.plan import make_plan
+from mazebench.evaluation.plan import build_agent, make_plan
 from mazebench.maps.pictures import draw_grid, draw_rays, write_image
+from mazebench.rollout import agent_seed, rollout
 from mazebench.storage.files import open_whole, writing_to
 from mazebench.tasks.context import resized_map
+from mazebench.tasks.episode import Episode
+from mazebench.tasks.perturbations.perturbation import ShownMap
+from mazebench.tasks.shown_map import show_map
 from mazebench.world.models import models_of
 from mazebench.world.ray_casting import ray_ends
 from mazebench.world.rendering import CAMERAS, Cameras
@@ -71,32 +73,27 @@ def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[l
     episode = trial.episode
     maze = plan.task.mazes[episode.maze]
 
-    agent = plan.build_agent()
-    state = agent.initial_state(1)
-    seed = np.array([agent_seed(options.seed, number)])
-    frames: list[np.ndarray] = []
-    ended = False
-    with contextlib.closing(MazeEnv(plan.task)) as env, contextlib.closing(_Scene(env, views, pixels)) as scene:
-        observation, info = env.reset(options={"episode": episode})
-        while True:
-            scene.record_position()
-            if is_film or ended:
-                frames.append(scene.draw(observation))
-            if ended:
-                break
-            truth = None
-            if plan.agent_class.needs_truth:
-                truth = true_state(plan.task, [episode], info["position"][None], np.array([info["yaw"]]))
-            inputs = Inputs(
-                observation={name: value[None] for name, value in observation.items()},
-                new_episode=np.array([info["steps"] == 0]),
-                new_context=np.array([info["is_first"]]),
-                seed=seed,
-                truth=truth,
+    agent, frames = build_agent(plan.options, plan.task, plan.agent_class), []
+    envs = MazeVectorEnv(plan.task, 1, num_threads=1, episode_source=lambda _: episode, autoreset_mode="Disabled")
+    with contextlib.closing(envs):
+        first = envs.reset()
+        with contextlib.closing(_Scene(envs, episode, show_map(plan.task, episode), views, pixels)) as scene:
+            if is_film:
+                frames.append(scene.draw(first[0]))
+            steps = rollout(
+                agent,
+                envs,
+                first,
+                lambda _: [agent_seed(options.seed, number)],
+                needs_truth=plan.agent_class.needs_truth,
             )
-            actions, state = agent.act(inputs, state)
-            observation, _, terminated, truncated, info = env.step(actions[0])
-            ended = terminated or truncated
+            for step in steps:
+                scene.record_position()
+                if is_film or step.ended.item():
+                    frames.append(scene.draw(step.next_observation))
+                if step.ended.item():
+                    break
+    info = {name: values[0] for name, values in step.next_info.items()}
 
     ending = "reached the goal" if info["success"] else "ran out of time"
     return frames, (
@@ -107,31 +104,35 @@ def _run(options: EvalOptions, view: str, pixels: int, is_film: bool) -> tuple[l
 
 @dataclasses.dataclass
 class _Scene:
-    """The views of a running episode, side by side in one picture."""
+    """The views of the running episode of one environment, side by side in one picture."""
 
-    env: MazeEnv
+    envs: MazeVectorEnv
+    episode: Episode
+    shown: ShownMap
     views: tuple[str, ...]
     pixels: int
 
     def __post_init__(self) -> None:
-        self._path: list[np.ndarray] = []
+        self._task = self.envs.task
+        self._path: list[np.ndarray] = []  # [2] m each
+        self.record_position()
         names = tuple(view for view in self.views if view in CAMERAS)
-        models = models_of(self.env.task.mazes, self.env.task.options.textures)
-        self._cameras = Cameras(models, names, self.pixels) if names else None
+        self._cameras = (
+            Cameras(models_of(self._task.mazes, self._task.options.textures), names, self.pixels) if names else None
+        )
 
     def record_position(self) -> None:
         """Adds the body's position to the driven path."""
-        self._path.append(self.env.simulation.position())
+        self._path.append(self.envs.rules.pose[0, :2].copy())
 
     def draw(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
         """Returns a picture `[H, W, 3]` uint8 of the current state, in which `observation` was made.
 
         The shown map, and the maze in the view of the range sensor, have the path driven up to now.
         """
-        pictures = {}
+        pictures, rules = {}, self.envs.rules
         if self._cameras is not None:
-            data = self.env.simulation.data
-            pictures = self._cameras.take(self.env.runner.episode.maze, data.qpos, data.mocap_pos[0])
+            pictures = self._cameras.take(self.episode.maze, rules.pose[0], rules.marker[0])
         pictures |= {view: self._drawing(view, observation) for view in self.views if view not in pictures}
         return np.concatenate([pictures[view] for view in self.views], axis=1)
 
@@ -140,32 +141,30 @@ class _Scene:
             self._cameras.close()
 
     def _drawing(self, view: str, observation: Mapping[str, np.ndarray]) -> np.ndarray:
-        picture = self._map() if view == MAP else self._rays(observation[LIDAR])
+        picture = self._map() if view == MAP else self._rays(observation[LIDAR][0])
         return cv2.resize(picture, (self.pixels, self.pixels), interpolation=cv2.INTER_AREA)
 
     def _map(self) -> np.ndarray:
         """Returns a picture of the map that the agent is shown, some two times as large as a view."""
-        runner, side = self.env.runner, self.env.task.context_size
-        seen = runner.shown_map.seen_walls()
+        shown, side = self.shown, self._task.context_size
+        seen = shown.seen_walls()
         size = len(seen)
         walls = resized_map(seen, side)
-        pixels = (runner.shown_map.seen_cell(cell) for cell in (runner.episode.start, runner.episode.goal))
+        pixels = (shown.seen_cell(cell) for cell in (self.episode.start, self.episode.goal))
         start, goal = ((row * side // size, column * side // size) for row, column in pixels)
-        path = runner.shown_map.seen_points(self._to_cells(self._path)) * (side / size)
+        path = shown.seen_points(self._to_cells(self._path)) * (side / size)
         return draw_grid(walls, self._cell_pixels(walls), start, goal, path)
 
     def _rays(self, ranges: np.ndarray) -> np.ndarray:
         """Returns a picture of the true maze with the rays of the range sensor, some two times as large as a view."""
-        simulation, episode = self.env.simulation, self.env.runner.episode
-        walls = self.env.task.mazes[episode.maze].walls
+        walls, pose = self._task.mazes[self.episode.maze].walls, self.envs.rules.pose[0]
         cell_pixels = self._cell_pixels(walls)
-        picture = draw_grid(walls, cell_pixels, episode.start, episode.goal, self._to_cells(self._path))
-        pose = np.array([*simulation.position(), simulation.yaw()])
+        picture = draw_grid(walls, cell_pixels, self.episode.start, self.episode.goal, self._to_cells(self._path))
         draw_rays(picture, cell_pixels, self._to_cells(pose[:2]), self._to_cells(ray_ends(pose, ranges)))
         return picture
 
     def _to_cells(self, points: ArrayLike) -> np.ndarray:  # [..., 2] m
-        return np.asarray(points) / self.env.task.cell_size
+        return np.asarray(points) / self._task.cell_size
 
     def _cell_pixels(self, walls: np.ndarray) -> int:
         return 2 * self.pixels // len(walls) + 1

@@ -274,8 +274,12 @@ def tasks_of_tracks(tracks: Sequence[str], **options: Any) -> tuple[Task, ...]:
     if not tracks or any(track not in TRACKS for track in tracks) or len(set(tracks)) < len(tracks):
         raise InputError(f"expected different tracks of {', '.join(TRACKS)}, found {', '.join(tracks) or 'none'}")
     wanted = TaskOptions.of({"context_size": options.pop("context_size", None)}).context_size
-    tasks = [Task.of(track, **options) for track in tracks]
-    context_size = wanted or max(task.context_size for task in tasks)
+    return in_the_same_mazes([Task.of(track, **options) for track in tracks], wanted)
+
+
+def in_the_same_mazes(tasks: Sequence[Task], context_size: int | None = None) -> tuple[Task, ...]:
+    """Returns tasks in the mazes of the first one, with contexts of one size, by default the largest one of theirs."""
+    context_size = context_size or max(task.context_size for task in tasks)
     return tuple(
         dataclasses.replace(task, context_size=context_size, mazes=tasks[0].mazes, scenarios=tasks[0].scenarios)
         for task in tasks

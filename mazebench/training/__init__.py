@@ -1,1 +1,1 @@
-"""Training: the loop, run folders, and where experience comes from."""
+"""Training: the loop, run folders, and collecting experience."""

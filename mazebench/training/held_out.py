@@ -48,7 +48,7 @@ class HeldOutEvaluation:
             for index, stream in enumerate(streams if kinds else ())
         ]
         self.task = _in_mazes(plain, *drawn) if drawn else plain
-        self.trials = list(enumerate(draw_trials(self.task, _EPISODES)))
+        self.trials = draw_trials(self.task, _EPISODES)
 
     def success_rates(self, agent: Agent, progress: Callable[[int, int], None]) -> dict[int, float]:
         """Returns the success rate of the agent, which acts greedily, by distance in cells.
@@ -57,10 +57,10 @@ class HeldOutEvaluation:
         """
         reached: dict[int, list[bool]] = {distance: [] for distance in self._distances}
         num_ended = 0
-        for outcomes in run_trials(agent, self.task, self.trials, len(self.trials)):
-            for outcome in outcomes:
-                reached[outcome.trial.distance].append(outcome.success)
-            num_ended += len(outcomes)
+        for results in run_trials(agent, self.task, dict(enumerate(self.trials)), len(self.trials)):
+            for result in results:
+                reached[self.trials[result.number].distance].append(result.success)
+            num_ended += len(results)
             progress(num_ended, len(self.trials))
         return {distance: float(np.mean(successes)) for distance, successes in reached.items()}
 

@@ -14,8 +14,8 @@ import logging
 import math
 import pathlib
 import time
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,26 +27,52 @@ from mazebench.evaluation.provenance import code_hash
 from mazebench.maps.scenarios import are_scenarios
 from mazebench.options import check_names, fields_of, options_in
 from mazebench.results.played import mazes_hash
-from mazebench.tasks.task import Task, as_options, resolve
+from mazebench.tasks.task import Task, as_options, in_the_same_mazes, resolve
 from mazebench.tasks.task_options import PROGRESS, TaskOptions
+from mazebench.training.collector import Collector
 from mazebench.training.counters import Counters
+from mazebench.training.experience import Experience
 from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.protocol import Learner, LearningAgent
 from mazebench.training.run_folder import RunFolder, read_counters
-from mazebench.training.sources import InProcessSource, Pieces, Source
-from mazebench.training.status import Progress, Timer, in_words
 from mazebench.training.train_options import FIXED, TrainOptions
 
 # As many steps take less than a minute on two cores. They are counted, not timed, so that the same run writes the same
 # lines.
 STEPS_BETWEEN_LINES = 5_000
 
-
 _logger = logging.getLogger("mazebench.training")
 
 
 class TrainingError(RunError):
     """A run can't go on; its checkpoints are intact."""
+
+
+class Status(NamedTuple):
+    """The status of a training."""
+
+    counters: Counters
+    share: float  # of the time or of the steps that is done, from 0 to 1: of what ends first
+    speed: float  # agent steps per second since the call began
+    evaluated: tuple[int, int] | None = None  # held-out episodes that have ended, and all; None unless evaluating
+
+    @property
+    def summary(self) -> str:
+        """Steps, updates and speed in words."""
+        steps, updates = self.counters.env_steps, self.counters.updates
+        return f"{steps:,} steps of the run, {updates:,} updates, {self.speed:,.0f} steps/s"
+
+    def __str__(self) -> str:
+        """Returns the status in words."""
+        if self.evaluated is not None:
+            return "{}; evaluating: {:,} of {:,} held-out episodes".format(self.summary, *self.evaluated)
+        if losses := self.counters.mean_losses():
+            return f"{self.summary}; {_in_words(losses)}"
+        return self.summary if self.counters.updates else f"{self.summary}; collecting before learning begins"
+
+
+# Called with the status after each step.
+Progress = Callable[[Status], None]
 
 
 def train(
@@ -68,8 +94,8 @@ def train(
 
     Args:
       agent: the name of an agent that learns, or "module:Class".
-      task: "local", the name of a track, or the names of several, of which each has an equal share of the environments;
-        or a `Task`, of which counts what was asked.
+      task: "local", the name of a track, or the names of several, of which each episode draws one; or a
+        `Task`, of which counts what was asked.
       out: the run folder.
       overrides: values of the agent's config by name.
       resume: go on from the last checkpoint in `out`.
@@ -106,12 +132,14 @@ def run_training(
     if len(options.task) > 1 and not agent_class.learns_several_tasks:
         raise InputError(f"agent {options.agent!r}: learns one track at a time, found {', '.join(options.task)}")
     defaults = agent_class.task_options(overrides)
-    tasks = [training_task(options.agent, agent_class, defaults, asked.replace(task=name)) for name in options.task]
+    tasks = tuple(
+        training_task(options.agent, agent_class, defaults, asked.replace(task=name)) for name in options.task
+    )
     _check_together(options, tasks)
-    learner = agent_class.build_learner(tasks[0], seed=options.seed, overrides=overrides)
     held_out = [HeldOutEvaluation(task, options.eval_mazes, asked.distances or ()) for task in tasks]
-    # The source comes first: if the cluster can't be reached, no run is begun.
-    with open_source(options, tasks, learner) as source, RunFolder(out) as folder:
+    tasks = in_the_same_mazes(tasks)
+    learner = agent_class.build_learner(tasks[0], seed=options.seed, overrides=overrides)
+    with RunFolder(out) as folder:
         counters = _begin_or_resume(options, folder, learner, tasks, resume)
         if options.env_steps is not None and counters.env_steps >= options.env_steps and counters.is_milestone:
             _logger.info("%s: the run is finished, at %s steps", out, f"{counters.env_steps:,}")
@@ -121,7 +149,7 @@ def run_training(
         elif resume:
             _logger.info("nothing to resume in %s; starting a new run", out)
         _logger.info("%s: %s", options.agent, learner.description())
-        TrainingLoop(options, folder, learner, tasks, source, held_out, counters, progress).run()
+        TrainingLoop(options, folder, learner, tasks, held_out, counters, progress).run()
 
 
 def _learning_agents() -> list[str]:
@@ -141,15 +169,19 @@ class TrainingLoop:
     _folder: RunFolder
     _learner: Learner
     _tasks: Sequence[Task]
-    _source: Source
     _held_out: Sequence[HeldOutEvaluation]  # of each task
     _counters: Counters
     _progress: Progress
 
     def __post_init__(self) -> None:
-        self._timer = Timer(self._options.minutes, self._options.env_steps, self._counters)
-        self._saved_steps, self._saved_time = self._counters.env_steps, time.monotonic()
+        self._first_steps, self._first_time = self._counters.env_steps, time.monotonic()
+        self._saved_steps, self._saved_time = self._first_steps, self._first_time
         self._longest = 0  # distance of goals now, where it grows
+        # One agent acts in the environments of all tasks, and reckons with the worst noise.
+        noise = max(task.interface.odometry_noise for task in self._tasks)
+        interface = dataclasses.replace(self._tasks[0].interface, odometry_noise=noise)
+        self._actor = self._learner.actor.for_interface(interface)
+        self._collector = Collector(self._tasks, self._learner.num_envs)
 
     def run(self) -> None:
         """Trains until the time or the steps are up; the last step is a milestone."""
@@ -164,15 +196,15 @@ class TrainingLoop:
         # New trajectories, so that a run that is resumed from this milestone goes on as the unbroken one did.
         self._widen()
         seeds = np.random.SeedSequence((self._options.seed, self._counters.env_steps))
-        source = self._source.collect(int(seeds.generate_state(1)[0]))
+        steps = self._collector.collect(self._actor, int(seeds.generate_state(1)[0]))
         while self._counters.env_steps < env_steps and not self._is_over():
             line_steps = self._counters.logged_steps + STEPS_BETWEEN_LINES
             if line_steps <= self._counters.env_steps < env_steps - STEPS_BETWEEN_LINES // 2:  # a milestone has a line
                 self._folder.log(self._counters, self._counters.mean_losses())
                 self._counters = self._counters.after_line()
-            self._learn_from(next(source))
+            self._learn_from(next(steps))
             self._widen()
-            self._progress(self._timer.status(self._counters))
+            self._progress(self._status())
             if self._is_savepoint_due():
                 self._save()
             stopping.check()
@@ -184,13 +216,12 @@ class TrainingLoop:
         longest = longest_distance(self._options, self._tasks, self._counters.env_steps)
         if longest != self._longest:
             self._longest = longest
-            self._source.limit_distances(longest)
+            self._collector.limit_distances(longest)
 
-    def _learn_from(self, pieces: Pieces) -> None:
-        """Stores experience, each piece with the index of its first environment, and makes the updates due."""
-        for first_env, experience in pieces:
-            self._learner.observe(experience, first_env)
-            self._counters = self._counters.after_steps(len(experience.action))
+    def _learn_from(self, experience: Experience) -> None:
+        """Stores a step in all environments, and makes the updates due."""
+        self._learner.observe(experience)
+        self._counters = self._counters.after_steps(len(experience.action))
         for _ in range(num_updates_due(self._learner, self._counters.env_steps) - self._counters.updates):
             self._update()
 
@@ -205,34 +236,51 @@ class TrainingLoop:
                 )
 
     def _is_over(self) -> bool:
-        return self._timer.share_done(self._counters) >= 1.0
+        return self._share_done() >= 1.0
+
+    def _share_done(self) -> float:
+        """Returns the share of the time, or of the steps, that is up, from 0 to 1."""
+        minutes, env_steps = self._options.minutes, self._options.env_steps
+        of_time = 0.0 if minutes is None else (time.monotonic() - self._first_time) / (60 * minutes)
+        of_steps = 0.0 if env_steps is None else self._counters.env_steps / env_steps
+        return min(1.0, max(of_time, of_steps))
+
+    def _status(self, evaluated: tuple[int, int] | None = None) -> Status:
+        speed = (self._counters.env_steps - self._first_steps) / (time.monotonic() - self._first_time)
+        return Status(self._counters, self._share_done(), speed, evaluated)
 
     def _is_savepoint_due(self) -> bool:
         seconds = 60 * self._options.checkpoint_minutes
         return seconds > 0 and (stopping.is_asked() or time.monotonic() >= self._saved_time + seconds)
 
     def _save(self) -> None:
-        """Saves a checkpoint, unless the last one is of this very step: a source may have brought no experience."""
+        """Saves a checkpoint, unless the last one is of this very step."""
         if self._counters.env_steps != self._saved_steps:
             _save(self._options, self._folder, self._learner, self._tasks, self._counters)
         self._saved_steps, self._saved_time = self._counters.env_steps, time.monotonic()
 
     def _reach_milestone(self) -> None:
         """Saves, evaluates, and logs; a run that is stopped in the evaluation repeats it when it is resumed."""
-        counters, status = self._counters, self._timer.status(self._counters)
+        counters, summary = self._counters, self._status().summary
         self._save()
         metrics = counters.mean_losses()
         for held_out in self._held_out:
-            rates = held_out.success_rates(self._learner.actor.in_task(held_out.task), self._show_evaluation)
+            rates = held_out.success_rates(
+                self._learner.actor.for_interface(held_out.task.interface), self._show_evaluation
+            )
             name = f"success_rate_{held_out.task.name}" if len(self._held_out) > 1 else "success_rate"
             metrics |= {f"{name}_{distance}": rate for distance, rate in rates.items()}
         self._folder.make_milestone(counters, metrics)
         self._counters = counters.at_milestone()
-        _logger.info("%s: %s", status.summary, in_words(metrics))
+        _logger.info("%s: %s", summary, _in_words(metrics))
 
     def _show_evaluation(self, ended: int, of: int) -> None:
         stopping.check()
-        self._progress(self._timer.status(self._counters, evaluated=(ended, of)))
+        self._progress(self._status(evaluated=(ended, of)))
+
+
+def _in_words(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {value:.3g}" for name, value in values.items())
 
 
 def num_updates_due(learner: Learner, env_steps: int) -> int:
@@ -287,19 +335,6 @@ def training_task(
     if task.cell_size != 1:
         raise InputError(f"expected mazes with cells of 1 m in a training, found {task.cell_size:g} m (--cell-size)")
     return task
-
-
-def open_source(options: TrainOptions, tasks: Sequence[Task], learner: Learner) -> Source:
-    """Returns where experience comes from: this process, or the workers of `options` on Ray.
-
-    Raises:
-      InputError: if workers are wanted, and Ray is not installed or its cluster can't be reached.
-    """
-    if not options.workers:
-        return InProcessSource(tasks, learner.actor, learner.num_envs)
-    from mazebench.training.distributed import RaySource
-
-    return RaySource(tasks, learner, options.workers, options.ray_address)
 
 
 def _begin_or_resume(

@@ -9,9 +9,7 @@ import pathlib
 from collections.abc import Mapping
 from typing import Any, ClassVar, Protocol, Self
 
-import numpy as np
-
-from mazebench.agent import Agent
+from mazebench.agent import Agent, Interface
 from mazebench.tasks.task import Task
 from mazebench.training.experience import Experience
 
@@ -24,7 +22,7 @@ class LearningAgent(Agent):
     """
 
     learns = True
-    learns_several_tasks: ClassVar[bool] = False  # at once, in the environments of each
+    learns_several_tasks: ClassVar[bool] = False  # at once, in the same environments
 
     @classmethod
     def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:
@@ -45,7 +43,7 @@ class LearningAgent(Agent):
         """Returns a new learner, which is ready to learn.
 
         Args:
-          task: the task to learn in, with its mazes; `Experience.maze` counts them.
+          task: the task to learn in, of several the first one, with their mazes; `Experience.maze` counts them.
           seed: of all that is drawn.
           overrides: values of the agent's config as text, by name.
 
@@ -55,8 +53,8 @@ class LearningAgent(Agent):
         """
         raise NotImplementedError
 
-    def in_task(self, task: Task) -> Self:
-        """Returns the agent for the environments of `task`, one of those that it is trained in.
+    def for_interface(self, interface: Interface) -> Self:
+        """Returns the agent for the environments of an interface, those of one or of all tasks of the training.
 
         What is learned is shared with this agent. By default it is this agent.
         """
@@ -66,16 +64,8 @@ class LearningAgent(Agent):
         """Returns what the learner needs of the step that was chosen last in `state`, such as probabilities."""
         return None
 
-    def explore_from(self, first_env: int, num_envs: int, seed: int) -> None:
-        """Begins a new stream of exploration, as the environments from `first_env` on of the learner's."""
-        raise NotImplementedError
-
-    def parameters(self) -> dict[str, np.ndarray]:
-        """Returns what was learned, by name, for `set_parameters` of a copy of this agent."""
-        raise NotImplementedError
-
-    def set_parameters(self, parameters: dict[str, np.ndarray]) -> None:
-        """Takes over what another copy returned as its `parameters`."""
+    def explore_from(self, seed: int) -> None:
+        """Begins a new stream of exploration."""
         raise NotImplementedError
 
 
@@ -108,8 +98,8 @@ class Learner(Protocol):
     def description(self) -> str:
         """Returns one line for people: the size of the network and of the replay."""
 
-    def observe(self, experience: Experience, first_env: int = 0) -> None:
-        """Stores one step in the environments from `first_env` on."""
+    def observe(self, experience: Experience) -> None:
+        """Stores one step in all environments."""
 
     def update(self) -> dict[str, float]:
         """Learns from one batch; returns losses and other scalars by name."""

@@ -19,7 +19,6 @@ from mazebench.errors import InputError, RunError
 from mazebench.storage.files import make_folder, open_whole, writing_to
 from mazebench.storage.json_files import read_json, read_lines, to_line, write_json
 from mazebench.training.counters import Counters
-from mazebench.training.tensorboard import Board
 
 CONFIG = "config.json"
 METRICS = "metrics.jsonl"
@@ -39,7 +38,7 @@ class RunFolder:
           InputError: if it can't be written, holds something else, or another training writes there.
         """
         self.path = path
-        self._board: Board | None = None
+        self._board: Any = None
         make_folder(path)
         found = sorted(item.name for item in self.path.iterdir())
         if CONFIG not in found and set(found) - {f"{CONFIG}.tmp", CHECKPOINTS}:
@@ -54,6 +53,8 @@ class RunFolder:
         return self
 
     def __exit__(self, *exception: object) -> None:
+        if self._board is not None:
+            self._board.close()
         os.close(self._lock)
 
     def checkpoints(self) -> list[pathlib.Path]:
@@ -96,9 +97,9 @@ class RunFolder:
             with (self.path / METRICS).open("a", encoding="utf-8") as file:
                 file.write(to_line(values))
             if self._board is None:
-                (self.path / _BOARD).mkdir(exist_ok=True)
-                self._board = Board(self.path / _BOARD, counters.env_steps)
-            self._board.add(values, counters.env_steps)
+                self._board = _open_board(self.path / _BOARD, counters.env_steps)
+            for name, value in values.items():
+                self._board.add_scalar(name, value, counters.env_steps)
         except OSError as error:
             raise self._cannot("write", self.path, error) from error
 
@@ -133,6 +134,14 @@ class RunFolder:
     def _cannot(self, do: str, what: pathlib.Path, error: OSError) -> RunError:
         last = next(reversed(self.checkpoints()), "none yet")
         return RunError(f"{what}: can't {do}: {error.strerror}; last checkpoint: {last}; go on with --resume")
+
+
+def _open_board(folder: pathlib.Path, step: int) -> Any:
+    """Returns a writer for TensorBoard, which will not show what another run wrote of steps from `step` on."""
+    from tensorboardX import SummaryWriter
+
+    # Two commands may begin in one second, so the process's id is in the name.
+    return SummaryWriter(str(folder), purge_step=step, flush_secs=10, filename_suffix=f".{os.getpid()}")
 
 
 def _lock(folder: pathlib.Path) -> int:

@@ -22,7 +22,7 @@ class TrainOptions(Options):
     """Options of a training: the agent, the values of its config, and the length of the run.
 
     Raises:
-      InputError: if a value is not allowed, the options don't say when to stop, or they name a cluster for no workers.
+      InputError: if a value is not allowed, or the options don't say when to stop.
     """
 
     agent: str
@@ -30,7 +30,7 @@ class TrainOptions(Options):
         tuple[Annotated[str, OneOf(LOCAL, *TRACKS)], ...],
         Doc(
             "local, or a track, a named way in which the map or the senses are imperfect; of several tracks, as "
-            "building,rebuilt, for agents that can, each has an equal share of the environments."
+            "building,rebuilt, for agents that can, each episode draws one."
         ),
     ] = (LOCAL,)
     minutes: Annotated[float | None, Interval(ge=0.01, le=_LONGEST_MINUTES), Doc("How long this command trains.")] = (
@@ -55,8 +55,6 @@ class TrainOptions(Options):
     widen_steps: Annotated[
         int, Ge(1), Doc("Agent steps over which that grows to the farthest distance of the task.")
     ] = 400_000
-    workers: Annotated[int, Ge(0), Doc("Ray actors that collect; 0 collects in this process.")] = 0
-    ray_address: Annotated[str | None, Doc("Address of a Ray cluster for the workers; local if not given.")] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -64,5 +62,3 @@ class TrainOptions(Options):
             raise InputError(f"expected different tracks, found {', '.join(self.task)}")
         if self.minutes is None and self.env_steps is None:
             raise InputError("expected --minutes or --env-steps, found neither")
-        if self.ray_address is not None and not self.workers:
-            raise InputError("--ray-address needs --workers, the number of actors on the cluster")

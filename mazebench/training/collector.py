@@ -1,0 +1,82 @@
+"""Collecting experience in environments of one task, or of several tracks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from mazebench.envs.vector import MazeVectorEnv
+from mazebench.rollout import Step, rollout
+from mazebench.tasks.task import Task
+from mazebench.training.experience import Experience
+from mazebench.training.protocol import LearningAgent
+
+_SEEDS = 2**31
+
+
+class Collector:
+    """B environments in which an agent collects experience; of several tasks, each episode draws one."""
+
+    def __init__(self, tasks: Task | Sequence[Task], num_envs: int, num_threads: int = 0):
+        """The tasks are one, or those of `tasks_of_tracks`; `num_envs` is B, `num_threads` 0 for all cores."""
+        self._envs = MazeVectorEnv(tasks, num_envs, num_threads=num_threads)
+        self._task = self._envs.task
+
+    def limit_distances(self, longest: int) -> None:
+        """Sends the agent to goals at most so many cells away from now on, or to the nearest of the task's."""
+        distances = self._task.distances
+        self._envs.draw_distances([each for each in distances if each <= longest] or [min(distances)])
+
+    def collect(self, actor: LearningAgent, seed: int) -> Iterator[Experience]:
+        """Begins new trajectories, the same for the same `seed`, and yields the exploring agent's steps without end."""
+        root = np.random.SeedSequence(seed)
+        first = self._envs.reset(seed=root.generate_state(self._envs.num_envs).tolist())
+        # What an agent draws from must not let it reconstruct its episode's flips, warp or noise.
+        rng = np.random.default_rng(root.spawn(1)[0])
+        actor.explore_from(seed)
+        truth = self._truth()
+        for step in rollout(
+            actor, self._envs, first, lambda slots: rng.integers(_SEEDS, size=len(slots)), explore=True
+        ):
+            before, truth = truth, self._truth()
+            yield self._experience(step, before, actor.notes(step.state))
+
+    def _truth(self) -> dict[str, np.ndarray]:
+        """Returns what is true of the environments now, by the names of the fields of `Experience`."""
+        rules = self._envs.rules
+        return {
+            "cell": rules.cell.copy(),
+            "pose": rules.pose.copy(),
+            "velocity": self._envs.velocity(),
+            "maze": rules.maze.copy(),
+            "start": rules.start.copy(),
+            "goal": rules.target.copy(),
+        }
+
+    def _experience(self, step: Step, truth: dict[str, np.ndarray], notes: Any) -> Experience:
+        """Returns a step as experience; `truth` is that of before the step."""
+        observation = step.inputs.observation
+        final_state = np.zeros_like(observation["state"])
+        final_cell = np.zeros(len(step.ended), dtype=np.int64)
+        if step.ended.any():
+            for slot in np.flatnonzero(step.ended):
+                final_state[slot] = step.next_info["final_obs"][slot]["state"]
+            # All mazes have one size and one cell size.
+            final_cell = self._task.mazes[0].cell_index(step.next_info["final_info"]["position"])
+        return Experience(
+            **truth,
+            state=observation["state"],
+            action=step.actions,
+            new_episode=step.inputs.new_episode,
+            new_context=step.inputs.new_context,
+            reward=step.reward,
+            terminated=step.terminated,
+            ended=step.ended,
+            final_state=final_state,
+            final_cell=final_cell,
+            context=observation["context"],
+            sensors={name: observation[name] for name in self._task.sensors},
+            notes=notes,
+        )
