@@ -140,9 +140,9 @@ def worth(kinds: Kinds = KINDS, episodes: Episodes = 40) -> None:
 def _on_time(task: Task, trials: Sequence[Trial], oracle: np.ndarray) -> np.ndarray:
     """Returns `[E]` float: 1 where the navigator reaches the goal within 1.25 times the oracle's steps, else 0."""
     agent, on_time = load_agent_class("navigator").build(task.interface), np.zeros(len(trials))
-    for outcomes in run_trials(agent, task, list(enumerate(trials)), len(trials), 1):
-        for outcome in outcomes:
-            on_time[outcome.index] = outcome.success and outcome.steps <= ON_TIME[0] * oracle[outcome.index]
+    for results in run_trials(agent, task, dict(enumerate(trials)), len(trials), 1):
+        for result in results:
+            on_time[result.number] = result.success and result.steps <= ON_TIME[0] * oracle[result.number]
     return on_time
 
 
