@@ -84,7 +84,8 @@ def summarize_facts(records: Sequence[Record], oracle_steps: Steps | None = None
     """Returns the figures of the records in which a fact holds, such as "blocked", and where it does not.
 
     Args:
-      records, oracle_steps: as for `summarize`; on some tracks, records tell facts.
+      records: of an evaluation, at least one; on some tracks, they tell facts.
+      oracle_steps: the oracle's steps in the evaluation's episodes; None if they are not known.
     """
     return {
         name: _figures([records[index] for index in np.flatnonzero(holds).tolist()], oracle_steps)
