@@ -134,7 +134,8 @@ np.testing.assert_array_equal(env.reset(seed=9).observation["egocentric"], befor
 @pytest.mark.parametrize(
     "program",
     [
-        "env = gymnasium.make('mazebench/Local-13-v1', render_mode='rgb_array', sensors='top')\nenv.reset(); env.render()",
+        "env = gymnasium.make('mazebench/Local-13-v1', render_mode='rgb_array', sensors='top')\n"
+        "env.reset(); env.render()",
         "envs = mazebench.make_vec('local', 2, render_mode='rgb_array'); envs.reset(); envs.render()\n"
         "env = mazebench.load(sensors='egocentric'); env.reset()",
     ],

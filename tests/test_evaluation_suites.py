@@ -78,9 +78,7 @@ class TestRun:
 
     def test_the_bytes_do_not_depend_on_how_it_is_run(self, tiny_run, tmp_path):
         calls = []
-        summaries = run_suite(
-            "tiny", BOTH, tmp_path, RunOptions(num_envs=16), lambda *call: calls.append(call)
-        )
+        summaries = run_suite("tiny", BOTH, tmp_path, RunOptions(num_envs=16), lambda *call: calls.append(call))
         assert results_of(tmp_path) == results_of(tiny_run)
         assert (calls[0], calls[-1]) == ((0, 160), (160, 160))
         assert calls == sorted(calls)
