@@ -31,8 +31,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
 TRAIN = "train --agent mah --env-steps 200 --checkpoint-steps 200 --eval-mazes 1 --set channels=4 --set hidden=16"
 TRAIN += " --set groups=4 --set steps=4 --set num_envs=8 --set min_rows=100 --set steps_per_update=32"
 COMMANDS = (
-    "eval --agent random --distances 2,6 --episodes-per-distance 1 --record",
-    "eval --agent mah --distances 1,2 --episodes-per-distance 1 --map-flip 0.1 --num-envs 16",
+    "eval --agent planner --distances 4 --episodes-per-distance 1 --map-warp 0.2 --record",
     "generate --size 9 --seed 3 --format txt,mjcf,png,glb,obj,stl",
     f"{TRAIN} --set replay_capacity=4000",
 )
@@ -92,7 +91,7 @@ def test_bytes_do_not_depend_on_the_number_of_environments(reference, tmp_path, 
 
 
 def test_bytes_do_not_depend_on_workers(reference, tmp_path):
-    assert run("mah-noise", tmp_path, num_envs=7, workers=2) == reference["mah-noise"]
+    assert run("planner", tmp_path, num_envs=7, workers=2) == reference["planner"]
     # The figures follow from the records, in the order in which these stand.
     result = load_result(tmp_path)
     assert result.summary.overall.spl_ci95 == summarize(result.records)[0].spl_ci95

@@ -152,7 +152,7 @@ class TestPartsThatCannotBePlayed:
     def test_they_are_left_out_and_named(self, mixed, tmp_path, monkeypatch):
         agent = self.write_agent(tmp_path, monkeypatch, 13)
         with pytest.warns(Remark) as warned:
-            summaries = run_suite("mixed", [agent, "random"], tmp_path / "out", RunOptions(workers=1))
+            summaries = run_suite("mixed", [agent, "random"], tmp_path / "out")
         assert [str(each.message) for each in warned] == [
             "agent 'Partial': plays local goals only, found hierarchical; left out: corners, flips"
         ]
