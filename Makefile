@@ -24,13 +24,14 @@ eval: .venv/installed-agents
 test: .venv/installed-dev
 	$(BIN)/pytest -n auto -m "not slow"
 
-# Into site/; a warning is an error. The notice that is turned off is not about our pages.
+# Into site/; a warning is an error, which `--quiet` would hide. The notice that is turned off is not about our pages.
 docs: .venv/installed-dev
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 check: .venv/installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/lint-imports
 	$(BIN)/mypy
 	$(MAKE) docs
 	$(MAKE) test

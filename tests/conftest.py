@@ -2,14 +2,34 @@
 
 from __future__ import annotations
 
+import os
 import pathlib
+import sys
 import warnings
 from collections.abc import Callable, Iterator
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # of each worker of pytest-xdist and its processes; read by imports below
 
 import pytest
 from made_results import make_results
 
+from mazebench import cli
 from mazebench.errors import Remark
+
+
+@pytest.fixture
+def command(tmp_path, monkeypatch, capsys) -> Callable[..., tuple[int, str, str]]:
+    """Runs a command in this process, in an empty working directory; gives exit status, output and errors."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str | pathlib.Path) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["mazebench", *map(str, arguments)])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as caught:
+            cli.main()
+        return caught.value.code, *capsys.readouterr()
+
+    return run
 
 
 @pytest.fixture

@@ -20,25 +20,19 @@ from mazebench.results.reading import load_result
 SETTINGS: dict[str, dict[str, Any]] = {
     "random": {"agent": "random", "distances": (2, 6)},
     "planner": {"agent": "planner", "distances": (4,), "map_flip": 0.2, "map_warp": 0.2},
-    "closed-loop-noise": {"agent": "planner-closed-loop", "distances": (5,), "position_noise": 0.5},
     "hierarchical": {
         "agent": "planner-closed-loop",
         "task": "hierarchical",
         "map_flip": 0.1,
         "position_noise": 0.3,
     },
-    "mah": {"agent": "mah", "distances": (1, 2)},
     "mah-noise": {"agent": "mah", "distances": (2,), "map_flip": 0.1, "position_noise": 0.3},
 }
-TRAIN = "train --agent mah --env-steps 400 --checkpoint-steps 200 --eval-mazes 1 --set channels=4 --set hidden=16"
+TRAIN = "train --agent mah --env-steps 200 --checkpoint-steps 200 --eval-mazes 1 --set channels=4 --set hidden=16"
 TRAIN += " --set groups=4 --set steps=4 --set num_envs=8 --set min_rows=100 --set steps_per_update=32"
 COMMANDS = (
-    "eval --agent random --distances 2,6 --episodes-per-distance 1 --record",
-    "eval --agent planner-closed-loop --task hierarchical --map-flip 0.1 --position-noise 0.3 --record",
-    "eval --agent planner --distances 4 --episodes-per-distance 1 --map-warp 0.2 --seed 5 --split train",
-    "eval --agent mah --distances 1,2 --episodes-per-distance 1 --map-flip 0.1 --num-envs 16",
-    "generate --size 9 --count 2 --seed 3 --format txt,mjcf,png,glb,obj,stl",
-    "generate --size 9 --kind rooms",
+    "eval --agent planner --distances 4 --episodes-per-distance 1 --map-warp 0.2 --record",
+    "generate --size 9 --seed 3 --format txt,mjcf,png,glb,obj,stl",
     f"{TRAIN} --set replay_capacity=4000",
 )
 # Runs each command in this process, and prints the SHA-256 of every file that is promised to be the same.
@@ -59,7 +53,7 @@ print(json.dumps(hashes))
 """
 # What must make no difference.
 SURROUNDINGS: dict[str, dict[str, str]] = {
-    "plain": {"PYTHONHASHSEED": "0", "LC_ALL": "C", "TZ": "UTC"},
+    "plain": {"PYTHONHASHSEED": "0", "LC_ALL": "C", "TZ": "UTC", "OMP_NUM_THREADS": "2"},
     "other": {
         "PYTHONHASHSEED": "4711",
         "LC_ALL": "C.UTF-8",
@@ -91,15 +85,13 @@ def test_the_settings_are_worth_their_time(reference):
     assert len({record["path_length"] for record in records}) > 10
 
 
-@pytest.mark.parametrize("num_envs", [1, 7])
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize(("name", "num_envs"), [*((name, 7) for name in SETTINGS), ("mah-noise", 1)])
 def test_bytes_do_not_depend_on_the_number_of_environments(reference, tmp_path, name, num_envs):
     assert run(name, tmp_path, num_envs=num_envs) == reference[name]
 
 
-@pytest.mark.parametrize("name", ["hierarchical", "mah-noise"])
-def test_bytes_do_not_depend_on_workers(reference, tmp_path, name):
-    assert run(name, tmp_path, num_envs=7, workers=2) == reference[name]
+def test_bytes_do_not_depend_on_workers(reference, tmp_path):
+    assert run("planner", tmp_path, num_envs=7, workers=2) == reference["planner"]
     # The figures follow from the records, in the order in which these stand.
     result = load_result(tmp_path)
     assert result.summary.overall.spl_ci95 == summarize(result.records)[0].spl_ci95
@@ -129,11 +121,9 @@ def on_one_core() -> None:
 def test_files_do_not_depend_on_the_surroundings(tmp_path):
     """Hash seeds, locales, time zones, threads, cores and the working directory make no difference to any command."""
     hashes = run_commands(tmp_path / "a", SURROUNDINGS["plain"])
-    expected = {"episodes.jsonl": 4, "trajectories.npz": 2, "metrics.jsonl": 1, "agent.safetensors": 2, "replay.npz": 2}
-    for name, count in expected.items():
-        assert sum(path.endswith(f"/{name}") for path in hashes) == count
-    for suffix, count in {"txt": 3, "xml": 3, "png": 3, "glb": 3, "obj": 2, "stl": 2}.items():
-        assert sum(path.endswith(f".{suffix}") for path in hashes) == count
+    names = {pathlib.Path(path).name for path in hashes}
+    assert {"episodes.jsonl", "trajectories.npz", "metrics.jsonl", "agent.safetensors", "replay.npz"} <= names
+    assert {".txt", ".xml", ".png", ".glb", ".obj", ".stl"} <= {pathlib.Path(path).suffix for path in hashes}
     other = run_commands(tmp_path / "b" / "ä 1", SURROUNDINGS["other"], preexec_fn=on_one_core)
     assert other == hashes
 
@@ -161,4 +151,4 @@ def test_files_do_not_depend_on_how_busy_the_machine_is(tmp_path):
         process.stdin.close()
     outputs = [process.stdout.read() for process in processes if process.stdout]
     assert len(set(outputs)) == 1
-    assert len(json.loads(outputs[0])) > 30
+    assert len(json.loads(outputs[0])) > 15

@@ -1,129 +1,82 @@
-"""The documents: what they link to exists, their code runs, their commands are those of the command line."""
+"""The pages: their code and commands run in order and print what they show. `make docs` checks the links of docs."""
 
 from __future__ import annotations
 
-import functools
 import importlib.util
 import pathlib
 import re
+import shlex
+import subprocess
 import sys
-import unicodedata
+import unittest
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 import typer
-from pages import PAGES, ROOT, Block, blocks, name_of, read
-from processes import run_python
+import yaml
+from sybil import Document, Example, Region
+from sybil.evaluators.python import PythonEvaluator
+from sybil.parsers.markdown import SkipParser
+from sybil.parsers.markdown.lexers import FencedCodeBlockLexer
 
+import mazebench
 from mazebench import cli
 from mazebench.maps.kinds import generate
 from mazebench.maps.pictures import draw_maze, write_image
 from mazebench.maps.readers.ros import write_ros_map
 from mazebench.maps.text import write_text_maze
 
-EVERY_PAGE = pytest.mark.parametrize("page", PAGES, ids=name_of)
+ROOT = pathlib.Path(__file__).parent.parent
+PAGES = [page.relative_to(ROOT).as_posix() for page in sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])]
 COMMANDS = typer.main.get_command(cli.app).commands
-# Quick, and without a checkpoint.
-PLAIN_AGENTS = {"random", "planner", "planner-closed-loop"}
+PLAIN_AGENTS = {"random", "planner", "planner-closed-loop"}  # quick, and without a checkpoint
+FENCE = FencedCodeBlockLexer(r"\w*")
+RUN = pytest.mark.parametrize("page", [page for page in PAGES if re.search("^```", (ROOT / page).read_text(), re.M)])
 
 
-class TestLinks:
-    @EVERY_PAGE
-    def test_links_lead_to_files(self, page):
-        assert [link for link in links(page) if not (page.parent / link.partition("#")[0]).exists()] == []
-
-    @EVERY_PAGE
-    def test_anchors_are_headings(self, page):
-        for link in links(page):
-            path, _, anchor = link.partition("#")
-            target = page.parent / path if path else page
-            assert not anchor or anchor in anchors(target), f"{link}: there are {sorted(anchors(target))}"
-
-    def test_pages_when_looked_for_in_the_overview(self):
-        folder = ROOT / "docs"
-        pages = {page for page in PAGES if folder in page.parents and page.parent.name != "reference"}
-        linked = {folder / link for link in links(folder / "index.md")}
-        assert pages - linked == {folder / "index.md"}
+@pytest.mark.parametrize("page", [page for page in PAGES if "/" not in page])
+def test_links_of_pages_outside_the_site_lead_somewhere(page):
+    for link in re.findall(r"\]\(([^)\s:]+)\)", (ROOT / page).read_text(encoding="utf-8")):
+        path, _, anchor = link.partition("#")
+        headings = re.findall(r"^#+ (.+)$", (ROOT / (path or page)).read_text(encoding="utf-8"), re.M) if anchor else []
+        slugs = {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+        assert (ROOT / path).exists(), link
+        assert not anchor or anchor in slugs, link
 
 
-def links(page: pathlib.Path) -> list[str]:
-    """The targets of its links and pictures that are not addresses."""
-    return [link for link in re.findall(r"\]\(([^)\s]+)\)", prose(page)) if "://" not in link]
+@pytest.mark.parametrize("page", PAGES)
+def test_commands_are_those_of_the_command_line(page):
+    document = Document.parse(str(ROOT / page))
+    for region in FENCE(document):
+        if region.lexemes["language"] in ("sh", ""):
+            for program, *words in commands(region.lexemes["source"]):
+                if program == "mazebench":
+                    COMMANDS[words[0]].make_context(words[0], words[1:])
+                elif region.lexemes["language"] == "sh" and program == "make":
+                    assert all(f"\n{target}:" in (ROOT / "Makefile").read_text() for target in words)
+                elif region.lexemes["language"] == "sh" and program == "python":
+                    assert importlib.util.find_spec(words[1]) if words[0] == "-m" else (ROOT / words[0]).exists()
+    for name, words in re.findall(r"`mazebench ([a-z]+)([^`]*)`", document.text):
+        options = {option for each in COMMANDS[name].params for option in each.opts + each.secondary_opts}
+        assert set(re.findall(r"--[\w-]+", words)) <= options, words
 
 
-def prose(page: pathlib.Path) -> str:
-    """Its text without the fenced blocks."""
-    return re.sub(r"^```.*?^```$", "", read(page), flags=re.MULTILINE | re.DOTALL)
+def commands(text: str) -> Iterator[list[str]]:
+    """Yields the commands of some shell lines, word by word."""
+    for line in text.replace("\\\n", " ").splitlines():
+        for command in line.split(" && "):
+            if words := shlex.split(command, comments=True):
+                yield words
 
 
-def anchors(page: pathlib.Path) -> set[str]:
-    """The anchors of its headings; where the site and the repository's browser make different ones, none."""
-    headings = [heading.replace("`", "") for heading in re.findall(r"^#+ (.+)$", prose(page), re.MULTILINE)]
-    in_browser = {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
-    plain = [unicodedata.normalize("NFKD", heading).encode("ascii", "ignore").decode() for heading in headings]
-    on_site = {re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", heading).strip().lower()) for heading in plain}
-    return in_browser & on_site
-
-
-class TestCommands:
-    """Every command shown is one that the command line takes; the quick ones are run below, with the code."""
-
-    @EVERY_PAGE
-    def test_blocks_when_run_as_commands(self, page):
-        for command in page_commands(page):
-            check_command(command)
-
-    @EVERY_PAGE
-    def test_commands_in_sentences_when_looked_up(self, page):
-        for text in re.findall(r"`mazebench ([a-z][^`]*)`", prose(page)):
-            name, *words = text.replace("[", " ").replace("]", " ").split()
-            known = {
-                option for parameter in COMMANDS[name].params for option in parameter.opts + parameter.secondary_opts
-            }
-            assert {word for word in words if word.startswith("--")} <= known, text
-
-
-def page_commands(page: pathlib.Path) -> list[list[str]]:
-    """All commands in its blocks; of blocks that may hold something else, the lines that are mazebench's."""
-    commands = []
-    for block in blocks(page):
-        if block.language == "sh":
-            commands += block.commands()
-        elif block.language == "":
-            lines = "\n".join(line for line in block.text.splitlines() if line.startswith("mazebench "))
-            commands += Block("sh", lines, "").commands()
-    return commands
-
-
-def check_command(command: list[str]) -> None:
-    """Fails where a command can't be what a reader should type: no such program, module, file, option or value."""
-    program, *arguments = command
-    if program == "mazebench":
-        COMMANDS[arguments[0]].make_context(arguments[0], arguments[1:])
-    elif program == "make":
-        targets = re.findall(r"^([\w-]+):", read(ROOT / "Makefile"), re.MULTILINE)
-        assert set(arguments) <= set(targets), command
-    elif program == "python" and arguments[0] == "-m":
-        assert importlib.util.find_spec(arguments[1]), command
-    elif program == "python":
-        assert (ROOT / arguments[0]).exists(), command
-
-
-class TestRun:
-    @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)], ids=name_of)
-    def test_blocks_of_a_page_when_run_in_order(self, page, reader):
-        printed = ""
-        for block in blocks(page):
-            if block.is_output and printed:
-                assert block.text in printed
-            elif not block.is_run:
-                printed = ""
-            elif block.file_name:
-                pathlib.Path(block.file_name).write_text(block.text, encoding="utf-8")
-            elif block.language == "python":
-                printed = reader.runs_code(block.text)
-            elif block.language == "sh":
-                printed = "".join(map(reader.runs_command, block.commands()))
+@RUN
+def test_a_page_can_be_followed(page, reader):
+    for example in Document.parse(str(ROOT / page), SkipParser(), reader.parse):
+        try:
+            example.evaluate()
+        except unittest.SkipTest:
+            reader.printed = ""
 
 
 @pytest.fixture
@@ -140,27 +93,42 @@ def reader(tmp_path, monkeypatch, capsys):
     known = set(sys.modules)
     yield Reader(monkeypatch, capsys)
     for name in set(sys.modules) - known:
-        if getattr(sys.modules[name], "__file__", None) and str(tmp_path) in sys.modules[name].__file__:
+        if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
             del sys.modules[name]  # what a page calls my_agent.py is another file on another page
 
 
 class Reader:
-    """Runs what a page shows, in this process; gives what is printed."""
+    """Runs the blocks of a page in this process."""
 
     def __init__(self, monkeypatch, capsys):
         self._monkeypatch, self._capsys = monkeypatch, capsys
-        self._names: dict[str, object] = {}
+        self.printed = ""  # by the block before
 
-    def runs_code(self, code: str) -> str:
-        exec(compile(code, "page", "exec"), self._names)
-        return self._capsys.readouterr().out
+    def parse(self, document: Document) -> Iterator[Region]:
+        """Yields the fenced blocks, each with the last line before it."""
+        for region in FENCE(document):
+            region.parsed = region.lexemes["source"]
+            region.lexemes["before"] = document.text[: region.start].rstrip().rpartition("\n")[2]
+            region.evaluator = self.run
+            yield region
 
-    def runs_command(self, command: list[str]) -> str:
+    def run(self, example: Example) -> None:
+        """Runs a block, or compares it with what the one before printed."""
+        language, before, text = example.region.lexemes["language"], example.region.lexemes["before"], example.parsed
+        if language == "text" and before == "```":
+            assert not self.printed or text in self.printed
+        elif re.fullmatch(r"`[\w.]+`", before):
+            pathlib.Path(before.strip("`")).write_text(text, encoding="utf-8")
+        elif language == "python":
+            PythonEvaluator()(example)
+            self.printed = self._capsys.readouterr().out
+        elif language == "sh":
+            self.printed = "".join(map(self._run_command, commands(text)))
+
+    def _run_command(self, command: list[str]) -> str:
         arguments = shortened(command)
         if arguments is None:
             return ""
-        if arguments[0] == "render":  # in a process of its own, because MuJoCo takes its backend when it is imported
-            return run_python("-m", "mazebench", *arguments, variables={"MUJOCO_GL": "egl"}).stdout if renders() else ""
         self._monkeypatch.setattr(sys, "argv", ["mazebench", *arguments])
         with pytest.raises(SystemExit) as caught:
             cli.main()
@@ -171,30 +139,34 @@ class Reader:
 
 def shortened(command: list[str]) -> list[str] | None:
     """The arguments of a mazebench command that takes a second or so, cut down where it would take more, else None."""
-    program, *arguments = command
+    program, kind, *options = [*command, ""]
     if program != "mazebench":
         return None
-    kind, *options = arguments
+    arguments = command[1:]
     if kind in ("list", "generate"):
         return arguments
     if kind == "collect":
         return [*arguments, "--episodes", "2"]
     if kind in ("compare", "report"):
-        folders = [option for option in options if not option.startswith("--")]
-        return arguments if pathlib.Path(folders[0]).exists() else None
-    if kind == "render":
-        is_short = {"--start", "--goal"} <= set(options) or "--split" in options
-        near = () if is_short else ("--distances", "3")
-        return [*arguments, "--pixels", "64", *near]
+        return arguments if pathlib.Path(options[0]).exists() else None
     if kind == "eval" and "--suite" not in options:
         agent = options[options.index("--agent") + 1]
         if agent in PLAIN_AGENTS or pathlib.Path(f"{agent.partition(':')[0]}.py").exists():
+            if "--track" in options:
+                return [*arguments, "--distances", "15"]
             few = ("--distances", "1,2", "--episodes-per-distance", "1")
-            return arguments if {"hierarchical", "--track", "--out", "--goal"} & set(options) else [*arguments, *few]
+            return arguments if {"hierarchical", "--out", "--goal"} & set(options) else [*arguments, *few]
     return None
 
 
-@functools.cache
-def renders() -> bool:
-    probe = "import mujoco; mujoco.GLContext(64, 64).free()"
-    return run_python("-c", probe, status=None, variables={"MUJOCO_GL": "egl"}).returncode == 0
+@pytest.mark.parametrize("diff", sorted(ROOT.glob("docs/examples/extend/*.diff")), ids=lambda path: path.stem)
+def test_a_diff_of_the_page_on_extending_fits_the_code(diff):
+    run = subprocess.run(["git", "apply", "--check", diff], text=True, cwd=ROOT, capture_output=True)
+    assert run.returncode == 0, run.stderr
+
+
+def test_change_log_and_citation_name_the_version():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    version, date = re.search(r"^## (\S+), (.+)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.M).groups()
+    assert version == mazebench.__version__ == citation["version"]
+    assert date == str(citation.get("date-released", "unreleased"))

@@ -23,7 +23,7 @@ from mazebench.maps.maze import Maze
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.task import Task
 
-NUM_STEPS = 320
+NUM_STEPS = 200
 SEEDS = [3, 1000, 17, 4]
 NUM_ENVS = len(SEEDS)
 INFOS = (

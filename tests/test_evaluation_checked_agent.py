@@ -8,7 +8,6 @@ import sys
 import numpy as np
 import pytest
 from acting import inputs_of
-from processes import run_python
 
 from mazebench.agent import Agent
 from mazebench.evaluation.checked_agent import AgentError, CheckedAgent
@@ -104,17 +103,19 @@ class TestEvaluation:
         assert not (tmp_path / "out" / "trajectories.npz").exists()
 
 
-def test_the_command_says_what_is_kept_and_shows_a_traceback_if_asked(tmp_path):
+def test_the_command_says_what_is_kept_and_shows_a_traceback_if_asked(command):
     # With one environment at a time, so that some episodes end before the agent breaks.
-    command = ["-m", "mazebench", "eval", "--distances", "1", "--episodes-per-distance", "1"]
-    command += ["--num-envs", "1", "--agent", "contract_at_hand:Late", "--out", "run"]
-    plain, loud = (run_python(*command, *words, status=1, cwd=tmp_path) for words in ([], ["--resume", "--traceback"]))
-    *_, line = plain.stderr.splitlines()
+    words = ["eval", "--distances", "1", "--episodes-per-distance", "1", "--num-envs", "1", "--out", "run"]
+    words += ["--agent", "contract_at_hand:Late"]
+    _, _, plain = command(*words)
+    status, _, loud = command(*words, "--resume", "--traceback")
+    *_, line = plain.splitlines()
     said = r"mazebench: agent 'contract_at_hand:Late': act\(\) raised AssertionError \(contract_at_hand.py:\d+\)"
     assert re.fullmatch(said + "; 1 of 20 episodes are kept in run", line)
-    assert "Traceback" not in plain.stderr
-    assert "assert state < 120" in loud.stderr
-    assert loud.stderr.splitlines()[-1] == line.replace("1 of 20", "2 of 20")
+    assert status == 1
+    assert "Traceback" not in plain
+    assert "assert state < 120" in loud
+    assert loud.splitlines()[-1] == line.replace("1 of 20", "2 of 20")
 
 
 class TestCheckedAgent:

@@ -78,9 +78,7 @@ class TestRun:
 
     def test_the_bytes_do_not_depend_on_how_it_is_run(self, tiny_run, tmp_path):
         calls = []
-        summaries = run_suite(
-            "tiny", BOTH, tmp_path, RunOptions(workers=2, num_envs=16), lambda *call: calls.append(call)
-        )
+        summaries = run_suite("tiny", BOTH, tmp_path, RunOptions(num_envs=16), lambda *call: calls.append(call))
         assert results_of(tmp_path) == results_of(tiny_run)
         assert (calls[0], calls[-1]) == ((0, 160), (160, 160))
         assert calls == sorted(calls)
@@ -154,7 +152,7 @@ class TestPartsThatCannotBePlayed:
     def test_they_are_left_out_and_named(self, mixed, tmp_path, monkeypatch):
         agent = self.write_agent(tmp_path, monkeypatch, 13)
         with pytest.warns(Remark) as warned:
-            summaries = run_suite("mixed", [agent, "random"], tmp_path / "out", RunOptions(workers=1))
+            summaries = run_suite("mixed", [agent, "random"], tmp_path / "out")
         assert [str(each.message) for each in warned] == [
             "agent 'Partial': plays local goals only, found hierarchical; left out: corners, flips"
         ]

@@ -15,7 +15,7 @@ from mazebench.errors import InputError
 from mazebench.evaluation.measured_oracle import measure_oracle_steps
 from mazebench.tasks.trials import Trial
 
-NUM_ENVS = 16
+NUM_ENVS = 8
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def test_labels_follow_from_the_state_whoever_has_driven_to_it(task, options):
     envs = mazebench.make_vec(task, NUM_ENVS, **options)
     envs.reset(seed=0)
     rng, goals = np.random.default_rng(0), set()
-    for step in range(100):
+    for step in range(80):
         found, rules = labels(envs), envs.rules
         if step % 10 == 0:
             new = Expert(envs.task.mazes, NUM_ENVS)

@@ -236,25 +236,27 @@ def test_motion_is_told_from_where_the_episode_began_through_its_landmarks():
     torch.testing.assert_close(state.code.positions[:, :2], torch.tensor([[5.0, 1.0], [4.0, 2.0]]))
 
 
-def test_mmn_after_a_minute_beats_random_in_a_small_maze():
+def test_mmn_after_some_seconds_beats_random_in_a_small_maze():
     """The learning test: goals 2 and 3 cells away in 25 steps."""
     values = {
         "hidden": 32,
         "head_hidden": 64,
+        "learning_rate": 1e-2,
         "num_simulations": 4,
         "num_eval_simulations": 8,
         "num_envs": 64,
-        "groups": 12,
-        "min_rows": 2000,
+        "groups": 4,
+        "sequences": 6,
+        "min_rows": 1000,
         "steps_per_update": 64,
-        "target_rate": 0.1,
+        "target_rate": 0.3,
         "longest_value": 25,
         "hindsight_mean_offset": 8,
         "hindsight_window": 30,
     }
-    before, after = learn(MMN, 3, (2, 3), 600, values)
-    assert before < 0.6
-    assert after > 0.8
+    before, after = learn(MMN, 3, (2, 3), 200, values)
+    assert before < 0.3
+    assert after > 0.5
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")

@@ -99,10 +99,7 @@ class TestNavigator:
         ("track", "level", "least"),
         [
             ("building", 1, 1.0),
-            ("building", 3, 0.95),
             ("rebuilt", 2, 0.9),
-            ("adrift", 1, 0.95),
-            ("adrift", 2, 0.85),
             ("adrift", 3, 0.8),
         ],
     )

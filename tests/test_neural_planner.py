@@ -119,7 +119,7 @@ def test_clipped_loss_by_hand():
     assert loss.item() == pytest.approx(-(1.2 - 1.5) / 2, rel=1e-4)
 
 
-@pytest.mark.parametrize("options", [{}, {"sensors": "lidar"}, {"task": "adrift", "level": 3}], ids=str)
+@pytest.mark.parametrize("options", [{"sensors": "lidar"}, {"task": "adrift", "level": 3}], ids=str)
 def test_agent_keeps_its_contract(tmp_path, options):
     learner = NeuralPlanner.build_learner(Task.of(mazes=field(7)), overrides=text(SMALL))
     learner.save(tmp_path, {})
@@ -158,8 +158,8 @@ GROWING = {"distances": (1, 2, 3, 4, 5), "first_distance": 2, "widen_steps": 100
 
 
 def run(out, env_steps, resume=False, teacher="reward", **options):
-    """A training with a milestone every 640 steps, which are two rollouts; returns its last checkpoint."""
-    values = {"overrides": SMALL | {"teacher": teacher}, "checkpoint_steps": 640, "eval_mazes": 1}
+    """A training with a milestone every 320 steps, which are a rollout; returns its last checkpoint."""
+    values = {"overrides": SMALL | {"teacher": teacher}, "checkpoint_steps": 320, "eval_mazes": 1}
     train("neural-planner", out=out, env_steps=env_steps, resume=resume, **values, **options)
     return max((out / "checkpoints").iterdir())
 
@@ -167,16 +167,15 @@ def run(out, env_steps, resume=False, teacher="reward", **options):
 @pytest.mark.parametrize(
     "options",
     [
-        TRACKS | GROWING,
         TRACKS | GROWING | {"teacher": "oracle"},
         {"distances": 10, "time_limit": 5, "num_goals": 1},  # all episodes end at the milestone
     ],
-    ids=("rewards", "oracle", "all end"),
+    ids=("oracle", "rewards, all end"),
 )
 def test_resumed_run_is_the_unbroken_one(tmp_path, options):
-    whole = run(tmp_path / "whole", 1280, **options)
-    run(tmp_path / "broken", 640, **options)
-    resumed = run(tmp_path / "broken", 1280, resume=True, **options)
+    whole = run(tmp_path / "whole", 640, **options)
+    run(tmp_path / "broken", 320, **options)
+    resumed = run(tmp_path / "broken", 640, resume=True, **options)
     assert whole.name == resumed.name
     files = {path.name for path in whole.iterdir()}
     assert ("replay.npz" in files) == (options.get("teacher") == "oracle")
@@ -185,9 +184,9 @@ def test_resumed_run_is_the_unbroken_one(tmp_path, options):
 
 
 def test_metrics_and_config_of_several_tracks(tmp_path):
-    run(tmp_path / "whole", 640, **TRACKS, **GROWING)
+    run(tmp_path / "whole", 320, **TRACKS, **GROWING)
     lines = [json.loads(line) for line in (tmp_path / "whole" / "metrics.jsonl").read_text().splitlines()]
-    assert lines[-1]["updates"] == 2
+    assert lines[-1]["updates"] == 1
     assert {"success_rate_building_1", "success_rate_rebuilt_5"} <= set(lines[-1])
     config = json.loads((tmp_path / "whole" / "config.json").read_text())
     assert config["also"] == ["rebuilt"]

@@ -35,7 +35,7 @@ def test_shipped_agent_with_a_map_reaches_near_goals_in_its_training_mazes(tmp_p
 
 
 def test_shipped_neural_planner_reaches_goals_of_a_track(tmp_path):
-    parts = {"task": "rebuilt", "split": "train", "distances": (15,)}
+    parts = {"task": "rebuilt", "split": "train", "distances": (15,), "kinds": ("house",)}
     summary = evaluate("neural-planner", out=tmp_path / "run", **parts)
     assert summary.overall.success_rate > 0.8
 

@@ -23,14 +23,14 @@ from mazebench.training.loop import train
 
 
 def tiny_options(**changes: Any) -> dict[str, Any]:
-    values = {"agent": "mah", "overrides": TINY, "checkpoint_steps": 800, "eval_mazes": 1, "env_steps": 1600}
+    values = {"agent": "mah", "overrides": TINY, "checkpoint_steps": 800, "eval_mazes": 1, "env_steps": 800}
     return {**values, **changes}
 
 
 def task_in(folder) -> dict[str, Any]:
     """The task that a run's config and the provenance of its checkpoint name."""
     task = json.loads((folder / "config.json").read_text())["task"]
-    with safetensors.safe_open(folder / "checkpoints" / "000000001600" / "agent.safetensors", "numpy") as file:
+    with safetensors.safe_open(folder / "checkpoints" / "000000000800" / "agent.safetensors", "numpy") as file:
         (metadata,) = map(json.loads, file.metadata().values())
     assert metadata["provenance"]["task"] == task
     assert len(metadata["provenance"]["agent_code_sha256"]) == 64
@@ -68,7 +68,7 @@ def test_a_run_on_a_track_names_it_and_is_evaluated_on_it(tmp_path):
 
 
 def test_a_resumed_run_on_wrong_maps_equals_the_unbroken_one(tmp_path):
-    options = tiny_options(map_flip=0.1)
+    options = tiny_options(map_flip=0.1, env_steps=1600)
     train(**options, out=tmp_path / "unbroken")
     train(**options | {"env_steps": 800}, out=tmp_path / "resumed")
     train(**options, out=tmp_path / "resumed", resume=True)
