@@ -93,7 +93,7 @@ try:
     task = mazebench.Task.of(size={side + 2}, context_size={side + 2}, kinds='dfs')
     Agent.build(task.interface, checkpoint='her.zip')
 except mazebench.UnplayableError as error:
-    assert 'expected mazes of {side} x {side}, as in training, found {side + 2}' in str(error), error
+    assert 'expected mazes of {side} cells a side, found {side + 2}' in str(error), error
 else:
     raise AssertionError('played')
 
