@@ -10,7 +10,6 @@ from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 from simple_mazes import clearance
 
-from mazebench.errors import InputError
 from mazebench.maps.geodesic import DiscPaths, length_between
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import MAX_SIZE, Maze, cell_to_point
@@ -34,9 +33,6 @@ PILLAR = """
 #.....#
 #######
 """
-# The walls at (2, 2) and (3, 3) meet in a corner.
-
-
 ROOM = """
 #######
 #.....#
@@ -137,18 +133,6 @@ def test_a_path_from_corner_to_corner_of_the_largest_maze_is_found():
     last = MAX_SIZE - 2
     expected = 2 * (last - 1) + np.hypot(last - 4, last - 1)
     assert length_between(Maze(walls), RADIUS, (last, 1), (1, last)) == pytest.approx(expected, rel=1e-3)
-
-
-class TestInput:
-    @pytest.mark.parametrize("radius", [0, -0.1, 0.5, float("nan")])
-    def test_a_radius_out_of_range_is_refused(self, radius):
-        with pytest.raises(InputError, match=r"expected a radius above 0 and below 0\.5 m, found"):
-            DiscPaths(parse(L_TURN), radius)
-
-    @pytest.mark.parametrize("start", [(1.1, 3.5), (0.5, 0.5), (-1, 2), (9, 2), (float("nan"), 1), (1.5, 3.5, 0)])
-    def test_a_start_that_is_not_free_is_refused(self, start):
-        with pytest.raises(InputError, match=r"expected a start \(x, y\) at least 0\.15 m from every wall, found \["):
-            DiscPaths(parse(L_TURN), RADIUS).length(np.array(start), (1, 1))
 
 
 class TestLaws:

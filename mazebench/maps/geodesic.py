@@ -22,7 +22,6 @@ import numpy as np
 from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 
-from mazebench.errors import InputError
 from mazebench.maps.maze import Cell, Maze
 from mazebench.maps.sight import clear_segments, taut_pairs
 
@@ -90,14 +89,9 @@ class DiscPaths:
 
     Args:
       radius: metres, above 0 and below half a cell.
-
-    Raises:
-      InputError: if `radius` is out of range.
     """
 
     def __init__(self, maze: Maze, radius: float):
-        if not 0 < radius < maze.cell_size / 2:
-            raise InputError(f"expected a radius above 0 and below {maze.cell_size / 2} m, found {radius}")
         self._maze = maze
         self._radius = float(radius) / maze.cell_size
         self._space = _FreeSpace(maze.walls, self._radius)
@@ -118,13 +112,15 @@ class DiscPaths:
         )
 
     def length(self, start: np.ndarray, goal: Cell) -> float:
-        """Returns the metres from `start` (`[2]` m, the disc's centre) to the goal cell; 0 if `start` is in it.
+        """Returns the metres from `start` to a free goal cell; 0 if `start` is in it.
 
-        Raises:
-          InputError: if `start` is not at least the radius away from every wall, or `goal` is not a free cell.
+        Args:
+          start: `[2]` m, the disc's centre, at least the radius away from every wall.
+          goal: row and column.
         """
-        start, corner = self._check(start, goal)
-        if _is_in_cell(start, corner):
+        start = start / self._maze.cell_size
+        corner = np.array([goal[1], self._maze.size - 1 - goal[0]])  # the lower left one
+        if ((corner <= start) & (start <= corner + 1)).all():
             return 0.0
         pieces = _concatenate([self._pieces, self._clear(self._query_pieces(start, corner))])
 
@@ -132,18 +128,6 @@ class DiscPaths:
         circle, source = pieces.circle.ravel(), len(self._corners.radius)
         distances = csgraph.dijkstra(_graph(pieces), indices=int(np.argmax(circle == source)))
         return self._maze.cell_size * float(distances[circle > source].min())
-
-    def _check(self, start: np.ndarray, goal: Cell) -> tuple[np.ndarray, np.ndarray]:
-        """Returns `start` (m) in cells and the goal cell's lower left corner (`[2]` int), if both are legal."""
-        point = np.asarray(start, dtype=np.float64) / self._maze.cell_size
-        if point.shape != (2,) or not self._space.holds(point):
-            radius = self._radius * self._maze.cell_size
-            raise InputError(
-                f"{self._maze.name}: expected a start (x, y) at least {radius:g} m from every wall, "
-                f"found {np.asarray(start).tolist()}"
-            )
-        row, column = self._maze.require_free(goal)
-        return point, np.array([column, self._maze.size - 1 - row])
 
     def _clear(self, pieces: _Pieces) -> _Pieces:
         """Returns those of some pieces that no wall cuts."""
@@ -189,17 +173,6 @@ class _FreeSpace:
         upper_or_lower = padded[:, :-1] | padded[:, 1:]
         self._has_corner = np.stack([self._is_near_wall, self._is_near_wall.T])
         self._has_edge = np.stack([left_or_right[:, 1:], upper_or_lower[1:].T])
-
-    def holds(self, point: np.ndarray) -> bool:
-        """Returns whether `point` (`[2]`) is free."""
-        size = len(self.walls)
-        if not np.all((point >= 0) & (point < size)):
-            return False
-        cell = point.astype(int)
-        cells = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2) + cell
-        walls = cells[self.walls[tuple(np.clip(cells, 0, size - 1).T)]]
-        outside = np.maximum(np.maximum(walls - point, point - walls - 1), 0)
-        return bool(np.all(np.hypot(*outside.T) >= self._clearance))
 
     def open_corners(self, corner: np.ndarray) -> np.ndarray:
         """Returns the 0 to 4 corners that a cell (lower left corner `[2]`) shares with no wall: `[0 to 4, 2]`."""
@@ -319,10 +292,6 @@ def _graph(pieces: _Pieces) -> sparse.csr_array:
 
 def _concatenate(parts: list[_Table]) -> _Table:
     return type(parts[0])(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
-
-
-def _is_in_cell(point: np.ndarray, corner: np.ndarray) -> bool:
-    return bool(np.all((point >= corner) & (point <= corner + 1)))
 
 
 _whole = functools.lru_cache(maxsize=2)(DiscPaths)
