@@ -40,8 +40,8 @@ class Sideways:
 
 def right_use() -> None:
     maze: mazebench.Maze = mazebench.generate("dfs", 15, np.random.default_rng(0))
-    cells: list[tuple[int, int]] = maze.shortest_path((1, 1), (13, 13))
-    env = mazebench.load("local", mazes=maze, distances=[len(cells) - 1], seed=0)
+    distance: int = maze.distance((1, 1), (13, 13))
+    env = mazebench.load("local", mazes=maze, distances=[distance], seed=0)
     success: bool = env.task.success
     position: np.ndarray = env.physics.position()
     envs: MazeVectorEnv = mazebench.make_vec(mazebench.TaskOptions(task="local", size=13), 4)

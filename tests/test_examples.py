@@ -97,7 +97,7 @@ class TestScripts:
         check_agent(f"sb3_her_agent:{agent}", task, "her.zip")
         her_agent = getattr(importlib.import_module("sb3_her_agent"), agent)
         task = mazebench.Task.of(size=side + 2, context_size=side + 2, kinds="dfs")
-        said = f"expected mazes of {side} x {side}, as in training, found {side + 2}"
+        said = f"expected mazes of {side} cells a side, found {side + 2}"
         with pytest.raises(mazebench.UnplayableError, match=said):
             her_agent.build(task.interface, checkpoint="her.zip")
 

@@ -16,11 +16,17 @@ from mazebench.maps.grids import largest_area
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.maze_files import read_maze
+from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.pictures import draw_maze
-from mazebench.maps.readers.image import maze_from_image
+from mazebench.maps.readers.image import grid_of_image
+from mazebench.maps.readers.occupancy_grid import locate_maze
 
 SEEDS = st.integers(0, 2**32 - 1)
 FEW = hypothesis.settings(max_examples=100, deadline=None)
+
+
+def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maze", walls: str = "filled") -> Maze:
+    return locate_maze(grid_of_image(image, size, name, walls), ReadOptions(), name).maze
 
 
 def blocks(walls: np.ndarray, cell_pixels: int) -> np.ndarray:

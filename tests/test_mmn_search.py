@@ -5,7 +5,6 @@ import copy
 import numpy as np
 import pytest
 import torch
-from mazebench_agents.common import kernels
 from mazebench_agents.mmn import MMN
 from mazebench_agents.mmn.hypermodel import rows_of
 from mazebench_agents.mmn.kernel_model import kernel_model, step, weights_of
@@ -14,6 +13,7 @@ from mazebench_agents.muzero.search import gumbel_muzero_policy
 from mazebench_agents.muzero.tree import empty_evaluation
 from test_mmn import CONFIGS, a_context, code_of, make_learner
 
+from mazebench import kernels
 from mazebench.agent import Interface
 from mazebench.maps.kinds import generate
 

@@ -35,7 +35,6 @@ class TestReading:
         assert scenarios.starts.tolist() == [[1, 1], [1, 3], [3, 1]]
         assert scenarios.goals.tolist() == [[3, 3], [2, 3], [2, 4]]
         assert scenarios.distances.tolist() == [4, 1, 4]
-        assert scenarios.octile_lengths.tolist() == [4.0, 1.0, 3.0]
         assert remarks()[-1].endswith(
             "2 of 5 scenarios left out: an end is a wall or can't be reached, or both are one cell"
         )
@@ -48,7 +47,7 @@ class TestReading:
             (" 4 3 2 0", " 8 6 2 0", r"expected scenarios of .*m\.map, 4 x 3 cells, found 8 x 6$"),
             ("maps/m.map 4 3 2", "maps/n.map 4 3 2", r"expected scenarios of one map, found maps/m\.map, maps/n\.map$"),
             (" 1.4", "", r"expected 9 fields in a line, found 8 in scenario 2$"),
-            (" 1.4", " far", r"expected numbers from the third field on, found could not convert"),
+            (" 4 3 2 0", " 4 x 2 0", r"expected numbers from the third field on, found invalid literal"),
             ("maps/m.map", "other.map", r"other\.map: can't read the text map: No such file or directory$"),
             (
                 SCENARIOS[10:],

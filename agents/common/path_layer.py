@@ -25,7 +25,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from .kernels import compiled
+from mazebench.kernels import compiled
 
 _DIAGONAL = math.sqrt(2.0) - 0.5  # share of the entered cell in the cost of a diagonal step
 _CORNER = 0.25  # share of each of the two cells at the corner

@@ -1,4 +1,4 @@
-"""Stable-Baselines3: many environments at once, features of their observations, and a buffer (extra `[sb3]`).
+"""Stable-Baselines3: many environments at once, and features of their observations (extra `[sb3]`).
 
 >>> envs = MazeVecEnv(mazebench.make_vec("rebuilt", 64))
 >>> model = PPO("MultiInputPolicy", envs, policy_kwargs={"features_extractor_class": WayFeatures})
@@ -9,19 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 import torch
-from stable_baselines3 import HerReplayBuffer
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-from stable_baselines3.common.type_aliases import DictReplayBufferSamples
 from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
-from mazebench.agent import Interface
 from mazebench.constants import FORWARD_VELOCITY, LEFT_VELOCITY, YAW, YAW_RATE, X, Y
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.errors import InputError, UnplayableError
+from mazebench.errors import InputError
 from mazebench.tasks.context import GLOBAL_MAP, GOAL
 from mazebench.world.simulation import STATE_SIZE
 
@@ -30,8 +26,6 @@ from ..neural_planner.neural_planner_config import NeuralPlannerConfig
 
 if TYPE_CHECKING:
     from gymnasium import spaces
-
-_CHANNELS = (32, 64, 64)  # of the convolutions, each of which halves the side
 
 
 class MazeVecEnv(VecEnv):
@@ -96,16 +90,6 @@ class MazeVecEnv(VecEnv):
         return self.envs.render()
 
 
-def map_layers(num_planes: int, side: int, num_features: int) -> nn.Sequential:
-    """Returns convolutions that make features `[B, num_features]` of planes `[B, num_planes, side, side]`."""
-    layers: list[nn.Module] = []
-    channels = num_planes
-    for wider in _CHANNELS:
-        layers += [nn.Conv2d(channels, wider, 3, stride=2, padding=1), nn.ReLU()]
-        channels, side = wider, (side + 1) // 2
-    return nn.Sequential(*layers, nn.Flatten(), nn.Linear(channels * side**2, num_features), nn.ReLU())
-
-
 class MapFeatures(BaseFeaturesExtractor):
     """Convolutions of the context, and the state and the lidar, if there is one, in values of an order of 1.
 
@@ -123,7 +107,11 @@ class MapFeatures(BaseFeaturesExtractor):
         scale = torch.tensor([1 / side] * 3 + [1.0] * (STATE_SIZE - 3))  # positions are in metres
         self.register_buffer("scale", scale, persistent=False)
         self.reach = None if lidar is None else float(lidar.high.max())  # type: ignore[attr-defined]
-        self.context = map_layers(channels, side, num_features)
+        layers: list[nn.Module] = []
+        for wider in (32, 64, 64):  # each layer halves the side
+            layers += [nn.Conv2d(channels, wider, 3, stride=2, padding=1), nn.ReLU()]
+            channels, side = wider, (side + 1) // 2
+        self.context = nn.Sequential(*layers, nn.Flatten(), nn.Linear(channels * side**2, num_features), nn.ReLU())
 
     def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
         parts = [self.context(observations["context"]), observations["state"] * self.scale]
@@ -159,29 +147,3 @@ class WayFeatures(BaseFeaturesExtractor):
         motion = torch.from_numpy(motion_features(velocity, np.full((batch_size, 2), -1)))  # no last actions
         situation = Situation(state[:, [X, Y, YAW]], ranges, motion.to(state.device))
         return self.planner.features(plan, torch.arange(batch_size, device=state.device), situation)  # [B, features]
-
-
-def check_side(side: int, interface: Interface) -> None:
-    """Raises `UnplayableError` unless a policy that was trained on contexts of this side can read those of mazes.
-
-    Contexts with more pixels than the maze has cells are resized, but positions in metres belong to one size of mazes.
-    """
-    if side not in (interface.size, interface.context_size):
-        raise UnplayableError(f"expected mazes of {side} x {side}, as in training, found {interface.size}")
-
-
-def resized(planes: np.ndarray, side: int) -> np.ndarray:
-    """Returns planes `[B, P, M, M]` of contexts as `[B, P, side, side]`."""
-    if planes.shape[-1] == side:
-        return planes
-    small = [[cv2.resize(plane, (side, side), interpolation=cv2.INTER_AREA) for plane in each] for each in planes]
-    return np.array(small)
-
-
-class EndingHerReplayBuffer(HerReplayBuffer):
-    """Ends a relabelled episode where its new goal is reached; the original keeps the end of the old goal."""
-
-    def _get_virtual_samples(self, *arguments: Any, **options: Any) -> DictReplayBufferSamples:
-        samples = super()._get_virtual_samples(*arguments, **options)
-        achieved, desired = (samples.next_observations[key] for key in ("achieved_goal", "desired_goal"))
-        return samples._replace(dones=(achieved == desired).all(dim=1, keepdim=True).float())

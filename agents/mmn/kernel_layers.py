@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from torch import nn
 
-from ..common import kernels
+from mazebench import kernels
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)

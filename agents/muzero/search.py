@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 
-from ..common import kernels
+from mazebench import kernels
+
 from . import tree as trees
 from .tree import ROOT, Evaluation, Settings
 

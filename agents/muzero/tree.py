@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..common.kernels import compiled, inlined
+from mazebench.kernels import compiled, inlined
 
 ROOT = 0
 UNVISITED = -1

@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mazebench.kernels import compiled, inlined
 from mazebench.world.ray_casting import LidarModel
 
-from ..common.kernels import compiled, inlined
 from . import rays
 
 # Floors of what the sensor declares, for errors of the model.

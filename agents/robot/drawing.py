@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from ..common.kernels import compiled, inlined
+from mazebench.kernels import compiled, inlined
 
 _LARGEST_BOX = 2.5  # cells squared; a box that is larger tells nothing of single cells
 _MOST_ZONES = 16  # in a box of the largest width along an axis

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..common.kernels import compiled
+from mazebench.kernels import compiled
 
 
 @compiled

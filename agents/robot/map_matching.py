@@ -16,7 +16,7 @@ import dataclasses
 import numpy as np
 from scipy import special
 
-from ..common.kernels import compiled
+from mazebench.kernels import compiled
 
 _ERROR = 0.05  # probability that a cell of the map is wrong
 _OUTSIDE = 1e-3  # probability that a cell outside of the map, or of its border, is free

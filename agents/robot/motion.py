@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from mazebench.constants import PHYSICS_TIMESTEP, STEPS_PER_ACTION, TOP_SPEED
+from mazebench.kernels import compiled, inlined
 
-from ..common.kernels import compiled, inlined
 from .body import TURN_STEP
 
 REACH = 0.18  # m from the body's centre at which walls begin to push: its radius and the margin of contacts

@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
+from mazebench.kernels import compiled
 from mazebench.maps.maze import Cell
 
-from ..common.kernels import compiled
 from .beams import MOST_EVIDENCE, UNKNOWN, Beams, add_scan
 
 SURE = 3.0  # log odds of evidence, from which a cell counts as seen

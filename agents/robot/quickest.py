@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mazebench.constants import NUM_ACTIONS, STEP_TIME, TOP_SPEED
+from mazebench.kernels import compiled
 
-from ..common.kernels import compiled
 from .body import COASTING_TIME, LOOK_LEFT, LOOK_RIGHT, STRAFE_LEFT, STRAFE_RIGHT, Point
 from .motion import REACH, moved, turned
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..common.kernels import compiled, inlined
+from mazebench.kernels import compiled, inlined
 
 _SMALLEST = 1e-12  # instead of a direction's component of 0
 

@@ -9,7 +9,7 @@ import heapq
 
 import numpy as np
 
-from ..common.kernels import compiled
+from mazebench.kernels import compiled
 
 
 @compiled

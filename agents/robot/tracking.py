@@ -16,8 +16,8 @@ import math
 import numpy as np
 
 from mazebench.constants import STEP_TIME
+from mazebench.kernels import compiled, inlined
 
-from ..common.kernels import compiled, inlined
 from .beams import Beams, log_likelihood, log_likelihoods
 from .body import Body
 from .occupancy import Occupancy

@@ -2,7 +2,6 @@
 
 import numpy as np
 import torch
-from mazebench_agents.integrations.sb3 import check_side, resized
 from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO
 
@@ -20,7 +19,9 @@ class PPOAgent(mazebench.Agent):
         if checkpoint is None:
             raise mazebench.InputError("expected --checkpoint, the file that sb3_tracks.py saved, found none")
         agent = cls(cls.algorithm.load(checkpoint, device="cpu").policy)
-        check_side(agent.side, interface)
+        # Positions in metres belong to one size of mazes.
+        if agent.side not in (interface.size, interface.context_size):
+            raise mazebench.UnplayableError(f"expected mazes of {agent.side} cells a side, found {interface.size}")
         return agent
 
     def __init__(self, policy):
@@ -34,7 +35,10 @@ class PPOAgent(mazebench.Agent):
         streams, memory = state
         for slot in np.flatnonzero(inputs.new_episode):
             streams[slot] = np.random.default_rng(inputs.seed[slot])
-        observation = inputs.observation | {"context": resized(inputs.observation["context"], self.side)}
+        batch, planes, side, _ = inputs.observation["context"].shape
+        shape = (batch, planes, self.side, side // self.side, self.side, side // self.side)
+        context = inputs.observation["context"].reshape(shape).mean(axis=(3, 5))  # of the side that it was trained on
+        observation = inputs.observation | {"context": context}
         with torch.no_grad():
             observation = {name: torch.as_tensor(values) for name, values in observation.items()}
             distribution, memory = self.distribution(observation, memory, torch.as_tensor(inputs.new_episode))

@@ -7,11 +7,20 @@ python docs/examples/sb3_her.py --tracks --distance 20 --steps 400000 --out her.
 import argparse
 
 import gymnasium
-from mazebench_agents.integrations.sb3 import EndingHerReplayBuffer
 from sb3_her_agent import GoalFeatures
-from stable_baselines3 import DQN
+from stable_baselines3 import DQN, HerReplayBuffer
 
 import mazebench  # noqa: F401  (registers the ids)
+
+
+class EndingHerReplayBuffer(HerReplayBuffer):
+    """Ends a relabelled episode where its new goal is reached; the original keeps the end of the old goal."""
+
+    def _get_virtual_samples(self, *arguments, **options):
+        samples = super()._get_virtual_samples(*arguments, **options)
+        achieved, desired = (samples.next_observations[key] for key in ("achieved_goal", "desired_goal"))
+        return samples._replace(dones=(achieved == desired).all(dim=1, keepdim=True).float())
+
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--steps", type=int, default=100_000)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import torch
-from mazebench_agents.integrations.sb3 import check_side, map_layers, resized
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.dqn.policies import MultiInputPolicy
+from torch import nn
 
 import mazebench
 from mazebench.tasks.context import GOAL
@@ -20,7 +20,11 @@ class GoalFeatures(BaseFeaturesExtractor):
         self.metres = float(observation_space["desired_goal"].high[0])  # on a side of the maze
         self.side = round(((observation_space["observation"].shape[0] - 12) / 3) ** 0.5)  # M of the planes
         self.scale = torch.tensor([1 / self.metres] * 3 + [1.0] * 9)
-        self.planes = map_layers(5, self.side, num_features)
+        layers = []
+        for channels, wider in ((5, 32), (32, 64), (64, 64)):  # each layer halves the side
+            layers += [nn.Conv2d(channels, wider, 3, stride=2, padding=1), nn.ReLU()]
+        num_pixels = ((self.side + 7) // 8) ** 2
+        self.planes = nn.Sequential(*layers, nn.Flatten(), nn.Linear(64 * num_pixels, num_features), nn.ReLU())
 
     def forward(self, observations):
         state, shown = observations["observation"][:, :12], observations["observation"][:, 12:]
@@ -48,8 +52,13 @@ class HerAgent(mazebench.Agent):
             raise mazebench.InputError("expected --checkpoint, the file that sb3_her.py saved, found none")
         policy = MultiInputPolicy.load(checkpoint, device="cpu")
         side = policy.q_net.features_extractor.side
-        check_side(side, interface)
+        if side not in (interface.size, interface.context_size):  # positions in metres belong to one size of mazes
+            raise mazebench.UnplayableError(f"expected mazes of {side} cells a side, found {interface.size}")
         return cls(policy, side, interface.size, interface.cell_size)
+
+    @classmethod
+    def context_size(cls, size):
+        return size  # a pixel for each cell
 
     def __init__(self, policy, side, size, cell_size):
         """`side` is M of the contexts that the policy was trained on."""
@@ -65,7 +74,8 @@ class HerAgent(mazebench.Agent):
         row, column = np.divmod(context[:, GOAL].reshape(batch, -1).argmax(axis=1), side)
         goal = np.stack([column, side - 1 - row], axis=1) + 0.5  # x, y in pixels of the map
         planes = np.delete(context, GOAL, axis=1)
-        planes = resized(planes, self.side)
+        factor = side // self.side  # of contexts that are larger than in training
+        planes = planes.reshape(batch, 3, self.side, factor, self.side, factor).mean(axis=(3, 5))
         shown = {
             "observation": np.hstack([state, planes.reshape(batch, -1)]),
             "achieved_goal": (state[:, :2] // self.cell_size + 0.5) * self.cell_size,

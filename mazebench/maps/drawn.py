@@ -11,11 +11,8 @@ from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 
 NUM_FRESH = 2**31  # mazes, so that an episode hardly ever meets one of another episode
-_FRESH, _MEASURED = "fresh", "measured"
 # First numbers of the seeds: no maze of one purpose is another one of another purpose.
-_SEEDS = {"train": 41_000, "dev": 42_000, _FRESH: 43_000, _MEASURED: 44_000}
-_NUM_MEASURED = 20  # mazes of a kind that are counted in
-_MORE_BOXES = 1.25  # than in the measured mazes; a maze that needs even more is drawn again
+_SEEDS = {"train": 41_000, "dev": 42_000, "fresh": 43_000}
 _NUM_KEPT = 1024  # fresh mazes; with its distances one of 31 x 31 takes some 40 kB
 
 
@@ -58,11 +55,6 @@ class FreshMazes:
     def __getitem__(self, number: int) -> Maze:
         return _fresh_maze(self.kinds, self.size, int(number))
 
-    @property
-    def max_boxes(self) -> int:
-        """The largest number of boxes that the walls of any of the mazes have."""
-        return _max_boxes(self.kinds, self.size)
-
 
 # The mazes of a task.
 Mazes = tuple[Maze, ...] | FreshMazes
@@ -70,19 +62,9 @@ Mazes = tuple[Maze, ...] | FreshMazes
 
 @functools.lru_cache(maxsize=_NUM_KEPT)
 def _fresh_maze(kinds: tuple[str, ...], size: int, number: int) -> Maze:
-    rng = _rng(_FRESH, size, number)
-    while True:
-        kind = kinds[rng.integers(len(kinds))]
-        maze = generate(kind, size, rng, f"{kind}-{size}-fresh-{number}")
-        if len(maze.boxes) <= _max_boxes(kinds, size):
-            return maze
-
-
-@functools.cache
-def _max_boxes(kinds: tuple[str, ...], size: int) -> int:
-    rngs = [_rng(_MEASURED, size, number) for number in range(_NUM_MEASURED)]
-    most = max(len(generate(kind, size, rng).boxes) for kind in kinds for rng in rngs)
-    return int(_MORE_BOXES * most)
+    rng = _rng("fresh", size, number)
+    kind = kinds[rng.integers(len(kinds))]
+    return generate(kind, size, rng, f"{kind}-{size}-fresh-{number}")
 
 
 def _rng(purpose: str, *numbers: int) -> np.random.Generator:

@@ -12,6 +12,7 @@ indexed `[x, y]`. `K` is the number of circles, `P` of straight pieces and `S` o
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from collections.abc import Iterator
@@ -21,14 +22,12 @@ import numpy as np
 from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 
-from mazebench.errors import InputError
 from mazebench.maps.maze import Cell, Maze
+from mazebench.maps.sight import clear_segments, taut_pairs
 
 # Cells (radians in a component of a unit vector) by which a contact may miss; rounding errors are below 1e-12.
 _TOLERANCE = 1e-9
-# Numbers tested at once, which keep temporary arrays to some ten megabytes.
-_PAIRS_AT_ONCE = 2**18
-_LINES_AT_ONCE = 16
+_PAIRS_AT_ONCE = 2**18  # so that temporary arrays take some ten megabytes
 _LARGEST_WHOLE = 127  # cells a side of mazes whose paths are all found at once
 
 
@@ -46,21 +45,11 @@ def length_between(maze: Maze, radius: float, start: Cell, goal: Cell) -> float:
     cells = np.indices(maze.walls.shape)
     to_start, to_goal = (np.hypot(cells[0] - row, cells[1] - column) for row, column in (start, goal))
     is_near = to_start + to_goal <= maze.distance(start, goal) + 2 * math.sqrt(2)  # with a cell's extent at both ends
-    rows, columns = (np.flatnonzero(is_near.any(axis=axis)) for axis in (1, 0))
-    top, left = max(0, rows[0] - 1), max(0, columns[0] - 1)
-    window = np.s_[top : rows[-1] + 2, left : columns[-1] + 2]
 
     # What the path can't pass is wall, and so are cells that only a way around leads to.
-    is_free = ~maze.walls[window] & is_near[window]
-    components, _ = ndimage.label(is_free)
-    here, there = ((row - top, column - left) for row, column in (start, goal))
-    walls = components != components[here]
-    side = max(walls.shape) + 2
-    padded = np.ones((side, side), dtype=bool)
-    padded[1 : 1 + walls.shape[0], 1 : 1 + walls.shape[1]] = walls
-    part = Maze(padded, maze.name, cell_size=maze.cell_size)
-    here, there = ((row + 1, column + 1) for row, column in (here, there))
-    return DiscPaths(part, radius).length(part.point(here), there)
+    components, _ = ndimage.label(~maze.walls & is_near)
+    part = dataclasses.replace(maze, walls=components != components[start])
+    return DiscPaths(part, radius).length(maze.point(start), goal)
 
 
 class _Circles(NamedTuple):
@@ -91,109 +80,59 @@ class _Side(NamedTuple):
     high: float
 
 
-class _Route(NamedTuple):
-    """A shortest path through pieces."""
-
-    pieces: _Pieces  # those of the maze and those of the query
-    length: float
-    ends: np.ndarray  # [L] int, the ends that the path passes, as indices into the 2 P ends of all pieces
-
-
 class DiscPaths:
     """Shortest paths of a disc of one radius in one maze.
 
     A path is a curve of the disc's centre that stays at least `radius` away from every wall and ends as soon as it is
     in the closed goal cell. The pieces between the maze's own corners are found once, here; each query adds those that
-    touch the start or the goal. Building takes time in the square of the number of corners, memory in the number of
-    pairs of them that see each other.
+    touch the start or the goal. Time and memory grow with the number of pairs of corners that see each other.
 
     Args:
       radius: metres, above 0 and below half a cell.
-
-    Raises:
-      InputError: if `radius` is out of range.
     """
 
     def __init__(self, maze: Maze, radius: float):
-        if not 0 < radius < maze.cell_size / 2:
-            raise InputError(f"expected a radius above 0 and below {maze.cell_size / 2} m, found {radius}")
         self._maze = maze
         self._radius = float(radius) / maze.cell_size
         self._space = _FreeSpace(maze.walls, self._radius)
         self._corners = _exposed_corners(self._space.walls, self._radius)
 
-        # The tangents of all pairs of circles that no wall cuts.
-        batches = (
-            self._clear(_tangents(self._corners, first, second, side))
-            for side in (1, -1)
-            for first, second in _candidate_pairs(self._corners, side)
+        # The tangents that no wall cuts: of circles whose quadrants share a normal and, between two circles, of those
+        # that have opposite normals.
+        points, normals = (array.astype(np.int64) for array in self._corners[:2])
+        pairs = np.stack(taut_pairs(self._space.walls, points, normals))
+        num_batches = pairs.shape[1] // _PAIRS_AT_ONCE + 1
+        agreement = (normals[pairs[0]] * normals[pairs[1]]).sum(axis=1)
+        self._pieces = _concatenate(
+            [
+                self._clear(_tangents(self._corners, *some, side))
+                for side in (1, -1)
+                for some in np.array_split(pairs[:, side * agreement >= 0], num_batches, axis=1)
+            ]
         )
-        self._pieces = _concatenate(list(batches))
 
     def length(self, start: np.ndarray, goal: Cell) -> float:
-        """Returns the metres from `start` (`[2]` m, the disc's centre) to the goal cell; 0 if `start` is in it.
+        """Returns the metres from `start` to a free goal cell; 0 if `start` is in it.
 
-        Raises:
-          InputError: if `start` is not at least the radius away from every wall, or `goal` is not a free cell.
+        Args:
+          start: `[2]` m, the disc's centre, at least the radius away from every wall.
+          goal: row and column.
         """
-        start, corner = self._check(start, goal)
-        if _is_in_cell(start, corner):
+        start = start / self._maze.cell_size
+        corner = np.array([goal[1], self._maze.size - 1 - goal[0]])  # the lower left one
+        if ((corner <= start) & (start <= corner + 1)).all():
             return 0.0
-        return self._maze.cell_size * self._search(start, corner).length
-
-    def path(self, start: np.ndarray, goal: Cell, arc_step: float = 0.05) -> np.ndarray:
-        """Returns points (x, y) along a shortest path from `start`, on arcs at most `arc_step` metres apart: `[L, 2]`.
-
-        Raises:
-          InputError: as `length` does, or if `arc_step` is not above 0.
-        """
-        if not arc_step > 0:
-            raise InputError(f"expected an arc_step above 0 m, found {arc_step}")
-        start, corner = self._check(start, goal)
-        if _is_in_cell(start, corner):
-            return self._maze.cell_size * start[None]
-        pieces, _, ends = self._search(start, corner)
-        circle, offset = pieces.circle.ravel()[ends], pieces.offset.ravel()[ends]
-        end = pieces.end.reshape(-1, 2)[ends]
-        points = [start[None]]
-        for i in range(1, len(ends)):
-            if circle[i] != circle[i - 1]:
-                points.append(end[i, None])
-            elif offset[i] != offset[i - 1]:
-                points.append(self._arc(circle[i], offset[i - 1], offset[i], arc_step / self._maze.cell_size))
-        return self._maze.cell_size * np.concatenate(points)
-
-    def _check(self, start: np.ndarray, goal: Cell) -> tuple[np.ndarray, np.ndarray]:
-        """Returns `start` (m) in cells and the goal cell's lower left corner (`[2]` int), if both are legal."""
-        point = np.asarray(start, dtype=np.float64) / self._maze.cell_size
-        if point.shape != (2,) or not self._space.holds(point):
-            radius = self._radius * self._maze.cell_size
-            raise InputError(
-                f"{self._maze.name}: expected a start (x, y) at least {radius:g} m from every wall, "
-                f"found {np.asarray(start).tolist()}"
-            )
-        row, column = self._maze.require_free(goal)
-        return point, np.array([column, self._maze.size - 1 - row])
-
-    def _clear(self, pieces: _Pieces) -> _Pieces:
-        keep = self._space.is_clear(pieces.end[:, 0], pieces.end[:, 1])
-        return _Pieces(*(array[keep] for array in pieces))
-
-    def _search(self, start: np.ndarray, corner: np.ndarray) -> _Route:
-        """Returns a shortest path from the start to the goal cell with this lower left corner."""
         pieces = _concatenate([self._pieces, self._clear(self._query_pieces(start, corner))])
 
         # The corners' circles come first, then the start; all beyond are points where a path may end.
         circle, source = pieces.circle.ravel(), len(self._corners.radius)
-        first = int(np.argmax(circle == source))
-        distances, previous = csgraph.dijkstra(_graph(pieces), indices=first, return_predecessors=True)
-        last = int(np.argmin(np.where(circle > source, distances, np.inf)))
+        distances = csgraph.dijkstra(_graph(pieces), indices=int(np.argmax(circle == source)))
+        return self._maze.cell_size * float(distances[circle > source].min())
 
-        # Follow the path back from its last end.
-        ends = [last]
-        while previous[ends[-1]] >= 0:
-            ends.append(int(previous[ends[-1]]))
-        return _Route(pieces, float(distances[last]), np.array(ends[::-1]))
+    def _clear(self, pieces: _Pieces) -> _Pieces:
+        """Returns those of some pieces that no wall cuts."""
+        keep = self._space.is_clear(pieces.end)
+        return _Pieces(*(array[keep] for array in pieces))
 
     def _query_pieces(self, start: np.ndarray, corner: np.ndarray) -> _Pieces:
         """Returns straight pieces from the start to the circles and from both to the goal, not tested for walls.
@@ -217,14 +156,6 @@ class DiscPaths:
         to_corner = _tangents(circles, first.ravel(), last.ravel(), side=1)
         return _concatenate([from_start, to_corner, to_side])
 
-    def _arc(self, circle: int, first: float, last: float, arc_step: float) -> np.ndarray:
-        """Returns the points of an arc without its first one: `[K, 2]`."""
-        num_steps = int(np.ceil(abs(last - first) / arc_step))
-        offset = np.linspace(first, last, num_steps + 1)[1:]
-        quadrant = self._corners.quadrant[circle]
-        angle = np.arctan2(quadrant[1], quadrant[0]) + offset / self._radius
-        return self._corners.centre[circle] + self._radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-
 
 class _FreeSpace:
     """The points at least `radius` away from every wall."""
@@ -233,27 +164,15 @@ class _FreeSpace:
         self.walls = walls[::-1].T  # [x, y]
         self._radius = radius
         self._clearance = radius - min(_TOLERANCE, radius / 2)
-        self._side = len(walls) + 1
         padded = np.pad(self.walls, 1, constant_values=True)
         left_or_right = padded[:-1] | padded[1:]
         # [x, y]: whether one of the four cells at a lattice point is a wall.
         self._is_near_wall = left_or_right[:, :-1] | left_or_right[:, 1:]
-        # Flattened [2, x, y], for flat and, with the axes exchanged, for steep segments: whether a wall is at the
-        # lattice point (x, y), and whether one is left or right of the line from there to (x, y + 1).
+        # [2, x, y], for flat and, with the axes exchanged, for steep segments: whether a wall is at the lattice point
+        # (x, y), and whether one is left or right of the line from there to (x, y + 1).
         upper_or_lower = padded[:, :-1] | padded[:, 1:]
-        self._corner_table = np.stack([self._is_near_wall, self._is_near_wall.T]).ravel()
-        self._edge_table = np.stack([left_or_right[:, 1:], upper_or_lower[1:].T]).ravel()
-
-    def holds(self, point: np.ndarray) -> bool:
-        """Returns whether `point` (`[2]`) is free."""
-        size = len(self.walls)
-        if not np.all((point >= 0) & (point < size)):
-            return False
-        cell = point.astype(int)
-        cells = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2) + cell
-        walls = cells[self.walls[tuple(np.clip(cells, 0, size - 1).T)]]
-        outside = np.maximum(np.maximum(walls - point, point - walls - 1), 0)
-        return bool(np.all(np.hypot(*outside.T) >= self._clearance))
+        self._has_corner = np.stack([self._is_near_wall, self._is_near_wall.T])
+        self._has_edge = np.stack([left_or_right[:, 1:], upper_or_lower[1:].T])
 
     def open_corners(self, corner: np.ndarray) -> np.ndarray:
         """Returns the 0 to 4 corners that a cell (lower left corner `[2]`) shares with no wall: `[0 to 4, 2]`."""
@@ -271,62 +190,9 @@ class _FreeSpace:
             low, high = first[1 - axis] + before, first[1 - axis] + 1 - after
             yield _Side(axis, level=first[axis], low=low, high=high)
 
-    def is_clear(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """Returns whether the segments between free points (`[S, 2]` each) are free: `[S]` bool.
-
-        They are unless a corner of a wall is too near or they enter a wall. Both show on the lattice's lines across a
-        segment's longer axis: the two lattice points about a crossing are the only ones on that line within half a
-        cell, and between two lines the segment changes cells at most once.
-        """
-        # Exchange ends and axes such that all segments lead to the right, with a slope of at most 1 either way.
-        steep = np.abs(end - start)[:, 1] > np.abs(end - start)[:, 0]
-        forward = np.where(steep, end[:, 1] > start[:, 1], end[:, 0] > start[:, 0])[:, None]
-        start, end = np.where(forward, start, end), np.where(forward, end, start)
-        start, end = (np.where(steep[:, None], point[:, ::-1], point) for point in (start, end))
-        extent, rise = (end - start).T
-        slope = rise / np.where(extent == 0, 1.0, extent)
-
-        # The lines that may show a wall. Most segments of a maze meet one soon, so the lines are tested in batches of
-        # growing size.
-        first = np.ceil(start[:, 0] - self._radius).astype(np.int64)
-        last = np.floor(end[:, 0] + self._radius).astype(np.int64)
-        table = steep * self._side**2
-        clear = np.ones(len(start), dtype=bool)
-        active = np.arange(len(start))
-        done, batch = 0, 1
-        while len(active):
-            line = np.minimum(first[active, None] + np.arange(done, done + batch), last[active, None])
-            blocked = self._is_blocked(line, start[active], extent[active], slope[active], table[active])
-            clear[active[blocked]] = False
-            done, batch = done + batch, min(2 * batch, _LINES_AT_ONCE)
-            active = active[~blocked & (first[active] + done <= last[active])]
-        return clear
-
-    def _is_blocked(
-        self, line: np.ndarray, start: np.ndarray, extent: np.ndarray, slope: np.ndarray, table: np.ndarray
-    ) -> np.ndarray:
-        """Returns whether a wall shows on any line at x = `line` (`[S, L]` int) of flat segments: `[S]` bool."""
-        # Where each line is crossed.
-        along = line - start[:, :1]
-        height = start[:, 1:] + slope[:, None] * along
-        below = np.floor(height).astype(np.int64)
-        gap = height - below
-        index = table[:, None] + line * self._side + below
-        extent = extent[:, None]
-
-        # Walls that the segment enters there.
-        blocked = self._edge_table[index] & (along >= 0) & (along <= extent)
-
-        # Corners below and above the crossing that are too near.
-        squared_cosine = 1 / (1 + slope * slope)
-        reach = (self._clearance / np.sqrt(squared_cosine))[:, None]
-        shift = (slope * squared_cosine)[:, None]
-        for rise in (0, 1):
-            to_corner = gap - rise
-            foot = along - to_corner * shift
-            near = (np.abs(to_corner) < reach) & (foot > 0) & (foot < extent)
-            blocked |= near & self._corner_table[index + rise]
-        return blocked.any(axis=1)
+    def is_clear(self, ends: np.ndarray) -> np.ndarray:
+        """Returns whether the segments between two free points each (`[S, 2, 2]`) are free: `[S]` bool."""
+        return clear_segments(self._has_corner, self._has_edge, ends, self._radius, self._clearance)
 
 
 def _exposed_corners(walls: np.ndarray, radius: float) -> _Circles:
@@ -344,27 +210,6 @@ def _exposed_corners(walls: np.ndarray, radius: float) -> _Circles:
 
 def _points(points: np.ndarray) -> _Circles:
     return _Circles(points, np.zeros_like(points, dtype=np.float64), np.zeros(len(points)))
-
-
-def _candidate_pairs(corners: _Circles, side: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yields batches of pairs `first < second` (`[P]` int each) whose quadrants share a normal, or opposite normals.
-
-    Normals are opposite if `side` is -1.
-
-    Two quadrants that share only an axis share a tangent only if it is at a right angle to that axis.
-    """
-    num_corners = len(corners.radius)
-    rows = max(1, _PAIRS_AT_ONCE // max(1, num_corners))
-    centre, quadrant = corners.centre.astype(np.int16), corners.quadrant.astype(np.int8)
-    for begin in range(0, max(1, num_corners), rows):
-        mine, others = slice(begin, begin + rows), slice(begin, None)
-        agreement = quadrant[mine, None, 0] * quadrant[others, 0] + quadrant[mine, None, 1] * quadrant[others, 1]
-        fits = agreement == 2 * side
-        if side == 1:
-            in_line = (centre[mine, None, 0] == centre[others, 0]) | (centre[mine, None, 1] == centre[others, 1])
-            fits |= (agreement == 0) & in_line
-        first, second = np.nonzero(np.triu(fits, k=1))
-        yield first + begin, second + begin
 
 
 def _tangents(circles: _Circles, first: np.ndarray, second: np.ndarray, side: int) -> _Pieces:
@@ -447,10 +292,6 @@ def _graph(pieces: _Pieces) -> sparse.csr_array:
 
 def _concatenate(parts: list[_Table]) -> _Table:
     return type(parts[0])(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
-
-
-def _is_in_cell(point: np.ndarray, corner: np.ndarray) -> bool:
-    return bool(np.all((point >= corner) & (point <= corner + 1)))
 
 
 _whole = functools.lru_cache(maxsize=2)(DiscPaths)

@@ -170,13 +170,6 @@ class Maze:
             row = csgraph.dijkstra(self._graph, unweighted=True, indices=index, limit=distance)
         return self.free_cells[row == distance]
 
-    def shortest_path(self, start: Cell, goal: Cell) -> list[Cell]:
-        """Returns a shortest 4-connected path, both ends included.
-
-        Of several, it is the one whose first differing step comes first in the order up, left, down, right.
-        """
-        return _descend(self.distances(goal), self.require_free(start))
-
     @functools.cached_property
     def diameter(self) -> int:
         """The largest distance of two free cells; with over 2,048 free cells, a lower bound by a double sweep."""
@@ -259,10 +252,11 @@ def grid_graph(index: np.ndarray) -> sparse.csr_array:
 
 
 def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]:
-    """Returns a cheapest 4-connected path on any grid (`[N, N]` bool).
+    """Returns a cheapest 4-connected path on any grid (`[N, N]` bool), both ends included.
 
     It is a shortest free path if there is one; else each wall on the path costs 1000 cells. The landmark oracle plans
-    so on maps with flipped cells (the paper's appendix on perturbed planning).
+    so on maps with flipped cells (the paper's appendix on perturbed planning). Of several, it is the path whose first
+    differing step comes first in the order up, left, down, right.
     """
     # Over free cells.
     index = np.where(walls, -1, np.cumsum(~walls).reshape(walls.shape) - 1)

@@ -35,7 +35,7 @@ def draw_maze(
 
     A green disc marks `start`, a red one `goal`, each at least 3 % of the picture wide. `path` is `[T, 2]` points
     (x, y) in metres, equally spaced in time; it is drawn as a line from blue (first) to orange (last).
-    `maze_from_image` reads a drawing without markers exactly.
+    `mazebench.read_maze` reads a drawing without markers exactly.
 
     Raises:
       InputError: if the picture would be larger than 8192 pixels a side or `path` is not finite points.

@@ -31,7 +31,6 @@ class Scenarios(NamedTuple):
     starts: np.ndarray  # [K, 2] int, cells of the maze
     goals: np.ndarray  # [K, 2] int, cells of the maze
     distances: np.ndarray  # [K] int, shortest 4-connected paths in cells, at least 1
-    octile_lengths: np.ndarray  # [K] float, of the file: shortest paths in cells that may also go diagonally
 
     def numbers(self, distances: Iterable[int]) -> np.ndarray:
         """Returns which scenarios have one of some distances: `[...]` int, from 0 to K - 1."""
@@ -61,7 +60,6 @@ def read_scenarios(path: str | pathlib.Path, options: ReadOptions) -> Scenarios:
     rows = _read_rows(path)
     try:
         numbers = np.array([row[2:8] for row in rows], dtype=int)
-        octile_lengths = np.array([row[8] for row in rows], dtype=float)
     except ValueError as error:
         raise InputError(f"{path}: expected numbers from the third field on, found {error}") from error
 
@@ -94,7 +92,7 @@ def read_scenarios(path: str | pathlib.Path, options: ReadOptions) -> Scenarios:
         )
     starts, goals = starts[is_playable], goals[is_playable]
     distances = [maze.distance(tuple(start), tuple(goal)) for start, goal in zip(starts, goals, strict=True)]
-    return Scenarios(maze, starts, goals, np.array(distances), octile_lengths[is_playable])
+    return Scenarios(maze, starts, goals, np.array(distances))
 
 
 def _read_rows(path: pathlib.Path) -> list[list[str]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import collections
 import dataclasses
-import pathlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -15,9 +14,6 @@ from mazebench.maps.maze import Maze, resized
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.readers.arrays import read_array
 from mazebench.maps.text import format_maze, parse_maze
-
-# Mazes of one's own: one or several, as values or arrays, or the path of a file or of a folder.
-OwnMazes = str | pathlib.Path | Maze | np.ndarray | Iterable[Maze | np.ndarray]
 
 
 def own_mazes(mazes: Any, options: ReadOptions) -> tuple[Maze, ...]:

@@ -13,12 +13,11 @@ import numpy as np
 
 from mazebench.errors import InputError
 from mazebench.maps.file_kinds import kind_of, way_out
-from mazebench.maps.maze import MAX_CHOSEN_SIZE, MIN_SIZE, Maze, MazeError, require_closed_border, require_connected
-from mazebench.maps.maze_options import ReadOptions
+from mazebench.maps.maze import MAX_CHOSEN_SIZE, MIN_SIZE, MazeError, require_closed_border, require_connected
 from mazebench.maps.pictures import MAX_SIDE
 from mazebench.maps.readers.filled_plan import MIN_SIDE, read_plan
 from mazebench.maps.readers.line_drawing import read_lines
-from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, OccupancyGrid, locate_maze
+from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from mazebench.storage.files import read_at_most
 
 _MAX_BYTES = 2**27  # of a picture's file; _MAX_PIXELS gray pixels take half of it
@@ -34,17 +33,17 @@ _MAX_MAP_SHADES = 8  # of a map of one pixel a cell: walls, floor, marks; a scan
 
 
 def read_plan_image(path: pathlib.Path, size: int | None, walls: str) -> OccupancyGrid:
-    """Reads the cells in a picture, as `maze_from_image` does.
+    """Reads the cells in a picture, as `grid_of_image` does.
 
     Raises:
       InputError: if the file can't be read, or `size` is out of range.
       MazeError: if the file is not a picture that `read_picture` reads, or shows no legal maze.
     """
-    return _grid_of_image(read_picture(path), size, path.stem, walls)
+    return grid_of_image(read_picture(path), size, path.stem, walls)
 
 
 def read_picture(path: str | pathlib.Path) -> np.ndarray:
-    """Returns the picture in a file of a kind that OpenCV reads, as `maze_from_image` takes it.
+    """Returns the picture in a file of a kind that OpenCV reads, as `grid_of_image` takes it.
 
     Raises:
       InputError: if the file can't be read or has more than 128 MiB.
@@ -61,8 +60,8 @@ def read_picture(path: str | pathlib.Path) -> np.ndarray:
     return image
 
 
-def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maze", walls: str = "filled") -> Maze:
-    """Reads the maze in a picture of a floor plan; dark is wall, light or transparent is floor.
+def grid_of_image(image: np.ndarray, size: int | None, name: str, walls: str) -> OccupancyGrid:
+    """Returns the cells that a picture of a floor plan shows; dark is wall, light or transparent is floor.
 
     Two kinds of plan can be read. In both, walls are filled and at least as thick as a cell. A plan of R x C cells that
     is not square is padded with wall, see `locate_maze`. Marks in colour on a plan with gray walls are floor.
@@ -85,11 +84,6 @@ def maze_from_image(image: np.ndarray, size: int | None = None, name: str = "maz
       MazeError: if no legal maze is found. Nothing is repaired, except that the outer cells of a plan on paper are
         always walls.
     """
-    return locate_maze(_grid_of_image(image, size, name, walls), ReadOptions(), name).maze
-
-
-def _grid_of_image(image: np.ndarray, size: int | None, name: str, walls: str) -> OccupancyGrid:
-    """Returns the cells that a picture shows, of which those that are free are one area within walls."""
     if size is not None and not MIN_SIZE <= size <= MAX_CHOSEN_SIZE:
         raise InputError(f"{name}: expected a size of {MIN_SIZE} to {MAX_CHOSEN_SIZE} cells, found {size}")
     gray = to_gray(image, name)
@@ -126,7 +120,7 @@ def _scaled_pgm(content: bytes) -> np.ndarray | None:
 
 
 def _decode(content: bytes) -> np.ndarray | None:
-    """Returns the picture in a file's bytes, as `maze_from_image` takes it; None if OpenCV can't decode it."""
+    """Returns the picture in a file's bytes, as `grid_of_image` takes it; None if OpenCV can't decode it."""
     if (gray := _scaled_pgm(content)) is not None:
         return gray
     # Only PNG may have opacity. A JPEG is turned as its camera was held, which IMREAD_UNCHANGED would not do.
@@ -147,7 +141,7 @@ def to_gray(image: np.ndarray, name: str) -> np.ndarray:
     """Returns the luminance of a picture on white paper, without its markers in colour: `[H, W]` uint8.
 
     Raises:
-      MazeError: if `image` is not of a kind that `maze_from_image` takes, or too small.
+      MazeError: if `image` is not of a kind that `grid_of_image` takes, or too small.
     """
     shape = image.shape
     if not (len(shape) == 2 or shape[2:] in ((3,), (4,))) or image.dtype not in (np.uint8, np.uint16):

@@ -1,7 +1,7 @@
 """Compilation of kernels to machine code, which is kept on disk.
 
 Numba notices when a kernel's file changes, but not when a module does that the kernel uses. So kernels are kept in a
-folder that is named after the contents of all files of the packages with kernels, and of mazebench's constants.
+folder that is named after the contents of all files in folders with kernels, of mazebench and of the kernel's package.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import hashlib
 import multiprocessing
 import os
 import pathlib
+import re
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -19,9 +20,7 @@ import numba
 from numba.core.event import Listener, register
 from numba.extending import register_jitable
 
-from mazebench import constants
-
-_WITH_KERNELS = ("common", "mmn", "muzero", "robot")
+_IMPORT = re.compile(rb"import kernels\b|kernels import")  # in the files of kernels
 
 
 class _Announcement(Listener):
@@ -32,7 +31,7 @@ class _Announcement(Listener):
     def on_start(self, event):
         if self.is_due:
             print(
-                "mazebench: compiling the agent's kernels, which numba's cache lacks; this takes some seconds",
+                "mazebench: compiling kernels, which numba's cache lacks; this takes some seconds",
                 file=sys.stderr,
             )
         self.is_due = False
@@ -84,7 +83,7 @@ def _cached(compile_with: Callable[..., Any], function: Callable[..., Any], **op
     config: Any = numba.config
     given = config.CACHE_DIR
     parent = pathlib.Path(given) if given else pathlib.Path(function.__code__.co_filename).parent / "__pycache__"
-    config.CACHE_DIR = str(parent / f"kernels-{_digest()}")
+    config.CACHE_DIR = str(parent / f"kernels-{_digest(function.__module__.partition('.')[0])}")
     try:
         return compile_with(cache=True, **options)(function)
     except RuntimeError:  # numba found no folder that it can write to
@@ -94,10 +93,11 @@ def _cached(compile_with: Callable[..., Any], function: Callable[..., Any], **op
 
 
 @functools.cache
-def _digest() -> str:
-    agents = pathlib.Path(__file__).parent.parent
-    files = [
-        pathlib.Path(constants.__file__),
-        *(path for name in _WITH_KERNELS for path in agents.glob(f"{name}/*.py")),
-    ]
-    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(files))).hexdigest()[:16]
+def _digest(package: str) -> str:
+    """Returns a hash of the files that kernels of a package can use: its own folders with kernels, and mazebench's."""
+    ours = pathlib.Path(__file__).parent
+    folders = {ours}
+    for top in (ours, *map(pathlib.Path, sys.modules[package].__path__)):
+        folders |= {path.parent for path in top.rglob("*.py") if _IMPORT.search(path.read_bytes())}
+    files = sorted({path for folder in folders for path in folder.glob("*.py")})
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]
