@@ -28,7 +28,7 @@ class _Announcement(Listener):
 
     is_due = multiprocessing.parent_process() is None  # else the workers of an evaluation would all say it
 
-    def on_start(self, event):
+    def on_start(self, event: object) -> None:
         if self.is_due:
             print(
                 "mazebench: compiling kernels, which numba's cache lacks; this takes some seconds",
@@ -36,11 +36,11 @@ class _Announcement(Listener):
             )
         self.is_due = False
 
-    def on_end(self, event):
+    def on_end(self, event: object) -> None:
         pass
 
 
-register("numba:compile", _Announcement())
+register("numba:compile", _Announcement())  # type: ignore[no-untyped-call]
 
 
 def compiled(

@@ -356,7 +356,7 @@ class TestTracks:
 def act_for_three_steps(name: str, spec: Task) -> int:
     """Returns how many steps were taken, of a run of which all actions are checked."""
     agent_class = load_agent_class(name)
-    interface = Interface(spec.task, spec.size, spec.context_size, sensors=spec.sensors)
+    interface = spec.interface
     agent = CheckedAgent(name, agent_class.build(interface), interface.actions)
     env = MazeVectorEnv(spec, 2, num_threads=1)
     steps = rollout(agent, env, env.reset(seed=0), np.zeros_like, needs_truth=agent_class.needs_truth)

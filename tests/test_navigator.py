@@ -8,7 +8,6 @@ from mazebench_agents.robot import planning
 from mazebench_agents.robot.body import FORWARD, Body
 from mazebench_agents.robot.driving import Drive
 
-from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.chunk import Result, run_trials
 from mazebench.maps.benchmark import load_kind_mazes, load_mazes
@@ -64,16 +63,7 @@ class TestDriving:
 
 def play(spec: Task, trials: list) -> list[Result]:
     """The results of the navigator, in the order of the trials."""
-    agent_class = load_agent_class("navigator")
-    interface = Interface(
-        spec.task,
-        spec.size,
-        spec.context_size,
-        sensors=spec.sensors,
-        lidar=spec.lidar,
-        odometry_noise=spec.odometry_noise_at(spec.level[0]),
-    )
-    agent = agent_class.build(interface)
+    agent = load_agent_class("navigator").build(spec.interface)
     played = run_trials(agent, spec, dict(enumerate(trials)), 64)
     return sorted(result for results in played for result in results)
 

@@ -12,7 +12,6 @@ from mazebench_agents.robot.motion import moved, turned
 from mazebench_agents.robot.quickest import make_course, quickest_drive
 from simple_mazes import corridor, field
 
-from mazebench.agent import Interface
 from mazebench.agent_loading import load_agent_class
 from mazebench.constants import NUM_ACTIONS, STEPS_PER_ACTION
 from mazebench.evaluation.chunk import Result, run_trials
@@ -32,7 +31,7 @@ def dfs(seed: int, size: int = 13, cell_size: float = 1.0) -> Maze:
 
 def play(agent: str, task, trials) -> list[Result]:
     """The result of each trial."""
-    interface = Interface(task.task, task.size, task.context_size, cell_size=task.cell_size)
+    interface = task.interface
     agent_class = load_agent_class(agent)
     steps = run_trials(
         agent_class.build(interface), task, dict(enumerate(trials)), 32, needs_truth=agent_class.needs_truth

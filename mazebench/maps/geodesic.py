@@ -105,9 +105,9 @@ class DiscPaths:
         agreement = (normals[pairs[0]] * normals[pairs[1]]).sum(axis=1)
         self._pieces = _concatenate(
             [
-                self._clear(_tangents(self._corners, *some, side))
+                self._clear(_tangents(self._corners, first, second, side))
                 for side in (1, -1)
-                for some in np.array_split(pairs[:, side * agreement >= 0], num_batches, axis=1)
+                for first, second in np.array_split(pairs[:, side * agreement >= 0], num_batches, axis=1)
             ]
         )
 
