@@ -1,7 +1,7 @@
 """Compilation of kernels to machine code, which is kept on disk.
 
 Numba notices when a kernel's file changes, but not when a module does that the kernel uses. So kernels are kept in a
-folder that is named after the contents of all files in folders with kernels, of mazebench and of the kernel's package.
+folder that is named after the contents of all files beside kernels, of mazebench and of the kernel's package.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numba
 from numba.core.event import Listener, register
 from numba.extending import register_jitable
 
-_IMPORT = re.compile(rb"import kernels\b|kernels import")  # in the files of kernels
+_IMPORT = re.compile(rb"^from .*\bkernels\b", re.MULTILINE)  # in the files of kernels
 
 
 class _Announcement(Listener):
@@ -30,10 +30,7 @@ class _Announcement(Listener):
 
     def on_start(self, event: object) -> None:
         if self.is_due:
-            print(
-                "mazebench: compiling kernels, which numba's cache lacks; this takes some seconds",
-                file=sys.stderr,
-            )
+            print("mazebench: compiling kernels, which numba's cache lacks; this takes some seconds", file=sys.stderr)
         self.is_due = False
 
     def on_end(self, event: object) -> None:
@@ -51,7 +48,21 @@ def compiled(
     If `fused`, a product and a sum may become one operation with one rounding: faster, and other last bits. If `nogil`,
     several threads may run it at once.
     """
-    return _cached(numba.njit, function, forceinline=inline, nogil=nogil, **_options(fused))
+    math = {"contract"} if fused else False
+    compile_it = functools.partial(numba.njit, forceinline=inline, nogil=nogil, error_model="numpy", fastmath=math)
+    package = sys.modules[function.__module__.partition(".")[0]]
+    if not hasattr(package, "__path__"):  # of a script, of which nothing says what its kernels use
+        return compile_it(function)
+    config: Any = numba.config
+    given = config.CACHE_DIR
+    parent = pathlib.Path(given) if given else pathlib.Path(function.__code__.co_filename).parent / "__pycache__"
+    config.CACHE_DIR = str(parent / f"kernels-{_digest(*package.__path__)}")
+    try:
+        return compile_it(function, cache=True)
+    except RuntimeError:  # numba found no folder that it can write to
+        return compile_it(function)
+    finally:
+        config.CACHE_DIR = given
 
 
 def num_threads() -> int:
@@ -75,29 +86,13 @@ def compiled_by_callers(function: Callable[..., Any]) -> Callable[..., Any]:
     return register_jitable(inline="always")(function)
 
 
-def _options(fused: bool) -> dict[str, Any]:
-    return {"error_model": "numpy", "fastmath": {"contract"} if fused else False}
-
-
-def _cached(compile_with: Callable[..., Any], function: Callable[..., Any], **options: Any) -> Any:
-    config: Any = numba.config
-    given = config.CACHE_DIR
-    parent = pathlib.Path(given) if given else pathlib.Path(function.__code__.co_filename).parent / "__pycache__"
-    config.CACHE_DIR = str(parent / f"kernels-{_digest(function.__module__.partition('.')[0])}")
-    try:
-        return compile_with(cache=True, **options)(function)
-    except RuntimeError:  # numba found no folder that it can write to
-        return compile_with(**options)(function)
-    finally:
-        config.CACHE_DIR = given
-
-
 @functools.cache
-def _digest(package: str) -> str:
-    """Returns a hash of the files that kernels of a package can use: its own folders with kernels, and mazebench's."""
+def _digest(*package: str) -> str:
+    """Returns a hash of what the kernels of a package, whose folders are given, can use: all files beside kernels."""
     ours = pathlib.Path(__file__).parent
-    folders = {ours}
-    for top in (ours, *map(pathlib.Path, sys.modules[package].__path__)):
-        folders |= {path.parent for path in top.rglob("*.py") if _IMPORT.search(path.read_bytes())}
-    files = sorted({path for folder in folders for path in folder.glob("*.py")})
-    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]
+    files = {pathlib.Path(__file__), ours / "constants.py"}
+    for top in (ours, *map(pathlib.Path, package)):
+        for path in top.rglob("*.py"):
+            if _IMPORT.search(path.read_bytes()):
+                files |= set(path.parent.glob("*.py"))
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(files))).hexdigest()[:16]

