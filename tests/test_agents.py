@@ -165,7 +165,7 @@ class TestConformance:
         assert set(found) == {interface}
 
     def test_options_belong_to_the_name_of_a_task(self):
-        with pytest.raises(InputError, match="expected the name of a task beside level, found NoneType"):
+        with pytest.raises(InputError, match="expected no options beside a TaskOptions, found level"):
             check_agent(Counting, level=3)
 
     @pytest.mark.parametrize(("broken", "message"), BROKEN.values(), ids=BROKEN)

@@ -102,8 +102,8 @@ def test_a_damaged_file_is_named_in_one_line(folders, kind, file, words, damage)
     path = shutil.copytree(folders[kind], "run") / pathlib.Path(file)
     path.write_bytes(damage(path.read_bytes()))
     if kind == "map" and damage is DAMAGE["cut short"]:  # the last row is then a short one, as some levels have them
-        status, (line,) = run(*words)
+        status, lines = run(*words)  # of which another may say that kernels are compiled
         assert status == 0
-        assert "plan: short rows filled with wall" in line
+        assert any("plan: short rows filled with wall" in line for line in lines)
         return
     assert (path.stem if kind == "map" else path.name) in refusal(*words)

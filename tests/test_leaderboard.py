@@ -135,7 +135,7 @@ FAULTS = {  # of an agent's folder with its result of a part
     "the 240 frozen episodes, found others": lambda part: edit_records(
         part, lambda record: record | {"seed": record["seed"] + (record["episode"] == 7)}
     ),
-    "240 frozen episodes, found others": lambda part: edit_records(
+    "the 240 frozen .*, found others": lambda part: edit_records(
         part, lambda record: record | {"oracle_steps": record["oracle_steps"] + (record["episode"] == 7)}
     ),
     "results of one agent, found those of x, y": lambda part: make_part(part.parent, "y", level=2),
