@@ -7,8 +7,8 @@ import pytest
 from simple_mazes import corridor
 
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.perturbations.flip_warp_noise import Perspective
 from mazebench.tasks.perturbations.perturbation import ShownMap
-from mazebench.tasks.perturbations.warp import Perspective
 from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.task import Task
