@@ -15,7 +15,6 @@ from processes import run_with_egl
 
 import mazebench
 from mazebench.envs.dm_control import Environment
-from mazebench.envs.gym import MazeEnv
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
 from mazebench.maps.kinds import generate
@@ -167,19 +166,6 @@ class TestStates:
         env.set_state(state)
         assert env.needs_reset == (moment != "at the first step")
         assert_equal(expected, play(env, actions))
-
-    def test_gymnasium_goes_back_to_a_state(self):
-        env = MazeEnv(Task.of("adrift", level=3), seed=1)
-        env.reset()
-        actions = [int(action) for action in actions_of(mazebench.load(), seed=1)]
-        for action in actions[:30]:
-            env.step(action)
-        state = env.get_state()
-        expected = [env.step(action) for action in actions[30:60]]
-        env.reset()
-        env.set_state(state)
-        for step, action in zip(expected, actions[30:60], strict=True):
-            assert_same_gym_step(step, env.step(action))
 
     def test_a_state_of_other_mazes_is_refused(self):
         mazes = [generate("dfs", 13, np.random.default_rng(seed), f"maze-{seed}") for seed in range(2)]

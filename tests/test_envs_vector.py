@@ -10,7 +10,6 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from gymnasium.wrappers import vector as wrappers
 from simple_mazes import corridor
 
 import mazebench
@@ -268,36 +267,6 @@ class TestAutoreset:
             else:
                 mask = theirs[f"_{key}"]
                 np.testing.assert_array_equal(ours[key][mask], theirs[key][mask], err_msg=key)
-
-
-WRAPPERS = {
-    "NormalizeObservation": lambda env: wrappers.NormalizeObservation(wrappers.FlattenObservation(env)),
-    "NormalizeReward": wrappers.NormalizeReward,
-    "RecordEpisodeStatistics": wrappers.RecordEpisodeStatistics,
-    "DictInfoToList": wrappers.DictInfoToList,
-}
-
-
-class TestWrappers:
-    """Gymnasium's vector wrappers give what they give around Gymnasium's own vector environment."""
-
-    @pytest.mark.parametrize("wrapper", WRAPPERS.values(), ids=WRAPPERS)
-    def test_a_wrapper_gives_what_it_gives_around_single_environments(self, wrapper):
-        spec, mode = SPECS["local"], AutoresetMode.NEXT_STEP  # in SAME_STEP, wrappers of observations refuse
-        ours, theirs = wrapper(MazeVectorEnv(spec, NUM_ENVS, autoreset_mode=mode)), wrapper(sync_vector_env(spec, mode))
-        assert ours.observation_space == theirs.observation_space
-        assert_tree_equal(ours.reset(seed=SEEDS)[0], theirs.reset(seed=SEEDS)[0])
-        num_ended = 0
-        for action in random_actions(80, NUM_ENVS):
-            one, other = ours.step(action), theirs.step(action)
-            assert_tree_equal(one[0], other[0])
-            for found, expected in zip(one[1:4], other[1:4], strict=True):
-                np.testing.assert_array_equal(found, expected)
-            if "episode" in other[4]:
-                for key in ("r", "l"):
-                    np.testing.assert_array_equal(one[4]["episode"][key], other[4]["episode"][key])
-                num_ended += other[4]["_episode"].sum()
-        assert num_ended > 3 or wrapper is not wrappers.RecordEpisodeStatistics
 
 
 class TestEpisodeSource:

@@ -16,7 +16,8 @@ from mazebench.evaluation.plan import make_plan
 from mazebench.rollout import agent_seed
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.perturbations.flip import MapFlip, flip
+from mazebench.tasks.perturbations.flip_warp_noise import MapFlip
+from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.rules import Rules
 
 
@@ -31,7 +32,7 @@ class Undoing(ClosedLoopPlanner):
             ends = tuple(tuple(np.argwhere(planes[plane])[0].tolist()) for plane in (START, GOAL))
             seed = self.episode_seeds.get(int(seed), int(seed))
             rng = Episode(0, *ends, 0.0, seed).stream(MapFlip.stream)
-            planes[GLOBAL_MAP] = flip(planes[GLOBAL_MAP] > 0.5, 0.1, ends, rng)
+            planes[GLOBAL_MAP] = MapFlip(0.1).show(ShownMap(planes[GLOBAL_MAP] > 0.5), ends, rng).walls
         return super().act(inputs._replace(observation={**inputs.observation, "context": context}), state, explore)
 
 

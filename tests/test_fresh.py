@@ -28,7 +28,6 @@ from mazebench.tasks.task import Task
 from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.loop import train
 from mazebench.world.mjcf import action_controls
-from mazebench.world.ray_casting import Lidar
 
 KINDS = ("dfs", "house")
 CONTROLS = action_controls()
@@ -107,16 +106,6 @@ class TestFreshMazes:
                 each.simulation.set_controls(CONTROLS[action])
                 each.simulation.step(STEPS_PER_ACTION)
             np.testing.assert_allclose(env.simulation.state(), compiled.simulation.state(), rtol=0, atol=1e-9)
-
-    def test_a_lidar_that_forgets_mazes_reads_as_one_that_keeps_them(self):
-        mazes = FreshMazes(KINDS, 13)
-        forgetting, numbers = Lidar(mazes), np.arange(600)
-        keeping = Lidar(tuple(mazes[number] for number in numbers))
-        rng = np.random.default_rng(0)
-        for size in (1, 300, 300, 2, 600):
-            maze = rng.choice(numbers, size)
-            pose = np.column_stack([rng.uniform(1, 12, (size, 2)), rng.uniform(-4, 4, size)])
-            np.testing.assert_array_equal(forgetting.ranges(maze, pose), keeping.ranges(maze, pose))
 
     def test_a_maze_that_is_too_small_for_the_distance_is_drawn_again(self):
         spec = Task.of(kinds="house", fresh=True, distances=max(each.diameter for each in small_houses()))

@@ -67,13 +67,6 @@ class TestDisplacement:
         assert (right[1] > 0).all()
         assert (down[0] * right[1] - down[1] * right[0] > 0).all()
 
-    def test_neighbouring_points_move_alike_and_far_ones_do_not(self):
-        # White noise smoothed by a Gaussian of deviation 3 has the correlation exp(-distance^2 / 36).
-        rng = np.random.default_rng(0)
-        noise = [Displacement(rng.standard_normal((2, SIZE + 18, SIZE + 18)), np.zeros(2)) for _ in range(2000)]
-        values = np.array([displacement.on_grid(Line(SIZE, 1))[0, [2, 3, 8], 0] for displacement in noise])
-        np.testing.assert_allclose(np.corrcoef(values.T)[0], np.exp([0, -1 / 36, -1]), atol=0.08)
-
     def test_points_move_as_the_grid_does(self):
         displacement = draw_displacement(SIZE, np.random.default_rng(0))
         line, points = grid(2)
@@ -153,11 +146,3 @@ class TestMarks:
         walls = np.ones((SIZE, SIZE), bool)
         walls[1, 5] = walls[4, 1] = False
         assert plain().pixel((1, 1), plain().picture(walls)) == (8, 2)  # the centre of the cell is at (3, 3)
-
-    def test_mark_on_a_sheet_without_free_pixels_lies_on_the_least_wall(self):
-        walls = np.ones((SIZE, SIZE), bool)
-        walls[3, 4] = False
-        drawn = plain(share=(0.3, 0.3), place=(0.5, 0.5))
-        picture = drawn.picture(walls)
-        assert 0.5 < picture.min() < 1
-        assert picture[drawn.pixel((3, 4), picture)] == picture.min()

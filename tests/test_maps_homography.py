@@ -8,7 +8,7 @@ import pytest
 from mazebench.maps.homography import warp_cell, warp_points, warp_walls
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import cell_to_point, point_to_cell
-from mazebench.tasks.perturbations.warp import random_homography
+from mazebench.tasks.perturbations.flip_warp_noise import random_homography
 
 
 @pytest.fixture(scope="module")

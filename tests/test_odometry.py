@@ -114,19 +114,6 @@ class TestCorruptedOdometry:
             np.testing.assert_allclose(wrap(error - STEP_TIME * np.cumsum(rate_error)), 0, atol=1e-10)
             assert np.abs(error[1:]).min() > 0
 
-    def test_the_pose_adds_up_scaled_moves_of_the_body_along_the_observed_heading(self, drives):
-        for seed, states in enumerate(drives):
-            odometry = corrupted_odometry(np.random.default_rng(seed))
-            values = observed(odometry, states)
-            true_yaw, heading = states[:-1, YAW], values[:-1, YAW]
-            move = np.diff(states[:, :2], axis=0)
-            ahead = np.cos(true_yaw) * move[:, 0] + np.sin(true_yaw) * move[:, 1]
-            left = np.cos(true_yaw) * move[:, 1] - np.sin(true_yaw) * move[:, 0]
-            moved = odometry.scale * np.stack(
-                [np.cos(heading) * ahead - np.sin(heading) * left, np.sin(heading) * ahead + np.cos(heading) * left]
-            )
-            np.testing.assert_allclose(np.diff(values[:, :2], axis=0), moved.T, atol=1e-12)
-
 
 class TestTrack:
     ACTIONS = tuple(np.random.default_rng(0).integers(6, size=60).tolist())

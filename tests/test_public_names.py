@@ -38,8 +38,3 @@ def test_an_example_prints_what_it_shows(name):
     printed: list[str] = []
     runner = doctest.DocTestRunner(optionflags=doctest.IGNORE_EXCEPTION_DETAIL)
     assert runner.run(test, out=printed.append).failed == 0, "".join(printed)
-
-
-@pytest.mark.parametrize("name", [name for name in mazebench.__all__ if inspect.isfunction(getattr(mazebench, name))])
-def test_functions_say_what_they_raise(name):
-    assert "Raises:\n  InputError: " in inspect.getdoc(getattr(mazebench, name))

@@ -39,13 +39,6 @@ class TestPlanes:
 
 
 class TestLocalMap:
-    def test_an_even_crop_shows_one_cell_more_before_the_start(self):
-        # The start (2, 2) comes to lie at (4 // 2, 4 // 2): two cells before it, one behind.
-        np.testing.assert_array_equal(
-            context(4, start=(2, 2))[1],
-            [[1, 1, 1, 1], [1, 0, 0, 1], [1, 1, 0, 0], [1, 0, 0, 0]],
-        )
-
     @pytest.mark.parametrize("context_size", range(3, 13))
     @pytest.mark.parametrize("start", [(1, 1), (1, 2), (2, 3), (3, 1)])
     def test_the_crop_shows_what_lies_around_the_start(self, context_size, start):
@@ -61,11 +54,6 @@ class TestGlobalMap:
     def test_a_larger_map_repeats_cells(self):
         # Each cell becomes 2 x 2.
         np.testing.assert_array_equal(context(10)[0], np.kron(WALLS, np.ones((2, 2))))
-
-    def test_a_larger_map_that_is_no_multiple_shows_the_nearest_cells(self):
-        # Row i of 7 shows row floor(5 i / 7) of 5: 0, 0, 1, 2, 2, 3, 4.
-        index = [0, 0, 1, 2, 2, 3, 4]
-        np.testing.assert_array_equal(context(7)[0], np.array(WALLS)[np.ix_(index, index)])
 
     def test_a_smaller_map_shows_shares_of_walls(self):
         walls = np.ones((6, 6), dtype=bool)

@@ -7,8 +7,8 @@ import pytest
 from simple_mazes import corridor
 
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.perturbations.flip_warp_noise import Perspective
 from mazebench.tasks.perturbations.perturbation import ShownMap
-from mazebench.tasks.perturbations.warp import Perspective
 from mazebench.tasks.route import Event, Route, plan_route
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.task import Task
@@ -43,19 +43,6 @@ class TestHierarchicalRoute:
         assert route.advance(ELSEWHERE, 10) is Event.LANDMARK
         assert (route.start, route.target, route.leg, route.deadline) == (FIRST, SECOND, 1, 20)
 
-    def test_a_landmark_reached_on_the_last_step_is_one_landmark(self):
-        # One landmark is done, not two.
-        route = hierarchical_route()
-        assert route.advance(FIRST, 10) is Event.LANDMARK
-        assert (route.leg, route.deadline) == (1, 20)
-
-    def test_each_landmark_counts_on_the_way_to_the_goal(self):
-        route = hierarchical_route()
-        cells = [ELSEWHERE, FIRST, ELSEWHERE, SECOND, ELSEWHERE, GOAL]
-        events = [route.advance(cell, step) for step, cell in enumerate(cells, 1)]
-        landmark, none = Event.LANDMARK, Event.NONE
-        assert events == [none, landmark, none, landmark, none, Event.REACHED]
-
     def test_a_body_that_stands_still_gets_all_legs(self):
         route = hierarchical_route(time_limit=3)
         events = [route.advance(START, step) for step in range(1, 10)]
@@ -69,12 +56,6 @@ class TestHierarchicalRoute:
 
     def test_a_goal_entered_on_the_way_to_a_landmark_counts(self):
         assert hierarchical_route().advance(GOAL, 2) is Event.REACHED
-
-    def test_a_goal_reached_on_the_very_last_step_counts(self):
-        route = hierarchical_route()
-        for step in (10, 20):
-            assert route.advance(ELSEWHERE, step) is Event.LANDMARK
-        assert route.advance(GOAL, 30) is Event.REACHED
 
 
 class TestSeveralGoals:
@@ -109,10 +90,6 @@ class TestLandmarks:
     )
     def test_landmarks_stand_every_k_cells(self, every, columns):
         assert self.cells(every, (1, 1), (1, 7)) == [(1, column) for column in columns]
-
-    @pytest.mark.parametrize("every", [3, 4, 5])
-    def test_a_path_no_longer_than_k_has_no_landmark(self, every):
-        assert self.cells(every, (1, 4), (1, 1)) == [(1, 4), (1, 1)]
 
     def test_a_local_task_has_no_landmark(self):
         assert self.cells(1, (1, 1), (1, 7), task="local") == [(1, 1), (1, 7)]

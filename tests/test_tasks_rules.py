@@ -178,13 +178,6 @@ class TestInfosOfTheTask:
 
 
 class TestObservation:
-    def test_the_context_shows_the_walls_the_goal_and_the_start(self):
-        (context,) = begin(1, along(1, 4)).context
-        assert (context.shape, context.dtype) == ((4, 9, 9), np.float32)
-        np.testing.assert_array_equal(context[0], corridor().walls)
-        np.testing.assert_array_equal(np.argwhere(context[2]), [[ROW, 4]])
-        np.testing.assert_array_equal(np.argwhere(context[3]), [[ROW, 1]])
-
     def test_noise_changes_the_observed_position_only(self):
         rules = begin(2, along(1, 4), position_noise=0.5)
         true = np.tile(np.arange(12.0), (2, 1))

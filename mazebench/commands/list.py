@@ -9,7 +9,7 @@ def list_() -> None:
     from mazebench.constants import DISCRETE, TASK_VERSION, VELOCITIES
     from mazebench.maps.benchmark import MAZES_PER_SPLIT, SIZES, SPLITS
     from mazebench.maps.kinds import KINDS
-    from mazebench.tasks.perturbations import PERTURBATIONS
+    from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS
     from mazebench.tasks.sensors import SENSORS
     from mazebench.tasks.task_options import HIERARCHICAL, LOCAL
     from mazebench.tasks.tracks import TRACKS

@@ -14,7 +14,7 @@ from mazebench.report.episodes import at_common_distances, common_distances, fac
 from mazebench.report.table import METRICS, Table, make_values
 from mazebench.results.intervals import Estimate, mean_interval, runs_interval
 from mazebench.results.paper import printed
-from mazebench.tasks.perturbations import PERTURBATIONS
+from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import TRACKS
 

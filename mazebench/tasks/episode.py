@@ -10,7 +10,7 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.maze import Cell, Maze
-from mazebench.tasks.perturbations import PERTURBATIONS
+from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS
 from mazebench.tasks.perturbations.perturbation import Perturbation
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task

@@ -21,10 +21,7 @@ from mazebench.maps.scenarios import are_scenarios
 from mazebench.maps.selection import described_maze, maze_as_described, own_mazes
 from mazebench.options import Doc, OneOf, ReadBy, fields_of, options_in
 from mazebench.tasks.context import MAX_CONTEXT_SIZE
-from mazebench.tasks.perturbations import PERTURBATIONS
-from mazebench.tasks.perturbations.flip import FlipShare
-from mazebench.tasks.perturbations.noise import PositionDeviation
-from mazebench.tasks.perturbations.warp import WarpShare
+from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS, FlipShare, PositionDeviation, WarpShare
 from mazebench.tasks.sensors import LIDAR, SENSORS
 from mazebench.tasks.sensors.sensor import SensorOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
@@ -224,15 +221,6 @@ class TaskOptions(SensorOptions, ReadOptions):
         if self.track is not None and LIDAR not in self.sensors:
             object.__setattr__(self, "sensors", (LIDAR, *self.sensors))
         self._check()
-
-    @classmethod
-    def from_json(cls, content: Mapping[str, Any]) -> Self:
-        """Returns the options of which `to_json` returned the content.
-
-        Raises:
-          InputError: if a value is not allowed.
-        """
-        return cls.of(content)
 
     def to_json(self) -> dict[str, Any]:
         """Returns the options by name, in values that JSON has; without those that are open, or as evaluations are."""
