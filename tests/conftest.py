@@ -10,11 +10,20 @@ from collections.abc import Callable, Iterator
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # of each worker of pytest-xdist and its processes; read by imports below
 
+import numpy as np
 import pytest
 from made_results import make_results
 
 from mazebench import cli
 from mazebench.errors import Remark
+from mazebench.maps.geodesic import length_between
+from mazebench.maps.kinds import generate
+
+
+@pytest.fixture(scope="session", autouse=True)
+def kernels() -> None:
+    """The kernels of shortest paths are compiled, of which a line on standard error would tell."""
+    length_between(generate("dfs", 7, np.random.default_rng(0)), 0.15, (1, 1), (5, 5))
 
 
 @pytest.fixture
