@@ -41,7 +41,6 @@ class TestArea:
             "3 separate areas (66 m2 with cell 1,1, at 100 % of the edge; 12 m2 with cell 2,2, enclosed; 4 m2" in line
         )
         assert "; number 2 is the maze, --area chooses by a cell; " in line
-        assert "narrower" not in line
 
     def test_a_building_whose_door_reaches_the_edge_is_no_ground(self):
         maze, _ = locate_maze(grid_of("........ #####... #...#... #...#... ....#... #####..."), ReadOptions(), "map")
@@ -64,34 +63,33 @@ class TestArea:
 
 
 class TestCells:
-    def test_they_begin_where_they_keep_the_most_floor(self, remarks):
+    def test_they_begin_where_they_keep_the_most_floor(self):
         states = np.full((24, 44), OCCUPIED, dtype=np.int8)
         states[3:21, 3:41] = FREE  # 1.8 m x 3.8 m: cells from the corner on would keep 1.5 m x 3.5 m
         maze, (x, y, _) = locate_maze(OccupancyGrid(states, 0.1), ReadOptions(cell_size=0.6), "map")
         assert len(maze.free_cells) == 3 * 6
         points = maze.point(maze.free_cells) + np.array([x, y])
         assert points.min() - 0.3 >= 0.3 - 1e-9
-        assert not any("narrower" in line for line in remarks())
 
     @pytest.mark.parametrize(
         ("options", "hint"),
         [
-            ({"cell_size": 1.2}, "doors narrower than two cells (2.4 m) may close, --cell-size 0.4 keeps more"),
-            ({"inflate": 0.45}, "walls are inflated, try a smaller --inflate"),
+            ({"cell_size": 1.2}, "map: if rooms are missing, try a smaller --cell-size"),
+            ({"inflate": 0.45}, "map: if rooms are missing, try a smaller --inflate"),
         ],
     )
-    def test_only_the_cause_of_closed_cells_is_named(self, options, hint, remarks):
+    def test_what_may_keep_closed_cells_is_said(self, options, hint, remarks):
         grid = grid_of(
             TWO_WINGS.replace("#....#...# #....#...# #....", "#....#...# #........# #...."), 8, resolution=0.1
         )
         locate_maze(grid, ReadOptions(**options), "map")
-        assert remarks()[-1].endswith(hint)
+        assert remarks()[-1] == hint
 
     def test_a_grid_without_a_free_cell_is_described(self):
         grid = grid_of("##### #.?.# #?.?# #.?.# #####", 2, resolution=0.1, shades="its shades are 0 to 254")
         message = (
             "map: expected a free cell of 0.4 m, found none; 64 % of the map is wall, 16 % unknown, 20 % free; "
-            "its widest gap is 0.2 m; it is 1 x 1 m; its shades are 0 to 254"
+            "its shades are 0 to 254"
         )
         with pytest.raises(MazeError) as caught:
             locate_maze(grid, ReadOptions(), "map")

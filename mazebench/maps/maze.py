@@ -73,7 +73,12 @@ class Maze:
             raise MazeError(f"{self.name}: expected walls of dtype bool, found {walls.dtype}")
         if not isinstance(self.cell_size, numbers.Real) or not 0 < self.cell_size < math.inf:
             raise MazeError(f"{self.name}: expected a cell_size above 0 m, found {self.cell_size!r}")
-        _check(walls, self.name)
+        if walls.ndim != 2 or walls.shape[0] != walls.shape[1]:
+            raise MazeError(f"{self.name}: expected a square grid, found shape {walls.shape}")
+        if not MIN_SIZE <= len(walls) <= MAX_SIZE:
+            raise MazeError(f"{self.name}: expected {MIN_SIZE} to {MAX_SIZE} cells a side, found {len(walls)}")
+        require_closed_border(walls, self.name)
+        require_connected(walls, self.name)
         walls.flags.writeable = False
         object.__setattr__(self, "walls", walls)
         object.__setattr__(self, "cell_size", float(self.cell_size))
@@ -125,13 +130,8 @@ class Maze:
 
     def cell_index(self, points: np.ndarray) -> np.ndarray:
         """Returns the cells, `[...]` int, of `[..., 2]` points in metres as row * N + column, as `cell` does."""
-        first, weights = self._index_terms
-        return (np.floor(points / self.cell_size).dot(weights) + first).astype(np.int64)
-
-    @functools.cached_property
-    def _index_terms(self) -> tuple[np.ndarray, np.ndarray]:
-        """The index of the lower left cell, and what a cell to the right and one up add to it."""
-        return np.array(self.size * (self.size - 1.0)), np.array([1.0, -self.size])
+        first = self.size * (self.size - 1.0)  # of the lower left cell
+        return (np.floor(points / self.cell_size).dot([1.0, -self.size]) + first).astype(np.int64)
 
     def cell_at(self, x: float, y: float) -> Cell:
         """Returns the cell of a single point in metres, as `cell` does, but in a fraction of the time."""
@@ -332,7 +332,7 @@ def require_closed_border(walls: np.ndarray, name: str) -> None:
     border[1:-1, 1:-1] = False
     open_border = np.argwhere(border & ~walls)
     if len(open_border):
-        raise MazeError(f"{name}: expected a closed border, found cell {_show(open_border[0])} free")
+        raise MazeError(f"{name}: expected a closed border, found cell {tuple(open_border[0].tolist())} free")
 
 
 def require_connected(walls: np.ndarray, name: str) -> None:
@@ -341,22 +341,8 @@ def require_connected(walls: np.ndarray, name: str) -> None:
     if num_components == 0:
         raise MazeError(f"{name}: expected a free cell, found only walls")
     if num_components > 1:
-        cut_off = np.argwhere(components == 2)[0]
+        first, cut_off = (tuple(np.argwhere(components == number)[0].tolist()) for number in (1, 2))
         raise MazeError(
             f"{name}: expected one connected free area, found {num_components}; "
-            f"cell {_show(cut_off)} cannot be reached from {_show(np.argwhere(components == 1)[0])}"
+            f"cell {cut_off} cannot be reached from {first}"
         )
-
-
-def _check(walls: np.ndarray, name: str) -> None:
-    if walls.ndim != 2 or walls.shape[0] != walls.shape[1]:
-        raise MazeError(f"{name}: expected a square grid, found shape {walls.shape}")
-    size = len(walls)
-    if not MIN_SIZE <= size <= MAX_SIZE:
-        raise MazeError(f"{name}: expected {MIN_SIZE} to {MAX_SIZE} cells a side, found {size}")
-    require_closed_border(walls, name)
-    require_connected(walls, name)
-
-
-def _show(cell: np.ndarray) -> str:
-    return f"({cell[0]}, {cell[1]})"

@@ -44,24 +44,7 @@ def free_cell_of_place(name: str, place: str, maze: Maze) -> Cell:
     Raises:
       InputError: if it is not free in `maze`; `name` is that of the option.
     """
-    cell = cell_of_place(place, maze.size, maze.cell_size)
-    if maze.is_free(cell):
-        return cell
-    if _POINT.fullmatch(place):
-        found = "a wall" if min(cell) >= 0 and max(cell) < maze.size else "one outside"
-        raise InputError(f"{name} {place!r}: {maze.name}: expected a point {_describe_extent(maze)}, found {found}")
     try:
-        return maze.require_free(cell)
+        return maze.require_free(cell_of_place(place, maze.size, maze.cell_size))
     except MazeError as error:
-        raise InputError(f"{name} {place!r}: {error}") from error
-
-
-def _describe_extent(maze: Maze) -> str:
-    """Returns the side of a maze and the part that its free cells span, which padding may have moved up."""
-    bottom, right = maze.free_cells.max(axis=0)
-    top, left = maze.free_cells.min(axis=0)
-    low, high = (
-        ", ".join(f"{maze.cell_size * number:g}" for number in corner)
-        for corner in ((left, maze.size - 1 - bottom), (right + 1, maze.size - top))
-    )
-    return f"in the {maze.side:g} x {maze.side:g} m of the maze, whose free cells reach from ({low}) to ({high}) m"
+        raise InputError(f"{name} {place!r}: {error}, in the {maze.side:g} x {maze.side:g} m of the maze") from error

@@ -12,8 +12,6 @@ from collections.abc import Iterator
 from mazebench.errors import InputError
 
 _LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}  # of the backends that need no display
-_GLFW = ("glfw", "on", "enable", "enabled", "true", "1", "")
-_OFF = ("off", "disable", "disabled", "false", "0")
 
 
 class RenderingError(InputError):
@@ -48,7 +46,8 @@ def rendering_error(error: Exception) -> RenderingError:
     setting = "MUJOCO_GL is not set" if chosen is None else f"MUJOCO_GL={chosen}"
     others = [f"MUJOCO_GL={name}" for name in installed_backends() if name != chosen]
     advice = f"set {' or '.join(others)} before Python starts" if others else "no other backend is installed here"
-    return RenderingError(f"can't open a rendering context, {setting}: {_reason(chosen, error)}; {advice}")
+    reason = str(error).splitlines()[0] if str(error) else repr(error)
+    return RenderingError(f"can't open a rendering context, {setting}: {reason}; {advice}")
 
 
 def installed_backends() -> list[str]:
@@ -60,15 +59,3 @@ def installed_backends() -> list[str]:
 def has_display() -> bool:
     """Returns whether windows can be expected to open here."""
     return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-def _reason(chosen: str | None, error: Exception) -> str:
-    if chosen in _OFF:
-        return "this switches rendering off"
-    if chosen in _LIBRARIES and chosen not in installed_backends():
-        return f"the library {_LIBRARIES[chosen]} is not installed"
-    if chosen is not None and chosen not in (*_LIBRARIES, *_GLFW):
-        return f"expected {', '.join(_LIBRARIES)}, glfw or off"
-    if not has_display() and chosen not in _LIBRARIES:
-        return "this machine has no display"
-    return str(error).splitlines()[0] if str(error) else repr(error)

@@ -23,7 +23,7 @@ _WORTH_LISTING, _FAIR_SIZE = 0.02, 0.05
 _GROUND_EDGE = 0.2  # share of the edge from which an area is ground; a building reaches the edge at its doors
 _MOST_LISTED = 5
 _MOST_PHASES = 8  # along an axis
-WORTH_SHIFTING = 1.1  # times the floor of cells from the corner on, for which they begin elsewhere
+_WORTH_SHIFTING = 1.1  # times the floor of cells from the corner on, for which they begin elsewhere
 
 
 class Cells(NamedTuple):
@@ -64,27 +64,17 @@ def lay_cells(blocked: np.ndarray, pixels: int) -> Cells:
 
     They begin at the upper left corner, or where clearly more free cells of the building are left.
     """
-    is_free = free_squares(blocked, pixels)
+    # The pixels that are the upper left ones of squares in which none is blocked.
+    square = np.ones((pixels, pixels), np.uint8)
+    free = cv2.erode((~blocked).astype(np.uint8), square, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0)
     offsets = range(0, pixels, math.ceil(pixels / _MOST_PHASES))
     laid = [
-        Cells(~is_free[down::pixels, right::pixels], pixels, down, right)
+        Cells(free[down::pixels, right::pixels] == 0, pixels, down, right)
         for down, right in itertools.product(offsets, offsets)
     ]
-    kept = [num_kept(cells, blocked) for cells in laid]
+    kept = [_building(areas).num_cells if (areas := areas_of(cells, blocked)) else 0 for cells in laid]
     best = int(np.argmax(kept))
-    return laid[best if kept[best] > WORTH_SHIFTING * kept[0] else 0]
-
-
-def free_squares(blocked: np.ndarray, side: int) -> np.ndarray:
-    """Returns `[H, W]` bool: the pixels that are the upper left ones of squares in which none is blocked."""
-    free, square = (~blocked).astype(np.uint8), np.ones((side, side), np.uint8)
-    return cv2.erode(free, square, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0) > 0
-
-
-def num_kept(cells: Cells, blocked: np.ndarray) -> int:
-    """Returns the number of free cells of the building."""
-    areas = areas_of(cells, blocked)
-    return _building(areas).num_cells if areas else 0
+    return laid[best if kept[best] > _WORTH_SHIFTING * kept[0] else 0]
 
 
 def areas_of(cells: Cells, blocked: np.ndarray) -> list[Area]:

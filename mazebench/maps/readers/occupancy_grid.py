@@ -6,10 +6,8 @@ cells, such as a text, each pixel is a cell.
 
 from __future__ import annotations
 
-import bisect
 import dataclasses
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import cv2
@@ -20,23 +18,17 @@ from mazebench.errors import InputError, remark
 from mazebench.maps.maze import MAX_CHOSEN_SIZE, MAX_SIZE, MIN_CELL_SIZE, MIN_SIZE, Maze, MazeError
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.readers.areas import (
-    WORTH_SHIFTING,
-    Area,
-    Cells,
     areas_of,
     choose,
     describe_areas,
     enclose,
-    free_squares,
     lay_cells,
-    num_kept,
 )
 
 Pose = tuple[float, float, float]  # x, y (m), yaw (rad)
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 _TOLERANCE = 1e-3  # pixels by which a cell may miss a whole number of them
-_SURE_CELL_SIZE = 0.5  # m, from which agents that steer by their pose seldom miss a goal
 _MANY_CLOSED = 0.05  # share of the free cells of which a user would miss rooms
 _MIN_INVERTED = 0.25  # share of wall from which one connected wall in free cells is taken for the free cells
 
@@ -85,8 +77,10 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
     cell_size = options.cell_size or round(pixels * grid.resolution, 9)
     cells = lay_cells(blocked, pixels)
     if cells.walls.all():
+        wall, unknown, free = (100 * (grid.states == state).mean() for state in (OCCUPIED, UNKNOWN, FREE))
         raise MazeError(
-            f"{name}: expected a free cell of {cell_size:g} m, found none; {_describe_pixels(grid, blocked, pixels)}"
+            f"{name}: expected a free cell of {cell_size:g} m, found none; {wall:.0f} % of the map is wall, "
+            f"{unknown:.0f} % unknown, {free:.0f} % free{'; ' * bool(grid.shades)}{grid.shades}"
         )
 
     # One area, closed all around.
@@ -103,7 +97,10 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
     # Where the maze lies, in pixels from the edges of the map.
     from_left, from_top = left + cells.right + column * pixels, top + cells.down + row * pixels
     from_below = len(grid.states) - from_top - size * pixels
-    origin = _moved(grid.origin, from_left * grid.resolution, from_below * grid.resolution)
+    x, y, yaw = grid.origin
+    right, up = from_left * grid.resolution, from_below * grid.resolution
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    origin = x + cosine * right - sine * up, y + sine * right + cosine * up, yaw
 
     # What a user should know.
     changes = [*grid.changes, *["nothing on it is wall"] * (not (states == OCCUPIED).any())]
@@ -114,7 +111,11 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
         changes.append(describe_areas(areas, enclosed, number, cell_size))
     if not is_found:
         changes.append(f"none has {options.area}")
-    changes += _describe_closed(areas[number], cells)
+    num_free = int((~cells.walls).sum())
+    num_closed = num_free - areas[number].num_cells
+    if num_closed:
+        share = f"{num_closed:,} of {num_free:,} free cells ({100 * num_closed / num_free:.0f} %)"
+        changes.append(f"{share} closed that can't be reached from the others")
     beyond = np.array([from_top + (height - 1) * pixels, from_left + (width - 1) * pixels]) - grid.states.shape
     if min(from_top, from_left) < 0 or max(beyond) >= 0:
         changes.append("wall added along its border")
@@ -124,11 +125,16 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
         changes.append(f"its cell (r, c) is ({_shifted('r', from_top)}, {_shifted('c', from_left)}) in the maze")
     if changes or from_left or from_below:
         remark(f"{name}: {'; '.join([*changes, _describe_corner(origin)])}")
-    if hints := [
-        *([] if grid.is_cells else _larger_cells(blocked, cells, grid.resolution)),
-        *_reasons_to_close(states, blocked, cells, areas[number], grid.resolution, options),
-    ]:
-        remark(f"{name}: {'; '.join(hints)}")
+    num_lost = num_closed - sum(area.num_cells for area in areas if area.is_ground and area is not areas[number])
+    if num_lost > _MANY_CLOSED * num_free:
+        advice = {
+            "a smaller --cell-size": pixels > _fewest_pixels(grid.resolution),
+            "a smaller --inflate": options.inflate > 0,
+            "--unknown free": options.unknown == "wall" and bool((states == UNKNOWN).any()),
+            "without text, furniture and door swings on the plan": options.pixel_size is not None,
+        }
+        if any(advice.values()):
+            remark(f"{name}: if rooms are missing, try {', or '.join(way for way, helps in advice.items() if helps)}")
     return LocatedMaze(maze, origin)
 
 
@@ -202,70 +208,6 @@ def _inflate(walls: np.ndarray, num_pixels: float) -> np.ndarray:
     return np.asarray(distances <= num_pixels + _TOLERANCE)
 
 
-def _describe_pixels(grid: OccupancyGrid, blocked: np.ndarray, pixels: int) -> str:
-    """Returns what a map is made of that has no free cell of some pixels."""
-    shares = ((grid.states == state).mean() for state in (OCCUPIED, UNKNOWN, FREE))
-    parts = "{:.0f} % of the map is wall, {:.0f} % unknown, {:.0f} % free".format(*(100 * share for share in shares))
-    widest = bisect.bisect_left(range(1, pixels), True, key=lambda side: not free_squares(blocked, side).any())
-    gap = f"; its widest gap is {widest * grid.resolution:g} m" if widest else ""
-    height, width = (length * grid.resolution for length in grid.states.shape)
-    return f"{parts}{gap}; it is {width:g} x {height:g} m{'; ' * bool(grid.shades)}{grid.shades}"
-
-
-def _describe_closed(area: Area, cells: Cells) -> list[str]:
-    num_free = int((~cells.walls).sum())
-    num_closed = num_free - area.num_cells
-    if not num_closed:
-        return []
-    part = f"{num_closed:,} of {num_free:,} free cells ({100 * num_closed / num_free:.0f} %)"
-    return [f"{part} closed that can't be reached from the others"]
-
-
-def _larger_cells(blocked: np.ndarray, cells: Cells, resolution: float) -> Iterator[str]:
-    """Yields what cells would keep in which agents drive surely, if these are smaller."""
-    sure = math.ceil(_SURE_CELL_SIZE / resolution - _TOLERANCE)
-    if cells.pixels < sure:
-        kept, smaller = (
-            num_kept(each, blocked) * (each.pixels * resolution) ** 2 for each in (lay_cells(blocked, sure), cells)
-        )
-        yield (
-            f"agents drive surely in cells from {_SURE_CELL_SIZE:g} m; --cell-size {sure * resolution:g} keeps "
-            f"{kept:.4g} m2 of floor, these cells {smaller:.4g} m2"
-        )
-
-
-def _reasons_to_close(
-    states: np.ndarray, blocked: np.ndarray, cells: Cells, area: Area, resolution: float, options: ReadOptions
-) -> Iterator[str]:
-    """Yields what has cut off free cells that lie inside, in words, and what to try against it."""
-    outside = [other.cells for other in areas_of(cells, blocked) if other.is_ground]
-    closed = ~cells.walls & ~area.cells & ~np.any([np.zeros_like(area.cells), *outside], axis=0)
-    if closed.sum() <= _MANY_CLOSED * (~cells.walls).sum():
-        return
-
-    def is_joined(walls: np.ndarray) -> bool:
-        """Returns whether the area and what was closed are connected between walls of pixels."""
-        labels, _ = ndimage.label(~walls)
-        kept, lost = (
-            labels[rows * cells.pixels + cells.down, columns * cells.pixels + cells.right]
-            for rows, columns in map(np.nonzero, (area.cells, closed))
-        )
-        return bool(np.isin(lost, kept).any())
-
-    if is_joined(blocked):
-        fewest = _fewest_pixels(resolution)
-        smaller = num_kept(lay_cells(blocked, fewest), blocked) * fewest**2
-        helps = smaller > WORTH_SHIFTING * area.num_cells * cells.pixels**2
-        remedy = f", --cell-size {fewest * resolution:g} keeps more" if helps else ""
-        yield f"doors narrower than two cells ({2 * cells.pixels * resolution:g} m) may close{remedy}"
-    elif options.inflate and is_joined(_walls(states, options.unknown)):
-        yield "walls are inflated, try a smaller --inflate"
-    elif options.unknown == "wall" and is_joined(_walls(states, "free")):
-        yield "unknown cells are wall, try --unknown free"
-    elif options.pixel_size is not None:
-        yield "text, furniture and door swings on a plan are walls too, erase them"
-
-
 def _describe_corner(origin: Pose) -> str:
     """Returns where the maze lies on a map and, if it is not turned, where a point of the map lies in the maze."""
     x, y, yaw = (round(number, 6) + 0.0 for number in origin)  # + 0.0: no -0
@@ -280,10 +222,3 @@ def _describe_corner(origin: Pose) -> str:
 def _shifted(name: str, by: float) -> str:
     """Returns a coordinate less a number, in words."""
     return f"{name} {'+' if by < 0 else '-'} {abs(by):g}" if by else name
-
-
-def _moved(origin: Pose, x: float, y: float) -> Pose:
-    """Returns the pose of the point (x, y) of a frame that lies at `origin`."""
-    x0, y0, yaw = origin
-    cosine, sine = math.cos(yaw), math.sin(yaw)
-    return x0 + cosine * x - sine * y, y0 + sine * x + cosine * y, yaw
