@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from mazebench.errors import InputError
-from mazebench.maps.grids import largest_area
 from mazebench.maps.kinds import generate
+from mazebench.maps.kinds.kind import largest_area
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.maze_files import read_maze
 from mazebench.maps.maze_options import ReadOptions

@@ -13,7 +13,7 @@ import pytest
 
 from mazebench.maps.maze import Maze
 from mazebench.play import viewer
-from mazebench.play.game import LETTERS, Game
+from mazebench.play.game import KEYS, Game
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.task import Task
 
@@ -47,7 +47,7 @@ class TestGame:
                 states.append(game.observation["state"])
             game.begin(game.env.runner.episode)
             np.testing.assert_array_equal(states, [game.env.step(action)[0]["state"]] * 2)
-        assert (LETTERS["a"], LETTERS["d"]) == (2, 3)
+        assert (KEYS["a"], KEYS["d"]) == (2, 3)
 
     def test_the_goal_is_reported_and_a_key_starts_again(self, game):
         for _ in range(20):
@@ -89,7 +89,7 @@ class TestViewer:
 
     def test_the_map_is_the_one_that_an_agent_is_shown(self):
         game = Game(Task.of("local", size=13, map_flip=0.3), seed=0)
-        picture = viewer._map_picture(game.context, 260)
+        picture = viewer._map_picture(game.observation["context"], 260)
         seen = picture[2::20, 2::20].max(axis=-1) < 128  # beside the marks, which are discs
         np.testing.assert_array_equal(seen, game.env.runner.shown_map.walls)
 

@@ -84,18 +84,19 @@ class _Doors:
     def __init__(self, walls: np.ndarray, slots: np.ndarray):
         self.is_open = ~walls[tuple(slots.T)]  # [D] bool
         self._rooms = np.sort(rooms_beside(walls, slots), axis=0)  # [2, D] int, from 1
-        num_rooms = int(self._rooms.max(initial=0)) + 1
-        _, self._pair = np.unique(self._rooms.T @ (num_rooms, 1), return_inverse=True)  # [D] int, the pair of rooms
-        self._num_doors = np.bincount(self._rooms[:, self.is_open].ravel(), minlength=num_rooms)  # [R] int, open ones
-        self._num_between = np.bincount(self._pair, self.is_open)  # open ones, by pair of rooms
-        self._ways: list[dict[int, int]] = [{} for _ in range(num_rooms)]  # of a room: open doors, rooms behind them
+        self._num_rooms = int(self._rooms.max(initial=0)) + 1
+        _, self._pair = np.unique(self._rooms.T @ (self._num_rooms, 1), return_inverse=True)  # [D] int, pair of rooms
+        self._ways: list[dict[int, int]] = [
+            {} for _ in range(self._num_rooms)
+        ]  # of a room: open doors, rooms behind them
         for door in np.flatnonzero(self.is_open).tolist():
             self._toggle_way(door)
 
     def types(self) -> np.ndarray:
         """Returns `[D]` int: the same number for doors whose rooms have as many other doors, also between them."""
-        others = np.minimum(self._num_doors[self._rooms] - self.is_open, _MOST_DOORS)
-        is_second = self._num_between[self._pair] > self.is_open
+        num_doors = np.bincount(self._rooms[:, self.is_open].ravel(), minlength=self._num_rooms)  # [R] int, open ones
+        others = np.minimum(num_doors[self._rooms] - self.is_open, _MOST_DOORS)
+        is_second = np.bincount(self._pair, self.is_open)[self._pair] > self.is_open
         return (np.sort(others, axis=0).T @ (_MOST_DOORS + 1, 1)) * 2 + is_second
 
     def odds(self) -> np.ndarray:
@@ -126,11 +127,9 @@ class _Doors:
 
     def swap(self, opened: int, closed: int) -> None:
         """Opens a closed door, and closes an open one."""
-        for door, change in ((opened, 1), (closed, -1)):
-            self.is_open[door] = change == 1
-            self._num_doors[self._rooms[:, door]] += change
-            self._num_between[self._pair[door]] += change
-            self._toggle_way(door)
+        self.is_open[opened], self.is_open[closed] = True, False
+        self._toggle_way(opened)
+        self._toggle_way(closed)
 
     def _toggle_way(self, door: int) -> None:
         for room, behind in (self._rooms[:, door].tolist(), self._rooms[::-1, door].tolist()):

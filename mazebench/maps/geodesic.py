@@ -131,7 +131,8 @@ class DiscPaths:
 
     def _clear(self, pieces: _Pieces) -> _Pieces:
         """Returns those of some pieces that no wall cuts."""
-        keep = self._space.is_clear(pieces.end)
+        space, ends = self._space, pieces.end
+        keep = clear_segments(space.has_corner, space.has_edge, ends, self._radius, space.clearance)
         return _Pieces(*(array[keep] for array in pieces))
 
     def _query_pieces(self, start: np.ndarray, corner: np.ndarray) -> _Pieces:
@@ -141,7 +142,9 @@ class DiscPaths:
         of a wall, the disc can be on the side up to where the wall's circle meets it, and it does so at a right angle.
         """
         source = len(self._corners.radius)
-        circles = _concatenate([self._corners, _points(start[None]), _points(self._space.open_corners(corner))])
+        corners = corner + np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
+        in_open = corners[~self._space.is_near_wall[tuple(corners.T)]]  # those that touch no wall
+        circles = _concatenate([self._corners, _points(start[None]), _points(in_open)])
 
         # From the circles and the start to a side of the goal cell, where each piece ends at a point of its own.
         to_side = _concatenate([_perpendiculars(circles, source + 1, side) for side in self._space.sides(corner)])
@@ -163,21 +166,16 @@ class _FreeSpace:
     def __init__(self, walls: np.ndarray, radius: float):
         self.walls = walls[::-1].T  # [x, y]
         self._radius = radius
-        self._clearance = radius - min(_TOLERANCE, radius / 2)
+        self.clearance = radius - min(_TOLERANCE, radius / 2)
         padded = np.pad(self.walls, 1, constant_values=True)
         left_or_right = padded[:-1] | padded[1:]
         # [x, y]: whether one of the four cells at a lattice point is a wall.
-        self._is_near_wall = left_or_right[:, :-1] | left_or_right[:, 1:]
+        self.is_near_wall = left_or_right[:, :-1] | left_or_right[:, 1:]
         # [2, x, y], for flat and, with the axes exchanged, for steep segments: whether a wall is at the lattice point
         # (x, y), and whether one is left or right of the line from there to (x, y + 1).
         upper_or_lower = padded[:, :-1] | padded[:, 1:]
-        self._has_corner = np.stack([self._is_near_wall, self._is_near_wall.T])
-        self._has_edge = np.stack([left_or_right[:, 1:], upper_or_lower[1:].T])
-
-    def open_corners(self, corner: np.ndarray) -> np.ndarray:
-        """Returns the 0 to 4 corners that a cell (lower left corner `[2]`) shares with no wall: `[0 to 4, 2]`."""
-        corners = corner + np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
-        return corners[~self._is_near_wall[tuple(corners.T)]]
+        self.has_corner = np.stack([self.is_near_wall, self.is_near_wall.T])
+        self.has_edge = np.stack([left_or_right[:, 1:], upper_or_lower[1:].T])
 
     def sides(self, corner: np.ndarray) -> Iterator[_Side]:
         """Yields the sides that a cell (lower left corner `[2]`) shares with a free cell, without what is too near."""
@@ -186,13 +184,9 @@ class _FreeSpace:
             first = corner + step * across
             if self.walls[tuple(corner + (2 * step - 1) * across)]:
                 continue
-            before, after = (self._radius * self._is_near_wall[tuple(point)] for point in (first, first + along))
+            before, after = (self._radius * self.is_near_wall[tuple(point)] for point in (first, first + along))
             low, high = first[1 - axis] + before, first[1 - axis] + 1 - after
             yield _Side(axis, level=first[axis], low=low, high=high)
-
-    def is_clear(self, ends: np.ndarray) -> np.ndarray:
-        """Returns whether the segments between two free points each (`[S, 2, 2]`) are free: `[S]` bool."""
-        return clear_segments(self._has_corner, self._has_edge, ends, self._radius, self._clearance)
 
 
 def _exposed_corners(walls: np.ndarray, radius: float) -> _Circles:

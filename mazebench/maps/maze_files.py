@@ -11,7 +11,7 @@ from mazebench.errors import InputError, remark
 from mazebench.maps.maze import Maze
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.readers.arrays import read_array_file
-from mazebench.maps.readers.image import read_plan_image
+from mazebench.maps.readers.image import grid_of_image, read_picture
 from mazebench.maps.readers.occupancy_grid import FREE, LocatedMaze, OccupancyGrid, locate_maze
 from mazebench.maps.readers.ros import (
     ROS_SUFFIXES,
@@ -67,14 +67,9 @@ def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
     Raises:
       InputError: if there is no map or one can't be read.
     """
-    return read_all(pathlib.Path(path), ReadOptions.of(options))
-
-
-def read_all(path: pathlib.Path, options: ReadOptions) -> tuple[Maze, ...]:
-    """Reads the maze in a file, or those in a folder, as `read_mazes` does."""
-    path = path.expanduser()
+    path = pathlib.Path(path).expanduser()
     files = _map_files(path) if path.is_dir() else [path]
-    return tuple(_read_located(file, None, options).maze for file in files)
+    return tuple(read_maze(file, **options) for file in files)
 
 
 def read_located(path: str | pathlib.Path, size: int | None = None, **options: Any) -> LocatedMaze:
@@ -83,11 +78,8 @@ def read_located(path: str | pathlib.Path, size: int | None = None, **options: A
     A point (x, y) of the maze lies at `(x0 + x cos(yaw) - y sin(yaw), y0 + x sin(yaw) + y cos(yaw))` in the map's frame
     if (x0, y0, yaw) is the origin that is returned.
     """
-    return _read_located(pathlib.Path(path).expanduser(), size, ReadOptions.of(options))
-
-
-def _read_located(path: pathlib.Path, size: int | None, options: ReadOptions) -> LocatedMaze:
-    located = locate_maze(_read_grid(path, size, options), options, path.stem)
+    path, reading = pathlib.Path(path).expanduser(), ReadOptions.of(options)
+    located = locate_maze(_read_grid(path, size, reading), reading, path.stem)
     if size not in (None, located.maze.size):
         raise InputError(f"{path}: expected a maze of size {size}, found size {located.maze.size}")
     return located
@@ -105,21 +97,18 @@ def _read_grid(path: pathlib.Path, size: int | None, options: ReadOptions) -> Oc
         raise InputError(f"{path}: expected a maze, found the picture of a ROS map; give {ros_map}")
     if options.pixel_size is not None:
         return read_floor_plan(path, options.pixel_size)
-    grid = read_plan_image(path, size, options.walls)
-    if not options.cell_size:
-        _remark_on_thin_walls(grid.states == FREE, path.stem)
-    return grid
+    grid = grid_of_image(read_picture(path), size, path.stem, options.walls)
 
-
-def _remark_on_thin_walls(free: np.ndarray, name: str) -> None:
-    """Says how large a maze is if its picture may be a floor plan in which each wall is as wide as a cell."""
+    # The picture may be a floor plan in which each wall is as wide as a cell.
+    free = grid.states == FREE
     inside = free[np.ix_(free.any(axis=1), free.any(axis=0))]
     rows, columns = np.add(inside.shape, 2)  # with the outer walls
-    if max(rows, columns) > _MANY_CELLS and inside.mean() > _MOSTLY_FREE:
+    if not options.cell_size and max(rows, columns) > _MANY_CELLS and inside.mean() > _MOSTLY_FREE:
         remark(
-            f"{name}: read as {columns} m wide and {rows} m high, with a cell of 1 m for the width of a wall; "
+            f"{path.stem}: read as {columns} m wide and {rows} m high, with a cell of 1 m for the width of a wall; "
             "if it is a floor plan, --pixel-size sets its scale"
         )
+    return grid
 
 
 def _map_files(folder: pathlib.Path) -> list[pathlib.Path]:

@@ -12,7 +12,7 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze, resized
 from mazebench.maps.maze_options import ReadOptions
-from mazebench.maps.readers.arrays import read_array
+from mazebench.maps.readers.arrays import maze_from_array
 from mazebench.maps.text import format_maze, parse_maze
 
 
@@ -38,7 +38,7 @@ def own_mazes(mazes: Any, options: ReadOptions) -> tuple[Maze, ...]:
 
 def _own_maze(item: object, name: str, options: ReadOptions) -> Maze:
     if isinstance(item, np.ndarray):
-        return read_array(item, name, options)
+        return maze_from_array(item, name, **dataclasses.asdict(options))
     if not isinstance(item, Maze):
         hint = "; wrap rows of numbers in np.array" if isinstance(item, list) else ""
         raise InputError(f"expected a Maze or an array in mazes, found {type(item).__name__}{hint}")

@@ -13,10 +13,8 @@ from mazebench.tasks.task import Task
 from mazebench.world.ray_casting import ray_ends
 
 # The actions of letters and of arrow keys, as indices in `ACTIONS`.
-LETTERS = {"w": 0, "s": 1, "a": 2, "d": 3, "q": 4, "e": 5}
-ARROWS = {"up": 0, "down": 1, "left": 4, "right": 5}
+KEYS = {"w": 0, "s": 1, "a": 2, "d": 3, "q": 4, "e": 5, "up": 0, "down": 1, "left": 4, "right": 5}
 LIDAR = "lidar"  # the only sensor whose readings are shown
-RESTART, NEXT = "r", "n"
 HELP = "w s a d  drive   q e  turn   arrows too   r  again   n  next   Esc  quit"
 
 
@@ -33,12 +31,15 @@ class Game:
 
     def press(self, key: str) -> None:
         """Does what a key stands for: a letter, or an arrow by its name. Other keys do nothing."""
-        if key == RESTART:
+        if key == "r":
             self.begin(self.env.runner.episode)
-        elif key == NEXT:
+        elif key == "n":
             self.begin()
-        elif key in LETTERS or key in ARROWS:
-            self.act({**LETTERS, **ARROWS}[key])
+        elif key in KEYS and not self.ended:
+            self.observation, _, terminated, truncated, _ = self.env.step(KEYS[key])
+            self.ended = terminated or truncated
+            self.path.append(self.env.simulation.position())
+            self.num_reached += terminated
 
     def begin(self, episode: Episode | None = None) -> None:
         """Begins an episode, or the next one of the seed."""
@@ -47,24 +48,10 @@ class Game:
         self.num_episodes += 1
         self.path = [self.env.simulation.position()]  # [2] m each: where the body was
 
-    def act(self, action: int) -> None:
-        """Takes one agent step, unless the episode has ended."""
-        if self.ended:
-            return
-        self.observation, _, terminated, truncated, _ = self.env.step(action)
-        self.ended = terminated or truncated
-        self.path.append(self.env.simulation.position())
-        self.num_reached += terminated
-
     @property
     def maze(self) -> Maze:
         """The maze of the episode."""
         return self.task.mazes[self.env.runner.episode.maze]
-
-    @property
-    def context(self) -> np.ndarray:
-        """`[4, M, M]` float32: the context that an agent would get."""
-        return self.observation["context"]
 
     @property
     def rays(self) -> np.ndarray | None:

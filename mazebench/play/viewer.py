@@ -135,7 +135,7 @@ def _overlay(viewer: Any, game: Game) -> None:
         return
     side = min(_MAP_PIXELS, window.width // 3, window.height // 2)
     area = mujoco.MjrRect(window.width - side - 10, window.height - side - 10, side, side)
-    viewer.set_images((area, _map_picture(game.context, side)))
+    viewer.set_images((area, _map_picture(game.observation["context"], side)))
     corner = mujoco.mjtGridPos
     viewer.set_texts(
         [

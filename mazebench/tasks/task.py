@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import pathlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -13,7 +12,7 @@ from mazebench.errors import InputError
 from mazebench.maps.benchmark import KINDS_SIZE, SIZES, load_kind_mazes, load_mazes
 from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
 from mazebench.maps.maze import MIN_CELL_SIZE, Maze, require_one_size
-from mazebench.maps.maze_files import read_all
+from mazebench.maps.maze_files import read_mazes
 from mazebench.maps.maze_options import THIN_WALLS, ReadOptions
 from mazebench.maps.scenarios import Scenarios, are_scenarios, read_scenarios
 from mazebench.options import check_names, fields_of
@@ -306,7 +305,7 @@ def _read(asked: TaskOptions) -> tuple[Mazes, Scenarios | None]:
         scenarios = read_scenarios(mazes, asked.reading)
         mazes = (scenarios.maze,)
     elif isinstance(mazes, str):
-        mazes = read_all(pathlib.Path(mazes), asked.reading)
+        mazes = read_mazes(mazes, **dataclasses.asdict(asked.reading))
     for maze in mazes:
         if asked.size not in (None, maze.size):
             raise InputError(f"expected mazes of size {asked.size}, found size {maze.size}")

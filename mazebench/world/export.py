@@ -7,10 +7,9 @@ import pathlib
 import numpy as np
 import trimesh
 
-from mazebench.maps.covering import cover
 from mazebench.maps.maze import WALL_HEIGHT, Maze
 from mazebench.storage.files import open_whole
-from mazebench.world.mjcf import maze_spec
+from mazebench.world.mjcf import maze_spec, wall_boxes
 from mazebench.world.textures import add_textures
 
 MESH_FORMATS = ("glb", "obj", "stl")
@@ -44,30 +43,20 @@ def wall_mesh(maze: Maze) -> trimesh.Trimesh:
 
     A pillar of 2 cm joins walls that touch only at a corner, where no body can pass anyway.
     """
-    scale = maze.cell_size
-    boxes = []
-    for top, left, bottom, right in cover(maze.walls):
-        low, high = maze.size - bottom, maze.size - top
-        boxes.append(_box(scale * left, scale * low, scale * right, scale * high, overhang=0.0))
-    half = _PILLAR / 2
-    for x, y in _diagonal_corners(maze):
-        boxes.append(_box(x - half, y - half, x + half, y + half, overhang=_PILLAR_OVERHANG))
-    mesh = trimesh.boolean.union(boxes, engine="manifold", check_volume=False)
-    mesh.visual.face_colors = _WALL_COLOUR
-    return mesh
+    boxes = [trimesh.creation.box(bounds=[at - half, at + half]) for at, half in zip(*wall_boxes(maze), strict=True)]
 
-
-def _box(left: float, low: float, right: float, high: float, overhang: float) -> trimesh.Trimesh:
-    return trimesh.creation.box(bounds=[[left, low, -overhang], [right, high, WALL_HEIGHT + overhang]])
-
-
-def _diagonal_corners(maze: Maze) -> np.ndarray:
-    """Returns the `K` points (x, y) in metres where two walls touch only at a corner: `[K, 2]` float."""
+    # The points where two walls touch only at a corner, each with a pillar.
     walls = maze.walls
     top_left, top_right, bottom_left, bottom_right = walls[:-1, :-1], walls[:-1, 1:], walls[1:, :-1], walls[1:, 1:]
     touching = (top_left == bottom_right) & (top_right == bottom_left) & (top_left != top_right)
-    rows, columns = np.nonzero(touching)
-    return maze.cell_size * np.stack([columns + 1, maze.size - 1 - rows], axis=-1)
+    for row, column in np.argwhere(touching):
+        x, y = maze.cell_size * (column + 1), maze.cell_size * (maze.size - 1 - row)
+        low = [x - _PILLAR / 2, y - _PILLAR / 2, -_PILLAR_OVERHANG]
+        high = [x + _PILLAR / 2, y + _PILLAR / 2, WALL_HEIGHT + _PILLAR_OVERHANG]
+        boxes.append(trimesh.creation.box(bounds=[low, high]))
+    mesh = trimesh.boolean.union(boxes, engine="manifold", check_volume=False)
+    mesh.visual.face_colors = _WALL_COLOUR
+    return mesh
 
 
 def write_mesh(maze: Maze, path: pathlib.Path) -> None:

@@ -112,10 +112,21 @@ class Lidar:
         num_bodies = len(pose)
         point, yaw = pose[:, :2].T / self._cell_size, pose[:, 2]
         heading = np.floor(yaw / _STEP)  # in steps, rounded down
-        spacing = _line_spacing(yaw - heading * _STEP)
 
-        # Where the rays begin, and their first lines.
-        cell, gap = self._cells_in_turned_mazes(self._indices(maze), point)
+        # The distances along the rays that point to the right and upwards, between two lines of constant x and of
+        # constant y: [2, 8, K]. The first of these rays is less than a step from +x.
+        rest = yaw - heading * _STEP
+        spacing = 1.0 / np.maximum(np.cos(rest) * _RAYS + np.sin(rest) * _RAYS_TURNED, _PARALLEL)
+
+        # Where the points lie in the mazes turned by 0, 1, 2 and 3 quarters: the number of the cell in `_free`, and the
+        # distances to the next lines on the right and above.
+        corner = np.floor(point)
+        offset = point - corner
+        gap = np.concatenate([1.0 - offset, offset]).take(_TURNED_AXES, axis=0)  # [2, 4, K]
+        index = np.concatenate([corner, self._size - 1 - corner]).astype(np.int64)
+        column, row = index.take(_TURNED_AXES, axis=0)
+        in_free = self._indices(maze)  # before `_first_maze` is read, which it may change
+        cell = ((self._first_maze + in_free) * self._size + row) * self._size + column  # [4, K]
         crossing = gap[:, :, None] * spacing[:, None]  # [2, 4, 8, K]
         cells = cell.repeat(_PER_TURN, axis=0).ravel()
 
@@ -126,19 +137,6 @@ class Lidar:
         # ray 0 follows ray 31.
         ray = (heading % NUM_RAYS).astype(np.int64)[:, None] + np.arange(NUM_RAYS)  # [K, 32]
         return ranges.take(ray * num_bodies + np.arange(num_bodies)[:, None], mode="wrap")
-
-    def _cells_in_turned_mazes(self, maze: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns where the points (`[2, K]`, in cells) lie in the mazes turned by 0, 1, 2 and 3 quarters.
-
-        That is the number of the cell in `_free` (`[4, K]` int), and the distances to the next lines on the right and
-        above (`[2, 4, K]`, in cells).
-        """
-        corner = np.floor(point)
-        offset = point - corner
-        gap = np.concatenate([1.0 - offset, offset]).take(_TURNED_AXES, axis=0)
-        index = np.concatenate([corner, self._size - 1 - corner]).astype(np.int64)
-        column, row = index.take(_TURNED_AXES, axis=0)
-        return ((self._first_maze + maze) * self._size + row) * self._size + column, gap
 
     def _traverse(self, cell: np.ndarray, crossing: np.ndarray, spacing: np.ndarray) -> np.ndarray:
         """Returns the distance at which each ray enters a wall, or one beyond its range: `[R]` float64, in cells.
@@ -171,13 +169,3 @@ class Lidar:
             step[1] *= ~is_x
             crossing = crossing.take(going_on, axis=1) + step
         return distances
-
-
-def _line_spacing(heading: np.ndarray) -> np.ndarray:
-    """Returns the distances along rays between two lines of constant x, and of constant y: `[2, 8, K]`, in cells.
-
-    The rays are those that point to the right and upwards, the first of them at an angle of `heading` (`[K]` rad, less
-    than a step) from +x.
-    """
-    direction = np.cos(heading) * _RAYS + np.sin(heading) * _RAYS_TURNED
-    return 1.0 / np.maximum(direction, _PARALLEL)

@@ -59,15 +59,14 @@ class Cameras:
         view.type, view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, seen.model.camera(camera).id
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(seen.model, seen.data, mujoco.MjvOption(), None, view, every, renderer.scene)
-        self._add_boxes(renderer.scene, seen)
-        return renderer.render()
 
-    def _add_boxes(self, scene: mujoco.MjvScene, seen: Seen) -> None:
-        """Adds the boxes that a model lacks to the scene, behind its geoms, where the next update leaves them."""
+        # The boxes that the model lacks come behind its geoms, where the next update leaves them.
+        scene = renderer.scene
         first, last = scene.ngeom, scene.ngeom + len(seen.middle)
         if self._added is not seen:
             set_boxes(scene.geoms[first:last], seen.middle, seen.half, seen.model.material("wall").rgba)
         self._added, scene.ngeom = seen, last
+        return renderer.render()
 
     def _open(self, most_shown: int) -> mujoco.Renderer:
         self._most_shown, self._added = most_shown, None
@@ -79,7 +78,12 @@ class Cameras:
         # MUJOCO_GL names the backend, and each backend raises errors of its own.
         except (mujoco.FatalError, RuntimeError, ImportError, AttributeError, OSError, ValueError) as error:
             raise rendering_error(error) from error
-        _close_at_exit(self)
+
+        # The cameras close before the interpreter unloads the modules that closing needs. Exit functions run in reverse
+        # order: registered again after a context is opened, this one runs before the backend's.
+        _open_cameras.add(self)
+        atexit.unregister(_close_cameras)
+        atexit.register(_close_cameras)
         return renderer
 
     def close(self) -> None:
@@ -102,14 +106,6 @@ def set_boxes(geoms: Sequence[mujoco.MjvGeom], middle: np.ndarray, half: np.ndar
 
 
 _open_cameras: weakref.WeakSet[Cameras] = weakref.WeakSet()
-
-
-def _close_at_exit(cameras: Cameras) -> None:
-    """Makes sure that `cameras` are closed before the interpreter unloads the modules that closing needs."""
-    _open_cameras.add(cameras)
-    # Exit functions run in reverse order. Registered again after a context is opened, ours runs before the backend's.
-    atexit.unregister(_close_cameras)
-    atexit.register(_close_cameras)
 
 
 def _close_cameras() -> None:

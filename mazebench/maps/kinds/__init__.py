@@ -54,5 +54,9 @@ def generate(kind: str, size: int, rng: np.random.Generator, name: str | None = 
         raise InputError(f"expected a size of {MIN_SIZE} to {MAX_SIZE} cells, found {size!r}")
     if not isinstance(rng, np.random.Generator):
         raise InputError(f"expected rng as a numpy.random.Generator, found {type(rng).__name__}")
-    KINDS[kind].check(kind, size)
-    return Maze(KINDS[kind].walls(size, rng), name or f"{kind}-{size}", kind=kind)
+    maker = KINDS[kind]
+    if size < maker.smallest:
+        raise InputError(f"kind {kind!r} makes mazes of {maker.smallest} cells and more, found size {size}")
+    if maker.odd and size % 2 == 0:
+        raise InputError(f"kind {kind!r} makes mazes of odd sizes only, found size {size}")
+    return Maze(maker.walls(size, rng), name or f"{kind}-{size}", kind=kind)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from mazebench.maps.grids import largest_area
-from mazebench.maps.kinds.kind import Kind
+from mazebench.maps.kinds.kind import Kind, largest_area
 
 _DENSITY = 0.46  # share of the cells that are rock at first
 _GENERATIONS = 3

@@ -11,8 +11,6 @@ from collections.abc import Callable
 import numpy as np
 from scipy import ndimage
 
-from mazebench.errors import InputError
-
 
 def door_slots(walls: np.ndarray) -> np.ndarray:
     """Returns the cells in which there may be a door between two rooms: `[D, 2]` int, open or not.
@@ -71,6 +69,14 @@ def rooms_beside(walls: np.ndarray, slots: np.ndarray) -> tuple[np.ndarray, np.n
     return np.where(level, rooms[row, column - 1], first), np.where(level, rooms[row, column + 1], second)
 
 
+def largest_area(walls: np.ndarray) -> np.ndarray:
+    """Returns `walls` (`[R, C]` bool) with all free cells closed but those of the largest connected area."""
+    areas, _ = ndimage.label(~walls)
+    sizes = np.bincount(areas.ravel())
+    sizes[0] = 0
+    return walls | (areas != np.argmax(sizes))  # all of them, if nothing is free
+
+
 @dataclasses.dataclass(frozen=True)
 class Kind:
     """A generator of layouts."""
@@ -80,10 +86,3 @@ class Kind:
     door_slots: Callable[[np.ndarray], np.ndarray] = door_slots  # [D, 2] int: cells that may be doors in given walls
     smallest: int = 13  # cells a side
     odd: bool = False  # whether sizes must be odd
-
-    def check(self, name: str, size: int) -> None:
-        """Raises `InputError` if there are no mazes of this kind with `size` cells a side."""
-        if size < self.smallest:
-            raise InputError(f"kind {name!r} makes mazes of {self.smallest} cells and more, found size {size}")
-        if self.odd and size % 2 == 0:
-            raise InputError(f"kind {name!r} makes mazes of odd sizes only, found size {size}")

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mazebench.maps.grids import largest_area
-from mazebench.maps.kinds.kind import Kind
+from mazebench.maps.kinds.kind import Kind, largest_area
 
 _DENSITY = 0.25  # share of the inner cells that become walls
 

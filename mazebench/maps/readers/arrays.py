@@ -37,12 +37,7 @@ def maze_from_array(array: np.ndarray, name: str = "maze", **options: Any) -> Ma
       InputError: if an option is not allowed.
       MazeError: if the array holds something else, or no legal maze.
     """
-    return read_array(np.asarray(array), name, ReadOptions.of(options))
-
-
-def read_array(array: np.ndarray, name: str, options: ReadOptions) -> Maze:
-    """Returns the maze in an array, as `maze_from_array` does."""
-    return locate_maze(_grid_of_array(array, name), options, name).maze
+    return locate_maze(_grid_of_array(np.asarray(array), name), ReadOptions.of(options), name).maze
 
 
 def read_array_file(path: pathlib.Path) -> OccupancyGrid:

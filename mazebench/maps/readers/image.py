@@ -32,16 +32,6 @@ _MAX_MARK_SHARE = 0.15  # of the picture, and of its dark pixels; if more are co
 _MAX_MAP_SHADES = 8  # of a map of one pixel a cell: walls, floor, marks; a scan has more
 
 
-def read_plan_image(path: pathlib.Path, size: int | None, walls: str) -> OccupancyGrid:
-    """Reads the cells in a picture, as `grid_of_image` does.
-
-    Raises:
-      InputError: if the file can't be read, or `size` is out of range.
-      MazeError: if the file is not a picture that `read_picture` reads, or shows no legal maze.
-    """
-    return grid_of_image(read_picture(path), size, path.stem, walls)
-
-
 def read_picture(path: str | pathlib.Path) -> np.ndarray:
     """Returns the picture in a file of a kind that OpenCV reads, as `grid_of_image` takes it.
 
@@ -90,13 +80,22 @@ def grid_of_image(image: np.ndarray, size: int | None, name: str, walls: str) ->
     if walls == "lines":
         return _grid_of_walls(read_lines(gray, size, name), name)
     try:
-        return _grid_of_walls(_read_walls(gray, size, name), name)
+        return _grid_of_filled(gray, size, name)
     except MazeError as error:
-        if np.mean(gray < 128) < _MIN_DARK or not _is_maze(255 - gray, size, name):
+        if np.mean(gray < 128) < _MIN_DARK:
             raise
+        try:
+            _grid_of_filled(255 - gray, size, name)
+        except MazeError:
+            raise error from None
         raise MazeError(
             f"{name}: expected dark walls on a light ground, found light ones on a dark ground; invert the picture"
         ) from error
+
+
+def _grid_of_filled(gray: np.ndarray, size: int | None, name: str) -> OccupancyGrid:
+    walls = _pixel_map(gray, size)
+    return _grid_of_walls(read_plan(gray, size, name) if walls is None else walls, name)
 
 
 def _grid_of_walls(walls: np.ndarray, name: str) -> OccupancyGrid:
@@ -166,20 +165,6 @@ def to_gray(image: np.ndarray, name: str) -> np.ndarray:
         return gray
     opacity = image[..., 3].astype(np.uint16)
     return ((gray * opacity + 255 * (255 - opacity)) // 255).astype(np.uint8)
-
-
-def _read_walls(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
-    """Returns the walls, `[R, C]` bool, that `gray` shows. Raises `MazeError` if it shows none."""
-    walls = _pixel_map(gray, size)
-    return read_plan(gray, size, name) if walls is None else walls
-
-
-def _is_maze(gray: np.ndarray, size: int | None, name: str) -> bool:
-    try:
-        _grid_of_walls(_read_walls(gray, size, name), name)
-    except MazeError:
-        return False
-    return True
 
 
 def _pixel_map(gray: np.ndarray, size: int | None) -> np.ndarray | None:

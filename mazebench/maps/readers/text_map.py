@@ -70,7 +70,13 @@ def grid_of_text(text: str, name: str) -> OccupancyGrid:
     _require_one_maze(lines, name)
     if (cells := _cells_in_table(rows)) is not None:
         if any(len(cell) > 1 for row in cells for cell in row):
-            return grid_of_numbers(_numbers(cells, name), name)
+            try:
+                numbers = np.array(cells, dtype=float)
+            except ValueError as error:
+                raise MazeError(
+                    f"{name}: expected rows of as many numbers, or cells of one character, found {error}"
+                ) from error
+            return grid_of_numbers(numbers, name)
         rows = ["".join(row) for row in cells]
     elif (posts := _POSTS.fullmatch(rows[0].strip())) and len(posts[2]) > 1:
         return grid_of_characters(_between_posts(rows, len(posts[2]) + 1, name), name)
@@ -104,15 +110,6 @@ def _cells_in_table(rows: list[str]) -> list[list[str]] | None:
     cells = [re.split(r"\s*[,;\t]\s*|\s+", row.strip(" \t,;")) for row in rows]
     is_table = len({len(row) for row in cells}) == 1 and len(cells[0]) > 2
     return cells if is_table else None
-
-
-def _numbers(cells: list[list[str]], name: str) -> np.ndarray:
-    try:
-        return np.array(cells, dtype=float)
-    except ValueError as error:
-        raise MazeError(
-            f"{name}: expected rows of as many numbers, or cells of one character, found {error}"
-        ) from error
 
 
 def _between_posts(rows: list[str], step: int, name: str) -> list[str]:
