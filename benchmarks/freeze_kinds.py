@@ -24,7 +24,7 @@ from mazebench.maps.benchmark import (
     KINDS_SIZE,
     MANIFEST,
     TRACKS_BENCHMARK,
-    kind_mazes_file,
+    mazes_file,
 )
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.maps.maze import Maze, canonical_bytes
@@ -52,7 +52,7 @@ def freeze_kinds(folder: pathlib.Path, commit: str) -> None:
         mazes = [maze for kind in KINDS[split] for maze in draw_mazes(kind, split, known, rng)]
         generator["kinds"][split] = KINDS[split]
         for kind in KINDS[split]:
-            files[kind_mazes_file(kind, split)] = "\n".join(format_maze(maze) for maze in mazes if maze.kind == kind)
+            files[mazes_file(kind, split)] = "\n".join(format_maze(maze) for maze in mazes if maze.kind == kind)
         if split in FROZEN_SPLITS:
             trials = draw_kind_trials(mazes, rng)
             files[episodes_file("local", KINDS_SIZE, split)] = format_trials(_task("building", 1, mazes), trials)

@@ -30,9 +30,9 @@ MAZES_PER_SPLIT = 20
 MANIFEST = "manifest.json"
 
 
-def mazes_file(size: int, split: str) -> str:
-    """Returns the name of the file with the mazes of one size and split."""
-    return f"mazes-{size}-{split}.txt"
+def mazes_file(group: int | str, split: str) -> str:
+    """Returns the name of the file with the mazes of one split, and of one size or, of the tracks, of one kind."""
+    return f"mazes-{group}-{split}.txt"
 
 
 @functools.cache
@@ -48,9 +48,7 @@ def load_mazes(size: int, split: str) -> tuple[Maze, ...]:
         raise unknown("size", size, SIZES)
     if split not in SPLITS:
         raise unknown("split", split, SPLITS)
-    blocks = read_asset(mazes_file(size, split)).split("\n\n")
-    mazes = (parse_maze(block, f"{size}-{split}-{index:02d}") for index, block in enumerate(blocks))
-    return tuple(dataclasses.replace(maze, kind="dfs") for maze in mazes)
+    return _read_mazes(PAPER_BENCHMARK, size, split, "dfs")
 
 
 @functools.cache
@@ -62,17 +60,14 @@ def load_kind_mazes(split: str) -> tuple[Maze, ...]:
     """
     if split not in ALL_SPLITS:
         raise unknown("split", split, ALL_SPLITS)
-    mazes: list[Maze] = []
-    for kind in manifest(TRACKS_BENCHMARK)["generator"]["kinds"][split]:
-        blocks = read_asset(kind_mazes_file(kind, split), TRACKS_BENCHMARK).split("\n\n")
-        names = (f"{kind}-{split}-{index:02d}" for index in range(len(blocks)))
-        mazes += [dataclasses.replace(parse_maze(*each), kind=kind) for each in zip(blocks, names, strict=True)]
-    return tuple(mazes)
+    kinds = manifest(TRACKS_BENCHMARK)["generator"]["kinds"][split]
+    return tuple(maze for kind in kinds for maze in _read_mazes(TRACKS_BENCHMARK, kind, split, kind))
 
 
-def kind_mazes_file(kind: str, split: str) -> str:
-    """Returns the name of the file with the tracks' mazes of one kind and split."""
-    return f"mazes-{kind}-{split}.txt"
+def _read_mazes(benchmark: str, group: int | str, split: str, kind: str) -> tuple[Maze, ...]:
+    blocks = read_asset(mazes_file(group, split), benchmark).split("\n\n")
+    mazes = (parse_maze(block, f"{group}-{split}-{index:02d}") for index, block in enumerate(blocks))
+    return tuple(dataclasses.replace(maze, kind=kind) for maze in mazes)
 
 
 def read_asset(name: str, benchmark: str = PAPER_BENCHMARK) -> str:

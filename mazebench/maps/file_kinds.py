@@ -4,39 +4,37 @@ from __future__ import annotations
 
 _PICTURE = "convert it to PNG"
 _DRAWING = "export it as PNG and give its scale by --pixel-size"
-_UNPACK = "unpack it"
 _READ = "text, pictures such as PNG, arrays (.npy) and ROS maps (.yaml) are read"
+_PICTURES = (
+    b"\x89PNG",
+    b"\xff\xd8\xff",
+    b"BM",
+    b"GIF8",
+    b"II*\0",
+    b"MM\0*",
+    b"RIFF",
+    b"P2",
+    b"P5",
+    b"P6",
+)  # of all formats that are read
 # By the first bytes: the name, and what to do with a file that is not read.
 _KINDS = {
-    b"\x89PNG": ("a PNG picture", ""),
-    b"\xff\xd8\xff": ("a JPEG picture", ""),
-    b"BM": ("a BMP picture", ""),
-    b"GIF8": ("a GIF picture", ""),
-    b"II*\0": ("a TIFF picture", ""),
-    b"MM\0*": ("a TIFF picture", ""),
-    b"RIFF": ("a WebP picture", ""),
-    b"P2": ("a PGM picture", ""),
-    b"P5": ("a PGM picture", ""),
-    b"P6": ("a PPM picture", ""),
+    **dict.fromkeys(_PICTURES, ("a picture", "")),
     b"\x93NUMPY": ("a NumPy array", ""),
     b"image:": ("the yaml of a ROS map", ""),
-    b"8BPS": ("a Photoshop picture", _PICTURE),
-    b"gimp xcf": ("a GIMP picture", _PICTURE),
     b"%PDF": ("a PDF", _DRAWING),
     b"<svg": ("an SVG drawing", _DRAWING),
     b"AC10": ("a DWG drawing", _DRAWING),
-    b"PK\x03\x04": ("a ZIP archive", _UNPACK),
-    b"\x1f\x8b": ("a gzip archive", _UNPACK),
+    b"PK\x03\x04": ("a ZIP archive", "unpack it"),
+    b"\x1f\x8b": ("a gzip archive", "unpack it"),
     b"<?xml": ("XML", _READ),
     b"<mujoco": ("an MJCF model", "give the map it was made from"),
-    b"glTF": ("a glTF mesh", "give the map it was made from"),
     b"version 1": ("scenarios of MovingAI", "give the .map"),
 }
 # By bytes further on.
 _CONTAINED = {
     b"ftypavif": ("an AVIF picture", _PICTURE),
     b"ftyphe": ("a HEIC picture", _PICTURE),
-    b"ftypmif1": ("a HEIC picture", _PICTURE),
     b"<svg": ("an SVG drawing", _DRAWING),
     b"\nSECTION": ("a DXF drawing", _DRAWING),
     b"\r\nSECTION": ("a DXF drawing", _DRAWING),

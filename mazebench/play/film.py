@@ -133,16 +133,14 @@ class _Scene:
         pictures, rules = {}, self.envs.rules
         if self._cameras is not None:
             pictures = self._cameras.take(self.episode.maze, rules.pose[0], rules.marker[0])
-        pictures |= {view: self._drawing(view, observation) for view in self.views if view not in pictures}
+        for view in set(self.views) - pictures.keys():
+            picture = self._map() if view == MAP else self._rays(observation[LIDAR][0])
+            pictures[view] = cv2.resize(picture, (self.pixels, self.pixels), interpolation=cv2.INTER_AREA)
         return np.concatenate([pictures[view] for view in self.views], axis=1)
 
     def close(self) -> None:
         if self._cameras is not None:
             self._cameras.close()
-
-    def _drawing(self, view: str, observation: Mapping[str, np.ndarray]) -> np.ndarray:
-        picture = self._map() if view == MAP else self._rays(observation[LIDAR][0])
-        return cv2.resize(picture, (self.pixels, self.pixels), interpolation=cv2.INTER_AREA)
 
     def _map(self) -> np.ndarray:
         """Returns a picture of the map that the agent is shown, some two times as large as a view."""
@@ -174,9 +172,7 @@ def _write_gif(frames: list[np.ndarray], out: pathlib.Path) -> None:
     animation = cv2.Animation()
     animation.frames = [cv2.cvtColor(frame, cv2.COLOR_RGB2BGRA) for frame in frames]
     animation.durations = [round(1000 / _FRAMES_PER_SECOND)] * len(frames)
-    done, content = cv2.imencodeanimation(".gif", animation)
-    if not done:
-        raise InputError(f"{out}: this OpenCV can't write GIF")
+    _, content = cv2.imencodeanimation(".gif", animation)
     with writing_to(out), open_whole(out) as file:
         file.write(content.tobytes())
 

@@ -12,7 +12,6 @@ import mujoco
 import numpy as np
 
 from mazebench.maps.drawn import Mazes
-from mazebench.maps.maze import Maze
 from mazebench.world.mjcf import has_whole_model, largest_spec, maze_spec, require_whole, wall_boxes
 from mazebench.world.textures import add_textures
 
@@ -62,20 +61,18 @@ class MazeModels:
           InputError: if textures are wanted of a maze that has too many boxes for a whole model.
         """
         if (found := self._kept.pop(index, None)) is None:
-            found = self._make(self._mazes[index])
+            maze = self._mazes[index]
+            spec = maze_spec(maze) if self._textures else largest_spec(maze)
+            if self._textures:
+                add_textures(spec, maze)
+            model = spec.compile()
+            lacking = np.zeros((2, 0, 3)) if has_whole_model(maze) else wall_boxes(maze)
+            found = Seen(model, mujoco.MjData(model), *lacking)
             self._num_shown += found.num_shown
             while self._kept and self._num_shown > _MOST_SHOWN:
                 self._num_shown -= self._kept.pop(next(iter(self._kept))).num_shown
         self._kept[index] = found
         return found
-
-    def _make(self, maze: Maze) -> Seen:
-        spec = maze_spec(maze) if self._textures else largest_spec(maze)
-        if self._textures:
-            add_textures(spec, maze)
-        model = spec.compile()
-        lacking = np.zeros((2, 0, 3)) if has_whole_model(maze) else wall_boxes(maze)
-        return Seen(model, mujoco.MjData(model), *lacking)
 
 
 def models_of(mazes: Mazes, textures: bool = False) -> MazeModels:

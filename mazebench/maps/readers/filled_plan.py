@@ -64,7 +64,12 @@ def read_plan(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
         raise MazeError(f"{name}: expected walls along the lines of a grid of cells, found edges off it ({advice})")
 
     # The shade of each cell's middle, which must be clearly dark or light.
-    cores = _cores(drawing, shape)
+    sums = cv2.integral(drawing)
+    (top, bottom), (left, right) = (
+        core_bounds(count, length) for count, length in zip(shape, drawing.shape, strict=True)
+    )
+    totals = sums[bottom][:, right] - sums[top][:, right] - sums[bottom][:, left] + sums[top][:, left]
+    cores = totals / np.outer(bottom - top, right - left)
     dark, light = dark_and_light(np.round(cores).astype(np.uint8))
     in_words = f"{shape[0]} x {shape[1]} cells"
     if light - dark < _MIN_CONTRAST:
@@ -141,13 +146,3 @@ def _count_cells(ink: np.ndarray, size: int | None) -> tuple[tuple[int, int], fl
         size=size,
         nearly_best=_NEARLY_BEST,
     )
-
-
-def _cores(drawing: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Returns the mean shade of the middle of each cell: `[R, C]` float."""
-    sums = cv2.integral(drawing)
-    (top, bottom), (left, right) = (
-        core_bounds(count, length) for count, length in zip(shape, drawing.shape, strict=True)
-    )
-    totals = sums[bottom][:, right] - sums[top][:, right] - sums[bottom][:, left] + sums[top][:, left]
-    return totals / np.outer(bottom - top, right - left)

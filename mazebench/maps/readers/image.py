@@ -43,8 +43,9 @@ def read_picture(path: str | pathlib.Path) -> np.ndarray:
     image = _decode(content)
     if image is None:
         kind = kind_of(content) or "a file of another kind"
-        is_damaged = kind.endswith("picture") and not way_out(kind)
-        raise MazeError(f"{path}: expected a picture, found {kind}{' that is damaged' * is_damaged}{way_out(kind)}")
+        raise MazeError(
+            f"{path}: expected a picture, found {kind}{' that is damaged' * (kind == 'a picture')}{way_out(kind)}"
+        )
     if image.shape[0] * image.shape[1] > _MAX_PIXELS:
         raise MazeError(f"{path}: expected at most {_MAX_PIXELS} pixels, found {image.shape[1]} x {image.shape[0]}")
     return image

@@ -132,7 +132,8 @@ def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
 
     # The departure from map_server.
     is_unknown = _saved_as_unknown(picture)
-    changes = [] if _named_path(path, metadata) == image else [f"image {metadata.image} taken from {image.parent}"]
+    named = path.parent / pathlib.Path(metadata.image.removeprefix("file://")).expanduser()
+    changes = [] if named == image else [f"image {metadata.image} taken from {image.parent}"]
     if metadata.mode == "trinary" and (states[is_unknown] == FREE).any():
         states[is_unknown] = UNKNOWN
         changes.append(
@@ -163,15 +164,10 @@ def picture_of(path: str | pathlib.Path) -> pathlib.Path:
       InputError: if the file can't be read.
     """
     path = pathlib.Path(path)
-    metadata = _read_metadata(path)
-    named = _named_path(path, metadata)
-    beside = path.parent / re.split(r"[/\\]", metadata.image)[-1]
+    name = _read_metadata(path).image
+    named = path.parent / pathlib.Path(name.removeprefix("file://")).expanduser()
+    beside = path.parent / re.split(r"[/\\]", name)[-1]
     return beside if beside.is_file() and not named.is_file() else named
-
-
-def _named_path(path: pathlib.Path, metadata: _Metadata) -> pathlib.Path:
-    name = metadata.image.removeprefix("file://")
-    return path.parent / pathlib.Path(name).expanduser()
 
 
 def map_of_picture(path: pathlib.Path) -> pathlib.Path | None:
