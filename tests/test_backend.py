@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import ctypes.util
-import sys
 
 import pytest
 from processes import run_python
-
-from mazebench.world.backend import installed_backends
 
 MISSING = [name for name, library in (("egl", "EGL"), ("osmesa", "OSMesa")) if not ctypes.util.find_library(library)]
 WRONG = ["elg", *MISSING[:1]]
@@ -66,11 +63,3 @@ for make in (
     said = run_python("-c", program, variables={"MUJOCO_GL": "elg"}, cwd=tmp_path).stdout.splitlines()
     assert said == said[:1] * 5
     assert said[0].startswith("can't open a rendering context, MUJOCO_GL=elg: ")
-
-
-def test_only_backends_that_are_installed_are_advised(monkeypatch):
-    monkeypatch.setenv("DISPLAY", "")
-    monkeypatch.setenv("WAYLAND_DISPLAY", "")
-    assert not set(installed_backends()) & set(MISSING)
-    if sys.platform == "linux":
-        assert "glfw" not in installed_backends()

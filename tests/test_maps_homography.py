@@ -37,13 +37,6 @@ class TestWarp:
         np.testing.assert_array_equal(warp_walls(maze.walls, shift), moved(maze.walls, right, down))
         assert warp_cell((10, 10), shift, maze.size) == (10 + down, 10 + right)
 
-    def test_a_stretch_makes_blocks_of_cells(self, maze):
-        # About the map's top left corner: each cell becomes a block of 3 x 3 cells, the middle one its centre.
-        stretch = np.diag([3.0, 3.0, 1.0])
-        expected = maze.walls[:7, :7].repeat(3, axis=0).repeat(3, axis=1)
-        np.testing.assert_array_equal(warp_walls(maze.walls, stretch), expected)
-        assert warp_cell((2, 5), stretch, maze.size) == (7, 16)
-
     def test_a_perspective_divides(self):
         # (x, y) goes to (x, y) / (1 + x / 4).
         perspective = np.array([[1.0, 0, 0], [0, 1, 0], [0.25, 0, 1]])
@@ -56,10 +49,6 @@ class TestWarp:
         points = warp_points(cell_to_point(np.array(cells), 21), homography, 21)
         expected = [warp_cell(cell, homography, 21) for cell in cells]
         np.testing.assert_array_equal(np.clip(point_to_cell(points, 21), 0, 20), expected)
-
-    def test_a_cell_that_leaves_the_map_is_kept_at_its_border(self):
-        shift = np.array([[1.0, 0, 3], [0, 1, -4], [0, 0, 1]])
-        assert warp_cell((2, 3), shift, 5) == (0, 4)
 
     def test_a_warped_cell_is_where_the_warped_walls_show_it(self, maze):
         # A wall block of 3 x 3 cells is found where its middle is said to lie, whatever the transform.

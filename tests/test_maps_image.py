@@ -34,27 +34,6 @@ def blocks(walls: np.ndarray, cell_pixels: int) -> np.ndarray:
     return np.where(walls, 0, 255).astype(np.uint8).repeat(cell_pixels, axis=0).repeat(cell_pixels, axis=1)
 
 
-def photograph(walls: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The plan on paper: turned up to 15 degrees, in perspective, half in shade, blurred, noisy, a JPEG."""
-    ink = rng.uniform(10, 90)
-    paper = np.maximum(blocks(walls, 24), ink).astype(np.float32)
-    side = 3 * max(paper.shape) // 2
-    margins = [(side - length) // 2 for length in paper.shape for _ in range(2)]
-    paper = cv2.copyMakeBorder(paper, *margins, cv2.BORDER_CONSTANT, value=255)
-    paper = cv2.resize(paper, (side, side)) if paper.shape != (side, side) else paper
-    angle = np.deg2rad(rng.uniform(-15, 15))
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    corners = np.array([[0, 0], [side, 0], [side, side], [0, side]], dtype=np.float32)
-    seen = (corners - side / 2) @ turn.T * 0.8 + side / 2 + rng.uniform(-0.06, 0.06, (4, 2)) * side
-    transform = cv2.getPerspectiveTransform(corners, seen.astype(np.float32))
-    image = cv2.warpPerspective(paper, transform, (side, side), borderValue=255)
-    across = np.linspace(0, 1, side) if rng.random() < 0.5 else np.linspace(1, 0, side)[:, None]
-    image = cv2.GaussianBlur(image * (0.95 - 0.5 * across), (0, 0), 1.2) + rng.normal(0, 8, image.shape)
-    tinted = np.clip(image[..., None] * [0.9, 0.96, 0.98], 0, 255).astype(np.uint8)
-    _, content = cv2.imencode(".jpg", tinted, [cv2.IMWRITE_JPEG_QUALITY, 75])
-    return cv2.cvtColor(cv2.imdecode(content, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
-
-
 def encode(image: np.ndarray, extension: str = ".png") -> bytes:
     return cv2.imencode(extension, image)[1].tobytes()
 
@@ -187,12 +166,6 @@ def test_a_scan_of_a_maze_is_read_with_and_without_the_size(kind, rows, columns)
     image = scan(walls, rng)
     assert maze_from_image(image) == padded(walls)
     assert maze_from_image(image, max(rows, columns)) == padded(walls)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_a_photograph_is_refused_with_the_way_out(maze, seed):
-    with pytest.raises(MazeError, match="crop, straighten and threshold a photograph first"):
-        maze_from_image(photograph(maze.walls, np.random.default_rng(seed)))
 
 
 def test_a_plan_that_is_turned_is_refused(maze):
@@ -367,8 +340,3 @@ def test_a_file_that_is_no_picture_is_named_in_one_line(content, message, capfd)
     with pytest.raises(InputError, match=rf"plan\.png: expected {message}"):
         read_bytes(content)
     assert capfd.readouterr() == ("", "")
-
-
-def test_a_picture_of_too_many_pixels_is_refused():
-    with pytest.raises(InputError, match=r"plan\.png: expected at most 67108864 pixels, found 8192 x 8193$"):
-        read_bytes(encode(np.zeros((8193, 8192), np.uint8)))

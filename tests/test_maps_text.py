@@ -7,7 +7,6 @@ import json
 import numpy as np
 import pytest
 
-from mazebench.errors import InputError
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.maze_files import read_located, read_maze
 from mazebench.maps.text import format_maze, parse_maze
@@ -128,7 +127,3 @@ class TestRefusal:
     def test_a_map_of_movingai_is_never_taken_for_an_inverted_one(self, tmp_path):
         rows = "type octile\nheight 4\nwidth 4\nmap\n....\n.@@.\n.@@.\n....\n"
         assert read(tmp_path, rows).walls[2:4, 2:4].all()
-
-    def test_a_missing_file_is_named(self, tmp_path):
-        with pytest.raises(InputError, match=r"none\.txt: can't read the text map: No such file or directory$"):
-            read_maze(tmp_path / "none.txt")

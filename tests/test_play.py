@@ -60,19 +60,6 @@ class TestGame:
 
 
 class TestViewer:
-    def test_rays_of_the_range_sensor_are_drawn_in_the_world(self, corridor):
-        game = Game(Task.of(mazes=corridor, distances=[2], sensors="lidar"), seed=0)
-        np.testing.assert_allclose(np.hypot(*(game.rays - game.path[-1]).T), game.observation["lidar"])
-        scene = mujoco.MjvScene(game.env.simulation.model, maxgeom=40)
-        walls = viewer.Walls(np.ones(4, np.float32))
-        for _ in range(2):  # of each picture, all is drawn anew
-            walls.draw(scene, game.maze)
-            num_boxes = scene.ngeom
-            viewer._draw_rays(scene, game)
-        assert scene.ngeom == num_boxes + 32
-        middles = [geom.pos[:2] for geom in scene.geoms[num_boxes : scene.ngeom]]
-        np.testing.assert_allclose(middles, (game.path[-1] + game.rays) / 2, atol=1e-5)
-
     def test_all_walls_are_drawn_of_each_maze_in_turn(self, corridor):
         room = np.ones((7, 7), dtype=bool)
         room[1:-1, 1:-1] = False

@@ -42,13 +42,12 @@ class TestReading:
     @pytest.mark.parametrize(
         ("before", "after", "said"),
         [
-            ("maps/m.map", "dao\\other.map", r"other\.map: can't read the text map"),
             ("version 1", "type octile", r"m\.map\.scen: expected scenarios of MovingAI, which begin with 'version 1'"),
             (" 4 3 2 0", " 8 6 2 0", r"expected scenarios of .*m\.map, 4 x 3 cells, found 8 x 6$"),
             ("maps/m.map 4 3 2", "maps/n.map 4 3 2", r"expected scenarios of one map, found maps/m\.map, maps/n\.map$"),
             (" 1.4", "", r"expected 9 fields in a line, found 8 in scenario 2$"),
             (" 4 3 2 0", " 4 x 2 0", r"expected numbers from the third field on, found invalid literal"),
-            ("maps/m.map", "other.map", r"other\.map: can't read the text map: No such file or directory$"),
+            ("maps/m.map", "dao\\other.map", r"other\.map: can't read the text map: No such file or directory$"),
             (
                 SCENARIOS[10:],
                 "0 m.map 4 3 0 0 1 1 1.4",

@@ -81,20 +81,6 @@ for action in (0, 4, 0, 0, 5, 2):
     one, other = plain.step(action).observation, textured.step(action).observation
 """)
 
-    def test_textured_pictures_are_the_same_in_all_environments(self):
-        run_with_egl("""
-options = dict(size=13, sensors="egocentric", textures=True)
-envs = mazebench.make_vec("local", 3, **options)
-pictures = envs.reset(seed=[3, 8, 9])[0]["egocentric"]
-env = gymnasium.make("mazebench/Local-13-v1", **options)
-dm = mazebench.load("local", **options)
-for slot, seed in enumerate((3, 8, 9)):
-    np.testing.assert_array_equal(env.reset(seed=seed)[0]["egocentric"], pictures[slot])
-    np.testing.assert_array_equal(dm.reset(seed=seed).observation["egocentric"], pictures[slot])
-    alone = mazebench.load("local", **options, seed=seed)  # no maze was exchanged here
-    np.testing.assert_array_equal(alone.reset().observation["egocentric"], pictures[slot])
-""")
-
     def test_the_goal_is_seen_in_red_from_four_cells_away(self):
         run_with_egl("""
 from mazebench.maps.text import parse_maze
