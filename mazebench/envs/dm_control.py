@@ -137,7 +137,7 @@ class Environment(control.Environment):
         require_task(task)
         self.maze_task = task
         # The task judges the time limit itself, so that a goal reached on the last step is a termination.
-        super().__init__(Physics.of_mazes(models_of(task.mazes)), Task(task, seed), n_sub_steps=STEPS_PER_ACTION)
+        super().__init__(Physics.of_mazes(models_of(task.mazes, False)), Task(task, seed), n_sub_steps=STEPS_PER_ACTION)
 
     def reset(self, seed: int | None = None, episode: Episode | None = None) -> dm_env.TimeStep:
         """Starts an episode: the next one of the environment's stream, the first one of `seed`'s, or `episode`."""

@@ -24,10 +24,7 @@ from mazebench.world.rendering import set_boxes
 _ESCAPE = 256  # GLFW's key codes; those of letters are the codes of capital letters
 _ARROWS = {262: "right", 263: "left", 264: "down", 265: "up"}
 _MAP_PIXELS = 260  # side of the map in the corner of the window
-_SECONDS_A_FRAME = 0.02
-_SECONDS_TO_CLOSE = 10.0
 _RAY_COLOUR = np.array([0.16, 0.6, 0.75, 1], dtype=np.float32)
-_RAY_RADIUS = 0.008  # m
 _WITHOUT = "`mazebench render` films episodes without a window"
 
 
@@ -54,7 +51,7 @@ def play(game: Game) -> None:
     finally:
         # A window that is still closing when Python exits would crash it.
         for thread in threads:
-            thread.join(_SECONDS_TO_CLOSE)
+            thread.join(timeout=10.0)
 
 
 def _play(viewer: Any, game: Game, keys: queue.SimpleQueue[int]) -> None:
@@ -73,7 +70,7 @@ def _play(viewer: Any, game: Game, keys: queue.SimpleQueue[int]) -> None:
         _overlay(viewer, game)
         viewer.sync()
         try:
-            code = keys.get(timeout=_SECONDS_A_FRAME)
+            code = keys.get(timeout=0.02)
         except queue.Empty:
             continue
         if code == _ESCAPE:
@@ -122,9 +119,9 @@ def _draw_rays(scene: mujoco.MjvScene, game: Game) -> None:
         return
     height = BODY_HEIGHT / 2
     for geom, end in zip(scene.geoms[scene.ngeom :], ends, strict=False):
-        capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
+        capsule, radius = mujoco.mjtGeom.mjGEOM_CAPSULE, 0.008
         mujoco.mjv_initGeom(geom, capsule, np.zeros(3), np.zeros(3), np.zeros(9), _RAY_COLOUR)
-        mujoco.mjv_connector(geom, capsule, _RAY_RADIUS, np.array([*game.path[-1], height]), np.array([*end, height]))
+        mujoco.mjv_connector(geom, capsule, radius, np.array([*game.path[-1], height]), np.array([*end, height]))
     scene.ngeom += len(ends)
 
 

@@ -12,10 +12,6 @@ from typing import IO
 from mazebench.errors import InputError
 
 
-class WriteError(InputError):
-    """A file or folder that can't be written."""
-
-
 def open_file(path: str | pathlib.Path, kind: str) -> io.BufferedReader:
     """Opens a file to read its bytes.
 
@@ -74,8 +70,8 @@ def make_folder(path: pathlib.Path) -> None:
 
 @contextlib.contextmanager
 def writing_to(folder: pathlib.Path) -> Iterator[None]:
-    """Turns an `OSError` in the block into a `WriteError` that names the file, or `folder` if the error names none."""
+    """Turns an `OSError` in the block into an `InputError` that names the file, or `folder` if the error names none."""
     try:
         yield
     except OSError as error:
-        raise WriteError(f"{error.filename or folder}: can't write there: {error.strerror}") from error
+        raise InputError(f"{error.filename or folder}: can't write there: {error.strerror}") from error

@@ -75,11 +75,7 @@ class MazeModels:
         return found
 
 
-def models_of(mazes: Mazes, textures: bool = False) -> MazeModels:
-    """Returns the models of `mazes`, which all environments with these mazes share."""
-    return _models_of(mazes, textures)  # the cache tells `textures=False` from the default
-
-
 @functools.lru_cache(maxsize=8)
-def _models_of(mazes: Mazes, textures: bool) -> MazeModels:
+def models_of(mazes: Mazes, textures: bool, /) -> MazeModels:
+    """Returns the models of `mazes`, which all environments with these mazes share."""
     return MazeModels(mazes, textures)

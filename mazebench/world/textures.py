@@ -62,9 +62,6 @@ _SURFACES = (
     _checks(_DARK, _WHITE, (0.5, 1)),
     _tiles((0.55, 0.78, 0.20), (0.13, 0.30, 0.08), (16, 64), (0.25, 1)),
 )
-_SKY = ((0.28, 0.50, 0.82), (0.90, 0.95, 0.99))
-_FLOOR = ((0.86, 0.83, 0.78), (0.80, 0.77, 0.71))
-_RED = (0.95, 0.10, 0.10, 1.0)
 
 
 class Face(NamedTuple):
@@ -158,10 +155,10 @@ def add_textures(spec: mujoco.MjSpec, maze: Maze) -> None:
 
 def _add_materials(spec: mujoco.MjSpec) -> None:
     sky = spec.texture("sky")
-    sky.rgb1, sky.rgb2 = _SKY
+    sky.rgb1, sky.rgb2 = (0.28, 0.50, 0.82), (0.90, 0.95, 0.99)
     floor = spec.texture("cells")
     floor.builtin = mujoco.mjtBuiltin.mjBUILTIN_CHECKER
-    floor.rgb1, floor.rgb2 = _FLOOR
+    floor.rgb1, floor.rgb2 = (0.86, 0.83, 0.78), (0.80, 0.77, 0.71)
 
     textures = [""] * mujoco.mjtTextureRole.mjNTEXROLE
     for index, surface in enumerate(_SURFACES):
@@ -182,7 +179,7 @@ def _add_materials(spec: mujoco.MjSpec) -> None:
         # With texuniform, a repetition of 1 spans two metres.
         repeat = [2 / surface.span[0], 2 / surface.span[1]]
         spec.add_material(name=name, textures=textures, texrepeat=repeat, texuniform=True, specular=0, emission=0.3)
-    spec.add_material(name="beacon", rgba=_RED, emission=0.5)
+    spec.add_material(name="beacon", rgba=(0.95, 0.10, 0.10, 1.0), emission=0.5)
     # Seen at eye level, the goal's disc on the floor is hardly visible from afar.
     spec.body("goal").add_site(
         name="beacon", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[0.1, 0.4, 0], pos=[0, 0, 0.4], material="beacon"

@@ -71,7 +71,10 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
             _require_not_inverted(grid.states, name)
 
     # Which pixels can't be driven on, and the cells made of them.
-    top, left, states = _without_unknown_margin(grid.states)
+    known = grid.states != UNKNOWN
+    rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+    top, left = (int(rows[0]), int(columns[0])) if len(rows) else (0, 0)
+    states = grid.states[top : rows[-1] + 1, left : columns[-1] + 1] if len(rows) else grid.states
     blocked = _inflate(_walls(states, options.unknown), options.inflate / grid.resolution)
     pixels = 1 if grid.is_cells else _cell_pixels(blocked, grid.resolution, options, name)
     cell_size = options.cell_size or round(pixels * grid.resolution, 9)
@@ -149,15 +152,6 @@ def _require_not_inverted(states: np.ndarray, name: str) -> None:
             f"{name}: expected free cells within walls, found one connected wall within free cells; is it inverted? "
             "1 is wall, and so are # and 100"
         )
-
-
-def _without_unknown_margin(states: np.ndarray) -> tuple[int, int, np.ndarray]:
-    """Returns the first row, the first column, and the grid without the rows and columns around it that are unknown."""
-    known = states != UNKNOWN
-    rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
-    if not len(rows):
-        return 0, 0, states
-    return int(rows[0]), int(columns[0]), states[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
 def _cell_pixels(blocked: np.ndarray, resolution: float, options: ReadOptions, name: str) -> int:

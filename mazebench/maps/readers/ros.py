@@ -77,7 +77,7 @@ def read_floor_plan(path: pathlib.Path, pixel_size: float) -> OccupancyGrid:
     )
     gray = to_gray(read_picture(path), path.stem)
     states = _states(gray, metadata)
-    shades = _describe_shades(gray, metadata)
+    shades = f"its shades are {gray.min()} to {gray.max()}"
     if not (states == OCCUPIED).any():
         raise MazeError(f"{path.stem}: expected dark walls on light paper, found none; {shades}")
     if (states == OCCUPIED).mean() > _MOSTLY_DARK:
@@ -144,7 +144,7 @@ def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
     if not math.isfinite(yaw):  # some versions of map_saver wrote nan
         changes.append(f"yaw {yaw:g} read as 0")
         yaw = 0.0
-    shades = _describe_shades(picture, metadata)
+    shades = f"its shades are {picture.min()} to {picture.max()}"
     return OccupancyGrid(states, metadata.resolution, (x, y, yaw), tuple(changes), shades)
 
 
@@ -224,35 +224,13 @@ def _read_metadata(path: pathlib.Path) -> _Metadata:
 
 def _states(picture: np.ndarray, metadata: _Metadata) -> np.ndarray:
     """Returns `[H, W]` int8 of a picture: `[H, W]`, or `[H, W, 3]` or `[H, W, 4]` with opacity, uint8 or uint16."""
-    gray, is_opaque = _gray_and_opaque(picture)
-    states = _state_of_shades(metadata)[gray]
-    if metadata.mode != "raw":
-        states[~is_opaque] = UNKNOWN
-    return states
-
-
-def _gray_and_opaque(picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the luminance, `[H, W]` uint8, and where a picture is opaque, `[H, W]` bool."""
     if picture.dtype == np.uint16:
         picture = (picture >> 8).astype(np.uint8)
-    if picture.ndim == 2:
-        return picture, np.ones(picture.shape, dtype=bool)
-    gray = cv2.cvtColor(np.ascontiguousarray(picture[..., :3]), cv2.COLOR_RGB2GRAY)
-    return gray, picture[..., 3] == 255 if picture.shape[2] == 4 else np.ones(gray.shape, dtype=bool)
-
-
-def _describe_shades(picture: np.ndarray, metadata: _Metadata) -> str:
-    """Returns the shades of a picture, and those that are wall and free, in words."""
-    gray, is_opaque = _gray_and_opaque(picture)
-    states = _state_of_shades(metadata)
-    ranges = [
-        f"{indices[0]} to {indices[-1]} are {name}" if len(indices) else f"none is {name}"
-        for name, state in (("wall", OCCUPIED), ("free", FREE))
-        if (indices := np.flatnonzero(states == state)) is not None
-    ]
-    clear = "" if is_opaque.all() else f"; {100 * (1 - is_opaque.mean()):.0f} % is transparent, which is unknown"
-    most = np.bincount(gray.ravel()).argmax()
-    return f"its shades are {gray.min()} to {gray.max()}, mostly {most}; {', '.join(ranges)}{clear}"
+    colors = np.ascontiguousarray(picture[..., :3])
+    states = _state_of_shades(metadata)[picture if picture.ndim == 2 else cv2.cvtColor(colors, cv2.COLOR_RGB2GRAY)]
+    if metadata.mode != "raw" and picture.shape[2:] == (4,):
+        states[picture[..., 3] < 255] = UNKNOWN
+    return states
 
 
 def _saved_as_unknown(picture: np.ndarray) -> np.ndarray:

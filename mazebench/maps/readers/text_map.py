@@ -68,7 +68,10 @@ def grid_of_text(text: str, name: str) -> OccupancyGrid:
     if not rows:
         raise MazeError(f"{name}: expected a text map, found no row")
     _require_one_maze(lines, name)
-    if (cells := _cells_in_table(rows)) is not None:
+
+    # A table, with commas, semicolons, tabs or blanks between its cells.
+    cells = [re.split(r"\s*[,;\t]\s*|\s+", row.strip(" \t,;")) for row in rows]
+    if len({len(row) for row in cells}) == 1 and len(cells[0]) > 2:
         if any(len(cell) > 1 for row in cells for cell in row):
             try:
                 numbers = np.array(cells, dtype=float)
@@ -103,13 +106,6 @@ def _require_one_maze(lines: list[str], name: str) -> None:
     ends = {letter for block in blocks for line in (block[0], block[-1]) for letter in line.strip()}
     if len(blocks) > 1 and len(ends) == 1 and all(len(block) > 2 for block in blocks):
         raise MazeError(f"{name}: expected one maze, found {len(blocks)} with blank lines between; give each a file")
-
-
-def _cells_in_table(rows: list[str]) -> list[list[str]] | None:
-    """Returns the cells of rows in which commas, semicolons, tabs or blanks stand between them; None for other rows."""
-    cells = [re.split(r"\s*[,;\t]\s*|\s+", row.strip(" \t,;")) for row in rows]
-    is_table = len({len(row) for row in cells}) == 1 and len(cells[0]) > 2
-    return cells if is_table else None
 
 
 def _between_posts(rows: list[str], step: int, name: str) -> list[str]:
