@@ -23,15 +23,11 @@ from mazebench.maps.readers.ros import (
 )
 from mazebench.maps.readers.text_map import read_text
 
-IMAGE_SUFFIXES = (
-    *(".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".pbm", ".pnm"),
-    *(".tif", ".tiff", ".webp", ".gif"),
-)
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".pbm", ".pnm", ".tif", ".tiff", ".webp", ".gif")
 _TABLE_SUFFIXES = (".csv", ".json")  # of files that may be something else
-TEXT_SUFFIXES = (".txt", ".map", *_TABLE_SUFFIXES)
 ARRAY_SUFFIXES = (".npy", ".npz")
 # In the order in which they are read if a folder holds one map in several: those come first that say the cells' size.
-SUFFIXES = (*ROS_SUFFIXES, *TEXT_SUFFIXES, *ARRAY_SUFFIXES, *IMAGE_SUFFIXES)
+SUFFIXES = (*ROS_SUFFIXES, ".txt", ".map", *_TABLE_SUFFIXES, *ARRAY_SUFFIXES, *IMAGE_SUFFIXES)
 # Of a floor plan that is read as a picture of cells: cells a side, and the free share of them. Mazes have more walls.
 _MANY_CELLS, _MOSTLY_FREE = 100, 0.8
 

@@ -13,7 +13,7 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.maps import colors
 from mazebench.maps.maze import Cell, Maze
-from mazebench.storage.files import open_whole
+from mazebench.storage.files import open_whole, writing_to
 
 MAX_SIDE = 8192  # pixels of a drawing's side
 # Neighbouring wall cells alternate between two nearly equal shades, so that the cells of a drawing can be counted.
@@ -119,11 +119,8 @@ def write_image(image: np.ndarray, path: str | pathlib.Path) -> None:
       InputError: if the file can't be written.
     """
     _, content = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
-    try:
-        with open_whole(path) as file:
-            file.write(content.tobytes())
-    except OSError as error:
-        raise InputError(f"{path}: can't write the picture: {error.strerror}") from error
+    with writing_to(pathlib.Path(path)), open_whole(path) as file:
+        file.write(content.tobytes())
 
 
 def _unit(image: np.ndarray, cell_pixels: int) -> float:

@@ -19,7 +19,7 @@ from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.plan import build_agent, make_plan
 from mazebench.maps.pictures import draw_grid, draw_rays, write_image
 from mazebench.rollout import agent_seed, rollout
-from mazebench.storage.files import open_whole, writing_to
+from mazebench.storage.files import make_folder, open_whole, writing_to
 from mazebench.tasks.context import resized_map
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
@@ -54,11 +54,9 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
     if out.suffix not in _WRITERS:
         raise unknown("suffix", out.suffix, _WRITERS)
     frames, outcome = _run(options, view, pixels, is_film=out.suffix != ".png")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(out.parent)
+    with writing_to(out):
         _WRITERS[out.suffix](frames, out)
-    except OSError as error:
-        raise InputError(f"{out}: can't write: {error.strerror}") from error
     return outcome
 
 
@@ -173,7 +171,7 @@ def _write_gif(frames: list[np.ndarray], out: pathlib.Path) -> None:
     animation.frames = [cv2.cvtColor(frame, cv2.COLOR_RGB2BGRA) for frame in frames]
     animation.durations = [round(1000 / _FRAMES_PER_SECOND)] * len(frames)
     _, content = cv2.imencodeanimation(".gif", animation)
-    with writing_to(out), open_whole(out) as file:
+    with open_whole(out) as file:
         file.write(content.tobytes())
 
 
@@ -190,7 +188,7 @@ def _write_mp4(frames: list[np.ndarray], out: pathlib.Path) -> None:
         index = content.rfind(b"moov") - 4
         if index < 0 or index + int.from_bytes(content[index : index + 4], "big") != len(content):
             raise InputError(f"{film}: can't make the film there: the disk is full, or this OpenCV can't write MP4")
-    with writing_to(out), open_whole(out) as file:
+    with open_whole(out) as file:
         file.write(content)
 
 

@@ -29,6 +29,13 @@ class Game:
         self.num_reached = 0
         self.begin()
 
+    def begin(self, episode: Episode | None = None) -> None:
+        """Begins an episode, or the next one of the seed."""
+        self.observation, _ = self.env.reset(options={"episode": episode})
+        self.ended = False
+        self.num_episodes += 1
+        self.path = [self.env.simulation.position()]  # [2] m each: where the body was
+
     def press(self, key: str) -> None:
         """Does what a key stands for: a letter, or an arrow by its name. Other keys do nothing."""
         if key == "r":
@@ -40,13 +47,6 @@ class Game:
             self.ended = terminated or truncated
             self.path.append(self.env.simulation.position())
             self.num_reached += terminated
-
-    def begin(self, episode: Episode | None = None) -> None:
-        """Begins an episode, or the next one of the seed."""
-        self.observation, _ = self.env.reset(options={"episode": episode})
-        self.ended = False
-        self.num_episodes += 1
-        self.path = [self.env.simulation.position()]  # [2] m each: where the body was
 
     @property
     def maze(self) -> Maze:

@@ -62,8 +62,3 @@ def open_doors(walls: np.ndarray, cost: np.ndarray, extra: float, rng: np.random
     tree = csgraph.minimum_spanning_tree(graph).data.astype(int) - 1
     others = cheapest[rng.random(len(cheapest)) < extra]
     walls[tuple(slots[np.concatenate([tree, others])].T)] = False
-
-
-def turned(walls: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Returns `walls` turned by a random number of quarter turns."""
-    return np.rot90(walls, int(rng.integers(4))).copy()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mazebench.maps.kinds.floor_plan import cut, open_doors, turned
+from mazebench.maps.kinds.floor_plan import cut, open_doors
 from mazebench.maps.kinds.kind import Kind
 
 _ROOM_SIDE = 6  # on average, with a wall
@@ -29,7 +29,7 @@ def museum_walls(size: int, rng: np.random.Generator) -> np.ndarray:
             cost[rng.integers(top, bottom)] = 0
         cost[bottom] = 2  # the wall to the next enfilade
     open_doors(walls, cost, _EXTRA_DOORS, rng)
-    return turned(walls, rng)
+    return np.rot90(walls, int(rng.integers(4))).copy()
 
 
 MUSEUM = Kind("enfilades: rooms one after the other", museum_walls)

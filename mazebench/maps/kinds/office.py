@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from mazebench.maps.kinds.floor_plan import cut, open_doors, turned
+from mazebench.maps.kinds.floor_plan import cut, open_doors
 from mazebench.maps.kinds.kind import Kind
 
 _WING = 10  # cells across, with a corridor of two cells and a row of rooms on both sides
@@ -48,7 +48,7 @@ def office_walls(size: int, rng: np.random.Generator) -> np.ndarray:
                 walls[top:bottom, left:right] = False
     walls = walls & ~corridors | fire_walls
     open_doors(walls, ~ndimage.binary_dilation(corridors), _EXTRA_DOORS, rng)
-    return turned(walls, rng)
+    return np.rot90(walls, int(rng.integers(4))).copy()
 
 
 OFFICE = Kind("wings with a corridor and rooms on both sides", office_walls)
