@@ -189,14 +189,11 @@ class _SingleAgents(Agent):
         return agent.act(observation)
 
 
+@functools.cache  # so that a class and its import by name give one and the same
 def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
     """Returns `declared` itself if it is an `Agent`, else an `Agent` that runs the `SingleAgent` in B environments."""
-    return declared if issubclass(declared, Agent) else _running(declared)  # type: ignore[arg-type]  # of mypy, which takes its objects' hash
-
-
-@functools.cache  # so that a class and its import by name give one and the same
-def _running(declared: type[SingleAgent]) -> type[Agent]:
-    """Returns an `Agent` that runs a `SingleAgent`."""
+    if issubclass(declared, Agent):
+        return declared
     # Named as the class that it wraps, for messages and provenance.
     declarations = ("needs_truth", "needs_sensors", "needs_shown", "plays_actions", "learns")
     names = ("__module__", "__qualname__", "__doc__", *declarations)

@@ -25,7 +25,6 @@ from mazebench.world.simulation import MujocoSimulation
 
 NUM_ENVS = (1, 16, 256, 1024, 4096)
 SIZES = (13, 31, 51, 101, 255)
-_MAZES_PER_SIZE = 8
 
 
 class Side(NamedTuple):
@@ -64,7 +63,7 @@ def sizes(chosen: Sequence[int] = SIZES, num_envs: int = 256) -> list[Side]:
     """Returns vector environments in mazes of several sizes."""
     sides = []
     for size in chosen:
-        mazes = [generate("dfs", size, np.random.default_rng([size, index])) for index in range(_MAZES_PER_SIZE)]
+        mazes = [generate("dfs", size, np.random.default_rng([size, index])) for index in range(8)]
         sides.append(_vector(f"{size} x {size}", Task.of(mazes=mazes, distances=TRAIN_DISTANCES), num_envs))
     return sides
 

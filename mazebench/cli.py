@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
+import functools
 import importlib
 import io
 import itertools
 import re
 import sys
-import warnings
-from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -26,7 +24,7 @@ from mazebench.commands.render import render
 from mazebench.commands.report import report
 from mazebench.commands.train import train
 from mazebench.constants import TASK_VERSION
-from mazebench.errors import InputError, Remark, RunError, one_line, shortened
+from mazebench.errors import InputError, RunError, one_line, remarks_to, shortened
 
 _LONGEST = 2000  # characters of a message; an agent's InputError may be of any length
 
@@ -62,8 +60,10 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names of files need not be legal Unicode
     try:
-        with _remarks_as_lines():
-            _refuse_empty_values(sys.argv)
+        for before, word in itertools.pairwise(sys.argv):
+            if not word or re.fullmatch(r"--[\w-]+=", word):  # an empty path would be the working directory
+                raise InputError(f"expected a value of {word.rstrip('=') or before}, found an empty one")
+        with remarks_to(functools.cache(_print_line)):  # each only once
             sys.exit(app(sys.argv[1:] or ["--help"], prog_name="mazebench", standalone_mode=False) or 0)
     except _ClickException as error:
         _fail(error.format_message().replace("Value error, ", ""), 2)  # with which pydantic begins, through typer
@@ -75,32 +75,6 @@ def main() -> None:
         _fail(f"{error.filename}: {error.strerror or error}", 2)
     except RunError as error:
         _fail(str(error), 1)
-
-
-def _refuse_empty_values(words: Sequence[str]) -> None:
-    """Raises `InputError` for `--out ""` and `--out=`: an empty path would be the working directory."""
-    for before, word in itertools.pairwise(words):
-        if not word or re.fullmatch(r"--[\w-]+=", word):
-            raise InputError(f"expected a value of {word.rstrip('=') or before}, found an empty one")
-
-
-@contextlib.contextmanager
-def _remarks_as_lines() -> Iterator[None]:
-    """Prints each `Remark` that the block warns with as one line, and only once."""
-    printed: set[str] = set()
-    show = warnings.showwarning
-
-    def show_remark(message: Warning | str, category: type[Warning], *where: Any, **source: Any) -> None:
-        if not issubclass(category, Remark):
-            show(message, category, *where, **source)
-        elif str(message) not in printed:
-            printed.add(str(message))
-            _print_line(str(message))
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("always", Remark)
-        warnings.showwarning = show_remark
-        yield
 
 
 def _fail(message: str, status: int) -> NoReturn:

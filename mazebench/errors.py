@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -46,32 +46,27 @@ class RunError(RuntimeError):
 class Remark(UserWarning):
     """A warning that tells a user in one line what was done with good input, such as a map that was padded."""
 
-    def __init__(self, message: str):
-        """Escapes what does not print in `message`, such as line ends in names of files."""
-        super().__init__(one_line(message))
-
 
 def remark(line: str) -> None:
     """Warns of something with a `Remark`."""
-    warnings.warn(line, Remark, stacklevel=2)
+    warnings.warn(one_line(line), Remark, stacklevel=2)
 
 
 @contextlib.contextmanager
-def held_remarks() -> Iterator[list[str]]:
-    """Gathers the remarks of the block in a list, and shows none of them; other warnings are shown as ever."""
-    lines: list[str] = []
+def remarks_to(show: Callable[[str], object]) -> Iterator[None]:
+    """Gives `show` each remark of the block; other warnings are shown as ever."""
     with warnings.catch_warnings():
-        show = warnings.showwarning
+        show_other = warnings.showwarning
 
-        def hold(message: Warning | str, category: type[Warning], *where: Any, **source: Any) -> None:
+        def show_warning(message: Warning | str, category: type[Warning], *where: Any, **source: Any) -> None:
             if issubclass(category, Remark):
-                lines.append(str(message))
+                show(str(message))
             else:
-                show(message, category, *where, **source)
+                show_other(message, category, *where, **source)
 
         warnings.simplefilter("always", Remark)
-        warnings.showwarning = hold
-        yield lines
+        warnings.showwarning = show_warning
+        yield
 
 
 def one_line(text: str) -> str:

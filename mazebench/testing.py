@@ -67,18 +67,16 @@ def check_agent(
         checked = checked_agent_class(name, agent_class)
     except InputError as error:
         raise ConformanceError(str(error)) from error
-    asked = as_options(_small_task() if task is None else task, options)
+    if task is None and not options:
+        rng = np.random.default_rng(0)
+        mazes = tuple(generate("dfs", _SIZE, rng, f"maze-{index}") for index in range(_NUM_MAZES))
+        task = TaskOptions(task="hierarchical", mazes=mazes, time_limit=_TIME_LIMIT, landmark_distance=3)
+    asked = as_options(task, options)
     try:
         played = task_as_played(name, checked, asked, resolve)
         _check_acting(name, checked, played, None if checkpoint is None else pathlib.Path(checkpoint))
     except AgentError as error:
         raise ConformanceError(str(error)) from error
-
-
-def _small_task() -> TaskOptions:
-    rng = np.random.default_rng(0)
-    mazes = tuple(generate("dfs", _SIZE, rng, f"maze-{index}") for index in range(_NUM_MAZES))
-    return TaskOptions(task="hierarchical", mazes=mazes, time_limit=_TIME_LIMIT, landmark_distance=3)
 
 
 def _check_acting(name: str, agent_class: type[Agent], task: Task, checkpoint: pathlib.Path | None) -> None:

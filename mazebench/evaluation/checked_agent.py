@@ -66,27 +66,19 @@ class CheckedAgent(Agent):
         with calling(self.name, "act"):
             actions, state = self._agent.act(inputs, state, explore)
             actions = np.asarray(actions)
+        shape: tuple[int, ...] = (len(inputs.new_episode),)
         if self._kind in VELOCITIES:
-            self._check_velocities(actions, (len(inputs.new_episode), len(VELOCITIES[self._kind])))
+            names, kinds, largest = VELOCITIES[self._kind], "fiu", np.finfo(float).max
+            shape += (len(names),)
+            expected = f"velocities ({', '.join(names)}) of shape {shape}"
+            legal, lowest = f"finite {expected}", -largest
         else:
-            self._check_actions(actions, len(inputs.new_episode))
-        return actions, state
-
-    def _check_actions(self, actions: np.ndarray, batch_size: int) -> None:
-        if actions.shape != (batch_size,) or not np.issubdtype(actions.dtype, np.integer):
+            kinds, lowest, largest = "iu", 0, len(DISCRETE[self._kind]) - 1
+            expected, legal = f"{shape[0]} integer actions", f"actions from 0 to {largest}"
+        if actions.shape != shape or actions.dtype.kind not in kinds:
             found = f"{actions.dtype} of shape {actions.shape}"
-            raise AgentError(f"agent {self.name!r}: expected {batch_size} integer actions from act(), found {found}")
-        num_actions = len(DISCRETE[self._kind])
-        illegal = actions[(actions < 0) | (actions >= num_actions)]
+            raise AgentError(f"agent {self.name!r}: expected {expected} from act(), found {found}")
+        illegal = actions[~((actions >= lowest) & (actions <= largest))]
         if len(illegal):
-            expected = f"actions from 0 to {num_actions - 1} from act()"
-            raise AgentError(f"agent {self.name!r}: expected {expected}, found {illegal[0]}")
-
-    def _check_velocities(self, velocities: np.ndarray, shape: tuple[int, int]) -> None:
-        expected = f"velocities ({', '.join(VELOCITIES[self._kind])}) of shape {shape} from act()"
-        if velocities.shape != shape or velocities.dtype.kind not in "fiu":
-            found = f"{velocities.dtype} of shape {velocities.shape}"
-            raise AgentError(f"agent {self.name!r}: expected {expected}, found {found}")
-        illegal = velocities[~np.isfinite(velocities)]
-        if len(illegal):
-            raise AgentError(f"agent {self.name!r}: expected finite {expected}, found {illegal[0]}")
+            raise AgentError(f"agent {self.name!r}: expected {legal} from act(), found {illegal[0]}")
+        return actions, state

@@ -150,14 +150,7 @@ def make_plan(
         "mujoco": origin.packages.get("mujoco"),
         "world_sha256": hashlib.sha256(world.to_xml().encode("utf-8")).hexdigest(),
     }
-    return Plan(
-        options=options,
-        task=task,
-        agent_class=agent_class,
-        trials=tuple(trials),
-        identity=identity,
-        provenance=origin,
-    )
+    return Plan(options, task, agent_class, tuple(trials), identity, provenance=origin)
 
 
 def _square(side: int) -> str:
@@ -180,7 +173,7 @@ def _with_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOpti
     A run's folder may gain a newer checkpoint any time, so it is looked into once, before anything is hashed or built.
 
     Raises:
-      InputError: if a checkpoint is given to an agent that reads none.
+      InputError: if a checkpoint is given to an agent that reads none, or a folder holds none.
     """
     with calling(options.agent, "default_checkpoint"):
         default = agent_class.default_checkpoint()
@@ -188,19 +181,11 @@ def _with_checkpoint(options: EvalOptions, agent_class: type[Agent]) -> EvalOpti
         return options if default is None else dataclasses.replace(options, checkpoint=str(default))
     if default is None and not agent_class.learns and ":" not in options.agent:
         raise InputError(f"agent {options.agent!r} reads no checkpoint; found --checkpoint {options.checkpoint}")
-    return dataclasses.replace(options, checkpoint=str(_newest_checkpoint(pathlib.Path(options.checkpoint))))
-
-
-def _newest_checkpoint(path: pathlib.Path) -> pathlib.Path:
-    """Returns `path` itself, or the newest agent in the folder of a training run or of a checkpoint.
-
-    Raises:
-      InputError: if a folder holds none.
-    """
-    if not path.is_dir():
-        return path
-    complete = (folder for folder in path.glob("checkpoints/*") if folder.name.isdecimal())
-    found = [file for folder in (path, *sorted(complete)) if (file := folder / "agent.safetensors").exists()]
-    if not found:
-        raise InputError(f"{path}: expected a checkpoint or the folder of a training run, found neither")
-    return found[-1]
+    path = pathlib.Path(options.checkpoint)
+    if path.is_dir():  # of a checkpoint or of a training run, whose newest one counts
+        complete = (folder for folder in path.glob("checkpoints/*") if folder.name.isdecimal())
+        found = [file for folder in (path, *sorted(complete)) if (file := folder / "agent.safetensors").exists()]
+        if not found:
+            raise InputError(f"{path}: expected a checkpoint or the folder of a training run, found neither")
+        path = found[-1]
+    return dataclasses.replace(options, checkpoint=str(path))

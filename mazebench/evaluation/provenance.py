@@ -38,6 +38,11 @@ def provenance(options: EvalOptions, task: Task, agent_class: type[Agent]) -> Pr
     checkpoint = options.checkpoint
     if checkpoint and checkpoint == str(agent_class.default_checkpoint()):
         checkpoint = pathlib.Path(checkpoint).name  # the folder depends on the installation
+    if ":" in options.agent:
+        names = _distributions().get(agent_class.__module__.partition(".")[0])
+        package = f"{names[0]} {_version(names[0])}" if names else None
+    else:
+        package = package_of(options.agent)
     content = {
         "benchmark_manifest_sha256": manifest_hash(task.options.benchmark),
         "task_version": TASK_VERSION,
@@ -45,7 +50,7 @@ def provenance(options: EvalOptions, task: Task, agent_class: type[Agent]) -> Pr
         "checkpoint_sha256": file_hash(options.checkpoint),
         "checkpoint_metadata": checkpoint_metadata(options.checkpoint),
         "agent_class": f"{agent_class.__module__}:{agent_class.__qualname__}",
-        "agent_package": _package_of(options.agent, agent_class),
+        "agent_package": package,
         "agent_code_sha256": code_hash(options.agent, agent_class),
         "seed": options.seed,
         "episodes_per_distance": options.episodes_per_distance,
@@ -118,14 +123,6 @@ def checkpoint_metadata(path: str | None) -> dict[str, Any] | None:
         return found
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
-
-
-def _package_of(name: str, agent_class: type[Agent]) -> str | None:
-    """Returns name and version of the distribution that an installed agent belongs to."""
-    if ":" not in name:
-        return package_of(name)
-    names = _distributions().get(agent_class.__module__.partition(".")[0])
-    return f"{names[0]} {_version(names[0])}" if names else None
 
 
 _distributions = functools.cache(metadata.packages_distributions)  # takes 0.4 s

@@ -47,23 +47,6 @@ def check_same_run(folder: pathlib.Path, identity: Mapping[str, Any]) -> None:
         raise InputError(f"{folder}: holds another run: its {key} is {str(found)[:200]}, this one's {value}")
 
 
-def is_begun(folder: pathlib.Path, identity: Mapping[str, Any], resume: bool) -> bool:
-    """Makes a folder, and returns whether it holds a run of an identity, to go on with.
-
-    Raises:
-      InputError: if it can't be made, holds a run and `resume` is false, or holds another run or anything else.
-    """
-    make_folder(folder)
-    found = {path.name for path in folder.iterdir() if path.suffix != ".tmp"}
-    if found & {CONFIG, JOURNAL} and not resume:  # a kill may have left the journal alone
-        raise InputError(f"{folder}: holds a run already; go on with --resume or name another folder")
-    if CONFIG in found:
-        check_same_run(folder, identity)
-    elif found - {JOURNAL}:
-        raise InputError(f"{folder}: expected an empty folder or one of a run, found {min(found)!r} in it")
-    return CONFIG in found
-
-
 class Store:
     """The episodes that have ended of one evaluation, on disk and in memory; a context manager."""
 
@@ -76,7 +59,15 @@ class Store:
           InputError: if the folder can't be written, or holds another run or anything else.
         """
         self.folder, self._plan = folder, plan
-        self._is_new = not is_begun(folder, plan.identity, resume)
+        make_folder(folder)
+        found = {path.name for path in folder.iterdir() if path.suffix != ".tmp"}
+        if found & {CONFIG, JOURNAL} and not resume:  # a kill may have left the journal alone
+            raise InputError(f"{folder}: holds a run already; go on with --resume or name another folder")
+        self._is_new = CONFIG not in found
+        if not self._is_new:
+            check_same_run(folder, plan.identity)
+        elif found - {JOURNAL}:
+            raise InputError(f"{folder}: expected an empty folder or one of a run, found {min(found)!r} in it")
         # A line that a kill cut short is passed over: its episode is run again.
         ended = [_from_line(line) for line in read_lines(folder / JOURNAL)]
         self.record = record or any(trajectory for _, trajectory in ended)

@@ -159,7 +159,13 @@ def _playable(plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str)
             continue
         key = folder, plan.task.interface
         if key not in refusals:
-            refusals[key] = _refusal(plan)
+            refusals[key] = None
+            try:
+                build_agent(plan.options, plan.task, plan.agent_class)
+            except UnplayableError as error:
+                refusals[key] = str(error)
+            except (InputError, RunError):  # which it raises again when its turn comes
+                pass
         if (reason := refusals[key]) is not None:
             left_out.setdefault(folder, {})[part] = reason
     for folder, reasons in left_out.items():
@@ -168,17 +174,6 @@ def _playable(plans: dict[tuple[str, str], Plan], out: pathlib.Path, suite: str)
             raise UnplayableError(f"{reason}; it can play no part of the suite {suite!r}")
         remark(f"{reason}; left out: {', '.join(reasons)}")
     return {(folder, part): plan for (folder, part), plan in plans.items() if part not in left_out.get(folder, {})}
-
-
-def _refusal(plan: Plan) -> str | None:
-    """Returns why the agent of a plan can't play it; None if it can, or fails in another way when its turn comes."""
-    try:
-        build_agent(plan.options, plan.task, plan.agent_class)
-    except UnplayableError as error:
-        return str(error)
-    except (InputError, RunError):
-        pass
-    return None
 
 
 def _prepare(
@@ -219,17 +214,12 @@ def _prepare(
 
 
 def _folders(agents: Sequence[str]) -> dict[str, str]:
-    """Returns the name of each agent's folder."""
+    """Returns the name of each agent's folder: letters, digits, dots, dashes and underscores."""
     folders: dict[str, str] = {}
     for agent in agents:
-        folder = folder_name(agent)
+        folder = "".join(letter if letter.isalnum() or letter in "._-" else "-" for letter in agent)
+        folder = f"agent{folder}" if folder.startswith(".") else folder
         if folder in folders.values():
             raise InputError(f"expected agents with folders of their own, found two for {folder!r}")
         folders[agent] = folder
     return folders
-
-
-def folder_name(agent: str) -> str:
-    """Returns the name of an agent's folder: letters, digits, dots, dashes and underscores."""
-    name = "".join(letter if letter.isalnum() or letter in "._-" else "-" for letter in agent)
-    return f"agent{name}" if name.startswith(".") else name

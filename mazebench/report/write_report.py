@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from mazebench.errors import held_remarks, remark
+from mazebench.errors import remark, remarks_to
 from mazebench.report.episodes import ReportedResult, join_episodes, read_results
 from mazebench.report.figures import draw_table, draw_violins, save
 from mazebench.report.page import build_page
@@ -33,7 +33,7 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
     """
     notes: list[str] = []
     try:
-        with held_remarks() as notes:
+        with remarks_to(notes.append):
             results = read_results(paths)
     finally:
         for note in notes:

@@ -98,7 +98,18 @@ def compare_results(a: Result, b: Result) -> PairedResults:
     Raises:
       InputError: if the two are not of the same episodes of one version of the benchmark.
     """
-    check_pairs(a, b)
+    for key in (*_SAME_TASK, *_SAME_PROVENANCE):
+        of_a, of_b = (
+            getattr(result.summary.provenance if key in _SAME_PROVENANCE else result.summary.task, key)
+            for result in (a, b)
+        )
+        if of_a != of_b:
+            raise InputError(
+                f"expected results of one {key.removesuffix('_in_results')} to compare, "
+                f"found {str(of_a)[:80]} in {a.folder} and {str(of_b)[:80]} in {b.folder}"
+            )
+    if fault := _other_episode(a.records, b.records):
+        raise InputError(f"expected the same episodes in {a.folder} and {b.folder}, found {fault}")
     ours, theirs = by_distance(a.records), by_distance(b.records)
     return PairedResults(
         overall=_compare(a.records, b.records),
@@ -163,27 +174,6 @@ def _who(summary: Summary, parts: list[str]) -> str:
     if task.track is not None:
         wrong.insert(0, f"track {task.title.replace(' ', ', level ')}")
     return summary.row + (f" ({', '.join(wrong)})" if wrong and parts == [""] else "")
-
-
-def check_pairs(a: Result, b: Result) -> None:
-    """Checks that two evaluations are of the same task and episodes.
-
-    Raises:
-      InputError: if they are not.
-    """
-    for key in (*_SAME_TASK, *_SAME_PROVENANCE):
-        ours, theirs = (
-            getattr(result.summary.provenance if key in _SAME_PROVENANCE else result.summary.task, key)
-            for result in (a, b)
-        )
-        if ours != theirs:
-            raise InputError(
-                f"expected results of one {key.removesuffix('_in_results')} to compare, "
-                f"found {str(ours)[:80]} in {a.folder} and {str(theirs)[:80]} in {b.folder}"
-            )
-    fault = _other_episode(a.records, b.records)
-    if fault:
-        raise InputError(f"expected the same episodes in {a.folder} and {b.folder}, found {fault}")
 
 
 def _other_episode(a: Sequence[Record], b: Sequence[Record]) -> str | None:

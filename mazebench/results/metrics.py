@@ -19,8 +19,6 @@ from mazebench.results.records import Figures, Record, column
 METRICS = {"success_rate": "success", "spl": "spl", "spl_grid": "spl_grid"}
 ON_TIME_METRICS = {f"on_time_{k:g}": k for k in ON_TIME}  # by the name in comparisons and reports
 
-_KIND = "kind"  # the field of a record that names the kind of its maze
-
 
 def spl(success: np.ndarray, shortest: np.ndarray, driven: np.ndarray) -> np.ndarray:
     """Returns `[E]` in [0, 1]: success weighted by path length, S l / max(l, p) (Anderson et al. 2018, eq. 1).
@@ -85,7 +83,7 @@ def by_fact(records: Sequence[Record]) -> dict[str, np.ndarray]:
     groups = {
         f"{'' if holds else 'not '}{fact}": column(records, fact) == holds for fact in facts for holds in (True, False)
     }
-    kinds = column(records, _KIND) if _KIND in told else np.empty(0)
+    kinds = column(records, "kind") if "kind" in told else np.empty(0)
     return groups | {kind: kinds == kind for kind in dict.fromkeys(kinds.tolist())}
 
 

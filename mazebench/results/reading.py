@@ -56,7 +56,12 @@ def load_result(folder: pathlib.Path) -> Result:
     if not (folder / SUMMARY).is_file():
         raise InputError(f"{folder}: expected a finished evaluation, found {_describe_content(folder)}")
     summary = _read_model(folder / SUMMARY, Summary, "an evaluation's summary")
-    records = _read_records(folder / EPISODES)
+    with open_file(folder / EPISODES, "records") as file:
+        lines = file.readlines()
+    records = tuple(
+        _validate(line, Record, f"{folder / EPISODES}: line {number}", "a record")
+        for number, line in enumerate(lines, 1)
+    )
     if len(records) != summary.episodes:
         raise InputError(f"{folder / EPISODES}: expected {summary.episodes} records, found {len(records)}")
     return Result(folder, summary, records)
@@ -102,23 +107,14 @@ def find_parts(folder: pathlib.Path) -> dict[str, pathlib.Path]:
 
 def _read_model(path: pathlib.Path, model: type[_Model], kind: str) -> _Model:
     with open_file(path, "file") as file:
-        content = file.read()
+        return _validate(file.read(), model, str(path), kind)
+
+
+def _validate(content: bytes, model: type[_Model], where: str, kind: str) -> _Model:
     try:
         return model.model_validate_json(content)
     except pydantic.ValidationError as error:
-        raise InputError(f"{path}: expected {kind}, found {describe_fault(error)}") from error
-
-
-def _read_records(path: pathlib.Path) -> tuple[Record, ...]:
-    with open_file(path, "records") as file:
-        lines = file.readlines()
-    records = []
-    for number, line in enumerate(lines, 1):
-        try:
-            records.append(Record.model_validate_json(line))
-        except pydantic.ValidationError as error:
-            raise InputError(f"{path}: line {number}: expected a record, found {describe_fault(error)}") from error
-    return tuple(records)
+        raise InputError(f"{where}: expected {kind}, found {describe_fault(error)}") from error
 
 
 def _describe_content(folder: pathlib.Path) -> str:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.rollout import Step, rollout
+from mazebench.rollout import rollout
 from mazebench.tasks.task import Task
 from mazebench.training.experience import Experience
 from mazebench.training.protocol import LearningAgent
@@ -40,8 +39,30 @@ class Collector:
         for step in rollout(
             actor, self._envs, first, lambda slots: rng.integers(_SEEDS, size=len(slots)), explore=True
         ):
+            observation = step.inputs.observation
+            final_state = np.zeros_like(observation["state"])
+            final_cell = np.zeros(len(step.ended), dtype=np.int64)
+            if step.ended.any():
+                for slot in np.flatnonzero(step.ended):
+                    final_state[slot] = step.next_info["final_obs"][slot]["state"]
+                # All mazes have one size and one cell size.
+                final_cell = self._task.mazes[0].cell_index(step.next_info["final_info"]["position"])
             before, truth = truth, self._truth()
-            yield self._experience(step, before, actor.notes(step.state))
+            yield Experience(
+                **before,
+                state=observation["state"],
+                action=step.actions,
+                new_episode=step.inputs.new_episode,
+                new_context=step.inputs.new_context,
+                reward=step.reward,
+                terminated=step.terminated,
+                ended=step.ended,
+                final_state=final_state,
+                final_cell=final_cell,
+                context=observation["context"],
+                sensors={name: observation[name] for name in self._task.sensors},
+                notes=actor.notes(step.state),
+            )
 
     def _truth(self) -> dict[str, np.ndarray]:
         """Returns what is true of the environments now, by the names of the fields of `Experience`."""
@@ -54,29 +75,3 @@ class Collector:
             "start": rules.start.copy(),
             "goal": rules.target.copy(),
         }
-
-    def _experience(self, step: Step, truth: dict[str, np.ndarray], notes: Any) -> Experience:
-        """Returns a step as experience; `truth` is that of before the step."""
-        observation = step.inputs.observation
-        final_state = np.zeros_like(observation["state"])
-        final_cell = np.zeros(len(step.ended), dtype=np.int64)
-        if step.ended.any():
-            for slot in np.flatnonzero(step.ended):
-                final_state[slot] = step.next_info["final_obs"][slot]["state"]
-            # All mazes have one size and one cell size.
-            final_cell = self._task.mazes[0].cell_index(step.next_info["final_info"]["position"])
-        return Experience(
-            **truth,
-            state=observation["state"],
-            action=step.actions,
-            new_episode=step.inputs.new_episode,
-            new_context=step.inputs.new_context,
-            reward=step.reward,
-            terminated=step.terminated,
-            ended=step.ended,
-            final_state=final_state,
-            final_cell=final_cell,
-            context=observation["context"],
-            sensors={name: observation[name] for name in self._task.sensors},
-            notes=notes,
-        )

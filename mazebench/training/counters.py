@@ -23,10 +23,6 @@ class Counters:
         """True if the run is at a milestone."""
         return self.env_steps == self.milestone_steps
 
-    def after_steps(self, num_steps: int) -> Self:
-        """Returns the counters after more agent steps."""
-        return dataclasses.replace(self, env_steps=self.env_steps + num_steps)
-
     def after_update(self, losses: Mapping[str, float]) -> Self:
         """Returns the counters after one more update, which returned `losses`."""
         sums = {name: self.loss_sums.get(name, 0.0) + value for name, value in losses.items()}

@@ -31,10 +31,9 @@ from mazebench.tasks.task import Task, as_options, in_the_same_mazes, resolve
 from mazebench.tasks.task_options import PROGRESS, TaskOptions
 from mazebench.training.collector import Collector
 from mazebench.training.counters import Counters
-from mazebench.training.experience import Experience
 from mazebench.training.held_out import HeldOutEvaluation
 from mazebench.training.protocol import Learner, LearningAgent
-from mazebench.training.run_folder import RunFolder, read_counters
+from mazebench.training.run_folder import RunFolder, checkpoints, read_counters
 from mazebench.training.train_options import FIXED, TrainOptions
 
 # As many steps take less than a minute on two cores. They are counted, not timed, so that the same run writes the same
@@ -189,54 +188,45 @@ class TrainingLoop:
             self._train_until(self._counters.milestone_steps + self._options.checkpoint_steps)
             if not self._counters.is_milestone:
                 self._reach_milestone()
-            if self._is_over():
+            if self._share_done() >= 1.0:
                 return
 
     def _train_until(self, env_steps: int) -> None:
         # New trajectories, so that a run that is resumed from this milestone goes on as the unbroken one did.
-        self._widen()
         seeds = np.random.SeedSequence((self._options.seed, self._counters.env_steps))
         steps = self._collector.collect(self._actor, int(seeds.generate_state(1)[0]))
-        while self._counters.env_steps < env_steps and not self._is_over():
+        while self._counters.env_steps < env_steps and self._share_done() < 1.0:
             line_steps = self._counters.logged_steps + STEPS_BETWEEN_LINES
             if line_steps <= self._counters.env_steps < env_steps - STEPS_BETWEEN_LINES // 2:  # a milestone has a line
                 self._folder.log(self._counters, self._counters.mean_losses())
                 self._counters = self._counters.after_line()
-            self._learn_from(next(steps))
-            self._widen()
+            # Where goals are near in the beginning, they are farther as the run goes on.
+            if self._options.first_distance is not None:
+                longest = longest_distance(self._options, self._tasks, self._counters.env_steps)
+                if longest != self._longest:
+                    self._longest = longest
+                    self._collector.limit_distances(longest)
+
+            # A step in all environments, and the updates that are due after it.
+            experience = next(steps)
+            self._learner.observe(experience)
+            num_steps = self._counters.env_steps + len(experience.action)
+            self._counters = dataclasses.replace(self._counters, env_steps=num_steps)
+            for _ in range(num_updates_due(self._learner, num_steps) - self._counters.updates):
+                losses = self._learner.update()
+                self._counters = self._counters.after_update(losses)
+                for name, value in losses.items():
+                    if not math.isfinite(value):
+                        last = checkpoints(self._folder.path)[-1]
+                        raise TrainingError(
+                            f"{name} became {value} at update {self._counters.updates}; last good checkpoint: {last}"
+                        )
+
             self._progress(self._status())
-            if self._is_savepoint_due():
+            seconds = 60 * self._options.checkpoint_minutes
+            if seconds > 0 and (stopping.is_asked() or time.monotonic() >= self._saved_time + seconds):
                 self._save()
             stopping.check()
-
-    def _widen(self) -> None:
-        """Sends the agent farther as the run goes on, if goals are near in the beginning."""
-        if self._options.first_distance is None:
-            return
-        longest = longest_distance(self._options, self._tasks, self._counters.env_steps)
-        if longest != self._longest:
-            self._longest = longest
-            self._collector.limit_distances(longest)
-
-    def _learn_from(self, experience: Experience) -> None:
-        """Stores a step in all environments, and makes the updates due."""
-        self._learner.observe(experience)
-        self._counters = self._counters.after_steps(len(experience.action))
-        for _ in range(num_updates_due(self._learner, self._counters.env_steps) - self._counters.updates):
-            self._update()
-
-    def _update(self) -> None:
-        losses = self._learner.update()
-        self._counters = self._counters.after_update(losses)
-        for name, value in losses.items():
-            if not math.isfinite(value):
-                last = self._folder.checkpoints()[-1]
-                raise TrainingError(
-                    f"{name} became {value} at update {self._counters.updates}; last good checkpoint: {last}"
-                )
-
-    def _is_over(self) -> bool:
-        return self._share_done() >= 1.0
 
     def _share_done(self) -> float:
         """Returns the share of the time, or of the steps, that is up, from 0 to 1."""
@@ -248,10 +238,6 @@ class TrainingLoop:
     def _status(self, evaluated: tuple[int, int] | None = None) -> Status:
         speed = (self._counters.env_steps - self._first_steps) / (time.monotonic() - self._first_time)
         return Status(self._counters, self._share_done(), speed, evaluated)
-
-    def _is_savepoint_due(self) -> bool:
-        seconds = 60 * self._options.checkpoint_minutes
-        return seconds > 0 and (stopping.is_asked() or time.monotonic() >= self._saved_time + seconds)
 
     def _save(self) -> None:
         """Saves a checkpoint, unless the last one is of this very step."""
@@ -341,19 +327,16 @@ def _begin_or_resume(
     options: TrainOptions, folder: RunFolder, learner: Learner, tasks: Sequence[Task], resume: bool
 ) -> Counters:
     """Saves the first checkpoint of a new run, or loads the last one into `learner`; returns where the run is."""
-    config = _origin(options, tasks) | {
-        "checkpoint_steps": options.checkpoint_steps,
-        "agent_config": learner.config(),
-    }
-    checkpoints = folder.checkpoints()
-    if checkpoints and not resume:
+    saved = checkpoints(folder.path)
+    if saved and not resume:
         raise InputError(f"{folder.path}: holds a run already; go on with --resume or name another folder")
-    folder.check_config(config)
-    if not checkpoints:
+    settings = {"checkpoint_steps": options.checkpoint_steps, "agent_config": learner.config()}
+    folder.check_config(_origin(options, tasks) | settings)
+    if not saved:
         _save(options, folder, learner, tasks, Counters())
         return Counters()
-    counters = read_counters(checkpoints[-1])
-    learner.load(checkpoints[-1])
+    counters = read_counters(saved[-1])
+    learner.load(saved[-1])
     folder.forget_metrics_after(counters)
     return counters
 

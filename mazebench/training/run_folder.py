@@ -24,7 +24,6 @@ CONFIG = "config.json"
 METRICS = "metrics.jsonl"
 CHECKPOINTS = "checkpoints"
 _COUNTERS = "counters.json"
-_BOARD = "tensorboard"
 _CHECKPOINT_NAME = re.compile(r"[0-9]{12,}")  # agent steps; older checkpoints are deleted, so no other folder may match
 
 
@@ -57,10 +56,6 @@ class RunFolder:
             self._board.close()
         os.close(self._lock)
 
-    def checkpoints(self) -> list[pathlib.Path]:
-        """Returns the complete checkpoints, oldest first."""
-        return checkpoints(self.path)
-
     def save_checkpoint(self, counters: Counters, save: Callable[[pathlib.Path], None]) -> None:
         """Lets `save` fill a new checkpoint, which then takes its place at once; the last milestone is kept beside it.
 
@@ -77,7 +72,7 @@ class RunFolder:
         except OSError as error:
             shutil.rmtree(temporary, ignore_errors=True)
             raise self._cannot("save", final, error) from error
-        for checkpoint in self.checkpoints():
+        for checkpoint in checkpoints(self.path):
             if int(checkpoint.name) not in (counters.env_steps, counters.milestone_steps):
                 shutil.rmtree(checkpoint, ignore_errors=True)
 
@@ -97,7 +92,16 @@ class RunFolder:
             with (self.path / METRICS).open("a", encoding="utf-8") as file:
                 file.write(to_line(values))
             if self._board is None:
-                self._board = _open_board(self.path / _BOARD, counters.env_steps)
+                from tensorboardX import SummaryWriter
+
+                # What another run wrote of later steps will not be shown. Two commands may begin in one second, so the
+                # process's id is in the name.
+                self._board = SummaryWriter(
+                    str(self.path / "tensorboard"),
+                    purge_step=counters.env_steps,
+                    flush_secs=10,
+                    filename_suffix=f".{os.getpid()}",
+                )
             for name, value in values.items():
                 self._board.add_scalar(name, value, counters.env_steps)
         except OSError as error:
@@ -132,16 +136,8 @@ class RunFolder:
         return self.path / CHECKPOINTS / f"{counters.env_steps:012d}"
 
     def _cannot(self, do: str, what: pathlib.Path, error: OSError) -> RunError:
-        last = next(reversed(self.checkpoints()), "none yet")
+        last = next(reversed(checkpoints(self.path)), "none yet")
         return RunError(f"{what}: can't {do}: {error.strerror}; last checkpoint: {last}; go on with --resume")
-
-
-def _open_board(folder: pathlib.Path, step: int) -> Any:
-    """Returns a writer for TensorBoard, which will not show what another run wrote of steps from `step` on."""
-    from tensorboardX import SummaryWriter
-
-    # Two commands may begin in one second, so the process's id is in the name.
-    return SummaryWriter(str(folder), purge_step=step, flush_secs=10, filename_suffix=f".{os.getpid()}")
 
 
 def _lock(folder: pathlib.Path) -> int:
