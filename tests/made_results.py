@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 import pathlib
+import types
 from typing import Any
 
 import numpy as np
 
+from mazebench.evaluation.chunk import Result, to_record
 from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import load_mazes, manifest_hash
 from mazebench.maps.maze import cell_to_point, path_through_walls
-from mazebench.results.metrics import spl, summarize, summarize_facts
+from mazebench.results.metrics import summarize, summarize_facts
 from mazebench.results.played import mazes_hash
 from mazebench.results.reading import EPISODES, SUMMARY
 from mazebench.results.records import Record
@@ -77,17 +79,16 @@ def make_result(
     else:
         options = {"size": size, "distances": distances, "landmark_distance": landmark_distance, **levels}
     spec = resolve_for_evaluation(TaskOptions(task=task, split=split, **options))
-    trials, size = select_trials(spec, episodes_per_distance), spec.size
-    rng = np.random.default_rng([len(agent), size, landmark_distance, seed])
-    labels = {"agent": agent, "task": task, "size": size, "split": split}
-    labels |= {"level": level} if task in TRACKS else {}
+    trials = [each for each in select_trials(spec, episodes_per_distance) if each.episode.maze < num_mazes]
+    rng = np.random.default_rng([len(agent), spec.size, landmark_distance, seed])
+    plan = types.SimpleNamespace(options=types.SimpleNamespace(agent=agent), task=spec, trials=trials)
     records, drives = [], []
-    for trial in trials:
-        if trial.episode.maze < num_mazes:
-            success = bool(rng.random() < skill ** (trial.distance / 4))
-            drives.append(_drive(spec, trial, success, rng))
-            content = labels | _outcome(len(records), trial, spec, success, drives[-1]) | spec.options.perturbations
-            records.append(Record(**content))
+    for number, trial in enumerate(trials):
+        success = bool(rng.random() < skill ** (trial.distance / 4))
+        drives.append(_drive(spec, trial, success, rng))
+        driven = float(np.linalg.norm(np.diff(drives[-1].pose[:, :2].astype(float), axis=0), axis=1).sum())
+        result = Result(number, success, len(drives[-1].pose) - 1, driven, blocked=False, kept=())
+        records.append(to_record(plan, result))
     folder.mkdir(parents=True)
     (folder / EPISODES).write_text("".join(each.to_line() for each in records))
     if record:
@@ -188,25 +189,3 @@ def _drive(spec: Task, trial: Trial, success: bool, rng: np.random.Generator) ->
                 error(state)
         observed = states[:, [0, 1, 5]].astype(np.float32)
     return Trajectory(np.column_stack([place, heading]).astype(np.float32), observed)
-
-
-def _outcome(number: int, trial: Trial, spec: Task, success: bool, drive: Trajectory) -> dict[str, Any]:
-    driven = float(np.linalg.norm(np.diff(drive.pose[:, :2].astype(float), axis=0), axis=1).sum())
-    shortest = np.array([trial.shortest_path, float(trial.distance)])
-    scores = spl(np.array([success] * 2), shortest, np.array([driven] * 2)).tolist()
-    return {
-        "episode": number,
-        "maze": spec.mazes[trial.episode.maze].name,
-        "start": trial.episode.start,
-        "goal": trial.episode.goal,
-        "distance": trial.distance,
-        "success": success,
-        "steps": len(drive.pose) - 1,
-        "path_length": driven,
-        "shortest_path": trial.shortest_path,
-        "spl": scores[0],
-        "spl_grid": scores[1],
-        "seed": trial.episode.seed,
-        "leg": 1,
-        "oracle_steps": trial.oracle_steps,
-    }

@@ -15,7 +15,7 @@ from hypothesis import strategies
 from run_folders import FEW, files_of, results_of
 
 from mazebench.errors import InputError, RunError
-from mazebench.evaluation.chunk import Chunk, Result, run_chunk, to_record
+from mazebench.evaluation.chunk import Chunk, Result, run_chunk
 from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.plan import Plan, make_plan
@@ -58,17 +58,6 @@ def files_of_at_most(num_bytes: int) -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-
-
-def test_episodes_that_end_in_any_order_are_written_in_the_protocols(plan, episodes, summary, unbroken, tmp_path):
-    order = np.random.default_rng(0).permutation(40).tolist()
-    with Store(tmp_path / "run", plan, resume=False, record=True) as store:
-        for index in order:
-            store.append([episodes[index]])
-        assert store.missing == []
-        assert store.records == [to_record(plan, result) for result in episodes]
-        store.finish(store.records, summary)
-    assert files_of(tmp_path / "run") == files_of(unbroken)
 
 
 @hypothesis.settings(max_examples=12, deadline=None)

@@ -37,11 +37,8 @@ def test_a_summary_shows_the_papers_figure(capsys, task, figure):
     assert "the paper's MMN" in output
 
 
-def test_a_summary_of_other_landmarks_shows_no_figure(capsys):
-    print_summary(a_summary(task="hierarchical", landmark_distance=3))
-    assert "0.80" not in capsys.readouterr().out
-
-
-def test_a_privileged_agent_is_labelled(capsys):
-    print_summary(a_summary(privileged=True))
-    assert "mmn (privileged): local, eval mazes 13 x 13" in capsys.readouterr().out
+def test_a_summary_of_other_landmarks_shows_no_figure_and_a_privileged_agent_is_labelled(capsys):
+    print_summary(a_summary(task="hierarchical", landmark_distance=3, privileged=True))
+    output = capsys.readouterr().out
+    assert "0.80" not in output
+    assert "mmn (privileged): hierarchical, eval mazes 13 x 13" in output

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 from run_folders import FEW, FILES, RECORDED, records_of
-from simple_mazes import field
 
-from mazebench.agent import SingleAgent
 from mazebench.errors import InputError
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.maps.benchmark import load_mazes
@@ -48,13 +44,6 @@ def test_a_file_that_is_missing_or_damaged_is_named(tmp_path, content, said):
         load_trajectories(tmp_path / "x.npz")
 
 
-class Turning(SingleAgent):
-    """Turns left on the spot."""
-
-    def act(self, observation):
-        return 4
-
-
 class TestRecording:
     @pytest.mark.parametrize(
         ("agent", "options"),
@@ -88,23 +77,6 @@ class TestRecording:
             cosine, sine = np.cos(true[0, 2]), np.sin(true[0, 2])
             expected = (true - true[0])[:, :2] @ [[cosine, -sine], [sine, cosine]]
             np.testing.assert_allclose(observed[:, :2], expected, atol=0.02)
-
-    def test_yaw_follows_the_body(self, tmp_path):
-        evaluate(Turning, out=tmp_path, record=True, distances=(2,), episodes_per_distance=1)
-        yaw = load_trajectories(tmp_path / TRAJECTORIES)[0].pose[:, 2].astype(float)
-        turned = np.angle(np.exp(1j * np.diff(yaw)))
-        # To the left by 21.12 degrees a step, once it has got going.
-        np.testing.assert_allclose(np.degrees(turned[2:]), 21.12, atol=0.25)
-
-    def test_positions_in_a_large_maze_are_exact_to_a_millimetre(self, tmp_path):
-        maze = dataclasses.replace(field(71), cell_size=100.0)
-        options = {"start": (1, 69), "goal": (1, 68), "episodes_per_distance": 1, "time_limit": 5}
-        evaluate("random", out=tmp_path, record=True, mazes=maze, **options)
-        [trajectory] = load_trajectories(tmp_path / TRAJECTORIES)
-        [record] = records_of(tmp_path)
-        assert trajectory.pose[0, :2].tolist() == [6950, 6950]
-        driven = np.linalg.norm(np.diff(trajectory.pose[:, :2].astype(float), axis=0), axis=1).sum()
-        assert driven == pytest.approx(record["path_length"], abs=1e-3 * record["steps"])
 
     def test_records_are_the_same_without_trajectories(self, tmp_path):
         for name, record, files in (("with", True, RECORDED), ("without", False, FILES)):

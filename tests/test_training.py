@@ -9,7 +9,6 @@ import time
 
 import numpy as np
 import pytest
-import torch
 from acting import RandomActor
 from faults import TINY
 from simple_mazes import field
@@ -100,18 +99,6 @@ def test_a_second_training_in_the_folder_is_refused_while_the_first_writes(tmp_p
         assert not half_written.exists()
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"agent": "planner"}, "doesn't learn"),
-        ({"overrides": {"colour": "red"}}, "unknown config key 'colour'"),
-    ],
-)
-def test_wrong_option_is_refused(tmp_path, changes, message):
-    with pytest.raises(InputError, match=message):
-        train(**tiny_options(**{"env_steps": 100, **changes}), out=tmp_path / "run")
-
-
 def stopped(options, folder, wanted, resume=False):
     """Runs a training that is stopped with SIGTERM at its first status for which `wanted` holds."""
     is_stopped = False
@@ -197,17 +184,6 @@ def test_loss_that_is_not_finite_stops_the_run_with_the_last_checkpoint(tmp_path
         TrainingError, match=r"became (nan|inf|-inf) at update .*; last good checkpoint: .*000000000000"
     ):
         train(**tiny_options(env_steps=100_000, overrides=overrides), out=tmp_path)
-
-
-def test_training_leaves_pytorch_as_many_threads_as_it_had(tmp_path):
-    num_threads = torch.get_num_threads()
-    torch.set_num_threads(3)
-    try:
-        train(**tiny_options(env_steps=480), out=tmp_path)
-        assert metrics(tmp_path)[-1]["updates"]
-        assert torch.get_num_threads() == 3
-    finally:
-        torch.set_num_threads(num_threads)
 
 
 def test_minutes_limit_a_command(tmp_path):
