@@ -160,14 +160,6 @@ class _SingleAgents(Agent):
         built = cls.single_class.build(interface, seed=seed, checkpoint=checkpoint)
         return cls(built, np.zeros(interface.action_shape, dtype=np.int64))
 
-    @classmethod
-    def context_size(cls, size: int) -> int:
-        return cls.single_class.context_size(size)
-
-    @classmethod
-    def default_checkpoint(cls) -> pathlib.Path | None:
-        return cls.single_class.default_checkpoint()
-
     def initial_state(self, batch_size: int) -> list[SingleAgent]:
         return [self._built] * batch_size
 
@@ -196,6 +188,6 @@ def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
         return declared
     # Named as the class that it wraps, for messages and provenance.
     declarations = ("needs_truth", "needs_sensors", "needs_shown", "plays_actions", "learns")
-    names = ("__module__", "__qualname__", "__doc__", *declarations)
+    names = ("__module__", "__qualname__", "__doc__", *declarations, "context_size", "default_checkpoint")
     attributes = {name: getattr(declared, name) for name in names}
     return type(declared.__name__, (_SingleAgents,), attributes | {"single_class": declared})

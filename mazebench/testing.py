@@ -67,7 +67,7 @@ def check_agent(
         checked = checked_agent_class(name, agent_class)
     except InputError as error:
         raise ConformanceError(str(error)) from error
-    if task is None and not options:
+    if task is None:
         rng = np.random.default_rng(0)
         mazes = tuple(generate("dfs", _SIZE, rng, f"maze-{index}") for index in range(_NUM_MAZES))
         task = TaskOptions(task="hierarchical", mazes=mazes, time_limit=_TIME_LIMIT, landmark_distance=3)

@@ -15,8 +15,6 @@ from mazebench.options import Option, as_tuple, fields_of, options_in
 from mazebench.tasks.task import Task, resolve_for_evaluation
 from mazebench.tasks.task_options import TaskOptions
 
-_WORTH_WATCHING = 10  # cells from start to goal
-
 
 def takes_options(
     *options_classes: type, without: Iterable[str] = ()
@@ -38,8 +36,15 @@ def takes_options(
 
         @functools.wraps(command)
         def run(**chosen: Any) -> None:
-            values = {name: _to_value(name, option, chosen.pop(name)) for name, option in options.items()}
-            changed = {name: value for name, value in values.items() if value not in (None, options[name].default)}
+            changed = {}
+            for name, option in options.items():
+                value = chosen.pop(name)
+                if isinstance(value, enum.Enum):
+                    value = value.value
+                elif option.is_tuple and value is not None:
+                    value = parse_numbers(name, value) if option.plain_kind is int else as_tuple(value)
+                if value not in (None, option.default):
+                    changed[name] = value
             command(**chosen, values=changed)
 
         parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in [*kept, *added]]
@@ -51,16 +56,12 @@ def takes_options(
 
 
 def watched_task(values: Mapping[str, Any]) -> Task:
-    """Returns the task of an episode that is to be looked at, of 10 cells or near to that if no distance is chosen.
-
-    Raises:
-      InputError: if the values name no task.
-    """
+    """Returns the task of an episode that is to be looked at, of 10 cells or near to that if no distance is chosen."""
     asked = TaskOptions.of(options_in(values, TaskOptions))
     task = resolve_for_evaluation(asked)
     if asked.distances or asked.num_ends == 2 or asked.track is not None or asked.is_hierarchical:
         return task
-    return task.replace(distances=(min(task.distances, key=lambda distance: abs(distance - _WORTH_WATCHING)),))
+    return task.replace(distances=(min(task.distances, key=lambda distance: abs(distance - 10)),))
 
 
 def parse_numbers(name: str, text: str) -> tuple[int, ...]:
@@ -99,11 +100,3 @@ def _parameter(name: str, option: Option) -> inspect.Parameter:
     flags = ("--task", "--track") if name == "task" else ()
     annotation = Annotated[kind, typer.Option(*flags, help=option.help, metavar=metavar)]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
-
-
-def _to_value(name: str, option: Option, given: Any) -> Any:
-    if isinstance(given, enum.Enum):
-        return given.value
-    if not option.is_tuple or given is None:
-        return given
-    return parse_numbers(name, given) if option.plain_kind is int else as_tuple(given)

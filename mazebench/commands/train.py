@@ -39,7 +39,12 @@ def train(
     load_mujoco(renders=has_camera(values.get("sensors", ())))
     from mazebench.training import loop, run_folder
 
-    parsed = dict(map(_parse_override, overrides or []))
+    parsed = {}
+    for text in overrides or []:
+        key, equals, value = text.partition("=")
+        if not equals or not key:
+            raise InputError(f"expected --set KEY=VALUE, found {text!r}")
+        parsed[key.strip()] = value.strip()
     options = TrainOptions(agent=agent, **options_in(values, TrainOptions))
     folder = out or pathlib.Path("runs") / _folder_name(options, values)
 
@@ -64,10 +69,3 @@ def _folder_name(options: TrainOptions, values: dict[str, Any]) -> str:
     levels = map(str, values.get("level", (1,)))
     parts += [str(values.get("size", SIZES[0]))] if options.task == (LOCAL,) else [*options.task, *levels]
     return "-".join([*parts, str(options.seed)])
-
-
-def _parse_override(text: str) -> tuple[str, str]:
-    key, equals, value = text.partition("=")
-    if not equals or not key:
-        raise InputError(f"expected --set KEY=VALUE, found {text!r}")
-    return key.strip(), value.strip()

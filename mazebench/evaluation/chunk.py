@@ -216,14 +216,15 @@ def to_record(plan: Plan, result: Result) -> Record:
         "leg": 1,
         "oracle_steps": trial.oracle_steps,
     }
-    further: dict[str, Any] = {} if task.cell_size == 1 else {"cell_size": task.cell_size}
-    if task.track is not None:
-        further["level"] = task.options.track_level
-    noise = {"lidar_noise": task.options.lidar_noise, "odometry_noise": task.options.odometry_noise}
-    further |= {name: value for name, value in noise.items() if value is not None}
-    further |= task.options.perturbations
-    if task.track is not None:  # summaries report the episodes of each of these groups apart
-        further["blocked"] = result.blocked
-        if maze.kind:
-            further["kind"] = maze.kind
-    return Record.model_validate(values | further)
+    is_track = task.track is not None
+    optional = {
+        "cell_size": None if task.cell_size == 1 else task.cell_size,
+        "level": task.options.track_level if is_track else None,
+        "lidar_noise": task.options.lidar_noise,
+        "odometry_noise": task.options.odometry_noise,
+        **task.options.perturbations,
+        # Summaries report the episodes of each of these groups apart.
+        "blocked": result.blocked if is_track else None,
+        "kind": (maze.kind or None) if is_track else None,
+    }
+    return Record.model_validate(values | {name: value for name, value in optional.items() if value is not None})

@@ -34,7 +34,24 @@ class Cluster:
         """
         self._started = not ray.is_initialized()
         if self._started:
-            _connect(address)
+            handler, is_terminated = signal.getsignal(signal.SIGTERM), False
+            try:
+                parts = urllib.parse.urlsplit(address if "://" in address else f"//{address}")
+                if parts.port is not None:
+                    socket.create_connection((parts.hostname or "", parts.port), _SECONDS_TO_ANSWER).close()
+                ray.init(address=address, log_to_driver=False, include_dashboard=False)
+            except SystemExit:  # Ray's answer to SIGTERM
+                ray.shutdown()
+                is_terminated = True
+            except (OSError, ValueError, RuntimeError) as error:
+                reason = shortened(str(error), 200)
+                raise InputError(f"can't reach a Ray cluster at {address!r}: {reason}") from error
+            finally:
+                if signal.getsignal(signal.SIGTERM) is not handler:
+                    signal.signal(signal.SIGTERM, handler)  # Ray replaces the handler
+            if is_terminated:
+                signal.raise_signal(signal.SIGTERM)
+                stopping.check()
         self.num_workers = workers or max(1, int(ray.cluster_resources().get("CPU", 0)))
 
     def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Result]]:
@@ -67,28 +84,6 @@ class Cluster:
     def __exit__(self, *exception: object) -> None:
         if self._started:
             ray.shutdown()
-
-
-def _connect(address: str) -> None:
-    """Connects this process to the cluster at `address`, as `Cluster` does."""
-    handler, is_terminated = signal.getsignal(signal.SIGTERM), False
-    try:
-        parts = urllib.parse.urlsplit(address if "://" in address else f"//{address}")
-        if parts.port is not None:
-            socket.create_connection((parts.hostname or "", parts.port), _SECONDS_TO_ANSWER).close()
-        ray.init(address=address, log_to_driver=False, include_dashboard=False)
-    except SystemExit:  # Ray's answer to SIGTERM
-        ray.shutdown()
-        is_terminated = True
-    except (OSError, ValueError, RuntimeError) as error:
-        reason = shortened(str(error), 200)
-        raise InputError(f"can't reach a Ray cluster at {address!r}: {reason}") from error
-    finally:
-        if signal.getsignal(signal.SIGTERM) is not handler:
-            signal.signal(signal.SIGTERM, handler)  # Ray replaces the handler
-    if is_terminated:
-        signal.raise_signal(signal.SIGTERM)
-        stopping.check()
 
 
 def _first_line(error: object) -> str:

@@ -69,35 +69,31 @@ def collect_demonstrations(
             remark(plan.remark)
         shutil.rmtree(temporary, ignore_errors=True)
         try:
-            storage = _open_storage(temporary, plan)
+            # The observations of the data set have no context: it is in the infos, once for each leg.
+            task, space = plan.task, observation_space(plan.task)
+            del space.spaces["context"]
+            storage = MinariStorage.new(
+                temporary,
+                observation_space=space,
+                action_space=action_space(task),
+                env_spec=env_spec_of(task),
+                jpeg_encoding=False,  # which would change pictures
+            )
+            storage.update_metadata(
+                {
+                    "dataset_id": "mazebench/{}-v0".format(
+                        re.sub(r"[^-\w]", "-", f"{task.options.slug}-{options.agent}")
+                    ),
+                    "minari_version": minari.__version__,
+                    "algorithm_name": options.agent,
+                    "description": f"{task}, driven by {options.agent}",
+                    "requirements": [f"mazebench-mujoco=={__version__}"],
+                }
+            )
             storage.update_episodes(_play(plan, num_episodes, num_envs, progress))
             temporary.rename(folder)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
-
-
-def _open_storage(folder: pathlib.Path, plan: Plan) -> MinariStorage:
-    """Returns an empty data set, whose observations have no context: it is in the infos, once for each leg."""
-    task, agent = plan.task, plan.options.agent
-    space = observation_space(task)
-    del space.spaces["context"]
-    storage = MinariStorage.new(
-        folder,
-        observation_space=space,
-        action_space=action_space(task),
-        env_spec=env_spec_of(task),
-        jpeg_encoding=False,  # which would change pictures
-    )
-    storage.update_metadata(
-        {
-            "dataset_id": "mazebench/{}-v0".format(re.sub(r"[^-\w]", "-", f"{task.options.slug}-{agent}")),
-            "minari_version": minari.__version__,
-            "algorithm_name": agent,
-            "description": f"{task}, driven by {agent}",
-            "requirements": [f"mazebench-mujoco=={__version__}"],
-        }
-    )
-    return storage
 
 
 def _play(plan: Plan, num_episodes: int, num_envs: int, progress: Callable[[int, int], None]) -> list[EpisodeBuffer]:

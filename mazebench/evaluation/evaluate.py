@@ -106,11 +106,7 @@ def run_plan(
     suite: str | None = None,
     part: str | None = None,
 ) -> Summary:
-    """Runs what is left of a plan in `folder` and returns its summary; a finished run is not run again.
-
-    Raises:
-      InputError, RunError: as `evaluate`.
-    """
+    """Runs what is left of a plan in `folder` and returns its summary; a finished run is not run again."""
     num_trials, record = len(plan.trials), bool(run.record)
     if run.resume and is_finished(folder, record):
         check_same_run(folder, plan.identity)

@@ -104,11 +104,9 @@ class _Processes:
 def _begin_worker() -> None:
     """Leaves this worker one core, and makes it end with its parent."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # PyTorch reads it when it is imported, our kernels when they run
-    threading.Thread(target=_end_with_parent, daemon=True).start()
 
+    def end_with_parent() -> None:
+        multiprocessing.parent_process().join()  # type: ignore[union-attr]  # a worker has one
+        os._exit(1)
 
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
+    threading.Thread(target=end_with_parent, daemon=True).start()

@@ -108,8 +108,15 @@ def compare_results(a: Result, b: Result) -> PairedResults:
                 f"expected results of one {key.removesuffix('_in_results')} to compare, "
                 f"found {str(of_a)[:80]} in {a.folder} and {str(of_b)[:80]} in {b.folder}"
             )
-    if fault := _other_episode(a.records, b.records):
-        raise InputError(f"expected the same episodes in {a.folder} and {b.folder}, found {fault}")
+    same = f"expected the same episodes in {a.folder} and {b.folder}, found"
+    if len(a.records) != len(b.records):
+        raise InputError(f"{same} {len(a.records)} and {len(b.records)} of them")
+    for name in _SAME_EPISODE:
+        of_a, of_b = column(a.records, name), column(b.records, name)
+        differs = (of_a != of_b).reshape(len(of_a), -1).any(axis=1)
+        if differs.any():
+            first = int(differs.argmax())
+            raise InputError(f"{same} episode {first} with {name} {of_a[first].tolist()} and {of_b[first].tolist()}")
     ours, theirs = by_distance(a.records), by_distance(b.records)
     return PairedResults(
         overall=_compare(a.records, b.records),
@@ -174,16 +181,3 @@ def _who(summary: Summary, parts: list[str]) -> str:
     if task.track is not None:
         wrong.insert(0, f"track {task.title.replace(' ', ', level ')}")
     return summary.row + (f" ({', '.join(wrong)})" if wrong and parts == [""] else "")
-
-
-def _other_episode(a: Sequence[Record], b: Sequence[Record]) -> str | None:
-    """Returns what the first episode is in which the two differ, in words."""
-    if len(a) != len(b):
-        return f"{len(a)} and {len(b)} of them"
-    for name in _SAME_EPISODE:
-        ours, theirs = column(a, name), column(b, name)
-        differs = (ours != theirs).reshape(len(a), -1).any(axis=1)
-        if differs.any():
-            first = int(differs.argmax())
-            return f"episode {first} with {name} {ours[first].tolist()} and {theirs[first].tolist()}"
-    return None

@@ -68,11 +68,7 @@ def load_result(folder: pathlib.Path) -> Result:
 
 
 def read_suite(folder: pathlib.Path) -> Suite:
-    """Returns what a suite's folder says of its content.
-
-    Raises:
-      InputError: if it says nothing that makes sense.
-    """
+    """Returns what a suite's folder says of its content."""
     return _read_model(folder / SUITE, Suite, "a suite's parts and folders")
 
 

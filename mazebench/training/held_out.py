@@ -81,9 +81,5 @@ def _draw_maze(task: Task, kind: str, name: str, stream: np.random.SeedSequence)
 
 
 def _in_mazes(task: Task, *mazes: Maze) -> Task:
-    """Returns the same task in some mazes.
-
-    Raises:
-      InputError: if it can't be played in one of them.
-    """
+    """Returns the same task in some mazes; an `InputError` if it can't be played in one of them."""
     return task.replace(mazes=mazes, kinds=(), num_mazes=None, fresh=False, split=None)

@@ -126,7 +126,11 @@ def run_training(
     """Trains an agent in the tasks that `options` name, as `asked` says."""
     agent_class = load_agent_class(options.agent)
     if not issubclass(agent_class, LearningAgent):
-        raise InputError(f"agent {options.agent!r} doesn't learn; agents that do: {', '.join(_learning_agents())}")
+        learning = []
+        for name in agent_names():
+            with contextlib.suppress(InputError):  # of one whose dependencies are not installed
+                learning += [name] if issubclass(load_agent_class(name), LearningAgent) else []
+        raise InputError(f"agent {options.agent!r} doesn't learn; agents that do: {', '.join(learning)}")
     overrides = {name: str(value) for name, value in (overrides or {}).items()}
     if len(options.task) > 1 and not agent_class.learns_several_tasks:
         raise InputError(f"agent {options.agent!r}: learns one track at a time, found {', '.join(options.task)}")
@@ -139,7 +143,19 @@ def run_training(
     tasks = in_the_same_mazes(tasks)
     learner = agent_class.build_learner(tasks[0], seed=options.seed, overrides=overrides)
     with RunFolder(out) as folder:
-        counters = _begin_or_resume(options, folder, learner, tasks, resume)
+        # The first checkpoint of a new run is saved, or the last one is loaded.
+        saved, counters = checkpoints(out), Counters()
+        if saved and not resume:
+            raise InputError(f"{out}: holds a run already; go on with --resume or name another folder")
+        settings = {"checkpoint_steps": options.checkpoint_steps, "agent_config": learner.config()}
+        folder.check_config(_origin(options, tasks) | settings)
+        if saved:
+            counters = read_counters(saved[-1])
+            learner.load(saved[-1])
+            folder.forget_metrics_after(counters)
+        else:
+            _save(options, folder, learner, tasks, counters)
+
         if options.env_steps is not None and counters.env_steps >= options.env_steps and counters.is_milestone:
             _logger.info("%s: the run is finished, at %s steps", out, f"{counters.env_steps:,}")
             return
@@ -149,15 +165,6 @@ def run_training(
             _logger.info("nothing to resume in %s; starting a new run", out)
         _logger.info("%s: %s", options.agent, learner.description())
         TrainingLoop(options, folder, learner, tasks, held_out, counters, progress).run()
-
-
-def _learning_agents() -> list[str]:
-    """Returns the names of the installed agents that can be trained; loads all whose dependencies are installed."""
-    found = []
-    for name in agent_names():
-        with contextlib.suppress(InputError):
-            found += [name] if issubclass(load_agent_class(name), LearningAgent) else []
-    return found
 
 
 @dataclasses.dataclass
@@ -301,11 +308,7 @@ def longest_distance(options: TrainOptions, tasks: Sequence[Task], env_steps: in
 def training_task(
     agent: str, agent_class: type[LearningAgent], defaults: Mapping[str, Any], asked: TaskOptions
 ) -> Task:
-    """Returns the task of a training; `defaults` are the learner's, for what `asked` leaves open.
-
-    Raises:
-      InputError: if trainings don't have such a task, or it can't be played.
-    """
+    """Returns the task of a training; `defaults` are the learner's, for what `asked` leaves open."""
     check_names(defaults, TaskOptions)
     given = asked.changed()
     for name in FIXED:
@@ -321,24 +324,6 @@ def training_task(
     if task.cell_size != 1:
         raise InputError(f"expected mazes with cells of 1 m in a training, found {task.cell_size:g} m (--cell-size)")
     return task
-
-
-def _begin_or_resume(
-    options: TrainOptions, folder: RunFolder, learner: Learner, tasks: Sequence[Task], resume: bool
-) -> Counters:
-    """Saves the first checkpoint of a new run, or loads the last one into `learner`; returns where the run is."""
-    saved = checkpoints(folder.path)
-    if saved and not resume:
-        raise InputError(f"{folder.path}: holds a run already; go on with --resume or name another folder")
-    settings = {"checkpoint_steps": options.checkpoint_steps, "agent_config": learner.config()}
-    folder.check_config(_origin(options, tasks) | settings)
-    if not saved:
-        _save(options, folder, learner, tasks, Counters())
-        return Counters()
-    counters = read_counters(saved[-1])
-    learner.load(saved[-1])
-    folder.forget_metrics_after(counters)
-    return counters
 
 
 def _save(

@@ -116,11 +116,7 @@ class RunFolder:
                 file.write("".join(map(to_line, kept)).encode("utf-8"))
 
     def check_config(self, config: dict[str, Any]) -> None:
-        """Writes the config, or compares it with the one that the folder holds.
-
-        Raises:
-          InputError: if the folder holds a run of another config.
-        """
+        """Writes the config, or raises an `InputError` if the folder holds a run of another one."""
         path = self.path / CONFIG
         if not path.exists():
             with writing_to(self.path):
