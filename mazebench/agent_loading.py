@@ -66,7 +66,7 @@ def checked_agent_class(name: str, loaded: Any) -> type[Agent]:
     """
     if not isinstance(loaded, type) or not issubclass(loaded, (Agent, SingleAgent)):
         raise InputError(f"agent {name!r}: expected a subclass of mazebench.Agent or SingleAgent, found {loaded!r}")
-    return as_agent_class(loaded)
+    return as_agent_class(loaded)  # type: ignore[arg-type]  # of mypy, which takes its objects' hash
 
 
 def source_line(error: BaseException) -> str:

@@ -56,7 +56,12 @@ def rollout(
         begun = np.flatnonzero(new_episode)
         seed = seed.copy()
         seed[begun] = seeds(begun)
-        truth = _truth(envs, info) if needs_truth else None
+        truth = None
+        if needs_truth:  # where an environment rests, it is a maze without a goal
+            walls = np.stack([envs.task.mazes[episode.maze if episode else 0].walls for episode in envs.episodes])
+            pose = np.column_stack([info["position"], info["yaw"]]).astype(np.float64)
+            goals = [episode.goal if episode else (0, 0) for episode in envs.episodes]
+            truth = Truth(walls, pose, np.array(goals, dtype=np.int64))
         inputs = Inputs(observation, new_episode, info["is_first"], seed, truth, active)
 
         # A step. An environment whose episode ends in it takes the next one; without one, it is no longer active.
@@ -75,12 +80,3 @@ def agent_seed(run_seed: int, number: int) -> int:
     It reveals nothing of the episode, whose flips, warp and noise come from `Episode.seed`.
     """
     return int(np.random.SeedSequence([run_seed, number]).generate_state(1)[0])
-
-
-def _truth(envs: MazeVectorEnv, info: dict[str, Any]) -> Truth:
-    """Returns the truth of B environments; where one rests, it is a maze without a goal."""
-    mazes = envs.task.mazes
-    walls = np.stack([mazes[episode.maze if episode else 0].walls for episode in envs.episodes])
-    goals = [episode.goal if episode else (0, 0) for episode in envs.episodes]
-    pose = np.column_stack([info["position"], info["yaw"]]).astype(np.float64)
-    return Truth(walls, pose, np.array(goals, dtype=np.int64))

@@ -65,11 +65,7 @@ def watched_task(values: Mapping[str, Any]) -> Task:
 
 
 def parse_numbers(name: str, text: str) -> tuple[int, ...]:
-    """Returns sorted numbers from ranges and commas, as "1-5,8,10"; `name` is the option's, for messages.
-
-    Raises:
-      InputError: if `text` is anything else.
-    """
+    """Returns sorted numbers from ranges and commas, as "1-5,8,10"; `name` is the option's, for messages."""
     numbers: set[int] = set()
     for part in text.split(","):
         low, dash, high = part.strip().partition("-")

@@ -12,7 +12,6 @@ from mazebench.agent import Agent, Inputs
 from mazebench.agent_loading import source_line
 from mazebench.constants import DISCRETE, VELOCITIES
 from mazebench.errors import InputError, RunError, shortened
-from mazebench.maps.benchmark import SIZES
 
 
 class AgentError(RunError):
@@ -40,15 +39,6 @@ def context_size_of(name: str, agent_class: type[Agent], size: int) -> int:
         return int(agent_class.context_size(size))
 
 
-def only_context_size(name: str, agent_class: type[Agent], size: int) -> int | None:
-    """Returns the M that the agent `name` needs in mazes of all sizes; None if it depends on the size."""
-    try:
-        found = {context_size_of(name, agent_class, each) for each in (SIZES[0], SIZES[-1], size)}
-    except (InputError, RunError):  # not meant for mazes of all these sizes
-        return None
-    return found.pop() if len(found) == 1 else None
-
-
 class CheckedAgent(Agent):
     """An agent whose wrong answers are `AgentError`s, which call it `name`."""
 
@@ -68,7 +58,7 @@ class CheckedAgent(Agent):
             actions = np.asarray(actions)
         shape: tuple[int, ...] = (len(inputs.new_episode),)
         if self._kind in VELOCITIES:
-            names, kinds, largest = VELOCITIES[self._kind], "fiu", np.finfo(float).max
+            names, kinds, largest = VELOCITIES[self._kind], "fiu", float(np.finfo(float).max)
             shape += (len(names),)
             expected = f"velocities ({', '.join(names)}) of shape {shape}"
             legal, lowest = f"finite {expected}", -largest

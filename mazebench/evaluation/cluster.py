@@ -27,11 +27,7 @@ class Cluster:
     num_threads = 1
 
     def __init__(self, address: str, workers: int):
-        """Connects to the cluster at `address`; "local" starts one on this machine, "auto" finds one that runs here.
-
-        Raises:
-          InputError: if there is none.
-        """
+        """Connects to the cluster at `address`; "local" starts one on this machine, "auto" finds one that runs here."""
         self._started = not ray.is_initialized()
         if self._started:
             handler, is_terminated = signal.getsignal(signal.SIGTERM), False
@@ -55,12 +51,7 @@ class Cluster:
         self.num_workers = workers or max(1, int(ray.cluster_resources().get("CPU", 0)))
 
     def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Result]]:
-        """Yields the results of each chunk that has ended; Ray runs the chunk of a worker that died again.
-
-        Raises:
-          InputError, RunError: what a chunk raised.
-          RunError: if a chunk's workers died again and again.
-        """
+        """Yields the results of each chunk that has ended; Ray runs the chunk of a worker that died again."""
         task = ray.remote(num_cpus=1, max_retries=_MAX_RETRIES)(run_whole_chunk)
         waiting = list(chunks)
         running: list[Any] = []

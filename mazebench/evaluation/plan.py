@@ -12,9 +12,10 @@ from typing import Any
 from mazebench.agent import Agent
 from mazebench.agent_loading import load_agent_class
 from mazebench.errors import InputError, RunError, UnplayableError
-from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of, only_context_size
+from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of
 from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.provenance import provenance
+from mazebench.maps.benchmark import SIZES
 from mazebench.results.records import Provenance
 from mazebench.tasks.context import default_context_size
 from mazebench.tasks.task import Task, resolve_for_evaluation
@@ -99,10 +100,13 @@ def build_agent(options: EvalOptions, task: Task, agent_class: type[Agent]) -> C
     """
     interface = task.interface
     checkpoint = None if options.checkpoint is None else pathlib.Path(options.checkpoint)
-    only = only_context_size(options.agent, agent_class, interface.size)
-    if only is not None and only != interface.context_size:
+    try:
+        wanted = {context_size_of(options.agent, agent_class, size) for size in (SIZES[0], SIZES[-1], interface.size)}
+    except (InputError, RunError):  # not meant for mazes of all these sizes
+        wanted = set()
+    if len(wanted) == 1 and interface.context_size not in wanted:
         raise UnplayableError(
-            f"agent {options.agent!r}: its context_size() asks for maps of {_square(only)} only; the track "
+            f"agent {options.agent!r}: its context_size() asks for maps of {_square(wanted.pop())} only; the track "
             f"{task.track!r} shows {_square(interface.context_size)}"
         )
     if needed := [name for name in agent_class.needs_shown if name in interface.hidden]:

@@ -141,11 +141,8 @@ class Store:
 
 def _from_line(line: dict[str, Any]) -> tuple[Record, Trajectory | None]:
     record = Record.model_validate_json(json.dumps(line["record"]))  # lists are tuples in JSON only
-    if not line["trajectory"]:
-        return record, None
-    pose, observed = (None if poses is None else np.array(poses, dtype=np.float32) for poses in line["trajectory"])
-    assert pose is not None
-    return record, Trajectory(pose, observed)
+    poses = [None if each is None else np.array(each, dtype=np.float32) for each in line["trajectory"]]
+    return record, Trajectory(*poses) if poses else None  # type: ignore[arg-type]  # the true poses are there
 
 
 def _to_line(record: Record, trajectory: Trajectory | None) -> str:

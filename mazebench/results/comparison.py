@@ -71,18 +71,17 @@ def compare_folders(a: pathlib.Path, b: pathlib.Path) -> Comparison:
     a_parts, b_parts = find_parts(a), find_parts(b)
     common = [name for name in a_parts if name in b_parts]
     if not common:
-        raise InputError(
-            f"expected results of the same parts, found {_named(a_parts)} in {a} and {_named(b_parts)} in {b}"
-        )
+        ours, theirs = (", ".join(name or "a single evaluation" for name in parts) for parts in (a_parts, b_parts))
+        raise InputError(f"expected results of the same parts, found {ours} in {a} and {theirs} in {b}")
     notes = [
         f"{folder}: {', '.join(only)} not in the other folder; left out"
         for folder, parts in ((a, a_parts), (b, b_parts))
         if (only := [name for name in parts if name not in common])
     ]
     pairs = {name: (load_result(a_parts[name]), load_result(b_parts[name])) for name in common}
-    ours, theirs = (result.summary for result in pairs[common[0]])
-    task = ours.task
-    title = f"A is {_who(ours, common)} in {a}, B is {_who(theirs, common)} in {b}"
+    first, second = (result.summary for result in pairs[common[0]])
+    task = first.task
+    title = f"A is {_who(first, common)} in {a}, B is {_who(second, common)} in {b}"
     title += f"; {task.title}, {task.split_in_results} mazes {task.size} x {task.size}" if common == [""] else ""
     return Comparison(
         title=title,
@@ -168,10 +167,6 @@ def _row_to_json(row: Row) -> dict[str, Any]:
         content |= {f"{metric}_difference_ci95": [difference.low, difference.high]}
     win_share = row.win_share
     return content | {"win_share": win_share.value, "win_share_ci95": [win_share.low, win_share.high]}
-
-
-def _named(parts: dict[str, pathlib.Path]) -> str:
-    return ", ".join(name or "a single evaluation" for name in parts)
 
 
 def _who(summary: Summary, parts: list[str]) -> str:

@@ -29,11 +29,7 @@ class Trajectory(NamedTuple):
 
 
 def load_trajectories(path: pathlib.Path) -> list[Trajectory]:
-    """Returns the trajectories of an evaluation.
-
-    Raises:
-      InputError: if the file can't be read or is damaged.
-    """
+    """Returns the trajectories of an evaluation."""
     arrays = read_arrays(path, "file of trajectories")
     try:
         ends = np.cumsum(arrays["length"])[:-1]

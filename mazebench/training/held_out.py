@@ -29,11 +29,7 @@ class HeldOutEvaluation:
     """
 
     def __init__(self, task: Task, num_mazes: int, distances: Sequence[int] = ()):
-        """Draws the mazes; the goals are at five of the `distances`, or of those of the task's track.
-
-        Raises:
-          InputError: if no such mazes are found.
-        """
+        """Draws the mazes; the goals are at five of the `distances`, or of those of the task's track."""
         mazes = task.mazes
         all_kinds = mazes.kinds if isinstance(mazes, FreshMazes) else (maze.kind for maze in mazes if maze.kind)
         kinds = tuple(dict.fromkeys(all_kinds))  # each once; mazes of one's own have none

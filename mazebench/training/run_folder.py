@@ -43,7 +43,15 @@ class RunFolder:
         if CONFIG not in found and set(found) - {f"{CONFIG}.tmp", CHECKPOINTS}:
             raise InputError(f"{self.path}: expected an empty folder or a training run's, found {found[0]!r} in it")
         make_folder(self.path / CHECKPOINTS)
-        self._lock = _lock(self.path / CHECKPOINTS)
+        # Other trainings are kept out until this descriptor is closed, or its process ends.
+        self._lock = os.open(path / CHECKPOINTS, os.O_RDONLY)
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            os.close(self._lock)
+            raise InputError(f"{path}: another training writes there; end it, or name another folder") from error
+        except OSError:  # a file system without locks
+            pass
         for half_written in (self.path / CHECKPOINTS).glob("*.tmp"):
             if _CHECKPOINT_NAME.fullmatch(half_written.stem):
                 shutil.rmtree(half_written, ignore_errors=True)
@@ -134,19 +142,6 @@ class RunFolder:
     def _cannot(self, do: str, what: pathlib.Path, error: OSError) -> RunError:
         last = next(reversed(checkpoints(self.path)), "none yet")
         return RunError(f"{what}: can't {do}: {error.strerror}; last checkpoint: {last}; go on with --resume")
-
-
-def _lock(folder: pathlib.Path) -> int:
-    """Returns a descriptor that keeps other trainings out of a folder until it is closed, or its process ends."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        os.close(descriptor)
-        raise InputError(f"{folder.parent}: another training writes there; end it, or name another folder") from error
-    except OSError:  # a file system without locks
-        pass
-    return descriptor
 
 
 def checkpoints(path: pathlib.Path) -> list[pathlib.Path]:
