@@ -57,18 +57,18 @@ class CheckedAgent(Agent):
             actions, state = self._agent.act(inputs, state, explore)
             actions = np.asarray(actions)
         shape: tuple[int, ...] = (len(inputs.new_episode),)
-        if self._kind in VELOCITIES:
-            names, kinds, largest = VELOCITIES[self._kind], "fiu", float(np.finfo(float).max)
+        names = VELOCITIES.get(self._kind, ())
+        if names:
             shape += (len(names),)
             expected = f"velocities ({', '.join(names)}) of shape {shape}"
-            legal, lowest = f"finite {expected}", -largest
+            kinds, legal = "fiu", f"finite {expected}"
         else:
-            kinds, lowest, largest = "iu", 0, len(DISCRETE[self._kind]) - 1
-            expected, legal = f"{shape[0]} integer actions", f"actions from 0 to {largest}"
+            last = len(DISCRETE[self._kind]) - 1
+            expected, kinds, legal = f"{shape[0]} integer actions", "iu", f"actions from 0 to {last}"
         if actions.shape != shape or actions.dtype.kind not in kinds:
             found = f"{actions.dtype} of shape {actions.shape}"
             raise AgentError(f"agent {self.name!r}: expected {expected} from act(), found {found}")
-        illegal = actions[~((actions >= lowest) & (actions <= largest))]
+        illegal = actions[~np.isfinite(actions) if names else (actions < 0) | (actions > last)]
         if len(illegal):
             raise AgentError(f"agent {self.name!r}: expected {legal} from act(), found {illegal[0]}")
         return actions, state
