@@ -72,17 +72,13 @@ class Expert:
         for slot, course in enumerate(zip(maze.tolist(), goal.tolist(), strict=True)):
             if self._courses[slot] != course:
                 self._courses[slot] = course
-                self._make_course(slot, *course)
+                walls = np.asarray(self._mazes[course[0]].walls)
+                made = make_course(walls, self._mazes[course[0]].cell_size, divmod(course[1], len(walls)))
+                of_course = made.walls, made.way_left, np.array([made.goal_x, made.goal_y])
+                if not self._arrays:
+                    self._arrays = tuple(np.zeros((len(goal), *array.shape), array.dtype) for array in of_course)
+                for arrays, array in zip(self._arrays, of_course, strict=True):
+                    arrays[slot] = array
         walls, way_left, goals = self._arrays
         cell_size = self._mazes[0].cell_size
         return costs_of_actions(walls, way_left, goals, cell_size, pose, velocity)
-
-    def _make_course(self, slot: int, maze: int, goal: int) -> None:
-        walls = np.asarray(self._mazes[maze].walls)
-        course = make_course(walls, self._mazes[maze].cell_size, divmod(goal, len(walls)))
-        of_course = course.walls, course.way_left, np.array([course.goal_x, course.goal_y])
-        if not self._arrays:
-            num_envs = len(self._courses)
-            self._arrays = tuple(np.zeros((num_envs, *array.shape), array.dtype) for array in of_course)
-        for arrays, array in zip(self._arrays, of_course, strict=True):
-            arrays[slot] = array

@@ -9,11 +9,10 @@ import torch
 from acting import RandomActor, inputs_of
 from mazebench_agents.common.layers import NUM_PLACE, MapEncoder, marked_position
 from mazebench_agents.mmn import MMN
-from mazebench_agents.mmn.batches import make_batch
 from mazebench_agents.mmn.hypermodel import _FAR, MMNNetwork, WayReader
 from mazebench_agents.mmn.losses import unrolled_losses
 from mazebench_agents.mmn.mmn_config import MMNConfig
-from mazebench_agents.mmn.targets import Targets
+from mazebench_agents.mmn.targets import Targets, make_batch
 from small_world import learn
 
 from mazebench.agent import Interface

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 from mazebench_agents.mmn import MMN
-from mazebench_agents.mmn.hypermodel import rows_of
+from mazebench_agents.mmn.hypermodel import Code
 from mazebench_agents.mmn.kernel_model import kernel_model, step, weights_of
 from mazebench_agents.mmn.search_policy import torch_model
 from mazebench_agents.muzero.search import gumbel_muzero_policy
@@ -81,7 +81,7 @@ def test_search_of_a_root_does_not_depend_on_the_other_roots_nor_on_their_number
     together = gumbel_muzero_policy(*kernel_model(network, latent, code), 6, np.zeros((256, 6)))
     for size in (1, 2, 3, 7, 64, 256):
         rows = torch.randperm(256, generator=torch.Generator().manual_seed(size))[:size]
-        alone = kernel_model(network, latent[rows], rows_of(code, rows))
+        alone = kernel_model(network, latent[rows], Code(*(part[rows] for part in code)))
         for found, expected in zip(gumbel_muzero_policy(*alone, 6, np.zeros((size, 6))), together, strict=True):
             np.testing.assert_array_equal(found, expected[rows.numpy()])
 

@@ -5,11 +5,10 @@ import math
 
 import pytest
 import torch
-from mazebench_agents.mmn.batches import Batch
 from mazebench_agents.mmn.hypermodel import MMNNetwork
 from mazebench_agents.mmn.losses import q_losses, two_hot, unrolled_losses
 from mazebench_agents.mmn.mmn_config import MMNConfig
-from mazebench_agents.mmn.targets import Targets, n_step_returns
+from mazebench_agents.mmn.targets import Batch, Targets, n_step_returns
 
 NEVER = torch.zeros(4, dtype=torch.bool)
 ALL = torch.ones(4, dtype=torch.bool)

@@ -160,9 +160,9 @@ def check_group(reference: Reference, hindsight: Hindsight, sample: Any, g: int,
     # The goal is the leg's, or was reached by the drawn row's trajectory; all steps lie a window before some end.
     ahead = reference.after(drawn.x, WINDOW)
     if hindsight.ratio:
-        ends = [row for row in ahead[1:] or ahead if row.cell == sample.goal[g]]
+        ends = [row for row in ahead[1:] or ahead if row.cell == sample.contexts.goal[g]]
     else:
-        assert sample.goal[g] == drawn.goal
+        assert sample.contexts.goal[g] == drawn.goal
         ends = [ahead[: WINDOW // 2 + 1][-1]]
     position = [reference.where[row.x][1] for row in rows]
     assert any(
@@ -175,12 +175,12 @@ def check_group(reference: Reference, hindsight: Hindsight, sample: Any, g: int,
     # Where the context starts, and from where displacements are measured.
     earliest = rows[int(np.argmin(position))]
     moves = hindsight.relabel_start and hindsight.ratio
-    assert sample.start[g] == (earliest.cell if moves else drawn.start)
+    assert sample.contexts.start[g] == (earliest.cell if moves else drawn.start)
     begin = drawn.trajectory or drawn
     origin = begin if hindsight.keep_anchor else earliest if moves else drawn.leg or drawn
-    assert sample.origin[g].tolist() == [origin.x, 0]
-    assert sample.maze[g] == drawn.maze
-    assert tuple(sample.shown[g].ravel().tolist()) == drawn.walls
+    assert sample.contexts.origin[g].tolist() == [origin.x, 0]
+    assert sample.contexts.maze[g] == drawn.maze
+    assert tuple(sample.contexts.shown[g].ravel().tolist()) == drawn.walls
 
 
 @settings(max_examples=60, deadline=None)
@@ -193,7 +193,7 @@ def test_a_sample_is_what_the_trajectories_say(both, hindsight, n, seed):
     sample = replay.sample(8, 3, n, hindsight=hindsight, rng=np.random.default_rng(seed))
     xs = sample.state[..., 0].astype(int)
     for g, k in np.ndindex(8, 3):
-        x, goal = int(xs[g, k]), int(sample.goal[g])
+        x, goal = int(xs[g, k]), int(sample.contexts.goal[g])
         check_group(reference, hindsight, sample, g, xs[g])
         env, position = reference.where[x]
         row = reference.rows[env][position]
@@ -218,8 +218,8 @@ def test_sequences_are_what_the_trajectories_say(both, hindsight, num_steps, see
         check_group(reference, hindsight, sample, g, xs[g, :, 0])
         env, position = reference.where[int(xs[g, 0, 0])]
         drawn = reference.rows[env][position]
-        anchor = (drawn.trajectory or drawn).cell if hindsight.keep_anchor else sample.start[g]
-        assert sample.anchor[g] == anchor
+        anchor = (drawn.trajectory or drawn).cell if hindsight.keep_anchor else sample.contexts.start[g]
+        assert sample.contexts.anchor[g] == anchor
         for s in range(2):
             rows = reference.after(int(xs[g, s, 0]), num_steps)
             exists = sample.exists[g, s]
@@ -283,5 +283,4 @@ def test_saved_and_loaded_replay_samples_the_same(tmp_path):
     samples = [
         each.sample(16, 4, 3, hindsight=ALWAYS, rng=np.random.default_rng(3), beta=0.4) for each in (replay, loaded)
     ]
-    for mine, theirs in zip(*samples, strict=True):
-        np.testing.assert_array_equal(mine, theirs)
+    np.testing.assert_equal(*samples)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mazebench_agents.robot import beams
 from mazebench_agents.robot.map_matching import MapBelief, orientations
-from mazebench_agents.robot.occupancy import Occupancy
+from mazebench_agents.robot.occupancy import SURE, posterior, seen_walls
 from mazebench_agents.robot.tracking import Tracker, aligned
 
 from mazebench.maps.kinds import generate
@@ -82,9 +82,9 @@ class TestBeams:
 
 def seen(pose: tuple[float, float, float], ranges: list[float], size: int, lost: float = 0.0) -> np.ndarray:
     """`[N, N]` float: the evidence of a scan."""
-    occupancy = Occupancy.unseen(size)
-    occupancy.see(pose, np.array(ranges), beams.beams_of(LidarModel(lost=lost), 1.0), 0.01)
-    return occupancy.evidence
+    evidence = np.zeros((size, size))
+    beams.add_scan(evidence, *pose, np.array(ranges), beams.beams_of(LidarModel(lost=lost), 1.0), 0.01)
+    return evidence
 
 
 class TestOccupancy:
@@ -109,21 +109,21 @@ class TestOccupancy:
         num_seen = num_wrong = 0
         for _ in range(5):
             maze = Maze(generate(kind, 13, rng).walls)
-            occupancy = Occupancy.unseen(13)
+            evidence = np.zeros((13, 13))
             for pose in poses_in(maze, 40, rng):
-                occupancy.see(tuple(pose.tolist()), scan(maze, pose, model, rng), beams.beams_of(model, 1.0), 0.01)
-            is_seen = occupancy.is_seen()
+                beams.add_scan(evidence, *pose, scan(maze, pose, model, rng), beams.beams_of(model, 1.0), 0.01)
+            is_seen = np.abs(evidence) >= SURE
             num_seen += is_seen.sum()
-            num_wrong += ((occupancy.evidence > 0) != maze.walls)[is_seen].sum()
+            num_wrong += ((evidence > 0) != maze.walls)[is_seen].sum()
         assert num_seen > 5 * 80
         assert num_wrong <= 0.005 * num_seen
 
     def test_a_map_that_proved_wrong_is_believed_less(self):
-        occupancy, prior = Occupancy.unseen(4), np.full((4, 4), 0.1)
-        occupancy.evidence[:2] = 8.0  # eight walls where the map shows none
-        assert occupancy.walls(prior)[3, 3] > 0.4
-        occupancy.evidence[:2] = -8.0
-        assert occupancy.walls(prior)[3, 3] < 0.1
+        evidence, prior = np.zeros((4, 4)), np.full((4, 4), 0.1)
+        evidence[:2] = 8.0  # eight walls where the map shows none
+        assert posterior(prior, evidence)[3, 3] > 0.4
+        evidence[:2] = -8.0
+        assert posterior(prior, evidence)[3, 3] < 0.1
 
 
 class TestTracking:
@@ -144,7 +144,7 @@ class TestTracking:
         maze, model = Maze(generate(kind, 31, rng).walls), beams.beams_of(TURTLEBOT3, 1.0)
         errors = [NoisyMotion(noise, rng)] * (noise > 0) + [Odometry(rng, scale)]
         poses = tour(maze, 60, rng)
-        occupancy, tracker = Occupancy.unseen(61), None
+        evidence, tracker = np.zeros((61, 61)), None
         for before, pose in zip([poses[0], *poses], poses, strict=False):
             state = np.zeros(12)
             state[[0, 1, 5]] = pose
@@ -159,8 +159,8 @@ class TestTracking:
                 step = (complex(*pose[:2]) - complex(*before[:2])) * np.exp(1j * turned)
                 x, y = tracker.pose[:2] + np.array([step.real, step.imag]) + rng.normal(0, 0.07, 2)
                 commanded = np.array([x, y, tracker.pose[2] + pose[2] - before[2]])
-                tracker.update(occupancy.seen_walls(), odometry, commanded, ranges, model)
-            occupancy.see(tuple(tracker.pose.tolist()), ranges, model, 0.03)
+                tracker.update(seen_walls(evidence), odometry, commanded, ranges, model)
+            beams.add_scan(evidence, *tracker.pose, ranges, model, 0.03)
         way = (complex(*poses[-1][:2]) - complex(*poses[0][:2])) * np.exp(1j * turned)
         assert abs(complex(*tracker.pose[:2]) - complex(30.5, 30.5) - way) < 0.15
         assert abs(wrap_angle(tracker.pose[2] - poses[-1][2] - turned)) < math.radians(5)
@@ -191,7 +191,7 @@ class TestMapBelief:
             nearby = np.argwhere(np.abs(np.indices(walls.shape) - start[:, None, None]).max(axis=0) < 6)
             cells = np.array([start, *nearby])
             shown = walls ^ (rng.random(walls.shape) < 0.05)
-            belief = MapBelief.begin(shown.astype(float), only((1, 1), 31), num_turns, ~shown / (~shown).sum(), 61)
+            belief = MapBelief(shown.astype(float), only((1, 1), 31), num_turns, ~shown / (~shown).sum(), 61)
             turn = int(rng.integers(4))
             assert belief.update(self.evidence(walls, cells, turn, 61), only((30, 30), 61) > 0)
             best = belief.placements[belief.weights.argmax()]
@@ -205,12 +205,12 @@ class TestMapBelief:
         walls, goal = np.ones((5, 5)), only((1, 1), 5)
         walls[1:4, 1:4] = 0.0
         walls[1, 2] = 1.0
-        belief = MapBelief.begin(walls, goal, 4, None, 5)
+        belief = MapBelief(walls, goal, 4, None, 5)
         mixed, goals = belief.mixture()
         assert [mixed[cell] for cell in ((1, 2), (2, 1), (3, 2), (2, 3), (2, 2))] == [0.25] * 4 + [0.0]
         assert goals[1, 1] == goals[3, 3] == 0.25
 
     def test_a_goal_that_was_passed_counts_against_a_hypothesis(self):
-        belief = MapBelief.begin(np.full((5, 5), 0.5), only((1, 1), 5), 4, None, 5)
+        belief = MapBelief(np.full((5, 5), 0.5), only((1, 1), 5), 4, None, 5)
         assert belief.update(np.zeros((5, 5)), only((1, 1), 5) > 0)
         assert belief.weights[0] < 1e-3

@@ -57,14 +57,7 @@ class NetworkAgent(LearningAgent):
     trained_size: int  # M of the contexts that the network was made for
 
     def __init__(self, config: Any, context_size: int, seed: int = 0, device: str = "cpu"):
-        """Makes an agent with a new network.
-
-        Args:
-          config: of the type of `default_config`.
-          context_size: M of the contexts that the network is made for.
-          seed: of the network's parameters, and of exploration.
-          device: of the network.
-        """
+        """Makes an agent with a new network for contexts of M x M; `seed` is also that of exploration."""
         self.config = config
         self.trained_size = context_size
         with torch.random.fork_rng(devices=[]):

@@ -21,11 +21,10 @@ class Descent:
         target_rate: float | None = None,
         rate: Callable[[int], float] | None = None,
     ):
-        """Makes the target network, if there is one, equal to `network`.
+        """Makes the target network, if there is one, equal to `network`, the torch.nn.Module that learns.
 
         Args:
-          network: the torch.nn.Module that learns.
-          optimizer: Adam or AdamW, of the network's parameters.
+          network, optimizer: Adam or AdamW, of the network's parameters.
           max_gradient_norm: to which a longer gradient is shortened.
           target_rate: of the moving average, a step; None for no target network.
           rate: returns the factor of the learning rate at a step, the first one being 1; None if it never falls. A

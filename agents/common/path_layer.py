@@ -54,13 +54,7 @@ class CheapestWays(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, cost: torch.Tensor, end: torch.Tensor) -> torch.Tensor:
-        """Returns u `[G, L, L]` float32.
-
-        Args:
-          ctx: keeps the trees for `backward`.
-          cost: `[G, L, L]` float32, more than 0, of entering each cell.
-          end: `[G, L, L]` float32, of ending in each cell; `FAR` where none of the goals is.
-        """
+        """Returns u `[G, L, L]` float32, of costs more than 0 and of ends; they are `FAR` where no goal is."""
         least, before, order = _cheapest_ways(cost.detach().cpu().numpy(), end.detach().cpu().numpy())
         ctx.before, ctx.order = before, order
         return torch.from_numpy(least).to(cost.device)

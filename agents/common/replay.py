@@ -39,38 +39,40 @@ _ROW = np.dtype(
 )
 
 
-class Sample(NamedTuple):
-    """G groups of K steps; the steps of a group share one context, so it is encoded once for all of them."""
-
-    row: np.ndarray  # [G] int, the rows whose priorities the groups were drawn by
-    weight: np.ndarray  # [G] float32, importance weights, at most 1
-    maze: np.ndarray  # [G] int
-    start: np.ndarray  # [G] int, cell
-    goal: np.ndarray  # [G] int, cell
-    origin: np.ndarray  # [G, 2] float32, x and y observed where the context's leg started
-    cell: np.ndarray  # [G, K] int, the body's true cell at `state`
-    state: np.ndarray  # [G, K, 12] float32
-    action: np.ndarray  # [G, K] int
-    reward: np.ndarray  # [G, K] float32, the sum of up to n rewards towards `goal`
-    discount: np.ndarray  # [G, K] float32, of `next_state`: 0 where the goal was reached within the n steps, else 1
-    next_state: np.ndarray  # [G, K, 12] float32, after up to n steps; a trajectory's last one where it ends before
-    valid: np.ndarray  # [G, K] bool, whether the step was taken outside of the goal
-    shown: np.ndarray | None  # [G, N, N] bool, walls on the shown maps; None unless the replay keeps them
-
-
-class SequenceSample(NamedTuple):
-    """G groups of S sequences of L steps and so L + 1 states; the sequences of a group share one context."""
+class Contexts(NamedTuple):
+    """The contexts of G groups; the steps of a group share one, so that it is encoded once for all of them."""
 
     maze: np.ndarray  # [G] int
     start: np.ndarray  # [G] int, cell
     goal: np.ndarray  # [G] int, cell
     anchor: np.ndarray  # [G] int, the cell where `origin` was observed
     origin: np.ndarray  # [G, 2] float32, x and y observed where the context's leg started, or the trajectory
+    shown: np.ndarray | None  # [G, N, N] bool, walls on the shown maps; None unless the replay keeps them
+
+
+class Sample(NamedTuple):
+    """G groups of K steps."""
+
+    row: np.ndarray  # [G] int, the rows whose priorities the groups were drawn by
+    weight: np.ndarray  # [G] float32, importance weights, at most 1
+    contexts: Contexts
+    cell: np.ndarray  # [G, K] int, the body's true cell at `state`
+    state: np.ndarray  # [G, K, 12] float32
+    action: np.ndarray  # [G, K] int
+    reward: np.ndarray  # [G, K] float32, the sum of up to n rewards towards the context's goal
+    discount: np.ndarray  # [G, K] float32, of `next_state`: 0 where the goal was reached within the n steps, else 1
+    next_state: np.ndarray  # [G, K, 12] float32, after up to n steps; a trajectory's last one where it ends before
+    valid: np.ndarray  # [G, K] bool, whether the step was taken outside of the goal
+
+
+class SequenceSample(NamedTuple):
+    """G groups of S sequences of L steps and so L + 1 states."""
+
+    contexts: Contexts
     state: np.ndarray  # [G, S, L + 1, 12] float32
     cell: np.ndarray  # [G, S, L + 1] int, the body's true cell at `state`
     action: np.ndarray  # [G, S, L] int, taken in the first L states
     exists: np.ndarray  # [G, S, L + 1] bool, whether the trajectory goes as far; then its last state is repeated
-    shown: np.ndarray | None  # [G, N, N] bool, walls on the shown maps; None unless the replay keeps them
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,19 +84,6 @@ class Hindsight:
     window: int = 60  # steps; a goal lies at most as far ahead, and a group's steps at most as far before the goal
     relabel_start: bool = False  # whether the context's start becomes the cell of the group's first step
     keep_anchor: bool = False  # whether displacements are measured from the trajectory's start, not from the leg's
-
-
-class _Groups(NamedTuple):
-    """The rows of a sample's groups and their contexts: see `Sample`."""
-
-    row: np.ndarray  # [G]
-    env: np.ndarray  # [G]
-    steps: np.ndarray  # [G, K], indices in the ring
-    maze: np.ndarray  # [G]
-    start: np.ndarray  # [G]
-    goal: np.ndarray  # [G]
-    anchor: np.ndarray  # [G]
-    origin: np.ndarray  # [G, 2]
 
 
 class Replay:
@@ -211,17 +200,14 @@ class Replay:
           rng: the source of all draws.
           beta: exponent of the importance weights, 0 for none (Schaul et al. 2016).
         """
-        group = self._draw_groups(num_groups, num_steps, hindsight, rng)
-        env, steps, goal = group.env[:, None], group.steps, group.goal[:, None]
+        row, steps, contexts = self._draw_groups(num_groups, num_steps, hindsight, rng)
+        env, goal = row[:, None] // self._length, contexts.goal[:, None]
         total, discount, last = self._returns(env, steps, goal, n)
-        rows = self._rows[env, steps]
+        rows, priority = self._rows[env, steps], self._tree.priorities(row)
         return Sample(
-            row=group.row,
-            weight=self._weights(group.row, beta),
-            maze=group.maze,
-            start=group.start,
-            goal=group.goal,
-            origin=group.origin,
+            row=row,
+            weight=((priority.min() / priority) ** beta).astype(np.float32),
+            contexts=contexts,
             cell=rows["cell"].astype(np.int64),
             state=rows["state"],
             action=rows["action"].astype(np.int64),
@@ -229,7 +215,6 @@ class Replay:
             discount=discount,
             next_state=self._rows["state"][env, last],
             valid=(rows["cell"] != goal) & (last != steps),
-            shown=self._shown_walls(group),
         )
 
     def sample_sequences(
@@ -242,11 +227,10 @@ class Replay:
         rng: np.random.Generator,
     ) -> SequenceSample:
         """Draws groups as `sample` does, of sequences of `num_steps` L, or fewer where their trajectory ends."""
-        group = self._draw_groups(num_groups, num_sequences, hindsight, rng)
+        row, index, contexts = self._draw_groups(num_groups, num_sequences, hindsight, rng)
 
         # From the first row of each sequence on, as long as its trajectory goes.
-        env = group.env[:, None]
-        index, going = group.steps, np.ones(group.steps.shape, dtype=bool)
+        env, going = row[:, None] // self._length, np.ones(index.shape, dtype=bool)
         indices, exists = [index], [going]
         for _ in range(num_steps):
             going = going & self._has_next(env, index)
@@ -255,20 +239,17 @@ class Replay:
             exists.append(going)
         rows = self._rows[env[..., None], np.stack(indices, axis=-1)]
         return SequenceSample(
-            maze=group.maze,
-            start=group.start,
-            goal=group.goal,
-            anchor=group.anchor,
-            origin=group.origin,
+            contexts=contexts,
             state=rows["state"],
             cell=rows["cell"].astype(np.int64),
             action=np.maximum(rows["action"][..., :-1], 0).astype(np.int64),
             exists=np.stack(exists, axis=-1),
-            shown=self._shown_walls(group),
         )
 
-    def _draw_groups(self, num_groups: int, num_steps: int, hindsight: Hindsight, rng: np.random.Generator) -> _Groups:
-        """Draws the rows of groups, and relabels a share of them."""
+    def _draw_groups(
+        self, num_groups: int, num_steps: int, hindsight: Hindsight, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray, Contexts]:
+        """Draws rows `[G]`, indices in the ring of groups' steps `[G, K]`, and contexts, a share of them relabelled."""
         row = self._tree.sample(num_groups, rng)
         env, index = np.divmod(row, self._length)
         drawn = self._rows[env, index]
@@ -295,15 +276,13 @@ class Replay:
         anchor = start
         if hindsight.keep_anchor:
             anchor, origin = drawn["anchor"].astype(np.int64), drawn["anchor_origin"]
-        return _Groups(row, env, steps, drawn["maze"].astype(np.int64), start, goal, anchor, origin)
 
-    def _shown_walls(self, group: _Groups) -> np.ndarray | None:
-        if not self._map_size:
-            return None
-        trajectory = self._rows["trajectory"][group.env, group.row % self._length]
-        maps = self._maps[group.env, trajectory % self._length]
-        shape = (-1, self._map_size, self._map_size)
-        return np.unpackbits(maps, axis=-1, count=self._map_size**2).reshape(shape).astype(bool)
+        # The map that the trajectory was shown.
+        shown = None
+        if self._map_size:
+            bits = np.unpackbits(self._maps[env, drawn["trajectory"] % self._length], axis=-1, count=self._map_size**2)
+            shown = bits.reshape(-1, self._map_size, self._map_size).astype(bool)
+        return row, steps, Contexts(drawn["maze"].astype(np.int64), start, goal, anchor, origin, shown)
 
     def update_priorities(self, row: np.ndarray, error: np.ndarray) -> None:
         """Sets the priorities of `row` `[K]`, of a sample, by the errors `[K]` of learning."""
@@ -314,10 +293,6 @@ class Replay:
         priority[self._rows["action"][np.divmod(row, self._length)] == _NO_ACTION] = 0.0
         self._largest_priority = max(self._largest_priority, float(priority.max()))
         self._tree.set(row, priority)
-
-    def _weights(self, row: np.ndarray, beta: float) -> np.ndarray:
-        priority = self._tree.priorities(row)
-        return ((priority.min() / priority) ** beta).astype(np.float32)
 
     def _forward(self, env: np.ndarray, index: np.ndarray, offset: np.ndarray) -> np.ndarray:
         """Returns the index up to `offset` rows after `index` in its trajectory, found by jumps of halving length."""

@@ -14,11 +14,6 @@ class SumTree:
         # Node 1 is the root, node i has children 2 i and 2 i + 1, and the leaf of item j is node num_leaves + j.
         self._sums = np.zeros(2 * self._num_leaves)
 
-    @property
-    def total(self) -> float:
-        """The sum of all priorities."""
-        return float(self._sums[1])
-
     def priorities(self, items: np.ndarray) -> np.ndarray:
         """Returns the priorities `[K]` float of `items` `[K]`."""
         return self._sums[self._num_leaves + items]
@@ -33,7 +28,7 @@ class SumTree:
 
     def sample(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Returns items `[count]`, one from each of `count` equal parts of the total (as Schaul et al. 2016)."""
-        left = (np.arange(count) + rng.random(count)) * (self.total / count)
+        left = (np.arange(count) + rng.random(count)) * (self._sums[1] / count)
         nodes = np.ones(count, dtype=np.int64)
         while nodes[0] < self._num_leaves:
             nodes *= 2

@@ -15,7 +15,7 @@ from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import SPARSE
 
 from . import symmetry
-from .replay import Sample, SequenceSample
+from .replay import Contexts
 
 _NUM_KEPT = 2**16  # mazes whose walls are kept, in bits; a million rows of experience have about half as many
 
@@ -24,7 +24,6 @@ class TrainingMaps:
     """The maps of a task's mazes; a symmetry of 0 leaves them as they are. `G` is the number of a sample's groups."""
 
     def __init__(self, task: Task):
-        self.mazes = task.mazes
         self._bits = functools.lru_cache(_NUM_KEPT)(lambda maze: np.packbits(task.mazes[maze].walls))
         self.size = task.size  # N
         self._context_size = task.context_size  # M
@@ -34,14 +33,14 @@ class TrainingMaps:
         bits = np.unpackbits(self._bits(maze), count=self.size**2)
         return bits.astype(bool).reshape(self.size, self.size)
 
-    def contexts(self, sample: Sample | SequenceSample, turned: int) -> torch.Tensor:
+    def contexts(self, contexts: Contexts, turned: int) -> torch.Tensor:
         """Returns the contexts `[G, 4, M, M]` of a sample's groups, turned by the symmetry `turned`."""
-        shown = map(self.walls, sample.maze.tolist()) if sample.shown is None else sample.shown
-        contexts = [
+        shown = map(self.walls, contexts.maze.tolist()) if contexts.shown is None else contexts.shown
+        planes = [
             build_context(walls, divmod(start, self.size), divmod(goal, self.size), self._context_size)
-            for walls, start, goal in zip(shown, sample.start.tolist(), sample.goal.tolist(), strict=True)
+            for walls, start, goal in zip(shown, contexts.start.tolist(), contexts.goal.tolist(), strict=True)
         ]
-        return symmetry.turn_planes(torch.from_numpy(np.stack(contexts)), turned)
+        return symmetry.turn_planes(torch.from_numpy(np.stack(planes)), turned)
 
     def marks(self, cell: np.ndarray, turned: int) -> torch.Tensor:
         """Returns the positions `[G, 2]` (row, column) at which turned contexts mark the cells `[G]`."""

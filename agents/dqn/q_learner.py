@@ -46,14 +46,17 @@ class DQNLearner(HindsightLearner):
             beta=config.importance_exponent,
         )
         turned = int(self.rng.integers(symmetry.NUM_SYMMETRIES)) if config.symmetries else 0
-        features = _turned_features(sample.state, sample.origin, turned)
-        next_features = _turned_features(sample.next_state, sample.origin, turned)
+        origin = torch.from_numpy(sample.contexts.origin)[:, None]
+        features, next_features = (
+            symmetry.turn_features(state_features(torch.from_numpy(state), origin), turned)
+            for state in (sample.state, sample.next_state)
+        )
         action = torch.from_numpy(symmetry.turn_actions(np.maximum(sample.action, 0), turned))
 
         # Their contexts, encoded by both networks; none without context.
         code = target_code = None
         if network.reads_context:
-            contexts = self.maps.contexts(sample, turned)
+            contexts = self.maps.contexts(sample.contexts, turned)
             code = network.encode(contexts)
             with torch.no_grad():
                 target_code = target_network.encode(contexts)
@@ -93,17 +96,7 @@ def double_q_target(
 ) -> torch.Tensor:
     """Returns r + discount * q_value(argmax q_selector), `[...]` (van Hasselt et al. 2016, eq. 4).
 
-    Args:
-      r_t: `[...]`, sums of rewards.
-      discount_t: `[...]`, of the value after them.
-      q_t_value: `[..., 6]`, action values that are taken over, the target network's.
-      q_t_selector: `[..., 6]`, action values that choose the action, the online network's.
+    The values `[..., 6]` are the target network's, and those of the selector the online network's.
     """
     best = q_t_selector.argmax(dim=-1, keepdim=True)
     return r_t + discount_t * q_t_value.gather(-1, best)[..., 0]
-
-
-def _turned_features(state: np.ndarray, origin: np.ndarray, turned: int) -> torch.Tensor:
-    """Returns features `[G, K, 9]` of states `[G, K, 12]` in the turned world."""
-    features = state_features(torch.from_numpy(state), torch.from_numpy(origin)[:, None])
-    return symmetry.turn_features(features, turned)

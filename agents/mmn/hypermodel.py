@@ -319,17 +319,6 @@ class WayReader(nn.Module):
         return functional.relu(self.features(torch.cat([nearer, scalars], dim=1)))
 
 
-def reward_and_discount(predictions: Predictions) -> tuple[torch.Tensor, torch.Tensor]:
-    """Returns reward and discount `[G, K]` of arriving in states: a goal ends the episode, any other step costs 1."""
-    discount = torch.sigmoid(-predictions.goal_logit)
-    return -discount, discount
-
-
-def rows_of(code: Code, rows: torch.Tensor) -> Code:
-    """Returns the codes of some of the contexts."""
-    return Code(*(part[rows] for part in code))
-
-
 def _weight_shapes(num_inputs: int, hidden: int, num_changes: int) -> dict[str, tuple[int, int]]:
     """Returns the rows and columns of the transition's weights; those of the first layer's bias come first."""
     return {

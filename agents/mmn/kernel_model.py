@@ -102,13 +102,12 @@ def weights_of(network: MMNNetwork) -> Weights:
     values = [parameter.detach().numpy() for parameter in parameters]
     copied = _copied.get(network)
     if copied is None or not all(map(np.array_equal, copied[0], values)):
-        body = linear_of(network.body[0]), linear_of(network.body[2])
         weights = Weights(
             scale=network.scale.detach().numpy().copy(),
             steepness=np.float32(steepness(sharpness.detach())),
             places=network.place_weights.numpy(),
             num_bins=network.num_bins,
-            body=body,
+            body=(linear_of(network.body[0]), linear_of(network.body[2])),
             heads=linear_of(network.heads),
         )
         _copied[network] = copied = [value.copy() for value in values], weights
@@ -342,6 +341,6 @@ def conclude(outputs: np.ndarray, num_bins: int, evaluation: Evaluation) -> None
                 weighted += weight * np.float32(j + 1 - num_bins)
         evaluation.value[b] = weighted / total
 
-        # Reward and discount of arriving there; see `hypermodel.reward_and_discount`.
+        # Reward and discount of arriving there: a goal ends the episode, any other step costs 1.
         discount = ONE / (ONE + np.float32(math.exp(outputs[b, NUM_ACTIONS + num_bins])))
         evaluation.reward[b], evaluation.discount[b] = -discount, discount

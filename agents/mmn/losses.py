@@ -10,10 +10,9 @@ import torch
 from torch.nn import functional
 
 from ..common.layers import VALUE_UNIT
-from .batches import Batch
 from .hypermodel import Code, MMNNetwork
 from .mmn_config import MMNConfig
-from .targets import Targets, n_step_returns
+from .targets import Batch, Targets, n_step_returns
 
 _HIDDEN_GRADIENT = 0.5  # of an unrolled state at each step: MuZero's
 _OTHER_MAP = "model_error_other_map"

@@ -17,7 +17,7 @@ from mazebench.tasks.context import START
 
 from ..common.actor import NetworkAgent, acting
 from ..common.layers import in_batches, marked_position, state_features
-from .hypermodel import CONTEXTS_AT_ONCE, STATES_AT_ONCE, Code, MMNNetwork, rows_of
+from .hypermodel import CONTEXTS_AT_ONCE, STATES_AT_ONCE, Code, MMNNetwork
 from .mmn_config import MMNConfig
 from .model_learner import MMNLearner
 from .search_policy import plan
@@ -73,7 +73,9 @@ class MMN(NetworkAgent):
         observed, origin = torch.from_numpy(inputs.observation["state"]), torch.from_numpy(state.origin)
         features = state_features(observed, origin)[torch.from_numpy(active)].to(self._device)
         latent = in_batches(self.network.encode, STATES_AT_ONCE, features[:, None])
-        code = state.code if active.all() else rows_of(state.code, torch.from_numpy(active).to(self._device))
+        code = state.code
+        if not active.all():
+            code = Code(*(part[torch.from_numpy(active).to(self._device)] for part in code))
 
         # The action that a tree search finds or, exploring, one that is less sure; without a model, the best by value.
         if not self.config.model:
@@ -94,14 +96,10 @@ class MMN(NetworkAgent):
     def _encode(
         self, observation: Observation, new: np.ndarray, new_anchor: np.ndarray, state: ActorState, explore: bool
     ) -> None:
-        """Writes the codes of the contexts at the rows `new` into `state`; where no anchor is new, the old one stays.
+        """Writes the codes of the contexts at the rows `new` `[K]` into `state`.
 
-        Args:
-          observation: of B environments.
-          new: `[K]` int, rows of the environments with new contexts.
-          new_anchor: `[K]` bool, whether displacements are measured from where these environments' bodies are now.
-          state: of B environments.
-          explore: whether the agent explores, so that cheapest ways may cross what costs much.
+        Displacements are measured from where bodies are now if `new_anchor` `[K]`, else from the anchor that they have.
+        If `explore`, cheapest ways may cross what costs much.
         """
         # How far each body has moved from its anchor.
         position = observation["state"][new, :2]

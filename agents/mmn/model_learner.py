@@ -12,21 +12,25 @@ from ..common import symmetry
 from ..common.actor import one_torch_thread
 from ..common.descent import Descent, in_numbers
 from ..common.learner import HindsightLearner
-from .batches import make_batch
-from .hypermodel import MMNNetwork
 from .losses import q_losses, unrolled_losses
-from .mmn_config import MMNConfig
-from .targets import targets_of
+from .targets import make_batch, targets_of
 
 
 class MMNLearner(HindsightLearner):
     """Updates the network of its actor."""
 
     def __init__(self, actor: Any, task: Task, seed: int):
-        config = actor.config
-        groups = parameter_groups(actor.network, config)
+        # Groups of parameters, whose `rate` multiplies the learning rate.
+        config, network = actor.config, actor.network
+        hyper, scale = network.hypermodel.hyper.weight, network.scale
+        others = [parameter for parameter in network.parameters() if parameter is not hyper and parameter is not scale]
+        groups = [
+            {"params": others, "rate": 1.0},
+            {"params": [hyper], "rate": config.hyper_rate},
+            {"params": [scale], "rate": config.scale_rate},
+        ]
         descent = Descent(
-            actor.network,
+            network,
             torch.optim.AdamW(groups, lr=config.learning_rate, weight_decay=config.weight_decay),
             max_gradient_norm=config.max_gradient_norm,
             target_rate=config.target_rate,
@@ -57,14 +61,3 @@ class MMNLearner(HindsightLearner):
 
         metrics["gradient_norm"] = self.descent.step(torch.stack(list(losses.values())).sum())
         return in_numbers(losses | metrics)
-
-
-def parameter_groups(network: MMNNetwork, config: MMNConfig) -> list[dict[str, Any]]:
-    """Returns the optimizer's groups of parameters, whose `rate` multiplies the learning rate."""
-    hyper, scale = network.hypermodel.hyper.weight, network.scale
-    others = [parameter for parameter in network.parameters() if parameter is not hyper and parameter is not scale]
-    return [
-        {"params": others, "rate": 1.0},
-        {"params": [hyper], "rate": config.hyper_rate},
-        {"params": [scale], "rate": config.scale_rate},
-    ]

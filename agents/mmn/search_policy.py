@@ -12,7 +12,7 @@ from mazebench.constants import NUM_ACTIONS
 
 from ..muzero.search import RecurrentFn, Root, SearchResult, gumbel_muzero_policy
 from ..muzero.tree import Evaluation
-from .hypermodel import Code, MMNNetwork, Predictions, reward_and_discount
+from .hypermodel import Code, MMNNetwork, Predictions
 from .kernel_model import kernel_model
 from .mmn_config import MMNConfig
 
@@ -58,9 +58,9 @@ def torch_model(network: MMNNetwork, latent: torch.Tensor, code: Code) -> tuple[
         latent, first = embedding.unflatten(0, shape).split(sizes, dim=-1)
         chosen = torch.from_numpy(action).to(embedding.device).unflatten(0, shape)
         predictions, after = arrive(network.step(latent, first, chosen, code))
-        reward, discount = reward_and_discount(predictions)
+        discount = torch.sigmoid(-predictions.goal_logit)  # a goal ends the episode, any other step costs 1
         value = network.value(predictions.value_logits)
-        return Evaluation(*_arrays(reward, discount, predictions.policy_logits, value)), after
+        return Evaluation(*_arrays(-discount, discount, predictions.policy_logits, value)), after
 
     predictions, embedding = arrive(latent)
     prior_logits, value = _arrays(predictions.policy_logits, network.value(predictions.value_logits))

@@ -88,9 +88,31 @@ def gumbel_muzero_policy(
     tree = np.empty((batch_size, num_simulations + 1), trees.node_type(num_actions))
     trees.plant(tree, *map(np.ascontiguousarray, (root.prior_logits, root.value)))
     if isinstance(model, KernelModel):
-        _search_by_kernels(tree, model, noise, visits, settings, root.embedding.numpy())
+        # Some trees at a time, on all cores where there are trees enough; results do not depend on their number.
+        def search_from(first: int) -> None:
+            some = slice(first, first + _TREES_AT_ONCE)
+            model.search(model.model, first, tree[some], noise[some], visits, settings, states[some])
+
+        states, firsts = root.embedding.numpy(), range(0, batch_size, _TREES_AT_ONCE)
+        num_threads = min(len(firsts), kernels.num_threads())
+        if num_threads > 1:
+            with ThreadPoolExecutor(num_threads) as threads:
+                list(threads.map(search_from, firsts))
+        else:
+            list(map(search_from, firsts))
     else:
-        _search_by_function(tree, model, noise, visits, settings, root.embedding)
+        # All trees together, the model on the device of the roots.
+        def step(_, first, embeddings, parents, actions, index, evaluation):
+            before = embeddings[torch.from_numpy(parents).to(every.device), every]
+            found, embeddings[index] = model(before, actions)
+            for part, values in zip(evaluation, found, strict=True):
+                part[:] = values
+
+        with torch.inference_mode():
+            every = torch.arange(batch_size, device=root.embedding.device)
+            embeddings = root.embedding.new_empty((num_simulations + 1, *root.embedding.shape))  # [N, B, D]
+            embeddings[ROOT] = root.embedding
+            run_simulations(step, None, 0, tree, noise, visits, settings, embeddings)
 
     action = np.empty(batch_size, np.int64)
     action_weights = np.empty((batch_size, num_actions), np.float32)
@@ -137,13 +159,11 @@ def run_simulations(
     Args:
       step: `step(model, first, states, parents, actions, index, evaluation)` takes the actions `[n]` in the states of
         the nodes `parents` `[n]`; writes the states of the nodes `index`, and the evaluation of the step.
-      model: for `step`.
-      first: for `step`, the index of the first of the roots.
+      model, first, states: for `step`; `first` is the index of the first of the roots, whose states are given.
       tree: `[n, N]`, with expanded roots.
       gumbel: `[n, A]` float32, added to the scores of the roots' actions.
       visits: `[N - 1]` int64, the visits of the actions that each simulation considers at the roots.
       settings: of the selection.
-      states: for `step`, those of all nodes; the roots have theirs.
     """
     num_trees, num_nodes = tree.shape
     actions, parents = np.empty(num_trees, np.int64), np.empty(num_trees, np.int64)
@@ -158,51 +178,3 @@ def run_simulations(
         # Expand the nodes that they lead to, and update the values on the paths to the roots.
         trees.expand(tree, index, evaluation)
         trees.backward(tree, index)
-
-
-@torch.inference_mode()
-def _search_by_function(
-    tree: np.ndarray,
-    model: RecurrentFn,
-    gumbel: np.ndarray,
-    visits: np.ndarray,
-    settings: Settings,
-    roots: torch.Tensor,
-) -> None:
-    """Runs the simulations of all trees together, the model on the device of the `roots` `[B, D]`."""
-
-    def step(model, first, embeddings, parents, actions, index, evaluation):
-        before = embeddings[torch.from_numpy(parents).to(roots.device), every]
-        found, embeddings[index] = model(before, actions)
-        for part, values in zip(evaluation, found, strict=True):
-            part[:] = values
-
-    every = torch.arange(len(tree), device=roots.device)
-    embeddings = roots.new_empty((tree.shape[1], *roots.shape))  # [N, B, D]
-    embeddings[ROOT] = roots
-    run_simulations(step, model, 0, tree, gumbel, visits, settings, embeddings)
-
-
-def _search_by_kernels(
-    tree: np.ndarray,
-    model: KernelModel,
-    gumbel: np.ndarray,
-    visits: np.ndarray,
-    settings: Settings,
-    embeddings: np.ndarray,
-) -> None:
-    """Runs all simulations, on all cores where there are trees enough; results do not depend on their number."""
-
-    def search_from(first: int) -> None:
-        some = slice(first, first + _TREES_AT_ONCE)
-        model.search(model.model, first, tree[some], gumbel[some], visits, settings, embeddings[some])
-
-    firsts = range(0, len(tree), _TREES_AT_ONCE)
-    num_threads = min(len(firsts), kernels.num_threads())
-    if num_threads <= 1:
-        for first in firsts:
-            search_from(first)
-        return
-    with ThreadPoolExecutor(num_threads) as threads:
-        for ended in [threads.submit(search_from, first) for first in firsts]:
-            ended.result()

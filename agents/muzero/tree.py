@@ -93,16 +93,10 @@ def simulate(
     actions: np.ndarray,
     parents: np.ndarray,
 ) -> None:
-    """Descends from each root to an action not yet visited, and attaches a node there.
+    """Descends from each root to an action not yet visited, and attaches the node `index` there, not expanded yet.
 
-    Args:
-      tree: `[B, N]`.
-      index: of the new nodes, which are not expanded yet.
-      gumbel: `[B, A]` float32, added to the scores of the roots' actions.
-      considered_visit: only actions visited so many times are considered at the roots.
-      settings: of the selection.
-      actions: `[B]`, output: the actions.
-      parents: `[B]`, output: the nodes that they leave.
+    Writes the `actions` `[B]`, and the nodes that they leave as `parents` `[B]`. At the roots, `gumbel` `[B, A]` is
+    added to scores, and only actions visited `considered_visit` times are considered.
     """
     scores = np.empty(gumbel.shape[1], np.float32)
     for b in range(len(tree)):
@@ -234,14 +228,7 @@ def _interior_action(node: Any, settings: Settings, scores: np.ndarray) -> int:
 @inlined
 def _complete(node: Any, qvalues: np.ndarray) -> None:
     """Writes the node's `qvalues` `[A]`; actions not visited get the mixed value."""
-    value = _mixed_value(node)
-    for a in range(len(node.qvalues)):
-        qvalues[a] = node.qvalues[a] if node.child_visits[a] > 0 else value
-
-
-@inlined
-def _mixed_value(node: Any) -> np.float32:
-    """Returns the mean of the network's value and the visited actions' (Danihelka et al. 2022, appendix D)."""
+    # The mean of the network's value and the visited actions' (Danihelka et al. 2022, appendix D).
     sum_probs, weighted = _ZERO, _ZERO
     for a in range(len(node.qvalues)):
         if node.child_visits[a] > 0:
@@ -250,7 +237,9 @@ def _mixed_value(node: Any) -> np.float32:
         if node.child_visits[a] > 0:
             weighted += max(_TINY, node.prior_probs[a]) * node.qvalues[a] / sum_probs
     count = np.float32(node.visits)
-    return (node.raw_value + (count - _ONE) * weighted) / count
+    mixed = (node.raw_value + (count - _ONE) * weighted) / count
+    for a in range(len(node.qvalues)):
+        qvalues[a] = node.qvalues[a] if node.child_visits[a] > 0 else mixed
 
 
 @inlined

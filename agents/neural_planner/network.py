@@ -70,11 +70,8 @@ class Choice(NamedTuple):
 def grid_bytes(prior: np.ndarray, walls: np.ndarray, evidence: np.ndarray, goal: np.ndarray) -> np.ndarray:
     """Returns the network's input for a grid, `[4, L, L]` uint8: bytes, because learners keep many.
 
-    Args:
-      prior: `[L, L]` float, the probability of a wall by the map.
-      walls: `[L, L]` float, the same by the map and all that was sensed.
-      evidence: `[L, L]` float, log odds of a wall by what was sensed, within `MOST_EVIDENCE` of 0.
-      goal: `[L, L]` float, weights of the goal; where all are 0, any cell may be it.
+    All are `[L, L]` float: the probability of a wall by the map, by map and senses, and its log odds by senses, within
+    `MOST_EVIDENCE` of 0; then weights of the goal; where all are 0, any cell may be it.
     """
     likely = goal / goal.max() if goal.any() else np.ones_like(goal)
     unlikely = np.minimum(-_UNLIKELY * np.log(np.maximum(likely, 1e-9)), _NO_GOAL)

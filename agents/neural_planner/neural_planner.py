@@ -156,7 +156,7 @@ class NeuralPlanner(NetworkAgent):
         for robot in robots:
             memory = robot.memory
             walls, goal = memory.estimate()
-            robot.grid = grid_bytes(memory.prior, walls, memory.occupancy.evidence, goal)
+            robot.grid = grid_bytes(memory.prior, walls, memory.evidence, goal)
         for same in _of_one_size(robots):
             grids = torch.from_numpy(np.stack([robots[index].grid for index in same]))
             plan = in_batches(self.network.plan, _GRIDS_AT_ONCE, grids)

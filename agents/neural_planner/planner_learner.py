@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,8 +25,6 @@ from ..common.learner import REPLAY_FILE, NetworkLearner
 from ..expert import Expert
 from .network import Choice, Situation
 
-# The arrays of `Rows`, in their order.
-_NAMES = ("grids", "grid", "pose", "ranges", "motion", "action", "log_probability", "advantage", "value", "label")
 _LEAST_RATE = 0.02  # of the learning rate, at the end
 
 
@@ -35,46 +33,14 @@ class Rows(NamedTuple):
 
     grids: torch.Tensor  # [G, 4, L, L] uint8
     grid: torch.Tensor  # [R] int, the grid of each step
-    situation: Situation  # of R states
+    pose: torch.Tensor  # [R, 3], this and the next two as in `Situation`
+    ranges: torch.Tensor  # [R, 32]
+    motion: torch.Tensor  # [R, 15]
     action: torch.Tensor  # [R] int
     log_probability: torch.Tensor  # [R], of the action when it was chosen
     advantage: torch.Tensor  # [R]
     value: torch.Tensor  # [R], what the value should be
     label: torch.Tensor  # [R, 6], the probabilities of actions by the oracle; without one, zeros
-
-
-class _Collected:
-    """Rows of steps that are collected one by one."""
-
-    def __init__(self) -> None:
-        self._grids: list[np.ndarray] = []
-        self._index: dict[int, int] = {}  # of a grid, by the identity of its array
-        self._rows: list[tuple[Any, ...]] = []
-
-    def add(self, grid: np.ndarray, *row: Any) -> None:
-        """Adds one step on a grid, its other parts in the order of `Rows`."""
-        if id(grid) not in self._index:
-            self._index[id(grid)] = len(self._grids)
-            self._grids.append(grid)
-        self._rows.append((self._index[id(grid)], *row))
-
-    def stacked(self) -> Rows:
-        """Returns all that was added."""
-        grid, pose, ranges, motion, action, log_probability, advantage, value, label = zip(*self._rows, strict=True)
-
-        def floats(values: Sequence[Any]) -> torch.Tensor:
-            return torch.from_numpy(np.asarray(values, dtype=np.float32))
-
-        return Rows(
-            torch.from_numpy(np.stack(self._grids)),
-            torch.tensor(grid),
-            Situation(torch.stack(pose), torch.stack(ranges), torch.stack(motion)),
-            torch.tensor(np.array(action)),
-            floats(log_probability),
-            floats(advantage),
-            floats(value),
-            floats(label),
-        )
 
 
 class _Step(NamedTuple):
@@ -128,14 +94,20 @@ class PlannerLearner(NetworkLearner):
             self._steps.clear()
         label = np.zeros((len(experience.action), NUM_ACTIONS), np.float32)
         if self._config.teacher == "oracle":
-            label = self._labels(experience)
+            # The probabilities of actions by the oracle's look-ahead from the true state.
+            costs = self._expert.costs(experience.maze, experience.goal, experience.pose, experience.velocity)
+            weights = np.exp(-(costs - costs.min(axis=1, keepdims=True)) / self._config.label_temperature)
+            label = (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
         ends = experience.reward, experience.terminated, experience.ended
         self._steps.append(_Step(choice, experience.action, *ends, label))
 
     @one_torch_thread()
     def update(self) -> dict[str, float]:
         """Learns from the rollout; returns the means of its losses and other scalars by name."""
-        config, sums = self._config, {"success": self._success_rate()}
+        # The share of the rollout's episodes that ended in the goal; 0 if none ended.
+        num_reached = sum(int(step.terminated.sum()) for step in self._steps[:-1])
+        num_ended = sum(int(step.ended.sum()) for step in self._steps[:-1])
+        config, sums = self._config, {"success": num_reached / max(1, num_ended)}
         newest = self._forget()
         if newest:
             self._kept.append(newest)
@@ -170,7 +142,7 @@ class PlannerLearner(NetworkLearner):
         """Returns the loss and its parts."""
         config = self._config
         plan = self.actor.network.plan(rows.grids)
-        logits, value = self.actor.network(plan, rows.grid, rows.situation)
+        logits, value = self.actor.network(plan, rows.grid, Situation(rows.pose, rows.ranges, rows.motion))
         log_probabilities = functional.log_softmax(logits, dim=1)
         entropy = -(log_probabilities.exp() * log_probabilities).sum(dim=1).mean()
         wall = plan.wall > 0.5
@@ -185,39 +157,41 @@ class PlannerLearner(NetworkLearner):
         loss = policy_loss + config.value_weight * value_loss - config.entropy_weight * entropy
         return {"loss": loss, "policy_loss": policy_loss, "value_loss": value_loss, **scalars}
 
-    def _labels(self, step: Experience) -> np.ndarray:
-        """Returns `[B, 6]`: the probabilities of actions by the oracle's look-ahead from the true state."""
-        costs = self._expert.costs(step.maze, step.goal, step.pose, step.velocity)
-        best = costs.min(axis=1, keepdims=True)
-        weights = np.exp(-(costs - best) / self._config.label_temperature)
-        return (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
-
-    def _success_rate(self) -> float:
-        """Returns the share of the rollout's episodes that ended in the goal; 0 if none ended."""
-        steps = self._steps[:-1]
-        num_ended = sum(int(step.ended.sum()) for step in steps)
-        return sum(int(step.terminated.sum()) for step in steps) / max(1, num_ended)
-
     def _forget(self) -> dict[int, Rows]:
         """Returns the rollout's steps by the size of the grids that they are on, and forgets them.
 
         The last step in each environment stays, for its value bootstraps the steps before it.
         """
-        config = self._config
+        config, steps = self._config, self._steps
         discount, trace = 1 - 1 / config.discount_steps, 1 - 1 / config.trace_steps
-        collected: dict[int, _Collected] = {}
-        steps = self._steps
         value = np.stack([step.choice.value for step in steps])
         reward = config.reward_scale * np.stack([step.reward for step in steps])
         terminated, ended = np.stack([step.terminated for step in steps]), np.stack([step.ended for step in steps])
         advantage = advantages(reward, value, terminated, ended, discount, trace)
-        for number, step in enumerate(steps[:-1]):
-            found = [step.choice.log_probability, advantage[number], advantage[number] + value[number], step.label]
-            for slot, grid in enumerate(step.choice.grids):
-                rows = collected.setdefault(grid.shape[-1], _Collected())
-                rows.add(grid, *(part[slot] for part in (*step.choice.situation, step.action, *found)))
-        del steps[:-1]
-        return {size: rows.stacked() for size, rows in collected.items()}
+
+        # All parts of the rows, `[T - 1, B, ...]`.
+        taken, self._steps = steps[:-1], steps[-1:]
+        if not taken:
+            return {}
+        parts = [
+            *(np.stack(part) for part in zip(*(step.choice.situation for step in taken), strict=True)),
+            np.stack([step.action for step in taken]),
+            np.stack([step.choice.log_probability for step in taken]),
+            advantage.astype(np.float32),
+            (advantage + value[:-1]).astype(np.float32),
+            np.stack([step.label for step in taken]),
+        ]
+
+        # The steps on grids of each size, and the grids, which several steps may share.
+        sizes, rollout = np.array([[grid.shape[-1] for grid in step.choice.grids] for step in taken]), {}
+        for size in dict.fromkeys(sizes.ravel().tolist()):
+            where = np.nonzero(sizes == size)
+            grids = [taken[step].choice.grids[slot] for step, slot in zip(*where, strict=True)]
+            index: dict[int, int] = {}  # of a grid, by the identity of its array
+            grid = torch.tensor([index.setdefault(id(each), len(index)) for each in grids])
+            different = torch.from_numpy(np.stack(list({id(each): each for each in grids}.values())))
+            rollout[size] = Rows(different, grid, *(torch.from_numpy(part[where]) for part in parts))
+        return rollout
 
     def save(self, folder: pathlib.Path, provenance: Mapping[str, Any]) -> None:
         """Writes what every learner does, and the rollouts that are kept."""
@@ -227,7 +201,7 @@ class PlannerLearner(NetworkLearner):
                 f"{number}-{size}-{name}": array.numpy()
                 for number, rollout in enumerate(self._kept)
                 for size, rows in rollout.items()
-                for name, array in zip(_NAMES, (*rows[:2], *rows.situation, *rows[3:]), strict=True)
+                for name, array in zip(Rows._fields, rows, strict=True)
             }
             with (folder / REPLAY_FILE).open("wb") as file:
                 np.savez_compressed(file, **arrays)
@@ -247,8 +221,8 @@ class PlannerLearner(NetworkLearner):
         try:
             for number, size in sorted({tuple(map(int, name.split("-")[:2])) for name in arrays}):
                 self._kept += [{} for _ in range(number + 1 - len(self._kept))]
-                found = [torch.from_numpy(arrays[f"{number}-{size}-{name}"]) for name in _NAMES]
-                self._kept[number][size] = Rows(found[0], found[1], Situation(*found[2:5]), *found[5:])
+                found = (torch.from_numpy(arrays[f"{number}-{size}-{name}"]) for name in Rows._fields)
+                self._kept[number][size] = Rows(*found)
         except (KeyError, ValueError) as error:
             raise InputError(f"{path}: expected rollouts, found a damaged file: {error}") from error
 
@@ -259,14 +233,7 @@ def advantages(
     """Returns generalized advantage estimates `[T - 1, B]` (Schulman et al. 2016, eq. 16) of all steps but the last.
 
     Where an episode was cut short, the value of the state before its last step stands for all rewards that follow.
-
-    Args:
-      reward: `[T, B]`, for each step.
-      value: `[T, B]`, of the state before each step.
-      terminated: `[T, B]` bool, whether the step reached the goal.
-      ended: `[T, B]` bool, whether the episode ended with the step.
-      discount: gamma.
-      trace: lambda.
+    Arrays are `[T, B]`: the value is that of the state before each step; a step that `terminated` reached the goal.
     """
     found, following = np.zeros_like(value), np.zeros_like(value[0])
     for step in range(len(value) - 2, -1, -1):
@@ -287,9 +254,8 @@ def _joined(parts: list[Rows]) -> Rows:
     """Returns the rows of all parts."""
     offsets = np.cumsum([0, *(len(rows.grids) for rows in parts)]).tolist()
     grid = torch.cat([rows.grid + offset for rows, offset in zip(parts, offsets, strict=False)])
-    situation = Situation(*map(torch.cat, zip(*(rows.situation for rows in parts), strict=True)))
-    rest = map(torch.cat, zip(*(rows[3:] for rows in parts), strict=True))
-    return Rows(torch.cat([rows.grids for rows in parts]), grid, situation, *rest)
+    rest = map(torch.cat, zip(*(rows[2:] for rows in parts), strict=True))
+    return Rows(torch.cat([rows.grids for rows in parts]), grid, *rest)
 
 
 def _on_grids(rows: Rows, grids: np.ndarray) -> Rows:
@@ -297,5 +263,4 @@ def _on_grids(rows: Rows, grids: np.ndarray) -> Rows:
     number = torch.full((len(rows.grids),), -1)
     number[torch.from_numpy(grids)] = torch.arange(len(grids))
     taken = number[rows.grid] >= 0
-    situation = Situation(*(each[taken] for each in rows.situation))
-    return Rows(rows.grids[grids], number[rows.grid[taken]], situation, *(each[taken] for each in rows[3:]))
+    return Rows(rows.grids[grids], number[rows.grid[taken]], *(each[taken] for each in rows[2:]))

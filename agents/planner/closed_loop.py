@@ -24,7 +24,7 @@ class _Drive:
     """The estimated pose of one environment's body, and the pilot that drives it."""
 
     odometry: DeadReckoning
-    pilot: Pilot
+    pilot: Pilot = dataclasses.field(init=False)
 
 
 class ClosedLoopPlanner(MapPlanner):
@@ -49,7 +49,7 @@ class ClosedLoopPlanner(MapPlanner):
             if drive is None or inputs.new_episode[slot]:
                 # An episode begins in the centre of the start cell.
                 x, y = cell_to_point(start, size).tolist()
-                drive = state[slot] = _Drive(DeadReckoning((x, y), observed.velocity(), _POSITION_GAIN), Pilot([]))
+                drive = state[slot] = _Drive(DeadReckoning((x, y), observed.velocity(), _POSITION_GAIN))
                 body = observed._replace(x=x, y=y)
             else:
                 body = drive.odometry.update(observed)
@@ -57,6 +57,6 @@ class ClosedLoopPlanner(MapPlanner):
                 cell = nearest_cell(body.x, body.y, size)
                 is_wall = contexts[slot][GLOBAL_MAP][cell] > 0.5  # of the map that is shown
                 path = plan(contexts[slot], start if is_wall else cell)
-                drive.pilot = Pilot.along(path, size, self._cells_per_metre)
+                drive.pilot = Pilot(path, size, self._cells_per_metre)
             actions[slot] = drive.pilot.action(body, self._kind not in WITHOUT_STRAFING)
         return as_kind(self._kind, actions), state

@@ -76,14 +76,9 @@ def _miss_likelihood(reading: float, beams: Beams) -> float:
 def log_likelihoods(
     walls: np.ndarray, poses: np.ndarray, ranges: np.ndarray, beams: Beams, deviation: float
 ) -> np.ndarray:
-    """Returns `[H]`: the log likelihoods of a scan from `poses` `[H, 3]`.
+    """Returns `[H]`: the log likelihoods of a scan `ranges` `[R]` from `poses` `[H, 3]`.
 
-    Args:
-      walls: `[L, L]` float, the probability of a wall in each cell.
-      poses: x, y and yaw (rad).
-      ranges: `[R]`, the scan.
-      beams: the beam model.
-      deviation: standard deviation of a pose's position; a larger one makes the likelihood smoother.
+    `walls` `[L, L]` are probabilities; a larger `deviation` of a pose's position makes the likelihood smoother.
     """
     result = np.zeros(len(poses))
     for h in range(len(poses)):

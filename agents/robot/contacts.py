@@ -22,13 +22,8 @@ def felt_walls(
 ) -> list[tuple[Cell, float]]:
     """Returns the cells beside the body that may have stopped it in a step, none in most steps, and their log odds.
 
-    Args:
-      before: the body before the step.
-      action: what it did.
-      after: the body one step on.
-      cell_size: m.
-      deviation: standard deviation of its position, m.
-      size: L.
+    `before` and `after` are the body before and after the step, `cell_size` and the position's `deviation` are in m.
+    `size` is L.
     """
     vx, vy = (cell_size * speed for speed in before.velocity())
     _, _, *free = moved_in_the_open(vx, vy, before.yaw, action)

@@ -9,11 +9,6 @@ from mazebench.constants import STEP_TIME
 from .body import Body, Point
 
 
-def moved(velocity_tm1: float, velocity_t: float) -> float:
-    """Returns how far a body moves in the step between two velocities: as far as at their mean."""
-    return STEP_TIME * (velocity_tm1 + velocity_t) / 2
-
-
 @dataclasses.dataclass
 class DeadReckoning:
     """The position of one body, which adds up velocities, and follows the observed positions by a constant gain."""
@@ -25,7 +20,8 @@ class DeadReckoning:
     def update(self, observed: Body) -> Body:
         """Takes in the body as it is observed one step on; returns it at the estimated position."""
         (x, y), (x_tm1, y_tm1), (x_t, y_t) = self.position, self.velocity, observed.velocity()
-        x, y = x + moved(x_tm1, x_t), y + moved(y_tm1, y_t)
+        # In a step, a body moves as far as at the mean of the velocities before and after.
+        x, y = x + STEP_TIME * (x_tm1 + x_t) / 2, y + STEP_TIME * (y_tm1 + y_t) / 2
         x, y = (1 - self.gain) * x + self.gain * observed.x, (1 - self.gain) * y + self.gain * observed.y
         self.position, self.velocity = (x, y), (x_t, y_t)
         return observed._replace(x=x, y=y)

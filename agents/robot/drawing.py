@@ -72,25 +72,18 @@ def compare(
             if box[0] * box[1] < _LARGEST_BOX:
                 for i in range(max(1, (top - 1) // 2), min(size - 2, bottom // 2) + 1):
                     for j in range(max(1, (left - 1) // 2), min(size - 2, end // 2) + 1):
-                        effect = _effect(effects, i, j, top, bottom, left, end, down, right)
-                        evidence[i, j] += _log_odds(walls[i, j], effect, differences[p, q], doubt, noise)
+                        # By how much a wall in the cell raises the pixel's value.
+                        effect = 0.0
+                        for a in range(max(2 * i, top), min(2 * i + 2, bottom) + 1):
+                            for b in range(max(2 * j, left), min(2 * j + 2, end) + 1):
+                                effect += down[a - top] * right[b - left] * effects[i, j, a - 2 * i, b - 2 * j]
+                        # How much likelier the pixel is with that wall than without; the other cells are uncertain.
+                        wall = walls[i, j]
+                        others = max(doubt - effect * math.sqrt(wall * (1 - wall)), 0.0)
+                        without = differences[p, q] + wall * effect
+                        with_wall = differences[p, q] - (1 - wall) * effect
+                        evidence[i, j] += (without**2 - with_wall**2) / (2 * (noise**2 + others**2))
     return differences, slopes, deviations, evidence
-
-
-@inlined
-def _log_odds(wall: float, effect: float, difference: float, doubt: float, noise: float) -> float:
-    """Returns how much more probable a pixel is with a wall in a cell than without, as log odds.
-
-    Args:
-      wall: the probability of a wall with which `difference` and `doubt` were found.
-      effect: by how much a wall in the cell raises the pixel's value.
-      difference: of the pixel and its expectation.
-      doubt: deviation of the pixel's expectation because cells are uncertain, this one included.
-      noise: deviation of the pixel for other reasons.
-    """
-    others = max(doubt - effect * math.sqrt(wall * (1 - wall)), 0.0)
-    without, with_wall = difference + wall * effect, difference - (1 - wall) * effect
-    return (without**2 - with_wall**2) / (2 * (noise**2 + others**2))
 
 
 @compiled
@@ -131,19 +124,6 @@ def _effects(walls: np.ndarray, thick: bool) -> np.ndarray:
                 for b in range(3):
                     effects[i, j, a, b] = _product(walls, thick, 2 * i + a, 2 * j + b, i, j)
     return effects
-
-
-@inlined
-def _effect(
-    effects: np.ndarray, row: int, column: int,
-    top: int, bottom: int, left: int, end: int, down: np.ndarray, right: np.ndarray,
-) -> float:  # fmt: skip
-    """Returns by how much a wall in a cell raises the value of a pixel with the given overlaps."""
-    effect = 0.0
-    for a in range(max(2 * row, top), min(2 * row + 2, bottom) + 1):
-        for b in range(max(2 * column, left), min(2 * column + 2, end) + 1):
-            effect += down[a - top] * right[b - left] * effects[row, column, a - 2 * row, b - 2 * column]
-    return effect
 
 
 @inlined

@@ -18,7 +18,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
-from typing import NamedTuple
 
 import numpy as np
 from scipy import special
@@ -55,16 +54,13 @@ _UNEXPLAINED_MARK = 1e-3  # weight of cells that a marker should not mark, at no
 _QUANTILES = np.array(list(itertools.product(special.ndtri(np.arange(0.1, 1, 0.2)), repeat=2)))
 
 
-class _Schedule(NamedTuple):
-    """The coarseness of each step."""
+def _schedule(first: float, last: float, num_steps: int, blur: float) -> list[tuple[float, float]]:
+    """Returns the coarseness of each step.
 
-    noise: np.ndarray  # [S] standard deviation of grey values
-    blur: np.ndarray  # [S] by how much the variance of points is overestimated, 0 for no blur
-
-
-def _schedule(first: float, last: float, num_steps: int, blur: float) -> _Schedule:
-    noise = [*np.geomspace(first, last, num_steps), 0.15, 0.12, 0.1, 0.08, 0.08, 0.08]
-    return _Schedule(np.array(noise), np.array([*[blur] * num_steps, 1.0, 0.5, 0.2, 0.0, 0.0, 0.0]))
+    It is the standard deviation of grey values, and by how much the variance of points is overestimated, 0 for no blur.
+    """
+    coarse = [(noise, blur) for noise in np.geomspace(first, last, num_steps).tolist()]
+    return [*coarse, (0.15, 1.0), (0.12, 0.5), (0.1, 0.2), (0.08, 0.0), (0.08, 0.0), (0.08, 0.0)]
 
 
 _RIGID_STEPS = 3  # before walls are estimated
@@ -131,30 +127,20 @@ def register(picture: np.ndarray, size: int) -> Registration:
     picture = picture.astype(np.float64)
     found: list[Registration] = []
     for schedule in _SCHEDULES:
-        found.append(_Fit.begin(picture, size).run(schedule))
+        found.append(_Fit(picture, size).run(schedule))
         if found[-1].residual < _SHARP:
             break
     return min(found, key=lambda registration: registration.residual)
 
 
-@dataclasses.dataclass
 class _Fit:
     """A registration under way."""
 
-    picture: np.ndarray  # [P, Q] float
-    corner: Cell
-    nominal: np.ndarray  # [P, Q, 2] float, the points if all parameters are 0
-    basis: np.ndarray  # [2, P Q, D] float, by how much each parameter of an axis moves the points along it
-    precision: np.ndarray  # [2 D + 1] float, of the parameters by the prior: rows, columns, thickening
-    parameters: np.ndarray  # [2 D + 1] float
-    covariance: np.ndarray  # [2 D + 1, 2 D + 1] float, of the parameters
-    log_odds: np.ndarray  # [N, N] float, of walls
-    prior: np.ndarray  # [N, N] float, log odds of walls
-
-    @classmethod
-    def begin(cls, picture: np.ndarray, size: int) -> _Fit:
-        """Returns the fit that lays the maze's inner cells on the box around what is free in the picture."""
-        prior = np.minimum(special.logit(with_border(np.full((size, size), _WALL))), _LARGEST_LOG_ODDS)
+    def __init__(self, picture: np.ndarray, size: int):
+        """Lays the maze's inner cells on the box around what is free in the picture."""
+        # Log odds of walls, by the prior and now.
+        self.prior = np.minimum(special.logit(with_border(np.full((size, size), _WALL))), _LARGEST_LOG_ODDS)  # [N, N]
+        self.log_odds = self.prior  # [N, N]
 
         # The box around what is free, and two pixels more.
         free = picture < max(0.5, picture.min() + 0.1)
@@ -164,28 +150,21 @@ class _Fit:
             crop = np.arange(max(first - 2, 0), min(last + 3, length))
             crops.append(crop)
             coordinates.append(1 + (crop + 0.5 - first) * (size - 2) / (last + 1 - first))
-        corner = (int(crops[0][0]), int(crops[1][0]))
-        nominal = np.stack(np.meshgrid(*coordinates, indexing="ij"), axis=-1)
-        basis = _basis(coordinates[0], coordinates[1], size)
+        self.picture = picture[np.ix_(*crops)]  # [P, Q]
+        self.corner = (int(crops[0][0]), int(crops[1][0]))
+        self.nominal = np.stack(np.meshgrid(*coordinates, indexing="ij"), axis=-1)  # [P, Q, 2], at parameters of 0
 
-        precision = np.ones(2 * basis.shape[-1] + 1)
-        precision[-1] = 1 / _THICKENING**2
-        return cls(
-            picture=picture[np.ix_(*crops)],
-            corner=corner,
-            nominal=nominal,
-            basis=basis,
-            precision=precision,
-            parameters=np.zeros(len(precision)),
-            covariance=np.diag(1 / precision),
-            log_odds=prior.copy(),
-            prior=prior,
-        )
+        # Parameters: of rows, of columns, thickening.
+        self.basis = _basis(coordinates[0], coordinates[1], size)
+        self.precision = np.ones(2 * self.basis.shape[-1] + 1)  # [2 D + 1], by the prior
+        self.precision[-1] = 1 / _THICKENING**2
+        self.parameters = np.zeros(len(self.precision))
+        self.covariance = np.diag(1 / self.precision)
 
-    def run(self, schedule: _Schedule) -> Registration:
+    def run(self, schedule: list[tuple[float, float]]) -> Registration:
         """Returns the registration after all steps of a schedule."""
-        for step, (noise, blur) in enumerate(zip(schedule.noise, schedule.blur, strict=True)):
-            differences = self._step(float(noise), float(blur), step >= _RIGID_STEPS)
+        for step, (noise, blur) in enumerate(schedule):
+            differences = self._step(noise, blur, step >= _RIGID_STEPS)
         residual = float(np.sqrt((differences**2).mean()))
         error = min(_ERROR + _ERROR_SLOPE * max(residual - _SHARP, 0.0), _LARGEST_ERROR)
         walls = (1 - error) * special.expit(self.log_odds) + error * special.expit(self.prior)
@@ -252,7 +231,7 @@ def _basis(rows: np.ndarray, columns: np.ndarray, size: int) -> np.ndarray:
     The first two parameters of an axis are a shift and a scale, the others weigh the modes of the field.
     """
     along_rows, along_columns = _modes_at(rows, size), _modes_at(columns, size)
-    first, second = _main_modes(size)
+    *_, first, second = _modes(size)
     modes = along_rows[:, None, first] * along_columns[None, :, second]
     basis = np.empty((2, len(rows) * len(columns), 2 + _NUM_MODES))
     basis[:, :, 0] = _AFFINE
@@ -267,29 +246,25 @@ def _modes_at(coordinates: np.ndarray, size: int) -> np.ndarray:
 
     By the method of Nystroem from the modes at nodes; constant from 1.5 cells outside on.
     """
-    nodes, weights, _ = _modes(size)
+    nodes, weights, _, _ = _modes(size)
     return _correlation(np.clip(coordinates, -1.5, size + 1.5), nodes) @ weights
 
 
 @functools.lru_cache
-def _modes(size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns nodes `[T]` on [0, N], the modes' weights at them `[T, 9]`, and the modes' variances `[9]`."""
+def _modes(size: int) -> tuple[np.ndarray, ...]:
+    """Returns nodes `[T]` on [0, N], and the modes' weights at them `[T, 9]`.
+
+    Then follow the modes along rows and along columns whose products have the largest variances, `[24]` each.
+    """
     nodes = np.linspace(0, size, _NODES * size + 1)
     lengths = np.full(len(nodes), 1 / _NODES)
     lengths[[0, -1]] /= 2
     root = np.sqrt(lengths)
     variances, vectors = np.linalg.eigh(root[:, None] * _correlation(nodes, nodes) * root)
     variances, vectors = variances[::-1][:_MODES_PER_AXIS], vectors[:, ::-1][:, :_MODES_PER_AXIS]
-    return nodes, root[:, None] * vectors / np.sqrt(variances), variances
-
-
-@functools.lru_cache
-def _main_modes(size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the modes along rows and along columns whose products have the largest variances."""
-    variances = _modes(size)[2]
     products = np.outer(variances, variances)
-    first, second = np.unravel_index(np.argsort(-products, axis=None)[:_NUM_MODES], products.shape)
-    return first, second
+    main = np.unravel_index(np.argsort(-products, axis=None)[:_NUM_MODES], products.shape)
+    return nodes, root[:, None] * vectors / np.sqrt(variances), *main
 
 
 def _correlation(points: np.ndarray, others: np.ndarray) -> np.ndarray:

@@ -38,14 +38,9 @@ class Drive:
     def next(
         self, blocked: np.ndarray, path: list[Cell], body: Body, cell_size: float, strafes: bool = True
     ) -> tuple[int, Point]:
-        """Returns the next action, and the point (x, y) that it should bring the body to, in cells.
+        """Returns the next action along `path`, and the point (x, y) that it should bring the body to, in cells.
 
-        Args:
-          blocked: `[L, L]` bool, the cells to keep clear of.
-          path: to follow.
-          body: in cells.
-          cell_size: m.
-          strafes: whether the body can strafe.
+        The drive keeps clear of `blocked` `[L, L]` bool; `cell_size` is in m, and `strafes` says whether the body can.
         """
         ahead = path[: _CELLS_AHEAD + 1]
         x, y = body.x * cell_size, body.y * cell_size

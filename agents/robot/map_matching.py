@@ -11,8 +11,6 @@ differ. This is a Rao-Blackwellised filter (Doucet et al. 2000) whose discrete p
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 from scipy import special
 
@@ -33,31 +31,20 @@ def orientations(plane: np.ndarray, count: int) -> np.ndarray:
     return np.ascontiguousarray([*turned, *(each[:, ::-1] for each in turned)][:count])
 
 
-@dataclasses.dataclass
 class MapBelief:
     """The hypotheses of where the map lies, and their probabilities."""
 
-    walls: np.ndarray  # [G, N, N] float, the probability of a wall by the map in each orientation
-    goals: np.ndarray  # [G, N, N] float, the probability of the goal
-    placements: np.ndarray  # [H, 3] int: orientation, and the row and column of the map at the grid's (0, 0)
-    log_weights: np.ndarray  # [H] float
-    weighed: np.ndarray  # [L, L] float, the probability of a wall with which each cell of the grid was weighed
-    visited: np.ndarray  # [L, L] bool, the cells without the goal
-
-    @classmethod
-    def begin(
-        cls, walls: np.ndarray, goal: np.ndarray, num_turns: int, middle: np.ndarray | None, size: int
-    ) -> MapBelief:
-        """Returns the belief before anything was seen.
+    def __init__(self, walls: np.ndarray, goal: np.ndarray, num_turns: int, middle: np.ndarray | None, size: int):
+        """Makes the belief before anything was seen.
 
         Args:
-          walls: `[N, N]` float, the probability of a wall by the map.
-          goal: `[N, N]` float, the probability of the goal.
+          walls, goal: `[N, N]` float, the probabilities of a wall and of the goal by the map.
           num_turns: 1, 4 or 8: whether the map may be turned, or mirrored, too.
           middle: `[N, N]` float, the probability that a cell of the map is the middle of the grid; None if grid and
             map have the same corners.
           size: L.
         """
+        # Placements: orientation, and the row and column of the map at the grid's (0, 0).
         if middle is None:
             placements = np.array([(turn, 0, 0) for turn in range(num_turns)])
             log_weights = np.zeros(num_turns)
@@ -68,24 +55,16 @@ class MapBelief:
             placements -= [0, size // 2, size // 2]
         if num_turns == 8:
             log_weights += np.where(placements[:, 0] < 4, np.log(1 - _MIRRORED), np.log(_MIRRORED))
-        return cls(
-            walls=orientations(walls, num_turns),
-            goals=orientations(goal, num_turns),
-            placements=placements,
-            log_weights=log_weights,
-            weighed=np.full((size, size), 0.5),
-            visited=np.zeros((size, size), dtype=bool),
-        )
+        self.placements, self.log_weights = placements, log_weights  # [H, 3] int, [H] float
+        self.weighed = np.full((size, size), 0.5)  # the probability of a wall with which each cell was weighed
+        self._num_turns = num_turns
+        self.begin_leg(walls, goal)
 
-    def on_leg(self, walls: np.ndarray, goal: np.ndarray) -> MapBelief:
-        """Returns the belief with another leg's map and goal, shown on a map that lies as this one."""
-        count = len(self.walls)
-        return dataclasses.replace(
-            self,
-            walls=orientations(walls, count),
-            goals=orientations(goal, count),
-            visited=np.zeros_like(self.visited),
-        )
+    def begin_leg(self, walls: np.ndarray, goal: np.ndarray) -> None:
+        """Takes in a leg's map and goal, shown on a map that lies as those before."""
+        self.walls = orientations(walls, self._num_turns)  # [G, N, N]
+        self.goals = orientations(goal, self._num_turns)  # [G, N, N]
+        self.visited = np.zeros(self.weighed.shape, dtype=bool)  # the cells without the goal
 
     @property
     def weights(self) -> np.ndarray:

@@ -6,58 +6,23 @@ Lengths are in cells. `L` is the number of cells on a side.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
 
 from mazebench.kernels import compiled
-from mazebench.maps.maze import Cell
 
-from .beams import MOST_EVIDENCE, UNKNOWN, Beams, add_scan
+from .beams import UNKNOWN
 
 SURE = 3.0  # log odds of evidence, from which a cell counts as seen
-_VISITED = 4.0  # log odds that a cell is free in which the body was
 _BINS = np.array([0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98])  # of prior probabilities, within which the map errs alike
 _PRIOR_CELLS = 3.0  # seen cells that weigh as much as the prior when the map's reliability is estimated
 _LEAST = 1e-6  # count of cells of a kind, instead of none
 
 
-@dataclasses.dataclass
-class Occupancy:
-    """The evidence of walls on one grid."""
-
-    evidence: np.ndarray  # [L, L] float, log odds of a wall
-
-    @classmethod
-    def unseen(cls, size: int) -> Occupancy:
-        """Returns a grid of `size` cells a side before anything was seen."""
-        return cls(np.zeros((size, size)))
-
-    def see(self, pose: tuple[float, float, float], ranges: np.ndarray, beams: Beams, deviation: float) -> None:
-        """Takes in a scan `[R]` from a pose x, y, yaw; `deviation` is the standard deviation of x and y."""
-        x, y, yaw = pose
-        add_scan(self.evidence, x, y, yaw, ranges, beams, deviation)
-
-    def visit(self, cell: Cell) -> None:
-        """Takes in that the body is in a cell."""
-        self.evidence[cell] = max(self.evidence[cell] - _VISITED, -MOST_EVIDENCE)
-
-    def feel(self, cell: Cell, log_odds: float) -> None:
-        """Takes in that a cell may have stopped the body, with the log odds that this adds."""
-        self.evidence[cell] = min(self.evidence[cell] + log_odds, MOST_EVIDENCE)
-
-    def seen_walls(self) -> np.ndarray:
-        """Returns `[L, L]` float: the probability of a wall by what was seen alone."""
-        return 1 / (1 + np.exp(-self.evidence) * ((1 - UNKNOWN) / UNKNOWN))
-
-    def walls(self, prior: np.ndarray) -> np.ndarray:
-        """Returns `[L, L]` float: the probability of a wall, by what was seen and a prior that may prove wrong."""
-        return posterior(prior, self.evidence)
-
-    def is_seen(self) -> np.ndarray:
-        """Returns `[L, L]` bool: the cells of which is known what they are."""
-        return np.abs(self.evidence) >= SURE
+def seen_walls(evidence: np.ndarray) -> np.ndarray:
+    """Returns `[L, L]` float: the probability of a wall by evidence `[L, L]` (log odds) alone."""
+    return 1 / (1 + np.exp(-evidence) * ((1 - UNKNOWN) / UNKNOWN))
 
 
 @compiled

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 
@@ -40,19 +39,14 @@ def steer(body: Body, aim: Point, strafes: bool) -> int:
     return LOOK_LEFT if misalignment > 0 else LOOK_RIGHT
 
 
-@dataclasses.dataclass
 class Pilot:
     """A path that is followed, and how far along it the body is."""
 
-    points: list[Point]  # centres of the path's cells
-    lookahead: float = _LOOKAHEAD  # cells along the path to the point aimed at
-    segment: int = 0  # the body is on the way from points[segment] to the next
-
-    @classmethod
-    def along(cls, path: Sequence[Cell], size: int, cells_per_metre: float = 1.0) -> Pilot:
-        """Returns a pilot at the beginning of a path of cells on a map of `size` cells a side."""
-        points = [(x, y) for x, y in cell_to_point(np.array(path), size).tolist()]
-        return cls(points, cells_per_metre * _LOOKAHEAD)
+    def __init__(self, path: Sequence[Cell], size: int, cells_per_metre: float):
+        """Begins a path of cells on a map of `size` cells a side."""
+        self.points: list[Point] = [(x, y) for x, y in cell_to_point(np.array(path), size).tolist()]
+        self.lookahead = cells_per_metre * _LOOKAHEAD  # cells
+        self.segment = 0  # the body is on the way from points[segment] to the next
 
     def action(self, body: Body, strafes: bool) -> int:
         """Returns the drive or turn that brings the body, which strafes or not, towards the aim."""

@@ -17,19 +17,20 @@ from mazebench.maps.maze import Cell, cell_to_point
 from mazebench.tasks.context import START
 from mazebench.world.ray_casting import LidarModel
 
-from .beams import beams_of
+from .beams import MOST_EVIDENCE, add_scan, beams_of
 from .body import LOOK_LEFT, LOOK_RIGHT, TURN_STEP, Body, Point, observed_body
 from .cells import marked_cell, nearest_cell
 from .contacts import felt_walls
 from .dead_reckoning import DeadReckoning
 from .map_matching import MapBelief
 from .map_reading import read_map
-from .occupancy import Occupancy
+from .occupancy import SURE, posterior, seen_walls
 from .tracking import Tracker, aligned
 
 _MARK_OFF = 1.0  # cells, standard deviation of the goal from its marker, once it was not there
 # Cells, which are taken for 1 m wide: standard deviations of a position.
 _EXACT, _TRACKED, _RECKONED = 0.01, 0.03, 0.15  # that is observed, tracked by a lidar, or reckoned from noisy ones
+_VISITED = 4.0  # log odds that a cell is free in which the body was
 _GAIN = 0.03  # weight of a noisy position against the one that velocities tell
 _ROUNDING = 1e-4  # of positions as float32
 
@@ -43,7 +44,7 @@ class Memory:
     deviation: float  # standard deviation of the body's position
     tracker: Tracker | None = None  # where a lidar is needed to know the pose
     dead_reckoning: DeadReckoning | None = None  # where observed positions are noisy
-    occupancy: Occupancy = dataclasses.field(init=False)  # what was seen or felt of the walls
+    evidence: np.ndarray = dataclasses.field(init=False)  # [L, L] float, log odds of a wall by what was seen or felt
     prior: np.ndarray = dataclasses.field(init=False)  # [L, L] float, the probability of a wall by the map
     goal: np.ndarray = dataclasses.field(init=False)  # [L, L] float, the probability of the goal by the map
     searched: np.ndarray = dataclasses.field(init=False)  # [L, L] bool, cells without the goal: the body was in them
@@ -52,7 +53,7 @@ class Memory:
 
     def __post_init__(self) -> None:
         self.prior, self.goal = self.belief.mixture()
-        self.occupancy = Occupancy.unseen(len(self.prior))
+        self.evidence = np.zeros(self.prior.shape)
         self.searched = np.zeros(self.prior.shape, dtype=bool)
 
     @property
@@ -65,8 +66,8 @@ class Memory:
 
         The map counts as much as it has proved right. The goal is in no cell that was searched, nor in a seen wall.
         """
-        walls = self.occupancy.walls(self.prior)
-        is_closed = self.occupancy.is_seen() & (walls > 0.5)
+        walls = posterior(self.prior, self.evidence)
+        is_closed = (np.abs(self.evidence) >= SURE) & (walls > 0.5)
         is_possible = ~(self.searched | is_closed)
         goal = self.goal * is_possible
         if not goal.any():
@@ -103,7 +104,11 @@ class Senses:
             memory = self._begin(context, observed, ranges)
         else:
             if inputs.new_context[slot]:
-                self._begin_leg(memory, context)
+                # Another map and goal, on a map that lies as the one before.
+                reading = read_map(context, self._size)
+                memory.belief.begin_leg(reading.walls, reading.goal)
+                memory.prior, memory.goal = memory.belief.mixture()
+                memory.searched[:] = False
             self._localize(memory, observed, ranges)
         self._map(memory, ranges)
         return memory
@@ -112,19 +117,18 @@ class Senses:
         """Returns the memory at an episode's first observation, before the walls that are sensed are added."""
         # An episode begins in the centre of a cell. Zero is odometry; any other position is a noisy one.
         off_centre = max(abs(coordinate % 1.0 - 0.5) for coordinate in (observed.x, observed.y))
-        start = (observed.x, observed.y) if off_centre < _ROUNDING else None
         reading, odometry = read_map(context, self._size), _pose(observed)
-        if start is not None:
+        if off_centre < _ROUNDING:
             # The grid is the maze. A start that is known but not marked says that the map may lie in any way.
             num_turns = 1 if context[START].any() else 8
-            belief = MapBelief.begin(reading.walls, reading.goal, num_turns, None, self._size)
+            belief = MapBelief(reading.walls, reading.goal, num_turns, None, self._size)
             if ranges is None or self._odometry_noise == 0:
                 return Memory(belief, observed, _EXACT)
             return Memory(belief, observed, _TRACKED, Tracker(odometry, odometry, self._odometry_noise))
         if ranges is None:
             # The grid is the maze, and the start is where it is marked.
             x, y = cell_to_point(marked_cell(reading.start), self._size).tolist()
-            belief = MapBelief.begin(reading.walls, reading.goal, 1, None, self._size)
+            belief = MapBelief(reading.walls, reading.goal, 1, None, self._size)
             dead_reckoning = DeadReckoning((x, y), observed.velocity(), _GAIN)
             return Memory(belief, observed._replace(x=x, y=y), _RECKONED, None, dead_reckoning)
 
@@ -135,17 +139,10 @@ class Senses:
             reckoning = DeadReckoning((observed.x, observed.y), observed.velocity())
         else:
             pose, num_turns = aligned(size, ranges, self._beams), 8
-        belief = MapBelief.begin(reading.walls, reading.goal, num_turns, reading.start, size)
+        belief = MapBelief(reading.walls, reading.goal, num_turns, reading.start, size)
         x, y, yaw = pose.tolist()
         tracker = Tracker(pose, odometry, self._odometry_noise)
         return Memory(belief, observed._replace(x=x, y=y, yaw=yaw), _TRACKED, tracker, reckoning)
-
-    def _begin_leg(self, memory: Memory, context: np.ndarray) -> None:
-        """Takes in the map and the goal of another leg."""
-        reading = read_map(context, self._size)
-        memory.belief = memory.belief.on_leg(reading.walls, reading.goal)
-        memory.prior, memory.goal = memory.belief.mixture()
-        memory.searched[:] = False
 
     def _localize(self, memory: Memory, observed: Body, ranges: np.ndarray | None) -> None:
         """Takes in the body as it is observed one step on; without a lidar, a wall has stopped it if it is slow."""
@@ -153,27 +150,27 @@ class Senses:
         if memory.dead_reckoning is not None:
             body = memory.dead_reckoning.update(observed)
         if memory.tracker is not None and ranges is not None:
-            walls = memory.occupancy.seen_walls()
+            walls = seen_walls(memory.evidence)
             memory.tracker.update(walls, _pose(body), memory.commanded, ranges, self._beams)
             body = memory.tracker.body(observed)
         memory.body = body
         if ranges is None:
             off, size = memory.deviation * self._cell_size, len(memory.searched)
             for cell, log_odds in felt_walls(before, memory.action, body, self._cell_size, off, size):
-                memory.occupancy.feel(cell, log_odds)
+                memory.evidence[cell] = min(memory.evidence[cell] + log_odds, MOST_EVIDENCE)
 
     def _map(self, memory: Memory, ranges: np.ndarray | None) -> None:
         """Takes in that the body is where it is, and a scan `[R]` if there is one; compares both with the map."""
         body, deviation = memory.body, memory.deviation
         if ranges is not None:
-            memory.occupancy.see((body.x, body.y, body.yaw), ranges, self._beams, deviation)
+            add_scan(memory.evidence, body.x, body.y, body.yaw, ranges, self._beams, deviation)
         # The episode would have ended in the goal. Near a cell's border, the body may be in another one.
         off_x, off_y = (abs(coordinate % 1.0 - 0.5) for coordinate in (body.x, body.y))
         if max(off_x, off_y) < 0.5 - 2 * deviation:
             memory.searched[memory.cell] = True
             if ranges is None:
-                memory.occupancy.visit(memory.cell)
-        if memory.belief.update(memory.occupancy.evidence, memory.searched):
+                memory.evidence[memory.cell] = max(memory.evidence[memory.cell] - _VISITED, -MOST_EVIDENCE)
+        if memory.belief.update(memory.evidence, memory.searched):
             memory.prior, memory.goal = memory.belief.mixture()
 
 

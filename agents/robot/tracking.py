@@ -20,7 +20,7 @@ from mazebench.kernels import compiled, inlined
 
 from .beams import Beams, log_likelihood, log_likelihoods
 from .body import Body
-from .occupancy import Occupancy
+from .occupancy import seen_walls
 
 _DEVIATION = 0.03  # cells, of a position that was matched
 _TEMPER = 0.5  # weight of a scan against the odometry: rays share errors
@@ -56,14 +56,9 @@ class Tracker:
     def update(
         self, walls: np.ndarray, odometry: np.ndarray, commanded: np.ndarray, ranges: np.ndarray, beams: Beams
     ) -> None:
-        """Takes in an observation.
+        """Takes in an observed pose `odometry` `[3]` and a scan `ranges` `[R]`.
 
-        Args:
-          walls: `[L, L]` float, the probability of a wall by what was seen before.
-          odometry: `[3]`, what is observed.
-          commanded: `[3]`, where the body should be by the last action.
-          ranges: `[R]`, the scan.
-          beams: of the sensor.
+        `walls` `[L, L]` are the probabilities by what was seen before, `commanded` `[3]` the pose by the last action.
         """
         x, y, yaw = self.pose.tolist()
         step_x, step_y, turned = (odometry - self.odometry).tolist()
@@ -90,8 +85,7 @@ class Tracker:
         self.error = measured - corrected
         self.driven += way**2
         self.moved += (measured.conjugate() * corrected).real
-        size = len(walls)
-        self.pose[:2] = np.clip(self.pose[:2], 0.01, size - 0.01)
+        self.pose[:2] = np.clip(self.pose[:2], 0.01, len(walls) - 0.01)
 
     def body(self, observed: Body) -> Body:
         """Returns the body in the grid's frame; its velocities carry the errors of the odometry's last step."""
@@ -105,7 +99,7 @@ def aligned(size: int, ranges: np.ndarray, beams: Beams) -> np.ndarray:
 
     Its heading, in [0, pi / 2), lays the scan on the grid's lines.
     """
-    walls, poses = Occupancy.unseen(size).seen_walls(), np.empty((_NUM_HEADINGS, 3))
+    walls, poses = seen_walls(np.zeros((size, size))), np.empty((_NUM_HEADINGS, 3))
     poses[:, :2] = size / 2
     poses[:, 2] = np.arange(_NUM_HEADINGS) * (math.pi / 2 / _NUM_HEADINGS)
     best = poses[log_likelihoods(walls, poses, ranges, beams, _DEVIATION).argmax()]
