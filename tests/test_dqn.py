@@ -6,7 +6,7 @@ import torch
 from acting import inputs_of
 from mazebench_agents.dqn import DQN
 from mazebench_agents.dqn.q_learner import double_q_target
-from mazebench_agents.mah import MAH, MAHPaper
+from mazebench_agents.mah import MAH
 from mazebench_agents.mah.map_q_network import ReadingQNetwork
 from small_world import learn
 
@@ -55,18 +55,6 @@ def test_network_without_context_does_not_depend_on_it():
     np.testing.assert_array_equal(one, other)
 
 
-def test_mah_paper_reads_one_code_of_the_context_and_codes_of_the_estimated_position():
-    agent = MAHPaper(MAHPaper.default_config, 7)
-    torch.manual_seed(0)
-    contexts = (torch.rand(2, 4, 7, 7) < 0.3).float()
-    code = agent.network.encode(contexts)
-    assert code.shape == (2, 256 + 4)  # and the marks of start and goal
-    assert not torch.equal(code[0, :256], code[1, :256])
-    state = torch.zeros(2, 3, 9)
-    assert agent.network(state, code).shape == (2, 3, 6)
-    assert not torch.equal(agent.network(state, code)[0], agent.network(state, code)[1])
-
-
 @pytest.mark.slow
 def test_mah_after_a_minute_beats_random_in_a_small_maze():
     """The learning test: goals up to 3 cells away in 25 steps, where acting at random reaches some 40 %."""
@@ -85,23 +73,3 @@ def test_mah_after_a_minute_beats_random_in_a_small_maze():
     before, after = learn(MAH, 3, (2, 3), 1500, values)
     assert before < 0.6
     assert after > 0.8
-
-
-def test_actions_do_not_depend_on_what_else_is_in_the_batch():
-    """PyTorch rounds differently at another batch size; an episode's actions must not."""
-    agent = MAH(MAH.default_config, 13, seed=2)
-    rng = np.random.default_rng(0)
-    observation = {
-        "state": rng.normal(size=(77, 12)).astype(np.float32),
-        "context": (rng.random((77, 4, 13, 13)) < 0.3).astype(np.float32),
-    }
-
-    def values(rows):
-        state = agent.initial_state(len(rows))
-        part = {key: value[rows] for key, value in observation.items()}
-        agent.act(inputs_of(part, np.ones(len(rows), dtype=bool)), state)
-        return state.code.numpy()
-
-    together = values(np.arange(77))
-    for rows in (np.array([76]), np.arange(40, 77), rng.permutation(77)):
-        np.testing.assert_array_equal(values(rows), together[rows])

@@ -50,14 +50,23 @@ def test_environments_that_do_not_go_on_by_themselves_are_refused():
         MazeVecEnv(mazebench.make_vec(autoreset_mode="Disabled"))
 
 
-@pytest.mark.parametrize("task", ["local", "rebuilt"])
-def test_a_policy_learns_from_them(task):
+@pytest.mark.parametrize(
+    ("task", "reader", "num_features"),
+    [
+        ("local", MapFeatures, 256 + 12),
+        ("rebuilt", MapFeatures, 256 + 12 + 32),
+        ("building", WayFeatures, NUM_READ + 32 + 15 + 2),
+    ],
+)
+def test_a_policy_learns_from_them(task, reader, num_features):
     envs = VecMonitor(MazeVecEnv(mazebench.make_vec(task, 4, distances=(1, 2))))
-    policy = {"net_arch": [16], "features_extractor_class": MapFeatures}
+    policy = {"net_arch": [16], "features_extractor_class": reader}
     model = PPO("MultiInputPolicy", envs, n_steps=32, batch_size=64, n_epochs=1, policy_kwargs=policy, device="cpu")
-    model.learn(256)
     features = model.policy.features_extractor
-    assert features.features_dim == 256 + 12 + (32 if task == "rebuilt" else 0)
+    before = next(features.parameters()).clone()
+    model.learn(128)
+    assert not torch.equal(before, next(features.parameters()))
+    assert features.features_dim == num_features
     actions, _ = model.predict(envs.reset())
     assert actions.shape == (4,)
 
@@ -82,12 +91,3 @@ def test_ways_are_read_as_by_the_neural_planner():
     assert differ.sum() <= 8  # of 96 rays
     found.sum().backward()
     assert all(weight.grad.abs().sum() > 0 for weight in reader.planner.costs.parameters())
-
-
-def test_a_policy_with_ways_learns():
-    envs = VecMonitor(MazeVecEnv(mazebench.make_vec("building", 4, distances=(1, 2))))
-    policy = {"net_arch": [16], "features_extractor_class": WayFeatures}
-    model = PPO("MultiInputPolicy", envs, n_steps=32, batch_size=64, n_epochs=1, policy_kwargs=policy, device="cpu")
-    before = model.policy.features_extractor.planner.costs[0].weight.clone()
-    model.learn(128)
-    assert not torch.equal(before, model.policy.features_extractor.planner.costs[0].weight)

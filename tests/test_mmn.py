@@ -16,7 +16,6 @@ from mazebench_agents.mmn.targets import Targets, make_batch
 from small_world import learn
 
 from mazebench.agent import Interface
-from mazebench.errors import UnplayableError
 from mazebench.maps.kinds import generate
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.task import Task
@@ -141,12 +140,6 @@ def test_saved_and_built_agent_acts_identically(config, tmp_path, mazes):
     np.testing.assert_array_equal(actions, expected)
 
 
-def test_agent_with_one_code_a_context_says_which_sizes_it_serves(tmp_path, mazes):
-    make_learner(mazes).save(tmp_path, {})
-    with pytest.raises(UnplayableError, match=r"'mmn': its checkpoint reads maps of 7 x 7 only, found 13 x 13"):
-        MMN.build(Interface("local", 13, 13), checkpoint=tmp_path / "agent.safetensors")
-
-
 def test_agent_that_reads_ways_knows_its_place_as_in_a_map_of_another_size():
     network = MMN(CONFIGS["mmn-paths"], 7).network
     torch.nn.init.normal_(network.scale)
@@ -156,14 +149,6 @@ def test_agent_that_reads_ways_knows_its_place_as_in_a_map_of_another_size():
     seen = [network.look(latent, code_of(network, context))[..., :NUM_PLACE] for context in (small, large)]
     torch.testing.assert_close(*seen)
     assert seen[0].std(dim=1).max() > 0.1
-
-
-def test_agent_that_reads_ways_acts_in_mazes_of_other_sizes():
-    agent = MMN(CONFIGS["mmn-paths"], 7)
-    for size in (5, 11):
-        inputs = inputs_of(an_observation(3) | {"context": a_context(size=size, batch=3).numpy()}, np.ones(3, bool))
-        actions, _ = agent.act(inputs, agent.initial_state(3))
-        assert actions.shape == (3,)
 
 
 @pytest.mark.parametrize("config", [SMALL, WITHOUT_MODEL])

@@ -11,7 +11,6 @@ from mazebench_agents.mmn.mmn_config import MMNConfig
 from mazebench_agents.mmn.targets import Batch, Targets, n_step_returns
 
 NEVER = torch.zeros(4, dtype=torch.bool)
-ALL = torch.ones(4, dtype=torch.bool)
 
 
 def at(*steps):
@@ -21,23 +20,21 @@ def at(*steps):
     return mask
 
 
-def test_n_step_returns_bootstrap_after_n_steps():
+@pytest.mark.parametrize(
+    ("at_goal", "length", "n", "returns"),
+    [
+        # From state 0: two steps, then -20; from 1: two steps, then -3; from 2: one step only; the last: its own value.
+        (NEVER, 4, 2, [-22.0, -5.0, -4.0, -3.0]),
+        # The step into the goal is rewarded 0: from state 1 the return is 0, from 0 one step of -1.
+        (at(2), 3, 3, [-1.0, 0.0]),
+        # Where the trajectory was cut short, its last value follows.
+        (NEVER, 2, 3, [-8.0, -7.0]),
+    ],
+)
+def test_n_step_returns(at_goal, length, n, returns):
     value = torch.tensor([-9.0, -7.0, -20.0, -3.0])
-    # From state 0: two steps, then -20; from 1: two steps, then -3; from 2: one step only; the last: its own value.
-    assert n_step_returns(value, NEVER, ALL, 2).tolist() == [-22.0, -5.0, -4.0, -3.0]
-
-
-def test_n_step_returns_end_at_the_goal_without_its_value():
-    value = torch.tensor([-9.0, -7.0, -20.0, -50.0])
-    # The step into the goal is rewarded 0: from state 1 the return is 0, from 0 one step of -1.
-    exists = torch.tensor([True, True, True, False])
-    assert n_step_returns(value, at(2), exists, 3).tolist()[:2] == [-1.0, 0.0]
-
-
-def test_n_step_returns_bootstrap_where_the_trajectory_was_cut_short():
-    value = torch.tensor([-9.0, -7.0, -20.0, -3.0])
-    exists = torch.tensor([True, True, False, False])
-    assert n_step_returns(value, NEVER, exists, 3).tolist()[:2] == [-8.0, -7.0]
+    found = n_step_returns(value, at_goal, torch.arange(4) < length, n)
+    assert found.tolist()[: len(returns)] == returns
 
 
 def test_two_hot_weighs_the_two_whole_numbers_beside():
@@ -127,16 +124,6 @@ class TestWithoutModel:
         _, metrics = q_losses(network, target, self.CONFIG, batch)
         returns = [-7.0] * 6 + [-2.0 - steps for steps in (4, 3, 2, 1)]
         assert metrics["value"].item() == pytest.approx(sum(returns) / 10, rel=1e-4)
-
-    def test_only_the_action_that_was_taken_learns(self):
-        """An advantage counts from the mean of all six."""
-        batch, _ = make_batch()
-        network = make_network(self.CONFIG)
-        losses, _ = q_losses(network, network, self.CONFIG, batch)
-        (gradient,) = torch.autograd.grad(losses["value_loss"], network.heads.bias)
-        taken, *others = gradient[1:7].tolist()
-        assert taken != 0
-        assert others == pytest.approx([-taken / 5] * 5)
 
 
 def test_map_ratio_compares_the_weights_of_two_mazes():

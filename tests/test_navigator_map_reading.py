@@ -56,10 +56,6 @@ class TestDrawnMap:
         assert reading.goal[goal] > 0.9
         assert reading.start[start] > 0.9
 
-    def test_start_is_found_where_only_its_mark_is_known(self):
-        _, start, _, context = sketched(3, 1)
-        assert read_map(context, SIZE).start[start] > 0.9
-
     def test_map_without_a_start_mark_is_read(self):
         maze, _, _, context = sketched(3, 1)
         context[START] = 0

@@ -14,6 +14,7 @@ from mazebench_agents.robot.tracking import Tracker, aligned
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, cell_to_point
 from mazebench.tasks.perturbations.odometry import NoisyMotion, Odometry
+from mazebench.tasks.sensors.lidar_noise import read
 from mazebench.world.angles import wrap_angle
 from mazebench.world.ray_casting import TURTLEBOT3, Lidar, LidarModel
 
@@ -22,14 +23,8 @@ FREE, WALL = -1, 1
 TURN = math.radians(21.12)  # of a look action
 
 
-def noisy(ranges: np.ndarray, model: LidarModel, rng: np.random.Generator) -> np.ndarray:
-    """Readings of a sensor at distances `[R]` up to its range."""
-    read = np.clip(ranges + rng.normal(0, model.sigma, ranges.shape), model.min_range, model.max_range)
-    return np.where((ranges >= model.max_range) | (rng.random(ranges.shape) < model.lost), model.max_range, read)
-
-
 def scan(maze: Maze, pose: np.ndarray, model: LidarModel, rng: np.random.Generator) -> np.ndarray:
-    return noisy(Lidar((maze,), model.max_range).ranges(np.zeros(1, int), pose[None])[0].astype(float), model, rng)
+    return read(Lidar((maze,), model.max_range).ranges(np.zeros(1, int), pose[None]), model, [rng])[0].astype(float)
 
 
 def poses_in(maze: Maze, count: int, rng: np.random.Generator) -> np.ndarray:
