@@ -40,7 +40,9 @@ def load_checkpoint(path: pathlib.Path, agent: str) -> tuple[dict[str, torch.Ten
     content = read_at_most(path, _MAX_BYTES, "checkpoint")
     try:
         tensors = safetensors.torch.load(content)
-        metadata = _metadata(content)
+        # The header is JSON, after eight bytes with its length.
+        header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])
+        metadata = json.loads(header["__metadata__"][FORMAT])
     except (safetensors.SafetensorError, ValueError, KeyError) as error:
         fault = str(error)[:120]
         raise InputError(f"{path}: expected a checkpoint of {FORMAT}, found a damaged one: {fault}") from error
@@ -74,9 +76,3 @@ def load_into(path: pathlib.Path, module: torch.nn.Module, tensors: Mapping[str,
         module.load_state_dict(dict(tensors))
     except RuntimeError as error:
         raise InputError(f"{path}: {shortened(str(error))}") from error
-
-
-def _metadata(content: bytes) -> Any:
-    """Returns the metadata of a whole safetensors file: the header is JSON, after eight bytes with its length."""
-    header_bytes = int.from_bytes(content[:8], "little")
-    return json.loads(json.loads(content[8 : 8 + header_bytes])["__metadata__"][FORMAT])

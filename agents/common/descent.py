@@ -24,7 +24,8 @@ class Descent:
         """Makes the target network, if there is one, equal to `network`, the torch.nn.Module that learns.
 
         Args:
-          network, optimizer: Adam or AdamW, of the network's parameters.
+          network: has the parameters that `optimizer` takes.
+          optimizer: Adam or AdamW.
           max_gradient_norm: to which a longer gradient is shortened.
           target_rate: of the moving average, a step; None for no target network.
           rate: returns the factor of the learning rate at a step, the first one being 1; None if it never falls. A

@@ -83,7 +83,7 @@ def unrolled_losses(
         if step < config.unroll:
             action = at(batch.action, step)
             latent = network.step(latent, network.first_layer(latent, seen, code), action, code)
-            latent = scale_gradient(latent, _HIDDEN_GRADIENT)
+            latent = latent * _HIDDEN_GRADIENT + latent.detach() * (1 - _HIDDEN_GRADIENT)
     metrics = watched.means()
     metrics["map_ratio"] = metrics.pop(_OTHER_MAP) / metrics["model_error_1"].clamp(min=1e-6)
     return losses.means(), metrics
@@ -179,8 +179,3 @@ def two_hot(value: torch.Tensor, num_bins: int) -> torch.Tensor:
 def cross_entropy(target: torch.Tensor, logits: torch.Tensor) -> torch.Tensor:
     """Returns the cross-entropy `[...]` of logits under target probabilities, both `[..., n]`."""
     return -(target * logits.log_softmax(dim=-1)).sum(dim=-1)
-
-
-def scale_gradient(tensor: torch.Tensor, scale: float) -> torch.Tensor:
-    """Returns `tensor` with its gradient scaled; MuZero halves that of unrolled states at each step."""
-    return tensor * scale + tensor.detach() * (1 - scale)
