@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mazebench_agents.robot import rays
-from mazebench_agents.robot.body import COASTING_TIME, Body
+from mazebench_agents.robot.body import Body
 from mazebench_agents.robot.cells import nearest_cell
 from mazebench_agents.robot.dead_reckoning import DeadReckoning
 from mazebench_agents.robot.shortest_paths import cheapest_ways
@@ -51,12 +51,6 @@ def test_dead_reckoning_adds_up_mean_velocities_and_follows_positions_by_its_gai
     odometry = DeadReckoning((1.0, 0.0), velocity=(2.0, 0.0), gain=gain)
     assert odometry.update(body(7.0, forward=4.0)).x == pytest.approx(expected)
     assert odometry.velocity == (4.0, 0.0)
-
-
-def test_a_body_comes_to_rest_ahead_of_where_it_drives():
-    assert Body(x=1.0, y=1.0, yaw=math.pi / 2, forward=2.0, left=0.0).rest() == pytest.approx(
-        (1.0, 1 + 2 * COASTING_TIME)
-    )
 
 
 @pytest.mark.parametrize(("point", "cell"), [((0.5, 0.5), (4, 0)), ((4.9, 4.1), (0, 4)), ((-3.0, 9.0), (0, 0))])
