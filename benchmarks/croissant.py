@@ -1,8 +1,9 @@
 """Describes the frozen mazes and episodes as a Croissant data set: `python -m benchmarks.croissant`.
 
 It brings assets/croissant.json (Croissant 1.1 with the fields of its RAI vocabulary) up to date with the manifests of
-the two benchmarks, with CITATION.cff and with `Source` of `[project.urls]` in pyproject.toml. The texts of the data set
-are in the file itself. It has no address and no date of publication as long as the other files have none.
+the two benchmarks, with CITATION.cff and with `Source` of `[project.urls]` in pyproject.toml. The file itself has the
+texts and the records of each file (`recordSet`). It has no address and no date of publication as long as the other
+files have none.
 """
 
 from __future__ import annotations
@@ -23,20 +24,6 @@ ASSETS = ROOT / "assets"
 OUT = ASSETS / "croissant.json"
 FOLDERS = {PAPER_BENCHMARK: "paper_mazes", TRACKS_BENCHMARK: "tracks"}
 
-# Of a file of episodes: what each column means, and its type.
-_COLUMNS = {
-    "maze": ("index of the maze in its split, from 0; in tracks, kind by kind as the manifest lists them", "Integer"),
-    "start_row": ("row of the start cell, from 0 at the top", "Integer"),
-    "start_column": ("column of the start cell, from 0 at the left", "Integer"),
-    "goal_row": ("row of the goal cell", "Integer"),
-    "goal_column": ("column of the goal cell", "Integer"),
-    "distance": ("cells from start to goal along a shortest path on the grid", "Integer"),
-    "yaw": ("heading at the start, in radians", "Float"),
-    "seed": ("seed of all else that the episode draws, such as errors of the map and noise", "Integer"),
-    "shortest_path": ("metres that a disc of 0.15 m radius drives at least to the goal cell", "Float"),
-    "oracle_steps": ("steps to the goal that the agent oracle takes, empty where it misses the goal", "Integer"),
-}
-
 
 def describe() -> dict[str, Any]:
     """Returns the description of the data set, as JSON-LD."""
@@ -44,25 +31,19 @@ def describe() -> dict[str, Any]:
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     authors = [author["name"] for author in citation["authors"]]
-    bibtex = {
-        "title": citation["title"],
-        "author": " and ".join(f"{{{name}}}" for name in authors),
-        "version": citation["version"],
-    }
-    fields = ", ".join(f"{name}={{{value}}}" for name, value in bibtex.items())
-    paths = [
-        (benchmark, f"{folder}/{name}")
-        for benchmark, folder in FOLDERS.items()
-        for name in (MANIFEST, *manifest(benchmark)["files"])
-    ]
     description |= {
         "license": f"https://spdx.org/licenses/{citation['license']}.html",
         "creator": [{"@type": "sc:Organization", "name": name} for name in authors],
         "keywords": citation["keywords"],
         "version": f"{manifest(TRACKS_BENCHMARK)['version']}.0.0",  # of the benchmarks, not of the package
-        "citeAs": f"@software{{mazebench, {fields}, year={{{description['dateCreated'][:4]}}}}}",
-        "distribution": [_file(*each) for each in paths],
-        "recordSet": [_record_set(path) for _, path in paths if "/episodes-" in path or "/mazes-" in path],
+        "citeAs": f"@software{{mazebench, title={{{citation['title']}}}, "
+        f"author={{{' and '.join(f'{{{name}}}' for name in authors)}}}, version={{{citation['version']}}}, "
+        f"year={{{description['dateCreated'][:4]}}}}}",
+        "distribution": [
+            _file(benchmark, f"{folder}/{name}")
+            for benchmark, folder in FOLDERS.items()
+            for name in (MANIFEST, *manifest(benchmark)["files"])
+        ],
     }
     if "Source" in project["urls"]:
         description["url"] = project["urls"]["Source"]
@@ -85,35 +66,6 @@ def _file(benchmark: str, path: str) -> dict[str, Any]:
         "contentSize": f"{len(content)} B",
         "encodingFormat": {"csv": "text/csv", "json": "application/json", "txt": "text/plain"}[name.rpartition(".")[2]],
         "sha256": found,
-    }
-
-
-def _record_set(path: str) -> dict[str, Any]:
-    """Returns the records of a file: frozen episodes, or the rows of mazes."""
-    name, _, suffix = path.replace("/", "-").rpartition(".")
-    if suffix == "csv":
-        text = "The frozen episodes of a task, size and split, one a record."
-        fields = [(column, meaning, kind, {"column": column}) for column, (meaning, kind) in _COLUMNS.items()]
-    else:
-        text = "The mazes of a split, row by row from the top. A maze has as many rows as a row has characters."
-        meaning = "A row of cells, from left to right: # is a wall, . is free."
-        fields = [("row", meaning, "Text", {"fileProperty": "lines"})]
-    return {
-        "@type": "cr:RecordSet",
-        "@id": name,
-        "name": name,
-        "description": text,
-        "field": [
-            {
-                "@type": "cr:Field",
-                "@id": f"{name}/{field}",
-                "name": field,
-                "description": meaning,
-                "dataType": f"sc:{kind}",
-                "source": {"fileObject": {"@id": path}, "extract": extract},
-            }
-            for field, meaning, kind, extract in fields
-        ],
     }
 
 

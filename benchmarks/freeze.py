@@ -35,16 +35,13 @@ def freeze(folder: pathlib.Path) -> None:
             chosen = mazes[size][index * MAZES_PER_SPLIT : (index + 1) * MAZES_PER_SPLIT]
             files[mazes_file(size, split)] = "\n".join(map(format_maze, chosen))
     for task, size, _ in benchmark_task_sizes():
-        spec = _task(task, mazes[size][MAZES_PER_SPLIT:])
+        distances = EVAL_DISTANCES if task == "local" else None
+        spec = Task.of(task, mazes=mazes[size][MAZES_PER_SPLIT:], distances=distances)
         files[episodes_file(task, size)] = format_trials(spec, draw_trials(spec, seed=_EPISODE_SEED))
     generator = {"style": "dfs", "openings": DFS_OPENINGS, "seed": _MAZE_SEED, "episode_seed": _EPISODE_SEED}
     files[MANIFEST] = format_manifest(PAPER_BENCHMARK, generator, files)
     for name, text in files.items():
         folder.joinpath(name).write_bytes(text.encode("ascii"))
-
-
-def _task(task: str, mazes: list[Maze]) -> Task:
-    return Task.of(task, mazes=mazes, distances=EVAL_DISTANCES if task == "local" else None)
 
 
 def draw_mazes(size: int) -> list[Maze]:

@@ -11,21 +11,14 @@ from __future__ import annotations
 import hashlib
 import itertools
 import pathlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 from benchmarks.freeze import format_manifest, format_trials
-from mazebench.maps.benchmark import (
-    DEV,
-    FROZEN_SPLITS,
-    KINDS_SIZE,
-    MANIFEST,
-    TRACKS_BENCHMARK,
-    mazes_file,
-)
+from mazebench.maps.benchmark import DEV, FROZEN_SPLITS, KINDS_SIZE, MANIFEST, TRACKS_BENCHMARK, mazes_file
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
@@ -41,7 +34,10 @@ _SEED = 3  # each split adds one of its own
 _EPISODES_PER_MAZE = 5
 
 
-def freeze_kinds(folder: pathlib.Path, commit: str) -> None:
+def freeze_kinds(
+    folder: pathlib.Path,
+    commit: Annotated[str, typer.Option(help="The hash of the commit from which the split eval is drawn.")],
+) -> None:
     """Writes the splits train, dev and eval into `folder`; eval is drawn from the hash of a commit."""
     folder.mkdir(parents=True, exist_ok=True)
     generator: dict[str, Any] = {"seed": _SEED, "kinds": {}, "contexts_sha256": {}, "eval_commit": commit}
@@ -82,7 +78,8 @@ def draw_mazes(kind: str, split: str, known: set[bytes], rng: np.random.Generato
 
 def draw_kind_trials(mazes: Sequence[Maze], rng: np.random.Generator) -> list[Trial]:
     """Returns five episodes in each maze, by maze; every distance comes up about as often as every other one."""
-    distances = _shuffled_rounds(DISTANCES, rng)
+    # All distances in a random order, then all of them in another one, and so on.
+    distances = itertools.chain.from_iterable(rng.permutation(DISTANCES).tolist() for _ in itertools.count())
     return [
         make_trial(maze, index, sample_pair(maze, distance, rng), rng)
         for index, maze in enumerate(mazes)
@@ -105,19 +102,5 @@ def _task(track: str, level: int, mazes: Sequence[Maze]) -> Task:
     return Task.of(track, mazes=list(mazes), level=level, distances=DISTANCES)
 
 
-def _shuffled_rounds(values: Sequence[int], rng: np.random.Generator) -> Iterator[int]:
-    """Yields all of `values` in a random order, then all of them in another one, and so on."""
-    while True:
-        yield from rng.permutation(values).tolist()
-
-
-def main(
-    folder: pathlib.Path,
-    commit: Annotated[str, typer.Option(help="The hash of the commit from which the split eval is drawn.")],
-) -> None:
-    """Write the files of the benchmark."""
-    freeze_kinds(folder, commit)
-
-
 if __name__ == "__main__":
-    typer.run(main)
+    typer.run(freeze_kinds)

@@ -18,6 +18,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import typer
 
+from benchmarks.results.results_tables import format_interval, format_table
 from mazebench.agent_loading import load_agent_class
 from mazebench.constants import ON_TIME
 from mazebench.errors import InputError
@@ -27,7 +28,7 @@ from mazebench.maps.benchmark import KINDS_SIZE
 from mazebench.maps.doors import door_slots, num_swappable, swap_doors
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.maps.maze import Cell, Maze
-from mazebench.results.intervals import Estimate, difference_interval, mean_interval
+from mazebench.results.intervals import difference_interval, mean_interval
 from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.perturbations.moved_doors import SWAPS_BY_PERCENT
 from mazebench.tasks.shown_map import is_blocked
@@ -61,7 +62,7 @@ def swaps(kinds: Kinds = KINDS, episodes: Episodes = 40) -> None:
     """Print how many doors must move so that a share of the shortest paths on the map is blocked."""
     shares = sorted({percent / 100 for counts in SWAPS_BY_PERCENT.values() for percent in counts})
     print(f"\nDoors that move, and the share of {episodes} paths on the map that they block:\n")
-    _print_head("kind", "doors", "open", *(f"{share:g}" for share in shares), "at most")
+    rows = []
     for kind in kinds.split(","):
         rng = np.random.default_rng(_SEED)
         cases = [
@@ -75,7 +76,8 @@ def swaps(kinds: Kinds = KINDS, episodes: Episodes = 40) -> None:
         found = [_nearest(blocked, bisect.bisect_left(numbers, share, key=blocked), share) for share in shares]
         most = bisect.bisect_left(numbers, math.inf, key=blocked) - 1
         cells = [f"{count}: {blocked(count):.2f}" if count <= most else "-" for count in (*found, most)]
-        _print_row(kind, f"{doors:.0f}", f"{num_open:.0f}", *cells)
+        rows.append([kind, f"{doors:.0f}", f"{num_open:.0f}", *cells])
+    print(format_table(["kind", "doors", "open", *(f"{share:g}" for share in shares), "at most"], rows))
 
 
 class _Case(NamedTuple):
@@ -109,7 +111,7 @@ def _blocked_share(cases: list[_Case], num_swaps: int) -> float:
 def worth(kinds: Kinds = KINDS, episodes: Episodes = 40) -> None:
     """Print what the oracle reaches, and what an exact map is worth to the navigator."""
     print(f"\nRight maps, {episodes} episodes of each kind; on time is within {ON_TIME[0]:g} oracle steps:\n")
-    _print_head("kind", "oracle: success", "steps a cell", "navigator on time", "without map", "map worth")
+    rows = []
     for kind in kinds.split(","):
         mazes = check_mazes(kind, -(-episodes // _PER_MAZE))
         rng = np.random.default_rng(_SEED)
@@ -127,14 +129,14 @@ def worth(kinds: Kinds = KINDS, episodes: Episodes = 40) -> None:
         )
         oracle = np.array([steps or np.inf for steps in measure_oracle_steps(shown, trials)])
         with_map, without = (_on_time(task, trials, oracle) for task in (shown, hidden))
-        _print_row(
-            kind,
-            _show(mean_interval(1.0 * np.isfinite(oracle), played)),
-            f"{np.mean(oracle / cells):.2f}",
-            f"{with_map.mean():.2f}",
-            f"{without.mean():.2f}",
-            _show(difference_interval(with_map - without, played)),
+        success, map_worth = (
+            mean_interval(1.0 * np.isfinite(oracle), played),
+            difference_interval(with_map - without, played),
         )
+        means = [f"{values.mean():.2f}" for values in (oracle / cells, with_map, without)]
+        rows.append([kind, format_interval(success), *means, format_interval(map_worth)])
+    head = ["kind", "oracle: success", "steps a cell", "navigator on time", "without map", "map worth"]
+    print(format_table(head, rows))
 
 
 def _on_time(task: Task, trials: Sequence[Trial], oracle: np.ndarray) -> np.ndarray:
@@ -144,19 +146,6 @@ def _on_time(task: Task, trials: Sequence[Trial], oracle: np.ndarray) -> np.ndar
         for result in results:
             on_time[result.number] = result.success and result.steps <= ON_TIME[0] * oracle[result.number]
     return on_time
-
-
-def _show(estimate: Estimate) -> str:
-    return f"{estimate.value:.2f} [{estimate.low:.2f}, {estimate.high:.2f}]"
-
-
-def _print_head(*cells: str) -> None:
-    _print_row(*cells)
-    _print_row(*["---"] * len(cells))
-
-
-def _print_row(*cells: str) -> None:
-    print("|", " | ".join(cells), "|", flush=True)
 
 
 if __name__ == "__main__":

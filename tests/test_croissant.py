@@ -21,6 +21,8 @@ def dataset():
 def test_the_shipped_file_is_what_the_command_writes():
     shipped = json.loads(croissant.OUT.read_text(encoding="ascii"))
     assert shipped == json.loads(json.dumps(croissant.describe())), "run python -m benchmarks.croissant"
+    described = {records["field"][0]["source"]["fileObject"]["@id"] for records in shipped["recordSet"]}
+    assert described == {file["@id"] for file in shipped["distribution"] if file["name"] != "manifest.json"}
 
 
 def test_only_the_date_of_publication_is_missing(dataset):

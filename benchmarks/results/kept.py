@@ -12,7 +12,7 @@ import pandas as pd
 from mazebench_agents.common.checkpoint import AGENT_FILE
 
 from mazebench.errors import InputError
-from mazebench.report.curves import SUCCESS, Run, read_run
+from mazebench.report.curves import SUCCESS
 from mazebench.report.episodes import join_episodes, read_results
 from mazebench.report.table import Table
 from mazebench.report.tables import build_tables
@@ -21,6 +21,7 @@ from mazebench.results.metrics import scores
 from mazebench.results.reading import CONFIG, EPISODES, SUITE, SUMMARY, Result, load_result
 from mazebench.results.records import column
 from mazebench.storage.files import make_folder, open_whole
+from mazebench.storage.json_files import read_lines
 from mazebench.tasks.tracks import LEVELS
 from mazebench.training.run_folder import METRICS, checkpoints
 
@@ -42,24 +43,20 @@ class Kept(NamedTuple):
     # A line for each episode of an agent in a setting (its index), which is a part of a suite, by a checkpoint (`run`).
     episodes: pd.DataFrame
     report: dict[str, Table]  # tables of the report of the suite `paper`, by name
-    training: dict[str, list[Run]]  # logs of training runs, by name of their archive
-
-    def has(self, agent: str, setting: str) -> bool:
-        """Returns whether an agent was evaluated in a setting."""
-        return (agent, setting) in self.episodes.index
+    training: dict[str, list[pd.DataFrame]]  # what training runs logged, by name of their archive
 
     def of(self, agent: str, setting: str) -> pd.DataFrame:
         """Returns the episodes of an agent in a setting: those of its training runs where several are kept."""
-        if not self.has(agent, setting):
+        if (agent, setting) not in self.episodes.index:
             raise InputError(f"expected an evaluation of {agent} on {setting} among the records, found none")
         found = self.episodes.loc[agent, setting]
         runs = found[found.archive == _RUNS]
         return found if runs.empty else runs
 
-    def levels(self, agent: str, track: str) -> list[pd.DataFrame]:
-        """Returns the episodes at each level of a track where an agent was evaluated."""
+    def on_track(self, agent: str, track: str) -> dict[str, pd.DataFrame]:
+        """Returns an agent's episodes in each setting of a track in which it was evaluated, as "rebuilt-2"."""
         settings = (f"{track}-{level}" for level in LEVELS)
-        return [self.of(agent, setting) for setting in settings if self.has(agent, setting)]
+        return {each: self.of(agent, each) for each in settings if (agent, each) in self.episodes.index}
 
     def milestones(self, archive: str) -> pd.DataFrame:
         """Returns what an archive's training runs logged at the milestones that all of them reached, a line each.
@@ -67,12 +64,12 @@ class Kept(NamedTuple):
         The index has millions of agent steps, rounded to a tenth.
         """
         runs = []
-        for run in self.training[archive]:
-            lines = run.lines[run.lines.filter(like=SUCCESS).notna().any(axis=1)]
+        for lines in self.training[archive]:
+            lines = lines[lines.filter(like=SUCCESS).notna().any(axis=1)]
             lines = lines.set_index((lines.env_steps / 1e6).round(1))
             runs.append(lines[~lines.index.duplicated(keep="last")])
-        common = functools.reduce(pd.Index.intersection, (run.index for run in runs))
-        return pd.concat([run.loc[common] for run in runs])
+        common = functools.reduce(pd.Index.intersection, (lines.index for lines in runs))
+        return pd.concat([lines.loc[common] for lines in runs])
 
     def success_rates(self, archive: str, distance: int) -> pd.DataFrame:
         """Returns the mean, lowest and highest success rate over training runs on watched mazes at each milestone."""
@@ -84,25 +81,22 @@ def estimate(own: pd.DataFrame, metric: str, other: pd.DataFrame | None = None) 
 
     The others are of the same episodes by another agent.
     """
-    values, others = (
-        None if each is None else each.pivot(index="run", columns="episode", values=metric).to_numpy()
-        for each in (own, other)
-    )
-    mazes = own.drop_duplicates("episode").sort_values("episode").maze.to_numpy()
-    return runs_interval(values, mazes, others)
+    values = own.pivot(index="run", columns="episode", values=metric)
+    others = None if other is None else other.pivot(index="run", columns="episode", values=metric).to_numpy()
+    mazes = own.drop_duplicates("episode").set_index("episode").maze[values.columns]
+    return runs_interval(values.to_numpy(), mazes.to_numpy(), others)
 
 
 def read_kept(folder: pathlib.Path) -> Kept:
     """Returns what all archives of `folder` hold, and those of training runs in its folder `training`."""
-    training: dict[str, list[Run]] = {}
+    training: dict[str, list[pd.DataFrame]] = {}
     with tempfile.TemporaryDirectory() as temporary:
         unpacked = pathlib.Path(temporary)
         for path in folder.rglob(f"*{_SUFFIX}"):
             with tarfile.open(path) as archive:
                 archive.extractall(unpacked / path.relative_to(folder).parent, filter="data")
-        for config in sorted((unpacked / _TRAINING).rglob(CONFIG)):
-            if run := read_run(config.parent, config.parent.name):
-                training.setdefault(config.relative_to(unpacked).parts[1], []).append(run)
+        for log in sorted((unpacked / _TRAINING).rglob(METRICS)):
+            training.setdefault(log.relative_to(unpacked).parts[1], []).append(pd.DataFrame(read_lines(log)))
         results = [load_result(path.parent) for path in sorted(unpacked.rglob(SUMMARY))]
         paper = join_episodes(read_results([each.folder for each in results if each.summary.suite == PAPER]))
         lines = [_episodes(each, each.folder.relative_to(unpacked).parts[0]) for each in results]
@@ -117,15 +111,11 @@ def _episodes(result: Result, archive: str) -> pd.DataFrame:
     if archive == _RUNS:
         agent, setting = result.folder.name.rpartition("-")[0], LOCAL
     facts = {"kind", "blocked"} & {*(records[0].model_extra or {})}  # on tracks
-    fields = ("episode", "maze", "distance", "success", "steps", *facts)
-    oracle = pd.array([record.oracle_steps for record in records], dtype="Int64")
+    columns = {name: column(records, name) for name in ("episode", "maze", "distance", "success", "steps", *facts)}
+    columns["oracle_steps"] = pd.array([record.oracle_steps for record in records], dtype="Int64")
     run = (summary.provenance.checkpoint_sha256 or "")[:8]
-    return pd.DataFrame(
-        {"archive": archive, "agent": agent, "run": run, "setting": setting}
-        | {name: column(records, name) for name in fields}
-        | {"oracle_steps": oracle}
-        | scores(records)
-    )
+    origin = {"archive": archive, "agent": agent, "run": run, "setting": setting}
+    return pd.DataFrame(origin | columns | scores(records))
 
 
 def keep(folder: pathlib.Path, records: pathlib.Path) -> pathlib.Path:

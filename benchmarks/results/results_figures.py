@@ -43,7 +43,7 @@ def figures(kept: Kept) -> list[Drawn]:
 def map_worth(kept: Kept) -> Drawn:
     """Returns the navigator on time with and without the map, by track and level."""
     agents = ("navigator", "navigator without map", "navigator with the true pose")
-    panels = [_on_time(track, {agent: kept.levels(agent, track) for agent in agents}) for track in TRACKS]
+    panels = [_on_time(track, {agent: kept.on_track(agent, track) for agent in agents}) for track in TRACKS]
     return _figure("map-worth", "What the map is worth", panels, "on-time rate")
 
 
@@ -67,9 +67,12 @@ def what_fails(kept: Kept) -> Drawn:
     """Returns the navigator on time where the shortest path on the map is open and where it is blocked."""
     panels = []
     for track in TRACKS:
-        levels = kept.levels("navigator", track)
-        open_path, blocked = ([own[own.blocked == is_blocked] for own in levels] for is_blocked in (False, True))
-        panels.append(_on_time(track, {"open path": open_path, "blocked path": blocked}))
+        levels = kept.on_track("navigator", track)
+        lines = {
+            name: {setting: own[own.blocked == is_blocked] for setting, own in levels.items()}
+            for name, is_blocked in (("open path", False), ("blocked path", True))
+        }
+        panels.append(_on_time(track, lines))
     return _figure("what-fails", "Where the navigator is late", panels, "on-time rate")
 
 
@@ -102,12 +105,12 @@ def model_and_search(kept: Kept) -> Drawn:
     return _figure("model-and-search", title, panels)
 
 
-def _on_time(track: str, lines: Mapping[str, Sequence[pd.DataFrame]]) -> Panel:
+def _on_time(track: str, lines: Mapping[str, Mapping[str, pd.DataFrame]]) -> Panel:
     """Returns the share on time at each level of a track."""
     points = [
         {"column": label, "x": x, "value": mean.value, "low95": mean.low, "high95": mean.high}
         for label, levels in lines.items()
-        for x, own in enumerate(levels)
+        for x, own in enumerate(levels.values())
         if len(own)
         for mean in [estimate(own, ON_TIME_125)]
     ]

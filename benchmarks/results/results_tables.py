@@ -7,9 +7,10 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import pathlib
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -22,7 +23,7 @@ from mazebench.report.curves import SUCCESS
 from mazebench.report.table import METRICS, to_markdown
 from mazebench.results.intervals import CONFIDENCE, Estimate
 from mazebench.results.metrics import ON_TIME_METRICS
-from mazebench.tasks.tracks import LEVELS, TRACKS
+from mazebench.tasks.tracks import TRACKS
 
 ROOT = pathlib.Path(__file__).parent.parent.parent
 RECORDS = ROOT / "records"
@@ -38,10 +39,8 @@ _BLOCK = re.compile(
     r"(<!-- table: ([^\n]+) -->\n)(?:\|[^\n]*\n)*(?:\n" + re.escape(SATURATED) + r"[^\n]*\n)?(<!-- end of table -->\n)"
 )
 _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints success rates
-_DISTANCES = (*_PRINTED_DISTANCES, 12, 15)
 _MILESTONES = (0.2, 0.6, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.6)  # million agent steps
 _TRACKS = [f"`{track}`" for track in TRACKS]
-_SETTINGS = {f"`{track}` {level}": f"{track}-{level}" for track in TRACKS for level in LEVELS}
 
 _TRAINED = {
     "mmn": "`mmn`",
@@ -114,13 +113,16 @@ _ROWS = {
 
 
 def with_tables(text: str, kept: Kept) -> str:
-    """Returns a page with its tables made from the records."""
-    return _BLOCK.sub(lambda block: block[1] + make_table(kept, block[2]) + block[3], text)
+    """Returns a page with its tables made from the records.
 
+    A table is one of `TABLES`, or one of the report of the suite `paper`, as "paper local-13 spl".
+    """
 
-def make_table(kept: Kept, name: str) -> str:
-    """Returns a table: one of `TABLES`, or one of the report of the suite `paper`, as "paper local-13 spl"."""
-    return report_table(kept, *name.split()[1:]) if name.startswith(f"{PAPER} ") else TABLES[name](kept)
+    def make(block: re.Match[str]) -> str:
+        name, *of_report = block[2].split()
+        return block[1] + (report_table(kept, *of_report) if name == PAPER else TABLES[name](kept)) + block[3]
+
+    return _BLOCK.sub(make, text)
 
 
 def report_table(kept: Kept, name: str, metric: str) -> str:
@@ -142,16 +144,15 @@ def paper_runs(metric: str, kept: Kept) -> str:
     """Returns the mean of a metric over training runs by distance, and the differences of `_PAIRS`."""
     found = {name: kept.of(name, LOCAL) for name in _TRAINED}
     rows = [_by_distance(label, found[name], metric) for name, label in _TRAINED.items()]
-    for a, b in _PAIRS:
-        rows.append(_by_distance(f"{_TRAINED[a]} - {_TRAINED[b]}", found[a], metric, found[b]))
-    return _table(["agent", "runs", *map(str, _PRINTED_DISTANCES)], rows)
+    rows += [_by_distance(f"{_TRAINED[a]} - {_TRAINED[b]}", found[a], metric, found[b]) for a, b in _PAIRS]
+    return format_table(["agent", "runs", *map(str, _PRINTED_DISTANCES)], rows)
 
 
 def mah_curve(kept: Kept) -> str:
     """Returns success rates of mah over training on the watched mazes: the mean, lowest and highest of the runs."""
     rates = [kept.success_rates("mah-long", distance) for distance in _PRINTED_DISTANCES]
-    rows = [[f"{steps:g}", *(_interval(Estimate(*each.loc[steps])) for each in rates)] for steps in _MILESTONES]
-    return _table(["million steps", *map(str, _PRINTED_DISTANCES)], rows)
+    rows = [[f"{steps:g}", *(format_interval(Estimate(*each.loc[steps])) for each in rates)] for steps in _MILESTONES]
+    return format_table(["million steps", *map(str, _PRINTED_DISTANCES)], rows)
 
 
 def short_runs(archives: Mapping[str, str], metrics: Mapping[str, str], kept: Kept) -> str:
@@ -160,55 +161,36 @@ def short_runs(archives: Mapping[str, str], metrics: Mapping[str, str], kept: Ke
     for name, description in archives.items():
         runs = kept.milestones(name).loc[[0.4]]
         rates = [_over_values(runs[f"{SUCCESS}{distance}"]) for distance in _PRINTED_DISTANCES]
-        logged = [
-            ", ".join(format(value, form) for value in runs.get(metric, pd.Series(dtype=float)).dropna())
-            for metric, form in metrics.items()
-        ]
-        rows.append([description, str(len(runs)), *rates, *logged])
+        logged = runs.reindex(columns=list(metrics)).dropna().items()
+        texts = [", ".join(format(value, metrics[metric]) for value in values) for metric, values in logged]
+        rows.append([description, str(len(runs)), *rates, *texts])
     logs = (name.replace("_", " ") for name in metrics)
-    return _table(["trained", "runs", *map(str, _PRINTED_DISTANCES), *logs], rows)
-
-
-def mmn_runs(kept: Kept) -> str:
-    """Returns mean success rates of mmn and mmn-paths over their training runs, and the paper's."""
-    mmn, paths = (kept.of(name, LOCAL) for name in ("mmn", "mmn-paths"))
-    paper = kept.report[LOCAL].wide("success_rate").loc[map(str, _PRINTED_DISTANCES), "MMN (paper)"]
-    difference, _, *cells = _by_distance("`mmn-paths` - `mmn`", paths, "success_rate", mmn, _DISTANCES)
-    rows = [
-        _by_distance("`mmn`", mmn, at=_DISTANCES),
-        _by_distance("`mmn-paths`", paths, at=_DISTANCES),
-        [difference, "", *cells],
-        ["the paper's MMN, as printed", "", *paper, "", ""],
-    ]
-    return _table(["agent", "runs", *map(str, _DISTANCES)], rows)
+    return format_table(["trained", "runs", *map(str, _PRINTED_DISTANCES), *logs], rows)
 
 
 def mmn_sizes(kept: Kept) -> str:
     """Returns mean success rates of mmn-paths over its training runs, in the mazes of each size of the benchmark."""
-    rows = [_by_distance(f"{size} x {size}", kept.of("mmn-paths", f"local-{size}"), at=_DISTANCES) for size in SIZES]
-    return _table(["mazes", "runs", *map(str, _DISTANCES)], rows)
+    at = (*_PRINTED_DISTANCES, 12, 15)
+    rows = [_by_distance(f"{size} x {size}", kept.of("mmn-paths", f"local-{size}"), at=at) for size in SIZES]
+    return format_table(["mazes", "runs", *map(str, at)], rows)
 
 
 def tracks_table(metric: str, rows: Mapping[str, str], kept: Kept) -> str:
     """Returns a metric of agents on the tracks."""
     lines = [[text, *(_levels(kept, track, agent, metric) for track in TRACKS)] for agent, text in rows.items()]
-    return _table(["agent", *_TRACKS], lines)
+    return format_table(["agent", *_TRACKS], lines)
 
 
 def tracks_learned(agent: str, kept: Kept) -> str:
     """Returns a learned agent's rates over its training runs, and the paired differences to the navigator."""
     rows = []
-    for name, setting in _SETTINGS.items():
-        if kept.has(agent, setting):
-            own, navigator = kept.of(agent, setting), kept.of("navigator", setting)
-            cells = [
-                _interval(estimate(own, metric, other))
-                for other in (None, navigator)
-                for metric in ("success_rate", ON_TIME_125)
-            ]
-            rows.append([name, str(own.run.nunique()), *cells])
+    for name, setting, own in _settings(kept, agent):
+        others = (None, kept.of("navigator", setting))
+        pairs = itertools.product(others, ("success_rate", ON_TIME_125))
+        means = (format_interval(estimate(own, metric, other)) for other, metric in pairs)
+        rows.append([name, str(own.run.nunique()), *means])
     header = ["setting", "runs", "success rate", "on-time rate"]
-    return _table([*header, "success - `navigator`", "on-time rate - `navigator`"], rows)
+    return format_table([*header, "success - `navigator`", "on-time rate - `navigator`"], rows)
 
 
 def tracks_worst_tenth(kept: Kept) -> str:
@@ -218,58 +200,57 @@ def tracks_worst_tenth(kept: Kept) -> str:
         by_maze = own.groupby(["run", "maze"])[ON_TIME_125].mean()
         return by_maze.groupby("run").apply(lambda of_run: of_run.nsmallest(-(-len(of_run) // 10)).mean()).mean()
 
+    agents = ("navigator", "neural-planner", "navigator without map")
     rows = [
-        [_ROWS[agent], *(" / ".join(_number(worst(own)) for own in kept.levels(agent, track)) for track in TRACKS)]
-        for agent in ("navigator", "neural-planner", "navigator without map")
+        [_ROWS[agent], *(_joined(map(worst, kept.on_track(agent, track).values())) for track in TRACKS)]
+        for agent in agents
     ]
-    return _table(["agent", *_TRACKS], rows)
+    return format_table(["agent", *_TRACKS], rows)
 
 
 def tracks_map_worth(kept: Kept) -> str:
     """Returns the navigator's headline numbers with their intervals, and what the map is worth to it."""
     rows = []
-    for name, setting in _SETTINGS.items():
-        own, without = kept.of("navigator", setting), kept.of("navigator without map", setting)
-        figures = [estimate(own, metric) for metric in ("success_rate", ON_TIME_2, ON_TIME_125)]
-        figures += [estimate(without, ON_TIME_125), estimate(own, ON_TIME_125, without)]
-        rows.append([name, *map(_interval, figures)])
+    for name, setting, own in _settings(kept, "navigator"):
+        without = kept.of("navigator without map", setting)
+        means = [estimate(own, metric) for metric in ("success_rate", ON_TIME_2, ON_TIME_125)]
+        means += [estimate(without, ON_TIME_125), estimate(own, ON_TIME_125, without)]
+        rows.append([name, *map(format_interval, means)])
     names = [METRICS[metric] for metric in (ON_TIME_2, ON_TIME_125)]
-    return _table(["part", "success", *names, f"without the map, {names[1]}", "map worth"], rows)
+    return format_table(["part", "success", *names, f"without the map, {names[1]}", "map worth"], rows)
 
 
 def tracks_blocked(kept: Kept) -> str:
     """Returns the navigator's share on time where the shortest path on the map is open, and where it is blocked."""
     rows = []
-    for name, setting in _SETTINGS.items():
+    for name, setting, own in _settings(kept, "navigator"):
         if not setting.startswith("building"):  # whose maps are right
-            own = kept.of("navigator", setting)
             groups = [own[own.blocked == is_blocked] for is_blocked in (False, True)]
-            rows.append(
-                [name, *(cell for each in groups for cell in (str(len(each)), _interval(estimate(each, ON_TIME_125))))]
-            )
+            cells = [[str(len(each)), format_interval(estimate(each, ON_TIME_125))] for each in groups]
+            rows.append([name, *cells[0], *cells[1]])
     open_path, blocked = (f"episodes, path on the map {name}" for name in ("open", "blocked"))
-    return _table(["part", open_path, METRICS[ON_TIME_125], blocked, METRICS[ON_TIME_125]], rows)
+    return format_table(["part", open_path, METRICS[ON_TIME_125], blocked, METRICS[ON_TIME_125]], rows)
 
 
 def by_track(head: str, columns: Mapping[str, tuple[str, str, Sequence[str]]], kept: Kept) -> str:
     """Returns a row for each track; a column is of an agent and a metric in some kinds of mazes."""
     rows = [[f"`{track}`", *(_levels(kept, track, *chosen) for chosen in columns.values())] for track in TRACKS]
-    return _table([head, *columns], rows)
+    return format_table([head, *columns], rows)
 
 
-_ALL = (*KNOWN, *NOVEL)
 _NOVEL_KINDS = {
     f"`{agent}`, {name} layouts": (agent, ON_TIME_125, kinds)
     for agent in ("navigator", "neural-planner")
     for name, kinds in (("known", KNOWN), ("held-out", NOVEL))
 }
-_NAVIGATOR = {METRICS[each]: ("navigator", each, _ALL) for each in ("success_rate", *ON_TIME_METRICS, "spl")}
-_NAVIGATOR_KINDS = {f"`{kind}`": ("navigator", ON_TIME_125, (kind,)) for kind in _ALL}
+_NAVIGATOR = {
+    METRICS[each]: ("navigator", each, (*KNOWN, *NOVEL)) for each in ("success_rate", *ON_TIME_METRICS, "spl")
+}
+_NAVIGATOR_KINDS = {f"`{kind}`": ("navigator", ON_TIME_125, (kind,)) for kind in (*KNOWN, *NOVEL)}
 # By the name that a page gives.
 TABLES: dict[str, Callable[[Kept], str]] = {
     "paper-runs": functools.partial(paper_runs, "success_rate"),
     "paper-runs-spl": functools.partial(paper_runs, "spl"),
-    "mmn-runs": mmn_runs,
     "mmn-sizes": mmn_sizes,
     "mah-curve": mah_curve,
     "mmn-ingredients": functools.partial(short_runs, _INGREDIENTS, {"model_error_1": ".3f", "map_ratio": ".1f"}),
@@ -300,14 +281,25 @@ def _by_distance(
 ) -> list[str]:
     """Returns a row: a name, the number of runs, and at each distance the mean, or the difference to another."""
     frames = [own] if other is None else [own, other]
-    cells = [_interval(estimate(own[own.distance == d], metric, *(o[o.distance == d] for o in frames[1:]))) for d in at]
+    groups = ([frame[frame.distance == distance] for frame in frames] for distance in at)
+    cells = [format_interval(estimate(group[0], metric, *group[1:])) for group in groups]
     return [name, ", ".join(str(each.run.nunique()) for each in frames), *cells]
+
+
+def _settings(kept: Kept, agent: str) -> Iterator[tuple[str, str, pd.DataFrame]]:
+    """Yields the name in tables, the name, and the agent's episodes for each setting of the tracks that it played."""
+    for track in TRACKS:
+        for setting, own in kept.on_track(agent, track).items():
+            yield f"`{track}` {setting[-1]}", setting, own
 
 
 def _levels(kept: Kept, track: str, agent: str, metric: str, kinds: Sequence[str] = (*KNOWN, *NOVEL)) -> str:
     """Returns the means of a metric at the levels of a track, in mazes of some kinds; "-" without evaluations."""
-    means = [own[own.kind.isin(kinds)][metric].mean() for own in kept.levels(agent, track)]
-    return " / ".join(map(_number, means)) or "-"
+    return _joined(own[own.kind.isin(kinds)][metric].mean() for own in kept.on_track(agent, track).values())
+
+
+def _joined(values: Iterable[float]) -> str:
+    return " / ".join(map(_number, values)) or "-"
 
 
 def _over_values(rates: pd.Series) -> str:
@@ -315,10 +307,11 @@ def _over_values(rates: pd.Series) -> str:
     if rates.nunique() == 1:
         return _number(rates.iloc[0])
     low, high = np.clip(stats.t.interval(CONFIDENCE, len(rates) - 1, rates.mean(), rates.sem()), 0, 1)
-    return _interval(Estimate(rates.mean(), float(low), float(high)))
+    return format_interval(Estimate(rates.mean(), low, high))
 
 
-def _interval(mean: Estimate) -> str:
+def format_interval(mean: Estimate) -> str:
+    """Returns a mean with its interval, as "0.50 [0.25, 0.75]"."""
     return f"{_number(mean.value)} [{_number(mean.low)}, {_number(mean.high)}]"
 
 
@@ -327,6 +320,6 @@ def _number(value: float) -> str:
     return f"{value:.2f}".replace("-0.00", "0.00")
 
 
-def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def format_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Returns a table in Markdown."""
     return "".join(f"| {' | '.join(line)} |\n" for line in (header, ["---"] * len(header), *rows))
