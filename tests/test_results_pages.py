@@ -11,7 +11,6 @@ import pytest
 import mazebench
 from benchmarks.results.kept import Kept, keep, read_kept
 from benchmarks.results.results_tables import PAGES, RECORDS, ROOT, with_tables
-from mazebench.report.curves import Run
 from mazebench.results.reading import load_result
 
 
@@ -62,10 +61,7 @@ def test_training_runs_are_those_of_one_length(kept):
 def test_success_rates_are_of_milestones_that_all_runs_reached():
     first = ({"env_steps": 200_064, "success_rate_2": 0.1}, {"env_steps": 300_000, "td_loss": 1.0})
     last = ({"env_steps": 6_600_000, "success_rate_2": 0.8}, {"env_steps": 6_648_448, "success_rate_2": 0.9})
-    runs = [
-        Run("0", {}, pd.DataFrame([*first, *last])),
-        Run("1", {}, pd.DataFrame(first[:1]).assign(success_rate_2=0.3)),
-    ]
+    runs = [pd.DataFrame([*first, *last]), pd.DataFrame(first[:1]).assign(success_rate_2=0.3)]
     both, alone = (Kept(pd.DataFrame(), {}, {"a": some}).success_rates("a", 2) for some in (runs, runs[:1]))
     assert both.to_dict("index") == {0.2: {"mean": 0.2, "min": 0.1, "max": 0.3}}
     assert alone["mean"].to_dict() == {0.2: 0.1, 6.6: 0.9}

@@ -57,13 +57,13 @@ def test_of_maps_that_are_gone_a_report_has_no_paths(tmp_path, remarks):
     evaluate("random", out=tmp_path / "out", mazes=tmp_path / "room.txt", **options)
     [result] = read_results([tmp_path / "out"])
     assert result.trajectories
-    assert result.walls("room").sum() == 16
+    assert result.walls["room"].sum() == 16
     (tmp_path / "room.txt").write_text(ROOM.replace("#...#", "#.#.#", 1))
     with pytest.raises(InputError, match="expected the mazes that were played, found others"):
         played_task(load_result(tmp_path / "out").summary)
     remarks()
     [result] = read_results([tmp_path / "out"])
-    assert (result.trajectories, result.walls("room")) == (None, None)
+    assert (result.trajectories, result.walls) == (None, {})
     assert [line.partition("expected")[2] for line in remarks()] == [
         " the mazes that were played, found others; reported without mazes and paths"
     ]

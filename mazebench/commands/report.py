@@ -25,15 +25,13 @@ def report(
     try:
         from mazebench.report.curves import find_runs, write_learning_curves
         from mazebench.report.episodes import find_evaluations
-        from mazebench.report.report_files import DOCUMENT, PAGE
-        from mazebench.report.write_report import counted, write_report
+        from mazebench.report.write_report import DOCUMENT, PAGE, counted, write_report
     except ImportError as error:
         raise InputError(f"the report needs {error.name}, which the extra [report] installs (docs/start.md)") from error
     runs = find_runs(results)
     with stopping.stoppable(lambda: (f"the report in {out} is not whole; make it again",)):
         if runs and not find_evaluations(results):
-            drawn = write_learning_curves(runs, out)
-            print(f"{counted(len(drawn), 'training run')}: {out / DOCUMENT}")
+            print(f"{counted(write_learning_curves(runs, out), 'training run')}: {out / DOCUMENT}")
             return
         if runs:
             remark(f"{counted(len(runs), 'training run')} left out beside results; report them by themselves")

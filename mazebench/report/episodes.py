@@ -14,19 +14,12 @@ import pandas as pd
 from mazebench.errors import InputError, remark
 from mazebench.results.metrics import by_fact, scores
 from mazebench.results.played import Shown, played_task, shown_of
-from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, Result, load_result
+from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, load_result
 from mazebench.results.records import Summary
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, load_trajectories
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import CUSTOM, HIERARCHICAL, LOCAL, TaskOptions
-
-# What `ReportedResult.episodes` says of each episode: fields of its record. Facts of a track are further columns.
-_OF_RECORDS = [
-    *("maze", "start", "goal", "distance", "success", "steps", "path_length", "shortest_path", "spl", "spl_grid"),
-    "seed",
-]
-_MOST_MAZES = 3  # that are named
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -49,24 +42,21 @@ class ReportedResult:
         return checkpoint[:8] if checkpoint else f"seed {self.summary.provenance.seed}"
 
     @functools.cached_property
-    def mazes(self) -> dict[str, int]:
-        """The indices of the task's mazes by their names; none if the task is not known."""
-        return {maze.name: index for index, maze in enumerate(self.task.fixed_mazes)} if self.task else {}
-
-    @functools.cached_property
     def shown(self) -> list[Shown]:
         """The map shown to the agent in each episode; empty if the task is not known."""
         if self.task is None:
             return []
+        indices = {maze.name: index for index, maze in enumerate(self.task.fixed_mazes)}
         columns = (self.episodes[name] for name in ("maze", "start", "goal", "seed"))
         return [
-            shown_of(self.task, Episode(self.mazes[maze], start, goal, 0.0, seed))
+            shown_of(self.task, Episode(indices[maze], start, goal, 0.0, seed))
             for maze, start, goal, seed in zip(*columns, strict=True)
         ]
 
-    def walls(self, maze: str) -> np.ndarray | None:
-        """Returns `[N, N]` bool, a maze; None if the task is not known."""
-        return self.task.mazes[self.mazes[maze]].walls if self.task else None
+    @functools.cached_property
+    def walls(self) -> dict[str, np.ndarray]:
+        """The walls `[N, N]` bool of the mazes by their names; none if the task is not known."""
+        return {maze.name: maze.walls for maze in self.task.fixed_mazes} if self.task else {}
 
 
 def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
@@ -92,7 +82,21 @@ def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
     if not results:
         where = ", ".join(map(str, paths))
         raise InputError(f"expected results of `mazebench eval` or `mazebench train` in {where}, found none to report")
-    return sorted(_drop_repeats(_label(results)), key=lambda result: result.setting)
+
+    # Labels tell the training runs of an agent apart, where there are several.
+    runs = pd.DataFrame([(result.label, result.run) for result in results]).groupby(0)[1].nunique()
+    results = [
+        dataclasses.replace(result, label=f"{result.label} {result.run}") if runs[result.label] > 1 else result
+        for result in results
+    ]
+
+    # Of each label and setting, the result with the most episodes stays, the first of equals.
+    kept: dict[tuple[str, TaskOptions], ReportedResult] = {}
+    for result in sorted(results, key=lambda each: -len(each.episodes)):
+        other = kept.setdefault((result.label, result.setting), result)
+        if other is not result:
+            remark(f"{result.folder}: {result.label}, {result.setting} again, as in {other.folder}; skipped")
+    return sorted((result for result in results if result in kept.values()), key=lambda result: result.setting)
 
 
 def join_episodes(results: Sequence[ReportedResult]) -> pd.DataFrame:
@@ -172,7 +176,7 @@ def find_evaluations(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
 
 def _read_result(folder: pathlib.Path) -> ReportedResult:
     result = load_result(folder)
-    summary = result.summary
+    summary, records = result.summary, result.records
     task: Task | None = None
     try:
         task = played_task(summary)
@@ -180,63 +184,33 @@ def _read_result(folder: pathlib.Path) -> ReportedResult:
         if summary.task.split_in_results != CUSTOM:
             raise InputError(f"{folder}: {error}") from error
         remark(f"{folder}: {error}; reported without mazes and paths")
-    episodes, facts = _to_table(result)
-    trajectories = _read_trajectories(folder, episodes) if task else None
+    fields = ("maze", "start", "goal", "distance", "success", "steps", "path_length", "shortest_path", "seed")
+    episodes = pd.DataFrame([[getattr(record, name) for name in fields] for record in records], columns=fields)
+    facts = by_fact(records)
+    episodes = episodes.assign(**scores(records), **facts)
     setting = summary.task.setting
     if setting.mazes is not None:  # by their names, wherever the files were
         setting = setting.replace(mazes=", ".join(sorted(episodes.maze.unique())))
-    return ReportedResult(folder, summary, summary.who, setting, episodes, facts, task, trajectories)
 
-
-def _to_table(result: Result) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """Returns the episodes, and which columns are facts."""
-    episodes = pd.DataFrame(
-        [[getattr(record, name) for name in _OF_RECORDS] for record in result.records], columns=_OF_RECORDS
-    )
-    facts = by_fact(result.records)
-    return episodes.assign(**scores(result.records), **facts), tuple(facts)
-
-
-def _read_trajectories(folder: pathlib.Path, episodes: pd.DataFrame) -> list[Trajectory] | None:
-    """Returns the trajectories if the folder has some that fit the records."""
+    trajectories: list[Trajectory] | None = None
     path = folder / TRAJECTORIES
-    if not path.exists():
-        return None
-    try:
-        trajectories = load_trajectories(path)
-        if [len(each.pose) for each in trajectories] != (episodes.steps + 1).tolist():
-            raise InputError(f"{path}: expected a pose for the start and for each step, found others")
-    except InputError as error:
-        remark(f"{error}; reported without paths")
-        return None
-    return trajectories
-
-
-def _label(results: Sequence[ReportedResult]) -> list[ReportedResult]:
-    """Returns the results with labels that tell the training runs of an agent apart, where there are several."""
-    runs = pd.DataFrame([(result.label, result.run) for result in results]).groupby(0)[1].nunique()
-    return [
-        dataclasses.replace(result, label=f"{result.label} {result.run}") if runs[result.label] > 1 else result
-        for result in results
-    ]
-
-
-def _drop_repeats(results: Sequence[ReportedResult]) -> list[ReportedResult]:
-    """Returns one result for each label and setting: the one with the most episodes, the first of equals."""
-    kept: dict[tuple[str, TaskOptions], ReportedResult] = {}
-    for result in sorted(results, key=lambda each: -len(each.episodes)):
-        other = kept.setdefault((result.label, result.setting), result)
-        if other is not result:
-            remark(f"{result.folder}: {result.label}, {result.setting} again, as in {other.folder}; skipped")
-    return [result for result in results if result in kept.values()]
+    if task and path.exists():
+        try:
+            trajectories = load_trajectories(path)
+            if [len(each.pose) for each in trajectories] != (episodes.steps + 1).tolist():
+                raise InputError(f"{path}: expected a pose for the start and for each step, found others")
+        except InputError as error:
+            remark(f"{error}; reported without paths")
+            trajectories = None
+    return ReportedResult(folder, summary, summary.who, setting, episodes, tuple(facts), task, trajectories)
 
 
 def _mazes_in_words(result: ReportedResult) -> str:
     """Returns the set of mazes, and what else a user chose; an empty text for the benchmark's eval mazes."""
     split, words = result.setting.split_in_results, result.setting.own_in_words
     if split == CUSTOM:
-        first, more = (names := sorted(result.episodes.maze.unique()))[:_MOST_MAZES], len(names) - _MOST_MAZES
-        words = (f"mazes {', '.join(first)}" + (f" and {more} more" if more > 0 else ""), *words)
+        names = sorted(result.episodes.maze.unique())
+        words = (f"mazes {', '.join(names[:3])}" + (f" and {len(names) - 3} more" if len(names) > 3 else ""), *words)
     elif split != "eval":
         words = (f"{split} mazes", *words)
     return ", ".join(words)

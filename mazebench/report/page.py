@@ -31,7 +31,6 @@ from mazebench.results.trajectories import Trajectory
 from mazebench.world.mjcf import BODY_RADIUS
 from mazebench.world.ray_casting import NUM_RAYS
 
-_NUM_TIME_COLORS = 32
 _POSITION_UNITS = 32  # a cell; one unit is about a pixel on the screen
 _YAW_UNITS = 256  # a turn
 
@@ -98,10 +97,23 @@ def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int
     mazes: dict[tuple[str, str | None], int] = {}  # names and walls, with their numbers
     described = []
     for result, used in zip(results, columns, strict=True):
-        own = [(name, _walls(result, name)) for name in result.episodes.maze.unique()]
-        numbers = {"setting": settings.index(result.setting), "columns": used}
+        setting, task, maps = result.setting, result.task, _shown(result)
+        walls = {name: _base64(np.packbits(walls).tobytes()) for name, walls in result.walls.items()}
+        own = [(name, walls.get(name)) for name in result.episodes.maze.unique()]
         described.append(
-            {**_describe(result), **numbers, "mazes": [mazes.setdefault(each, len(mazes)) for each in own]}
+            {
+                "label": result.label,
+                "setting": settings.index(setting),
+                "columns": used,
+                "mazes": [mazes.setdefault(each, len(mazes)) for each in own],
+                "size": setting.size,
+                "cellSize": setting.cell_size or 1.0,
+                "episodes": len(result.episodes),
+                "exact": setting.is_exact,
+                "picture": 0 if not maps or maps[0].are_cells else len(maps[0].walls),  # pixels a side, if no cells
+                "lidar": task.options.lidar.max_range if task and "lidar" in task.sensors else 0,  # m
+                "groups": result.facts,
+            }
         )
     # The explorer opens with a result that has paths, hierarchical if there is such a one.
     first = min(
@@ -111,7 +123,7 @@ def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int
         "settings": list(map(str, settings)),
         "rays": NUM_RAYS,
         "units": {"position": _POSITION_UNITS, "yaw": _YAW_UNITS, "step": STEP_TIME, "body": BODY_RADIUS},
-        "timeColors": [mpl.colors.to_hex(TIME_COLORS(n / (_NUM_TIME_COLORS - 1))) for n in range(_NUM_TIME_COLORS)],
+        "timeColors": [mpl.colors.to_hex(color) for color in TIME_COLORS(np.linspace(0, 1, 32))],
         "mazes": [{"name": name, "walls": walls} for name, walls in mazes],
         "results": described,
         "first": results.index(first),
@@ -185,22 +197,3 @@ def _changes(poses: np.ndarray) -> list[list[int]]:
 def _pack(columns: Mapping[str, Any]) -> str:
     """Returns columns as JSON, deflated, in base64."""
     return _base64(zlib.compress(json.dumps(columns, separators=(",", ":")).encode("ascii"), 9))
-
-
-def _walls(result: ReportedResult, maze: str) -> str | None:
-    walls = result.walls(maze)
-    return None if walls is None else _base64(np.packbits(walls).tobytes())
-
-
-def _describe(result: ReportedResult) -> dict[str, Any]:
-    setting, task, maps = result.setting, result.task, _shown(result)
-    return {
-        "label": result.label,
-        "size": setting.size,
-        "cellSize": setting.cell_size or 1.0,
-        "episodes": len(result.episodes),
-        "exact": setting.is_exact,
-        "picture": 0 if not maps or maps[0].are_cells else len(maps[0].walls),  # pixels on a side, if they are no cells
-        "lidar": task.options.lidar.max_range if task and "lidar" in task.sensors else 0,  # m
-        "groups": result.facts,
-    }

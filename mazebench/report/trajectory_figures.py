@@ -61,10 +61,9 @@ def _pick_trials(episodes: pd.DataFrame) -> list[int]:
 def _draw_episode(axes: Axes, episode: pd.Series) -> None:
     """Draws the maze, landmarks, start, goal, and the path."""
     result: ReportedResult = episode.result
-    walls = result.walls(episode.maze)
     assert result.trajectories is not None
-    assert walls is not None
-    size, cells = len(walls), walls.astype(int)
+    cells = result.walls[episode.maze].astype(int)
+    size = len(cells)
     cells.flat[result.shown[episode.number].landmarks] = 2
     axes.imshow(cells, cmap=_CELL_COLORS, vmin=0, vmax=2, extent=(0, size, 0, size), interpolation="none")
     x, y, _ = result.trajectories[episode.number].pose.T

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
-from mazebench.errors import remark, remarks_to
+from mazebench.errors import InputError, remark, remarks_to
 from mazebench.report.episodes import ReportedResult, join_episodes, read_results
 from mazebench.report.figures import draw_table, draw_violins, save
 from mazebench.report.page import build_page
-from mazebench.report.report_files import FIGURES, PAGE, TABLES, new_report
 from mazebench.report.tables import build_tables
 from mazebench.report.trajectory_figures import draw_trajectories
+from mazebench.storage.files import make_folder, writing_to
 
+DOCUMENT, PAGE, TABLES, FIGURES = "report.md", "report.html", "tables", "figures"
 _PACKAGES = ("mazebench-mujoco", "mujoco", "numpy", "torch")  # in provenance
 
 
@@ -57,6 +59,27 @@ def write_report(paths: Sequence[pathlib.Path], out: pathlib.Path) -> list[Repor
         page = build_page(results, head, tables, figures, provenance_of(results), notes)
         (out / PAGE).write_bytes(page.encode(errors="replace"))  # names of folders need not be legal Unicode
     return results
+
+
+@contextlib.contextmanager
+def new_report(out: pathlib.Path) -> Iterator[None]:
+    """Makes the folder of a report, without an earlier report's files.
+
+    Raises:
+      InputError: if it holds something else, or can't be written in the block.
+    """
+    make_folder(out)
+    with writing_to(out):
+        others = sorted({path.name for path in out.iterdir()} - {DOCUMENT, PAGE, TABLES, FIGURES})
+        if others:
+            raise InputError(f"{out}: expected an empty folder or a report's, found {others[0]!r} in it")
+        (out / PAGE).unlink(missing_ok=True)
+        for folder in (out / TABLES, out / FIGURES):
+            folder.mkdir(exist_ok=True)
+            for path in folder.iterdir():
+                if path.suffix in (".md", ".csv", ".tex", ".png", ".pdf"):
+                    path.unlink()
+        yield
 
 
 def counted(count: int, noun: str) -> str:
