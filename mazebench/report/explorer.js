@@ -17,11 +17,9 @@ const inCells = (count) => `${count} ${count === 1 ? "cell" : "cells"}`;
 const unpacked = new Map(); // promises by the number of a result
 const view = { result: -1, episode: -1, time: 0, timer: 0, packed: null };
 
-function bytesOfBase64(text) {
-  return Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-}
+const bytesOfBase64 = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
 
-// The episodes of a result by columns, and its poses.
+// A promise of the episodes of a result by columns, and of its poses.
 function unpack(number) {
   if (!unpacked.has(number)) unpacked.set(number, join(number));
   return unpacked.get(number);
@@ -53,7 +51,7 @@ function wallsOf(bytes, size) {
 }
 
 function partOf(path, first, count) {
-  return { x: path.x.slice(first, first + count), y: path.y.slice(first, first + count), yaw: path.yaw.slice(first, first + count) };
+  return Object.fromEntries(Object.entries(path).map(([name, values]) => [name, values.slice(first, first + count)]));
 }
 
 // Everything about one episode, by names.
@@ -96,8 +94,6 @@ function shownMap({ columns, maps }, result, index, real) {
   };
 }
 
-// --- choosing an episode ---
-
 function fill(select, options, value) {
   select.replaceChildren(...options.map(([key, text]) => new Option(text, key)));
   const keys = options.map(([key]) => String(key));
@@ -108,20 +104,16 @@ function resultsOf(setting) {
   return data.results.flatMap((result, number) => (result.setting === setting ? [number] : []));
 }
 
-function chooseResult(number) {
-  const { setting } = data.results[number];
-  byId("setting").value = String(setting);
-  fill(byId("agent"), resultsOf(setting).map((other) => [other, data.results[other].label]), number);
-}
-
 async function openResult(number, episode = null) {
   stop();
+  const result = data.results[number];
+  byId("setting").value = String(result.setting);
+  fill(byId("agent"), resultsOf(result.setting).map((other) => [other, data.results[other].label]), number);
   view.result = number;
   const packed = await unpack(number);
   if (view.result !== number) return;
   view.packed = packed;
   const { columns } = packed;
-  const result = data.results[number];
   fill(byId("maze"), [["", "all"], ...result.mazes.map((maze, index) => [index, data.mazes[maze].name])], byId("maze").value);
   const distances = [...new Set(columns.distance)].sort((a, b) => a - b);
   fill(byId("distance"), [["", "all"], ...distances.map((distance) => [distance, inCells(distance)])], byId("distance").value);
@@ -136,9 +128,7 @@ async function openResult(number, episode = null) {
 
 function listed() {
   const { columns } = view.packed;
-  const maze = byId("maze").value;
-  const distance = byId("distance").value;
-  const group = byId("group").value;
+  const [maze, distance, group] = ["maze", "distance", "group"].map((id) => byId(id).value);
   const failures = byId("failures").checked;
   return columns.success.flatMap((success, index) => {
     const isHere = (maze === "" || columns.maze[index] === Number(maze)) && (distance === "" || columns.distance[index] === Number(distance));
@@ -169,8 +159,7 @@ function showNothing(text) {
   byId("outcome").textContent = text;
   byId("clock").value = "";
   byId("time").disabled = byId("play").disabled = true;
-  for (const id of ["numbers", "others"]) byId(id).hidden = true;
-  for (const id of ["shown", "driven", "lidar-label"]) byId(id).hidden = true;
+  for (const id of ["numbers", "others", "shown", "driven", "lidar-label"]) byId(id).hidden = true;
   byId("key").replaceChildren();
 }
 
@@ -191,8 +180,6 @@ function openEpisode(index) {
   moveTo(Math.max(poses - 1, 0));
   history.replaceState(null, "", `#episode=${view.result}-${index}`);
 }
-
-// --- words and numbers ---
 
 function writeOutcome() {
   const { current } = view;
@@ -221,9 +208,7 @@ function writeNumbers() {
   );
 }
 
-function keyOf(columns, index, mazes) {
-  return [data.mazes[mazes[columns.maze[index]]].name, columns.start[index], columns.goal[index], columns.seed[index]].join(" ");
-}
+const keyOf = ({ maze, start, goal, seed }, index, mazes) => [data.mazes[mazes[maze[index]]].name, start[index], goal[index], seed[index]].join(" ");
 
 async function writeOthers() {
   const { result, episode } = view;
@@ -241,10 +226,7 @@ async function writeOthers() {
 function otherRow(number, index, columns) {
   const button = element("button", { type: "button", class: "link" }, data.results[number].label);
   if (number === view.result) button.setAttribute("aria-current", "true");
-  button.addEventListener("click", () => {
-    chooseResult(number);
-    openResult(number, index);
-  });
+  button.addEventListener("click", () => openResult(number, index));
   const texts = [columns.success[index] ? "✓ reached" : "✗ failed", String(columns.steps[index]), columns.spl[index].toFixed(2)];
   return element("tr", {}, element("td", {}, button), ...texts.map((text) => element("td", { class: "number" }, text)));
 }
@@ -266,8 +248,6 @@ function writeKey() {
 function differs(current) {
   return !current.isDrawn && current.shown && current.real && current.shown.some((wall, cell) => wall !== current.real[cell]);
 }
-
-// --- drawing ---
 
 function draw() {
   const { current } = view;
@@ -323,8 +303,6 @@ function describe() {
   byId("driven").setAttribute("aria-label", `Maze ${current.maze} with the path driven up to step ${view.time} of ${current.steps}`);
 }
 
-// --- time ---
-
 function moveTo(time) {
   const { current } = view;
   const { x, y, yaw } = current.path;
@@ -348,10 +326,7 @@ function stop() {
 }
 
 function play() {
-  if (view.timer) {
-    stop();
-    return;
-  }
+  if (view.timer) return stop();
   const from = view.time >= view.current.path.x.length - 1 ? 0 : view.time;
   const began = performance.now();
   byId("play").textContent = "Pause";
@@ -364,23 +339,13 @@ function play() {
   view.timer = requestAnimationFrame(frame);
 }
 
-// --- the start ---
-
-function linkedEpisode() {
-  const found = /^#episode=(\d+)-(\d+)$/.exec(location.hash);
-  const result = found && data.results[Number(found[1])];
-  return result && Number(found[2]) < result.episodes ? [Number(found[1]), Number(found[2])] : null;
-}
-
 function listen() {
   const on = (id, event, action) => byId(id).addEventListener(event, action);
   on("setting", "change", () => {
     for (const id of ["maze", "distance", "group"]) byId(id).value = "";
     const numbers = resultsOf(Number(byId("setting").value));
     const sameAgent = numbers.find((number) => data.results[number].label === data.results[view.result].label);
-    const number = sameAgent === undefined ? numbers[0] : sameAgent;
-    chooseResult(number);
-    openResult(number);
+    openResult(sameAgent === undefined ? numbers[0] : sameAgent);
   });
   on("agent", "change", () => openResult(Number(byId("agent").value)));
   for (const id of ["maze", "distance", "group", "failures"]) on(id, "change", () => listEpisodes(null));
@@ -395,13 +360,10 @@ function listen() {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 }
 
-function startExplorer() {
-  const linked = linkedEpisode();
-  const [result, episode] = linked || [data.first, null];
-  fill(byId("setting"), data.settings.map((name, setting) => [setting, name]), data.results[result].setting);
-  listen();
-  chooseResult(result);
-  openResult(result, episode).then(() => linked && byId("explorer").scrollIntoView());
-}
-
-startExplorer();
+// The address may name an episode.
+const found = /^#episode=(\d+)-(\d+)$/.exec(location.hash);
+const isLinked = found && Number(found[2]) < (data.results[Number(found[1])] || { episodes: 0 }).episodes;
+const [first, linked] = isLinked ? [Number(found[1]), Number(found[2])] : [data.first, null];
+fill(byId("setting"), data.settings.map((name, setting) => [setting, name]), data.results[first].setting);
+listen();
+openResult(first, linked).then(() => isLinked && byId("explorer").scrollIntoView());

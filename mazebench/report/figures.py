@@ -163,8 +163,7 @@ def to_svg(figure: Figure) -> bytes:
 
 
 def _num_columns(num_panels: int) -> int:
-    """Returns how many panels are beside one another."""
-    return min(num_panels, 3 if num_panels != 4 else 2)
+    return 2 if num_panels == 4 else min(num_panels, 3)
 
 
 def _make_grid(title: str, titles: Sequence[str], height: float) -> tuple[Figure, list[Axes]]:

@@ -7,7 +7,6 @@ comments.
 
 from __future__ import annotations
 
-import argparse
 import datetime
 import hashlib
 import pathlib
@@ -35,8 +34,6 @@ from mazebench.tasks.trials import frozen_trials
 BEGIN, END = "<!-- leaderboard begins -->\n", "<!-- leaderboard ends -->\n"
 PARTS = [f"{track} {level}" for track in TRACKS for level in LEVELS]
 
-_MAP_FREE = "navigator without map"  # the agent over which gains are measured
-
 
 class Entry(pydantic.BaseModel):
     """The results of one agent on all parts of the tracks."""
@@ -50,12 +47,6 @@ class Entry(pydantic.BaseModel):
     date: datetime.date  # on which the entry was made
     parts: dict[str, tuple[Share, Share]]  # on time, and success, by track and level, as "rebuilt 1"
 
-    @property
-    def file_name(self) -> str:
-        """A name that entries of the same agent, code and checkpoints share."""
-        identity = hashlib.sha256("\n".join([self.agent, *self.code, *self.checkpoints]).encode()).hexdigest()
-        return f"{re.sub(r'[^A-Za-z0-9_]+', '-', self.agent)}-{identity[:8]}.json"
-
 
 def read_entries(paths: Iterable[pathlib.Path]) -> list[Entry]:
     """Returns the entries of runs of the suite `tracks`, of agents' folders in them, or of folders with its parts.
@@ -63,11 +54,11 @@ def read_entries(paths: Iterable[pathlib.Path]) -> list[Entry]:
     Raises:
       InputError: if an agent's folder holds anything else than its results of all parts, each once.
     """
-    folders = []
+    entries = []
     for path in paths:
-        in_suite = read_suite(path).folders.values() if (path / SUITE).is_file() else ()
-        folders += [path / name for name in in_suite] or [path]
-    return [_make_entry(folder) for folder in folders]
+        names = read_suite(path).folders.values() if (path / SUITE).is_file() else [""]
+        entries += [_make_entry(path / name) for name in names]
+    return entries
 
 
 def kept_entries(page: pathlib.Path) -> list[Entry]:
@@ -78,7 +69,8 @@ def kept_entries(page: pathlib.Path) -> list[Entry]:
 
 def make_tables(entries: Sequence[Entry]) -> str:
     """Returns the leaderboard in Markdown: a table of all episodes, and two of the parts, on time and success."""
-    floor = next((entry.on_time[0] for entry in entries if entry.agent == _MAP_FREE), np.nan)
+    # Gains are over the navigator without the map.
+    floor = next((entry.on_time[0] for entry in entries if entry.agent == "navigator without map"), np.nan)
     names = [escape_markdown(entry.agent) + " (privileged)" * entry.privileged for entry in entries]
     overall = {
         "agent": names,
@@ -93,11 +85,11 @@ def make_tables(entries: Sequence[Entry]) -> str:
         for index in (0, 1)
     )
     ranks = pd.RangeIndex(1, len(entries) + 1)
-    first, second, third = (
+    tables = (
         to_markdown(pd.DataFrame(table, index=ranks).rename_axis(columns="rank"))
         for table in (overall, on_time, success)
     )
-    return f"{first}\nOn-time rate by track and level:\n\n{second}\nSuccess rate by track and level:\n\n{third}"
+    return "{}\nOn-time rate by track and level:\n\n{}\nSuccess rate by track and level:\n\n{}".format(*tables)
 
 
 def write_leaderboard(entries: Iterable[Entry], page: pathlib.Path) -> None:
@@ -114,7 +106,10 @@ def write_leaderboard(entries: Iterable[Entry], page: pathlib.Path) -> None:
         raise InputError(f"{page}: expected the lines {BEGIN.strip()} and {END.strip()}, found no such lines")
     make_folder(page.with_suffix(""))
     for entry in entries:
-        write_json(page.with_suffix("") / entry.file_name, entry.model_dump(mode="json"))
+        # Entries of the same agent, code and checkpoints share a name.
+        identity = hashlib.sha256("\n".join([entry.agent, *entry.code, *entry.checkpoints]).encode()).hexdigest()
+        name = f"{re.sub(r'[^A-Za-z0-9_]+', '-', entry.agent)}-{identity[:8]}.json"
+        write_json(page.with_suffix("") / name, entry.model_dump(mode="json"))
     page.write_text(f"{before}{begin}{make_tables(kept_entries(page))}{end}{after}", encoding="utf-8")
 
 
@@ -164,21 +159,20 @@ def _read_episodes(result: Result) -> pd.DataFrame:
     return pd.DataFrame({"part": task.title, "maze": column(records, "maze"), "success": success, "on_time": on_time})
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(*arguments: str) -> None:
     """Runs the command; bad input ends it with one line and status 2."""
-    parser = argparse.ArgumentParser(prog="python -m mazebench.report.leaderboard")
-    parser.add_argument("results", nargs="*", type=pathlib.Path, metavar="RESULTS", help="runs of the suite `tracks`")
-    parser.add_argument("page", type=pathlib.Path, metavar="PAGE.md")
-    options = parser.parse_args(arguments)
+    if not arguments or arguments[-1].startswith("-"):
+        sys.exit("usage: python -m mazebench.report.leaderboard RESULTS... PAGE.md")
+    *results, page = map(pathlib.Path, arguments)
     try:
-        entries = read_entries(options.results)
-        write_leaderboard(entries, options.page)
-        for entry in entries:
-            print(f"{entry.agent}: on-time rate {entry.on_time[0]:.2f}, success {entry.success:.2f}; in {options.page}")
+        entries = read_entries(results)
+        write_leaderboard(entries, page)
     except InputError as error:
         print(f"mazebench: {error}", file=sys.stderr)
         sys.exit(2)
+    for entry in entries:
+        print(f"{entry.agent}: on-time rate {entry.on_time[0]:.2f}, success {entry.success:.2f}; in {page}")
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])

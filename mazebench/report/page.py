@@ -48,14 +48,13 @@ def build_page(
     Args:
       results: all results.
       head: what the results are, in a line.
-      tables: all tables.
-      figures: of these tables and others.
+      tables, figures: all of them; a figure has the name of its table.
       provenance: where the results come from.
       warnings: lines about the results.
     """
     marks = f":root {{ --start: {colors.to_hex(colors.START)}; --goal: {colors.to_hex(colors.GOAL)}; }}\n"
     style, script = marks + _read("page.css"), _read("canvas.js") + _read("explorer.js")
-    columns: dict[str, int] = {}  # packed, with their numbers
+    columns: dict[str, int] = {}  # JSON, deflated, in base64, with their numbers
     used = [
         [columns.setdefault(_pack(part), len(columns)) for part in (_trials(result), _outcomes(result))]
         for result in results
@@ -195,5 +194,4 @@ def _changes(poses: np.ndarray) -> list[list[int]]:
 
 
 def _pack(columns: Mapping[str, Any]) -> str:
-    """Returns columns as JSON, deflated, in base64."""
     return _base64(zlib.compress(json.dumps(columns, separators=(",", ":")).encode("ascii"), 9))

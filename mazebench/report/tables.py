@@ -54,10 +54,7 @@ def make_table(
 ) -> Table:
     """Returns a table with a column for each agent, then one for each mean over training runs, then the paper's.
 
-    Args:
-      name, title, note, row_name: of the table.
-      rows: the episodes of each row.
-      paper: printed values by agent, metric and row.
+    `rows` has the episodes of each row, `paper` printed values by agent, metric and row.
     """
     lines: list[dict[str, Any]] = []
     episodes = pd.concat(rows, names=["row"]).reset_index("row")
@@ -75,9 +72,9 @@ def make_table(
                 lines.append(_line(metric, row, f"{agent}, mean", mean, runs.size) | {"runs": len(runs)})
     for agent, metrics in (paper or {}).items():
         for metric, values in metrics.items():
-            printed_rows = {row: values[int(row)] for row in rows if row.isdigit() and int(row) in values}
             named = {"metric": metric, "column": f"{agent} (paper)", "source": "paper"}
-            lines += [named | {"row": row, "value": value} for row, value in printed_rows.items()]
+            known = (row for row in rows if row.isdigit() and int(row) in values)
+            lines += [named | {"row": row, "value": values[int(row)]} for row in known]
     if any(line.get("mark") for line in lines):
         note = f"{note} {_UNTRAINED_NOTE}".strip()
     return Table(name, title, note, row_name, make_values(lines, rows))
@@ -132,11 +129,8 @@ def _tables_of(episodes: pd.DataFrame) -> Iterator[Table]:
             for level, warped in group[group.strength > 0].groupby("strength"):
                 title = f"Local navigation, {size} × {size}, on maps warped by up to {level:g} of their side"
                 yield _by_distance(f"warp-{level:g}-local-{size}", title, warped, is_warped=True)
-    yield from _track_tables(episodes)
 
-
-def _track_tables(episodes: pd.DataFrame) -> Iterator[Table]:
-    """Yields a table of all tracks, with a row for each track and level, and a table of each track."""
+    # A table of all tracks, with a row for each track and level, and a table of each track.
     groups = {name: group for name in TRACKS if len(group := episodes[episodes.track == name])}
     levels = {
         name: {str(level): at_common_distances(own) for level, own in group.groupby("level")}
@@ -166,8 +160,7 @@ def _by_distance(name: str, title: str, episodes: pd.DataFrame, is_warped: bool 
 
 def _printed(task: str, episodes: pd.DataFrame, is_warped: bool = False) -> dict[str, Any]:
     """Returns the paper's values for the setting of some episodes; none for other mazes than the eval mazes."""
-    setting = episodes.iloc[0]
-    return {} if setting.mazes else printed(task, int(setting["size"]), is_warped)
+    return {} if episodes.mazes.iloc[0] else printed(task, int(episodes["size"].iloc[0]), is_warped)
 
 
 def _rows_by(episodes: pd.DataFrame, column: str) -> Rows:
@@ -181,16 +174,12 @@ def _known(episodes: pd.DataFrame) -> list[str]:
 
 
 def _line(metric: str, row: str, column: str, mean: Estimate, num_episodes: int) -> dict[str, Any]:
-    interval = {"value": mean.value, "low95": mean.low, "high95": mean.high}
     named = {"metric": metric, "row": row, "column": column, "source": "measured"}
-    return named | {"episodes": num_episodes} | interval
+    return named | {"episodes": num_episodes, "value": mean.value, "low95": mean.low, "high95": mean.high}
 
 
 def _format_distances(distances: list[int]) -> str:
     """Returns distances as "1–15" if they follow one another, or else as "2, 4, 6"."""
     first, last = distances[0], distances[-1]
-    return (
-        f"{first}–{last}"
-        if last - first >= 2 and len(distances) == last - first + 1
-        else ", ".join(map(str, distances))
-    )
+    is_range = len(distances) > 2 and len(distances) == last - first + 1
+    return f"{first}–{last}" if is_range else ", ".join(map(str, distances))
