@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import itertools
 import json
 import os
@@ -95,11 +94,6 @@ class Browser:
     def resize(self, width: int, height: int) -> None:
         """Makes the window another size."""
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
-
-    def screenshot(self, path: pathlib.Path, whole: bool = False) -> None:
-        """Writes a PNG of the window, or of the whole page."""
-        content = self.call("Page.captureScreenshot", captureBeyondViewport=whole)["data"]
-        path.write_bytes(base64.b64decode(content))
 
     def _next_message(self) -> dict[str, Any]:
         while b"\0" not in self._buffer:

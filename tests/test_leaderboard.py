@@ -118,7 +118,7 @@ class TestPage:
 
     def test_bad_input_ends_the_command_with_one_line_and_status_2(self, tmp_path, capsys):
         with pytest.raises(SystemExit) as caught:
-            main([str(tmp_path / "none"), "page.md"])
+            main(str(tmp_path / "none"), "page.md")
         said = f"mazebench: {tmp_path}/none: expected a finished evaluation, found nothing there\n"
         assert (caught.value.code, capsys.readouterr().err) == (2, said)
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-import sys
 
 import pytest
 from made_results import make_result
 
-from mazebench import cli
 from mazebench.errors import InputError, Remark
 from mazebench.report.curves import find_runs, write_learning_curves
 
@@ -67,22 +65,11 @@ def test_a_run_that_logged_nothing_is_skipped(tmp_path):
         write_learning_curves(find_runs([tmp_path]), tmp_path / "out")
 
 
-class TestCommand:
-    def command(self, monkeypatch, capsys, *arguments):
-        monkeypatch.setattr(sys, "argv", ["mazebench", "report", *map(str, arguments)])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        return caught.value.code, *capsys.readouterr()
-
-    def test_it_draws_training_runs_where_there_are_no_results(self, tmp_path, monkeypatch, capsys):
-        make_run(tmp_path / "run")
-        out = tmp_path / "out"
-        found = self.command(monkeypatch, capsys, tmp_path / "run", "--out", out)
-        assert found == (0, f"1 training run: {out / 'report.md'}\n", "")
-
-    def test_beside_results_runs_are_left_out_with_a_word(self, tmp_path, monkeypatch, capsys):
-        make_run(tmp_path / "all" / "run")
-        make_result(tmp_path / "all" / "result", "mah", num_mazes=1, record=False)
-        status, output, errors = self.command(monkeypatch, capsys, tmp_path / "all", "--out", tmp_path / "out")
-        assert (status, output.partition(":")[0]) == (0, "1 result of mah")
-        assert errors == "mazebench: 1 training run left out beside results; report them by themselves\n"
+def test_the_command_draws_training_runs_where_there_are_no_results(tmp_path, command):
+    make_run(tmp_path / "all" / "run")
+    out = tmp_path / "out"
+    assert command("report", tmp_path / "all", "--out", out) == (0, f"1 training run: {out / 'report.md'}\n", "")
+    make_result(tmp_path / "all" / "result", "mah", num_mazes=1, record=False)
+    status, output, errors = command("report", tmp_path / "all", "--out", tmp_path / "other")
+    assert (status, output.partition(":")[0]) == (0, "1 result of mah")
+    assert errors == "mazebench: 1 training run left out beside results; report them by themselves\n"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pandas as pd
-import pytest
 from made_results import make_result
 from matplotlib.colors import to_hex
 from matplotlib.image import imread
@@ -50,18 +49,6 @@ def test_what_the_paper_printed_looks_like_no_agent(tmp_path):
     looks = {line.get_label(): (line.get_color(), line.get_marker()) for line in lines}
     assert list(looks) == [*labels, *(f"{agent} (paper)" for agent in ("MMN", "MAH", "DQN", "Random"))]
     assert len(set(looks.values())) == 8
-
-
-@pytest.mark.parametrize(("distances", "is_band"), [((2, 4), False), ((2, 4, 6, 8), True)])
-def test_many_distances_have_bands_and_few_have_bars_beside_one_another(tmp_path, distances, is_band):
-    for agent in ("mah", "mmn"):
-        make_result(tmp_path / agent, agent, skill=1.0, num_mazes=3, distances=distances, record=False)
-    axes = draw(tmp_path, "local-13").axes[0]
-    mah, mmn = axes.get_lines()[:2]
-    assert (mah.get_xdata() == mmn.get_xdata()).all() == is_band
-    assert {type(each).__name__ for each in axes.collections} == {
-        "FillBetweenPolyCollection" if is_band else "LineCollection"
-    }
 
 
 def test_violins_show_the_scores_of_each_level_and_their_mean(tmp_path):

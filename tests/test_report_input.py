@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 import shutil
-import sys
 import warnings
 
 import pytest
 from made_results import edit_summary, make_result, of_own_mazes, read_summary
 
-from mazebench import cli
-from mazebench.errors import InputError, Remark
+from mazebench.errors import Remark
 from mazebench.report.episodes import read_results
 from mazebench.report.write_report import write_report
 from mazebench.results.reading import EPISODES, SUMMARY
@@ -72,41 +70,23 @@ class TestSkipped:
         assert warning.endswith("reported without paths")
 
 
-class TestLabels:
-    def test_checkpoints_and_seeds_tell_agents_of_one_name_apart(self, tmp_path):
-        make_result(tmp_path / "a", "mah", num_mazes=1, checkpoint="aa11bb22")
-        make_result(tmp_path / "b", "mah", num_mazes=1, checkpoint="cc33dd44")
-        make_result(tmp_path / "c", "random", num_mazes=1, seed=0)
-        make_result(tmp_path / "d", "random", num_mazes=1, seed=1)
-        make_result(tmp_path / "e", "dqn", num_mazes=1)
-        assert read(tmp_path) == (["mah aa11bb22", "mah cc33dd44", "random seed 0", "random seed 1", "dqn"], [])
-
-    def test_privileged_agents_are_marked(self, run):
-        make_result(run / "oracle", "oracle", num_mazes=2, privileged=True)
-        assert read(run) == (["mah", "oracle (privileged)"], [])
+def test_checkpoints_and_seeds_tell_agents_of_one_name_apart(tmp_path):
+    make_result(tmp_path / "a", "mah", num_mazes=1, checkpoint="aa11bb22")
+    make_result(tmp_path / "b", "mah", num_mazes=1, checkpoint="cc33dd44")
+    make_result(tmp_path / "c", "random", num_mazes=1, seed=0)
+    make_result(tmp_path / "d", "random", num_mazes=1, seed=1)
+    make_result(tmp_path / "e", "dqn", num_mazes=1)
+    assert read(tmp_path) == (["mah aa11bb22", "mah cc33dd44", "random seed 0", "random seed 1", "dqn"], [])
 
 
-class TestRefused:
-    def test_a_report_of_nothing(self, tmp_path):
-        with pytest.raises(InputError, match="found none to report"):
-            read(tmp_path)
-
-    def test_the_command_prints_one_line_for_each_fault(self, run, tmp_path, monkeypatch, capsys):
-        def command(*arguments):
-            monkeypatch.setattr(sys, "argv", ["mazebench", "report", *map(str, arguments)])
-            with pytest.raises(SystemExit) as caught:
-                cli.main()
-            return caught.value.code, *capsys.readouterr()
-
-        status, output, errors = command(tmp_path / "none", "--out", tmp_path / "out")
-        assert (status, output, len(errors.splitlines())) == (2, "", 2)
-        assert not (tmp_path / "out").exists()
-        status, output, errors = command(run, tmp_path / "none", "--out", tmp_path / "out")
-        assert status == 0
-        assert output == f"1 result of mah: {tmp_path / 'out' / 'report.html'}\n"
-        assert errors == (
-            f"mazebench: {tmp_path / 'none'}: expected results of `mazebench eval`, found none; skipped\n"
-        )
+def test_the_command_prints_one_line_for_each_fault(run, tmp_path, command):
+    status, output, errors = command("report", tmp_path / "none", "--out", tmp_path / "out")
+    assert (status, output, len(errors.splitlines())) == (2, "", 2)
+    assert "found none to report" in errors
+    assert not (tmp_path / "out").exists()
+    status, output, errors = command("report", run, tmp_path / "none", "--out", tmp_path / "out")
+    assert (status, output) == (0, f"1 result of mah: {tmp_path / 'out' / 'report.html'}\n")
+    assert errors == f"mazebench: {tmp_path / 'none'}: expected results of `mazebench eval`, found none; skipped\n"
 
 
 def test_results_on_mazes_of_ones_own_are_reported_with_their_walls(tmp_path):
