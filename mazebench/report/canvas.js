@@ -41,22 +41,18 @@ function drawMap(pen, map, side, color) {
   pen.globalAlpha = 1;
 }
 
-// A disc; nothing where the map marks no cell, -1.
-function drawStart(pen, cell, side, radius, color) {
-  if (cell < 0) return;
+// The start as a disc and the goal as a star, told apart without colours too; nothing where the map marks no cell, -1.
+function drawEnds(pen, start, goal, side, radius, color) {
+  const centre = (cell) => [(cell % side) + 0.5, Math.floor(cell / side) + 0.5];
   pen.beginPath();
-  pen.arc((cell % side) + 0.5, Math.floor(cell / side) + 0.5, radius, 0, 2 * Math.PI);
+  if (start >= 0) pen.arc(...centre(start), radius, 0, 2 * Math.PI);
   pen.fillStyle = color("start");
   pen.fill();
-}
-
-// A star, told apart from the start without colours too.
-function drawGoal(pen, cell, side, radius, color) {
-  if (cell < 0) return;
   pen.beginPath();
-  for (let corner = 0; corner < 10; corner++) {
+  const [x, y] = centre(goal);
+  for (let corner = 0; goal >= 0 && corner < 10; corner++) {
     const [length, angle] = [(corner % 2 ? 0.55 : 1.3) * radius, (corner * Math.PI) / 5];
-    pen.lineTo((cell % side) + 0.5 + length * Math.sin(angle), Math.floor(cell / side) + 0.5 - length * Math.cos(angle));
+    pen.lineTo(x + length * Math.sin(angle), y - length * Math.cos(angle));
   }
   pen.fillStyle = color("goal");
   pen.fill();

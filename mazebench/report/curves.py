@@ -28,11 +28,7 @@ def find_runs(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
 def write_learning_curves(folders: Sequence[pathlib.Path], out: pathlib.Path) -> int:
     """Writes figures of all runs and a document with them to the folder `out`, and returns the number of runs.
 
-    It warns with a `Remark` of each run that is skipped.
-
-    Args:
-      folders: of training runs, at least one.
-      out: an empty or new folder, or one with an earlier report, which is replaced.
+    It warns with a `Remark` of each run that is skipped. An earlier report in `out` is replaced.
 
     Raises:
       InputError: if no run has logged anything, or `out` can't be used.

@@ -43,8 +43,8 @@ class ReportedResult:
 
     @functools.cached_property
     def shown(self) -> list[Shown]:
-        """The map shown to the agent in each episode; empty if the task is not known."""
-        if self.task is None:
+        """The map shown to the agent in each episode of a result with paths or perturbations; empty for others."""
+        if self.task is None or not (self.trajectories or self.setting.active_perturbations):
             return []
         indices = {maze.name: index for index, maze in enumerate(self.task.fixed_mazes)}
         columns = (self.episodes[name] for name in ("maze", "start", "goal", "seed"))
@@ -63,9 +63,6 @@ def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
     """Returns all results at or below `paths`, one for each setting and training run, sorted by setting; at least one.
 
     It warns with a `Remark` of each thing that is skipped.
-
-    Args:
-      paths: evaluation folders, or folders above them.
 
     Raises:
       InputError: if there is no result.

@@ -218,17 +218,14 @@ async function writeOthers() {
     const { columns } = await unpack(number);
     if (view.result !== result || view.episode !== episode) return;
     const index = columns.success.findIndex((_, other) => keyOf(columns, other, data.results[number].mazes) === wanted);
-    if (index >= 0) rows.push(otherRow(number, index, columns));
+    if (index < 0) continue;
+    const button = element("button", { type: "button", class: "link" }, data.results[number].label);
+    if (number === result) button.setAttribute("aria-current", "true");
+    button.addEventListener("click", () => openResult(number, index));
+    const texts = [columns.success[index] ? "✓ reached" : "✗ failed", String(columns.steps[index]), columns.spl[index].toFixed(2)];
+    rows.push(element("tr", {}, element("td", {}, button), ...texts.map((text) => element("td", { class: "number" }, text))));
   }
   byId("others").tBodies[0].replaceChildren(...rows);
-}
-
-function otherRow(number, index, columns) {
-  const button = element("button", { type: "button", class: "link" }, data.results[number].label);
-  if (number === view.result) button.setAttribute("aria-current", "true");
-  button.addEventListener("click", () => openResult(number, index));
-  const texts = [columns.success[index] ? "✓ reached" : "✗ failed", String(columns.steps[index]), columns.spl[index].toFixed(2)];
-  return element("tr", {}, element("td", {}, button), ...texts.map((text) => element("td", { class: "number" }, text)));
 }
 
 function writeKey() {
@@ -265,8 +262,7 @@ function drawShown(current, color) {
   drawMap(pen, current.shown, side, color);
   if (!current.isDrawn) current.landmarks.forEach((cell) => fillCell(pen, cell, side, color("landmark")));
   const radius = (0.36 * thickness(current.size) * side) / current.size;
-  drawStart(pen, current.shownStart, side, radius, color);
-  drawGoal(pen, current.shownGoal, side, radius, color);
+  drawEnds(pen, current.shownStart, current.shownGoal, side, radius, color);
 }
 
 function drawDriven(current, ranges, color) {
@@ -274,23 +270,19 @@ function drawDriven(current, ranges, color) {
   const pen = prepare(byId("driven"), size);
   drawMap(pen, current.real || (current.isDrawn ? null : current.shown), size, color);
   for (const cell of current.landmarks) fillCell(pen, cell, size, color("landmark"));
-  drawStart(pen, current.start, size, 0.36 * thickness(size), color);
-  drawGoal(pen, current.goal, size, 0.36 * thickness(size), color);
-  if (differs(current)) markDifferences(pen, current, color);
+  drawEnds(pen, current.start, current.goal, size, 0.36 * thickness(size), color);
+  // Small squares where map and maze disagree; the map itself is drawn beside it as it was shown.
+  if (differs(current)) {
+    current.real.forEach((wall, cell) => {
+      if (current.shown[cell] === wall) return;
+      pen.fillStyle = color(wall ? "lost-wall" : "false-wall");
+      pen.fillRect((cell % size) + 0.25, Math.floor(cell / size) + 0.25, 0.5, 0.5);
+    });
+  }
   if (!path.x.length) return;
   drawRays(pen, path, view.time, size, ranges, current.sensor.range, color);
   drawPath(pen, path, view.time, size, color);
   if (current.observed) drawDashed(pen, current.observed, view.time, size, color("odometry"));
-}
-
-// Small squares where map and maze disagree; the map itself is drawn beside it as it was shown.
-function markDifferences(pen, current, color) {
-  const { size } = current;
-  current.real.forEach((wall, cell) => {
-    if (current.shown[cell] === wall) return;
-    pen.fillStyle = color(wall ? "lost-wall" : "false-wall");
-    pen.fillRect((cell % size) + 0.25, Math.floor(cell / size) + 0.25, 0.5, 0.5);
-  });
 }
 
 function describe() {

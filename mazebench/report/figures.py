@@ -27,7 +27,6 @@ _PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#
 _MARKERS, _DASHES = "os^Dv<>PXp*h", ("-", (0, (3.7, 1.6)), (0, (6.4, 1.6, 1.0, 1.6)))
 # Of what the paper printed: one colour that no agent has, and strokes where agents have areas.
 _PAPER_MARKERS = {"MMN (paper)": "x", "MAH (paper)": "+", "DQN (paper)": "1", "Random (paper)": "2"}
-_VIOLINS = ("map_flip", "position_noise")  # perturbations of which the paper shows the distribution of SPL
 _STYLE: Any = {
     "font.size": 8.5,
     "axes.titlesize": 9,
@@ -47,7 +46,6 @@ _STYLE: Any = {
 }
 _DODGE, _DODGES = 0.12, 0.72  # of the smallest step between levels: two agents are so far apart, all of them at most
 _LINE_HEIGHT = 0.105  # of scores, that a line of text takes
-_MIN_CURVE = 4  # points of a curve with bands; fewer have bars, since bands over one point are not seen
 
 
 class Panel(NamedTuple):
@@ -79,7 +77,7 @@ def draw_table(table: Table, labels: Sequence[str]) -> Drawn:
     """
     is_printed = (table.values.source.eq("paper") & table.values.metric.eq("spl_grid")).any()
     metrics = ("success_rate", next(iter(ON_TIME_METRICS)), "spl_grid" if is_printed else "spl")
-    is_curve = table.row_name == "distance" and len(table.x) >= _MIN_CURVE
+    is_curve = table.row_name == "distance" and len(table.x) > 3  # few points have bars: bands over one are not seen
     x_name = f"{table.row_name}{' (cells)' if 'distance' in table.row_name else ''}"
     single = table.values[table.values.runs.isna() & table.values.row.isin(table.x)]  # no means over training runs
     single = single.assign(x=single.row.astype(object).map(table.x))
@@ -96,7 +94,7 @@ def draw_violins(episodes: pd.DataFrame) -> list[Drawn]:
     """Returns violins of SPL by the level of a perturbation, on the benchmark's eval mazes: a panel per agent."""
     figures = []
     for perturbation, name, group in perturbed_groups(episodes[episodes.mazes == ""]):
-        if perturbation not in _VIOLINS:
+        if perturbation not in ("map_flip", "position_noise"):  # of which the paper shows the distribution of SPL
             continue
         agents = list(at_common_distances(group).groupby("label", observed=True))
         level_name = perturbation.replace("_", " ")

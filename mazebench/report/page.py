@@ -26,7 +26,6 @@ from mazebench.report.figures import Drawn, to_svg
 from mazebench.report.table import Table
 from mazebench.report.trajectory_figures import TIME_COLORS
 from mazebench.results.paper import citation, reference
-from mazebench.results.played import Shown
 from mazebench.results.trajectories import Trajectory
 from mazebench.world.mjcf import BODY_RADIUS
 from mazebench.world.ray_casting import NUM_RAYS
@@ -45,12 +44,7 @@ def build_page(
 ) -> str:
     """Returns the page as HTML; text from results is escaped in it, or stands in it as JSON and base64.
 
-    Args:
-      results: all results.
-      head: what the results are, in a line.
-      tables, figures: all of them; a figure has the name of its table.
-      provenance: where the results come from.
-      warnings: lines about the results.
+    `head` describes the results in a line. A figure has the name of its table.
     """
     marks = f":root {{ --start: {colors.to_hex(colors.START)}; --goal: {colors.to_hex(colors.GOAL)}; }}\n"
     style, script = marks + _read("page.css"), _read("canvas.js") + _read("explorer.js")
@@ -96,7 +90,7 @@ def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int
     mazes: dict[tuple[str, str | None], int] = {}  # names and walls, with their numbers
     described = []
     for result, used in zip(results, columns, strict=True):
-        setting, task, maps = result.setting, result.task, _shown(result)
+        setting, task, maps = result.setting, result.task, result.shown
         walls = {name: _base64(np.packbits(walls).tobytes()) for name, walls in result.walls.items()}
         own = [(name, walls.get(name)) for name in result.episodes.maze.unique()]
         described.append(
@@ -141,7 +135,7 @@ def _trials(result: ReportedResult) -> dict[str, Any]:
         "seed": episodes.seed.tolist(),
         "groups": {fact: episodes[fact].astype(int).tolist() for fact in result.facts},
     }
-    if maps := _shown(result):
+    if maps := result.shown:
         columns["shownStart"] = [shown.start for shown in maps]
         columns["shownGoal"] = [shown.goal for shown in maps]
     if result.trajectories:
@@ -168,11 +162,6 @@ def _outcomes(result: ReportedResult) -> dict[str, Any]:
         if trajectories[0].observed is not None:
             columns["observed"] = _changes(np.concatenate([lay_on_first_pose(each) for each in trajectories]) / scale)
     return columns
-
-
-def _shown(result: ReportedResult) -> list[Shown]:
-    """Returns what was shown in the episodes of a result with paths or perturbations; nothing for others."""
-    return result.shown if result.trajectories or result.setting.active_perturbations else []
 
 
 def lay_on_first_pose(trajectory: Trajectory) -> np.ndarray:
