@@ -69,13 +69,16 @@ class ReportedResult:
         return self.task.mazes[self.mazes[maze]].walls if self.task else None
 
 
-def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
+def read_results(
+    paths: Sequence[pathlib.Path], load: Callable[[pathlib.Path], Result] = load_result
+) -> list[ReportedResult]:
     """Returns all results at or below `paths`, one for each setting and training run, sorted by setting; at least one.
 
     It warns with a `Remark` of each thing that is skipped.
 
     Args:
       paths: evaluation folders, or folders above them.
+      load: reads the result of an evaluation folder.
 
     Raises:
       InputError: if there is no result.
@@ -86,7 +89,7 @@ def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
             remark(f"{path}: expected results of `mazebench eval`, found none; skipped")
     for folder in find_evaluations(paths):
         try:
-            results.append(_read_result(folder))
+            results.append(_reported(load(folder)))
         except InputError as error:
             remark(f"{error}; skipped")
     if not results:
@@ -170,9 +173,8 @@ def find_evaluations(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
     return folders_below(paths, lambda names: not names.isdisjoint({SUMMARY, EPISODES, JOURNAL}))
 
 
-def _read_result(folder: pathlib.Path) -> ReportedResult:
-    result = load_result(folder)
-    summary = result.summary
+def _reported(result: Result) -> ReportedResult:
+    folder, summary = result.folder, result.summary
     task: Task | None = None
     try:
         task = played_task(summary)
