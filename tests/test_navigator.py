@@ -72,7 +72,7 @@ def success_rate(results: list[Result]) -> float:
     return float(np.mean([result.success for result in results]))
 
 
-def track_success_rate(track: str, level: int, distances: tuple[int, ...], num_mazes: int = 9, **options) -> float:
+def track_success_rate(track: str, level: int, distances: tuple[int, ...], num_mazes: int = 6, **options) -> float:
     mazes = load_kind_mazes("train")
     spec = Task.of(track, mazes=mazes[:: len(mazes) // num_mazes], level=level, distances=distances, **options)
     return success_rate(play(spec, draw_trials(spec, 2)))
