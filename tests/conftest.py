@@ -24,6 +24,7 @@ def kernels() -> None:
     """The kernels of shortest paths are compiled, of which a line on standard error would tell."""
     length_between(generate("dfs", 7, np.random.default_rng(0)), 0.15, (1, 1), (5, 5))
 
+
 gc.disable()  # while tests are imported, which leaves no garbage
 
 
