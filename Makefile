@@ -22,7 +22,7 @@ eval: .venv/installed-agents
 	$(BIN)/mazebench eval --agent $(AGENT)
 
 test: .venv/installed-dev
-	$(BIN)/pytest -n auto -m "not slow"
+	$(BIN)/pytest -n auto --dist worksteal -m "not slow"
 
 # Into site/; a warning is an error, which `--quiet` would hide. The notice that is turned off is not about our pages.
 docs: .venv/installed-dev
@@ -38,7 +38,7 @@ check: .venv/installed-dev
 
 # The tests that `make test` leaves out: kills, full disks, busy machines.
 test-slow: .venv/installed-dev
-	$(BIN)/pytest -n auto -m slow
+	$(BIN)/pytest -n auto --dist worksteal -m slow
 
 check-full: check test-slow
 	$(MAKE) pythons

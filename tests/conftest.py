@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import pathlib
 import sys
@@ -12,9 +13,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # of each worker of pytest-xdist 
 
 import numpy as np
 import pytest
-from made_results import make_results
 
-from mazebench import cli
 from mazebench.errors import Remark
 from mazebench.maps.geodesic import length_between
 from mazebench.maps.kinds import generate
@@ -26,9 +25,20 @@ def kernels() -> None:
     length_between(generate("dfs", 7, np.random.default_rng(0)), 0.15, (1, 1), (5, 5))
 
 
+gc.disable()  # while tests are imported, which leaves no garbage
+
+
+def pytest_collection_finish() -> None:
+    """Has later collections of garbage pass over what was imported."""
+    gc.freeze()
+    gc.enable()
+
+
 @pytest.fixture
 def command(tmp_path, monkeypatch, capsys) -> Callable[..., tuple[int, str, str]]:
     """Runs a command in this process, in an empty working directory; gives exit status, output and errors."""
+    from mazebench import cli  # not for the process that only hands tests out to workers
+
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: str | pathlib.Path) -> tuple[int, str, str]:
@@ -58,6 +68,8 @@ def remarks() -> Iterator[Callable[[], list[str]]]:
 @pytest.fixture(scope="session")
 def made(tmp_path_factory) -> pathlib.Path:
     """The folder of the results that `make_results` makes."""
+    from made_results import make_results
+
     return make_results(tmp_path_factory.mktemp("made") / "results")
 
 

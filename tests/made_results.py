@@ -115,7 +115,6 @@ def make_results(folder: pathlib.Path) -> pathlib.Path:
         make_result(here / "local-15", agent, size=15, record=False, **few)
         make_result(here / "routes", agent, "hierarchical", **few)
         make_result(here / "flip", agent, "hierarchical", map_flip=0.2, **few)
-        make_result(here / "warp", agent, map_warp=0.2, **few)
         make_result(here / "noise", agent, position_noise=0.5, record=False, **few)
     return folder
 

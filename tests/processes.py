@@ -2,23 +2,42 @@
 
 from __future__ import annotations
 
+import atexit
+import functools
+import json
 import os
 import pathlib
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping
 
 import pytest
 
 _NO_EGL = 77  # exit status
 _PROBE = f"""
-import sys
+try:
+    mujoco.GLContext(64, 64).free()
+except (RuntimeError, AttributeError):
+    sys.exit({_NO_EGL})
+"""
+# Forks a process for each line, a program and where its standard error goes, and prints its exit status. Thus modules
+# are imported once.
+_FORKS = """
+import json, os, sys
 try:
     import mujoco
-    mujoco.GLContext(64, 64).free()
 except (RuntimeError, ImportError, AttributeError):
-    sys.exit({_NO_EGL})
-import gymnasium, mazebench, numpy as np
+    sys.exit()
+import dm_control.mjcf, gymnasium, mazebench.envs.vector, numpy as np
+for line in sys.stdin:
+    program, errors = json.loads(line)
+    if (child := os.fork()) == 0:
+        os.dup2(os.open(os.devnull, os.O_RDWR), 1)
+        os.dup2(os.open(errors, os.O_WRONLY), 2)
+        exec(program)
+        break
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
 
 
@@ -55,7 +74,19 @@ def run_python(
 
 def run_with_egl(program: str) -> None:
     """Runs a program that must succeed and print nothing on standard error; skips where EGL is not usable."""
-    result = run_python("-c", _PROBE + program, status=None, variables={"MUJOCO_GL": "egl"})
-    if result.returncode == _NO_EGL:
-        pytest.skip("EGL is not usable here")
-    assert (result.returncode, result.stderr) == (0, "")
+    with tempfile.NamedTemporaryFile() as errors:
+        forks = _forks()
+        print(json.dumps([_PROBE + program, errors.name]), file=forks.stdin, flush=True)
+        status = forks.stdout.readline()
+        if not status or int(status) == _NO_EGL:
+            pytest.skip("EGL is not usable here")
+        assert (int(status), errors.read().decode()) == (0, "")
+
+
+@functools.cache
+def _forks() -> subprocess.Popen[str]:
+    """The process that forks, with EGL; it ends with this one."""
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    forks = subprocess.Popen([sys.executable, "-c", _FORKS], env=environment(MUJOCO_GL="egl"), **pipes)
+    atexit.register(forks.communicate)
+    return forks

@@ -44,7 +44,7 @@ def built(name: str, context_size: int) -> tuple[type[Agent], Agent]:
 
 
 @pytest.mark.parametrize(("name", "context_size"), CASES)
-@hypothesis.settings(max_examples=8, deadline=None, derandomize=True)
+@hypothesis.settings(max_examples=5, deadline=None, derandomize=True)
 @hypothesis.given(data=strategies.data())
 def test_any_observations_are_answered_by_actions(name, context_size, data):
     agent_class, agent = built(name, context_size)

@@ -124,11 +124,11 @@ def play_vector(env: MazeVectorEnv, actions: np.ndarray, seeds) -> list[list[Ste
 def assert_same(expected: Iterable[Step], found: Iterable[Step]) -> None:
     """Bit for bit."""
     for number, (one, other) in enumerate(zip(expected, found, strict=True)):
-        np.testing.assert_array_equal(one.state, other.state, err_msg=f"state {number}")
-        np.testing.assert_array_equal(one.context, other.context, err_msg=f"context {number}")
+        assert np.array_equal(one.state, other.state), f"state {number}"
+        assert np.array_equal(one.context, other.context), f"context {number}"
         assert one[2:5] == other[2:5], f"step {number}"
         for name in INFOS:
-            np.testing.assert_array_equal(one.info[name], other.info[name], err_msg=f"{name} {number}")
+            assert np.array_equal(one.info[name], other.info[name]), f"{name} {number}"
 
 
 def assert_tree_equal(one, other) -> None:
@@ -137,7 +137,7 @@ def assert_tree_equal(one, other) -> None:
         for key in one:
             assert_tree_equal(one[key], other[key])
     else:
-        np.testing.assert_array_equal(one, other)
+        assert np.array_equal(one, other)
 
 
 class TestSameEpisodes:
@@ -248,7 +248,7 @@ class TestAutoreset:
 
     def assert_same_infos(self, ours, theirs) -> None:
         for key in ("state", "context"):
-            np.testing.assert_array_equal(ours[0][key], theirs[0][key])
+            assert np.array_equal(ours[0][key], theirs[0][key])
             assert ours[0][key].dtype == theirs[0][key].dtype
         self.compare_infos(ours[1], theirs[1])
 
@@ -258,7 +258,7 @@ class TestAutoreset:
             if key == "final_info":
                 self.compare_infos(ours[key], theirs[key])
             elif key.startswith("_"):
-                np.testing.assert_array_equal(ours[key], theirs[key], err_msg=key)
+                assert np.array_equal(ours[key], theirs[key]), key
             elif key == "final_obs":
                 for one, other in zip(ours[key], theirs[key], strict=True):
                     assert (one is None) == (other is None)
@@ -266,7 +266,7 @@ class TestAutoreset:
                         assert_tree_equal(one, other)
             else:
                 mask = theirs[f"_{key}"]
-                np.testing.assert_array_equal(ours[key][mask], theirs[key][mask], err_msg=key)
+                assert np.array_equal(ours[key][mask], theirs[key][mask]), key
 
 
 class TestEpisodeSource:

@@ -12,7 +12,8 @@ from run_folders import IMPORTS, records_of
 from mazebench.errors import RunError
 from mazebench.evaluation.evaluate import evaluate
 
-FEW = {"distances": (1, 2, 3, 4), "episodes_per_distance": 2}  # 160 episodes, two chunks for one worker
+# 160 episodes, two chunks for one worker.
+FEW = {"distances": (1, 2, 3, 4), "episodes_per_distance": 2, "time_limit": 9}
 # `Mortal` kills its process in its second chunk, the first time that it comes to one.
 AGENTS = """
 import os, pathlib, signal

@@ -92,7 +92,7 @@ class TestNavigator:
     )
     def test_goals_are_reached_in_buildings_with_noisy_senses_or_without_a_map(self, track, level, least, options):
         mazes = load_kind_mazes("train")
-        spec = Task.of(track, mazes=mazes[:: len(mazes) // 9], level=level, distances=(15, 25), **options)
+        spec = Task.of(track, mazes=mazes[:: len(mazes) // 6], level=level, distances=(15, 25), **options)
         assert success_rate(play(spec, draw_trials(spec, 2))) >= least
 
     def test_near_goals_are_found_without_a_map_and_a_mark(self):

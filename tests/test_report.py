@@ -191,7 +191,7 @@ class TestFiles:
     def test_every_table_and_figure_has_all_its_forms(self, report):
         tables = {path.stem for path in (report / "tables").iterdir() if path.suffix == ".csv"}
         assert tables >= {"local-13", "local-15", "size-local", "hierarchical-13", "flip-hierarchical-13", "all"}
-        assert tables >= {"warp-0.2-local-13", "warp-local-13", "noise-local-13"}
+        assert "noise-local-13" in tables
         for folder, suffixes in (("tables", (".md", ".csv", ".tex")), ("figures", (".png", ".pdf"))):
             names = {path.name for path in (report / folder).iterdir()}
             stems = {name.removesuffix(suffixes[0]) for name in names if name.endswith(suffixes[0])}
@@ -218,7 +218,7 @@ class TestFiles:
         rows = provenance_of(read_results([made]))
         found = rows[["agent", "checkpoint", "seed", "results", "episodes", "in"]].values.tolist()
         assert found == [
-            [agent, "none", 0, 6, 32, os.path.relpath(made / str(number))] for number, agent in enumerate(MADE_AGENTS)
+            [agent, "none", 0, 5, 28, os.path.relpath(made / str(number))] for number, agent in enumerate(MADE_AGENTS)
         ]
         assert rows.command[0] == "mazebench eval --agent mah"
         assert set(rows.versions) == {f"mazebench-mujoco 0.1.0, numpy {np.__version__}, Python 3.11.7"}

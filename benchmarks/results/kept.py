@@ -98,7 +98,8 @@ def read_kept(folder: pathlib.Path) -> Kept:
         for log in sorted((unpacked / _TRAINING).rglob(METRICS)):
             training.setdefault(log.relative_to(unpacked).parts[1], []).append(pd.DataFrame(read_lines(log)))
         results = [load_result(path.parent) for path in sorted(unpacked.rglob(SUMMARY))]
-        paper = join_episodes(read_results([each.folder for each in results if each.summary.suite == PAPER]))
+        of_paper = {each.folder: each for each in results if each.summary.suite == PAPER}
+        paper = join_episodes(read_results(list(of_paper), of_paper.__getitem__))
         lines = [_episodes(each, each.folder.relative_to(unpacked).parts[0]) for each in results]
     episodes = pd.concat(lines).set_index(["agent", "setting"]).sort_index(kind="stable")
     return Kept(episodes, {table.name: table for table in build_tables(paper)}, training)

@@ -14,7 +14,7 @@ import pandas as pd
 from mazebench.errors import InputError, remark
 from mazebench.results.metrics import by_fact, scores
 from mazebench.results.played import Shown, played_task, shown_of
-from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, load_result
+from mazebench.results.reading import EPISODES, JOURNAL, SUMMARY, Result, load_result
 from mazebench.results.records import Summary
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, load_trajectories
 from mazebench.tasks.episode import Episode
@@ -59,10 +59,16 @@ class ReportedResult:
         return {maze.name: maze.walls for maze in self.task.fixed_mazes} if self.task else {}
 
 
-def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
+def read_results(
+    paths: Sequence[pathlib.Path], load: Callable[[pathlib.Path], Result] = load_result
+) -> list[ReportedResult]:
     """Returns all results at or below `paths`, one for each setting and training run, sorted by setting; at least one.
 
     It warns with a `Remark` of each thing that is skipped.
+
+    Args:
+      paths: evaluation folders, or folders above them.
+      load: reads the result of an evaluation folder.
 
     Raises:
       InputError: if there is no result.
@@ -73,7 +79,7 @@ def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
             remark(f"{path}: expected results of `mazebench eval`, found none; skipped")
     for folder in find_evaluations(paths):
         try:
-            results.append(_read_result(folder))
+            results.append(_reported(load(folder)))
         except InputError as error:
             remark(f"{error}; skipped")
     if not results:
@@ -171,9 +177,8 @@ def find_evaluations(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
     return folders_below(paths, lambda names: not names.isdisjoint({SUMMARY, EPISODES, JOURNAL}))
 
 
-def _read_result(folder: pathlib.Path) -> ReportedResult:
-    result = load_result(folder)
-    summary, records = result.summary, result.records
+def _reported(result: Result) -> ReportedResult:
+    folder, summary, records = result.folder, result.summary, result.records
     task: Task | None = None
     try:
         task = played_task(summary)
