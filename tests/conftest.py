@@ -15,15 +15,6 @@ import numpy as np
 import pytest
 
 from mazebench.errors import Remark
-from mazebench.maps.geodesic import length_between
-from mazebench.maps.kinds import generate
-
-
-@pytest.fixture(scope="session", autouse=True)
-def kernels() -> None:
-    """The kernels of shortest paths are compiled, of which a line on standard error would tell."""
-    length_between(generate("dfs", 7, np.random.default_rng(0)), 0.15, (1, 1), (5, 5))
-
 
 gc.disable()  # while tests are imported, which leaves no garbage
 
@@ -34,10 +25,22 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
+# Fixtures import what the process that only hands out tests to workers can do without.
+
+
+@pytest.fixture(scope="session", autouse=True)
+def kernels() -> None:
+    """The kernels of shortest paths are compiled, of which a line on standard error would tell."""
+    from mazebench.maps.geodesic import length_between
+    from mazebench.maps.kinds import generate
+
+    length_between(generate("dfs", 7, np.random.default_rng(0)), 0.15, (1, 1), (5, 5))
+
+
 @pytest.fixture
 def command(tmp_path, monkeypatch, capsys) -> Callable[..., tuple[int, str, str]]:
     """Runs a command in this process, in an empty working directory; gives exit status, output and errors."""
-    from mazebench import cli  # not for the process that only hands tests out to workers
+    from mazebench import cli
 
     monkeypatch.chdir(tmp_path)
 
