@@ -118,9 +118,9 @@ def test_goals_are_relabelled_on_the_maps_that_were_shown():
         shown |= {context[GLOBAL_MAP].tobytes() for context in step.context[step.new_episode]}
         learner.observe(step)
     sample = learner.replay.sample(200, 4, 3, hindsight=Hindsight(ratio=1.0), rng=rng)
-    contexts = learner.maps.contexts(sample, 0).numpy()
+    contexts = learner.maps.contexts(sample.contexts, 0).numpy()
     assert {context[GLOBAL_MAP].tobytes() for context in contexts} <= shown
-    true = np.stack([task.mazes[maze].walls for maze in sample.maze])
+    true = np.stack([task.mazes[maze].walls for maze in sample.contexts.maze])
     assert ((contexts[:, GLOBAL_MAP] != true).sum(axis=(1, 2)) == 2).all(), "a door closed, a door opened"
 
 

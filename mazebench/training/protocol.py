@@ -28,7 +28,7 @@ class LearningAgent(Agent):
     def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:
         """Returns the options of the task that a learner is to collect in, unless the user asks for others; here none.
 
-        They are fields of `Task`, but not those that choose mazes, track, level or context size.
+        They are fields of `TaskOptions`, but not those that choose mazes, track, level or context size.
 
         Args:
           overrides: values of the agent's config as text, by name.
