@@ -54,12 +54,12 @@ def draw_mazes(size: int) -> list[Maze]:
     return [Maze(walls, f"{size}-{index}") for index, walls in enumerate(unique.values())]
 
 
-def format_trials(spec: Task, trials: list[Trial]) -> str:
+def format_trials(task: Task, trials: list[Trial]) -> str:
     """Returns the text of a file of frozen episodes, with the steps that the oracle takes in each."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for trial, steps in zip(trials, measure_oracle_steps(spec, trials), strict=True):
+    for trial, steps in zip(trials, measure_oracle_steps(task, trials), strict=True):
         episode = trial.episode
         shortest = f"{trial.shortest_path:.9f}"  # nanometres: the same on every machine
         drawn = [episode.maze, *episode.start, *episode.goal, trial.distance, repr(episode.yaw), episode.seed]

@@ -60,7 +60,7 @@ def test_a_run_says_that_progress_was_rewarded(tmp_path):
 
 
 def test_a_run_on_a_track_names_it_and_is_evaluated_on_it(tmp_path):
-    train(**tiny_options(task="rebuilt", level=(1, 2)), out=tmp_path)
+    train(**tiny_options(task=Task.of("rebuilt", level=(1, 2))), out=tmp_path)
     task = task_in(tmp_path)
     assert (task["task"], task["level"], task["num_goals"], task["sensors"]) == ("rebuilt", [1, 2], 1, ["lidar"])
     last = json.loads((tmp_path / "metrics.jsonl").read_text().splitlines()[-1])

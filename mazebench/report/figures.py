@@ -91,21 +91,21 @@ def draw_table(table: Table, labels: Sequence[str]) -> Drawn:
 
 @mpl.rc_context(_STYLE)
 def draw_violins(episodes: pd.DataFrame) -> list[Drawn]:
-    """Returns violins of SPL by the level of a perturbation, on the benchmark's eval mazes: a panel per agent."""
+    """Returns violins of SPL by the strength of a perturbation, on the benchmark's eval mazes: a panel per agent."""
     figures = []
     for perturbation, name, group in perturbed_groups(episodes[episodes.mazes == ""]):
         if perturbation not in ("map_flip", "position_noise"):  # of which the paper shows the distribution of SPL
             continue
         agents = list(at_common_distances(group).groupby("label", observed=True))
-        level_name = perturbation.replace("_", " ")
-        title = f"SPL by {level_name}: {group.task.iloc[0]}"
+        strength_name = perturbation.replace("_", " ")
+        title = f"SPL by {strength_name}: {group.task.iloc[0]}"
         figure, grid = _make_grid(title, [label for label, _ in agents], 2.1)
         for axes, (_, own) in zip(grid, agents, strict=True):
             levels, scores = zip(*own.groupby("strength").spl, strict=True)
             places = range(len(levels))
             axes.violinplot([each.to_numpy() for each in scores], places, widths=0.8, showmeans=True, showextrema=False)
             _set_ticks(axes, {place: f"{level:g}" for place, level in enumerate(levels)})
-            axes.set(xlabel=level_name, ylabel="SPL", ylim=(-0.05, 1.05))
+            axes.set(xlabel=strength_name, ylabel="SPL", ylim=(-0.05, 1.05))
         figures.append(Drawn(f"violins-{name}", title, f"{note_on_levels(perturbation, group)} Dashes: means.", figure))
     return figures
 

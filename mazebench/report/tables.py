@@ -83,7 +83,7 @@ def make_table(
 def perturbed_groups(episodes: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
     """Yields each perturbation, the name of files on its levels in a setting, and the episodes of that setting.
 
-    The column `strength` has the level of the perturbation, also 0. Only agents that have results with the perturbation
+    The column `strength` has that of the perturbation, also 0. Only agents that have results with the perturbation
     count, and only results without another one.
     """
     is_off = episodes[list(PERTURBATIONS)].eq(0)
@@ -98,7 +98,7 @@ def perturbed_groups(episodes: pd.DataFrame) -> Iterator[tuple[str, str, pd.Data
 
 
 def note_on_levels(perturbation: str, episodes: pd.DataFrame) -> str:
-    """Returns what a level of a perturbation means, and which distances count."""
+    """Returns what the strength of a perturbation means, and which distances count."""
     distances = common_distances(episodes)
     counted = f"Distances {_format_distances(distances)}." if distances else ""
     return f"{fields_of(TaskOptions)[perturbation].help} {counted}".strip()
@@ -120,10 +120,10 @@ def _tables_of(episodes: pd.DataFrame) -> Iterator[Table]:
             f"hierarchical-{size}", title, note, "landmark distance", rows, _printed("hierarchical", group)
         )
     for perturbation, name, group in perturbed_groups(episodes):
-        level_name, (task, size) = perturbation.replace("_", " "), group[["task", "size"]].iloc[0]
-        title = f"{level_name.capitalize()}: {task}, {size} × {size}"
+        strength_name, (task, size) = perturbation.replace("_", " "), group[["task", "size"]].iloc[0]
+        title = f"{strength_name.capitalize()}: {task}, {size} × {size}"
         rows, note = _rows_by(group, "strength"), note_on_levels(perturbation, group)
-        yield make_table(name, title, note, level_name, rows)
+        yield make_table(name, title, note, strength_name, rows)
         # The paper prints local navigation on warped maps by distance.
         if (perturbation, task) == ("map_warp", "local"):
             for level, warped in group[group.strength > 0].groupby("strength"):
