@@ -58,6 +58,7 @@ class TestDrawnMazes:
         ("options", "message"),
         [
             ({"kinds": "office"}, "kind 'office': only the eval split has it"),
+            ({"kinds": "dfs,office"}, "kind 'office': only the eval split has it"),
             ({"kinds": "attic"}, "unknown kinds 'attic'; available: cave, dfs, house"),
             ({"kinds": "dfs,dfs"}, "expected each kind once, found dfs, dfs"),
             ({"kinds": "dfs", "size": 14}, "kind 'dfs' makes mazes of odd sizes only, found size 14"),

@@ -172,13 +172,9 @@ def resolve(
     mazes, scenarios = read or _read(asked)
     _check_mazes(asked, mazes)
     size, cell_size = mazes[0].size, mazes[0].cell_size
-    split = asked.split or "train"
-    filled = asked.replace(size=size, cell_size=cell_size, split=split, actions=asked.actions or "six")
-    if asked.is_drawn:
-        num_mazes = None if asked.fresh else asked.num_mazes or NUM_DRAWN
-        filled = filled.replace(kinds=asked.kinds or DRAWN_KINDS[:1], num_mazes=num_mazes)
-    if asked.track is not None:
-        filled = filled.replace(level=asked.level or LEVELS[:1])
+    split, actions = asked.split or "train", asked.actions or "six"
+    level = asked.level or (() if asked.track is None else LEVELS[:1])
+    context_size = _context_size(asked, size, context_size_of)
 
     # The distances that fit the mazes, and a time limit in which goals of one's own are reached.
     by_default = distances or (EVAL_DISTANCES if split == "eval" else TRAIN_DISTANCES)
@@ -192,11 +188,22 @@ def resolve(
         is_new = asked.has_own or asked.is_drawn
         time_limit = default_time_limit(cells, track=None, cell_size=cell_size, is_new=is_new)
 
-    filled = filled.replace(
-        distances=chosen, time_limit=time_limit, context_size=_context_size(asked, size, context_size_of)
+    of_drawn: dict[str, Any] = {}
+    if asked.is_drawn:
+        num_mazes = None if asked.fresh else asked.num_mazes or NUM_DRAWN
+        of_drawn = {"kinds": asked.kinds or DRAWN_KINDS[:1], "num_mazes": num_mazes}
+    filled = asked.replace(
+        size=size,
+        cell_size=cell_size,
+        split=split,
+        level=level or None,
+        distances=chosen,
+        time_limit=time_limit,
+        actions=actions,
+        context_size=context_size,
+        **of_drawn,
     )
     _check_distances(filled, mazes, scenarios)
-    assert filled.context_size is not None
     return Task(
         options=filled,
         asked=asked,
@@ -205,9 +212,9 @@ def resolve(
         size=size,
         cell_size=cell_size,
         distances=chosen,
-        levels=filled.level or (),
-        context_size=filled.context_size,
-        actions=filled.actions or "six",
+        levels=level,
+        context_size=context_size,
+        actions=actions,
     )
 
 

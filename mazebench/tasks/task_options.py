@@ -19,7 +19,7 @@ from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.places import free_cell_of_place, place_text
 from mazebench.maps.scenarios import are_scenarios
 from mazebench.maps.selection import described_maze, maze_as_described, own_mazes
-from mazebench.options import Doc, OneOf, ReadBy, fields_of, options_in
+from mazebench.options import Doc, OneOf, ReadBy, as_tuple, fields_of, options_in
 from mazebench.tasks.context import MAX_CONTEXT_SIZE
 from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS, FlipShare, PositionDeviation, WarpShare
 from mazebench.tasks.sensors import LIDAR, SENSORS
@@ -40,14 +40,6 @@ MIN_CONTEXT_SIZE = 3
 _SHOWING_POSE = ("top", "chase")  # the sensors that show where the body is
 # Fields that an agent may choose, or is not told, while the same is played.
 _OF_AGENTS = ("actions", "sensors", "camera_size", "textures", "hide", "exact_pose", "context_size")
-
-
-def _drawn_kind(kinds: Any) -> Any:
-    """Raises `InputError` if one of the kinds is of the eval split alone."""
-    for kind in kinds if isinstance(kinds, list | tuple) else (kinds,):
-        if kind in NOVEL:
-            raise InputError(f"kind {kind!r}: only the eval split has it; kinds: {', '.join(DRAWN_KINDS)}")
-    return kinds
 
 
 def _as_mazes(mazes: Any) -> Any:
@@ -213,7 +205,10 @@ class TaskOptions(SensorOptions, ReadOptions):
     ] = None
 
     def __post_init__(self) -> None:
-        _drawn_kind(self.kinds)
+        object.__setattr__(self, "kinds", as_tuple(self.kinds))
+        for kind in self.kinds:
+            if kind in NOVEL:
+                raise InputError(f"kind {kind!r}: only the eval split has it; kinds: {', '.join(DRAWN_KINDS)}")
         super().__post_init__()
         if self.mazes is not None and not isinstance(self.mazes, str):
             object.__setattr__(self, "mazes", own_mazes(self.mazes, self.reading))
