@@ -10,7 +10,6 @@ import numpy as np
 
 from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.maps.benchmark import MAZES_PER_SPLIT, PAPER_BENCHMARK, SIZES, TRACKS_BENCHMARK, read_asset
-from mazebench.maps.geodesic import length_between
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.episode import Episode, make_episode, sample_pair
 from mazebench.tasks.task import EVAL_DISTANCES, Task
@@ -143,6 +142,8 @@ def _draw_pairs(
 
 def make_trial(maze: Maze, index: int, pair: tuple[Cell, Cell], rng: np.random.Generator) -> Trial:
     """Returns the trial of a start and a goal in maze number `index`; draws the first heading and the seed."""
+    from mazebench.maps.geodesic import length_between  # loads numba, which frozen trials do without
+
     start, goal = pair
     episode = make_episode(index, start, goal, rng)
     shortest = length_between(maze, BODY_RADIUS, start, goal)
