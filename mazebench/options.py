@@ -137,7 +137,7 @@ class Options:
     def changed(self) -> dict[str, Any]:
         """Returns the fields that differ from their defaults, by name."""
         values = {name: (getattr(self, name), option.default) for name, option in fields_of(type(self)).items()}
-        return {name: value for name, (value, default) in values.items() if value is not default and value != default}
+        return {name: value for name, (value, default) in values.items() if value != default}
 
 
 def fields_of(options_class: type) -> Mapping[str, Option]:

@@ -38,7 +38,7 @@ _AGENTS = {
 
 
 class Kept(NamedTuple):
-    """What is kept."""
+    """The kept evaluations and training runs."""
 
     # A line for each episode of an agent in a setting (its index), which is a part of a suite, by a checkpoint (`run`).
     episodes: pd.DataFrame
