@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
+import torch
 
 import mazebench
 from mazebench.errors import InputError
@@ -66,6 +68,17 @@ class TestOccupancy:
         walls[1, 1:5] = walls[2, 1] = False
         assert maze_from_array(occupancy, unknown="free") == Maze(walls)
 
+    @pytest.mark.parametrize(
+        "form", [np.asarray, lambda walls: 100 * walls.astype(int), lambda w: np.where(w, "#", ".")]
+    )
+    def test_what_is_masked_is_unknown(self, form):
+        mask = np.zeros_like(WALLS)
+        distances = Maze(WALLS).distances(tuple(np.argwhere(~WALLS)[0]))
+        mask[np.unravel_index(distances.argmax(), mask.shape)] = True  # a dead end, behind which nothing is cut off
+        seen = np.ma.masked_array(form(WALLS), mask)
+        assert maze_from_array(seen) == Maze(WALLS | mask)
+        assert maze_from_array(seen, unknown="free") == Maze(WALLS)
+
 
 @pytest.mark.parametrize(
     "form", [np.asarray, lambda walls: 100 * walls.astype(int), lambda walls: np.where(walls, "#", ".")]
@@ -114,10 +127,29 @@ class TestTasks:
 
     def test_several_arrays_are_a_task(self):
         other = WALLS.T.copy()
-        for maps in ([WALLS, other], (Maze(WALLS), other), np.stack([WALLS, other])):
+        for maps in ([WALLS, other], (Maze(WALLS), other), np.stack([WALLS, other]), [WALLS.tolist(), other.tolist()]):
             assert mazebench.Task.of(mazes=maps, distances=[2]).mazes == (Maze(WALLS), Maze(other))
 
-    @pytest.mark.parametrize("mazes", [5, [WALLS.tolist()], [None]])
-    def test_what_is_no_maze_is_refused(self, mazes):
+    @pytest.mark.parametrize("form", [pd.DataFrame, torch.tensor, np.ndarray.tolist, lambda w: tuple(map(tuple, w))])
+    def test_an_array_of_any_library_is_read_alike(self, form):
+        assert maze_from_array(form(WALLS)) == Maze(WALLS)
+        assert mazebench.Task.of(mazes=form(WALLS), distances=[2]).mazes == (Maze(WALLS),)
+
+    @pytest.mark.parametrize(
+        ("array", "message"),
+        [
+            (np.stack([WALLS] * 3, axis=-1), r"found shape \(7, 7, 3\) bool; of a picture, give one channel"),
+            (WALLS[..., None], r"found shape \(7, 7, 1\) bool; of a picture"),
+            ([[1, 1], [1]], "expected an array, found list"),
+            ([None], r"found shape \(1,\) object"),
+        ],
+    )
+    def test_what_is_no_maze_is_refused_alike(self, array, message):
+        for read in (maze_from_array, lambda mazes: mazebench.Task.of(mazes=mazes)):
+            with pytest.raises(InputError, match=message):
+                read(array)
+
+    @pytest.mark.parametrize("mazes", [5, ["plan.txt", "other.txt"]])
+    def test_other_values_are_refused(self, mazes):
         with pytest.raises(InputError, match=r"expected .* in mazes|expected mazes as"):
             mazebench.Task.of(mazes=mazes)

@@ -6,9 +6,15 @@ import json
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
+import mazebench
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.maze_files import read_located, read_maze
+from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED
+from mazebench.maps.readers.text_map import grid_of_text
 from mazebench.maps.text import format_maze, parse_maze
 
 PLAN = """\
@@ -90,6 +96,64 @@ class TestReading:
         text = text.replace(f"|{blank}|{blank}|", f"|{line}|{blank}|") + f"{post}{line}{post}{line}{post}\n"
         assert read(tmp_path, text) == parse_maze(expected)
 
+    @pytest.mark.parametrize(
+        "plan",
+        [
+            "+---+---+\n|...|...|\n|.#.|...|\n|.......|\n+---+---+\n",
+            "+---+---+\n|...|...|\n|.......|\n+---+---+\n",
+            "+-------+\n|  #    |\n|     - |\n+-------+\n",
+            "+---+---+\n|...|...|\n+---+...+\n|...|...|\n+---+---+\n",
+        ],
+    )
+    def test_a_plan_of_lines_is_read_as_it_is_drawn(self, plan, tmp_path):
+        maze = read(tmp_path, plan)
+        drawn = [[letter in "+-|#" for letter in line] for line in plan.splitlines()]
+        for row, line in enumerate(maze.walls[: len(drawn)]):
+            assert (line >= np.array(drawn[row])).all()  # what can't be reached is closed
+        assert maze.size == len(drawn[0])
+
+    @pytest.mark.parametrize("rows", [["o---o---o", "|       |", "o---o--o "], ["+---+", "|   |", "+---+", "|   |"]])
+    def test_posts_that_are_missing_are_named(self, rows, tmp_path):
+        with pytest.raises(
+            MazeError, match=r"expected rows of posts and of rooms in turns, found (none in row 2|4 rows)"
+        ):
+            read(tmp_path, "\n".join(rows))
+
+    @pytest.mark.parametrize(
+        "table",
+        [
+            "1,1,1,1,1\n1,,,1,1\n1,1,,1,1\n1,1,,,1\n1,1,1,1,1\n",
+            "1;1;1;1;1;;\n1;;;1;1;;\n1;1;;1;1;;\n1;1;;;1;;\n1;1;1;1;1;;\n;;;;;;\n",
+            "#\t#\t#\t#\t#\n#\t\t\t#\t#\n#\t#\t\t#\t#\n#\t#\t\t\t#\n#\t#\t#\t#\t#\n",
+        ],
+    )
+    def test_an_empty_field_is_free_where_walls_alone_are_marked(self, table, tmp_path):
+        assert read(tmp_path, table, "plan.csv") == parse_maze(PLAN)
+
+    @pytest.mark.parametrize(("wall", "free"), [("1,0", "0,0"), ("100,0", "0,0"), ("TRUE", "FALSE"), ("true", "false")])
+    @pytest.mark.parametrize("separator", [";", "\t"])
+    def test_numbers_and_truth_values_of_spreadsheets_are_read(self, wall, free, separator, tmp_path):
+        lines = [separator.join(wall if letter == "#" else free for letter in row) for row in PLAN.split()]
+        assert read(tmp_path, "\n".join(lines), "plan.csv") == parse_maze(PLAN)
+
+    @given(walls=arrays(bool, (5, 7)), separator=st.sampled_from(",;\t"), quote=st.sampled_from(["", '"']))
+    def test_a_table_is_the_array_that_was_written(self, walls, separator, quote):
+        table = "\n".join(separator.join(f"{quote}{int(cell)}{quote}" for cell in row) for row in walls)
+        np.testing.assert_array_equal(grid_of_text(table, "m").states, np.where(walls, OCCUPIED, FREE))
+
+    def test_characters_of_double_width_and_squares_are_read(self, tmp_path):
+        for wall, free in ("＃．", "■□", "⬛⬜", ("⬛\ufe0f", "⬜\ufe0f")):
+            assert read(tmp_path, PLAN.replace("#", wall).replace(".", free)) == parse_maze(PLAN)
+
+    def test_the_grid_of_a_json_object_is_read(self, tmp_path):
+        content = {"name": "plan", "grid": rows(parse_maze(PLAN).walls), "start": [1, 1]}
+        assert read(tmp_path, json.dumps(content), "plan.json") == parse_maze(PLAN)
+
+    def test_a_name_of_other_bytes_is_escaped(self, tmp_path):
+        maze = read(tmp_path, PLAN, "gr\udcf6\x1b.txt")
+        assert maze.name == "gr\\udcf6\\x1b"
+        assert mazebench.load(mazes=maze, distances=[2]).physics is not None
+
     def test_a_house_is_the_floor_within_its_outline(self, tmp_path):
         corners = [[1, 1], [5, 1], [5, 3], [3, 3], [3, 5], [1, 5]]
         house = {"id": "a", "verts": corners, "room_category": {"Kitchen": [[1, 1, 3, 3]]}}
@@ -110,7 +174,17 @@ class TestRefusal:
             ("0.5,0.5,0.5\n0.1,0.2,0.3\n", "found float64 with the values 0.1, 0.2, 0.3, 0.5"),
             (PLAN + "\n" + PLAN, "expected one maze, found 2 with blank lines between"),
             (MOVING_AI.replace("height 5", "height 6"), "expected a MovingAI map of 6 rows of 5 cells"),
-            ('{"rooms": []}', "expected the JSON of a HouseExpo house"),
+            ('{"rooms": [], "id": 3}', "expected a HouseExpo house, .* found the keys rooms, id$"),
+            ('{"type": "FeatureCollection", "features": []}', "found the keys type, features; draw the plan"),
+            ('{"verts": {}}', "expected verts of a HouseExpo house"),
+            ('{"verts": ' + "[" * 100_000, "expected a HouseExpo house"),
+            ("1,0,1\n1,,1\n1,1,1\n", r"expected a value in each field, found none at \(1, 1\)$"),
+            ("1,0,1\n1,0\n1,1,1\n", r"expected 3 fields in each row, found 2 in row 1$"),
+            ("0,1,2\n1,0,1\n1,1,1\n", r"found 0, 1, 2, ... in row 0, a header or an index"),
+            ("A,B,C\n1,0,1\n1,1,1\n", r"found A, B, C, ... in row 0, a header"),
+            ("1,0,1\n2,0,1\n3,1,1\n", r"found 1, 2, 3, ... in column 0, a header"),
+            ("1;0;1\n1;wall;1\n1;1;1\n", r"cells of one character, found 'wall' at \(1, 1\)$"),
+            ("0,9;0,1;0,9\n0,9;0,1;0,9\n", "found float64 with the values 0.1, 0.9"),
             ("####\n#..#\n####\n", r"^plan: expected 5 to \d+ cells a side, found 4$"),
             (b"\xff\xff\xff", "found byte 0xff at 0; text, pictures such as PNG"),
             (b"AB\0", "found byte 0x00 at 2; text, pictures such as PNG"),

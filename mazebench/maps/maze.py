@@ -18,7 +18,7 @@ import numpy as np
 from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, one_line
 from mazebench.maps.covering import Rectangle, cover
 
 Cell = tuple[int, int]
@@ -68,6 +68,7 @@ class Maze:
     kind: str = ""  # of its layout, see `mazebench.maps.kinds`; empty for a maze that no kind has made
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "name", one_line(self.name))  # files may have any bytes in their names
         walls = np.array(self.walls)
         if walls.dtype != bool:
             raise MazeError(f"{self.name}: expected walls of dtype bool, found {walls.dtype}")

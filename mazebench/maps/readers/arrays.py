@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import pathlib
 import zipfile
@@ -11,16 +12,16 @@ import numpy as np
 
 from mazebench.errors import InputError
 from mazebench.maps.file_kinds import kind_of
-from mazebench.maps.maze import Maze
+from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.readers.cells import grid_of_characters, grid_of_numbers
-from mazebench.maps.readers.occupancy_grid import OccupancyGrid, locate_maze
+from mazebench.maps.readers.occupancy_grid import UNKNOWN, OccupancyGrid, locate_maze
 from mazebench.storage.files import read_at_most
 
 _MAX_BYTES = 2**27  # of a file
 
 
-def maze_from_array(array: np.ndarray, name: str = "maze", **options: Any) -> Maze:
+def maze_from_array(array: Any, name: str = "maze", **options: Any) -> Maze:
     """Returns the maze in an array, whose row 0 is on top.
 
         >>> mazebench.maze_from_array(np.array([[0, 0, 0], [1, 1, 0], [0, 0, 0]])).size  # a border is added
@@ -29,7 +30,8 @@ def maze_from_array(array: np.ndarray, name: str = "maze", **options: Any) -> Ma
     Args:
       array: `[R, C]`: walls as bool or as 0 (free) and 1 (wall); or occupancy, -1 where unknown, as 0 (free) and 1
         (occupied) or as whole numbers from 0 to 100 per cent; or characters as a text map has them. An array that is
-        no closed square is made one, see `locate_maze`.
+        no closed square is made one, see `locate_maze`. What is masked is unknown. Tables of pandas, tensors and lists
+        of rows are taken, too.
       name: of the maze.
       **options: those of `ReadOptions`.
 
@@ -37,7 +39,19 @@ def maze_from_array(array: np.ndarray, name: str = "maze", **options: Any) -> Ma
       InputError: if an option is not allowed.
       MazeError: if the array holds something else, or no legal maze.
     """
-    return locate_maze(_grid_of_array(np.asarray(array), name), ReadOptions.of(options), name).maze
+    return locate_maze(_grid_of_array(as_array(array, name), name), ReadOptions.of(options), name).maze
+
+
+def as_array(values: Any, name: str) -> np.ndarray:
+    """Returns the array that a table, a tensor or lists of numbers hold, with its mask if it has one.
+
+    Raises:
+      MazeError: if there is none.
+    """
+    try:
+        return values if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
+    except (TypeError, ValueError, RuntimeError) as error:  # of rows that differ in length, or a tensor on a GPU
+        raise MazeError(f"{name}: expected an array, found {type(values).__name__}: {str(error)[:120]}") from error
 
 
 def read_array_file(path: pathlib.Path) -> OccupancyGrid:
@@ -61,6 +75,10 @@ def read_array_file(path: pathlib.Path) -> OccupancyGrid:
 
 
 def _grid_of_array(array: np.ndarray, name: str) -> OccupancyGrid:
+    if isinstance(array, np.ma.MaskedArray):
+        mask, known = np.ma.getmaskarray(array), array.compressed()
+        grid = _grid_of_array(array.filled(known[0] if len(known) else 0), name)
+        return dataclasses.replace(grid, states=np.where(mask, np.int8(UNKNOWN), grid.states))
     if array.dtype.kind == "U" and array.ndim == 2 and np.char.str_len(array).max(initial=0) == 1:
         return grid_of_characters(["".join(row) for row in array], name)
     return grid_of_numbers(array, name)

@@ -14,9 +14,9 @@ import numpy as np
 from mazebench.maps.maze import MazeError
 from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 
-_WALL = "#*1%█▓■" + "".join(map(chr, range(0x2500, 0x2580)))  # the last are lines of boxes
-_FREE = ". 0·PG"
-_ASCII_BOX = "+-|"
+WALL = "#*1%█▓■⬛" + "".join(map(chr, range(0x2500, 0x2580)))  # the last are lines of boxes
+_FREE = ". 0·PG□⬜"
+_ASCII_BOX = "+-|"  # walls where there are no others, or the first row is made of them
 _MOVING_AI_WALL = "@OTW"  # out of bounds, trees and water
 _WORD = re.compile(r"[a-z]{3,}")
 _MAX_FREE, _MIN_OCCUPIED = 25, 65  # per cent, of map_saver
@@ -32,7 +32,10 @@ def grid_of_numbers(array: np.ndarray, name: str) -> OccupancyGrid:
       MazeError: if the array holds something else.
     """
     if array.ndim != 2 or array.dtype.kind not in "biuf" or not array.size:
-        raise MazeError(f"{name}: expected a two-dimensional array of numbers, found shape {array.shape} {array.dtype}")
+        hint = "; of a picture, give one channel" if array.shape[2:] in ((1,), (3,), (4,)) else ""
+        raise MazeError(
+            f"{name}: expected a two-dimensional array of numbers, found shape {array.shape} {array.dtype}{hint}"
+        )
     is_whole = array.dtype.kind != "f" or bool((array == np.round(array)).all())
     is_ternary = np.isin(array, (UNKNOWN, 0, 1)).all()  # as in ROS 2's OccupancyGrid, and in Player's maps
     is_percent = is_whole and array.min() >= UNKNOWN and _LEAST_PERCENT <= array.max() <= OCCUPIED
@@ -65,10 +68,12 @@ def grid_of_characters(rows: Sequence[str], name: str, is_moving_ai: bool = Fals
     found = set("".join(rows))
     if found <= set(string.digits) and not found <= set("01"):
         return grid_of_numbers(np.array([[int(digit) for digit in sorted(found)]]), name)  # refuses such codes
-    has_its_walls = is_moving_ai or ("@" in found and not found & set(_WALL))
-    wall = _MOVING_AI_WALL if has_its_walls else _WALL
+    has_its_walls = is_moving_ai or ("@" in found and not found & set(WALL))
+    wall = _MOVING_AI_WALL if has_its_walls else WALL
     if not found & set(wall):
         wall = _ASCII_BOX
+    elif set(rows[0].strip()) <= set(_ASCII_BOX):
+        wall += _ASCII_BOX
     marks = {letter for letter in found - set(wall + _FREE) if letter.isascii() and (letter.isalnum() or letter == "@")}
     for row, line in enumerate(rows):
         if word := next((word for word in _WORD.findall(line) if len(set(word)) >= 3), None):

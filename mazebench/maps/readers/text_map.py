@@ -6,18 +6,19 @@ import codecs
 import pathlib
 import re
 
-import numpy as np
-
 from mazebench.maps.file_kinds import kind_of, way_out
 from mazebench.maps.maze import MazeError
 from mazebench.maps.readers.cells import grid_of_characters, grid_of_numbers
-from mazebench.maps.readers.house_expo import read_house
+from mazebench.maps.readers.json_map import read_json_map
 from mazebench.maps.readers.occupancy_grid import OccupancyGrid
+from mazebench.maps.readers.tables import cells_in_table, numbers_in_table, separator_of
 from mazebench.storage.files import read_at_most
 
 _MAX_BYTES = 2**26  # 1,024 rows of 1,024 numbers with 18 digits take a third of it
 _ENCODINGS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 _POSTS = re.compile(r"([+o*.])(-+)\1(?:\2\1)*")  # the first line of a maze with walls between posts
+# Characters of double width, as East Asian fonts have them, and what only chooses how the one before is drawn.
+_SAME = {0xFEE0 + code: code for code in range(0x21, 0x7F)} | {0x3000: " ", 0xFE0F: None}
 
 
 def read_text(path: pathlib.Path) -> OccupancyGrid:
@@ -53,37 +54,30 @@ def grid_of_text(text: str, name: str) -> OccupancyGrid:
       MazeError: if it is none of these.
     """
     # Only these end a line: splitlines() would also split at characters that a text map must refuse.
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    text = text.replace("\r\n", "\n").replace("\r", "\n").translate(_SAME)
     if text.startswith("type "):
         return _moving_ai(text, name)
     if text.lstrip().startswith("{"):
-        return read_house(text, name)
+        return read_json_map(text, name)
     if "[" in text:  # a list of rows, as Python, JSON or NumPy write it
         lines = [" ".join(row.strip("[, \n").split()) for row in text.split("]")]
         lines = lines[0].split(",") if len(list(filter(None, lines))) == 1 else lines
     else:
         lines = re.sub(r"\\n|\\+", "\n", text).split("\n")  # D4RL ends a row with a backslash
-    lines = [re.sub(r"^\s*[(\"']+|[\"'),]+\s*$|[\"']", "", line) for line in lines]  # of strings in a program
-    rows = [line for line in lines if line.strip()]
-    if not rows:
-        raise MazeError(f"{name}: expected a text map, found no row")
-    _require_one_maze(lines, name)
-
-    # A table, with commas, semicolons, tabs or blanks between its cells.
-    cells = [re.split(r"\s*[,;\t]\s*|\s+", row.strip(" \t,;")) for row in rows]
-    if len({len(row) for row in cells}) == 1 and len(cells[0]) > 2:
-        if any(len(cell) > 1 for row in cells for cell in row):
-            try:
-                numbers = np.array(cells, dtype=float)
-            except ValueError as error:
-                raise MazeError(
-                    f"{name}: expected rows of as many numbers, or cells of one character, found {error}"
-                ) from error
-            return grid_of_numbers(numbers, name)
-        rows = ["".join(row) for row in cells]
-    elif (posts := _POSTS.fullmatch(rows[0].strip())) and len(posts[2]) > 1:
-        return grid_of_characters(_between_posts(rows, len(posts[2]) + 1, name), name)
-    return grid_of_characters(rows, name)
+    lines = [re.sub(r"^\s*\(+|\)[),]*\s*$", "", line) for line in lines]  # of tuples in a program
+    if (separator := separator_of(lines)) is not None:
+        cells = cells_in_table(lines, separator, name)
+    else:
+        lines = [re.sub(r"^\s*[\"']+|[\"',]+\s*$|[\"']", "", line) for line in lines]  # of strings in a program
+        cells = [line.split() for line in lines if line.strip()]  # a table with blanks, or none
+        if not cells:
+            raise MazeError(f"{name}: expected a text map, found no row")
+        _require_one_maze(lines, name)
+        if len({len(row) for row in cells}) > 1 or len(cells[0]) < 3:
+            return _grid_of_rows([line for line in lines if line.strip()], name)
+    if all(len(cell) == 1 for row in cells for cell in row):
+        return grid_of_characters(["".join(row) for row in cells], name)
+    return grid_of_numbers(numbers_in_table(cells, name), name)
 
 
 def _moving_ai(text: str, name: str) -> OccupancyGrid:
@@ -108,13 +102,25 @@ def _require_one_maze(lines: list[str], name: str) -> None:
         raise MazeError(f"{name}: expected one maze, found {len(blocks)} with blank lines between; give each a file")
 
 
-def _between_posts(rows: list[str], step: int, name: str) -> list[str]:
-    """Returns a row for each row of posts and of rooms, and a column for each post and each room between two."""
-    width = len(rows[0].strip())
-    indent = len(rows[0]) - len(rows[0].lstrip())
-    if len(rows) % 2 == 0:
-        raise MazeError(f"{name}: expected rows of posts and of rooms in turns, found {len(rows)} rows")
-    columns = sorted({column for post in range(0, width, step) for column in (post, post + 1) if column < width})
+def _grid_of_rows(rows: list[str], name: str) -> OccupancyGrid:
+    """Returns the cells of rows of characters, which may draw walls between posts.
+
+    In a maze of posts, every second row has a post at each step, and rooms are blank or have a letter.
+    """
+    posts = _POSTS.fullmatch(rows[0].strip())
+    if posts is None or len(posts[2]) == 1:
+        return grid_of_characters(rows, name)
+    post, step = posts[1], len(posts[2]) + 1
+    indent, width = rows[0].index(post), len(posts[0])
     lines = [row[indent:].ljust(width) for row in rows]
-    posts = {lines[0][0], "-", "|"}
-    return ["".join("#" if line[column] in posts else " " for column in columns) for line in lines]
+    without = [number for number in range(0, len(lines), 2) if set(lines[number][:width:step]) != {post}]
+    if post == "+" and (without or set("".join(lines[1::2])) & set("#.")):
+        return grid_of_characters(rows, name)  # a plan with walls of lines and their corners
+    if without or len(rows) % 2 == 0:
+        found = f"none in row {without[0]}" if without else f"{len(rows)} rows"
+        raise MazeError(f"{name}: expected rows of posts and of rooms in turns, found {found}")
+
+    # A row for each row of posts and of rooms, and a column for each post and each room between two.
+    columns = sorted({column for start in range(0, width, step) for column in (start, start + 1) if column < width})
+    walls = {post, "-", "|"}
+    return grid_of_characters(["".join("#" if line[at] in walls else " " for at in columns) for line in lines], name)
