@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import importlib
+import os
 import pathlib
 import sys
 import traceback
 from importlib import metadata
 from typing import Any
 
+import numpy as np
+
 from mazebench.agent import Agent, SingleAgent, as_agent_class
-from mazebench.errors import InputError, shortened, unknown
+from mazebench.constants import DISCRETE, VELOCITIES
+from mazebench.errors import InputError, describe_error, unknown
+from mazebench.tasks.sensors import SENSORS
+from mazebench.tasks.task_options import HIDEABLE
 
 ENTRY_POINT_GROUP = "mazebench.agents"
+_DECLARED = {"plays_actions": (*DISCRETE, *VELOCITIES), "needs_sensors": tuple(SENSORS), "needs_shown": HIDEABLE}
 _IMPORTLIB = pathlib.Path(importlib.__file__).parent
 
 
@@ -41,20 +48,21 @@ def load_agent_class(name: str) -> type[Agent]:
         hint = "; expected module:Class, such as my_agent:MyAgent"
         if "/" in module or module.endswith(".py") or not (module and class_name):
             raise InputError(f"agent {name!r}{hint}")
-        if "" not in sys.path and "." not in sys.path:
-            sys.path.insert(0, "")
+        if not {"", ".", os.getcwd()} & set(sys.path):
+            sys.path.insert(0, os.getcwd())  # whole, as agents may change the working folder
         entry_point = metadata.EntryPoint(name, name, ENTRY_POINT_GROUP)
     elif name in entry_points:
         entry_point = entry_points[name]
     else:
         raise InputError(f"{unknown('agent', name, entry_points)}; one of your own is named as module:Class")
     try:
-        loaded = entry_point.load()
+        with np.errstate():  # what the module sets is undone
+            loaded = entry_point.load()
     except Exception as error:  # other people's modules may raise anything
         if isinstance(error, ModuleNotFoundError) and not hint:
             hint = "; the extra [agents] brings it (docs/start.md)"
-        found = shortened(f"{type(error).__name__}: {error}")
-        raise InputError(f"agent {name!r} can't be imported: {found}{source_line(error)}{hint}") from error
+        found = f"{describe_error(error)}{source_line(error)}"
+        raise InputError(f"agent {name!r} can't be imported: {found}{hint}") from error
     return checked_agent_class(name, loaded)
 
 
@@ -62,10 +70,18 @@ def checked_agent_class(name: str, loaded: Any) -> type[Agent]:
     """Returns `loaded` as an `Agent` class.
 
     Raises:
-      InputError: unless it is a subclass of `Agent` or `SingleAgent`.
+      InputError: unless it is a subclass of `Agent` or `SingleAgent` whose declarations can be met.
     """
     if not isinstance(loaded, type) or not issubclass(loaded, (Agent, SingleAgent)):
         raise InputError(f"agent {name!r}: expected a subclass of mazebench.Agent or SingleAgent, found {loaded!r}")
+    for flag in ("needs_truth", "learns"):
+        if not isinstance(found := getattr(loaded, flag), bool):
+            raise InputError(f"agent {name!r}: expected {flag} as True or False, found {found!r}"[:200])
+    for declared, known in _DECLARED.items():
+        found = getattr(loaded, declared)
+        are_known = isinstance(found, tuple) and all(item in known for item in found)
+        if not are_known or (declared == "plays_actions" and not found):
+            raise InputError(f"agent {name!r}: expected {declared} as a tuple of {', '.join(known)}, found {found!r}")
     return as_agent_class(loaded)  # type: ignore[arg-type]  # of mypy, which takes its objects' hash
 
 

@@ -80,6 +80,14 @@ def shortened(text: str, most: int = 300) -> str:
     return text if len(text) <= most else f"{text[:most]}... ({len(text) - most:,} more characters)"
 
 
+def describe_error(error: BaseException) -> str:
+    """Returns the kind and the text of an exception of other people's code, in one line."""
+    text = ""
+    with contextlib.suppress(Exception):  # of a class whose text can't be made
+        text = str(error)
+    return shortened(f"{type(error).__name__}: {text}").removesuffix(":")
+
+
 def unknown(kind: str, name: object, available: Iterable[object]) -> InputError:
     """Returns the error of an unknown name, which lists the known ones."""
     names = ", ".join(sorted(str(item) for item in available)) or "none"

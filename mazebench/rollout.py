@@ -77,6 +77,6 @@ def rollout(
 def agent_seed(run_seed: int, number: int) -> int:
     """Returns the seed of an agent's own draws in episode `number` of a run.
 
-    It reveals nothing of the episode, whose flips, warp and noise come from `Episode.seed`.
+    It is another seed than `Episode.seed`, of flips, warp and noise, but it gives back the number of the episode.
     """
     return int(np.random.SeedSequence([run_seed, number]).generate_state(1)[0])

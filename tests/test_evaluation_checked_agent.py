@@ -8,8 +8,10 @@ import sys
 import numpy as np
 import pytest
 from acting import inputs_of
+from run_folders import FILES, files_of, records_of
 
 from mazebench.agent import Agent
+from mazebench.errors import InputError
 from mazebench.evaluation.checked_agent import AgentError, CheckedAgent
 from mazebench.evaluation.evaluate import evaluate
 
@@ -19,6 +21,7 @@ def evaluate_at_hand(name, out, **running):
 
 
 AGENTS = """
+import os
 import numpy as np
 from mazebench.agent import Agent
 
@@ -38,7 +41,7 @@ class TooHigh(Good):
 
 class Divides(Good):
     def answer(self, batch_size):
-        return 1 // 0  # line 21
+        return 1 // 0  # line 22
 
 
 class NoSeed(Good):
@@ -53,10 +56,55 @@ class InLibrary(Good):
     def answer(self, batch_size):
         import json
 
-        return json.loads("{")  # line 36
+        return json.loads("{")  # line 37
 
 
 
+
+
+class Stops(Good):
+    def answer(self, batch_size):
+        return next(iter([]))
+
+
+class Exits(Good):
+    def answer(self, batch_size):
+        raise GeneratorExit
+
+
+class Mute(Good):
+    def answer(self, batch_size):
+        class Fault(Exception):
+            def __str__(self):
+                raise RuntimeError("no text")
+
+        raise Fault
+
+
+class Strict(Good):
+    def __init__(self):
+        np.seterr(all="raise")
+
+
+class Wanders(Good):
+    def answer(self, batch_size):
+        os.chdir("/")
+        return super().answer(batch_size)
+
+
+class Forks(Good):
+    def answer(self, batch_size):
+        if (child := os.fork()) == 0:
+            raise SystemExit
+        os.waitpid(child, 0)
+        return super().answer(batch_size)
+
+
+class ForksOn(Good):
+    def answer(self, batch_size):
+        if child := os.fork():
+            os.waitpid(child, 0)
+        return super().answer(batch_size)
 
 
 class Late(Good):
@@ -78,8 +126,11 @@ def _agents_at_hand(tmp_path, monkeypatch):
 
 BROKEN = [
     ("TooHigh", "expected actions from 0 to 5 from act(), found 6"),
-    ("Divides", "act() raised ZeroDivisionError: integer division or modulo by zero (contract_at_hand.py:21)"),
+    ("Divides", "act() raised ZeroDivisionError: integer division or modulo by zero (contract_at_hand.py:22)"),
     ("NoSeed", "build() raised TypeError: NoSeed.build() got an unexpected keyword argument 'seed'"),
+    ("Stops", "act() raised StopIteration (contract_at_hand.py:"),
+    ("Exits", "act() raised GeneratorExit (contract_at_hand.py:"),
+    ("Mute", "act() raised Fault (contract_at_hand.py:"),
     ("InLibrary", "act() raised JSONDecodeError: Expecting property name enclosed in double quotes"),
 ]
 
@@ -93,8 +144,32 @@ class TestEvaluation:
         assert "\n" not in str(caught.value)
 
     def test_where_a_library_raised_the_agents_line_is_named(self, tmp_path):
-        with pytest.raises(AgentError, match=r"\(contract_at_hand\.py:36\)$"):
+        with pytest.raises(AgentError, match=r"\(contract_at_hand\.py:37\)$"):
             evaluate_at_hand("InLibrary", tmp_path / "out")
+
+    @pytest.mark.parametrize("name", ["Strict", "Wanders", "Forks", "ForksOn"])
+    def test_what_an_agent_does_to_its_process_changes_no_result(self, tmp_path, monkeypatch, name):
+        monkeypatch.chdir(tmp_path)
+        evaluate_at_hand("Good", "good")
+        evaluate_at_hand(name, "out")
+        good, found = ([each | {"agent": ""} for each in records_of(tmp_path / out)] for out in ("good", "out"))
+        assert found == good
+        assert set(files_of(tmp_path / "out")) == FILES
+
+    @pytest.mark.parametrize(
+        ("declared", "value", "said"),
+        [
+            ("needs_truth", 1, "expected needs_truth as True or False, found 1"),
+            ("learns", "yes", "expected learns as True or False, found 'yes'"),
+            ("plays_actions", (), r"expected plays_actions as a tuple of six, .*, found \(\)"),
+            ("plays_actions", "velocity", "expected plays_actions as a tuple of six, .*, found 'velocity'"),
+            ("needs_sensors", "lidar", "expected needs_sensors as a tuple of .*, lidar, found 'lidar'"),
+            ("needs_shown", ("walls",), r"expected needs_shown as a tuple of map, goal, found \('walls',\)"),
+        ],
+    )
+    def test_a_declaration_that_can_not_be_met_is_refused_before_a_step(self, declared, value, said):
+        with pytest.raises(InputError, match=f"{said}$"):
+            evaluate(type("Declares", (Agent,), {declared: value}))
 
     def test_a_folder_without_episodes_can_be_used_again(self, tmp_path):
         with pytest.raises(AgentError):

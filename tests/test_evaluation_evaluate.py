@@ -286,7 +286,7 @@ class TestRefused:
         module.write_text(f"{IMPORTS}class Mine(SingleAgent):\n    def act(self, observation):\n        return 0\n")
         evaluate("changing_at_hand:Mine", out=tmp_path / "out", **FEW)
         module.write_text(module.read_text().replace("return 0", "return 1"))
-        with pytest.raises(InputError, match=r"out: holds another run: its agent's file was changed since"):
+        with pytest.raises(InputError, match=r"out: holds another run: its agent's code was changed since"):
             evaluate("changing_at_hand:Mine", out=tmp_path / "out", resume=True, **FEW)
 
     @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import struct
+import zipfile
 
 import pytest
 from run_folders import FEW, IMPORTS, summary_of
@@ -55,15 +56,40 @@ def test_a_checkpoint_is_named_by_its_hash_and_tells_its_config(tmp_path):
     assert make_plan(eval_options("mah")).provenance.model_dump()["checkpoint"] == "mah-13.safetensors"
 
 
-def test_an_agent_at_hand_is_named_by_the_hash_of_its_file(tmp_path, monkeypatch):
-    code = f"{IMPORTS}class Mine(SingleAgent):\n    def act(self, observation):\n        return 0\n"
-    (tmp_path / "provenance_at_hand.py").write_text(code)
+def test_an_agent_at_hand_is_named_by_all_modules_that_it_imports_from_its_folder(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "folder_at_hand").mkdir()
+    agent = f"""{IMPORTS}import features_at_hand
+class Mine(SingleAgent):
+    @classmethod
+    def build(cls, interface, **given):
+        import folder_at_hand.late
+        return cls()
+
+    def act(self, observation):
+        return 0
+"""
+    files = {"provenance_at_hand.py": agent, "features_at_hand.py": "", "folder_at_hand/late.py": "", "unused.py": ""}
+    for name, code in files.items():
+        (tmp_path / name).write_text(code)
     name = "provenance_at_hand:Mine"
-    options = eval_options(name)
-    found = make_plan(options).provenance.model_dump()
-    assert found["agent_code_sha256"] == hashlib.sha256(code.encode()).hexdigest()
-    assert (found["agent_class"], found["agent_package"]) == (name, None)
+    found = make_plan(eval_options(name)).provenance
+    assert (found.agent_class, found.agent_package) == (name, None)
+    for changed in files:
+        (tmp_path / changed).write_text(files[changed] + "# changed")
+        is_other = make_plan(eval_options(name)).provenance.agent_code_sha256 != found.agent_code_sha256
+        assert is_other == (changed != "unused.py")
+        (tmp_path / changed).write_text(files[changed])
+
+
+def test_an_agent_in_an_archive_is_evaluated_and_has_no_hash(tmp_path, monkeypatch, remarks):
+    code = f"{IMPORTS}class Mine(SingleAgent):\n    def act(self, observation):\n        return 0\n"
+    with zipfile.ZipFile(tmp_path / "agents.zip", "w") as archive:
+        archive.writestr("zipped_at_hand.py", code)
+    monkeypatch.syspath_prepend(tmp_path / "agents.zip")
+    summary = evaluate("zipped_at_hand:Mine", distances=(1,), episodes_per_distance=1)
+    assert summary.provenance.agent_code_sha256 is None
+    assert "zipped_at_hand:Mine: its code is in no file" in remarks()[0]
 
 
 def test_an_installed_agent_is_named_by_all_python_files_of_its_package(tmp_path, monkeypatch):

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import json
 import pathlib
 import resource
 import shutil
 from collections.abc import Iterator
+from typing import Any
 
 import hypothesis
 import numpy as np
 import pytest
 from hypothesis import strategies
-from run_folders import FEW, files_of, results_of
+from run_folders import FEW, Killed, files_of, results_of
 
 from mazebench.errors import InputError, RunError
 from mazebench.evaluation.chunk import Chunk, Result, run_chunk
@@ -22,6 +25,9 @@ from mazebench.evaluation.plan import Plan, make_plan
 from mazebench.evaluation.store import Store
 from mazebench.results.reading import load_result
 from mazebench.results.records import Summary
+
+NAMES = strategies.sampled_from(["record", "trajectory", "episode", "agent"]) | strategies.text(max_size=3)
+JSON = strategies.none() | strategies.booleans() | strategies.integers() | strategies.floats(-1, 1) | strategies.text()
 
 
 @pytest.fixture(scope="module")
@@ -110,6 +116,73 @@ def test_of_two_processes_that_begin_a_run_the_second_is_refused(plan, episodes,
         with pytest.raises(InputError, match=r"holds a run already; go on with --resume or name another folder$"):
             Store(tmp_path, plan, resume=False, record=False)
         first.append(episodes[:1])
+
+
+def edited(line: str, path: str, value: Any) -> str:
+    """A line of the journal with another value at a path of keys."""
+    content = json.loads(line)
+    *keys, last = path.split(".")
+    functools.reduce(lambda inner, key: inner[key], keys, content)[last] = value
+    return json.dumps(content)
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda line: "5", "expected another line 2, found "),
+        (lambda line: "{}", "expected another line 2, found record: Field required"),
+        (lambda line: edited(line, "trajectory", [[[1.0]], None]), "expected another line 2, found trajectory"),
+        (lambda line: edited(line, "trajectory", [[[1, 2, 3]], None]), "found a trajectory of another length"),
+        (lambda line: edited(line, "record.agent", "other"), "found 'other' as agent of episode 0"),
+        (lambda line: edited(line, "record.maze", "other"), "found 'other' as maze of episode 0"),
+        (lambda line: edited(line, "record.episode", 1), "as (maze|start|goal|seed|distance) of episode 1"),
+        (lambda line: edited(line, "record.episode", 99), "found one of 99"),
+        (lambda line: edited(line, "record.seed", 5), "found '5' as seed of episode 0"),
+        (lambda line: edited(line, "record.spl", 0.5), "found '0.5' as spl of episode 0"),
+    ],
+)
+def test_a_record_of_another_run_is_refused(plan, episodes, tmp_path, edit, message):
+    with Store(tmp_path, plan, resume=False, record=True) as store:
+        store.append(episodes[:1])
+    journal = tmp_path / "journal.jsonl"
+    journal.write_text("\n" + edit(journal.read_text().strip()) + "\n")
+    with pytest.raises(InputError, match=rf"journal\.jsonl: .*{message}"):
+        Store(tmp_path, plan, resume=True, record=True)
+
+
+@hypothesis.given(
+    strategies.recursive(JSON, lambda inner: strategies.lists(inner) | strategies.dictionaries(NAMES, inner))
+)
+def test_any_other_line_is_refused(plan, tmp_path_factory, line):
+    folder = tmp_path_factory.getbasetemp() / "lines"
+    shutil.rmtree(folder, ignore_errors=True)
+    with Store(folder, plan, resume=False, record=False):
+        pass
+    (folder / "journal.jsonl").write_text(json.dumps(line) + "\n")
+    with pytest.raises(InputError, match="expected another line 1"):
+        Store(folder, plan, resume=True, record=False)
+
+
+def test_records_without_the_config_of_their_run_are_refused(plan, episodes, tmp_path):
+    with Store(tmp_path, plan, resume=False, record=False) as store:
+        store.append([episodes[0]._replace(kept=())])
+    (tmp_path / "config.json").unlink()
+    with pytest.raises(InputError, match=r"expected config\.json of the run in journal\.jsonl, found none"):
+        Store(tmp_path, plan, resume=True, record=False)
+
+
+def test_a_run_that_is_stopped_before_its_first_episode_ends_keeps_its_config(plan, tmp_path):
+    with contextlib.suppress(Killed), Store(tmp_path, plan, resume=False, record=False):
+        raise Killed
+    assert (tmp_path / "config.json").exists()
+
+
+def test_what_is_gone_is_not_said_to_be_kept(plan, episodes, tmp_path):
+    with Store(tmp_path / "run", plan, resume=False, record=False) as store:
+        store.append([each._replace(kept=()) for each in episodes])
+        shutil.rmtree(tmp_path / "run")
+        with pytest.raises(RunError, match=r"No such file or directory; its journal is gone$"):
+            store.finish(store.records, None)
 
 
 def test_a_config_that_is_none_is_refused(plan, tmp_path):

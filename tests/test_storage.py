@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import os
 
 import numpy as np
+import pydantic
 import pytest
 
 from mazebench.errors import InputError
+from mazebench.maps.readers.arrays import read_array_file
 from mazebench.storage.array_files import read_arrays
 from mazebench.storage.files import open_whole, read_at_most
 from mazebench.storage.json_files import read_json, read_lines, to_line, write_json
+
+
+class Line(pydantic.BaseModel):
+    episode: int
 
 
 def test_a_file_is_read_up_to_its_limit(tmp_path):
@@ -20,6 +27,34 @@ def test_a_file_is_read_up_to_its_limit(tmp_path):
         read_at_most(tmp_path / "x", 4, "thing")
     with pytest.raises(InputError, match="can't read the thing: Is a directory"):
         read_at_most(tmp_path, 5, "thing")
+
+
+def test_a_pipe_is_no_file(tmp_path):
+    os.mkfifo(tmp_path / "x")
+    for path, found in ((tmp_path / "x", "found a pipe or a device"), ("/dev/zero", "found a pipe"), ("a\0b", "null")):
+        with pytest.raises(InputError, match=found):
+            read_at_most(path, 5, "thing")
+
+
+def test_a_link_in_the_place_of_a_new_file_is_not_followed(tmp_path):
+    (tmp_path / "other").write_text("kept")
+    (tmp_path / "x.json.tmp").symlink_to(tmp_path / "other")
+    write_json(tmp_path / "x.json", [1])
+    assert (tmp_path / "other").read_text() == "kept"
+    assert not (tmp_path / "x.json").is_symlink()
+
+
+def test_an_archive_is_bounded_by_what_it_unpacks_to(tmp_path):
+    np.savez_compressed(tmp_path / "x.npz", a=np.zeros(2**28, np.uint8))
+    assert (tmp_path / "x.npz").stat().st_size < 2**20
+    with pytest.raises(InputError, match="expected at most 134217728 bytes when unpacked, found 2684"):
+        read_array_file(tmp_path / "x.npz")
+
+
+def test_values_that_are_nested_too_deeply_are_named(tmp_path):
+    (tmp_path / "x.json").write_text("[" * 100_000)
+    with pytest.raises(InputError, match="expected JSON, found values that are nested too deeply"):
+        read_json(tmp_path / "x.json")
 
 
 def test_the_file_from_before_is_kept_when_writing_fails(tmp_path):
@@ -36,8 +71,11 @@ def test_a_line_that_is_not_whole_is_passed_over(tmp_path):
     path = tmp_path / "x.jsonl"
     whole = [{"episode": number} for number in range(3)]
     path.write_text("\n" + "".join(map(to_line, whole)) + '{"epis')
-    assert read_lines(path) == whole
-    assert read_lines(tmp_path / "none.jsonl") == []
+    assert [line.model_dump() for line in read_lines(path, Line)] == whole
+    assert read_lines(tmp_path / "none.jsonl", Line) == []
+    path.write_text('{"episode": 1}\n[]\n')
+    with pytest.raises(InputError, match=r"x\.jsonl: expected another line 2, found "):
+        read_lines(path, Line)
 
 
 def test_arrays_come_back_and_nothing_is_unpickled(tmp_path):

@@ -12,7 +12,9 @@ import safetensors.torch
 import torch
 
 from mazebench.errors import InputError, shortened
+from mazebench.maps.file_kinds import kind_of, way_out
 from mazebench.storage.files import open_whole, read_at_most
+from mazebench.storage.json_files import parse_json
 
 from .config_values import Config, override
 
@@ -41,11 +43,12 @@ def load_checkpoint(path: pathlib.Path, agent: str) -> tuple[dict[str, torch.Ten
     try:
         tensors = safetensors.torch.load(content)
         # The header is JSON, after eight bytes with its length.
-        header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])
-        metadata = json.loads(header["__metadata__"][FORMAT])
+        header = parse_json(content[8 : 8 + int.from_bytes(content[:8], "little")])
+        metadata = parse_json(header["__metadata__"][FORMAT])
     except (safetensors.SafetensorError, ValueError, KeyError) as error:
-        fault = str(error)[:120]
-        raise InputError(f"{path}: expected a checkpoint of {FORMAT}, found a damaged one: {fault}") from error
+        kind = kind_of(content)
+        found = f"a damaged one: {str(error)[:120]}" if kind is None else f"{kind}{way_out(kind)}"
+        raise InputError(f"{path}: expected a checkpoint of {FORMAT}, found {found}") from error
     name = metadata.get("agent") if isinstance(metadata, dict) else metadata
     if not isinstance(metadata, dict) or name != agent:
         raise InputError(f"{path}: expected a checkpoint of agent {agent!r}, found one of {str(name)[:80]!r}")

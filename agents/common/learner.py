@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from mazebench.errors import InputError
 from mazebench.storage.json_files import read_json
 from mazebench.tasks.task import Task
 from mazebench.training.experience import Experience
@@ -54,7 +55,12 @@ class NetworkLearner:
         self.actor.load(folder / AGENT_FILE)
         tensors, _ = load_checkpoint(folder / _TRAINING_FILE, self.actor.name)
         self.descent.load(tensors)
-        self.rng.bit_generator.state = read_json(folder / _RANDOM_FILE)
+        path = folder / _RANDOM_FILE
+        state = read_json(path)
+        try:
+            self.rng.bit_generator.state = state
+        except (TypeError, ValueError, KeyError, OverflowError) as error:
+            raise InputError(f"{path}: expected the state of a random generator, found {error!r}"[:200]) from error
 
 
 class HindsightLearner(NetworkLearner):

@@ -21,9 +21,8 @@ from mazebench.results.metrics import scores
 from mazebench.results.reading import CONFIG, EPISODES, SUITE, SUMMARY, Result, load_result
 from mazebench.results.records import column
 from mazebench.storage.files import make_folder, open_whole
-from mazebench.storage.json_files import read_lines
 from mazebench.tasks.tracks import LEVELS
-from mazebench.training.run_folder import METRICS, checkpoints
+from mazebench.training.run_folder import METRICS, checkpoints, read_metrics
 
 PAPER = "paper"  # the suite
 LOCAL = "local-13"  # the part of `paper` on which training runs are evaluated
@@ -96,7 +95,7 @@ def read_kept(folder: pathlib.Path) -> Kept:
             with tarfile.open(path) as archive:
                 archive.extractall(unpacked / path.relative_to(folder).parent, filter="data")
         for log in sorted((unpacked / _TRAINING).rglob(METRICS)):
-            training.setdefault(log.relative_to(unpacked).parts[1], []).append(pd.DataFrame(read_lines(log)))
+            training.setdefault(log.relative_to(unpacked).parts[1], []).append(pd.DataFrame(read_metrics(log.parent)))
         results = [load_result(path.parent) for path in sorted(unpacked.rglob(SUMMARY))]
         of_paper = {each.folder: each for each in results if each.summary.suite == PAPER}
         paper = join_episodes(read_results(list(of_paper), of_paper.__getitem__))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+import os
 from typing import Any
 
 import numpy as np
@@ -11,26 +10,38 @@ import numpy as np
 from mazebench.agent import Agent, Inputs
 from mazebench.agent_loading import source_line
 from mazebench.constants import DISCRETE, VELOCITIES
-from mazebench.errors import InputError, RunError, shortened
+from mazebench.errors import InputError, RunError, describe_error
+from mazebench.stopping import Stopped
 
 
 class AgentError(RunError):
     """An agent raised an exception or broke its contract."""
 
 
-@contextmanager
-def calling(name: str, method: str) -> Iterator[None]:
+class calling:
     """Turns an exception of the agent `name` in `method` into an `AgentError` that names the line.
 
-    An `InputError`, which an agent raises for a checkpoint that it can't use, stays as it is.
+    An `InputError`, which an agent raises for a checkpoint that it can't use, stays as it is. What NumPy does with
+    floating-point errors is the harness's own again when the agent returns, and a process that the agent forked ends
+    there.
     """
-    try:
-        yield
-    except (InputError, RunError):
-        raise
-    except (Exception, SystemExit) as error:  # other people's code may raise anything
-        found = shortened(f"{type(error).__name__}: {error}").removesuffix(":")
-        raise AgentError(f"agent {name!r}: {method}() raised {found}{source_line(error)}") from error
+
+    def __init__(self, name: str, method: str):
+        """Names the agent and its method."""
+        self._name, self._method = name, method
+
+    def __enter__(self) -> None:
+        self._process, self._errstate = os.getpid(), np.errstate()
+        self._errstate.__enter__()
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        self._errstate.__exit__(None, None, None)
+        if os.getpid() != self._process:
+            os._exit(kind is not None)  # the run is its parent's
+        if error is None or isinstance(error, (InputError, RunError, Stopped, KeyboardInterrupt)):
+            return
+        found = describe_error(error)  # other people's code may raise anything
+        raise AgentError(f"agent {self._name!r}: {self._method}() raised {found}{source_line(error)}") from error
 
 
 def context_size_of(name: str, agent_class: type[Agent], size: int) -> int:

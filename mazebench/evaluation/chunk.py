@@ -91,17 +91,24 @@ def run_chunk(chunk: Chunk) -> Iterator[list[Result]]:
         yield [result._replace(kept=np.array(result.kept)) for result in results] if chunk.record else results
 
 
-def run_whole_chunk(chunk: Chunk) -> list[Result]:
-    """Returns the results of all episodes of a chunk.
+def run_whole_chunk(
+    chunk: Chunk, is_stopped: Callable[[], bool] = lambda: False
+) -> tuple[list[Result], InputError | RunError | None]:
+    """Returns the results of the episodes of a chunk, and what ended it before all of them had ended.
 
-    Raises:
-      InputError, RunError: of the plain kinds, since what caused them need not survive the way to another process.
+    Errors are of the plain kinds, since what caused them need not survive the way to another process. A chunk that is
+    stopped ends without one after the step that runs.
     """
+    ended: list[Result] = []
     try:
-        return [result for results in run_chunk(chunk) for result in results]
+        for results in run_chunk(chunk):
+            ended += results
+            if is_stopped():
+                break
     except (InputError, RunError) as error:
         kinds = (UnplayableError, InputError, AgentError, RunError)
-        raise next(kind for kind in kinds if isinstance(error, kind))(str(error)) from None
+        return ended, next(kind for kind in kinds if isinstance(error, kind))(str(error))
+    return ended, None
 
 
 def run_trials(

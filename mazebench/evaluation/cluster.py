@@ -60,14 +60,17 @@ class Cluster:
                 running.append(task.remote(waiting.pop(0)))
             ended, running = ray.wait(running, num_returns=1, timeout=PATIENCE)
             try:
-                yield [result for chunk in ray.get(ended) for result in chunk]
+                found = ray.get(ended)
             except ray.exceptions.RayTaskError as error:
-                cause = error.cause
-                if isinstance(cause, (InputError, RunError)):
-                    raise cause from error
-                raise RunError(f"a Ray task failed: {_first_line(cause)}") from error
+                raise RunError(f"a Ray task failed: {_first_line(error.cause)}") from error
             except ray.exceptions.RayError as error:
                 raise RunError(f"a Ray task was lost: {_first_line(error)}; go on with --resume") from error
+            for results, error in found:
+                yield results
+                if error is not None:
+                    raise error
+            if not found:
+                yield []
 
     def __enter__(self) -> Cluster:
         return self

@@ -92,8 +92,13 @@ def run_evaluation(
     plan = make_plan(options, agent_class)
     if plan.remark:
         remark(plan.remark)
+    if plan.provenance.agent_code_sha256 is None:
+        remark(
+            f"{options.agent}: its code is in no file, so it has no hash, and --resume does not notice a change of it"
+        )
     with open_pool(run) as pool, tempfile.TemporaryDirectory() as temporary:
-        return run_plan(plan, pathlib.Path(temporary if out is None else out), pool, run, progress)
+        folder = pathlib.Path(temporary if out is None else out).absolute()  # agents may change the working folder
+        return run_plan(plan, folder, pool, run, progress)
 
 
 def run_plan(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import hashlib
@@ -140,6 +141,9 @@ def make_plan(
     agent_class = agent_class or load_agent_class(options.agent)
     task = task_as_played(options.agent, agent_class, options.task, resolver)
     options = _with_checkpoint(options, agent_class)
+    if ":" in options.agent:  # modules that it imports when it is built are part of its code
+        with contextlib.suppress(InputError, RunError):  # which it raises again when it is run
+            build_agent(options, task, agent_class)
     if trials is None:
         trials = select_trials(task, options.episodes_per_distance, options.seed)
     origin = provenance(options, task, agent_class)
@@ -154,6 +158,8 @@ def make_plan(
         "mujoco": origin.packages.get("mujoco"),
         "world_sha256": hashlib.sha256(world.to_xml().encode("utf-8")).hexdigest(),
     }
+    if options.checkpoint is not None:  # agents may change the working folder
+        options = dataclasses.replace(options, checkpoint=str(pathlib.Path(options.checkpoint).absolute()))
     return Plan(options, task, agent_class, tuple(trials), identity, provenance=origin)
 
 

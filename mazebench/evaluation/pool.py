@@ -7,15 +7,20 @@ import concurrent.futures.process
 import contextlib
 import multiprocessing
 import multiprocessing.resource_tracker
+import multiprocessing.synchronize
 import os
 import signal
 import threading
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
-from mazebench.errors import RunError
+from mazebench import stopping
+from mazebench.errors import InputError, RunError
 from mazebench.evaluation.chunk import PATIENCE, Chunk, Result, run_chunk, run_whole_chunk
 from mazebench.evaluation.eval_options import RunOptions
+
+_NO_GUARD = 86  # exit status of a worker whose script starts workers again
+_LONGEST_STEP = 10.0  # seconds that a step may take until workers are ended that were asked to stop
 
 
 class Pool(Protocol):
@@ -64,9 +69,15 @@ class _Processes:
 
     def __init__(self, workers: int):
         self.num_workers = workers
+        # A worker first runs the script that started it, which must not start workers of its own.
+        if getattr(multiprocessing.current_process(), "_inheriting", False):
+            os._exit(_NO_GUARD)
         # Not forked: threads of the simulation may be running in this process.
         context = multiprocessing.get_context("spawn")
-        self._executor = concurrent.futures.ProcessPoolExecutor(workers, context, initializer=_begin_worker)
+        self._stop = context.Event()
+        self._executor = concurrent.futures.ProcessPoolExecutor(
+            workers, context, initializer=_begin_worker, initargs=(self._stop,)
+        )
         self._processes: set[multiprocessing.process.BaseProcess] = set()
 
     def run(self, chunks: Sequence[Chunk]) -> Iterator[list[Result]]:
@@ -76,7 +87,7 @@ class _Processes:
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         before = set(multiprocessing.active_children())
         try:
-            waiting = {self._executor.submit(run_whole_chunk, chunk) for chunk in chunks}
+            waiting = {self._executor.submit(_run_until_stopped, chunk) for chunk in chunks}
         except OSError as error:
             raise RunError(f"can't start {self.num_workers} worker processes: {error.strerror}") from error
         finally:
@@ -84,12 +95,33 @@ class _Processes:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         while waiting:
             ended, waiting = concurrent.futures.wait(waiting, PATIENCE, concurrent.futures.FIRST_COMPLETED)
-            try:
-                for future in ended:
-                    yield future.result()
-                yield []
-            except concurrent.futures.process.BrokenProcessPool as error:
-                raise RunError("a worker process ended abruptly; go on with --resume") from error
+            if stopping.is_asked():  # chunks that run end after their step
+                self._stop.set()
+                running = {future for future in waiting if not future.cancel()}
+                ended |= concurrent.futures.wait(running, _LONGEST_STEP).done
+            results: list[Result] = []
+            fault: InputError | RunError | None = None
+            for future in ended:
+                try:
+                    of_chunk, error = future.result()
+                    results += of_chunk
+                except concurrent.futures.process.BrokenProcessPool:
+                    error = self._broken()
+                fault = fault or error
+            yield results
+            if fault is not None:
+                raise fault
+
+    def _broken(self) -> InputError | RunError:
+        """Returns the error of workers that ended abruptly."""
+        for process in self._processes:
+            process.join(PATIENCE)
+        if any(process.exitcode == _NO_GUARD for process in self._processes):
+            return InputError(
+                "expected the call with workers under `if __name__ == '__main__':`, since each worker runs the script "
+                "first; found none"
+            )
+        return RunError("a worker process ended abruptly; what ended is kept, go on with --resume")
 
     def __enter__(self) -> _Processes:
         return self
@@ -101,8 +133,17 @@ class _Processes:
         self._executor.shutdown(cancel_futures=True)
 
 
-def _begin_worker() -> None:
+_stop: multiprocessing.synchronize.Event  # of a worker's parent
+
+
+def _run_until_stopped(chunk: Chunk) -> tuple[list[Result], InputError | RunError | None]:
+    return run_whole_chunk(chunk, _stop.is_set)
+
+
+def _begin_worker(stop: multiprocessing.synchronize.Event) -> None:
     """Leaves this worker one core, and makes it end with its parent."""
+    global _stop
+    _stop = stop
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # PyTorch reads it when it is imported, our kernels when they run
 
     def end_with_parent() -> None:

@@ -11,24 +11,27 @@ import pathlib
 import platform
 import struct
 import sys
+from collections.abc import Sequence
 from importlib import metadata
 from typing import Any
 
 from mazebench.agent import Agent
 from mazebench.agent_loading import package_of
 from mazebench.constants import TASK_VERSION
-from mazebench.errors import InputError
+from mazebench.errors import InputError, one_line
 from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.maps.benchmark import manifest_hash
 from mazebench.results.played import mazes_hash
 from mazebench.results.records import Provenance
 from mazebench.storage.files import open_file
+from mazebench.storage.json_files import parse_json
 from mazebench.tasks.task import Task
 
 _PACKAGES = (
     *("mazebench-mujoco", "mujoco", "dm-control", "dm-env", "gymnasium", "numpy", "scipy"),
     *("opencv-python-headless", "torch", "ray"),
 )
+_OTHERS = {"__main__", "mazebench", "mazebench_agents"}  # of the modules next to an agent's file: no part of it
 # Of a checkpoint. What they hold must leave a summary that can be read again, where it takes up to ten times the bytes.
 _MAX_HEADER_BYTES = 2**18
 
@@ -54,7 +57,7 @@ def provenance(options: EvalOptions, task: Task, agent_class: type[Agent]) -> Pr
         "agent_code_sha256": code_hash(options.agent, agent_class),
         "seed": options.seed,
         "episodes_per_distance": options.episodes_per_distance,
-        "command": [pathlib.Path(sys.argv[0]).name, *sys.argv[1:]],
+        "command": [one_line(word) for word in (pathlib.Path(sys.argv[0]).name, *sys.argv[1:])],
         "python": platform.python_version(),
         "packages": {name: _version(name) for name in _PACKAGES},
         "machine": {
@@ -69,29 +72,49 @@ def provenance(options: EvalOptions, task: Task, agent_class: type[Agent]) -> Pr
 
 
 def code_hash(agent: str, agent_class: type[Agent]) -> str | None:
-    """Returns the SHA-256 of an agent's code, which may be edited before a run is resumed.
+    """Returns the SHA-256 of the names and contents of an agent's Python files, which may be edited before a resume.
 
-    It is that of the file of a `module:Class`, and that of all Python files of the package of an installed agent. None
-    for classes of no file, as in a notebook.
+    Of an installed agent, they are all files of its package. Of a `module:Class`, they are the files of those modules
+    that are loaded from its package or, of a single file, from the folder that it lies in and those below. None for a
+    class in no file, as of a notebook or an archive.
     """
     try:
-        file = inspect.getfile(agent_class)
+        file = pathlib.Path(inspect.getfile(agent_class)).absolute()
     except (TypeError, OSError):
         return None
-    package = sys.modules[agent_class.__module__.partition(".")[0]]
-    if ":" in agent or not hasattr(package, "__path__"):
-        return file_hash(file)
-    return _package_hash(tuple(package.__path__))
+    if not file.is_file():
+        return None
+    name = agent_class.__module__.partition(".")[0]
+    folders = tuple(map(pathlib.Path, getattr(sys.modules[name], "__path__", ())))
+    if folders and ":" not in agent:
+        return _package_hash(folders)
+
+    # The loaded files of the package, or those next to a single file that are no installed ones.
+    loaded = {
+        pathlib.Path(path).absolute(): each.partition(".")[0]
+        for each, module in list(sys.modules.items())
+        if (path := getattr(module, "__file__", None)) and path.endswith(".py")
+    }
+    if folders:
+        files = {path for path, package in loaded.items() if package == name}
+    else:
+        beside = {path for path, package in loaded.items() if file.parent in path.parents and package not in _OTHERS}
+        files = {path for path in beside if "site-packages" not in path.parts}
+    files = {path for path in files if path.is_file()} | {file}
+    return _files_hash(sorted(files), folders[0].absolute() if folders else file.parent)
 
 
 @functools.cache
-def _package_hash(folders: tuple[str, ...]) -> str:
-    """Returns the SHA-256 of the names and contents of all Python files below some folders."""
+def _package_hash(folders: tuple[pathlib.Path, ...]) -> str:
+    return _files_hash([path for folder in folders for path in sorted(folder.rglob("*.py"))], folders[0])
+
+
+def _files_hash(files: Sequence[pathlib.Path], folder: pathlib.Path) -> str:
+    """Returns the SHA-256 of the names in a folder and the contents of files."""
     digest = hashlib.sha256()
-    for folder in map(pathlib.Path, folders):
-        for path in sorted(folder.rglob("*.py")):
-            content = path.read_bytes()
-            digest.update(f"{path.relative_to(folder).as_posix()} {len(content)}\n".encode() + content)
+    for path in files:
+        content = path.read_bytes()
+        digest.update(f"{os.path.relpath(path, folder)} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 
@@ -118,7 +141,7 @@ def checkpoint_metadata(path: str | None) -> dict[str, Any] | None:
         length = struct.unpack("<Q", start)[0] if len(start) == 8 else 0
         header = file.read(length) if length <= _MAX_HEADER_BYTES else b""
     try:
-        found = {key: json.loads(text) for key, text in json.loads(header)["__metadata__"].items()}
+        found = {key: parse_json(text) for key, text in parse_json(header)["__metadata__"].items()}
         json.dumps(found, allow_nan=False)  # as a summary will hold it
         return found
     except (ValueError, KeyError, TypeError, AttributeError):

@@ -14,8 +14,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pydantic
 
 from mazebench.errors import InputError, RunError
+from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.chunk import Result, to_record, to_trajectory
 from mazebench.evaluation.plan import Plan
 from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, SUMMARY
@@ -42,9 +44,15 @@ def check_same_run(folder: pathlib.Path, identity: Mapping[str, Any]) -> None:
         if found == value:
             continue
         if key == "agent_code_sha256" and found and value:
-            what = "file" if ":" in identity["agent"] else "package"
-            raise InputError(f"{folder}: holds another run: its agent's {what} was changed since; name another folder")
+            raise InputError(f"{folder}: holds another run: its agent's code was changed since; name another folder")
         raise InputError(f"{folder}: holds another run: its {key} is {str(found)[:200]}, this one's {value}")
+
+
+class _Line(pydantic.BaseModel):
+    """A line of the journal."""
+
+    record: Record
+    trajectory: list[list[tuple[float, float, float]] | None]  # as `Trajectory`; empty if none is kept
 
 
 class Store:
@@ -69,7 +77,10 @@ class Store:
         elif found - {JOURNAL}:
             raise InputError(f"{folder}: expected an empty folder or one of a run, found {min(found)!r} in it")
         # A line that a kill cut short is passed over: its episode is run again.
-        ended = [_from_line(line) for line in read_lines(folder / JOURNAL)]
+        lines = read_lines(folder / JOURNAL, _Line)
+        if self._is_new and lines:
+            raise InputError(f"{folder}: expected {CONFIG} of the run in {JOURNAL}, found none; name another folder")
+        ended = [self._checked(line) for line in lines]
         self.record = record or any(trajectory for _, trajectory in ended)
         self._ended = {each.episode: (each, trajectory) for each, trajectory in ended if trajectory or not self.record}
         with writing_to(folder):
@@ -93,6 +104,25 @@ class Store:
     def records(self) -> list[Record]:
         """The records of the episodes that have ended, in protocol order."""
         return [self._ended[index][0] for index in sorted(self._ended)]
+
+    def _checked(self, line: _Line) -> tuple[Record, Trajectory | None]:
+        """Returns what a line of the journal holds.
+
+        Raises:
+          InputError: if it is of no episode of the plan, or was not written of one.
+        """
+        record, where = line.record, f"{self.folder / JOURNAL}: expected records of the run's episodes"
+        number, blocked = record.episode, (record.model_extra or {}).get("blocked") is True
+        if number >= len(self._plan.trials):
+            raise InputError(f"{where}, found one of {number}")
+        result = Result(number, record.success, record.steps, record.path_length, blocked, ())
+        written, found = to_record(self._plan, result).model_dump(), record.model_dump()
+        if other := [name for name in written if found.get(name) != written[name]]:
+            raise InputError(f"{where}, found {str(found.get(other[0]))[:80]!r} as {other[0]} of episode {number}")
+        poses = [None if each is None else np.array(each, dtype=np.float32) for each in line.trajectory]
+        if not all(each is None or each.shape == (record.steps + 1, 3) for each in poses) or len(poses) not in (0, 2):
+            raise InputError(f"{where}, found a trajectory of another length of episode {number}")
+        return record, Trajectory(*poses) if poses else None  # type: ignore[arg-type]  # the true poses are there
 
     def append(self, results: Sequence[Result]) -> None:
         """Adds episodes that ended.
@@ -122,27 +152,22 @@ class Store:
         try:
             yield
         except OSError as error:
-            raise RunError(
-                f"{self.folder}: can't write there: {error.strerror}; what was written is kept, go on with --resume"
-            ) from error
+            is_kept = (self.folder / JOURNAL).exists()
+            kept = "what was written is kept, go on with --resume" if is_kept else "its journal is gone"
+            raise RunError(f"{self.folder}: can't write there: {error.strerror}; {kept}") from error
 
     def __enter__(self) -> Store:
         return self
 
-    def __exit__(self, *exception: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
         with contextlib.suppress(OSError):  # of a line that could not be written, which was reported
             self._journal.close()
-        if self._is_new and not self._ended:  # such as a run that the agent can't play
+        # A run that the agent can't play leaves nothing; one that was stopped keeps its config.
+        if self._is_new and not self._ended and kind is not None and issubclass(kind, InputError | AgentError):
             with contextlib.suppress(OSError):
                 for name in (JOURNAL, CONFIG):
                     (self.folder / name).unlink(missing_ok=True)
                 self.folder.rmdir()
-
-
-def _from_line(line: dict[str, Any]) -> tuple[Record, Trajectory | None]:
-    record = Record.model_validate_json(json.dumps(line["record"]))  # lists are tuples in JSON only
-    poses = [None if each is None else np.array(each, dtype=np.float32) for each in line["trajectory"]]
-    return record, Trajectory(*poses) if poses else None  # type: ignore[arg-type]  # the true poses are there
 
 
 def _to_line(record: Record, trajectory: Trajectory | None) -> str:

@@ -113,6 +113,7 @@ def run_suite(
     """
     if suite not in SUITES:
         raise unknown("suite", suite, SUITES)
+    out = out.absolute()  # agents may change the working folder
     if checkpoint is not None and len(agents) > 1:
         raise InputError(f"expected one agent with --checkpoint, found {len(agents)}")
     plans = {

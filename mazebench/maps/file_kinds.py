@@ -5,6 +5,8 @@ from __future__ import annotations
 _PICTURE = "convert it to PNG"
 _DRAWING = "export it as PNG and give its scale by --pixel-size"
 _READ = "text, pictures such as PNG, arrays (.npy) and ROS maps (.yaml) are read"
+_ITSELF = "download the file itself"
+_TENSORS = "save its tensors as safetensors or its array as .npy"
 _PICTURES = (
     b"\x89PNG",
     b"\xff\xd8\xff",
@@ -25,6 +27,9 @@ _KINDS = {
     b"%PDF": ("a PDF", _DRAWING),
     b"<svg": ("an SVG drawing", _DRAWING),
     b"AC10": ("a DWG drawing", _DRAWING),
+    b"version https://git-lfs": ("a Git LFS pointer", "run git lfs pull"),
+    **dict.fromkeys((b"<!DOCTYPE html", b"<!doctype html", b"<html", b"<HTML"), ("an HTML page", _ITSELF)),
+    **dict.fromkeys((b"\x80\x02", b"\x80\x04", b"\x80\x05"), ("a pickle", _TENSORS)),
     b"PK\x03\x04": ("a ZIP archive", "unpack it"),
     b"\x1f\x8b": ("a gzip archive", "unpack it"),
     b"<?xml": ("XML", _READ),
@@ -33,6 +38,7 @@ _KINDS = {
 }
 # By bytes further on.
 _CONTAINED = {
+    b"/data.pkl": ("a file of PyTorch", _TENSORS),
     b"ftypavif": ("an AVIF picture", _PICTURE),
     b"ftyphe": ("a HEIC picture", _PICTURE),
     b"<svg": ("an SVG drawing", _DRAWING),

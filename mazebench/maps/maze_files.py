@@ -15,6 +15,7 @@ from mazebench.maps.readers.image import grid_of_image, read_picture
 from mazebench.maps.readers.occupancy_grid import FREE, LocatedMaze, OccupancyGrid, locate_maze
 from mazebench.maps.readers.ros import (
     ROS_SUFFIXES,
+    is_filter_mask,
     is_map,
     map_of_picture,
     picture_of,
@@ -121,6 +122,9 @@ def _map_files(folder: pathlib.Path) -> list[pathlib.Path]:
                 remark(f"{file}: left out, as it names no image and so is no map")
                 continue
             pictures.add(picture_of(file).resolve())
+            if is_filter_mask(file):
+                remark(f"{file}: left out, as by its name it is a mask of a costmap filter, as Nav2 has them")
+                continue
         if file.suffix.lower() in _TABLE_SUFFIXES:
             try:
                 read_text(file)

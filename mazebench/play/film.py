@@ -53,6 +53,7 @@ def film_episode(options: EvalOptions, out: pathlib.Path, view: str, pixels: int
         raise unknown("view", view, (MAP, *CAMERAS, LIDAR, "all"))
     if out.suffix not in _WRITERS:
         raise unknown("suffix", out.suffix, _WRITERS)
+    out = out.absolute()  # agents may change the working folder
     frames, outcome = _run(options, view, pixels, is_film=out.suffix != ".png")
     make_folder(out.parent)
     with writing_to(out):

@@ -13,8 +13,8 @@ from mazebench.report.episodes import folders_below
 from mazebench.report.figures import Panel, draw_panels, save
 from mazebench.report.table import escape_markdown, to_markdown
 from mazebench.report.write_report import DOCUMENT, FIGURES, new_report
-from mazebench.storage.json_files import read_json, read_lines
-from mazebench.training.run_folder import CHECKPOINTS, CONFIG, METRICS
+from mazebench.storage.json_files import read_json
+from mazebench.training.run_folder import CHECKPOINTS, CONFIG, METRICS, read_metrics
 
 SUCCESS = "success_rate_"  # begins the names of success rates
 _STEPS = "env_steps"
@@ -40,7 +40,7 @@ def write_learning_curves(folders: Sequence[pathlib.Path], out: pathlib.Path) ->
     origins = {}
     for folder in whole:
         try:
-            config, lines = read_json(folder / CONFIG), read_lines(folder / METRICS)
+            config, lines = read_json(folder / CONFIG), read_metrics(folder)
         except InputError as error:
             remark(f"{error}; skipped")
             continue

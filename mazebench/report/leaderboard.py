@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 import pydantic
 
-from mazebench.constants import ON_TIME
+from mazebench.constants import ON_TIME, STEP_TIME
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import KINDS_SIZE, load_kind_mazes, manifest_hash
 from mazebench.report.table import escape_markdown, to_markdown
@@ -30,6 +30,7 @@ from mazebench.storage.files import make_folder, open_file
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.tasks.trials import frozen_trials
+from mazebench.world.near_walls import FASTEST
 
 BEGIN, END = "<!-- leaderboard begins -->\n", "<!-- leaderboard ends -->\n"
 PARTS = [f"{track} {level}" for track in TRACKS for level in LEVELS]
@@ -40,7 +41,7 @@ class Entry(pydantic.BaseModel):
 
     agent: Name
     privileged: bool
-    code: tuple[str, ...]  # package and version, or "file", and the SHA-256 of the code
+    code: tuple[str, ...]  # package and version, or "file", and the SHA-256 of the code or "without hash"
     checkpoints: tuple[str, ...]  # SHA-256
     on_time: tuple[Share, Share, Share]  # of all episodes, with its 95 % interval
     success: Share  # of all episodes
@@ -77,7 +78,7 @@ def make_tables(entries: Sequence[Entry]) -> str:
         "on-time rate": ["{:.2f} [{:.2f}, {:.2f}]".format(*entry.on_time) for entry in entries],
         "gain": [f"{entry.on_time[0] - floor:+.2f}".replace("+nan", "") for entry in entries],
         "success": [f"{entry.success:.2f}" for entry in entries],
-        "code": [escape_markdown(", ".join(each[:-56] for each in entry.code)) for entry in entries],  # 8 of 64 letters
+        "code": [escape_markdown(", ".join(re.sub(r"\w{56}$", "", each) for each in entry.code)) for entry in entries],
         "date": [entry.date.isoformat() for entry in entries],
     }
     on_time, success = (
@@ -129,7 +130,11 @@ def _make_entry(folder: pathlib.Path) -> Entry:
     return Entry(
         agent=agents[0],
         privileged=any(summary.privileged for summary in summaries),
-        code=tuple(sorted({f"{origin.agent_package or 'file'} {origin.agent_code_sha256}" for origin in origins})),
+        code=tuple(
+            sorted(
+                {f"{origin.agent_package or 'file'} {origin.agent_code_sha256 or 'without hash'}" for origin in origins}
+            )
+        ),
         checkpoints=tuple(sorted({origin.checkpoint_sha256 for origin in origins if origin.checkpoint_sha256})),
         on_time=(mean.value, mean.low, mean.high),
         success=episodes.success.mean(),
@@ -147,15 +152,21 @@ def _read_episodes(result: Result) -> pd.DataFrame:
         raise InputError(f"{result.folder}: expected eval episodes of a track, with its senses, found {found}")
     if provenance.benchmark_manifest_sha256 != manifest_hash(summary.benchmark):
         raise InputError(f"{result.folder}: expected results of the installed benchmark, found those of another one")
-    if provenance.agent_code_sha256 is None:
-        raise InputError(f"{result.folder}: expected the hash of the agent's code, found none; evaluate it again")
     mazes, trials = load_kind_mazes("eval"), frozen_trials("local", KINDS_SIZE, task.benchmark, "eval")
     episodes = [(trial.episode, trial.oracle_steps) for trial in trials]
     frozen = [(mazes[each.maze].name, each.start, each.goal, each.seed, steps) for each, steps in episodes]
     if [(each.maze, each.start, each.goal, each.seed, each.oracle_steps) for each in records] != frozen:
         raise InputError(f"{result.folder}: expected the {len(frozen)} frozen episodes, found others")
 
-    success, on_time = column(records, "success"), is_on_time(records, ON_TIME[0])
+    # What is faster than the physics lets a body be was moved by something else. A metre is left for the goal's size.
+    success, seconds = column(records, "success"), STEP_TIME * column(records, "steps")
+    driven = np.maximum(column(records, "path_length"), success * (column(records, "shortest_path") - 1))
+    if (too_fast := driven > FASTEST * seconds).any():
+        number = int(too_fast.argmax())
+        found = f"{driven[number]:.1f} m in {seconds[number]:.1f} s in episode {number}"
+        raise InputError(f"{result.folder}: expected bodies of at most {FASTEST:.1f} m/s, found {found}")
+
+    on_time = is_on_time(records, ON_TIME[0])
     return pd.DataFrame({"part": task.title, "maze": column(records, "maze"), "success": success, "on_time": on_time})
 
 

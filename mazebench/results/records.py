@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 import pydantic
 
+from mazebench.errors import one_line
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE
 from mazebench.storage.json_files import to_line
 from mazebench.tasks.task_options import TaskOptions
@@ -24,7 +25,8 @@ StoredTask = Annotated[
     pydantic.InstanceOf[TaskOptions],
     pydantic.BeforeValidator(lambda task: TaskOptions.of(task) if isinstance(task, dict) else task),
 ]
-Name = Annotated[str, pydantic.Field(min_length=1, max_length=1000)]
+# Results of others may have any name; what does not print, such as commands to a terminal, is escaped.
+Name = Annotated[str, pydantic.Field(min_length=1, max_length=1000), pydantic.AfterValidator(one_line)]
 
 
 class _Stored(pydantic.BaseModel):
@@ -90,7 +92,7 @@ class Provenance(_Stored):
     checkpoint_sha256: str | None
     agent_class: str  # as module:Class
     agent_package: str | None  # name and version; None for a `module:Class`
-    agent_code_sha256: str | None  # of the package of an installed agent, of the file of a `module:Class`
+    agent_code_sha256: str | None  # of the agent's files, see `code_hash`; None where it is in no file
     packages: dict[str, str | None]
     command: list[str]
     python: str
@@ -104,8 +106,8 @@ class Summary(_Stored):
     privileged: bool  # whether the agent was given the true maze and pose
     untrained_scale: bool = False  # whether the agent learned on maps of another scale, in metres a cell of the context
     task: StoredTask  # as this agent played it
-    suite: str | None = None  # of a part of a suite, with the part's name
-    part: str | None = None
+    suite: Name | None = None  # of a part of a suite, with the part's name
+    part: Name | None = None
     benchmark: Name
     episodes: Annotated[int, pydantic.Field(ge=1, lt=_LARGEST)]
     provenance: Provenance

@@ -11,6 +11,19 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.storage.files import open_file
 
+_MAX_BYTES = 2**31  # that an archive may unpack to
+
+
+def unpack(archive: np.lib.npyio.NpzFile, num_bytes: int = _MAX_BYTES) -> dict[str, np.ndarray]:
+    """Returns the arrays of an open .npz file by name.
+
+    Raises:
+      ValueError: if they unpack to more than `num_bytes`.
+    """
+    if (found := sum(entry.file_size for entry in archive.zip.infolist())) > num_bytes:
+        raise ValueError(f"expected at most {num_bytes} bytes when unpacked, found {found}")
+    return dict(archive)
+
 
 def read_arrays(path: pathlib.Path, kind: str) -> dict[str, np.ndarray]:
     """Returns the arrays of an .npz file by name; nothing in it is unpickled.
@@ -21,6 +34,6 @@ def read_arrays(path: pathlib.Path, kind: str) -> dict[str, np.ndarray]:
     with open_file(path, kind) as file:
         try:
             with np.load(file, allow_pickle=False) as arrays:
-                return dict(arrays)
+                return unpack(arrays)
         except (OSError, EOFError, ValueError, zipfile.BadZipFile, zlib.error) as error:
             raise InputError(f"{path}: expected a {kind}, found a damaged file: {error}") from error

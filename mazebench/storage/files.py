@@ -6,6 +6,7 @@ import contextlib
 import io
 import os
 import pathlib
+import stat
 from collections.abc import Iterator
 from typing import IO
 
@@ -19,9 +20,13 @@ def open_file(path: str | pathlib.Path, kind: str) -> io.BufferedReader:
       InputError: if it can't be opened; the message calls it a `kind`.
     """
     try:
-        return open(path, "rb")
-    except OSError as error:
-        raise InputError(f"{path}: can't read the {kind}: {error.strerror}") from error
+        is_file = stat.S_ISREG(os.stat(path).st_mode) or os.path.isdir(path)  # of a folder, `open` says so
+        if is_file:
+            return open(path, "rb")
+    except (OSError, ValueError) as error:  # ValueError: of a path with a null character
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"{path}: can't read the {kind}: {reason}") from error
+    raise InputError(f"{path}: expected a {kind} in a file, found a pipe or a device")
 
 
 def read_at_most(path: str | pathlib.Path, num_bytes: int, kind: str) -> bytes:
@@ -42,7 +47,7 @@ def open_whole(path: str | pathlib.Path) -> Iterator[IO[bytes]]:
     """Yields a file to write, which replaces the one at `path` when the block ends without an exception.
 
     The content reaches the disk before the replacement, so that a reader finds the old file or the whole new one. A
-    kill may leave a `.tmp` file beside it, which the next writer overwrites.
+    kill may leave a `.tmp` file beside it, which the next writer removes.
 
     Raises:
       OSError: if it can't be written; its `filename` is `path`.
@@ -50,7 +55,8 @@ def open_whole(path: str | pathlib.Path) -> Iterator[IO[bytes]]:
     path = pathlib.Path(path)
     temporary = path.with_name(path.name + ".tmp")
     try:
-        with temporary.open("wb") as file:
+        temporary.unlink(missing_ok=True)
+        with temporary.open("xb") as file:  # "x" follows no link, which another user may have put there
             yield file
             file.flush()
             os.fsync(file.fileno())

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, remark
 from mazebench.maps.benchmark import KINDS_SIZE, SIZES, load_kind_mazes, load_mazes
 from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
 from mazebench.maps.maze import MIN_CELL_SIZE, Maze, require_one_size
@@ -312,7 +312,7 @@ def _read(asked: TaskOptions) -> tuple[Mazes, Scenarios | None]:
         scenarios = read_scenarios(mazes, asked.reading)
         mazes = (scenarios.maze,)
     elif isinstance(mazes, str):
-        mazes = read_mazes(mazes, **dataclasses.asdict(asked.reading))
+        mazes = _without_unplayable(asked, read_mazes(mazes, **dataclasses.asdict(asked.reading)))
     for maze in mazes:
         if asked.size not in (None, maze.size):
             raise InputError(f"expected mazes of size {asked.size}, found size {maze.size}")
@@ -375,22 +375,41 @@ def _check_mazes(asked: TaskOptions, mazes: Mazes) -> None:
                 raise InputError(f"fresh mazes: expected no {name}, which may be a wall in one of them, found {end!r}")
         return
     require_one_size(mazes)
-    name, cell_size = mazes[0].name, mazes[0].cell_size
-    if cell_size < MIN_CELL_SIZE:
-        raise InputError(
-            f"{name}: expected cells of at least {MIN_CELL_SIZE} m, through which the body passes, "
-            f"found {cell_size} m; {THIN_WALLS}"
-        )
-    if asked.track is not None and cell_size != 1:
-        raise InputError(f"track {asked.track!r}: expected cells of 1 m, found {cell_size} m")
     for maze in mazes:
-        if asked.track is not None:
-            TRACKS[asked.track].require(maze, asked.level or LEVELS[:1])
-        if len(maze.free_cells) < 2:
-            raise InputError(f"{maze.name}: expected two free cells for a start and a goal, found one")
-        start, goal = asked.ends(maze)
-        if start is not None and start == goal:
-            raise InputError(f"{maze.name}: expected start and goal in different cells, found both in {start}")
+        _check_maze(asked, maze)
+
+
+def _check_maze(asked: TaskOptions, maze: Maze) -> None:
+    """Raises `InputError` if the task can't be played in a maze."""
+    if maze.cell_size < MIN_CELL_SIZE:
+        raise InputError(
+            f"{maze.name}: expected cells of at least {MIN_CELL_SIZE} m, through which the body passes, "
+            f"found {maze.cell_size} m; {THIN_WALLS}"
+        )
+    if asked.track is not None:
+        if maze.cell_size != 1:
+            raise InputError(f"track {asked.track!r}: expected cells of 1 m, found {maze.cell_size} m")
+        TRACKS[asked.track].require(maze, asked.level or LEVELS[:1])
+    if len(maze.free_cells) < 2:
+        raise InputError(f"{maze.name}: expected two free cells for a start and a goal, found one")
+    start, goal = asked.ends(maze)
+    if start is not None and start == goal:
+        raise InputError(f"{maze.name}: expected start and goal in different cells, found both in {start}")
+
+
+def _without_unplayable(asked: TaskOptions, mazes: tuple[Maze, ...]) -> tuple[Maze, ...]:
+    """Returns the mazes of a folder in which the task can be played, and warns of each other one; all if none can."""
+    faults: dict[int, str] = {}
+    for number, maze in enumerate(mazes):
+        try:
+            _check_maze(asked, maze)
+        except InputError as error:
+            faults[number] = str(error)
+    if len(faults) == len(mazes):
+        return mazes
+    for number, fault in faults.items():
+        remark(f"maze {mazes[number].name!r} left out: {fault}")
+    return tuple(maze for number, maze in enumerate(mazes) if number not in faults)
 
 
 def _check_distances(options: TaskOptions, mazes: Mazes, scenarios: Scenarios | None) -> None:

@@ -15,7 +15,9 @@ import shutil
 from collections.abc import Callable, Mapping
 from typing import Any, Self
 
-from mazebench.errors import InputError, RunError
+import pydantic
+
+from mazebench.errors import InputError, RunError, describe_fault
 from mazebench.storage.files import make_folder, open_whole, writing_to
 from mazebench.storage.json_files import read_json, read_lines, to_line, write_json
 from mazebench.training.counters import Counters
@@ -36,7 +38,7 @@ class RunFolder:
         Raises:
           InputError: if it can't be written, holds something else, or another training writes there.
         """
-        self.path = path
+        self.path = path = path.absolute()  # agents may change the working folder
         self._board: Any = None
         make_folder(path)
         found = sorted(item.name for item in self.path.iterdir())
@@ -119,7 +121,7 @@ class RunFolder:
         """Removes the metrics that a run writes again when it is resumed from the checkpoint at `counters`."""
         path = self.path / METRICS
         with writing_to(self.path):
-            kept = [line for line in read_lines(path) if line["env_steps"] <= counters.logged_steps]
+            kept = [line for line in read_metrics(self.path) if line["env_steps"] <= counters.logged_steps]
             with open_whole(path) as file:
                 file.write("".join(map(to_line, kept)).encode("utf-8"))
 
@@ -149,6 +151,35 @@ def checkpoints(path: pathlib.Path) -> list[pathlib.Path]:
     return sorted(folder for folder in path.glob(f"{CHECKPOINTS}/*") if _CHECKPOINT_NAME.fullmatch(folder.name))
 
 
+class _Metrics(pydantic.BaseModel):
+    """A line of metrics by their names."""
+
+    model_config = pydantic.ConfigDict(extra="allow", strict=True)
+    __pydantic_extra__: dict[str, int | float]
+    env_steps: int
+
+
+def read_metrics(path: pathlib.Path) -> list[dict[str, Any]]:
+    """Returns the lines of metrics of the run folder `path`.
+
+    Raises:
+      InputError: if a line holds something else.
+    """
+    return [line.model_dump() for line in read_lines(path / METRICS, _Metrics)]
+
+
 def read_counters(checkpoint: pathlib.Path) -> Counters:
-    """Returns the counters of a checkpoint."""
-    return Counters(**read_json(checkpoint / _COUNTERS))
+    """Returns the counters of a checkpoint.
+
+    Raises:
+      InputError: if the file holds others.
+    """
+    path = checkpoint / _COUNTERS
+    content = read_json(path)
+    try:
+        counters = pydantic.TypeAdapter(Counters).validate_python(content)
+    except pydantic.ValidationError as error:
+        raise InputError(f"{path}: expected the counters of a training, found {describe_fault(error)}") from error
+    if dataclasses.asdict(counters) != content or counters.env_steps != int(checkpoint.name):
+        raise InputError(f"{path}: expected the counters at {int(checkpoint.name)} agent steps, found others")
+    return counters

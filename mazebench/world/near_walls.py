@@ -23,8 +23,8 @@ from mazebench.world.mjcf import BODY_RADIUS, CONTACT_MARGIN, boxes_spec, parked
 # of the angle between push and motion. v grows only while the push along it, c times at most 34 N, is above the
 # damping, 8 v: v < 4.25 c. The push falls below 34 N at v c = 3.06. So v can't grow beyond the v at which both hold,
 # 3.61 m/s. With two drives at once, as velocities set them, it is 3.643 m/s, over all pairs of them and all angles.
-_FASTEST = 1.14 * TOP_SPEED
-_REACH = BODY_RADIUS + CONTACT_MARGIN + _FASTEST * STEP_TIME  # m, from the body's centre at the start of an agent step
+FASTEST = 1.14 * TOP_SPEED
+_REACH = BODY_RADIUS + CONTACT_MARGIN + FASTEST * STEP_TIME  # m, from the body's centre at the start of an agent step
 _MOST_ENTERED = 10_000  # cells whose boxes are kept, some 1 kB each
 _AHEAD = 2  # cells around the one that is entered whose boxes are found in advance
 _FIRST_WALL = 1  # index of its geom, after the floor

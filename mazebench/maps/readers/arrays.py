@@ -16,9 +16,10 @@ from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.readers.cells import grid_of_characters, grid_of_numbers
 from mazebench.maps.readers.occupancy_grid import UNKNOWN, OccupancyGrid, locate_maze
+from mazebench.storage.array_files import unpack
 from mazebench.storage.files import read_at_most
 
-_MAX_BYTES = 2**27  # of a file
+_MAX_BYTES = 2**27  # of a file, and of what an archive unpacks to
 
 
 def maze_from_array(array: Any, name: str = "maze", **options: Any) -> Maze:
@@ -65,7 +66,7 @@ def read_array_file(path: pathlib.Path) -> OccupancyGrid:
     expected = f"{path}: expected a {path.suffix} file of numbers"
     try:
         loaded = np.load(io.BytesIO(content), allow_pickle=False)
-        arrays = [loaded] if isinstance(loaded, np.ndarray) else [loaded[key] for key in loaded.files]
+        arrays = [loaded] if isinstance(loaded, np.ndarray) else list(unpack(loaded, _MAX_BYTES).values())
     except (ValueError, MemoryError, OSError, EOFError, zipfile.BadZipFile) as error:  # of a header that lies, too
         found = kind_of(content) or "a file of another kind"
         raise InputError(f"{expected}, found {found} ({str(error)[:80]})") from error

@@ -5,11 +5,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import pathlib
 import re
+import warnings
 
 import cv2
 import numpy as np
+import PIL.Image
 
 from mazebench.errors import InputError
 from mazebench.maps.file_kinds import kind_of, way_out
@@ -26,6 +30,7 @@ _PGM_HEAD = re.compile(
     rb"P5(?:\s|#[^\n]*\n)+(?P<width>\d{1,5})(?:\s|#[^\n]*\n)+(?P<height>\d{1,5})(?:\s|#[^\n]*\n)+(?P<white>\d{1,5})\s"
 )
 _PNG_START = b"\x89PNG\r\n\x1a\n"
+_FORMATS = ("PNG", "JPEG", "BMP", "GIF", "PPM", "TIFF", "WEBP")
 _MIN_DARK = 0.3  # share of the pixels of a picture of light walls on a dark ground
 _MARK_SATURATION = 90  # of 255, between the strongest and the weakest channel of a marker
 _MAX_MARK_SHARE = 0.15  # of the picture, and of its dark pixels; if more are coloured, the paper or the walls are
@@ -40,15 +45,26 @@ def read_picture(path: str | pathlib.Path) -> np.ndarray:
       MazeError: if it is no picture, or has too many pixels.
     """
     content = read_at_most(path, _MAX_BYTES, "picture")
+    # A picture of many pixels is refused before they take memory.
+    with contextlib.suppress(OSError, ValueError, OverflowError), warnings.catch_warnings(action="ignore"):
+        try:
+            with PIL.Image.open(io.BytesIO(content), formats=_FORMATS) as head:
+                _require_few_pixels(head.height, head.width, path)
+        except PIL.Image.DecompressionBombError as error:
+            raise MazeError(f"{path}: expected at most {_MAX_PIXELS} pixels, found many more") from error
     image = _decode(content)
     if image is None:
         kind = kind_of(content) or "a file of another kind"
         raise MazeError(
             f"{path}: expected a picture, found {kind}{' that is damaged' * (kind == 'a picture')}{way_out(kind)}"
         )
-    if image.shape[0] * image.shape[1] > _MAX_PIXELS:
-        raise MazeError(f"{path}: expected at most {_MAX_PIXELS} pixels, found {image.shape[1]} x {image.shape[0]}")
+    _require_few_pixels(*image.shape[:2], path)
     return image
+
+
+def _require_few_pixels(height: int, width: int, path: str | pathlib.Path) -> None:
+    if height * width > _MAX_PIXELS:
+        raise MazeError(f"{path}: expected at most {_MAX_PIXELS} pixels, found {width} x {height}")
 
 
 def grid_of_image(image: np.ndarray, size: int | None, name: str, walls: str) -> OccupancyGrid:

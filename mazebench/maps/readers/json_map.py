@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import cv2
@@ -11,6 +10,7 @@ import numpy as np
 from mazebench.maps.maze import MazeError
 from mazebench.maps.readers.cells import grid_of_numbers
 from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
+from mazebench.storage.json_files import parse_json
 
 _RESOLUTION = 0.05  # m, the side of a pixel
 _MAX_SIDE = 400.0  # m, of a house
@@ -24,8 +24,8 @@ def read_json_map(text: str, name: str) -> OccupancyGrid:
     """
     expected = f"{name}: expected a HouseExpo house, with points of its outline as verts, or one list of rows"
     try:
-        content = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        content = parse_json(text)
+    except ValueError as error:
         raise MazeError(f"{expected}, found {str(error)[:80]}") from error
     if "verts" in content:
         return _house(content["verts"], name)

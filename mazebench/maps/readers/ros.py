@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
 import pathlib
 import re
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import cv2
 import numpy as np
@@ -18,13 +19,14 @@ import yaml
 from annotated_types import Interval
 from scipy import ndimage
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, remark
 from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.readers.image import read_picture, to_gray
 from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, Pose
 from mazebench.storage.files import open_whole, read_at_most
 
 ROS_SUFFIXES = (".yaml", ".yml")
+_MASK_NAME = re.compile(r"(^|[-_.])(keepout|speed|binary|filter)([-_.]|$)|[-_.]mask$")  # of costmap filters of Nav2
 _MAX_BYTES = 2**16  # of a YAML file
 _FREE_SHADE, _UNKNOWN_SHADE, _OCCUPIED_SHADE = 254, 205, 0  # that map_saver writes
 _OCCUPIED_THRESH, _FREE_THRESH = 0.65, 0.196  # with which map_server reads them back
@@ -33,10 +35,35 @@ _Share = Annotated[float, Interval(ge=0, le=1)]
 _MOSTLY_DARK = 0.8  # share of walls from which a floor plan is light on dark; mazes of corridors have up to 0.6
 
 
+class _Loader(yaml.SafeLoader):
+    """Reads YAML without aliases, by which a few bytes can stand for a content of any size."""
+
+    def compose_node(self, *place: Any) -> yaml.Node | None:
+        """Composes the node of the next event."""
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.YAMLError("an alias, which no such file needs")
+        return super().compose_node(*place)
+
+
+def _load_yaml(path: pathlib.Path) -> Any:
+    """Returns the content of a YAML file.
+
+    Raises:
+      InputError: if it can't be read or is no YAML.
+    """
+    text = read_at_most(path, _MAX_BYTES, "map")
+    try:
+        return yaml.load(text, _Loader)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: of a date that does not exist
+        found = " ".join(str(error).split())[:120]
+        raise InputError(f"{path}: expected the YAML file of a ROS map, found {found}") from error
+
+
 class _Metadata(pydantic.BaseModel):
     """The content of the YAML file; other keys are ignored, as by map_server."""
 
-    image: str = pydantic.Field(min_length=1, description="the name of a picture")  # absolute, or beside the YAML file
+    # Absolute, or beside the YAML file.
+    image: str = pydantic.Field(pattern=r"^[^\x00]{1,1000}$", description="the name of a picture")
     resolution: float = pydantic.Field(gt=0, allow_inf_nan=False, description="the side of a pixel, above 0 m")
     # x, y (m) and yaw (rad) of the lower left corner of the picture
     origin: tuple[pydantic.FiniteFloat, pydantic.FiniteFloat, float] = pydantic.Field(
@@ -123,6 +150,8 @@ def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
     """
     path = pathlib.Path(path)
     metadata = _read_metadata(path)
+    if is_filter_mask(path):
+        remark(f"{path}: read as a building, though by its name it is a mask of a costmap filter, as Nav2 has them")
     image = picture_of(path)
     try:
         picture = read_picture(image)
@@ -132,7 +161,7 @@ def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
 
     # The departure from map_server.
     is_unknown = _saved_as_unknown(picture)
-    named = path.parent / pathlib.Path(metadata.image.removeprefix("file://")).expanduser()
+    named = path.parent / os.path.expanduser(metadata.image.removeprefix("file://"))
     changes = [] if named == image else [f"image {metadata.image} taken from {image.parent}"]
     if metadata.mode == "trinary" and (states[is_unknown] == FREE).any():
         states[is_unknown] = UNKNOWN
@@ -151,10 +180,15 @@ def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
 def is_map(path: pathlib.Path) -> bool:
     """Returns whether a YAML file names a picture, as a map does; one that can't be read may be a map."""
     try:
-        content = yaml.safe_load(read_at_most(path, _MAX_BYTES, "map"))
-    except (InputError, yaml.YAMLError, ValueError):
+        content = _load_yaml(path)
+    except InputError:
         return True
     return isinstance(content, dict) and "image" in content
+
+
+def is_filter_mask(path: pathlib.Path) -> bool:
+    """Returns whether a YAML file is, by its name, a mask of keepout zones or speed limits beside a map."""
+    return _MASK_NAME.search(path.stem.lower()) is not None
 
 
 def picture_of(path: str | pathlib.Path) -> pathlib.Path:
@@ -165,7 +199,7 @@ def picture_of(path: str | pathlib.Path) -> pathlib.Path:
     """
     path = pathlib.Path(path)
     name = _read_metadata(path).image
-    named = path.parent / pathlib.Path(name.removeprefix("file://")).expanduser()
+    named = path.parent / os.path.expanduser(name.removeprefix("file://"))
     beside = path.parent / re.split(r"[/\\]", name)[-1]
     return beside if beside.is_file() and not named.is_file() else named
 
@@ -204,12 +238,7 @@ def write_ros_map(maze: Maze, path: str | pathlib.Path, origin: Pose = (0.0, 0.0
 
 
 def _read_metadata(path: pathlib.Path) -> _Metadata:
-    text = read_at_most(path, _MAX_BYTES, "map")
-    expected = f"{path}: expected the YAML file of a ROS map"
-    try:
-        content = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError) as error:  # ValueError: of a date that does not exist
-        raise InputError(f"{expected}, found {' '.join(str(error).split())[:120]}") from error
+    content, expected = _load_yaml(path), f"{path}: expected the YAML file of a ROS map"
     if not isinstance(content, dict):
         found = "an empty file" if content is None else f"no keys but {str(content)[:60]!r}"
         raise InputError(f"{expected}, with keys such as image and resolution, found {found}")
