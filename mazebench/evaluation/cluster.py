@@ -65,10 +65,10 @@ class Cluster:
                 raise RunError(f"a Ray task failed: {_first_line(error.cause)}") from error
             except ray.exceptions.RayError as error:
                 raise RunError(f"a Ray task was lost: {_first_line(error)}; go on with --resume") from error
-            for results, error in found:
+            for results, fault in found:
                 yield results
-                if error is not None:
-                    raise error
+                if fault is not None:
+                    raise fault
             if not found:
                 yield []
 

@@ -103,11 +103,10 @@ class _Processes:
             fault: InputError | RunError | None = None
             for future in ended:
                 try:
-                    of_chunk, error = future.result()
-                    results += of_chunk
+                    of_chunk, of_this = future.result()
+                    results, fault = results + of_chunk, fault or of_this
                 except concurrent.futures.process.BrokenProcessPool:
-                    error = self._broken()
-                fault = fault or error
+                    fault = self._broken()
             yield results
             if fault is not None:
                 raise fault

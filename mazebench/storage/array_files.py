@@ -5,6 +5,7 @@ from __future__ import annotations
 import pathlib
 import zipfile
 import zlib
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +15,8 @@ from mazebench.storage.files import open_file
 _MAX_BYTES = 2**31  # that an archive may unpack to
 
 
-def unpack(archive: np.lib.npyio.NpzFile, num_bytes: int = _MAX_BYTES) -> dict[str, np.ndarray]:
-    """Returns the arrays of an open .npz file by name.
+def unpack(archive: Any, num_bytes: int = _MAX_BYTES) -> dict[str, np.ndarray]:
+    """Returns the arrays of an open `NpzFile` by name.
 
     Raises:
       ValueError: if they unpack to more than `num_bytes`.

@@ -58,7 +58,7 @@ def read_picture(path: str | pathlib.Path) -> np.ndarray:
         raise MazeError(
             f"{path}: expected a picture, found {kind}{' that is damaged' * (kind == 'a picture')}{way_out(kind)}"
         )
-    _require_few_pixels(*image.shape[:2], path)
+    _require_few_pixels(image.shape[0], image.shape[1], path)
     return image
 
 

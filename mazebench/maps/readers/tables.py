@@ -48,9 +48,9 @@ def cells_in_table(lines: Sequence[str], separator: str, name: str) -> list[list
     marks = {field for row in table for field in row if field}
     if marks <= _ONLY_WALLS:
         return [[field or "0" for field in row] for row in table]
-    for row, fields in enumerate(table):
-        if "" in fields:
-            raise MazeError(f"{name}: expected a value in each field, found none at ({row}, {fields.index('')})")
+    for number, row in enumerate(table):
+        if "" in row:
+            raise MazeError(f"{name}: expected a value in each field, found none at ({number}, {row.index('')})")
     return table
 
 
