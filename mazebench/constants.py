@@ -26,3 +26,4 @@ STEP_TIME = PHYSICS_TIMESTEP * STEPS_PER_ACTION  # s, of an agent step
 TOP_SPEED = 3.2  # m/s
 
 MAX_PIXELS = 1280  # a side of a picture
+RENDERING = {"render_modes": ["rgb_array"], "render_fps": 1 / STEP_TIME}  # of the environments, in Gymnasium's words

@@ -50,8 +50,12 @@ class MazeVecEnv(VecEnv):
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> dict[str, np.ndarray]:
-        observations, _ = self.envs.reset(seed=self._seeds)  # those of `seed`, or None for each environment
+        # The seeds are those of `seed`, or None for each environment; the options those of `set_options`.
+        if any(options != self._options[0] for options in self._options):
+            raise InputError("expected the same options for all environments, found different ones")
+        observations, _ = self.envs.reset(seed=self._seeds, options=self._options[0])
         self._reset_seeds()
+        self._reset_options()
         return observations
 
     def step_async(self, actions: np.ndarray) -> None:

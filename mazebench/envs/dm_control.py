@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import warnings
+from collections.abc import Sequence
 from typing import Any
 
 import dm_env
@@ -93,6 +94,30 @@ class Physics(Simulation, engine.Physics):
 class Task(TaskRunner, control.Task):
     """The task as dm_control asks for it; `mazebench.tasks.rules.Rules` describes it."""
 
+    def __init__(self, task: MazeTask, seed: int | None = None):
+        super().__init__(task, seed)
+        self._generator = _generator(seed)
+
+    def choose_episode(self, seed: int | None = None, episode: Episode | None = None) -> None:
+        super().choose_episode(seed, episode)
+        if seed is not None:
+            self._generator = _generator(seed)
+
+    @property
+    def random(self) -> np.random.RandomState:
+        """The generator of dm_control's wrappers, such as those that add noise; episodes do not draw from it.
+
+        One that is set also seeds the stream of episodes.
+        """
+        return self._generator
+
+    @random.setter
+    def random(self, generator: np.random.RandomState) -> None:
+        self._generator = generator
+        self.rng = np.random.default_rng(generator.randint(2**31))
+
+    _random = random  # which others set to seed the suite's tasks
+
     def get_observation(self, simulation: Simulation) -> dict[str, np.ndarray]:
         observation = super().get_observation(simulation)
         if self.maze_task.has_legs:
@@ -121,13 +146,16 @@ class Task(TaskRunner, control.Task):
         return result
 
 
+def _generator(seed: int | None) -> np.random.RandomState:
+    """Returns a new generator of the kind that dm_control's tasks have, also of a large seed."""
+    return np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed)))
+
+
 class Environment(control.Environment):
     """A dm_control Environment whose `reset` also takes a seed, or the episode to play."""
 
     physics: Physics
     task: Task
-    maze_task: MazeTask  # what is played
-
     def __init__(self, task: MazeTask, seed: int | None = None):
         """Opens the environment; `seed` is that of the first reset.
 
@@ -135,9 +163,21 @@ class Environment(control.Environment):
           InputError: if `seed` is not a natural number, or `task` not a `Task`.
         """
         require_task(task)
-        self.maze_task = task
         # The task judges the time limit itself, so that a goal reached on the last step is a termination.
         super().__init__(Physics.of_mazes(models_of(task.mazes, False)), Task(task, seed), n_sub_steps=STEPS_PER_ACTION)
+
+    @property
+    def maze_task(self) -> MazeTask:
+        """The task that is played, with the distances of the episodes that follow."""
+        return self.task.maze_task
+
+    def draw_distances(self, distances: Sequence[int]) -> None:
+        """Draws episodes with goals at these distances (cells) from now on; the one under way is not changed.
+
+        Raises:
+          InputError: as `mazebench.Task.at_distances`.
+        """
+        self.task.draw_distances(distances)
 
     def reset(self, seed: int | None = None, episode: Episode | None = None) -> dm_env.TimeStep:
         """Starts an episode: the next one of the environment's stream, the first one of `seed`'s, or `episode`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 import os
 from enum import Enum
@@ -16,25 +17,19 @@ from mazebench.maps.selection import described_maze
 from mazebench.tasks.task import Task
 
 
-class TaskSpec(EnvSpec):
-    """A spec whose `max_episode_steps` are those of a task, which judges its time limit itself.
+class JsonSpec:
+    """Base class of environments whose `spec.to_json()` describes them, mazes of one's own included.
 
-    JSON leaves them out: Gymnasium would put a `TimeLimit` around an environment that is made of it. That would also
-    call an episode truncated that reaches its goal on the last step.
+    The spec has no `max_episode_steps`, for which Gymnasium would put a `TimeLimit` around an environment that is made
+    of it.
     """
 
-    of_task: int | None = None  # the task's limit
-
-    def to_json(self) -> str:
-        own = dataclasses.replace(self, max_episode_steps=None) if self.max_episode_steps == self.of_task else self
-        return EnvSpec.to_json(own)
-
-
-class JsonSpec:
-    """Base class of environments whose `spec.to_json()` describes them, mazes of one's own included."""
-
-    task: Task
     _spec: EnvSpec | None = None
+
+    @property
+    @abc.abstractmethod
+    def task(self) -> Task:
+        """The task that is played."""
 
     @property
     def spec(self) -> EnvSpec | None:
@@ -48,9 +43,7 @@ class JsonSpec:
             kwargs = {name: _plain(value) for name, value in spec.kwargs.items()}
             if not isinstance(kwargs.get("mazes"), str | None):  # else a path, or none
                 kwargs["mazes"] = [described_maze(maze) for maze in self.task.fixed_mazes]
-            values = {field.name: getattr(spec, field.name) for field in dataclasses.fields(spec) if field.init}
-            spec = TaskSpec(**values | {"kwargs": kwargs, "max_episode_steps": self.task.longest_episode})
-            spec.of_task = spec.max_episode_steps
+            spec = dataclasses.replace(spec, kwargs=kwargs)
         self._spec = spec
 
 

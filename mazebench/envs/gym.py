@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from mazebench.constants import STEP_TIME, STEPS_PER_ACTION
+from mazebench.constants import RENDERING, STEPS_PER_ACTION
 from mazebench.envs import spaces
 from mazebench.envs.env_spec import JsonSpec
 from mazebench.envs.single import EnvironmentState, TaskRunner
-from mazebench.errors import InputError, unknown
-from mazebench.tasks.arguments import Arguments
+from mazebench.errors import InputError
+from mazebench.tasks.arguments import Arguments, reset_options
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.task import Task
 from mazebench.world.models import models_of
@@ -28,7 +28,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
     `info` has what `Rules.infos` returns, for training and records; agents must not use it in an evaluation.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 1 / STEP_TIME}  # noqa: RUF012
+    metadata = RENDERING
 
     def __init__(self, task: Task, seed: int | None = None, render_mode: str | None = None, camera: str = "top"):
         """Opens the environment.
@@ -44,7 +44,6 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         """
         arguments = Arguments(render_mode=render_mode, camera=camera)
         self.runner = TaskRunner(task, seed)
-        self.task = task
         walls = near_walls_of(task.mazes, 1)
         self.simulation = MujocoSimulation(walls.model, walls)
         self._needs_reset = True
@@ -54,17 +53,41 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         self._camera = arguments.camera
         self._cameras: Cameras | None = None  # of `render`
 
+    @property
+    def task(self) -> Task:
+        """The task that is played, with the distances of the episodes that follow."""
+        return self.runner.maze_task
+
+    def draw_distances(self, distances: Sequence[int]) -> None:
+        """Draws episodes with goals at these distances (cells) from now on; the one under way is not changed.
+
+        Raises:
+          InputError: as `mazebench.Task.at_distances`.
+        """
+        self.runner.draw_distances(distances)
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Starts an episode, the same for the same `seed`, or the one of `options={"episode": Episode(...)}`.
+        """Starts an episode, the same for the same `seed`.
+
+        Args:
+          seed: of the stream of episodes that begins; with None, the stream goes on.
+          options: `{"episode": Episode(...)}` plays that one. `{"distances": range(1, 4)}` calls `draw_distances`
+            before.
 
         Raises:
           gymnasium.error.Error: if `seed` is not a natural number.
-          InputError: if `options` hold anything but an episode.
+          InputError: if there is no such option, or its value is not allowed.
         """
+        chosen = reset_options(options, "episode", "distances")
+        episode = chosen.get("episode")
+        if not isinstance(episode, Episode | None):
+            raise InputError(f"expected options['episode'] to be an Episode, found {type(episode).__name__}")
+        if "distances" in chosen:
+            self.draw_distances(chosen["distances"])
         super().reset(seed=seed)
-        self.runner.choose_episode(seed, _episode_of(options))
+        self.runner.choose_episode(seed, episode)
         with self.simulation.reset_context():
             self.runner.initialize_episode(self.simulation)
         self._needs_reset = False
@@ -121,16 +144,3 @@ class MazeEnv(JsonSpec, gymnasium.Env):
 
     def _observation(self) -> dict[str, np.ndarray]:
         return self.runner.get_observation(self.simulation)
-
-
-def _episode_of(options: dict[str, Any] | None) -> Episode | None:
-    """Returns the episode that the options of `reset` hold."""
-    if not isinstance(options, Mapping | None):
-        raise InputError(f"expected options as a dict, found {type(options).__name__}")
-    for name in options or {}:
-        if name != "episode":
-            raise unknown("option", name, ("episode",))
-    episode = (options or {}).get("episode")
-    if not isinstance(episode, Episode | None):
-        raise InputError(f"expected options['episode'] to be an Episode, found {type(episode).__name__}")
-    return episode

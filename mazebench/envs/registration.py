@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
-from mazebench.constants import BENCHMARK_SIZES, TASK_VERSION
+from mazebench.constants import BENCHMARK_SIZES, RENDERING, TASK_VERSION
 from mazebench.errors import InputError
 from mazebench.world.backend import load_mujoco, loading_backend
 
@@ -33,7 +33,7 @@ def register_environments() -> None:
     """Registers every task, track and size; a second call changes nothing.
 
     The ids have no `max_episode_steps`, for which Gymnasium's wrapper would truncate an episode that reaches its goal
-    on the last step; the `spec` of an environment tells them.
+    on the last step.
     """
     for size in BENCHMARK_SIZES:
         for task in ("local", "hierarchical"):
@@ -137,9 +137,9 @@ def make_vec(
     Of several tracks, each episode draws one, which `info["track"]` tells. They are played in the same mazes, at the
     same levels, and with contexts of one size: `context_size`, or the largest one of the tracks'.
 
-    `autoreset_mode` says what follows the end of an episode; see `MazeVectorEnv`. `max_episode_steps` is what Gymnasium
-    passes on from the `spec` of such environments. `options` are those of `mazebench.Task.of`. Arrays are those of
-    `make` with a first axis of `num_envs`.
+    `autoreset_mode` says what follows the end of an episode; see `MazeVectorEnv`. `options` are those of
+    `mazebench.Task.of`; `time_limit` takes the place of Gymnasium's `max_episode_steps`, which is refused. Arrays are
+    those of `make` with a first axis of `num_envs`.
 
     Raises:
       InputError: if an option is unknown or not allowed.
@@ -156,9 +156,13 @@ def make_vec(
         tasks = tasks_of_tracks(task, **options)
     else:
         tasks = (_task(task, options, _VECTOR, id_size),)
-    if max_episode_steps not in (None, tasks[0].longest_episode):
+    if max_episode_steps is not None:
         raise InputError(f"expected time_limit in the place of max_episode_steps, found {max_episode_steps}")
     return MazeVectorEnv(tasks, num_envs, seed, num_threads, render_mode, autoreset_mode=autoreset_mode)
+
+
+for _entry_point in (make, make_goal, make_vec):
+    vars(_entry_point)["metadata"] = RENDERING  # by which Gymnasium adds its wrappers of other render modes
 
 
 def _task(task: str | Task | TaskOptions, options: dict[str, Any], arguments: Sequence[str], id_size: int = 0) -> Task:

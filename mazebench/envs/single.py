@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -56,6 +56,14 @@ class TaskRunner:
             self.rng = np.random.default_rng(Arguments(seed=seed).seed)
         if episode is not None:
             self._next_episode = check_episode(self.maze_task, episode)
+
+    def draw_distances(self, distances: Sequence[int]) -> None:
+        """Draws episodes with goals at these distances (cells) from now on; the one under way is not changed.
+
+        Raises:
+          InputError: as `mazebench.Task.at_distances`.
+        """
+        self.maze_task = self.maze_task.at_distances(distances)
 
     @property
     def episode(self) -> Episode:
@@ -128,6 +136,7 @@ class TaskRunner:
         return EnvironmentState(
             maze=self.maze_task.mazes[self.rules.maze.item()],
             simulation=simulation.full_state(),
+            distances=self.maze_task.distances,
             rng=self.rng.bit_generator.state,
             rules=_copied(changing),
         )
@@ -141,6 +150,8 @@ class TaskRunner:
         index = state.rules["maze"].item()
         if index >= len(self.maze_task.mazes) or self.maze_task.mazes[index] != state.maze:
             raise InputError(f"expected a state of an environment with the same mazes, found one of {state.maze.name}")
+        if state.distances != self.maze_task.distances:
+            self.draw_distances(state.distances)
         simulation.surround(index, state.rules["cell"].item())
         simulation.set_full_state(state.simulation)
         self.rng.bit_generator.state = state.rng
@@ -156,6 +167,7 @@ class EnvironmentState(NamedTuple):
 
     maze: Maze
     simulation: np.ndarray  # [S], see `Simulation.full_state`
+    distances: tuple[int, ...]  # cells, of the episodes that follow
     rng: Mapping[str, Any]  # of NumPy's bit generator that draws episodes
     rules: dict[str, Any]  # attributes of the `Rules`
     needs_reset: bool = False

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import gymnasium
@@ -15,12 +15,12 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from mazebench.constants import STEP_TIME, STEPS_PER_ACTION, VELOCITIES
+from mazebench.constants import RENDERING, STEPS_PER_ACTION, VELOCITIES
 from mazebench.envs import spaces
 from mazebench.envs.env_spec import JsonSpec
 from mazebench.errors import InputError, unknown
 from mazebench.tasks.actions import controls_of_actions, controls_of_velocities
-from mazebench.tasks.arguments import Arguments, require_task
+from mazebench.tasks.arguments import Arguments, require_task, reset_options
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.observation import observation_specs
 from mazebench.tasks.rules import Rules
@@ -58,7 +58,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
     `close` ends the threads. A process that is forked meanwhile can't use the environment, but can make its own.
     """
 
-    metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": ["rgb_array"], "render_fps": 1 / STEP_TIME}  # noqa: RUF012
+    metadata = RENDERING | {"autoreset_mode": AutoresetMode.SAME_STEP}
 
     def __init__(
         self,
@@ -73,7 +73,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """Opens the environments.
 
         Args:
-          task: the task, or those of several tracks; the attribute of this name is the first one.
+          task: the task, or those of several tracks.
           num_envs: B.
           seed: of the first reset, as in `reset`.
           num_threads: of the simulation; 0 uses all cores.
@@ -85,7 +85,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
           InputError: if an argument is not allowed.
         """
         tasks = (task,) if isinstance(task, Task) else tuple(task)
-        self.task = task = tasks[0]
+        task = tasks[0]
         require_task(task)
         arguments = Arguments(num_envs=num_envs, num_threads=num_threads, render_mode=render_mode)
         self.num_envs = num_envs = arguments.num_envs
@@ -128,6 +128,11 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._marker = self._batch.bind("mocap_pos")
         self._top_camera: Cameras | None = None  # of `render`
 
+    @property
+    def task(self) -> Task:
+        """The task that is played, or the first of several, with the distances of the episodes that follow."""
+        return self._tasks[0]
+
     def __reduce__(self) -> tuple[Any, ...]:
         raise TypeError(
             f"{type(self).__name__} can't be copied or pickled; copy dm_env or Gymnasium environments, or make another "
@@ -143,7 +148,8 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
           seed: one seed for each environment, or an integer s for s, s + 1, ...; with None, an environment's stream of
             episodes goes on.
           options: `{"reset_mask": mask}` with `mask` `[B]` bool resets only where it is True. The other environments
-            stay as they are, and `info` says nothing of them.
+            stay as they are, and `info` says nothing of them. `{"distances": range(1, 4)}` calls `draw_distances`
+            before.
 
         Raises:
           InputError: if an argument is not allowed.
@@ -151,26 +157,30 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
           gymnasium.error.ClosedEnvironmentError: after `close`, and in a forked process.
         """
         self._require_open()
-        mask = self._reset_mask(options)
+        chosen = reset_options(options, "reset_mask", "distances")
+        mask = self._reset_mask(chosen.get("reset_mask"))
         if not (self._was_reset or mask.all()):
             raise gymnasium.error.ResetNeeded("expected a call to reset() of all environments before this one of some")
-        for i, value in enumerate(_seeds(seed, self.num_envs)):
+        seeds = _seeds(seed, self.num_envs)
+        if "distances" in chosen:
+            self.draw_distances(chosen["distances"])
+        for i, value in enumerate(seeds):
             if value is not None and mask[i]:
                 self._rngs[i] = np.random.default_rng(value)
+        if seed is not None:  # Gymnasium's own generator, of which episodes do not depend
+            given = seeds[:1] if np.ndim(seed) == 0 else seeds
+            self._np_random = np.random.default_rng([value for value in given if value is not None])
+            self._np_random_seed = given[0] if np.ndim(seed) == 0 else tuple(given)
         self._was_reset = True
         indices = np.flatnonzero(mask)
         self._begin_episodes(indices)
         self._observe(indices)
         return self._observations(), self._infos(mask.copy())
 
-    def _reset_mask(self, options: dict[str, Any] | None) -> np.ndarray:
-        """Returns `[B]` bool: which environments `options` say to reset."""
-        if not isinstance(options, Mapping | None):
-            raise InputError(f"expected options as a dict, found {type(options).__name__}")
-        for name in options or {}:
-            if name != "reset_mask":
-                raise unknown("option", name, ("reset_mask",))
-        mask = (options or {}).get("reset_mask", np.ones(self.num_envs, dtype=bool))
+    def _reset_mask(self, mask: Any) -> np.ndarray:
+        """Returns `[B]` bool: which environments to reset, all if the option of this name is not given."""
+        if mask is None:
+            return np.ones(self.num_envs, dtype=bool)
         if not (isinstance(mask, np.ndarray) and mask.dtype == bool and mask.shape == (self.num_envs,) and mask.any()):
             raise InputError(
                 f"expected reset_mask, an array of {self.num_envs} bool, not all False, found {mask!r}"[:200]
@@ -306,9 +316,9 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """Draws episodes with goals at these distances (cells) from now on; those under way are not changed.
 
         Raises:
-          InputError: if there are no distances. Where no maze has them, the next episode raises it.
+          InputError: as `mazebench.Task.at_distances`.
         """
-        self._tasks = tuple(task.replace(distances=tuple(distances)) for task in self._tasks)
+        self._tasks = tuple(task.at_distances(distances) for task in self._tasks)
 
     def velocity(self) -> np.ndarray:
         """Returns the true velocities `[B, 2]` (x and y on the map, m/s), for labels; agents must not use them."""

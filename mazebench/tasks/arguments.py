@@ -1,13 +1,14 @@
-"""Checks of the arguments that the constructors of environments take besides a task."""
+"""Checks of the arguments of environments besides a task."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Any
 
 from annotated_types import Ge
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, unknown
 from mazebench.options import OneOf, Options
 from mazebench.tasks.task import Task
 from mazebench.world.rendering import CAMERAS
@@ -22,6 +23,20 @@ class Arguments(Options):
     camera: Annotated[str, OneOf(*CAMERAS)] = "top"  # whose pictures `render` returns
     num_envs: Annotated[int, Ge(1)] = 1  # environments side by side
     num_threads: Annotated[int, Ge(0)] = 0  # of the simulation; 0 uses all cores
+
+
+def reset_options(options: Mapping[str, Any] | None, *names: str) -> Mapping[str, Any]:
+    """Returns the options of a reset by name, without any where there are none.
+
+    Raises:
+      InputError: if they are no mapping, or have others than `names`.
+    """
+    if not isinstance(options, Mapping | None):
+        raise InputError(f"expected options as a dict, found {type(options).__name__}")
+    for name in options or {}:
+        if name not in names:
+            raise unknown("option", name, names)
+    return options or {}
 
 
 def require_task(task: Task) -> None:

@@ -15,7 +15,7 @@ from mazebench.maps.maze import MIN_CELL_SIZE, Maze, require_one_size
 from mazebench.maps.maze_files import read_mazes
 from mazebench.maps.maze_options import THIN_WALLS, ReadOptions
 from mazebench.maps.scenarios import Scenarios, are_scenarios, read_scenarios
-from mazebench.options import check_names, fields_of
+from mazebench.options import as_tuple, check_names, fields_of
 from mazebench.tasks.context import MAX_CONTEXT_SIZE, default_context_size
 from mazebench.tasks.interface import Interface
 from mazebench.tasks.sensors import LIDAR
@@ -88,6 +88,16 @@ class Task:
         read = None if set(changes) & set(_OF_MAZES) else (self.mazes, self.scenarios)
         task = resolve(self.options.replace(**changes), read=read)
         return dataclasses.replace(task, context_size=self.context_size) if "context_size" not in changes else task
+
+    def at_distances(self, distances: Sequence[int]) -> Task:
+        """Returns the task with goals at other distances (cells); a time limit that the options have stays as it is.
+
+        Raises:
+          InputError: if there are no distances, a maze has no cells so far apart, or the task does not draw goals.
+        """
+        if self.options.is_hierarchical:
+            raise InputError(f"expected a task whose goals are drawn at distances, found {self.name!r}")
+        return self.replace(distances=as_tuple(distances))
 
     @property
     def name(self) -> str:

@@ -293,7 +293,8 @@ def _check_together(options: TrainOptions, tasks: Sequence[Task]) -> None:
         raise InputError(f"expected different tracks, found {', '.join(options.task)}")
     if options.first_distance is None:
         return
-    if any(task.options.pairs == "fixed" or task.scenarios is not None or task.options.num_ends for task in tasks):
+    given = [task.options for task in tasks if task.scenarios is not None or task.options.num_ends]
+    if given or any(task.options.pairs == "fixed" or task.options.is_hierarchical for task in tasks):
         raise InputError("--first-distance: expected starts and goals that are drawn, found given ones")
     if options.first_distance > (farthest := max(max(task.distances) for task in tasks)):
         raise InputError(f"expected --first-distance of at most {farthest}, the farthest goals, found more")

@@ -36,17 +36,23 @@ def loading_backend() -> Iterator[None]:
     try:
         yield
     # The kind of error depends on the backend.
-    except (AttributeError, ImportError, OSError, RuntimeError) as error:
+    except (AttributeError, ImportError, OSError, RuntimeError, ValueError) as error:
         raise rendering_error(error) from None  # it says all
 
 
 def rendering_error(error: Exception) -> RenderingError:
     """Returns an error that says why `error` came up while a backend was opened, and which backends are installed."""
-    chosen = os.environ.get("MUJOCO_GL")
+    chosen, device = os.environ.get("MUJOCO_GL"), os.environ.get("MUJOCO_EGL_DEVICE_ID", "0")
+    backend, platform = (chosen or "").strip().lower(), os.environ.get("PYOPENGL_PLATFORM", "")
     setting = "MUJOCO_GL is not set" if chosen is None else f"MUJOCO_GL={chosen}"
     others = [f"MUJOCO_GL={name}" for name in installed_backends() if name != chosen]
     advice = f"set {' or '.join(others)} before Python starts" if others else "no other backend is installed here"
     reason = str(error).splitlines()[0] if str(error) else repr(error)
+    # Other variables that keep a backend from loading, after which MuJoCo lacks its renderer.
+    if backend in _LIBRARIES and platform and platform.lower() != backend:
+        reason, advice = f"PYOPENGL_PLATFORM={platform} names another backend", "unset it before Python starts"
+    elif backend == "egl" and not device.strip().isdecimal():
+        reason, advice = f"expected MUJOCO_EGL_DEVICE_ID as a number, found {device!r}", "set it before Python starts"
     return RenderingError(f"can't open a rendering context, {setting}: {reason}; {advice}")
 
 

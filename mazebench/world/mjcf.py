@@ -7,6 +7,8 @@ docs/task.md lists.
 
 from __future__ import annotations
 
+from typing import Any
+
 import mujoco
 import numpy as np
 
@@ -57,6 +59,20 @@ def maze_spec(maze: Maze) -> mujoco.MjSpec:
     return spec
 
 
+def robot_spec(maze: Maze) -> mujoco.MjSpec:
+    """Returns a maze to put a robot into: walls, and a floor that carries, under gravity and with MuJoCo's own options.
+
+    Raises:
+      InputError: as `maze_spec`.
+    """
+    require_whole(maze)
+    spec = mujoco.MjSpec()
+    spec.modelname = maze.name
+    _add_surroundings(spec, maze, floor_contacts=1)
+    _add_walls(spec, *wall_boxes(maze))
+    return spec
+
+
 def has_whole_model(maze: Maze) -> bool:
     """Returns whether MuJoCo puts the whole model of a maze together in some seconds."""
     return len(maze.boxes) <= MAX_BOXES
@@ -95,7 +111,16 @@ def boxes_spec(maze: Maze, middle: np.ndarray, half: np.ndarray) -> mujoco.MjSpe
     spec.option.timestep = PHYSICS_TIMESTEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0, 0, 0]
+    # The floor is only seen: the body's height is fixed, so it needs no contact.
+    _add_surroundings(spec, maze, floor_contacts=0)
+    _add_walls(spec, middle, half, condim=1, margin=CONTACT_MARGIN, solref=_CONTACT_SOLREF)
+    _add_goal(spec, maze.cell_size)
+    _add_body(spec, maze)
+    return spec
 
+
+def _add_surroundings(spec: mujoco.MjSpec, maze: Maze, floor_contacts: int) -> None:
+    """Adds all but walls and bodies: how the maze looks, and a floor of these `contype` and `conaffinity`."""
     # Set, not computed by MuJoCo, so that models of one size share camera and shadow ranges.
     spec.stat.center = [maze.side / 2, maze.side / 2, WALL_HEIGHT / 2]
     spec.stat.extent = maze.side
@@ -110,11 +135,7 @@ def boxes_spec(maze: Maze, middle: np.ndarray, half: np.ndarray) -> mujoco.MjSpe
     spec.visual.headlight.specular = [0, 0, 0]
 
     _add_materials(spec, maze)
-    _add_room(spec, maze.side)
-    _add_walls(spec, middle, half)
-    _add_goal(spec, maze.cell_size)
-    _add_body(spec, maze)
-    return spec
+    _add_room(spec, maze.side, floor_contacts)
 
 
 def _add_materials(spec: mujoco.MjSpec, maze: Maze) -> None:
@@ -152,18 +173,17 @@ def _add_materials(spec: mujoco.MjSpec, maze: Maze) -> None:
     spec.add_material(name="goal", rgba=[*colors.GOAL, 0.7], emission=0.1)
 
 
-def _add_room(spec: mujoco.MjSpec, side: float) -> None:
+def _add_room(spec: mujoco.MjSpec, side: float, floor_contacts: int) -> None:
     middle = side / 2
     world = spec.worldbody
-    # The floor is only seen: the body's height is fixed, so it needs no contact.
     world.add_geom(
         name="floor",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         pos=[middle, middle, 0],
         size=[middle, middle, 0.1],
         material="floor",
-        contype=0,
-        conaffinity=0,
+        contype=floor_contacts,
+        conaffinity=floor_contacts,
     )
     world.add_light(
         name="sun",
@@ -202,7 +222,8 @@ def parked_boxes(count: int, cell_size: float) -> tuple[np.ndarray, np.ndarray]:
     return middle, half
 
 
-def _add_walls(spec: mujoco.MjSpec, middle: np.ndarray, half: np.ndarray) -> None:
+def _add_walls(spec: mujoco.MjSpec, middle: np.ndarray, half: np.ndarray, **contacts: Any) -> None:
+    """Adds wall boxes whose contacts have some parameters that are not MuJoCo's own."""
     for index, (pos, size) in enumerate(zip(middle, half, strict=True)):
         spec.worldbody.add_geom(
             name=f"wall_{index}",
@@ -210,9 +231,7 @@ def _add_walls(spec: mujoco.MjSpec, middle: np.ndarray, half: np.ndarray) -> Non
             pos=pos,
             size=size,
             material="wall",
-            condim=1,
-            margin=CONTACT_MARGIN,
-            solref=_CONTACT_SOLREF,
+            **contacts,
         )
 
 

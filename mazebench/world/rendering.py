@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from mazebench.world.backend import rendering_error
+from mazebench.world.backend import RenderingError, rendering_error
 from mazebench.world.models import MazeModels, Seen
 
 CAMERAS = ("top", "chase", "egocentric")
@@ -69,6 +69,9 @@ class Cameras:
         return renderer.render()
 
     def _open(self, most_shown: int) -> mujoco.Renderer:
+        global _failure, _has_opened
+        if _failure:
+            raise RenderingError(_failure)
         self._most_shown, self._added = most_shown, None
         model = copy.copy(self._models.seen(0).model)
         if not self._smooth:
@@ -77,7 +80,10 @@ class Cameras:
             renderer = mujoco.Renderer(model, self._pixels, self._pixels, max_geom=self._most_shown)
         # MUJOCO_GL names the backend, and each backend raises errors of its own.
         except (mujoco.FatalError, RuntimeError, ImportError, AttributeError, OSError, ValueError) as error:
-            raise rendering_error(error) from error
+            found = rendering_error(error)
+            _failure = None if _has_opened else str(found)
+            raise found from error
+        _has_opened = True
 
         # The cameras close before the interpreter unloads the modules that closing needs. Exit functions run in reverse
         # order: registered again after a context is opened, this one runs before the backend's.
@@ -104,6 +110,10 @@ def set_boxes(geoms: Sequence[mujoco.MjvGeom], middle: np.ndarray, half: np.ndar
     for geom, size, place in zip(geoms, half, middle, strict=True):
         mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_BOX, size, place, np.eye(3).ravel(), rgba)
 
+
+# MuJoCo ends the process when it tries again after the first context has failed to open.
+_has_opened = False  # a context, in this process
+_failure: str | None = None  # of the first one
 
 _open_cameras: weakref.WeakSet[Cameras] = weakref.WeakSet()
 
