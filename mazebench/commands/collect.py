@@ -27,6 +27,9 @@ def collect(
     out: Annotated[pathlib.Path, typer.Option(help="Folder for the data set, a new or an empty one.")],
     values: dict[str, Any],
     episodes: Annotated[int, typer.Option(min=1, help="How many episodes.")] = 100,
+    context_per_step: Annotated[
+        bool, typer.Option(help="Write the context of each step into its observation, as in the environment.")
+    ] = False,
 ) -> None:
     """Collect demonstrations of an agent on training mazes, as a Minari data set."""
     load_mujoco(renders=has_camera(values.get("sensors", ())))
@@ -38,5 +41,7 @@ def collect(
         stopping.stoppable(lambda: ("nothing is kept; run it again",)),
         progress.evaluating(f"{agent}, {task.title}", progress.Kept()) as show,
     ):
-        collect_demonstrations(options, episodes, out, num_envs=run.num_envs, progress=show)
+        collect_demonstrations(
+            options, episodes, out, num_envs=run.num_envs, context_per_step=context_per_step, progress=show
+        )
     print(f"{episodes:,} episodes in {out}")

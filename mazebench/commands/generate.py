@@ -30,7 +30,7 @@ def generate(
         str,
         typer.Option(
             "--format",
-            help="Files to write: any of mjcf, mjcf-textured, mjcf-robot, txt, png, ros, glb, obj, stl; separated by commas.",
+            help="Any of mjcf, mjcf-textured, mjcf-robot, txt, png, ros, glb, obj, stl, separated by commas.",
         ),
     ] = "txt,mjcf,png,glb",
     mazes_file: Annotated[

@@ -156,6 +156,7 @@ class Environment(control.Environment):
 
     physics: Physics
     task: Task
+
     def __init__(self, task: MazeTask, seed: int | None = None):
         """Opens the environment; `seed` is that of the first reset.
 

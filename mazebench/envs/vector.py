@@ -167,10 +167,12 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         for i, value in enumerate(seeds):
             if value is not None and mask[i]:
                 self._rngs[i] = np.random.default_rng(value)
-        if seed is not None:  # Gymnasium's own generator, of which episodes do not depend
-            given = seeds[:1] if np.ndim(seed) == 0 else seeds
-            self._np_random = np.random.default_rng([value for value in given if value is not None])
-            self._np_random_seed = given[0] if np.ndim(seed) == 0 else tuple(given)
+        # Gymnasium's own generator, from which no episode draws.
+        has_many = isinstance(seed, Sequence | np.ndarray)
+        given = [value for value in (seeds if has_many else seeds[:1]) if value is not None]
+        if given:
+            self._np_random = np.random.default_rng(given)
+            self._np_random_seed = tuple(seeds) if has_many else given[0]  # type: ignore[assignment]  # as SyncVectorEnv
         self._was_reset = True
         indices = np.flatnonzero(mask)
         self._begin_episodes(indices)

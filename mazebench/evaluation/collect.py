@@ -6,23 +6,26 @@ arrays; those that are privileged are for training.
 
 from __future__ import annotations
 
+import dataclasses
+import io
 import pathlib
 import re
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from mazebench import __version__
 from mazebench.agent import Observation
+from mazebench.agent_loading import load_agent_class
 from mazebench.envs.env_spec import env_spec_of
 from mazebench.envs.spaces import action_space, observation_space
-from mazebench.errors import InputError, remark
+from mazebench.errors import InputError, RunError, remark
 from mazebench.evaluation.chunk import Result, run_trials
 from mazebench.evaluation.eval_options import NUM_ENVS, EvalOptions
 from mazebench.evaluation.plan import Plan, build_agent, make_plan
-from mazebench.storage.files import writing_to
+from mazebench.storage.files import open_whole, writing_to
 from mazebench.tasks.episode import sample_episode
 from mazebench.tasks.rules import reward
 from mazebench.tasks.task import Task, resolve
@@ -35,6 +38,8 @@ try:
 except ModuleNotFoundError as error:
     raise InputError("mazebench collect needs Minari, which the extra [minari] brings (docs/start.md)") from error
 
+_NUM_REFERENCE = 20  # episodes at most, in which the scores are measured that stand for 0 and 1
+
 
 def collect_demonstrations(
     options: EvalOptions,
@@ -42,6 +47,7 @@ def collect_demonstrations(
     folder: pathlib.Path,
     *,
     num_envs: int = NUM_ENVS,
+    context_per_step: bool = False,
     progress: Callable[[int, int], None] = lambda ended, of: None,
 ) -> None:
     """Writes demonstrations of an agent as the data set `folder`, all or nothing.
@@ -51,16 +57,19 @@ def collect_demonstrations(
       num_episodes: how many.
       folder: a new or an empty one.
       num_envs: environments side by side, at most.
+      context_per_step: whether each observation has its context, as in the environment; else the infos have each
+        context once.
       progress: called as episodes end, with their number and that of all.
 
     Raises:
       InputError: if an option can't be met, the mazes are those of the split eval, or `folder` is not empty or can't be
         written.
-      RunError: if the agent failed.
+      RunError: if the agent failed, or the disk is full in the end.
     """
     if options.task.split == "eval":
         raise InputError("expected split 'train' or 'dev' to collect from, found 'eval', whose mazes are for results")
-    temporary = folder.absolute().with_name(folder.name + ".tmp")  # Minari can't make it at a relative path
+    folder = folder.absolute()  # Minari can't make one at a relative path
+    temporary = folder.with_name(folder.name + ".tmp")
     with writing_to(folder):
         if folder.exists() and (found := sorted(path.name for path in folder.iterdir())):
             raise InputError(f"{folder}: expected a new or an empty folder, found {found[0]!r} in it")
@@ -68,10 +77,11 @@ def collect_demonstrations(
         if plan.remark:
             remark(plan.remark)
         shutil.rmtree(temporary, ignore_errors=True)
+        folder.parent.mkdir(parents=True, exist_ok=True)
         try:
-            # The observations of the data set have no context: it is in the infos, once for each leg.
             task, space = plan.task, observation_space(plan.task)
-            del space.spaces["context"]
+            if not context_per_step:
+                del space.spaces["context"]
             storage = MinariStorage.new(
                 temporary,
                 observation_space=space,
@@ -79,38 +89,68 @@ def collect_demonstrations(
                 env_spec=env_spec_of(task),
                 jpeg_encoding=False,  # which would change pictures
             )
-            storage.update_metadata(
-                {
-                    "dataset_id": "mazebench/{}-v0".format(
-                        re.sub(r"[^-\w]", "-", f"{task.options.slug}-{options.agent}")
-                    ),
-                    "minari_version": minari.__version__,
-                    "algorithm_name": options.agent,
-                    "description": f"{task}, driven by {options.agent}",
-                    "requirements": [f"mazebench-mujoco=={__version__}"],
-                }
-            )
-            storage.update_episodes(_play(plan, num_episodes, num_envs, progress))
-            temporary.rename(folder)
+            trials = _trials_of(plan, num_episodes)
+            episodes = _play(plan, trials, num_envs, progress)
+            metadata = _reference_scores(task, dict(list(trials.items())[:_NUM_REFERENCE]), options.seed)
+            metadata |= {
+                "dataset_id": "mazebench/{}-v0".format(re.sub(r"[^-\w]", "-", f"{task.options.slug}-{options.agent}")),
+                "minari_version": minari.__version__,
+                "algorithm_name": options.agent,
+                "description": f"{task.options}, driven by {options.agent}",
+                "requirements": [f"mazebench-mujoco=={__version__}"],
+            }
+
+            # HDF5 fills a file in memory: on a full disk it would end the process.
+            path, content = storage._file_path, io.BytesIO()
+            storage._file_path = content
+            try:
+                storage.update_episodes(_with_contexts(each) if context_per_step else each for each in episodes)
+                with open_whole(path) as file:
+                    file.write(content.getbuffer())
+                storage.update_metadata(metadata | {"dataset_size": storage.get_size()})
+                temporary.rename(folder)
+            except OSError as error:
+                raise RunError(
+                    f"{folder}: can't write there: {error.strerror}; nothing is kept, run it again"
+                ) from error
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _play(plan: Plan, num_episodes: int, num_envs: int, progress: Callable[[int, int], None]) -> list[EpisodeBuffer]:
-    """Returns the episodes, each under its seed; calls `progress` as they end."""
-    task, seed = plan.task, plan.options.seed
-    trials = {}
+def _trials_of(plan: Plan, num_episodes: int) -> dict[int, Trial]:
+    """Returns the episodes to play by their seeds."""
+    task, seed, trials = plan.task, plan.options.seed, {}
     for number in range(seed, seed + num_episodes):
         episode = sample_episode(task, np.random.default_rng(number))
         distance = task.mazes[episode.maze].distance(episode.start, episode.goal)
         # Nothing is measured by the shortest path, which only orders the episodes: the way from cell to cell will do.
         trials[number] = Trial(episode, distance, shortest_path=distance * task.cell_size)
+    return trials
+
+
+def _play(
+    plan: Plan, trials: Mapping[int, Trial], num_envs: int, progress: Callable[[int, int], None]
+) -> list[EpisodeBuffer]:
+    """Returns the episodes, each under its seed; calls `progress` as they end."""
+    task, seed = plan.task, plan.options.seed
     agent, truth = build_agent(plan.options, plan.task, plan.agent_class), plan.agent_class.needs_truth
     played: dict[int, EpisodeBuffer] = {}
     for results in run_trials(agent, task, trials, num_envs, seed=seed, needs_truth=truth, keep=_moments):
         played |= {result.number: _demonstration(task, trials[result.number], result) for result in results}
-        progress(len(played), num_episodes)
+        progress(len(played), len(trials))
     return [played[number] for number in trials]
+
+
+def _reference_scores(task: Task, trials: Mapping[int, Trial], seed: int) -> dict[str, Any]:
+    """Returns the mean returns of `random` and `oracle` in some trials, which Minari's normalized score has as 0, 1."""
+    scores = {}
+    for name, agent_name, actions in (("ref_min_score", "random", task.actions), ("ref_max_score", "oracle", "six")):
+        played = task.replace(actions=actions, sensors=(), lidar_noise=None)  # neither observes anything
+        agent_class = load_agent_class(agent_name)
+        agent = agent_class.build(played.interface, seed=seed)
+        results = run_trials(agent, played, trials, len(trials), seed=seed, needs_truth=agent_class.needs_truth)
+        scores[name] = float(np.mean([each.success - each.steps for several in results for each in several]))
+    return scores
 
 
 def _moments(observation: Observation, info: dict[str, Any], actions: np.ndarray | None) -> list[dict[str, Any]]:
@@ -149,3 +189,10 @@ def _demonstration(task: Task, trial: Trial, result: Result) -> EpisodeBuffer:
             "privileged": {"pose": pose, "way_left": way_left},
         },
     )
+
+
+def _with_contexts(episode: EpisodeBuffer) -> EpisodeBuffer:
+    """Returns an episode whose observations have their contexts, instead of its infos."""
+    infos = dict(episode.infos or {})
+    observations = {**episode.observations, "context": infos.pop("context")[infos["leg"]]}
+    return dataclasses.replace(episode, observations=observations, infos=infos)
