@@ -63,3 +63,30 @@ for make in (
     said = run_python("-c", program, variables={"MUJOCO_GL": "elg"}, cwd=tmp_path).stdout.splitlines()
     assert said == said[:1] * 5
     assert said[0].startswith("can't open a rendering context, MUJOCO_GL=elg: ")
+
+
+@pytest.mark.parametrize(
+    ("variables", "cause"),
+    [
+        ({"MUJOCO_GL": "egl", "PYOPENGL_PLATFORM": "glx"}, "PYOPENGL_PLATFORM=glx names another backend; unset it"),
+        ({"MUJOCO_GL": "osmesa", "PYOPENGL_PLATFORM": "egl"}, "PYOPENGL_PLATFORM=egl names another backend; unset it"),
+        ({"MUJOCO_GL": "egl", "MUJOCO_EGL_DEVICE_ID": "x"}, "MUJOCO_EGL_DEVICE_ID as a number, found 'x'"),
+        ({"MUJOCO_GL": "glfw", "DISPLAY": "", "WAYLAND_DISPLAY": ""}, ""),
+    ],
+    ids=["egl", "osmesa", "device", "display"],
+)
+def test_a_second_picture_fails_as_the_first_did_with_the_cause(variables, cause):
+    program = """
+import gymnasium, mazebench
+for seed in range(2):
+    env = gymnasium.make("mazebench/Local-13-v1", render_mode="rgb_array")
+    env.reset(seed=seed)
+    try:
+        env.render()
+    except mazebench.InputError as error:
+        print(error)
+"""
+    first, second = run_python("-c", program, variables=variables).stdout.splitlines()
+    assert first == second
+    assert first.startswith("can't open a rendering context, MUJOCO_GL=")
+    assert cause in first

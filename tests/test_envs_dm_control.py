@@ -6,6 +6,7 @@ import dm_env
 import numpy as np
 import pytest
 from absl.testing import absltest
+from dm_control.suite.wrappers import action_noise
 from dm_env import test_utils
 from processes import run_with_egl
 from simple_mazes import corridor, field
@@ -139,6 +140,32 @@ class TestSeeds:
         play(env, [FORWARD] * 7)  # breaks off in the middle
         play(env, [STRAFE_LEFT] * 200)
         assert_equal(first, play(env, self.ACTIONS, seed=4))
+
+
+class TestRandom:
+    """`task.random` is what dm_control's suite offers and others set."""
+
+    def test_the_wrapper_of_the_suite_draws_noise_that_follows_the_seed(self):
+        env = mazebench.load(mazes=dfs_mazes(), seed=4, actions="velocity")
+        noisy, still = action_noise.Wrapper(env, scale=0.3), [np.zeros(3, dtype=np.float32)] * 10
+        first = play(noisy, still)
+        assert not np.array_equal(first[-1].observation["state"], first[0].observation["state"])
+        env.reset(seed=4)
+        assert_equal(first[1:], [noisy.step(action) for action in still])
+
+    def test_a_generator_that_is_set_begins_a_stream_of_episodes(self):
+        env, other = (mazebench.load(mazes=dfs_mazes(), seed=seed) for seed in range(2))
+        streams = []
+        for each in (env, env, other):
+            each.task._random = np.random.RandomState(seed=3)  # as Shimmy's reset(seed=3)
+            streams.append([each.reset() for _ in range(3)])
+        assert_equal(streams[0], streams[1])
+        assert_equal(streams[0], streams[2])
+
+    def test_noise_changes_no_episode(self):
+        env, other = (mazebench.load(mazes=dfs_mazes(), seed=0) for _ in range(2))
+        env.task.random.normal(size=100)
+        assert_equal([env.reset(), env.reset()], [other.reset(), other.reset()])
 
 
 class TestPhysics:

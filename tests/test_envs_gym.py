@@ -171,6 +171,13 @@ class TestSteps:
 
 
 class TestRendering:
+    @pytest.mark.filterwarnings("ignore:.*You are trying to use 'human' rendering")
+    @pytest.mark.parametrize("name", ["Local-13", "LocalGoal-13", "Rough"])
+    def test_gymnasium_adds_its_wrappers_of_other_render_modes(self, name):
+        for mode, wrapper in (("rgb_array_list", "RenderCollection"), ("human", "HumanRendering")):
+            env = gymnasium.make(f"mazebench/{name}-v1", render_mode=mode)
+            assert isinstance(env, getattr(gymnasium.wrappers, wrapper))
+
     def test_two_environments_render_side_by_side(self):
         run_with_egl("""
 from gymnasium.envs import registration
@@ -187,6 +194,11 @@ assert not np.array_equal(first, second)
 np.testing.assert_array_equal(envs[0].render(), first)
 envs[0].reset(seed=1)
 np.testing.assert_array_equal(envs[0].render(), second)
+envs.append(gymnasium.make("mazebench/Local-13-v1", render_mode="rgb_array_list"))
+envs[2].reset(seed=0)
+envs[2].step(0)
+pictures = envs[2].render()
+assert len(pictures) == 2 and np.array_equal(pictures[0], first)
 for env in envs:
     env.close()
 """)
@@ -239,27 +251,28 @@ class TestSpec:
         assert again.task == envs.task
         assert (again.num_envs, again.metadata) == (3, envs.metadata)
 
-    @pytest.mark.parametrize(
-        ("name", "options", "expected"),
-        [
-            ("Local-13", {}, 100),
-            ("Local-13", {"num_goals": 3}, 300),
-            ("Rough", {"distances": [20]}, 6 * 20 + 150),
-            ("Hierarchical-13", {}, None),
-        ],
-    )
-    def test_it_tells_how_long_episodes_may_be(self, name, options, expected):
-        name = f"mazebench/{name}-v1"
-        for env, make in (
-            (gymnasium.make(name, **options), gymnasium.make),
-            (gymnasium.make_vec(name, num_envs=2, **options), gymnasium.make_vec),
-        ):
-            assert env.spec.max_episode_steps == expected
-            # The task judges the limit itself, also in an environment that is made again.
-            again = make(EnvSpec.from_json(env.spec.to_json()))
-            assert again.spec.max_episode_steps == expected
-            assert "TimeLimit" not in repr(again)
-        assert gymnasium.make_vec(env.spec).spec.max_episode_steps == expected
+    @pytest.mark.parametrize("as_spec", [str, None, "json"], ids=["id", "spec", "json"])
+    @pytest.mark.parametrize("mode", ["single", "goal", None, "sync", "async", "vector_entry_point"])
+    def test_a_goal_on_the_last_step_is_no_truncation_in_what_is_made_again(self, mode, as_spec):
+        name = "mazebench/LocalGoal-13-v1" if mode == "goal" else "mazebench/Local-13-v1"
+        options = {"time_limit": 4, "distances": [1]}  # four steps forward with seed 3
+        spec = name if as_spec is str else gymnasium.make(name, **options).spec
+        spec, options = (
+            EnvSpec.from_json(spec.to_json()) if as_spec == "json" else spec,
+            options if spec is name else {},
+        )
+        if mode in ("single", "goal"):
+            env = gymnasium.make(spec, **options)
+            env.reset(seed=3)
+            ends = [env.step(FORWARD)[2:4] for _ in range(4)]
+        else:
+            env = gymnasium.make_vec(spec, num_envs=1, vectorization_mode=mode, **options)
+            env.reset(seed=3)
+            steps = (env.step(np.array([FORWARD])) for _ in range(4))
+            ends = [(terminated.item(), truncated.item()) for _, _, terminated, truncated, _ in steps]
+        assert ends == [(False, False)] * 3 + [(True, False)]
+        assert env.spec.max_episode_steps is None
+        env.close()
 
     def test_a_limit_of_gymnasiums_wrapper_is_kept(self):
         spec = gymnasium.wrappers.TimeLimit(gymnasium.make("mazebench/Local-13-v1"), 7).spec

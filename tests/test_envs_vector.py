@@ -185,6 +185,24 @@ class TestSeeds:
             expected = single.reset(seed=5 if slot == 0 else None)[0]["state"]
             np.testing.assert_array_equal(second["state"][slot], expected)
 
+    def test_gymnasiums_generator_follows_the_seed_as_elsewhere(self):
+        env, sync = MazeVectorEnv(SPECS["local"], 2), SyncVectorEnv([lambda: MazeEnv(SPECS["local"])] * 2)
+        single = MazeEnv(SPECS["local"])
+        drawn = []
+        for _ in range(2):
+            env.reset(seed=np.int64(5)), single.reset(seed=5)
+            assert env.np_random_seed == 5
+            drawn.append(env.np_random.random())
+        assert drawn == [single.np_random.random()] * 2
+        for each in (env, sync):
+            each.reset(seed=[4, 9])
+        assert env.np_random_seed == sync.np_random_seed == (4, 9)
+        drawn = env.np_random.random()
+        env.reset()
+        assert env.np_random_seed == (4, 9)
+        env.reset(seed=[4, 9])
+        assert env.np_random.random() == drawn
+
 
 def without_final(infos: dict) -> dict:
     """Arrays of objects hold dicts, which numpy can't compare."""

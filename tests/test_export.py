@@ -54,6 +54,37 @@ class TestModel:
         np.testing.assert_allclose(model.geom_pos[boxes, 2] - model.geom_size[boxes, 2], 0.0, atol=1e-12)
 
 
+class TestRobotModel:
+    """The model that a robot is put into: walls, gravity and a floor that carries."""
+
+    ROBOT = (
+        "<mujoco><worldbody><body name='box'><freejoint/><geom type='box' size='.1 .1 .1'/></body></worldbody></mujoco>"
+    )
+
+    @pytest.mark.parametrize("maze", MAZES[:2], ids=lambda maze: maze.name)
+    def test_a_body_falls_on_the_floor_and_stays_between_the_walls(self, maze, tmp_path):
+        write_mjcf(maze, tmp_path / "maze.xml", for_robot=True)
+        spec = mujoco.MjSpec.from_file(str(tmp_path / "maze.xml"))
+        frame = spec.worldbody.add_frame(pos=[*maze.point(maze.free_cells[0]), 0.3])
+        spec.attach(mujoco.MjSpec.from_string(self.ROBOT), prefix="my_", frame=frame)
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, nstep=500)
+        assert data.body("my_box").xpos[2] == pytest.approx(0.1, abs=1e-3)
+        for direction in range(4):  # thrown at the walls around it
+            data.qvel[:2] = 3 * np.roll([1, 0], direction) * (1 if direction < 2 else -1)
+            mujoco.mj_step(model, data, nstep=500)
+            assert maze.is_free(maze.cell(data.body("my_box").xpos[:2]))
+            assert data.body("my_box").xpos[2] == pytest.approx(0.1, abs=1e-3)
+
+    def test_pymjcf_attaches_it(self, tmp_path):
+        mjcf = pytest.importorskip("dm_control.mjcf")
+        write_mjcf(DIAGONAL, tmp_path / "maze.xml", for_robot=True)
+        arena = mjcf.RootElement(model="arena")
+        arena.attach(mjcf.from_path(str(tmp_path / "maze.xml")))
+        assert mjcf.Physics.from_mjcf_model(arena).model.ngeom == len(cover(DIAGONAL.walls)) + 1
+
+
 @pytest.mark.parametrize("name", ['a&b<c>"d', "ümläut", "two words"])
 def test_a_name_is_escaped(name, tmp_path):
     write_mjcf(Maze(DIAGONAL.walls, name), tmp_path / "maze.xml")

@@ -160,6 +160,21 @@ class TestFullDisk:
         assert run(*LEARN, "--out", disk.path / "run", "--resume")[0] == 0
         assert learned_in(disk.path / "run") == learned_in(unbroken("learn"))
 
+    def test_a_collection_on_a_full_disk_leaves_nothing_and_can_be_run_again(self, disk: Disk, command):
+        pytest.importorskip("minari")
+        words = ["collect", "--agent", "random", "--distances", "1", "--episodes", "2", "--out"]
+        disk.leave(40)
+        status, _, errors = command(*words, disk.path / "run")
+        (line,) = said(errors)
+        assert status == 1
+        assert line.startswith(f"mazebench: {disk.path / 'run'}")
+        assert "No space left on device" in line
+        assert [path.name for path in disk.path.iterdir()] == ["filler"]
+        disk.make_room()
+        for folder in (disk.path / "run", disk.path / "other"):
+            assert command(*words, folder)[0] == 0
+        assert files_of(disk.path / "run") == files_of(disk.path / "other")
+
     def test_the_film_from_before_is_kept_when_the_disk_fills(self, disk: Disk, command):
         film = disk.path / "film.mp4"
         film.write_bytes(b"an earlier film")

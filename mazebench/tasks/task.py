@@ -15,7 +15,7 @@ from mazebench.maps.maze import MIN_CELL_SIZE, Maze, require_one_size
 from mazebench.maps.maze_files import read_mazes
 from mazebench.maps.maze_options import THIN_WALLS, ReadOptions
 from mazebench.maps.scenarios import Scenarios, are_scenarios, read_scenarios
-from mazebench.options import as_tuple, check_names, fields_of
+from mazebench.options import check_names, fields_of
 from mazebench.tasks.context import MAX_CONTEXT_SIZE, default_context_size
 from mazebench.tasks.interface import Interface
 from mazebench.tasks.sensors import LIDAR
@@ -97,7 +97,7 @@ class Task:
         """
         if self.options.is_hierarchical:
             raise InputError(f"expected a task whose goals are drawn at distances, found {self.name!r}")
-        return self.replace(distances=as_tuple(distances))
+        return self.replace(distances=(None,) if distances is None else distances)  # None would leave them open
 
     @property
     def name(self) -> str:
