@@ -90,17 +90,16 @@ class Option(NamedTuple):
         if not self.is_tuple:
             return self._checked_item(name, _plain(value), value)
         values = as_tuple(value)
-        whole = value if isinstance(value, str) else values
-        return tuple(self._checked_item(name, item, whole) for item in values)
+        if self.plain_kind is int and isinstance(value, str):
+            raise InputError(f"expected {name} as numbers, such as range(1, 4), found {value!r}"[:_LONGEST])
+        return tuple(self._checked_item(name, item, values) for item in values)
 
     def _checked_item(self, name: str, value: Any, whole: Any) -> Any:
-        """Returns a value, or an element of the tuple or text `whole`, in its own type."""
+        """Returns a value, or an element of the tuple `whole`, in its own type."""
         kind = self.plain_kind
         accepted = (int, float) if kind is float else kind
         if not isinstance(value, accepted) or (isinstance(value, bool) and kind is not bool):
-            is_text = self.is_tuple and kind is int and isinstance(whole, str)
-            example = ", as (1, 2, 3) or range(1, 4)" if is_text else ""
-            raise InputError(f"expected {name} of type {self.kind_text}{example}, found {whole!r}"[:_LONGEST])
+            raise InputError(f"expected {name} of type {self.kind_text}, found {whole!r}"[:_LONGEST])
         if self.choices is not None and value not in self.choices:
             raise unknown(name, value, self.choices)
         if kind is float and None in (self.lowest, self.highest) and not math.isfinite(value):

@@ -68,12 +68,12 @@ for make in (
 @pytest.mark.parametrize(
     ("variables", "cause"),
     [
-        ({"MUJOCO_GL": "egl", "PYOPENGL_PLATFORM": "glx"}, "PYOPENGL_PLATFORM=glx names another backend; unset it"),
-        ({"MUJOCO_GL": "osmesa", "PYOPENGL_PLATFORM": "egl"}, "PYOPENGL_PLATFORM=egl names another backend; unset it"),
+        ({"MUJOCO_GL": "egl", "PYOPENGL_PLATFORM": "glx"}, "PYOPENGL_PLATFORM=glx names another backend"),
+        ({"MUJOCO_GL": "osmesa", "PYOPENGL_PLATFORM": "egl"}, "PYOPENGL_PLATFORM=egl names another backend"),
         ({"MUJOCO_GL": "egl", "MUJOCO_EGL_DEVICE_ID": "x"}, "MUJOCO_EGL_DEVICE_ID as a number, found 'x'"),
-        ({"MUJOCO_GL": "glfw", "DISPLAY": "", "WAYLAND_DISPLAY": ""}, ""),
+        ({"MUJOCO_GL": "glfw", "DISPLAY": "", "WAYLAND_DISPLAY": ""}, "MUJOCO_GL=glfw"),
     ],
-    ids=["egl", "osmesa", "device", "display"],
+    ids=str,
 )
 def test_a_second_picture_fails_as_the_first_did_with_the_cause(variables, cause):
     program = """
@@ -88,5 +88,4 @@ for seed in range(2):
 """
     first, second = run_python("-c", program, variables=variables).stdout.splitlines()
     assert first == second
-    assert first.startswith("can't open a rendering context, MUJOCO_GL=")
     assert cause in first

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import warnings
-from collections.abc import Sequence
 from typing import Any
 
 import dm_env
@@ -95,20 +94,17 @@ class Task(TaskRunner, control.Task):
     """The task as dm_control asks for it; `mazebench.tasks.rules.Rules` describes it."""
 
     def __init__(self, task: MazeTask, seed: int | None = None):
+        self._generator = np.random.RandomState()
         super().__init__(task, seed)
-        self._generator = _generator(seed)
 
     def choose_episode(self, seed: int | None = None, episode: Episode | None = None) -> None:
         super().choose_episode(seed, episode)
         if seed is not None:
-            self._generator = _generator(seed)
+            self._generator = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed)))
 
     @property
     def random(self) -> np.random.RandomState:
-        """The generator of dm_control's wrappers, such as those that add noise; episodes do not draw from it.
-
-        One that is set also seeds the stream of episodes.
-        """
+        """The generator of dm_control's wrappers, from which no episode draws; one that is set seeds the episodes."""
         return self._generator
 
     @random.setter
@@ -146,11 +142,6 @@ class Task(TaskRunner, control.Task):
         return result
 
 
-def _generator(seed: int | None) -> np.random.RandomState:
-    """Returns a new generator of the kind that dm_control's tasks have, also of a large seed."""
-    return np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed)))
-
-
 class Environment(control.Environment):
     """A dm_control Environment whose `reset` also takes a seed, or the episode to play."""
 
@@ -169,16 +160,8 @@ class Environment(control.Environment):
 
     @property
     def maze_task(self) -> MazeTask:
-        """The task that is played, with the distances of the episodes that follow."""
+        """The task that is played, with the distances of the episodes that follow (`task.draw_distances`)."""
         return self.task.maze_task
-
-    def draw_distances(self, distances: Sequence[int]) -> None:
-        """Draws episodes with goals at these distances (cells) from now on; the one under way is not changed.
-
-        Raises:
-          InputError: as `mazebench.Task.at_distances`.
-        """
-        self.task.draw_distances(distances)
 
     def reset(self, seed: int | None = None, episode: Episode | None = None) -> dm_env.TimeStep:
         """Starts an episode: the next one of the environment's stream, the first one of `seed`'s, or `episode`."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import abc
 import dataclasses
 import os
 from enum import Enum
@@ -20,16 +19,11 @@ from mazebench.tasks.task import Task
 class JsonSpec:
     """Base class of environments whose `spec.to_json()` describes them, mazes of one's own included.
 
-    The spec has no `max_episode_steps`, for which Gymnasium would put a `TimeLimit` around an environment that is made
-    of it.
+    It has no `max_episode_steps`, for which Gymnasium would put a `TimeLimit` around what is made of it.
     """
 
+    task: Task
     _spec: EnvSpec | None = None
-
-    @property
-    @abc.abstractmethod
-    def task(self) -> Task:
-        """The task that is played."""
 
     @property
     def spec(self) -> EnvSpec | None:

@@ -44,6 +44,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         """
         arguments = Arguments(render_mode=render_mode, camera=camera)
         self.runner = TaskRunner(task, seed)
+        self.task = task
         walls = near_walls_of(task.mazes, 1)
         self.simulation = MujocoSimulation(walls.model, walls)
         self._needs_reset = True
@@ -53,28 +54,17 @@ class MazeEnv(JsonSpec, gymnasium.Env):
         self._camera = arguments.camera
         self._cameras: Cameras | None = None  # of `render`
 
-    @property
-    def task(self) -> Task:
-        """The task that is played, with the distances of the episodes that follow."""
-        return self.runner.maze_task
-
     def draw_distances(self, distances: Sequence[int]) -> None:
-        """Draws episodes with goals at these distances (cells) from now on; the one under way is not changed.
-
-        Raises:
-          InputError: as `mazebench.Task.at_distances`.
-        """
+        """Draws episodes with goals at these distances (cells) from now on; see `mazebench.Task.at_distances`."""
         self.runner.draw_distances(distances)
+        self.task = self.runner.maze_task
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Starts an episode, the same for the same `seed`.
+        """Starts an episode, the same for the same `seed`, or the one of `options={"episode": Episode(...)}`.
 
-        Args:
-          seed: of the stream of episodes that begins; with None, the stream goes on.
-          options: `{"episode": Episode(...)}` plays that one. `{"distances": range(1, 4)}` calls `draw_distances`
-            before.
+        `options={"distances": range(1, 4)}` calls `draw_distances` before.
 
         Raises:
           gymnasium.error.Error: if `seed` is not a natural number.
@@ -137,6 +127,7 @@ class MazeEnv(JsonSpec, gymnasium.Env):
           InputError: if it is a state of an environment with other mazes.
         """
         self.runner.set_state(state, self.simulation)
+        self.task = self.runner.maze_task
         self._needs_reset = state.needs_reset
 
     def __getstate__(self) -> dict[str, Any]:

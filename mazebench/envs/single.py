@@ -43,8 +43,9 @@ class TaskRunner:
         require_task(task)
         self.maze_task = task
         self.rules = Rules(task, num_envs=1)
-        self.rng = np.random.default_rng(Arguments(seed=seed).seed)
+        self.rng = np.random.default_rng()
         self._next_episode: Episode | None = None
+        self.choose_episode(seed)
 
     def choose_episode(self, seed: int | None = None, episode: Episode | None = None) -> None:
         """Makes the next reset begin the stream of episodes of `seed`, or play `episode` instead of a drawn one.
@@ -58,11 +59,7 @@ class TaskRunner:
             self._next_episode = check_episode(self.maze_task, episode)
 
     def draw_distances(self, distances: Sequence[int]) -> None:
-        """Draws episodes with goals at these distances (cells) from now on; the one under way is not changed.
-
-        Raises:
-          InputError: as `mazebench.Task.at_distances`.
-        """
+        """Draws episodes with goals at these distances (cells) from now on; see `mazebench.Task.at_distances`."""
         self.maze_task = self.maze_task.at_distances(distances)
 
     @property

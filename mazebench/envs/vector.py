@@ -73,7 +73,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """Opens the environments.
 
         Args:
-          task: the task, or those of several tracks.
+          task: the task, or those of several tracks; the attribute of this name is the first one.
           num_envs: B.
           seed: of the first reset, as in `reset`.
           num_threads: of the simulation; 0 uses all cores.
@@ -85,7 +85,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
           InputError: if an argument is not allowed.
         """
         tasks = (task,) if isinstance(task, Task) else tuple(task)
-        task = tasks[0]
+        self.task = task = tasks[0]
         require_task(task)
         arguments = Arguments(num_envs=num_envs, num_threads=num_threads, render_mode=render_mode)
         self.num_envs = num_envs = arguments.num_envs
@@ -128,11 +128,6 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._marker = self._batch.bind("mocap_pos")
         self._top_camera: Cameras | None = None  # of `render`
 
-    @property
-    def task(self) -> Task:
-        """The task that is played, or the first of several, with the distances of the episodes that follow."""
-        return self._tasks[0]
-
     def __reduce__(self) -> tuple[Any, ...]:
         raise TypeError(
             f"{type(self).__name__} can't be copied or pickled; copy dm_env or Gymnasium environments, or make another "
@@ -158,7 +153,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """
         self._require_open()
         chosen = reset_options(options, "reset_mask", "distances")
-        mask = self._reset_mask(chosen.get("reset_mask"))
+        mask = self._checked_mask(chosen.get("reset_mask", np.ones(self.num_envs, dtype=bool)))
         if not (self._was_reset or mask.all()):
             raise gymnasium.error.ResetNeeded("expected a call to reset() of all environments before this one of some")
         seeds = _seeds(seed, self.num_envs)
@@ -168,21 +163,18 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
             if value is not None and mask[i]:
                 self._rngs[i] = np.random.default_rng(value)
         # Gymnasium's own generator, from which no episode draws.
-        has_many = isinstance(seed, Sequence | np.ndarray)
-        given = [value for value in (seeds if has_many else seeds[:1]) if value is not None]
-        if given:
+        has_one = not isinstance(seed, Sequence | np.ndarray)
+        if given := [value for value in (seeds[:1] if has_one else seeds) if value is not None]:
             self._np_random = np.random.default_rng(given)
-            self._np_random_seed = tuple(seeds) if has_many else given[0]  # type: ignore[assignment]  # as SyncVectorEnv
+            self._np_random_seed = given[0] if has_one else tuple(seeds)  # type: ignore[assignment]  # as SyncVectorEnv
         self._was_reset = True
         indices = np.flatnonzero(mask)
         self._begin_episodes(indices)
         self._observe(indices)
         return self._observations(), self._infos(mask.copy())
 
-    def _reset_mask(self, mask: Any) -> np.ndarray:
-        """Returns `[B]` bool: which environments to reset, all if the option of this name is not given."""
-        if mask is None:
-            return np.ones(self.num_envs, dtype=bool)
+    def _checked_mask(self, mask: Any) -> np.ndarray:
+        """Returns the option `reset_mask` if it is `[B]` bool."""
         if not (isinstance(mask, np.ndarray) and mask.dtype == bool and mask.shape == (self.num_envs,) and mask.any()):
             raise InputError(
                 f"expected reset_mask, an array of {self.num_envs} bool, not all False, found {mask!r}"[:200]
@@ -315,12 +307,9 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         return infos | {f"_{key}": mask for key in infos}
 
     def draw_distances(self, distances: Sequence[int]) -> None:
-        """Draws episodes with goals at these distances (cells) from now on; those under way are not changed.
-
-        Raises:
-          InputError: as `mazebench.Task.at_distances`.
-        """
+        """Draws episodes with goals at these distances (cells) from now on; see `mazebench.Task.at_distances`."""
         self._tasks = tuple(task.at_distances(distances) for task in self._tasks)
+        self.task = self._tasks[0]
 
     def velocity(self) -> np.ndarray:
         """Returns the true velocities `[B, 2]` (x and y on the map, m/s), for labels; agents must not use them."""

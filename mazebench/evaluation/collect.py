@@ -57,8 +57,7 @@ def collect_demonstrations(
       num_episodes: how many.
       folder: a new or an empty one.
       num_envs: environments side by side, at most.
-      context_per_step: whether each observation has its context, as in the environment; else the infos have each
-        context once.
+      context_per_step: whether each observation has its context; else the infos have each context once.
       progress: called as episodes end, with their number and that of all.
 
     Raises:
@@ -110,9 +109,7 @@ def collect_demonstrations(
                 storage.update_metadata(metadata | {"dataset_size": storage.get_size()})
                 temporary.rename(folder)
             except OSError as error:
-                raise RunError(
-                    f"{folder}: can't write there: {error.strerror}; nothing is kept, run it again"
-                ) from error
+                raise RunError(f"{folder}: can't write there: {error.strerror}; nothing is kept") from error
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
 
@@ -131,12 +128,13 @@ def _trials_of(plan: Plan, num_episodes: int) -> dict[int, Trial]:
 def _play(
     plan: Plan, trials: Mapping[int, Trial], num_envs: int, progress: Callable[[int, int], None]
 ) -> list[EpisodeBuffer]:
-    """Returns the episodes, each under its seed; calls `progress` as they end."""
-    task, seed = plan.task, plan.options.seed
+    """Returns the episodes; calls `progress` as they end."""
     agent, truth = build_agent(plan.options, plan.task, plan.agent_class), plan.agent_class.needs_truth
     played: dict[int, EpisodeBuffer] = {}
-    for results in run_trials(agent, task, trials, num_envs, seed=seed, needs_truth=truth, keep=_moments):
-        played |= {result.number: _demonstration(task, trials[result.number], result) for result in results}
+    for results in run_trials(
+        agent, plan.task, trials, num_envs, seed=plan.options.seed, needs_truth=truth, keep=_moments
+    ):
+        played |= {result.number: _demonstration(plan.task, trials[result.number], result) for result in results}
         progress(len(played), len(trials))
     return [played[number] for number in trials]
 

@@ -26,11 +26,7 @@ class Arguments(Options):
 
 
 def reset_options(options: Mapping[str, Any] | None, *names: str) -> Mapping[str, Any]:
-    """Returns the options of a reset by name, without any where there are none.
-
-    Raises:
-      InputError: if they are no mapping, or have others than `names`.
-    """
+    """Returns the options of a reset, or raises `InputError` if they are no mapping or have others than `names`."""
     if not isinstance(options, Mapping | None):
         raise InputError(f"expected options as a dict, found {type(options).__name__}")
     for name in options or {}:

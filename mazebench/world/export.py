@@ -9,7 +9,7 @@ import trimesh
 
 from mazebench.maps.maze import WALL_HEIGHT, Maze
 from mazebench.storage.files import open_whole
-from mazebench.world.mjcf import maze_spec, robot_spec, wall_boxes
+from mazebench.world.mjcf import maze_spec, wall_boxes
 from mazebench.world.textures import add_textures
 
 MESH_FORMATS = ("glb", "obj", "stl")
@@ -25,14 +25,12 @@ _TO_GLTF = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
 def write_mjcf(maze: Maze, path: pathlib.Path, textures: bool = False, for_robot: bool = False) -> None:
-    """Writes a model that MuJoCo and its viewer open without any other file.
-
-    With `textures` it has the textured look, and `for_robot` it is that of `robot_spec`.
+    """Writes a model that MuJoCo opens without any other file; with `textures`, or to put a robot into.
 
     Raises:
       OSError: if it can't be written.
     """
-    spec = robot_spec(maze) if for_robot else maze_spec(maze)
+    spec = maze_spec(maze, for_robot)
     if textures:
         add_textures(spec, maze)
     spec.compile()

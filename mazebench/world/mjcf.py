@@ -33,6 +33,7 @@ _YAW_INERTIA = 0.02
 CONTACT_MARGIN = 0.03
 # As stiff as the timestep allows, and overdamped: with a damping ratio of 1 up to 18 % of the speed rebounds.
 _CONTACT_SOLREF = [2 * PHYSICS_TIMESTEP, 3.0]
+_CONTACTS: dict[str, Any] = {"condim": 1, "margin": CONTACT_MARGIN, "solref": _CONTACT_SOLREF}  # of walls
 _EYE_HEIGHT = 0.45
 MAX_BOXES = 32_768  # of a whole model; the time that MuJoCo takes for them, 2 s, grows with the square
 _PARKED_DEPTH = 10.0  # metres below the floor
@@ -47,29 +48,17 @@ NUM_CONTROLS = 5
 _FORWARD, _BACKWARD, _LEFT, _RIGHT, _TURN = range(NUM_CONTROLS)
 
 
-def maze_spec(maze: Maze) -> mujoco.MjSpec:
+def maze_spec(maze: Maze, for_robot: bool = False) -> mujoco.MjSpec:
     """Returns the whole model of one maze, which `mazebench generate` writes.
+
+    A model to put a robot into has walls and a floor that carries, gravity and MuJoCo's own options, and no bodies.
 
     Raises:
       InputError: if it has more boxes than MuJoCo puts together in some seconds.
     """
     require_whole(maze)
-    spec = boxes_spec(maze, *wall_boxes(maze))
+    spec = boxes_spec(maze, *wall_boxes(maze), for_robot)
     spec.modelname = maze.name
-    return spec
-
-
-def robot_spec(maze: Maze) -> mujoco.MjSpec:
-    """Returns a maze to put a robot into: walls, and a floor that carries, under gravity and with MuJoCo's own options.
-
-    Raises:
-      InputError: as `maze_spec`.
-    """
-    require_whole(maze)
-    spec = mujoco.MjSpec()
-    spec.modelname = maze.name
-    _add_surroundings(spec, maze, floor_contacts=1)
-    _add_walls(spec, *wall_boxes(maze))
     return spec
 
 
@@ -98,29 +87,22 @@ def wall_boxes(maze: Maze) -> tuple[np.ndarray, np.ndarray]:
     return placed_boxes(top, left, bottom, right, maze.size, maze.cell_size)
 
 
-def boxes_spec(maze: Maze, middle: np.ndarray, half: np.ndarray) -> mujoco.MjSpec:
+def boxes_spec(maze: Maze, middle: np.ndarray, half: np.ndarray, for_robot: bool = False) -> mujoco.MjSpec:
     """Returns a model with the floor, body and goal of `maze`, and wall boxes of its own.
 
     Args:
       maze: where the body begins, in its first free cell.
       middle: `[K, 3]` m, of the boxes.
       half: `[K, 3]` m, their half sides.
+      for_robot: see `maze_spec`.
     """
     spec = mujoco.MjSpec()
     spec.modelname = "maze"
-    spec.option.timestep = PHYSICS_TIMESTEP
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.gravity = [0, 0, 0]
-    # The floor is only seen: the body's height is fixed, so it needs no contact.
-    _add_surroundings(spec, maze, floor_contacts=0)
-    _add_walls(spec, middle, half, condim=1, margin=CONTACT_MARGIN, solref=_CONTACT_SOLREF)
-    _add_goal(spec, maze.cell_size)
-    _add_body(spec, maze)
-    return spec
+    if not for_robot:
+        spec.option.timestep = PHYSICS_TIMESTEP
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        spec.option.gravity = [0, 0, 0]
 
-
-def _add_surroundings(spec: mujoco.MjSpec, maze: Maze, floor_contacts: int) -> None:
-    """Adds all but walls and bodies: how the maze looks, and a floor of these `contype` and `conaffinity`."""
     # Set, not computed by MuJoCo, so that models of one size share camera and shadow ranges.
     spec.stat.center = [maze.side / 2, maze.side / 2, WALL_HEIGHT / 2]
     spec.stat.extent = maze.side
@@ -135,7 +117,12 @@ def _add_surroundings(spec: mujoco.MjSpec, maze: Maze, floor_contacts: int) -> N
     spec.visual.headlight.specular = [0, 0, 0]
 
     _add_materials(spec, maze)
-    _add_room(spec, maze.side, floor_contacts)
+    _add_room(spec, maze.side, for_robot)
+    _add_walls(spec, middle, half, **({} if for_robot else _CONTACTS))
+    if not for_robot:
+        _add_goal(spec, maze.cell_size)
+        _add_body(spec, maze)
+    return spec
 
 
 def _add_materials(spec: mujoco.MjSpec, maze: Maze) -> None:
@@ -173,17 +160,18 @@ def _add_materials(spec: mujoco.MjSpec, maze: Maze) -> None:
     spec.add_material(name="goal", rgba=[*colors.GOAL, 0.7], emission=0.1)
 
 
-def _add_room(spec: mujoco.MjSpec, side: float, floor_contacts: int) -> None:
+def _add_room(spec: mujoco.MjSpec, side: float, carries: bool) -> None:
     middle = side / 2
     world = spec.worldbody
+    # Without a robot, the floor is only seen: our body's height is fixed, so it needs no contact.
     world.add_geom(
         name="floor",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         pos=[middle, middle, 0],
         size=[middle, middle, 0.1],
         material="floor",
-        contype=floor_contacts,
-        conaffinity=floor_contacts,
+        contype=int(carries),
+        conaffinity=int(carries),
     )
     world.add_light(
         name="sun",
@@ -223,7 +211,6 @@ def parked_boxes(count: int, cell_size: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _add_walls(spec: mujoco.MjSpec, middle: np.ndarray, half: np.ndarray, **contacts: Any) -> None:
-    """Adds wall boxes whose contacts have some parameters that are not MuJoCo's own."""
     for index, (pos, size) in enumerate(zip(middle, half, strict=True)):
         spec.worldbody.add_geom(
             name=f"wall_{index}",

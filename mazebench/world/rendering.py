@@ -23,6 +23,10 @@ class Cameras:
     All pictures have the textures of the first model, which the context holds.
     """
 
+    # Why the process could not open its first context, after which MuJoCo ends the process at another try; empty if it
+    # could.
+    _failure: str | None = None
+
     def __init__(self, models: MazeModels, names: tuple[str, ...], pixels: int = _PICTURE_SIZE, smooth: bool = True):
         """`names` are of `CAMERAS`, `pixels` is the side of a picture.
 
@@ -69,9 +73,8 @@ class Cameras:
         return renderer.render()
 
     def _open(self, most_shown: int) -> mujoco.Renderer:
-        global _failure, _has_opened
-        if _failure:
-            raise RenderingError(_failure)
+        if Cameras._failure:
+            raise RenderingError(Cameras._failure)
         self._most_shown, self._added = most_shown, None
         model = copy.copy(self._models.seen(0).model)
         if not self._smooth:
@@ -81,9 +84,9 @@ class Cameras:
         # MUJOCO_GL names the backend, and each backend raises errors of its own.
         except (mujoco.FatalError, RuntimeError, ImportError, AttributeError, OSError, ValueError) as error:
             found = rendering_error(error)
-            _failure = None if _has_opened else str(found)
+            Cameras._failure = str(found) if Cameras._failure is None else ""
             raise found from error
-        _has_opened = True
+        Cameras._failure = ""
 
         # The cameras close before the interpreter unloads the modules that closing needs. Exit functions run in reverse
         # order: registered again after a context is opened, this one runs before the backend's.
@@ -110,10 +113,6 @@ def set_boxes(geoms: Sequence[mujoco.MjvGeom], middle: np.ndarray, half: np.ndar
     for geom, size, place in zip(geoms, half, middle, strict=True):
         mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_BOX, size, place, np.eye(3).ravel(), rgba)
 
-
-# MuJoCo ends the process when it tries again after the first context has failed to open.
-_has_opened = False  # a context, in this process
-_failure: str | None = None  # of the first one
 
 _open_cameras: weakref.WeakSet[Cameras] = weakref.WeakSet()
 
