@@ -75,17 +75,20 @@ for make in (
     ],
     ids=str,
 )
-def test_a_second_picture_fails_as_the_first_did_with_the_cause(variables, cause):
+def test_all_pictures_fail_as_the_first_did_with_the_cause(variables, cause):
     program = """
-import gymnasium, mazebench
-for seed in range(2):
-    env = gymnasium.make("mazebench/Local-13-v1", render_mode="rgb_array")
-    env.reset(seed=seed)
-    try:
-        env.render()
-    except mazebench.InputError as error:
-        print(error)
+import mazebench
+def render_dm_env():
+    env = mazebench.load("local")
+    env.reset()
+    env.physics.render()
+for _ in range(2):
+    for render in (mazebench.make("local", render_mode="rgb_array").render, render_dm_env):
+        try:
+            render()
+        except mazebench.InputError as error:
+            print(error)
 """
-    first, second = run_python("-c", program, variables=variables).stdout.splitlines()
-    assert first == second
-    assert cause in first
+    lines = run_python("-c", program, variables=variables).stdout.splitlines()
+    assert lines == lines[:1] * 4
+    assert cause in lines[0]

@@ -20,6 +20,7 @@ from mazebench.tasks.observation import observation_specs
 from mazebench.tasks.task import Task as MazeTask
 from mazebench.tasks.task_options import PROGRESS
 from mazebench.world.models import MazeModels, models_of
+from mazebench.world.rendering import opening_context
 from mazebench.world.simulation import FULL_STATE, Simulation
 
 with warnings.catch_warnings():
@@ -77,6 +78,10 @@ class Physics(Simulation, engine.Physics):
         """Computes what follows from positions and velocities, after a reset and in a new copy."""
         super().after_reset()
         self._update()  # dm_control leaves the actuators' velocities at 0, which is wrong in a copy of a moving body
+
+    def _make_rendering_contexts(self) -> None:
+        with opening_context():
+            super()._make_rendering_contexts()
 
     def full_state(self) -> np.ndarray:
         return self.get_state(FULL_STATE)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import copy
 import weakref
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import mujoco
 import numpy as np
@@ -22,10 +23,6 @@ class Cameras:
 
     All pictures have the textures of the first model, which the context holds.
     """
-
-    # Why the process could not open its first context, after which MuJoCo ends the process at another try; empty if it
-    # could.
-    _failure: str | None = None
 
     def __init__(self, models: MazeModels, names: tuple[str, ...], pixels: int = _PICTURE_SIZE, smooth: bool = True):
         """`names` are of `CAMERAS`, `pixels` is the side of a picture.
@@ -73,20 +70,12 @@ class Cameras:
         return renderer.render()
 
     def _open(self, most_shown: int) -> mujoco.Renderer:
-        if Cameras._failure:
-            raise RenderingError(Cameras._failure)
         self._most_shown, self._added = most_shown, None
         model = copy.copy(self._models.seen(0).model)
         if not self._smooth:
             model.vis.quality.offsamples = 0
-        try:
+        with opening_context():
             renderer = mujoco.Renderer(model, self._pixels, self._pixels, max_geom=self._most_shown)
-        # MUJOCO_GL names the backend, and each backend raises errors of its own.
-        except (mujoco.FatalError, RuntimeError, ImportError, AttributeError, OSError, ValueError) as error:
-            found = rendering_error(error)
-            Cameras._failure = str(found) if Cameras._failure is None else ""
-            raise found from error
-        Cameras._failure = ""
 
         # The cameras close before the interpreter unloads the modules that closing needs. Exit functions run in reverse
         # order: registered again after a context is opened, this one runs before the backend's.
@@ -106,6 +95,26 @@ class Cameras:
 
     def __del__(self) -> None:
         self.close()
+
+
+# Why the process could not open its first context; empty if it could. MuJoCo would end the process at another try.
+_failure: str | None = None
+
+
+@contextlib.contextmanager
+def opening_context() -> Iterator[None]:
+    """Turns what is raised where a rendering context is opened into a `RenderingError`, always that of the first."""
+    global _failure
+    if _failure:
+        raise RenderingError(_failure)
+    try:
+        yield
+    # MUJOCO_GL names the backend, and each backend raises errors of its own.
+    except (mujoco.FatalError, RuntimeError, ImportError, AttributeError, OSError, ValueError) as error:
+        found = rendering_error(error)
+        _failure = str(found) if _failure is None else ""
+        raise found from error
+    _failure = ""
 
 
 def set_boxes(geoms: Sequence[mujoco.MjvGeom], middle: np.ndarray, half: np.ndarray, rgba: np.ndarray) -> None:
