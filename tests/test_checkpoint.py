@@ -1,6 +1,7 @@
 """Checkpoints: what is saved comes back; a damaged one or one of another agent is refused in one line."""
 
 import pathlib
+import pickle
 
 import pytest
 import torch
@@ -47,6 +48,24 @@ def test_checkpoint_of_another_network_is_refused(tmp_path):
 def test_checkpoint_with_a_wrong_config_is_refused(tmp_path, config):
     with pytest.raises(InputError):
         MAH.build(INTERFACE, checkpoint=saved(tmp_path, config=config))
+
+
+@pytest.mark.parametrize(
+    ("content", "found"),
+    [
+        (
+            b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 1234\n",
+            "a Git LFS pointer; run git lfs pull",
+        ),
+        (b"\n<html><body>Sign in</body></html>", "an HTML page; download the file itself"),
+        (b"PK\3\4" + bytes(26) + b"archive/data.pkl", "a file of PyTorch; save its tensors as safetensors"),
+        (pickle.dumps({}), "a pickle; save its tensors as safetensors"),
+    ],
+)
+def test_what_is_no_checkpoint_is_named(tmp_path, content, found):
+    (tmp_path / "agent.safetensors").write_bytes(content)
+    with pytest.raises(InputError, match=f"found {found}"):
+        MAH.build(INTERFACE, checkpoint=tmp_path / "agent.safetensors")
 
 
 def test_missing_checkpoint_is_refused(tmp_path):

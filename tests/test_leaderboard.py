@@ -37,7 +37,7 @@ def make_part(folder, agent, task="adrift", level=1, successes=240, code="c" * 6
 
     def edit(record):
         success = record["episode"] < successes
-        lengths = {"path_length": 1.0, "shortest_path": 1.0, "steps": 1}
+        lengths = {"path_length": 0.5, "shortest_path": 0.5, "steps": 1}
         return record | lengths | {"success": success, "spl": float(success), "spl_grid": float(success)}
 
     return edit_records(part, edit)
@@ -139,7 +139,9 @@ FAULTS = {  # of an agent's folder with its result of a part
         part, lambda record: record | {"oracle_steps": record["oracle_steps"] + (record["episode"] == 7)}
     ),
     "results of one agent, found those of x, y": lambda part: make_part(part.parent, "y", level=2),
-    "the hash of the agent's code, found none": lambda part: with_provenance(part, agent_code_sha256=None),
+    "bodies of at most 3.6 m/s, found .* in episode 7": lambda part: edit_records(
+        part, lambda record: record | ({"shortest_path": 2.0} if record["episode"] == 7 else {})
+    ),
     "results of the installed benchmark, found those of another one": lambda part: with_provenance(
         part, benchmark_manifest_sha256="0" * 64
     ),

@@ -3,6 +3,7 @@
 import pathlib
 import struct
 import tempfile
+import zlib
 
 import cv2
 import hypothesis
@@ -322,6 +323,12 @@ def test_a_picture_that_is_not_read_gets_a_line_that_helps(image, options, messa
 PICTURE = draw_maze(MAZE)
 
 
+def of_size(width: int, height: int) -> bytes:
+    """The head of a PNG, which says its size."""
+    head = b"IHDR" + struct.pack(">IIBBBBB", width, height, 1, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + head + struct.pack(">I", zlib.crc32(head)) + b"\0\0\0\1IDAT"
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -329,6 +336,8 @@ PICTURE = draw_maze(MAZE)
         (b"#####\n", "a picture, found a file of another kind"),
         (b"\x89PNG\r\n\x1a\n", "a picture, found a picture that is damaged$"),
         (b"%PDF-1.7\n", "a picture, found a PDF; export it as PNG"),
+        (of_size(30000, 30000), "at most 67108864 pixels, found 268435456 or more$"),
+        (of_size(10000, 10000), "at most 67108864 pixels, found 100000000 or more$"),
         (b"PK\x03\x04\x14\0", "a picture, found a ZIP archive; unpack it$"),
         *(
             (encode(PICTURE, extension)[:500], "a picture, found a picture that is damaged$")

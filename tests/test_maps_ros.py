@@ -362,6 +362,10 @@ class TestRefusal:
             (yaml.safe_dump(METADATA | {"origin": [0.0, float("inf"), 0.0]}), "found [0.0, inf, 0.0]"),
             (yaml.safe_dump(METADATA | {"occupied_thresh": 65}), "occupied_thresh (a number from 0 to 1), found 65"),
             (yaml.safe_dump(METADATA | {"free_thresh": 0.9}), "(a number from 0 to occupied_thresh), found 0.9"),
+            ("a: &a [x, x]\nb: [*a, *a]\n", "found an alias, which no such file needs"),
+            ("[" * 3000, "expected the YAML file of a ROS map, found maximum recursion depth"),
+            (yaml.safe_dump(METADATA | {"image": "a\0b.pgm"}), "with image (the name of a picture), found 'a"),
+            (yaml.safe_dump(METADATA | {"image": "~nobody-here/a.pgm"}), "~nobody-here/a.pgm: can't read the picture"),
             (yaml.safe_dump(METADATA), "map.yaml: {folder}/map.pgm: can't read the picture: No such file"),
         ],
     )
@@ -385,6 +389,16 @@ class TestRefusal:
             read_maze(tmp_path / "map.pgm")
         path.write_text("a: 1")  # another file that has the name by chance
         assert read_maze(tmp_path / "map.pgm").size == 5
+
+
+@pytest.mark.parametrize("name", ["plant_keepout", "speed_mask", "plant-speed", "keepout"])
+def test_a_mask_of_a_costmap_filter_is_told_from_a_map(name, tmp_path, remarks):
+    for each in ("plant", name):
+        write_ros_map(Maze(generate("dfs", 7, np.random.default_rng(0)).walls, each), tmp_path / f"{each}.yaml")
+    read_maze(tmp_path / f"{name}.yaml")
+    assert "read as a building, though by its name it is a mask of a costmap filter" in remarks()[0]
+    assert [maze.name for maze in read_mazes(tmp_path)] == ["plant"]
+    assert f"{name}.yaml: left out" in remarks()[0]
 
 
 def test_a_folder_of_maps_reads_each_once(tmp_path):

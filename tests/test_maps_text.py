@@ -191,6 +191,8 @@ class TestRefusal:
             (b"\0\0\0 ftypheic", r"plan\.txt: expected a text map, found a HEIC picture; convert it to PNG$"),
             (b"%PDF-1.7\n", "found a PDF; export it as PNG and give its scale by --pixel-size$"),
             (b"  0\nSECTION\n", "found a DXF drawing; export"),
+            (b"version https://git-lfs.github.com/spec/v1\n", "found a Git LFS pointer; run git lfs pull$"),
+            (b"<!DOCTYPE html>\n<p>", "found an HTML page; download the file itself$"),
             (b"", "found an empty file$"),
         ],
     )

@@ -99,6 +99,15 @@ class TestEnvironments:
         with pytest.raises(InputError, match=r"dfs-0: expected cells of at least 0.4 m.*found 0.35 m"):
             Task.of(mazes=dfs(cell_size=0.35))
 
+    def test_a_maze_of_a_folder_that_can_not_be_played_is_left_out_with_a_line(self, tmp_path, remarks):
+        for name, maze in (("house", generate("house", 31, np.random.default_rng(0))), ("hall", field(31))):
+            (tmp_path / f"{name}.txt").write_text(format_maze(maze))
+        assert [maze.name for maze in Task.of("rebuilt", mazes=tmp_path).mazes] == ["house"]
+        assert [line for line in remarks() if line.startswith("maze 'hall' left out: ")]
+        (tmp_path / "house.txt").unlink()
+        with pytest.raises(InputError, match="expected 3 doors"):
+            Task.of("rebuilt", mazes=tmp_path)
+
     def test_tracks_keep_their_scale(self):
         with pytest.raises(InputError, match=r"track 'building': expected cells of 1 m, found 0.5 m"):
             Task.of("building", mazes=dfs(13, cell_size=0.5))

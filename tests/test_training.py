@@ -4,13 +4,16 @@ import itertools
 import json
 import logging
 import math
+import shutil
 import signal
 import time
 
+import hypothesis
 import numpy as np
 import pytest
 from acting import RandomActor
 from faults import TINY
+from hypothesis import strategies
 from simple_mazes import field
 
 from mazebench import stopping
@@ -21,7 +24,14 @@ from mazebench.tasks.task import Task, tasks_of_tracks
 from mazebench.training import loop
 from mazebench.training.collector import Collector
 from mazebench.training.loop import TrainingError, train
-from mazebench.training.run_folder import RunFolder
+from mazebench.training.run_folder import RunFolder, read_metrics
+
+JSON = strategies.recursive(
+    strategies.none() | strategies.integers() | strategies.text(),
+    lambda inner: (
+        strategies.lists(inner) | strategies.dictionaries(strategies.sampled_from(["updates", "loss"]), inner)
+    ),
+)
 
 
 def tiny_options(**changes):
@@ -72,6 +82,35 @@ def test_resume_reports_no_step_twice(tmp_path):
         file.write('{"env_steps":1200,"updates":1}\n{"env_st')  # what a killed process wrote after its last checkpoint
     train(**tiny_options(env_steps=1600), out=tmp_path, resume=True)
     assert [line["env_steps"] for line in metrics(tmp_path)] == [800, 1600]
+
+
+@pytest.mark.parametrize(
+    ("name", "edit", "message"),
+    [
+        ("counters.json", lambda content: {}, "expected the counters at 2400 agent steps"),
+        ("counters.json", lambda content: [], "expected the counters of a training"),
+        ("counters.json", lambda content: content | {"updates": "many"}, "expected the counters of a training"),
+        ("counters.json", lambda content: content | {"env_steps": 1600}, "expected the counters at 2400"),
+        ("counters.json", lambda content: {"updbtes": 3, **content}, "expected the counters at 2400"),
+        ("random.json", lambda content: {}, "expected the state of a random generator"),
+        ("random.json", lambda content: content | {"bit_generator": "PCG63"}, "expected the state of a random"),
+        ("random.json", lambda content: content | {"state": {"state": -1, "inc": 2**200}}, "expected the state of"),
+    ],
+)
+def test_a_state_of_another_form_is_refused(unbroken, tmp_path, name, edit, message):
+    folder = shutil.copytree(unbroken, tmp_path / "run")
+    path = folder / "checkpoints" / "000000002400" / name
+    path.write_text(json.dumps(edit(json.loads(path.read_text()))))
+    with pytest.raises(InputError, match=rf"{name}: {message}"):
+        train(**tiny_options(env_steps=3200), out=folder, resume=True)
+
+
+@hypothesis.given(line=JSON)
+def test_metrics_of_another_form_are_refused(tmp_path_factory, line):
+    folder = tmp_path_factory.getbasetemp()
+    (folder / "metrics.jsonl").write_text(json.dumps(line) + "\n")
+    with pytest.raises(InputError, match=r"metrics\.jsonl: expected another line 1, found "):
+        read_metrics(folder)
 
 
 def test_a_finished_run_is_not_run_again(unbroken, caplog):

@@ -49,7 +49,7 @@ def provenance(options: EvalOptions, task: Task, agent_class: type[Agent]) -> Pr
     content = {
         "benchmark_manifest_sha256": manifest_hash(task.options.benchmark),
         "task_version": TASK_VERSION,
-        "checkpoint": checkpoint,
+        "checkpoint": None if checkpoint is None else one_line(checkpoint),
         "checkpoint_sha256": file_hash(options.checkpoint),
         "checkpoint_metadata": checkpoint_metadata(options.checkpoint),
         "agent_class": f"{agent_class.__module__}:{agent_class.__qualname__}",

@@ -28,7 +28,8 @@ def own_mazes(mazes: Any, options: ReadOptions) -> tuple[Maze, ...]:
     if not hasattr(mazes, "__array__"):
         if not isinstance(mazes, Iterable):
             raise InputError(f"expected mazes as values, arrays or a path, found {type(mazes).__name__}")
-        mazes = list(mazes)
+        if not (mazes := list(mazes)):
+            raise InputError("expected at least one maze, found none")
         for item in mazes:
             if isinstance(item, str | pathlib.Path):
                 raise InputError(

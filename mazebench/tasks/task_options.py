@@ -11,7 +11,7 @@ from typing import Annotated, Any, Self
 from annotated_types import Ge, Interval
 
 from mazebench.constants import DISCRETE, VELOCITIES
-from mazebench.errors import InputError
+from mazebench.errors import InputError, one_line
 from mazebench.maps.benchmark import ALL_SPLITS, FROZEN_SPLITS, KINDS_SIZE, PAPER_BENCHMARK, TRACKS_BENCHMARK
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.maps.maze import Cell, Maze, corner_cells
@@ -222,8 +222,9 @@ class TaskOptions(SensorOptions, ReadOptions):
         values = {name: value for name, value in vars(self).items() if value is not None}
         if self.reward == SPARSE:
             del values["reward"]
-        if isinstance(self.mazes, tuple):
-            values["mazes"] = [described_maze(maze) for maze in self.mazes]
+        if self.mazes is not None:  # a path may have bytes that JSON has not
+            own = self.mazes
+            values["mazes"] = one_line(own) if isinstance(own, str) else [described_maze(maze) for maze in own]
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
     # What they mean.

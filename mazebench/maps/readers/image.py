@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import pathlib
 import re
@@ -45,26 +44,31 @@ def read_picture(path: str | pathlib.Path) -> np.ndarray:
       MazeError: if it is no picture, or has too many pixels.
     """
     content = read_at_most(path, _MAX_BYTES, "picture")
-    # A picture of many pixels is refused before they take memory.
-    with contextlib.suppress(OSError, ValueError, OverflowError), warnings.catch_warnings(action="ignore"):
-        try:
-            with PIL.Image.open(io.BytesIO(content), formats=_FORMATS) as head:
-                _require_few_pixels(head.height, head.width, path)
-        except PIL.Image.DecompressionBombError as error:
-            raise MazeError(f"{path}: expected at most {_MAX_PIXELS} pixels, found many more") from error
+    _require_few_pixels(*_declared_size(content), path)  # before they take memory
     image = _decode(content)
     if image is None:
         kind = kind_of(content) or "a file of another kind"
         raise MazeError(
             f"{path}: expected a picture, found {kind}{' that is damaged' * (kind == 'a picture')}{way_out(kind)}"
         )
-    _require_few_pixels(image.shape[0], image.shape[1], path)
+    _require_few_pixels(image.shape[1], image.shape[0], path)
     return image
 
 
-def _require_few_pixels(height: int, width: int, path: str | pathlib.Path) -> None:
-    if height * width > _MAX_PIXELS:
-        raise MazeError(f"{path}: expected at most {_MAX_PIXELS} pixels, found {width} x {height}")
+def _declared_size(content: bytes) -> tuple[int, int]:
+    """Returns the width and height that the head of a picture says; 0 if it says none."""
+    try:
+        with warnings.catch_warnings(action="ignore"), PIL.Image.open(io.BytesIO(content), formats=_FORMATS) as head:
+            return head.size
+    except PIL.Image.DecompressionBombError:
+        return 2**14, 2**14  # or more
+    except (OSError, ValueError, OverflowError):
+        return 0, 0
+
+
+def _require_few_pixels(width: int, height: int, path: str | pathlib.Path) -> None:
+    if width * height > _MAX_PIXELS:
+        raise MazeError(f"{path}: expected at most {_MAX_PIXELS} pixels, found {width * height} or more")
 
 
 def grid_of_image(image: np.ndarray, size: int | None, name: str, walls: str) -> OccupancyGrid:
