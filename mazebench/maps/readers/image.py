@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import io
 import pathlib
-import re
+import struct
 import warnings
 
 import cv2
 import numpy as np
 import PIL.Image
+import PIL.ImageOps
 
 from mazebench.errors import InputError
 from mazebench.maps.file_kinds import kind_of, way_out
@@ -25,10 +26,6 @@ from mazebench.storage.files import read_at_most
 
 _MAX_BYTES = 2**27  # of a picture's file; _MAX_PIXELS gray pixels take half of it
 _MAX_PIXELS = MAX_SIDE**2  # of a picture that is read: every drawing of this package
-_PGM_HEAD = re.compile(
-    rb"P5(?:\s|#[^\n]*\n)+(?P<width>\d{1,5})(?:\s|#[^\n]*\n)+(?P<height>\d{1,5})(?:\s|#[^\n]*\n)+(?P<white>\d{1,5})\s"
-)
-_PNG_START = b"\x89PNG\r\n\x1a\n"
 _FORMATS = ("PNG", "JPEG", "BMP", "GIF", "PPM", "TIFF", "WEBP")
 _MIN_DARK = 0.3  # share of the pixels of a picture of light walls on a dark ground
 _MARK_SATURATION = 90  # of 255, between the strongest and the weakest channel of a marker
@@ -37,38 +34,39 @@ _MAX_MAP_SHADES = 8  # of a map of one pixel a cell: walls, floor, marks; a scan
 
 
 def read_picture(path: str | pathlib.Path) -> np.ndarray:
-    """Returns the picture in a file of a kind that OpenCV reads, as `grid_of_image` takes it.
+    """Returns the picture in a file, as `grid_of_image` takes it.
 
     Raises:
       InputError: if the file can't be read or has more than 128 MiB.
       MazeError: if it is no picture, or has too many pixels.
     """
     content = read_at_most(path, _MAX_BYTES, "picture")
-    _require_few_pixels(*_declared_size(content), path)  # before they take memory
-    image = _decode(content)
-    if image is None:
+    try:
+        with warnings.catch_warnings(action="ignore"), PIL.Image.open(io.BytesIO(content), formats=_FORMATS) as picture:
+            if picture.width * picture.height <= _MAX_PIXELS:  # as its head says, before they take memory
+                return _as_array(picture)
+            found = f"{picture.width} x {picture.height}"
+    except PIL.Image.DecompressionBombError:
+        found = "many more"
+    except (OSError, ValueError, SyntaxError, EOFError, OverflowError, LookupError, struct.error) as error:
         kind = kind_of(content) or "a file of another kind"
         raise MazeError(
             f"{path}: expected a picture, found {kind}{' that is damaged' * (kind == 'a picture')}{way_out(kind)}"
-        )
-    _require_few_pixels(image.shape[1], image.shape[0], path)
-    return image
+        ) from error
+    raise MazeError(f"{path}: expected at most {_MAX_PIXELS} pixels, found {found}")
 
 
-def _declared_size(content: bytes) -> tuple[int, int]:
-    """Returns the width and height that the head of a picture says; 0 if it says none."""
-    try:
-        with warnings.catch_warnings(action="ignore"), PIL.Image.open(io.BytesIO(content), formats=_FORMATS) as head:
-            return head.size
-    except PIL.Image.DecompressionBombError:
-        return 2**14, 2**14  # or more
-    except (OSError, ValueError, OverflowError):
-        return 0, 0
-
-
-def _require_few_pixels(width: int, height: int, path: str | pathlib.Path) -> None:
-    if width * height > _MAX_PIXELS:
-        raise MazeError(f"{path}: expected at most {_MAX_PIXELS} pixels, found {width * height} or more")
+def _as_array(picture: PIL.Image.Image) -> np.ndarray:
+    """Returns a picture as its camera was held, as `grid_of_image` takes it."""
+    is_png = picture.format == "PNG"  # the only format whose opacity counts
+    picture = PIL.ImageOps.exif_transpose(picture)
+    if picture.mode == "1":
+        return np.asarray(picture.convert("L"))
+    if picture.mode == "L" and "transparency" not in picture.info:
+        return np.asarray(picture)
+    if picture.mode.startswith("I"):
+        return np.asarray(picture).astype(np.uint16)
+    return np.asarray(picture.convert("RGBA" if is_png and picture.has_transparency_data else "RGB"))
 
 
 def grid_of_image(image: np.ndarray, size: int | None, name: str, walls: str) -> OccupancyGrid:
@@ -123,38 +121,6 @@ def _grid_of_walls(walls: np.ndarray, name: str) -> OccupancyGrid:
     require_closed_border(walls, name)
     require_connected(walls, name)
     return OccupancyGrid(np.where(walls, OCCUPIED, FREE).astype(np.int8), is_cells=True)
-
-
-def _scaled_pgm(content: bytes) -> np.ndarray | None:
-    """Returns `[H, W]` uint8 of a binary PGM whose white is not the largest number, which OpenCV does not scale."""
-    head = _PGM_HEAD.match(content)
-    if head is None or (white := int(head["white"])) in (0, 255, 65535):
-        return None
-    shape = int(head["height"]), int(head["width"])
-    numbers = np.dtype(np.uint8 if white < 256 else ">u2")
-    body = content[head.end() : head.end() + shape[0] * shape[1] * numbers.itemsize]
-    if len(body) < shape[0] * shape[1] * numbers.itemsize:
-        return None
-    shades = np.rint(np.minimum(np.arange(2**16) / white, 1) * 255).astype(np.uint8)
-    return shades[np.frombuffer(body, numbers)].reshape(shape)
-
-
-def _decode(content: bytes) -> np.ndarray | None:
-    """Returns the picture in a file's bytes, as `grid_of_image` takes it; None if OpenCV can't decode it."""
-    if (gray := _scaled_pgm(content)) is not None:
-        return gray
-    # Only PNG may have opacity. A JPEG is turned as its camera was held, which IMREAD_UNCHANGED would not do.
-    flags = cv2.IMREAD_UNCHANGED if content.startswith(_PNG_START) else cv2.IMREAD_COLOR
-    log_level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    try:
-        image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), flags)
-    except cv2.error:
-        return None
-    finally:
-        cv2.utils.logging.setLogLevel(log_level)
-    if image is None or image.ndim == 2:
-        return image
-    return cv2.cvtColor(image, cv2.COLOR_BGRA2RGBA if image.shape[2] == 4 else cv2.COLOR_BGR2RGB)
 
 
 def to_gray(image: np.ndarray, name: str) -> np.ndarray:
