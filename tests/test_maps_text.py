@@ -112,12 +112,14 @@ class TestReading:
             assert (line >= np.array(drawn[row])).all()  # what can't be reached is closed
         assert maze.size == len(drawn[0])
 
-    @pytest.mark.parametrize("rows", [["o---o---o", "|       |", "o---o--o "], ["+---+", "|   |", "+---+", "|   |"]])
+    @pytest.mark.parametrize(
+        "rows", ["o---o---o\n|       |\no---o--o ", "+---+\n|   |\n+---+\n|   |", "o---o\n| # |\no---o"]
+    )
     def test_posts_that_are_missing_are_named(self, rows, tmp_path):
         with pytest.raises(
-            MazeError, match=r"expected rows of posts and of rooms in turns, found (none in row 2|4 rows)"
+            MazeError, match=r"expected rows of posts and of rooms in turns, found (none in row 2|4 rows|'#' in a room)"
         ):
-            read(tmp_path, "\n".join(rows))
+            read(tmp_path, rows)
 
     @pytest.mark.parametrize(
         "table",
@@ -173,6 +175,7 @@ class TestRefusal:
             ("11111\n10231\n11111\n", "found int64 with the values 0, 1, 2, 3"),
             ("0.5,0.5,0.5\n0.1,0.2,0.3\n", "found float64 with the values 0.1, 0.2, 0.3, 0.5"),
             (PLAN + "\n" + PLAN, "expected one maze, found 2 with blank lines between"),
+            (2 * "1,1,1\n1,0,1\n1,1,1\n\n", "expected one maze, found 2 with blank lines between"),
             (MOVING_AI.replace("height 5", "height 6"), "expected a MovingAI map of 6 rows of 5 cells"),
             ('{"rooms": [], "id": 3}', "expected a HouseExpo house, .* found the keys rooms, id$"),
             ('{"type": "FeatureCollection", "features": []}', "found the keys type, features; draw the plan"),

@@ -42,7 +42,8 @@ def cells_in_table(lines: Sequence[str], separator: str, name: str) -> list[list
     for number, row in enumerate(table):
         if len(row) < width:
             raise MazeError(f"{name}: expected {width} fields in each row, found {len(row)} in row {number}")
-    table = [[_plain(field, separator) for field in row[:width]] for row in table]
+    point = "," if separator == "," else "."  # of a decimal comma
+    table = [[_BOOLEANS.get(field.lower(), field.replace(",", point)) for field in row[:width]] for row in table]
     _require_no_labels(table, name)
 
     marks = {field for row in table for field in row if field}
@@ -71,11 +72,6 @@ def numbers_in_table(cells: Sequence[Sequence[str]], name: str) -> np.ndarray:
                     f"found {field[:60]!r} at ({row}, {column})"
                 ) from error
     return numbers
-
-
-def _plain(field: str, separator: str) -> str:
-    """Returns a field with a point for a decimal comma, and 0 or 1 for a truth value."""
-    return _BOOLEANS.get(field.lower(), field if separator == "," else field.replace(",", "."))
 
 
 def _require_no_labels(table: Sequence[Sequence[str]], name: str) -> None:

@@ -65,6 +65,7 @@ def grid_of_text(text: str, name: str) -> OccupancyGrid:
     else:
         lines = re.sub(r"\\n|\\+", "\n", text).split("\n")  # D4RL ends a row with a backslash
     lines = [re.sub(r"^\s*\(+|\)[),]*\s*$", "", line) for line in lines]  # of tuples in a program
+    _require_one_maze(lines, name)
     if (separator := separator_of(lines)) is not None:
         cells = cells_in_table(lines, separator, name)
     else:
@@ -72,7 +73,6 @@ def grid_of_text(text: str, name: str) -> OccupancyGrid:
         cells = [line.split() for line in lines if line.strip()]  # a table with blanks, or none
         if not cells:
             raise MazeError(f"{name}: expected a text map, found no row")
-        _require_one_maze(lines, name)
         if len({len(row) for row in cells}) > 1 or len(cells[0]) < 3:
             return _grid_of_rows([line for line in lines if line.strip()], name)
     if all(len(cell) == 1 for row in cells for cell in row):
@@ -97,8 +97,8 @@ def _moving_ai(text: str, name: str) -> OccupancyGrid:
 def _require_one_maze(lines: list[str], name: str) -> None:
     """Raises `MazeError` if blank lines separate blocks that each begin and end with a row of wall."""
     blocks = [block.strip("\n").split("\n") for block in re.split(r"\n\s*\n", "\n".join(lines).strip())]
-    ends = {letter for block in blocks for line in (block[0], block[-1]) for letter in line.strip()}
-    if len(blocks) > 1 and len(ends) == 1 and all(len(block) > 2 for block in blocks):
+    ends = {letter for block in blocks for line in (block[0], block[-1]) for letter in line}
+    if len(blocks) > 1 and len(ends - set(" ,;\t\"'")) == 1 and all(len(block) > 2 for block in blocks):
         raise MazeError(f"{name}: expected one maze, found {len(blocks)} with blank lines between; give each a file")
 
 
@@ -114,10 +114,11 @@ def _grid_of_rows(rows: list[str], name: str) -> OccupancyGrid:
     indent, width = rows[0].index(post), len(posts[0])
     lines = [row[indent:].ljust(width) for row in rows]
     without = [number for number in range(0, len(lines), 2) if set(lines[number][:width:step]) != {post}]
-    if post == "+" and (without or set("".join(lines[1::2])) & set("#.")):
+    rooms = "".join(lines[1::2])
+    if post == "+" and (without or "." in rooms or "#" in rooms):
         return grid_of_characters(rows, name)  # a plan with walls of lines and their corners
-    if without or len(rows) % 2 == 0:
-        found = f"none in row {without[0]}" if without else f"{len(rows)} rows"
+    if without or len(rows) % 2 == 0 or "#" in rooms:
+        found = f"none in row {without[0]}" if without else "'#' in a room" if "#" in rooms else f"{len(rows)} rows"
         raise MazeError(f"{name}: expected rows of posts and of rooms in turns, found {found}")
 
     # A row for each row of posts and of rooms, and a column for each post and each room between two.
