@@ -86,6 +86,17 @@ class Strict(Good):
         np.seterr(all="raise")
 
 
+class Lost(Good):
+    def __init__(self):
+        os.chdir("/")
+
+
+class Builds(Good):
+    @classmethod
+    def build(cls, interface, **given):
+        return None
+
+
 class Wanders(Good):
     def answer(self, batch_size):
         os.chdir("/")
@@ -131,6 +142,7 @@ BROKEN = [
     ("Stops", "act() raised StopIteration (contract_at_hand.py:"),
     ("Exits", "act() raised GeneratorExit (contract_at_hand.py:"),
     ("Mute", "act() raised Fault (contract_at_hand.py:"),
+    ("Builds", "expected an Agent from build(), found NoneType"),
     ("InLibrary", "act() raised JSONDecodeError: Expecting property name enclosed in double quotes"),
 ]
 
@@ -147,7 +159,7 @@ class TestEvaluation:
         with pytest.raises(AgentError, match=r"\(contract_at_hand\.py:37\)$"):
             evaluate_at_hand("InLibrary", tmp_path / "out")
 
-    @pytest.mark.parametrize("name", ["Strict", "Wanders", "Forks", "ForksOn"])
+    @pytest.mark.parametrize("name", ["Strict", "Wanders", "Lost", "Forks", "ForksOn"])
     def test_what_an_agent_does_to_its_process_changes_no_result(self, tmp_path, monkeypatch, name):
         monkeypatch.chdir(tmp_path)
         evaluate_at_hand("Good", "good")

@@ -63,6 +63,7 @@ def evaluate(
       RunError: if the agent or a worker failed; what ended until then is kept.
     """
     check_names(options, EvalOptions, RunOptions, TaskOptions)
+    out = None if out is None else pathlib.Path(out).absolute()  # agents may change the working folder
     if options.get("context_size") is not None:
         raise InputError(
             f"expected no context_size in an evaluation, found {options['context_size']}; agents choose it"
@@ -89,6 +90,7 @@ def run_evaluation(
 
     `agent_class` is the class that `options.agent` names, if it is loaded already.
     """
+    out = None if out is None else pathlib.Path(out).absolute()
     plan = make_plan(options, agent_class)
     if plan.remark:
         remark(plan.remark)
@@ -97,8 +99,7 @@ def run_evaluation(
             f"{options.agent}: its code is in no file, so it has no hash, and --resume does not notice a change of it"
         )
     with open_pool(run) as pool, tempfile.TemporaryDirectory() as temporary:
-        folder = pathlib.Path(temporary if out is None else out).absolute()  # agents may change the working folder
-        return run_plan(plan, folder, pool, run, progress)
+        return run_plan(plan, out or pathlib.Path(temporary), pool, run, progress)
 
 
 def run_plan(

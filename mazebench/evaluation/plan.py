@@ -13,7 +13,7 @@ from typing import Any
 from mazebench.agent import Agent
 from mazebench.agent_loading import load_agent_class
 from mazebench.errors import InputError, RunError, UnplayableError
-from mazebench.evaluation.checked_agent import CheckedAgent, calling, context_size_of
+from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling, context_size_of
 from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.provenance import provenance
 from mazebench.maps.benchmark import SIZES
@@ -118,6 +118,8 @@ def build_agent(options: EvalOptions, task: Task, agent_class: type[Agent]) -> C
         )
     with calling(options.agent, "build"):
         agent = agent_class.build(interface, seed=options.seed, checkpoint=checkpoint)
+    if not isinstance(agent, Agent):
+        raise AgentError(f"agent {options.agent!r}: expected an Agent from build(), found {type(agent).__name__}")
     return CheckedAgent(options.agent, agent, interface.actions)
 
 
