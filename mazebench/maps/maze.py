@@ -15,8 +15,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy import ndimage, sparse
-from scipy.sparse import csgraph
+import scipy
 
 from mazebench.errors import InputError, one_line
 from mazebench.maps.covering import Rectangle, cover
@@ -168,14 +167,14 @@ class Maze:
         if self.keeps_distances:
             row = self._distance_row(index)
         else:  # no farther than needed
-            row = csgraph.dijkstra(self._graph, unweighted=True, indices=index, limit=distance)
+            row = scipy.sparse.csgraph.dijkstra(self._graph, unweighted=True, indices=index, limit=distance)
         return self.free_cells[row == distance]
 
     @functools.cached_property
     def diameter(self) -> int:
         """The largest distance of two free cells; with over 2,048 free cells, a lower bound by a double sweep."""
         if self.keeps_distances:
-            return int(csgraph.dijkstra(self._graph, unweighted=True).max())
+            return int(scipy.sparse.csgraph.dijkstra(self._graph, unweighted=True).max())
         return int(self._distance_row(int(np.argmax(self._distance_row(0)))).max())
 
     @functools.cached_property
@@ -190,7 +189,7 @@ class Maze:
         return index
 
     @functools.cached_property
-    def _graph(self) -> sparse.csr_array:
+    def _graph(self) -> scipy.sparse.csr_array:
         return grid_graph(self._index)
 
     @functools.cached_property
@@ -200,7 +199,7 @@ class Maze:
     def _distance_row(self, source: int) -> np.ndarray:  # [F] int: from free cell `source` to each free cell
         row = self._rows.get(source)
         if row is None:
-            row = csgraph.dijkstra(self._graph, unweighted=True, indices=source).astype(np.int32)
+            row = scipy.sparse.csgraph.dijkstra(self._graph, unweighted=True, indices=source).astype(np.int32)
             if self.keeps_distances:
                 self._rows[source] = row
         return row
@@ -237,7 +236,7 @@ def resized(maze: Maze, cell_size: float | None) -> Maze:
     return maze if not cell_size else dataclasses.replace(maze, cell_size=cell_size)
 
 
-def grid_graph(index: np.ndarray) -> sparse.csr_array:
+def grid_graph(index: np.ndarray) -> scipy.sparse.csr_array:
     """Returns the 4-connected graph of the cells whose `index` (`[N, N]` int, consecutive from 0) is not negative."""
     # The pairs of neighbours: side by side, then one above the other.
     first = np.concatenate([index[:, :-1].ravel(), index[:-1].ravel()])
@@ -249,7 +248,7 @@ def grid_graph(index: np.ndarray) -> sparse.csr_array:
     num_nodes = int(index.max()) + 1
     ones = np.ones(2 * len(first))  # of the type that SciPy's searches take without a copy
     row, column = np.concatenate([first, second]), np.concatenate([second, first])
-    return sparse.csr_array((ones, (row, column)), shape=(num_nodes, num_nodes))
+    return scipy.sparse.csr_array((ones, (row, column)), shape=(num_nodes, num_nodes))
 
 
 def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]:
@@ -263,7 +262,7 @@ def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]
     index = np.where(walls, -1, np.cumsum(~walls).reshape(walls.shape) - 1)
     distances = np.full(walls.shape, np.inf)
     if not walls[goal]:
-        distances[~walls] = csgraph.dijkstra(grid_graph(index), unweighted=True, indices=index[goal])
+        distances[~walls] = scipy.sparse.csgraph.dijkstra(grid_graph(index), unweighted=True, indices=index[goal])
     if np.isfinite(distances[start]):
         distances[walls] = UNREACHABLE
         return _descend(distances, start)
@@ -273,8 +272,8 @@ def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]
     every_cell = np.arange(walls.size).reshape(walls.shape)
     graph = grid_graph(every_cell).tocoo()
     cost = np.where(walls.ravel()[graph.row], _WALL_COST, 1.0)
-    weighted = sparse.csr_array((cost, (graph.row, graph.col)), shape=graph.shape)
-    distances = csgraph.dijkstra(weighted, indices=every_cell[goal]).reshape(walls.shape)
+    weighted = scipy.sparse.csr_array((cost, (graph.row, graph.col)), shape=graph.shape)
+    distances = scipy.sparse.csgraph.dijkstra(weighted, indices=every_cell[goal]).reshape(walls.shape)
     return _descend(distances, start, np.where(walls, _WALL_COST, 1.0))
 
 
@@ -338,7 +337,7 @@ def require_closed_border(walls: np.ndarray, name: str) -> None:
 
 def require_connected(walls: np.ndarray, name: str) -> None:
     """Raises `MazeError` unless the free cells of any grid (`[R, C]` bool) are one connected area of at least one."""
-    components, num_components = ndimage.label(~walls)
+    components, num_components = scipy.ndimage.label(~walls)
     if num_components == 0:
         raise MazeError(f"{name}: expected a free cell, found only walls")
     if num_components > 1:

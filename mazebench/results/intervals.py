@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from scipy import special
+import scipy
 
 CONFIDENCE = 0.95
 
@@ -32,7 +32,7 @@ class Estimate:
 
 def wilson_interval(rate: float, num_trials: float) -> tuple[float, float]:
     """Returns Wilson's score interval of a rate in [0, 1] (Wilson 1927); `num_trials` > 0 need not be whole."""
-    z = special.ndtri(_UPPER_TAIL)
+    z = scipy.special.ndtri(_UPPER_TAIL)
     centre = rate + z**2 / (2 * num_trials)
     half_width = z * np.sqrt(rate * (1 - rate) / num_trials + z**2 / (4 * num_trials**2))
     scale = 1 + z**2 / num_trials
@@ -90,7 +90,7 @@ def difference_interval(differences: np.ndarray, mazes: np.ndarray) -> Estimate:
     mean, centre = float(np.mean(differences)), float(np.sum(differences)) / count
     squares = _squares_by_maze(differences - centre, clusters)
     squares += default**2 * ((1 - centre) ** 2 + (1 + centre) ** 2)
-    half_width = special.ndtri(_UPPER_TAIL) * np.sqrt(squares) / count
+    half_width = scipy.special.ndtri(_UPPER_TAIL) * np.sqrt(squares) / count
     return Estimate(mean, float(max(centre - half_width, -1)), float(min(centre + half_width, 1)))
 
 
@@ -120,7 +120,7 @@ def runs_interval(values: np.ndarray, mazes: np.ndarray, others: np.ndarray | No
     half_width = 0.0
     if variances.any():
         freedom = variances.sum() ** 2 / (variances**2 / [len(each) - 1 for each in means]).sum()
-        half_width = special.stdtrit(freedom, _UPPER_TAIL) * np.sqrt(variances.sum())
+        half_width = scipy.special.stdtrit(freedom, _UPPER_TAIL) * np.sqrt(variances.sum())
     value = over_mazes.value
     low, high = (np.hypot(value - end, half_width) for end in (over_mazes.low, over_mazes.high))
     return Estimate(value, float(max(value - low, lowest)), float(min(value + high, 1)))
@@ -153,7 +153,7 @@ def _squares_by_maze(residuals: np.ndarray, clusters: np.ndarray) -> float:
     num_clusters = clusters.max() + 1
     if num_clusters == len(clusters):
         return independent
-    few = special.stdtrit(num_clusters - 1, _UPPER_TAIL) / special.stdtrit(len(clusters) - 1, _UPPER_TAIL)
+    few = scipy.special.stdtrit(num_clusters - 1, _UPPER_TAIL) / scipy.special.stdtrit(len(clusters) - 1, _UPPER_TAIL)
     sums = np.bincount(clusters, weights=residuals)
     squares = few**2 * num_clusters / (num_clusters - 1) * (sums**2).sum()
     return float(np.clip(squares, independent, _mean_size(clusters) * independent))

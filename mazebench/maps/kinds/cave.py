@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from mazebench.maps.kinds.kind import Kind, largest_area
 
@@ -22,7 +22,7 @@ def cave_walls(size: int, rng: np.random.Generator) -> np.ndarray:
         rock[1:-1, 1:-1] = rng.random((size - 2, size - 2)) < _DENSITY
         for _ in range(_GENERATIONS):
             # Beyond the border is rock.
-            around = ndimage.uniform_filter(9.0 * rock, 3, mode="constant", cval=9.0)
+            around = scipy.ndimage.uniform_filter(9.0 * rock, 3, mode="constant", cval=9.0)
             rock[1:-1, 1:-1] = around[1:-1, 1:-1] > 4.5
         walls = largest_area(rock == 1)
         if (~walls).sum() >= _SMALLEST_SHARE * (size - 2) ** 2:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
+import scipy
 
 from mazebench.maps.kinds.kind import door_slots, rooms_beside
 
@@ -58,7 +57,7 @@ def open_doors(walls: np.ndarray, cost: np.ndarray, extra: float, rng: np.random
     _, cheapest = np.unique(rooms[0] * num_rooms + rooms[1], return_index=True)
 
     # Slots are in the order of their costs, so that their numbers give the same tree. A cost of 0 would be no edge.
-    graph = sparse.csr_array((cheapest + 1, rooms[:, cheapest]), shape=(num_rooms, num_rooms))
-    tree = csgraph.minimum_spanning_tree(graph).data.astype(int) - 1
+    graph = scipy.sparse.csr_array((cheapest + 1, rooms[:, cheapest]), shape=(num_rooms, num_rooms))
+    tree = scipy.sparse.csgraph.minimum_spanning_tree(graph).data.astype(int) - 1
     others = cheapest[rng.random(len(cheapest)) < extra]
     walls[tuple(slots[np.concatenate([tree, others])].T)] = False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from mazebench.maps.kinds.floor_plan import cut, open_doors, split_rooms
 from mazebench.maps.kinds.kind import Kind
@@ -36,7 +36,7 @@ def hospital_walls(size: int, rng: np.random.Generator) -> np.ndarray:
             if row < len(rows):
                 fire_walls[bottom + 1 : bottom + 3, rng.integers(max(left, first), min(right, last))] = True
     walls = walls & ~corridors | fire_walls
-    open_doors(walls, ndimage.binary_dilation(corridors) & ~corridors, _EXTRA_DOORS, rng)
+    open_doors(walls, scipy.ndimage.binary_dilation(corridors) & ~corridors, _EXTRA_DOORS, rng)
     return walls
 
 

@@ -9,7 +9,7 @@ import dataclasses
 from collections.abc import Callable
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 
 def door_slots(walls: np.ndarray) -> np.ndarray:
@@ -63,7 +63,7 @@ def rooms_beside(walls: np.ndarray, slots: np.ndarray) -> tuple[np.ndarray, np.n
     closed = walls.copy()
     row, column = slots.T
     closed[row, column] = True
-    rooms, _ = ndimage.label(~closed)
+    rooms, _ = scipy.ndimage.label(~closed)
     first, second = rooms[row - 1, column], rooms[row + 1, column]
     level = (first == 0) | (second == 0)
     return np.where(level, rooms[row, column - 1], first), np.where(level, rooms[row, column + 1], second)
@@ -71,7 +71,7 @@ def rooms_beside(walls: np.ndarray, slots: np.ndarray) -> tuple[np.ndarray, np.n
 
 def largest_area(walls: np.ndarray) -> np.ndarray:
     """Returns `walls` (`[R, C]` bool) with all free cells closed but those of the largest connected area."""
-    areas, _ = ndimage.label(~walls)
+    areas, _ = scipy.ndimage.label(~walls)
     sizes = np.bincount(areas.ravel())
     sizes[0] = 0
     return walls | (areas != np.argmax(sizes))  # all of them, if nothing is free

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from mazebench.maps.kinds.floor_plan import cut, open_doors
 from mazebench.maps.kinds.kind import Kind
@@ -47,7 +47,7 @@ def office_walls(size: int, rng: np.random.Generator) -> np.ndarray:
             for left, right in cut(start, end, [1] * (num_rooms - 1), _LEAST_SIDE, rng) if start < end else ():
                 walls[top:bottom, left:right] = False
     walls = walls & ~corridors | fire_walls
-    open_doors(walls, ~ndimage.binary_dilation(corridors), _EXTRA_DOORS, rng)
+    open_doors(walls, ~scipy.ndimage.binary_dilation(corridors), _EXTRA_DOORS, rng)
     return np.rot90(walls, int(rng.integers(4))).copy()
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from mazebench.maps.kinds.dfs import between_lattice_cells, carve_corridors
 from mazebench.maps.kinds.kind import Kind, lattice_door_slots
@@ -42,7 +42,7 @@ def _carve_rooms(walls: np.ndarray, most: int, rng: np.random.Generator) -> None
 
 def _open_doors(walls: np.ndarray, rng: np.random.Generator) -> None:
     """Opens the walls of a random spanning tree of the regions of free cells, and some more, in place."""
-    labels, num_regions = ndimage.label(~walls)
+    labels, num_regions = scipy.ndimage.label(~walls)
     regions = labels.tolist()
     joined = list(range(num_regions + 1))  # the number of the group of regions to which each region belongs
     for row, column in rng.permutation(np.argwhere(between_lattice_cells(walls))).tolist():
