@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from mazebench.commands.display import load_mujoco
-from mazebench.commands.summary_table import print_table
 
 
 def bench(
@@ -18,6 +17,7 @@ def bench(
     """Measure speed on this machine in a minute, as ratios taken in the same run."""
     load_mujoco(renders=False)
     from mazebench.bench import run
+    from mazebench.commands.summary_table import print_table
 
     results = run(quick)
     if as_json:
