@@ -1,18 +1,23 @@
 """Compilation of kernels to machine code, which is kept on disk.
 
 Numba notices when a kernel's file changes, but not when a module does that the kernel uses. So kernels are kept in a
-folder that is named after the contents of all files beside kernels, of mazebench and of the kernel's package.
+folder that is named after the contents of all files beside kernels, of mazebench and of the kernel's package. Numba's
+own choice of folders does not come into play, for it would leave out the name.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import multiprocessing
 import os
 import pathlib
 import re
+import shutil
 import sys
+import tempfile
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -20,7 +25,11 @@ import numba
 from numba.core.event import Listener, register
 from numba.extending import register_jitable
 
+from mazebench.errors import remark
+
+_CONFIG: Any = numba.config
 _IMPORT = re.compile(rb"^from .*\bkernels\b", re.MULTILINE)  # in the files of kernels
+_KEPT_UNUSED = 7 * 24 * 3600  # s, after which machine code is deleted that no process has asked for
 
 
 class _Announcement(Listener):
@@ -43,26 +52,52 @@ register("numba:compile", _Announcement())  # type: ignore[no-untyped-call]
 def compiled(
     function: Callable[..., Any], inline: bool = False, fused: bool = False, nogil: bool = False
 ) -> Callable[..., Any]:
-    """Returns `function` as machine code, cached on disk if numba finds a folder that it can write to.
+    """Returns `function` as machine code, cached on disk if there is a folder that can be written to.
 
     If `fused`, a product and a sum may become one operation with one rounding: faster, and other last bits. If `nogil`,
     several threads may run it at once.
     """
     math = {"contract"} if fused else False
     compile_it = functools.partial(numba.njit, forceinline=inline, nogil=nogil, error_model="numpy", fastmath=math)
-    package = sys.modules[function.__module__.partition(".")[0]]
-    if not hasattr(package, "__path__"):  # of a script, of which nothing says what its kernels use
+    package, file = sys.modules[function.__module__.partition(".")[0]], pathlib.Path(function.__code__.co_filename)
+    if not hasattr(package, "__path__") or not file.exists():  # of a script or an archive: its other files are unknown
         return compile_it(function)
-    config: Any = numba.config
-    given = config.CACHE_DIR
-    parent = pathlib.Path(given) if given else pathlib.Path(function.__code__.co_filename).parent / "__pycache__"
-    config.CACHE_DIR = str(parent / f"kernels-{_digest(*package.__path__)}")
+    folder = cache_folder(file.parent / "__pycache__", _digest(*package.__path__))
+    if folder is None:
+        return compile_it(function)
+    given = _CONFIG.CACHE_DIR
+    _CONFIG.CACHE_DIR = str(folder)
     try:
         return compile_it(function, cache=True)
-    except RuntimeError:  # numba found no folder that it can write to
-        return compile_it(function)
     finally:
-        config.CACHE_DIR = given
+        _CONFIG.CACHE_DIR = given
+
+
+@functools.cache
+def cache_folder(beside: pathlib.Path, digest: str) -> pathlib.Path | None:
+    """Returns the folder for machine code of a digest, and makes it; None if no folder can be written to.
+
+    It lies in the first of these that can be written to: the value of NUMBA_CACHE_DIR, `beside`, and `mazebench` in the
+    user's cache. What was long not used there is deleted.
+    """
+    users = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    given = [pathlib.Path(_CONFIG.CACHE_DIR)] if _CONFIG.CACHE_DIR else []
+    for parent in (*given, beside, pathlib.Path(users) / "mazebench"):
+        folder = parent / f"kernels-{digest}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=folder).close()
+            os.utime(folder)  # says that it is in use
+        except OSError:
+            continue
+        for other in parent.glob("kernels-*"):
+            with contextlib.suppress(OSError):  # another process may delete it, too
+                if other.stat().st_mtime < time.time() - _KEPT_UNUSED:
+                    shutil.rmtree(other)
+        return folder
+    if multiprocessing.parent_process() is None:
+        remark("found no folder to keep compiled kernels in, so each start compiles them; set NUMBA_CACHE_DIR to one")
+    return None
 
 
 def num_threads() -> int:
