@@ -11,6 +11,7 @@ from mazebench.maps.doors import door_slots, swap_doors
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.kinds import KINDS, generate
 from mazebench.maps.maze import MAX_SIZE, Maze, resized
+from mazebench.tasks.episode import Episode
 from mazebench.tasks.task import Task
 from mazebench.world.mjcf import BODY_RADIUS, CONTACT_MARGIN, action_controls, maze_spec, velocity_controls
 from mazebench.world.near_walls import _REACH, NearWalls, WallGeoms
@@ -106,16 +107,23 @@ class TestBoxes:
                 np.testing.assert_array_equal(values[0, : len(near)], expected, err_msg=name)
             assert (geoms.pos[0, len(near) :, 2] < 0).all()
 
-    def test_environments_may_be_in_different_fresh_mazes(self):
+    @pytest.mark.parametrize("num_others", [1, 7])  # the boxes of a few bodies are looked up one by one
+    def test_environments_may_be_in_different_fresh_mazes(self, num_others):
         mazes = FreshMazes(("dfs", "house"), 13)
-        walls, alone = NearWalls(mazes, 3), NearWalls((mazes[9],), 1)
+        walls, alone = NearWalls(mazes, 10), NearWalls((mazes[9],), 1)
         expected = WallGeoms.of_model(alone.model)
-        geoms = WallGeoms(*(np.zeros((3, *each.shape[1:])) for each in expected))
+        geoms = WallGeoms(*(np.zeros((10, *each.shape[1:])) for each in expected))
         cell = int(mazes[9].free_cells[4] @ (13, 1))
-        walls.write(geoms, np.array([2, 0]), np.array([9, 5]), np.array([cell, 14]))
+        others = np.arange(num_others)
+        walls.write(geoms, np.append(others, 8), np.append(others + 5, 9), np.append(others * 0 + 14, cell))
         alone.write_one(expected, 0, cell)
-        np.testing.assert_array_equal(geoms.pos[2], expected.pos[0])
-        assert not geoms.pos[1].any()
+        np.testing.assert_array_equal(geoms.pos[8], expected.pos[0])
+        assert not geoms.pos[9].any()
+
+    def test_an_environment_without_an_episode_has_no_body_in_a_free_cell(self):
+        envs = MazeVectorEnv(Task.of(), 2, episode_source=lambda i: None if i else Episode(0, (1, 1), (3, 1), 0.0, 7))
+        envs.reset()
+        envs.step(np.zeros(2, dtype=int))
 
 
 def test_a_maze_of_the_largest_size_is_played():

@@ -211,7 +211,9 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         rules.advance(self._qpos, running)
         self._marker[:, 0] = rules.marker
         terminated, truncated = rules.reached.copy(), rules.timed_out.copy()
-        rewards = np.where(running, rules.rewards(), np.float32(0))
+        rewards = rules.rewards()
+        if not all_run:
+            rewards[~running] = 0
 
         # With NEXT_STEP, begin the episodes that follow those that ended in the step before.
         if self._ended.any():
@@ -285,11 +287,11 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
 
     def _surround(self) -> None:
         """Puts the walls around the bodies that have entered another cell."""
-        around = np.stack([self.rules.maze, self.rules.cell])
-        moved = (around != self._around).any(axis=0).nonzero()[0]
+        maze, cell = self.rules.maze, self.rules.cell
+        moved = ((maze != self._around[0]) | (cell != self._around[1])).nonzero()[0]
         if len(moved):
-            self._walls.write(self._geoms, moved, *around[:, moved])
-            self._around = around
+            self._walls.write(self._geoms, moved, maze[moved], cell[moved])
+            self._around[:] = maze, cell
 
     def _observe(self, indices: np.ndarray) -> None:
         """Takes over what the agents of the environments `indices` observe; each call draws new noise."""

@@ -27,6 +27,7 @@ FASTEST = 1.14 * TOP_SPEED
 _REACH = BODY_RADIUS + CONTACT_MARGIN + FASTEST * STEP_TIME  # m, from the body's centre at the start of an agent step
 _MOST_ENTERED = 10_000  # cells whose boxes are kept, some 1 kB each
 _AHEAD = 2  # cells around the one that is entered whose boxes are found in advance
+_FEW = 4  # bodies in other cells, whose boxes are sooner looked up one by one
 _FIRST_WALL = 1  # index of its geom, after the floor
 _NO_TREE = int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)  # contacts are searched without trees of bounding boxes
 
@@ -93,15 +94,19 @@ class NearWalls:
           maze: `[E]` int, the index of the maze that each is in.
           cell: `[E]` int, the body's cell in it, as row * N + column.
         """
+        if len(env) <= _FEW:
+            for each, *where in zip(env.tolist(), maze.tolist(), cell.tolist(), strict=True):
+                self.write_one(geoms, *where, env=each)
+            return
         slot = env if self._is_fresh else maze
         for at, shown in {(int(slot[i]), int(maze[i])) for i in np.flatnonzero(self._shown[slot] != maze)}:
             self._show(at, shown)
         _assign(geoms, env, *self._near(slot, cell))
 
-    def write_one(self, geoms: WallGeoms, maze: int, cell: int) -> None:
+    def write_one(self, geoms: WallGeoms, maze: int, cell: int, env: int = 0) -> None:
         """Does what `write` does for a single environment, and prepares the cells around, which take little longer."""
         if (boxes := self._entered.get((maze, cell))) is None:
-            slot = 0 if self._is_fresh else maze
+            slot = env if self._is_fresh else maze
             if self._shown[slot] != maze:
                 self._show(slot, maze)
             if len(self._entered) > _MOST_ENTERED:
@@ -109,12 +114,12 @@ class NearWalls:
             row, column = divmod(cell, self._size)
             rows, columns = (slice(max(0, at - _AHEAD), at + _AHEAD + 1) for at in (row, column))
             cells = np.argwhere(~self._mazes[maze].walls[rows, columns]) + np.array([rows.start, columns.start])
-            near = cells @ (self._size, 1)
+            near = np.append(cells @ (self._size, 1), cell)  # which is a wall where there is no body
             rows_of = zip(near.tolist(), *self._near(np.full(len(near), slot), near), strict=True)
             found = {(maze, each): values for each, *values in rows_of}
             self._entered |= found
             boxes = found[maze, cell]
-        _assign(geoms, 0, *boxes)
+        _assign(geoms, env, *boxes)
 
     def _near(self, slot: np.ndarray, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Returns middles, half sides (`[E, K, 3]` m) and radii (`[E, K]` m) of the boxes near cells of slots."""
