@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 import numbers
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ MAX_CHOSEN_SIZE = 255  # of mazes whose cells a reader finds, or whose scale it 
 WALL_HEIGHT = 1.0  # metres; DeepMind Lab's 100 units
 MIN_CELL_SIZE = 0.4  # m, in which the body drives: it is 0.3 m wide, and contacts act 0.03 m before a wall
 UNREACHABLE = -1
+_NOT_FOUND = -2  # a free cell, by a search so far
 
 # (rows, columns) to each neighbour, in the order in which a shortest path prefers them.
 _NEIGHBOURS = ((-1, 0), (0, -1), (1, 0), (0, 1))
@@ -163,12 +165,10 @@ class Maze:
     def cells_at(self, source: Cell, distance: int) -> np.ndarray:
         """Returns the free cells at exactly `distance` from `source`, in reading order: `[K, 2]` int."""
         self.require_free(source)
-        index = int(self._index[tuple(source)])
         if self.keeps_distances:
-            row = self._distance_row(index)
-        else:  # no farther than needed
-            row = scipy.sparse.csgraph.dijkstra(self._graph, unweighted=True, indices=index, limit=distance)
-        return self.free_cells[row == distance]
+            return self.free_cells[self._distance_row(int(self._index[tuple(source)])) == distance]
+        cells = next(itertools.islice(self._search(source), distance, None), np.zeros(0, dtype=np.int64))
+        return np.stack(np.divmod(np.sort(cells), self.size), axis=-1)
 
     @functools.cached_property
     def diameter(self) -> int:
@@ -197,12 +197,31 @@ class Maze:
         return {}
 
     def _distance_row(self, source: int) -> np.ndarray:  # [F] int: from free cell `source` to each free cell
+        if not self.keeps_distances:
+            distances = np.zeros(self.walls.size, dtype=np.int32)
+            for distance, cells in enumerate(self._search(self.free_cells[source])):
+                distances[cells] = distance
+            return distances[~self.walls.ravel()]
         row = self._rows.get(source)
         if row is None:
             row = scipy.sparse.csgraph.dijkstra(self._graph, unweighted=True, indices=source).astype(np.int32)
-            if self.keeps_distances:
-                self._rows[source] = row
+            self._rows[source] = row
         return row
+
+    def _search(self, source: Cell | np.ndarray) -> Iterator[np.ndarray]:
+        """Yields the free cells at distance 0, 1, ... from `source`: `[K]` int, row * N + column, in no order."""
+        is_left = ~self.walls.ravel()
+        cells = np.array([source[0] * self.size + source[1]])
+        is_left[cells] = False
+        while len(cells):
+            yield cells
+            found = []
+            for step in (-self.size, -1, 1, self.size):  # one after the other, so that each cell is found once
+                near = cells + step
+                near = near[is_left[near]]
+                is_left[near] = False
+                found.append(near)
+            cells = np.concatenate(found)
 
 
 def corner_cells(maze: Maze) -> tuple[Cell, Cell]:
@@ -258,14 +277,28 @@ def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]
     so on maps with flipped cells (the paper's appendix on perturbed planning). Of several, it is the path whose first
     differing step comes first in the order up, left, down, right.
     """
-    # Over free cells.
-    index = np.where(walls, -1, np.cumsum(~walls).reshape(walls.shape) - 1)
-    distances = np.full(walls.shape, np.inf)
-    if not walls[goal]:
-        distances[~walls] = scipy.sparse.csgraph.dijkstra(grid_graph(index), unweighted=True, indices=index[goal])
-    if np.isfinite(distances[start]):
-        distances[walls] = UNREACHABLE
-        return _descend(distances, start)
+    # Over free cells, from the goal as far as the start. A list of rows, with walls around them,
+    # has the steps from each cell to the goal: plain numbers take a fraction of the time of arrays.
+    width = len(walls) + 2
+    bordered = np.full((width, width), UNREACHABLE)
+    bordered[1:-1, 1:-1][~walls] = _NOT_FOUND
+    steps = bordered.ravel().tolist()
+    first, last = ((row + 1) * width + column + 1 for row, column in (start, goal))
+    moves = [down * width + right for down, right in _NEIGHBOURS]
+    found = [last] if steps[first] == steps[last] == _NOT_FOUND else []
+    steps[last] = 0
+    while found and steps[first] == _NOT_FOUND:
+        cells, found = found, []
+        for cell in cells:
+            for move in moves:
+                if steps[cell + move] == _NOT_FOUND:
+                    steps[cell + move] = steps[cell] + 1
+                    found.append(cell + move)
+    if found:
+        path = [first]
+        while path[-1] != last:
+            path.append(next(path[-1] + move for move in moves if steps[path[-1] + move] == steps[path[-1]] - 1))
+        return [(cell // width - 1, cell % width - 1) for cell in path]
 
     # Through walls. The search goes backwards from the goal: edge u -> v is the step from v to u, and costs what
     # entering u costs.
@@ -277,20 +310,17 @@ def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]
     return _descend(distances, start, np.where(walls, _WALL_COST, 1.0))
 
 
-def _descend(distances: np.ndarray, start: Cell, step_cost: np.ndarray | None = None) -> list[Cell]:
-    """Returns the path that follows `distances` to the goal (negative at walls) down to 0.
-
-    A step into a cell costs its `step_cost`, 1 by default.
-    """
+def _descend(distances: np.ndarray, start: Cell, step_cost: np.ndarray) -> list[Cell]:
+    """Returns the path that follows `distances` to the goal down to 0; a step into a cell costs its `step_cost`."""
     size = len(distances)
     path = [start]
     while distances[path[-1]] > 0:
         row, column = path[-1]
         for down, right in _NEIGHBOURS:
             cell = (row + down, column + right)
-            if not (0 <= cell[0] < size and 0 <= cell[1] < size) or distances[cell] < 0:
+            if not (0 <= cell[0] < size and 0 <= cell[1] < size):
                 continue
-            if distances[row, column] - distances[cell] == (1.0 if step_cost is None else step_cost[cell]):
+            if distances[row, column] - distances[cell] == step_cost[cell]:
                 path.append(cell)
                 break
         else:
