@@ -98,7 +98,7 @@ def _blocked_share(cases: list[_Case], num_swaps: int) -> float:
     try:
         shown = [
             # The first swaps of a case do not depend on their number.
-            swap_doors(case.maze.walls, case.slots, num_swaps, case.ends, np.random.default_rng([_SEED, index]))
+            swap_doors(case.maze.walls, case.maze.kind, num_swaps, case.ends, np.random.default_rng([_SEED, index]))
             for index, case in enumerate(cases)
         ]
     except InputError:

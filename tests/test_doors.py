@@ -31,7 +31,7 @@ def slots_of(maze: Maze) -> set[tuple[int, int]]:
 
 def moved(maze: Maze, num_swaps: int, seed: int, keep=()) -> Maze:
     rng = np.random.default_rng(seed)
-    return Maze(swap_doors(maze.walls, door_slots(maze), num_swaps, keep, rng), "map", kind=maze.kind)
+    return Maze(swap_doors(maze.walls, maze.kind, num_swaps, keep, rng), "map", kind=maze.kind)
 
 
 def num_rooms_by_doors(maze: Maze) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import tracks_checks
-from mazebench.maps.doors import door_slots, swap_doors
+from mazebench.maps.doors import swap_doors
 from mazebench.tasks.perturbations.moved_doors import MovedDoors
 
 KINDS, EPISODES = "dfs,office", 3
@@ -23,7 +23,7 @@ def test_as_many_doors_can_move_as_a_level_wants(kind):
         doors = MovedDoors(percent=85)
         doors.require(maze)
         ends = tuple(map(tuple, maze.free_cells[[0, -1]].tolist()))
-        swap_doors(maze.walls, door_slots(maze), doors.num_swaps(maze), ends, np.random.default_rng(0))
+        swap_doors(maze.walls, maze.kind, doors.num_swaps(maze), ends, np.random.default_rng(0))
 
 
 def test_more_swaps_block_more_paths(capsys):

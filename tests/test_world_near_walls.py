@@ -7,7 +7,7 @@ import pytest
 
 from mazebench.constants import ACTIONS, STEP_TIME, STEPS_PER_ACTION, TOP_SPEED
 from mazebench.envs.vector import MazeVectorEnv
-from mazebench.maps.doors import door_slots, swap_doors
+from mazebench.maps.doors import swap_doors
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.kinds import KINDS, generate
 from mazebench.maps.maze import MAX_SIZE, Maze, resized
@@ -28,7 +28,7 @@ def rebuilt() -> Maze:
     """A house in which doors have moved."""
     house = maze_of("house")
     ends = tuple(map(tuple, house.free_cells[[0, -1]].tolist()))
-    return Maze(swap_doors(house.walls, door_slots(house), 2, ends, np.random.default_rng(0)), "rebuilt")
+    return Maze(swap_doors(house.walls, house.kind, 2, ends, np.random.default_rng(0)), "rebuilt")
 
 
 def drive(maze: Maze, num_steps: int, held: float, seed: int = 0, is_continuous: bool = False) -> tuple[int, float]:

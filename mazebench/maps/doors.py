@@ -5,6 +5,9 @@
 
 from __future__ import annotations
 
+import copy
+import functools
+import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -16,6 +19,8 @@ from mazebench.maps.kinds.kind import rooms_beside
 from mazebench.maps.maze import Cell, Maze
 
 _MOST_DOORS = 4  # of a room, that are told apart: a corridor has many
+_NUM_KEPT = 128  # mazes whose doors are kept; those of 31 x 31 cells take up to 100 kB
+_MOST_CELLS_KEPT = 64 * 64  # of a maze whose doors are kept
 
 
 def door_slots(maze: Maze) -> np.ndarray:
@@ -36,7 +41,7 @@ def num_swappable(maze: Maze) -> int:
 
 
 def swap_doors(
-    walls: np.ndarray, slots: np.ndarray, num_swaps: int, keep: Iterable[Cell], rng: np.random.Generator
+    walls: np.ndarray, kind: str, num_swaps: int, keep: Iterable[Cell], rng: np.random.Generator
 ) -> np.ndarray:
     """Returns the walls of a map on which doors have moved: `[N, N]` bool, connected like `walls`.
 
@@ -47,7 +52,7 @@ def swap_doors(
 
     Args:
       walls: `[N, N]` bool, of the maze.
-      slots: `[D, 2]` int, its door slots.
+      kind: of the maze.
       num_swaps: how many doors are open in the maze but closed on the map; as many are the other way round.
       keep: cells that are free on the map, too.
       rng: draws the doors.
@@ -55,12 +60,13 @@ def swap_doors(
     Raises:
       InputError: if no such map was found.
     """
-    doors = _Doors(walls, slots)
-    kept = np.isin(slots @ (len(walls), 1), [row * len(walls) + column for row, column in keep])
+    find_doors = _doors if walls.size <= _MOST_CELLS_KEPT else _doors.__wrapped__
+    doors = find_doors(walls.tobytes(), kind).copy()
+    cells = doors.slots @ (len(walls), 1)
+    kept = (cells[:, None] == [row * len(walls) + column for row, column in keep]).any(axis=1)
     may_close, may_open = doors.is_open & ~kept, ~doors.is_open
-    odds = doors.odds()
     for _ in range(num_swaps):
-        odds_now = odds[doors.types()]
+        odds_now = doors.odds[doors.types()]
         weights = np.where(may_open, odds_now, 0.0)
         closable: list[int] = []
         while not closable:
@@ -72,39 +78,58 @@ def swap_doors(
         closed = closable[_draw(1 / odds_now[closable], rng)]
         doors.swap(opened, closed)
         may_close[closed] = False
-        may_open[np.abs(slots - slots[opened]).sum(axis=1) <= 1] = False  # it, and those that touch it
+        gap = np.abs(cells - cells[opened])
+        may_open[(gap <= 1) | (gap == len(walls))] = False  # it, and those that touch it
     moved = walls.copy()
-    moved[tuple(slots.T)] = ~doors.is_open
+    moved[tuple(doors.slots.T)] = ~doors.is_open
     return moved
 
 
-class _Doors:
-    """The doors of a map, open or not, and the rooms that they join. `R` is the number of rooms and 1."""
+@functools.lru_cache(maxsize=_NUM_KEPT)
+def _doors(walls: bytes, kind: str) -> _Doors:
+    size = math.isqrt(len(walls))
+    return _Doors(Maze(np.frombuffer(walls, dtype=bool).reshape(size, size), kind=kind))
 
-    def __init__(self, walls: np.ndarray, slots: np.ndarray):
-        self.is_open = ~walls[tuple(slots.T)]  # [D] bool
-        self._rooms = np.sort(rooms_beside(walls, slots), axis=0)  # [2, D] int, from 1
-        self._num_rooms = int(self._rooms.max(initial=0)) + 1
-        _, self._pair = np.unique(self._rooms.T @ (self._num_rooms, 1), return_inverse=True)  # [D] int, pair of rooms
-        self._ways: list[dict[int, int]] = [
-            {} for _ in range(self._num_rooms)
-        ]  # of a room: open doors, rooms behind them
+
+class _Doors:
+    """The doors of a map, open or not, and the rooms that they join.
+
+    `R` is the number of rooms and 1, `P` the number of pairs of rooms with slots between them.
+    """
+
+    def __init__(self, maze: Maze):
+        self.slots = door_slots(maze)
+        self.is_open = ~maze.walls[tuple(self.slots.T)]  # [D] bool
+        self._rooms = np.sort(rooms_beside(maze.walls, self.slots), axis=0)  # [2, D] int, from 1
+        num_rooms = int(self._rooms.max(initial=0)) + 1
+        _, self._pair = np.unique(self._rooms.T @ (num_rooms, 1), return_inverse=True)  # [D] int, pair of rooms
+
+        # Open doors: the number of a room's ([R] int) and of those between two rooms ([P] int), and of a room, those
+        # doors with the rooms behind them.
+        self._num_open = np.bincount(self._rooms[:, self.is_open].ravel(), minlength=num_rooms)
+        self._num_between = np.bincount(self._pair[self.is_open], minlength=self._pair.max(initial=-1) + 1)
+        self._ways: list[dict[int, int]] = [{} for _ in range(num_rooms)]
         for door in np.flatnonzero(self.is_open).tolist():
-            self._toggle_way(door)
+            first, second = self._rooms[:, door].tolist()
+            self._ways[first][door], self._ways[second][door] = second, first
+
+        # The odds that a door is open, by type; a half each for types that are rare.
+        types, num_types = self.types(), 2 * (_MOST_DOORS + 1) ** 2
+        num_open, num_closed = (np.bincount(types, each, num_types) for each in (self.is_open, ~self.is_open))
+        self.odds = (num_open + 0.5) / (num_closed + 0.5)
+
+    def copy(self) -> _Doors:
+        """Returns doors that may be swapped without a change of these."""
+        copied = copy.copy(self)
+        for name in ("is_open", "_num_open", "_num_between", "_ways"):
+            setattr(copied, name, copy.copy(getattr(self, name)))
+        return copied
 
     def types(self) -> np.ndarray:
         """Returns `[D]` int: the same number for doors whose rooms have as many other doors, also between them."""
-        num_doors = np.bincount(self._rooms[:, self.is_open].ravel(), minlength=self._num_rooms)  # [R] int, open ones
-        others = np.minimum(num_doors[self._rooms] - self.is_open, _MOST_DOORS)
-        is_second = np.bincount(self._pair, self.is_open)[self._pair] > self.is_open
-        return (np.sort(others, axis=0).T @ (_MOST_DOORS + 1, 1)) * 2 + is_second
-
-    def odds(self) -> np.ndarray:
-        """Returns the odds that a door is open, by type."""
-        types, num_types = self.types(), 2 * (_MOST_DOORS + 1) ** 2
-        num_open = np.bincount(types, self.is_open, num_types)
-        num_closed = np.bincount(types, ~self.is_open, num_types)
-        return (num_open + 0.5) / (num_closed + 0.5)  # a half each for types that are rare
+        first, second = np.minimum(self._num_open[self._rooms] - self.is_open, _MOST_DOORS)
+        is_second = self._num_between[self._pair] > self.is_open
+        return (np.minimum(first, second) * (_MOST_DOORS + 1) + np.maximum(first, second)) * 2 + is_second
 
     def way_around(self, door: int) -> list[int]:
         """Returns the open doors on a shortest way from one room of a closed door to the other."""
@@ -112,12 +137,12 @@ class _Doors:
         came_by = {start: (-1, start)}  # of each room that was seen: the door to it, and the room before
         queue = [start]
         for room in queue:
-            if room == goal:
-                break
             for way, behind in self._ways[room].items():
                 if behind not in came_by:
                     came_by[behind] = (way, room)
                     queue.append(behind)
+            if goal in came_by:
+                break
         doors = []
         room = goal
         while room != start:
@@ -127,16 +152,19 @@ class _Doors:
 
     def swap(self, opened: int, closed: int) -> None:
         """Opens a closed door, and closes an open one."""
-        self.is_open[opened], self.is_open[closed] = True, False
-        self._toggle_way(opened)
-        self._toggle_way(closed)
-
-    def _toggle_way(self, door: int) -> None:
-        for room, behind in (self._rooms[:, door].tolist(), self._rooms[::-1, door].tolist()):
-            if self._ways[room].pop(door, None) is None:
-                self._ways[room][door] = behind
+        for door, change in ((opened, 1), (closed, -1)):
+            first, second = rooms = self._rooms[:, door].tolist()
+            self.is_open[door] = change > 0
+            self._num_open[rooms] += change
+            self._num_between[self._pair[door]] += change
+            for room, behind in ((first, second), (second, first)):
+                ways = self._ways[room] = dict(self._ways[room])  # others may share the old one
+                if change > 0:
+                    ways[door] = behind
+                else:
+                    del ways[door]
 
 
 def _draw(weights: np.ndarray, rng: np.random.Generator) -> int:
     """Returns an index of `weights`, each in proportion to its weight."""
-    return int(np.searchsorted(np.cumsum(weights), rng.random() * weights.sum(), side="right"))
+    return int(weights.cumsum().searchsorted(rng.random() * weights.sum(), side="right"))

@@ -8,7 +8,7 @@ import numpy as np
 
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import KINDS_SIZE
-from mazebench.maps.doors import door_slots, num_swappable, swap_doors
+from mazebench.maps.doors import num_swappable, swap_doors
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.perturbations.perturbation import Perturbation, ShownMap
 from mazebench.tasks.streams import Stream
@@ -40,11 +40,10 @@ class MovedDoors(Perturbation):
             raise InputError(f"{maze.name}: expected {needed} doors that can move, found {max(0, movable)}")
 
     def show(self, shown: ShownMap, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
-        maze = Maze(shown.walls, "shown", kind=shown.kind)
-        walls = swap_doors(maze.walls, door_slots(maze), self.num_swaps(maze), ends, rng)
+        walls = swap_doors(shown.walls, shown.kind, self.num_swaps(shown), ends, rng)
         return dataclasses.replace(shown, walls=walls)
 
-    def num_swaps(self, maze: Maze) -> int:
+    def num_swaps(self, maze: Maze | ShownMap) -> int:
         """Returns how many doors of a maze move; in mazes of other sizes, as many for each cell."""
         swaps = SWAPS_BY_PERCENT.get(maze.kind, SWAPS_BY_PERCENT[_DEFAULT_KIND])[self.percent]
-        return max(1, round(swaps * (maze.size / KINDS_SIZE) ** 2))
+        return max(1, round(swaps * (len(maze.walls) / KINDS_SIZE) ** 2))
