@@ -76,7 +76,9 @@ class Displacement:
     def on_grid(self, line: Line) -> np.ndarray:
         """Returns `[2, T, T]` float64: the displacements at all points of `line` x `line`."""
         smooth = _gaussians_on(line, self.noise.shape[-1])
-        return _weighted(smooth, self.noise, smooth) - self.mean[:, None, None]
+        moved = _weighted(smooth, self.noise, smooth)
+        moved -= self.mean[:, None, None]  # in place: a second array of this size would take longer than the products
+        return moved
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """Returns `[T, 2]` float64: the displacements at `points` `[T, 2]`."""
