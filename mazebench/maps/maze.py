@@ -29,7 +29,6 @@ MAX_CHOSEN_SIZE = 255  # of mazes whose cells a reader finds, or whose scale it 
 WALL_HEIGHT = 1.0  # metres; DeepMind Lab's 100 units
 MIN_CELL_SIZE = 0.4  # m, in which the body drives: it is 0.3 m wide, and contacts act 0.03 m before a wall
 UNREACHABLE = -1
-_NOT_FOUND = -2  # a free cell, by a search so far
 
 # (rows, columns) to each neighbour, in the order in which a shortest path prefers them.
 _NEIGHBOURS = ((-1, 0), (0, -1), (1, 0), (0, 1))
@@ -277,55 +276,44 @@ def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]
     so on maps with flipped cells (the paper's appendix on perturbed planning). Of several, it is the path whose first
     differing step comes first in the order up, left, down, right.
     """
-    # Over free cells, from the goal as far as the start. A list of rows, with walls around them,
-    # has the steps from each cell to the goal: plain numbers take a fraction of the time of arrays.
-    width = len(walls) + 2
-    bordered = np.full((width, width), UNREACHABLE)
-    bordered[1:-1, 1:-1][~walls] = _NOT_FOUND
-    steps = bordered.ravel().tolist()
+    costs = np.full((len(walls) + 2, len(walls) + 2), math.inf)
+    costs[1:-1, 1:-1][~walls] = 1
+    if path := _cheapest_path(costs, start, goal):
+        return path
+    costs[1:-1, 1:-1][walls] = _WALL_COST
+    return _cheapest_path(costs, start, goal)
+
+
+def _cheapest_path(costs: np.ndarray, start: Cell, goal: Cell) -> list[Cell]:
+    """Returns a path whose cells cost the least to enter; an empty one if there is none.
+
+    `costs` (`[N + 2, N + 2]` float) are those of the cells and of a border. Infinite ones can't be entered.
+    """
+    # Cells are numbers in a list of all rows: plain numbers take a fraction of the time of arrays.
+    width, cost = len(costs), costs.ravel().tolist()
     first, last = ((row + 1) * width + column + 1 for row, column in (start, goal))
     moves = [down * width + right for down, right in _NEIGHBOURS]
-    found = [last] if steps[first] == steps[last] == _NOT_FOUND else []
-    steps[last] = 0
-    while found and steps[first] == _NOT_FOUND:
-        cells, found = found, []
-        for cell in cells:
+
+    # Backwards from the goal as far as the start: the cost from each cell to the goal, and the cells by that cost.
+    left = np.where(costs < math.inf, math.inf, -1.0).ravel().tolist()
+    left[last] = 0.0
+    reached = {0.0: [last]}
+    while reached and (lowest := min(reached)) < left[first]:
+        for cell in reached.pop(lowest):
+            through = lowest + cost[cell]
+            nexts = reached.setdefault(through, [])
             for move in moves:
-                if steps[cell + move] == _NOT_FOUND:
-                    steps[cell + move] = steps[cell] + 1
-                    found.append(cell + move)
-    if found:
-        path = [first]
-        while path[-1] != last:
-            path.append(next(path[-1] + move for move in moves if steps[path[-1] + move] == steps[path[-1]] - 1))
-        return [(cell // width - 1, cell % width - 1) for cell in path]
+                if through < left[cell + move]:
+                    left[cell + move] = through
+                    nexts.append(cell + move)
+    if not 0 <= left[first] < math.inf:
+        return []
 
-    # Through walls. The search goes backwards from the goal: edge u -> v is the step from v to u, and costs what
-    # entering u costs.
-    every_cell = np.arange(walls.size).reshape(walls.shape)
-    graph = grid_graph(every_cell).tocoo()
-    cost = np.where(walls.ravel()[graph.row], _WALL_COST, 1.0)
-    weighted = scipy.sparse.csr_array((cost, (graph.row, graph.col)), shape=graph.shape)
-    distances = scipy.sparse.csgraph.dijkstra(weighted, indices=every_cell[goal]).reshape(walls.shape)
-    return _descend(distances, start, np.where(walls, _WALL_COST, 1.0))
-
-
-def _descend(distances: np.ndarray, start: Cell, step_cost: np.ndarray) -> list[Cell]:
-    """Returns the path that follows `distances` to the goal down to 0; a step into a cell costs its `step_cost`."""
-    size = len(distances)
-    path = [start]
-    while distances[path[-1]] > 0:
-        row, column = path[-1]
-        for down, right in _NEIGHBOURS:
-            cell = (row + down, column + right)
-            if not (0 <= cell[0] < size and 0 <= cell[1] < size):
-                continue
-            if distances[row, column] - distances[cell] == step_cost[cell]:
-                path.append(cell)
-                break
-        else:
-            raise AssertionError("distances do not descend to 0")
-    return path
+    # Forwards.
+    path = [first]
+    while (cell := path[-1]) != last:
+        path.append(next(near for move in moves if left[cell] - left[near := cell + move] == cost[near]))
+    return [(cell // width - 1, cell % width - 1) for cell in path]
 
 
 def cell_to_point(cells: np.ndarray | Cell, size: int) -> np.ndarray:

@@ -38,12 +38,8 @@ def controls_of_action(kind: str, action: int) -> np.ndarray:
 def controls_of_actions(kind: str, actions: np.ndarray, num_envs: int) -> np.ndarray:
     """Returns `[B, 5]` float: the controls of `[B]` int actions of a kind, one for each of B environments."""
     actions, num_actions = np.asarray(actions), len(DISCRETE[kind])
-    if (
-        actions.shape != (num_envs,)
-        or actions.dtype.kind not in "iu"
-        or actions.min() < 0
-        or actions.max() >= num_actions
-    ):
+    is_integer = np.issubdtype(actions.dtype, np.integer)
+    if actions.shape != (num_envs,) or not is_integer or actions.min() < 0 or actions.max() >= num_actions:
         raise InputError(
             f"expected {num_envs} actions from 0 to {num_actions - 1}, found shape {actions.shape}, "
             f"values {_in_short(actions)}"
