@@ -1,8 +1,8 @@
 """Compilation of kernels to machine code, which is kept on disk.
 
 Numba notices when a kernel's file changes, but not when a module does that the kernel uses. So kernels are kept in a
-folder that is named after the contents of all files beside kernels, of mazebench and of the kernel's package. Numba's
-own choice of folders does not come into play, for it would leave out the name.
+folder that is named after the contents of all files beside kernels, of mazebench and of the kernel's package. Numba
+itself would choose folders without that name where it can't write beside kernels.
 """
 
 from __future__ import annotations
@@ -58,19 +58,21 @@ def compiled(
     several threads may run it at once.
     """
     math = {"contract"} if fused else False
-    compile_it = functools.partial(numba.njit, forceinline=inline, nogil=nogil, error_model="numpy", fastmath=math)
+    compile_it: Any = functools.partial(numba.njit, forceinline=inline, nogil=nogil, error_model="numpy", fastmath=math)
+    kernel = compile_it(function)
     package, file = sys.modules[function.__module__.partition(".")[0]], pathlib.Path(function.__code__.co_filename)
-    if not hasattr(package, "__path__") or not file.exists():  # of a script or an archive: its other files are unknown
-        return compile_it(function)
+    if _CONFIG.DISABLE_JIT or not hasattr(package, "__path__") or not file.exists():
+        return kernel  # Python, or of a script or an archive, of which nothing says what its kernels use
     folder = cache_folder(file.parent / "__pycache__", _digest(*package.__path__))
     if folder is None:
-        return compile_it(function)
+        return kernel
     given = _CONFIG.CACHE_DIR
     _CONFIG.CACHE_DIR = str(folder)
-    try:
-        return compile_it(function, cache=True)
-    finally:
-        _CONFIG.CACHE_DIR = given
+    with contextlib.suppress(RuntimeError):  # numba found no folder that it can write to
+        kernel.enable_caching()
+    _CONFIG.CACHE_DIR = given
+    # Where another user has made a folder below this one, numba chose one of its own.
+    return kernel if str(kernel.stats.cache_path).startswith(str(folder)) else compile_it(function)
 
 
 @functools.cache
@@ -90,8 +92,8 @@ def cache_folder(beside: pathlib.Path, digest: str) -> pathlib.Path | None:
             os.utime(folder)  # says that it is in use
         except OSError:
             continue
-        for other in parent.glob("kernels-*"):
-            with contextlib.suppress(OSError):  # another process may delete it, too
+        for other in parent.glob("kernels-" + 16 * "[0-9a-f]"):
+            with contextlib.suppress(OSError):  # of another user, or deleted by another process
                 if other.stat().st_mtime < time.time() - _KEPT_UNUSED:
                     shutil.rmtree(other)
         return folder

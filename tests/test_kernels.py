@@ -43,13 +43,15 @@ class TestCacheFolder:
         assert "each start compiles" in line
 
     def test_machine_code_that_was_long_not_used_is_deleted(self, users_cache, tmp_path):
-        old, recent = tmp_path / "package" / "kernels-old", tmp_path / "package" / "kernels-recent"
-        for folder in (old / "robot", recent):
-            folder.mkdir(parents=True)
-        os.utime(old, (0, 0))
-        kernels.cache_folder(tmp_path / "package", "78")
+        old, recent, others = (tmp_path / f"kernels-{name}" for name in (16 * "0", 16 * "1", "of-linux"))
+        for folder in (old, recent, others):
+            (folder / "robot").mkdir(parents=True)
+        for folder in (old, others):
+            os.utime(folder, (0, 0))
+        kernels.cache_folder(tmp_path, 16 * "2")
         assert not old.exists()
         assert recent.exists()
+        assert others.exists(), "a folder that is no machine code"
 
 
 def test_a_kernel_follows_a_change_of_what_it_uses(users_cache, tmp_path, monkeypatch):

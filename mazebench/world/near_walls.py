@@ -95,8 +95,8 @@ class NearWalls:
           cell: `[E]` int, the body's cell in it, as row * N + column.
         """
         if len(env) <= _FEW:
-            for each, *where in zip(env.tolist(), maze.tolist(), cell.tolist(), strict=True):
-                self.write_one(geoms, *where, env=each)
+            for where in zip(maze.tolist(), cell.tolist(), env.tolist(), strict=True):
+                self.write_one(geoms, *where)
             return
         slot = env if self._is_fresh else maze
         for at, shown in {(int(slot[i]), int(maze[i])) for i in np.flatnonzero(self._shown[slot] != maze)}:
