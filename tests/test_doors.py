@@ -76,6 +76,14 @@ class TestSwaps:
             assert cells <= slots_of(maze)
             assert cells <= slots_of(shown), "a door that has moved is a door on the map, too"
 
+    def test_a_map_does_not_depend_on_those_that_were_drawn_before(self):
+        maze = generate("rooms", 31, np.random.default_rng(0))
+        first = moved(maze, 10, 0)
+        of_no_kind = Maze(maze.walls)
+        assert moved(of_no_kind, 10, 0) != first
+        assert moved(maze, 10, 1) != first
+        assert moved(maze, 10, 0) == first
+
     def test_doors_that_are_opened_do_not_touch(self):
         for seed in range(20):
             maze = generate("house", 31, np.random.default_rng(seed))

@@ -13,6 +13,7 @@ from hypothesis import strategies
 from hypothesis.extra import numpy as numpy_strategies
 from scipy import ndimage
 
+from mazebench.maps.kinds import generate
 from mazebench.maps.maze import (
     Maze,
     MazeError,
@@ -155,6 +156,15 @@ class TestDistances:
         assert maze.diameter == max(
             brute_force_distances(maze.walls, random_cell(maze, i)).max() for i in range(len(maze.free_cells))
         )
+
+    def test_distances_in_a_maze_that_does_not_keep_them(self):
+        maze = generate("cave", 71, np.random.default_rng(0))
+        assert not maze.keeps_distances
+        source = random_cell(maze, 1)
+        expected = brute_force_distances(maze.walls, source)
+        np.testing.assert_array_equal(maze.distances(source), expected)
+        for distance in (0, 1, 17, expected.max(), expected.max() + 1):
+            np.testing.assert_array_equal(maze.cells_at(source, distance), np.argwhere(expected == distance))
 
 
 class TestConversion:
