@@ -16,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-import scipy
+import scipy  # its parts are loaded at their first use; they would take half of the time in which commands start
 
 from mazebench.errors import InputError, one_line
 from mazebench.maps.covering import Rectangle, cover
