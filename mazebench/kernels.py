@@ -63,11 +63,9 @@ def compiled(
     package, file = sys.modules[function.__module__.partition(".")[0]], pathlib.Path(function.__code__.co_filename)
     if _CONFIG.DISABLE_JIT or not hasattr(package, "__path__") or not file.exists():
         return kernel  # Python, or of a script or an archive, of which nothing says what its kernels use
-    folder = cache_folder(file.parent / "__pycache__", _digest(*package.__path__))
-    if folder is None:
+    if (folder := cache_folder(file.parent / "__pycache__", _digest(*package.__path__))) is None:
         return kernel
-    given = _CONFIG.CACHE_DIR
-    _CONFIG.CACHE_DIR = str(folder)
+    given, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(folder)
     with contextlib.suppress(RuntimeError):  # numba found no folder that it can write to
         kernel.enable_caching()
     _CONFIG.CACHE_DIR = given
@@ -77,10 +75,9 @@ def compiled(
 
 @functools.cache
 def cache_folder(beside: pathlib.Path, digest: str) -> pathlib.Path | None:
-    """Returns the folder for machine code of a digest, and makes it; None if no folder can be written to.
+    """Returns a folder that can be written to for machine code of a digest; None if there is none.
 
-    It lies in the first of these that can be written to: the value of NUMBA_CACHE_DIR, `beside`, and `mazebench` in the
-    user's cache. What was long not used there is deleted.
+    It lies in NUMBA_CACHE_DIR, in `beside`, or in the user's cache. What was long not used there is deleted.
     """
     users = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     given = [pathlib.Path(_CONFIG.CACHE_DIR)] if _CONFIG.CACHE_DIR else []

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import copy
 import functools
+import itertools
 import math
 from collections.abc import Iterable
 
@@ -92,10 +93,7 @@ def _doors(walls: bytes, kind: str) -> _Doors:
 
 
 class _Doors:
-    """The doors of a map, open or not, and the rooms that they join.
-
-    `R` is the number of rooms and 1, `P` the number of pairs of rooms with slots between them.
-    """
+    """The doors of a map, open or not, and the rooms that they join. `R` is the number of rooms and 1."""
 
     def __init__(self, maze: Maze):
         self.slots = door_slots(maze)
@@ -104,14 +102,13 @@ class _Doors:
         num_rooms = int(self._rooms.max(initial=0)) + 1
         _, self._pair = np.unique(self._rooms.T @ (num_rooms, 1), return_inverse=True)  # [D] int, pair of rooms
 
-        # Open doors: the number of a room's ([R] int) and of those between two rooms ([P] int), and of a room, those
-        # doors with the rooms behind them.
+        # The open doors: how many a room ([R] int) and a pair of rooms has, and those of a room, with the rooms behind.
         self._num_open = np.bincount(self._rooms[:, self.is_open].ravel(), minlength=num_rooms)
         self._num_between = np.bincount(self._pair[self.is_open], minlength=self._pair.max(initial=-1) + 1)
         self._ways: list[dict[int, int]] = [{} for _ in range(num_rooms)]
         for door in np.flatnonzero(self.is_open).tolist():
-            first, second = self._rooms[:, door].tolist()
-            self._ways[first][door], self._ways[second][door] = second, first
+            for room, behind in itertools.permutations(self._rooms[:, door].tolist()):
+                self._ways[room][door] = behind
 
         # The odds that a door is open, by type; a half each for types that are rare.
         types, num_types = self.types(), 2 * (_MOST_DOORS + 1) ** 2
@@ -153,16 +150,13 @@ class _Doors:
     def swap(self, opened: int, closed: int) -> None:
         """Opens a closed door, and closes an open one."""
         for door, change in ((opened, 1), (closed, -1)):
-            first, second = rooms = self._rooms[:, door].tolist()
             self.is_open[door] = change > 0
-            self._num_open[rooms] += change
             self._num_between[self._pair[door]] += change
-            for room, behind in ((first, second), (second, first)):
-                ways = self._ways[room] = dict(self._ways[room])  # others may share the old one
-                if change > 0:
-                    ways[door] = behind
-                else:
-                    del ways[door]
+            for room, behind in itertools.permutations(self._rooms[:, door].tolist()):
+                self._num_open[room] += change
+                self._ways[room] = self._ways[room] | {door: behind}  # a new one: copies share the old one
+                if change < 0:
+                    del self._ways[room][door]
 
 
 def _draw(weights: np.ndarray, rng: np.random.Generator) -> int:
