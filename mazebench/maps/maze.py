@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import itertools
 import math
 import numbers
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -159,6 +158,9 @@ class Maze:
         """Returns the length in cells of a shortest 4-connected path between two free cells."""
         self.require_free(start)
         self.require_free(goal)
+        if not self.keeps_distances:
+            _, ends = self._search(start, goal[0] * self.size + goal[1])
+            return len(ends) - 1
         return int(self._distance_row(int(self._index[tuple(start)]))[self._index[tuple(goal)]])
 
     def cells_at(self, source: Cell, distance: int) -> np.ndarray:
@@ -166,8 +168,9 @@ class Maze:
         self.require_free(source)
         if self.keeps_distances:
             return self.free_cells[self._distance_row(int(self._index[tuple(source)])) == distance]
-        cells = next(itertools.islice(self._search(source), distance, None), np.zeros(0, dtype=np.int64))
-        return np.stack(np.divmod(np.sort(cells), self.size), axis=-1)
+        cells, ends = self._search(source, farthest=distance)
+        at_distance = cells[ends[distance - 1] if distance else 0 :] if len(ends) > distance else cells[:0]
+        return np.stack(np.divmod(np.sort(at_distance).astype(np.int64), self.size), axis=-1)
 
     @functools.cached_property
     def diameter(self) -> int:
@@ -198,8 +201,8 @@ class Maze:
     def _distance_row(self, source: int) -> np.ndarray:  # [F] int: from free cell `source` to each free cell
         if not self.keeps_distances:
             distances = np.zeros(self.walls.size, dtype=np.int32)
-            for distance, cells in enumerate(self._search(self.free_cells[source])):
-                distances[cells] = distance
+            cells, ends = self._search(self.free_cells[source])
+            distances[cells] = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
             return distances[~self.walls.ravel()]
         row = self._rows.get(source)
         if row is None:
@@ -207,20 +210,10 @@ class Maze:
             self._rows[source] = row
         return row
 
-    def _search(self, source: Cell | np.ndarray) -> Iterator[np.ndarray]:
-        """Yields the free cells at distance 0, 1, ... from `source`: `[K]` int, row * N + column, in no order."""
-        is_left = ~self.walls.ravel()
-        cells = np.array([source[0] * self.size + source[1]])
-        is_left[cells] = False
-        while len(cells):
-            yield cells
-            found = []
-            for step in (-self.size, -1, 1, self.size):  # one after the other, so that each cell is found once
-                near = cells + step
-                near = near[is_left[near]]
-                is_left[near] = False
-                found.append(near)
-            cells = np.concatenate(found)
+    def _search(self, source: Cell | np.ndarray, goal: int = -1, farthest: int = MAX_SIZE**2) -> tuple[np.ndarray, ...]:
+        from mazebench.maps.search import search  # which needs numba
+
+        return search(self.walls, source[0] * self.size + source[1], goal, farthest)
 
 
 def corner_cells(maze: Maze) -> tuple[Cell, Cell]:

@@ -101,7 +101,7 @@ def _read_rows(path: pathlib.Path) -> list[list[str]]:
     head, *lines = text.splitlines() or [""]
     if not head.startswith("version 1"):
         raise InputError(f"{path}: expected scenarios of MovingAI, which begin with 'version 1', found {head[:40]!r}")
-    rows = [line.split() for line in lines if line.strip()]
+    rows = [line.split("\t" if line.count("\t") >= _NUM_FIELDS - 1 else None) for line in lines if line.strip()]
     for number, row in enumerate(rows):
         if len(row) != _NUM_FIELDS:
             raise InputError(f"{path}: expected {_NUM_FIELDS} fields in a line, found {len(row)} in scenario {number}")
