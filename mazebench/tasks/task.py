@@ -12,7 +12,6 @@ from mazebench.errors import InputError, remark
 from mazebench.maps.benchmark import KINDS_SIZE, SIZES, load_kind_mazes, load_mazes
 from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
 from mazebench.maps.maze import MIN_CELL_SIZE, Maze, require_one_size
-from mazebench.maps.maze_files import read_mazes
 from mazebench.maps.maze_options import THIN_WALLS, ReadOptions
 from mazebench.maps.scenarios import Scenarios, are_scenarios, read_scenarios
 from mazebench.options import check_names, fields_of
@@ -322,6 +321,8 @@ def _read(asked: TaskOptions) -> tuple[Mazes, Scenarios | None]:
         scenarios = read_scenarios(mazes, asked.reading)
         mazes = (scenarios.maze,)
     elif isinstance(mazes, str):
+        from mazebench.maps.maze_files import read_mazes  # with all readers, which few commands need
+
         mazes = _without_unplayable(asked, read_mazes(mazes, **dataclasses.asdict(asked.reading)))
     for maze in mazes:
         if asked.size not in (None, maze.size):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from mazebench.maps.maze import MAX_SIZE
 from mazebench.maps.places import cell_of_place
@@ -79,7 +79,7 @@ def lay_cells(blocked: np.ndarray, pixels: int) -> Cells:
 
 def areas_of(cells: Cells, blocked: np.ndarray) -> list[Area]:
     """Returns the areas that may be the building, by falling size: the largest, and others of a fair share."""
-    labels, _ = ndimage.label(~cells.walls)
+    labels, _ = scipy.ndimage.label(~cells.walls)
     sizes = np.bincount(labels.ravel(), minlength=1)
     sizes[0] = 0
     if not sizes.any():

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from mazebench.errors import InputError, remark
 from mazebench.maps.maze import MAX_CHOSEN_SIZE, MAX_SIZE, MIN_CELL_SIZE, MIN_SIZE, Maze, MazeError
@@ -147,7 +147,7 @@ def _require_not_inverted(states: np.ndarray, name: str) -> None:
     border[1:-1, 1:-1] = False
     walls = states == OCCUPIED
     is_free_around = (states != UNKNOWN).all() and not walls[border].any()
-    if is_free_around and walls.mean() >= _MIN_INVERTED and ndimage.label(walls)[1] == 1:
+    if is_free_around and walls.mean() >= _MIN_INVERTED and scipy.ndimage.label(walls)[1] == 1:
         raise MazeError(
             f"{name}: expected free cells within walls, found one connected wall within free cells; is it inverted? "
             "1 is wall, and so are # and 100"
@@ -188,7 +188,7 @@ def _walls(states: np.ndarray, unknown: str) -> np.ndarray:
     """Returns `[H, W]` bool; unknown areas that reach the edge lie outside of the building and are always wall."""
     is_unknown = states == UNKNOWN
     if unknown == "free":
-        areas, _ = ndimage.label(is_unknown)
+        areas, _ = scipy.ndimage.label(is_unknown)
         edges = np.concatenate([areas[0], areas[-1], areas[:, 0], areas[:, -1]])
         is_unknown &= np.isin(areas, edges)
     return (states == OCCUPIED) | is_unknown

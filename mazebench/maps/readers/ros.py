@@ -15,9 +15,9 @@ from typing import Annotated, Any, Literal
 import cv2
 import numpy as np
 import pydantic
+import scipy
 import yaml
 from annotated_types import Interval
-from scipy import ndimage
 
 from mazebench.errors import InputError, remark
 from mazebench.maps.maze import Maze, MazeError
@@ -121,20 +121,20 @@ def read_floor_plan(path: pathlib.Path, pixel_size: float) -> OccupancyGrid:
 
 def _box_of_walls(states: np.ndarray) -> tuple[slice, slice]:
     """Returns the rows and the columns from the first to the last with a wall; there is one."""
-    (box,) = ndimage.find_objects((states == OCCUPIED).astype(int))
+    (box,) = scipy.ndimage.find_objects((states == OCCUPIED).astype(int))
     return box
 
 
 def _without_surroundings(states: np.ndarray) -> np.ndarray:
     """Returns states in which all that lies outside of the outer walls is unknown; as they are if these are open."""
-    light, _ = ndimage.label(np.pad(states != OCCUPIED, 1, constant_values=True))
+    light, _ = scipy.ndimage.label(np.pad(states != OCCUPIED, 1, constant_values=True))
     inside = np.where(light[1:-1, 1:-1] == light[0, 0], UNKNOWN, states)
     free = inside == FREE
     if free.sum() < _LEAST_INSIDE * states[_box_of_walls(states)].size:
         return states
     # Specks and frames on the paper are dark, too; the walls are what touches free pixels.
-    dark, _ = ndimage.label(states == OCCUPIED, structure=np.ones((3, 3)))
-    walls = np.isin(dark, dark[ndimage.binary_dilation(free, np.ones((3, 3))) & (dark > 0)])
+    dark, _ = scipy.ndimage.label(states == OCCUPIED, structure=np.ones((3, 3)))
+    walls = np.isin(dark, dark[scipy.ndimage.binary_dilation(free, np.ones((3, 3))) & (dark > 0)])
     return np.where((dark > 0) & ~walls, UNKNOWN, inside)
 
 
