@@ -14,10 +14,8 @@ import multiprocessing
 import os
 import pathlib
 import re
-import shutil
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -29,7 +27,6 @@ from mazebench.errors import remark
 
 _CONFIG: Any = numba.config
 _IMPORT = re.compile(rb"^from .*\bkernels\b", re.MULTILINE)  # in the files of kernels
-_KEPT_UNUSED = 7 * 24 * 3600  # s, after which machine code is deleted that no process has asked for
 
 
 class _Announcement(Listener):
@@ -77,7 +74,7 @@ def compiled(
 def cache_folder(beside: pathlib.Path, digest: str) -> pathlib.Path | None:
     """Returns a folder that can be written to for machine code of a digest; None if there is none.
 
-    It lies in NUMBA_CACHE_DIR, in `beside`, or in the user's cache. What was long not used there is deleted.
+    It lies in NUMBA_CACHE_DIR, in `beside`, or in the user's cache.
     """
     users = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     given = [pathlib.Path(_CONFIG.CACHE_DIR)] if _CONFIG.CACHE_DIR else []
@@ -86,13 +83,8 @@ def cache_folder(beside: pathlib.Path, digest: str) -> pathlib.Path | None:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=folder).close()
-            os.utime(folder)  # says that it is in use
         except OSError:
             continue
-        for other in parent.glob("kernels-" + 16 * "[0-9a-f]"):
-            with contextlib.suppress(OSError):  # of another user, or deleted by another process
-                if other.stat().st_mtime < time.time() - _KEPT_UNUSED:
-                    shutil.rmtree(other)
         return folder
     if multiprocessing.parent_process() is None:
         remark("found no folder to keep compiled kernels in, so each start compiles them; set NUMBA_CACHE_DIR to one")

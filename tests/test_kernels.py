@@ -1,7 +1,6 @@
 """Where the machine code of kernels is kept."""
 
 import importlib
-import os
 import sys
 
 import numba
@@ -39,14 +38,6 @@ class TestCacheFolder:
         assert kernels.cache_folder(file, "56") is None
         (line,) = remarks()
         assert "each start compiles" in line
-
-    def test_machine_code_that_was_long_not_used_is_deleted(self, users_cache, tmp_path):
-        _, recent, _ = folders = [tmp_path / f"kernels-{name}" for name in (16 * "0", 16 * "1", "of-linux")]
-        for folder in folders:
-            (folder / "robot").mkdir(parents=True)
-            os.utime(folder, None if folder == recent else (0, 0))
-        kernels.cache_folder(tmp_path, 16 * "2")
-        assert [folder.exists() for folder in folders] == [False, True, True]
 
 
 def test_a_kernel_follows_a_change_of_what_it_uses(users_cache, tmp_path, monkeypatch):
