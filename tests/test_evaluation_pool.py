@@ -112,9 +112,11 @@ def test_a_chunk_that_fails_or_is_stopped_hands_over_what_ended(tmp_path):
 def test_a_script_without_a_main_guard_is_told_to_have_one(tmp_path):
     script = tmp_path / "script.py"
     script.write_text("import mazebench\nmazebench.evaluate('random', distances=(1,), workers=1)\n")
-    ended = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert "under `if __name__ == '__main__':`" in ended.stderr.splitlines()[-1]
-    assert "start a new process" not in ended.stderr
+    for words, said in (([script], "under `if __name__ == '__main__':`"), (["-"], "expected the script in a file")):
+        with script.open() as file:
+            ended = subprocess.run([sys.executable, *words], stdin=file, capture_output=True, text=True, check=False)
+        assert said in ended.stderr.splitlines()[-1]
+        assert "start a new process" not in ended.stderr
 
 
 @pytest.mark.usefixtures("nothing_left")

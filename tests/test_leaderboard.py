@@ -90,11 +90,14 @@ class TestTables:
     def test_the_rank_is_by_time_then_success_and_the_gain_over_the_navigator_without_the_map(self, page):
         entries = [make_entry("slow", 0.9, 0.1), make_entry("never", 0.0, 0.1), make_entry("quick", 0.6, 0.5)]
         parts = dict.fromkeys(PARTS, (0.5, 0.5))
-        entries.append(make_entry("navigator without map", 0.7, 0.3))
+        entries.append(
+            make_entry("navigator without map", 0.7, 0.3).model_copy(update={"code": ("file without hash",)})
+        )
         write_leaderboard([entry.model_copy(update={"parts": parts}) for entry in entries], page)
-        found = [(row[0], row[1], row[3]) for row in rows(kept_entries(page))]
-        names = ["quick", "navigator without map", "slow", "never"]
-        assert found == list(zip("1234", names, ["+0.20", "+0.00", "-0.20", "-0.20"], strict=True))
+        found = [(row[0], row[1], row[3], row[5]) for row in rows(kept_entries(page))]
+        names, codes = ["quick", "navigator without map", "slow", "never"], ["made-up 1.0 cccccccc"] * 4
+        codes[1] = "file without hash"
+        assert found == list(zip("1234", names, ["+0.20", "+0.00", "-0.20", "-0.20"], codes, strict=True))
 
 
 class TestPage:

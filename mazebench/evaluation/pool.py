@@ -10,6 +10,7 @@ import multiprocessing.resource_tracker
 import multiprocessing.synchronize
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator, Sequence
 from typing import Protocol
@@ -72,6 +73,9 @@ class _Processes:
         # A worker first runs the script that started it, which must not start workers of its own.
         if getattr(multiprocessing.current_process(), "_inheriting", False):
             os._exit(_NO_GUARD)
+        script = getattr(sys.modules["__main__"], "__file__", None)
+        if script is not None and not os.path.exists(script):  # as of standard input
+            raise InputError(f"expected the script in a file, since each worker runs it first, found {script}")
         # Not forked: threads of the simulation may be running in this process.
         context = multiprocessing.get_context("spawn")
         self._stop = context.Event()
