@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy import ndimage, sparse
+from scipy import sparse
 from scipy.sparse import csgraph
 from simple_mazes import clearance
 
@@ -49,33 +49,6 @@ def parse(text: str) -> Maze:
 def length(text: str, start: tuple[int, int], goal: tuple[int, int], radius: float = RADIUS) -> float:
     maze = parse(text)
     return DiscPaths(maze, radius).length(cell_to_point(start, maze.size), goal)
-
-
-def random_walls(rng: np.random.Generator, size: int) -> np.ndarray:
-    """Open fields to mazes with loops, by the share of walls; every second one on the odd lattice, with long walls."""
-    inner = rng.random((size - 2, size - 2)) < rng.uniform(0.05, 0.6)
-    if rng.random() < 0.5:
-        inner[::2, ::2] = False
-        inner[1::2, 1::2] |= rng.random(inner[1::2, 1::2].shape) < 0.9
-    inner[tuple(rng.integers(size - 2, size=2))] = False
-    areas, _ = ndimage.label(~np.pad(inner, 1, constant_values=True))
-    return areas != np.argmax(np.bincount(areas.ravel())[1:]) + 1
-
-
-def random_start(maze: Maze, radius: float, rng: np.random.Generator) -> np.ndarray:
-    """As often the centre of a free cell, any point the disc can be at, or such a point close to a corner of a cell."""
-    kind = rng.integers(3)
-    while True:
-        centre = cell_to_point(random_cell(maze, rng), maze.size)
-        angle = rng.uniform(0, 2 * np.pi)
-        near_corner = centre - 0.5 + rng.uniform(1, 1.5) * radius * np.array([np.cos(angle), np.sin(angle)])
-        point = (centre, centre + rng.uniform(-0.5, 0.5, size=2), near_corner)[kind]
-        if clearance(maze.walls, point[None])[0] >= radius:
-            return point
-
-
-def random_cell(maze: Maze, rng: np.random.Generator) -> tuple[int, int]:
-    return tuple(map(int, maze.free_cells[rng.integers(len(maze.free_cells))]))
 
 
 class TestWorkedExamples:
@@ -126,8 +99,9 @@ class TestGrid:
     @pytest.mark.parametrize("seed", range(6))
     def test_no_path_on_a_grid_is_shorter_and_the_shortest_is_little_longer(self, seed, radius):
         rng = np.random.default_rng(seed)
-        maze = Maze(random_walls(rng, 7))
-        start, goal = random_start(maze, radius, rng), random_cell(maze, rng)
+        maze = generate(("dfs", "obstacles", "rooms")[seed % 3], 7, rng)
+        cell, goal = map(tuple, maze.free_cells[rng.integers(len(maze.free_cells), size=2)].tolist())
+        start = maze.point(cell) + rng.uniform(radius - 0.5, 0.5 - radius, size=2)  # any point of a cell
         found, on_grid = DiscPaths(maze, radius).length(start, goal), grid_length(maze, radius, start, goal)
         assert found - 2e-3 <= on_grid <= 1.02 * found + 2 * STEP
 
