@@ -21,7 +21,6 @@ from mazebench.errors import InputError, UnplayableError
 from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.maps.benchmark import load_mazes
-from mazebench.maps.maze import Maze, cell_to_point
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.task import Task
 from mazebench.testing import ConformanceError, check_agent
@@ -30,6 +29,8 @@ from mazebench.world.mjcf import BODY_RADIUS, TURN_RATE, action_controls, veloci
 MIDDLE = Episode(0, (20, 20), (35, 35), 0.0, 0)
 # The velocity that stands for each of the six actions.
 UNIT_VELOCITIES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
+DRAWN = np.random.default_rng(0).integers(6, size=60)
+TURNING = np.random.default_rng(0).uniform(-1.2, 1.2, size=(60, 2))
 
 
 @pytest.fixture(scope="module")
@@ -66,22 +67,12 @@ class TestControls:
         spec = Task.of("local", size=13, actions="velocity")
         envs, rng = MazeVectorEnv(spec, 32, seed=0), np.random.default_rng(0)
         envs.reset(seed=0)
-        depth = 0.0
         for step in range(120):
             if step % 6 == 0:
                 actions = rng.uniform(-1, 1, size=(32, 3))
             _, _, _, _, info = envs.step(actions)
-            depth = max(
-                depth, *(sunk_in(spec.mazes[m], p) for m, p in zip(info["maze"], info["position"], strict=True))
-            )
-        assert depth < 0.01
-
-
-def sunk_in(maze: Maze, position: np.ndarray) -> float:
-    """Returns the depth in metres of a body in a wall; negative if it stands free."""
-    centres = cell_to_point(np.argwhere(maze.walls), maze.size)
-    gaps = np.maximum(np.abs(centres - position) - 0.5, 0)
-    return BODY_RADIUS - float(np.hypot(*gaps.T).min())
+            for maze, position in zip(info["maze"], info["position"], strict=True):
+                assert simple_mazes.clearance(spec.mazes[maze].walls, position[None]) > BODY_RADIUS - 0.01
 
 
 class TestEnvironments:
@@ -92,34 +83,28 @@ class TestEnvironments:
         assert MazeEnv(task).action_space == gymnasium.spaces.Box(-1.0, 1.0, (size,), np.float32)
         assert MazeVectorEnv(task, 2).action_space.shape == (2, size)
 
-    @pytest.mark.parametrize("task", ["local", "hierarchical"])
-    def test_unit_velocities_play_the_discrete_episode(self, task):
-        discrete, continuous = (MazeEnv(Task.of(task, actions=kind)) for kind in ("six", "velocity"))
-        discrete.reset(seed=5)
-        continuous.reset(seed=5)
-        for action in np.random.default_rng(0).integers(len(ACTIONS), size=60):
-            expected, found = discrete.step(action), continuous.step(UNIT_VELOCITIES[action])
-            np.testing.assert_array_equal(expected[0]["state"], found[0]["state"])
-            assert expected[1:4] == found[1:4]
+    @pytest.mark.parametrize(
+        ("kind", "actions", "other_kind", "same_actions"),
+        [
+            ("velocity", UNIT_VELOCITIES[DRAWN], "six", DRAWN),
+            ("four", DRAWN % 4, "six", [ACTIONS.index(DISCRETE["four"][action]) for action in DRAWN % 4]),
+            ("diff", TURNING, "velocity", np.insert(TURNING, 1, 0.0, axis=1)),
+        ],
+    )
+    def test_kinds_play_the_same_episode_where_they_have_the_same_actions(
+        self, kind, actions, other_kind, same_actions
+    ):
+        one, other = (MazeEnv(Task.of(actions=each)) for each in (kind, other_kind))
+        np.testing.assert_equal(one.reset(seed=5), other.reset(seed=5))
+        for action, same in zip(actions, same_actions, strict=True):
+            np.testing.assert_equal(one.step(action), other.step(same))
 
-    def test_four_are_the_six_without_strafing(self):
-        four, six = (MazeEnv(Task.of(actions=kind)) for kind in ("four", "six"))
-        four.reset(seed=5)
-        six.reset(seed=5)
-        assert four.action_space.n == 4
-        for action in np.random.default_rng(0).integers(4, size=60):
-            found, expected = four.step(action), six.step(ACTIONS.index(DISCRETE["four"][action]))
-            np.testing.assert_array_equal(expected[0]["state"], found[0]["state"])
+    def test_four_have_no_strafing(self):
+        env = MazeEnv(Task.of(actions="four"))
+        env.reset(seed=5)
+        assert env.action_space.n == 4
         with pytest.raises(InputError, match=r"from 0 to 3 \(forward, backward, look_left, look_right\), found 4"):
-            four.step(4)
-
-    def test_diff_is_velocity_without_strafing(self):
-        diff, velocity = (MazeEnv(Task.of(actions=kind)) for kind in ("diff", "velocity"))
-        diff.reset(seed=5)
-        velocity.reset(seed=5)
-        for forward, turn in np.random.default_rng(0).uniform(-1.2, 1.2, size=(60, 2)):
-            found, expected = diff.step([forward, turn]), velocity.step([forward, 0, turn])
-            np.testing.assert_array_equal(expected[0]["state"], found[0]["state"])
+            env.step(4)
 
     @pytest.mark.parametrize(("kind", "size"), [("velocity", 3), ("diff", 2)])
     def test_steps_are_the_same_in_all_environments(self, kind, size):
@@ -141,19 +126,6 @@ class TestEnvironments:
 
     def test_velocities_are_clipped(self, field):
         np.testing.assert_array_equal(cruise(field, [2, 0, -7], 3), cruise(field, [1, 0, -1], 3))
-
-    @pytest.mark.parametrize("action", [0, [0, 0], [0, 0, np.nan]])
-    def test_an_invalid_velocity_is_refused(self, field, action):
-        field.reset(episode=MIDDLE)
-        with pytest.raises(ValueError, match=r"expected velocities .* from -1 to 1 of shape \(3,\)"):
-            field.step(action)
-
-    @pytest.mark.parametrize("actions", [[0, 1], np.full((2, 3), np.inf)])
-    def test_invalid_velocities_of_a_vector_are_refused(self, actions):
-        envs = MazeVectorEnv(Task.of(actions="velocity"), 2)
-        envs.reset(seed=0)
-        with pytest.raises(ValueError, match=r"expected velocities .* of shape \(2, 3\)"):
-            envs.step(actions)
 
 
 class Homing(SingleAgent):
@@ -220,10 +192,6 @@ class TestAgents:
         assert found["four"] == found["diff"]
         assert found["six"] == found["velocity"]
         assert found["six"] != found["diff"]
-
-    def test_an_unknown_kind_is_refused(self):
-        with pytest.raises(InputError, match=r"^unknown actions 'five'; available: diff, four, six, velocity$"):
-            Task.of(actions="five")
 
     @pytest.mark.parametrize(
         ("name", "said"),

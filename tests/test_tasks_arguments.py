@@ -93,7 +93,7 @@ class TestActions:
             env.step(action)
         env.step(np.zeros(3, dtype=int) if isinstance(env, MazeVectorEnv) else 0)
 
-    @pytest.mark.parametrize("action", [None, [0, 0], [np.nan, 0, 0]])
+    @pytest.mark.parametrize("action", [None, [0, 0], [np.nan, 0, 0], np.full((3, 3), np.inf)], ids=str)
     @pytest.mark.parametrize("make", [MazeEnv, Environment, lambda spec: MazeVectorEnv(spec, 3)])
     def test_a_wrong_velocity_is_refused_in_one_line(self, make, action):
         env = make(mazebench.Task.of(size=13, actions="velocity"))
