@@ -128,23 +128,6 @@ class TestTrack:
             np.testing.assert_allclose(drifting["state"][6:8], exact_one["state"][6:8], rtol=0.1001)
         assert np.abs(drifting["state"][[X, Y, YAW]] - exact_one["state"][[X, Y, YAW]]).min() > 1e-4
 
-    def test_scans_along_the_odometry_meet_the_walls(self):
-        env = mazebench.load("adrift", seed=3, odometry_noise=0.0, lidar_noise="0,0")
-        time_step = env.reset()
-        (x, y), yaw = env.physics.position(), env.physics.yaw()
-        walls = env.maze_task.mazes[env.task.episode.maze].walls
-        for action in self.ACTIONS:
-            own_x, own_y, own_yaw = time_step.observation["state"][[X, Y, YAW]].astype(float)
-            # Where the rays end in the frame of odometry, turned and shifted into the maze by the pose at the start.
-            lidar = time_step.observation["lidar"]
-            angle = own_yaw + np.arange(32) * (2 * np.pi / 32)
-            end_x, end_y = own_x + (lidar + 1e-3) * np.cos(angle), own_y + (lidar + 1e-3) * np.sin(angle)
-            column = np.floor(x + np.cos(yaw) * end_x - np.sin(yaw) * end_y).astype(int)
-            row = 30 - np.floor(y + np.sin(yaw) * end_x + np.cos(yaw) * end_y).astype(int)
-            within_reach = lidar < 5
-            assert walls[row[within_reach], column[within_reach]].mean() > 0.95  # but for rays that graze a corner
-            time_step = env.step(action)
-
     def test_the_goal_conditioned_environment_is_refused(self):
         with pytest.raises(InputError, match=r"goal-conditioned environment: expected .*no track"):
             GoalMazeEnv(Task.of("adrift"))

@@ -10,8 +10,9 @@ import sys
 import mujoco
 import numpy as np
 import pytest
+from processes import run_python
+from simple_mazes import corridor, field
 
-from mazebench.maps.maze import Maze
 from mazebench.play import viewer
 from mazebench.play.game import KEYS, Game
 from mazebench.tasks.episode import Episode
@@ -21,17 +22,9 @@ SECONDS = 60  # to wait for what must come
 
 
 @pytest.fixture
-def corridor() -> Maze:
-    """Of 3 cells, from (1, 1) to (1, 3) of 5 x 5."""
-    walls = np.ones((5, 5), dtype=bool)
-    walls[1, 1:4] = False
-    return Maze(walls, "corridor")
-
-
-@pytest.fixture
-def game(corridor) -> Game:
+def game() -> Game:
     """From (1, 1), where the body looks at the goal in (1, 3)."""
-    game = Game(Task.of(mazes=corridor, distances=[2]), seed=0)
+    game = Game(Task.of(mazes=corridor(), distances=[2]), seed=0)
     game.env.runner.choose_episode(episode=Episode(0, (1, 1), (1, 3), 0.0, 0))
     game.begin()
     return game
@@ -60,12 +53,10 @@ class TestGame:
 
 
 class TestViewer:
-    def test_all_walls_are_drawn_of_each_maze_in_turn(self, corridor):
-        room = np.ones((7, 7), dtype=bool)
-        room[1:-1, 1:-1] = False
-        scene = mujoco.MjvScene(Game(Task.of(mazes=corridor), seed=0).env.simulation.model, maxgeom=80)
+    def test_all_walls_are_drawn_of_each_maze_in_turn(self, game):
+        scene = mujoco.MjvScene(game.env.simulation.model, maxgeom=80)
         walls = viewer.Walls(np.ones(4, np.float32))
-        for maze in (corridor, Maze(room, "room"), corridor):
+        for maze in (corridor(), field(7), corridor()):
             walls.draw(scene, maze)
             shown = np.zeros((maze.size, maze.size), dtype=bool)
             for geom in scene.geoms[: scene.ngeom]:
@@ -81,12 +72,8 @@ class TestViewer:
         np.testing.assert_array_equal(seen, game.env.runner.shown_map.walls)
 
     def test_a_display_that_does_not_open_is_named_in_one_line(self):
-        command = [sys.executable, "-m", "mazebench", "play"]
-        environment = os.environ | {"DISPLAY": ":9876"}
-        environment.pop("WAYLAND_DISPLAY", None)
-        result = subprocess.run(command, env=environment, capture_output=True, text=True)
-        assert result.returncode == 2
-        assert result.stderr == (
+        display = {"DISPLAY": ":9876", "WAYLAND_DISPLAY": ""}
+        assert run_python("-m", "mazebench", "play", status=2, variables=display).stderr == (
             "mazebench: can't open a window: there is no display, or it refuses; "
             "`mazebench render` films episodes without a window\n"
         )

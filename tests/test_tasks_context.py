@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from simple_mazes import field
 
 from mazebench.maps.text import parse_maze
-from mazebench.tasks.context import build_context, default_context_size
+from mazebench.tasks.context import build_context
+from mazebench.tasks.task import Task
 
 MAZE = parse_maze("#####\n#..##\n##..#\n#...#\n#####")
 START, GOAL = (1, 1), (3, 3)
@@ -56,13 +58,6 @@ class TestGlobalMap:
         np.testing.assert_array_equal(context(10)[0], np.kron(WALLS, np.ones((2, 2))))
 
     def test_a_smaller_map_shows_shares_of_walls(self):
-        walls = np.ones((6, 6), dtype=bool)
-        walls[1:5, 1:4] = False
-        # Thirds of two cells a side: the top left one holds one free cell of four.
-        expected = [[0.75, 0.5, 1], [0.5, 0, 1], [0.75, 0.5, 1]]
-        np.testing.assert_allclose(build_context(walls, (1, 1), (4, 3), 3)[0], expected, atol=1e-6)
-
-    def test_a_smaller_map_that_is_no_divisor_shows_shares_of_cells(self):
         # A third of 5 cells a side is 5/3: the top left one holds 2/3 x 2/3 of the free cell (1, 1), of 25/9.
         found = context(3)[0]
         assert found[0, 0] == pytest.approx(1 - (4 / 9) / (25 / 9), abs=1e-6)
@@ -89,6 +84,6 @@ class TestMarks:
             assert planes[0][marks(planes[3])[0]] < 1
 
 
-@pytest.mark.parametrize(("size", "expected"), [(5, 5), (13, 13), (21, 21), (22, 21), (255, 21)])
-def test_the_default_context_size_ends_at_21(size, expected):
-    assert default_context_size(size) == expected
+@pytest.mark.parametrize(("size", "expected"), [(5, 5), (21, 21), (22, 21)])
+def test_the_context_has_the_mazes_size_by_default_and_21_at_most(size, expected):
+    assert Task.of(mazes=field(size)).context_size == expected

@@ -116,11 +116,13 @@ class TestHierarchical:
 
     @everywhere
     def test_the_next_landmark_comes_when_one_is_reached(self, num_envs):
-        rules = begin(num_envs, along(7, 1), *self.OPTIONS, landmark_distance=2)
-        happened = [drive(rules, (ROW, column)) for column in (6, 5, 4, 3, 2, 1)]
-        assert [first for first, _, _ in happened] == [False, True, False, True, False, False]
-        assert happened[-1] == (False, True, False)
-        np.testing.assert_array_equal(rules.landmark, 2)
+        # From column 3 back: the second landmark, at 3, does not count before the first one, at 5.
+        rules = begin(num_envs, along(7, 1), *self.OPTIONS, landmark_distance=2, time_limit=9)
+        seen = [(drive(rules, (ROW, column)), marked(rules)) for column in (3, 5, 4, 3, 2, 1)]
+        assert [columns for _, columns in seen] == [[7, 5], [5, 3], [5, 3], [3, 1], [3, 1], [3, 1]]
+        assert [first for (first, _, _), _ in seen] == [False, True, False, True, False, False]
+        assert seen[-1][0] == (False, True, False)
+        assert (rules.info(0)["landmark"], rules.info(0)["steps_left"]) == (2, 9 - 2)
 
     def test_the_local_map_is_centred_on_the_legs_start(self):
         rules = begin(1, along(7, 1), *self.OPTIONS, landmark_distance=2)
@@ -152,6 +154,7 @@ class TestInfosOfTheTask:
         assert (row, abs(column - 3)) == (ROW, 4)
         info = rules.info(0)
         assert (info["distance"], info["way_left"], info["steps_left"], info["landmark"]) == (4, 4, 9, 1)
+        assert [drive(rules, (ROW, 3)) for _ in range(9)][-1] == (False, False, True)
 
     @pytest.mark.parametrize("track", ["building", "rebuilt", "rough"])
     def test_a_track_tells_its_level_and_what_records_have(self, track):

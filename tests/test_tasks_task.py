@@ -193,10 +193,6 @@ class TestOptions:
         program = "import sys, mazebench.tasks.task; sys.exit('mujoco' in sys.modules)"
         run_python("-c", program)
 
-    def test_the_context_has_the_mazes_size_by_default_and_21_at_most(self):
-        assert Task.of(mazes=CORRIDOR).context_size == 9
-        assert Task.of(mazes=generate("obstacles", 30, np.random.default_rng(0))).context_size == 21
-
     def test_maps_may_be_a_maze_a_sequence_a_file_or_a_folder(self, tmp_path):
         path = tmp_path / "corridor.txt"
         path.write_text(format_maze(CORRIDOR), encoding="ascii")

@@ -1,8 +1,6 @@
-"""The status of a training run, and how it is shown."""
+"""What a training and an evaluation show of how far they are."""
 
 from __future__ import annotations
-
-import pytest
 
 from mazebench.commands import progress
 from mazebench.training.counters import Counters
@@ -11,25 +9,12 @@ from mazebench.training.loop import Status
 COUNTERS = Counters(env_steps=90_112).after_update({"td_loss": 0.01}).after_update({"td_loss": 0.02})
 
 
-@pytest.mark.parametrize(
-    ("status", "words"),
-    [
-        (Status(COUNTERS, 0.45, 654.3), "90,112 steps of the run, 2 updates, 654 steps/s; td_loss 0.015"),
-        (Status(COUNTERS.after_line(), 0.45, 654.3), "90,112 steps of the run, 2 updates, 654 steps/s"),
-        (Status(Counters(), 0.0, 0.0), "0 steps of the run, 0 updates, 0 steps/s; collecting before learning begins"),
-        (Status(COUNTERS, 1.0, 9.0, (50, 1200)), "2 updates, 9 steps/s; evaluating: 50 of 1,200 held-out episodes"),
-    ],
-)
-def test_a_status_says_how_far_the_run_is(status: Status, words: str):
-    assert str(status).endswith(words)
-
-
 def test_where_nothing_is_a_terminal_there_is_a_line_now_and_then(capsys):
     with progress.training() as show:
         for tenth in range(100):
             show(Status(COUNTERS, 0.25 + tenth / 2400, 9.0))
     (line,) = capsys.readouterr().out.splitlines()
-    assert " 25% done; 90,112 steps" in line
+    assert " 25% done; 90,112 steps of the run, 2 updates, 9 steps/s; td_loss 0.015" in line
 
 
 def test_an_evaluation_counts_its_episodes(capsys):

@@ -11,7 +11,7 @@ from simple_mazes import clearance
 from mazebench.constants import ACTIONS, STEPS_PER_ACTION
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, point_to_cell
-from mazebench.world.mjcf import BODY_HEIGHT, BODY_RADIUS, action_controls
+from mazebench.world.mjcf import BODY_RADIUS, action_controls
 from mazebench.world.models import MazeModels
 from mazebench.world.near_walls import NearWalls, WallGeoms
 from mazebench.world.simulation import MujocoSimulation
@@ -67,8 +67,9 @@ def trajectory(simulation: MujocoSimulation, action: str | None, num_steps: int,
 class TestDriving:
     @pytest.mark.parametrize("action", DRIVES)
     @pytest.mark.parametrize("yaw", YAWS)
-    def test_speed_when_starting_from_rest(self, action, yaw):
-        frames = trajectory(simulation_at(FIELD, MIDDLE, yaw), action, 12, STEPS_PER_FRAME)
+    def test_speed_when_starting_from_rest_and_when_cruising(self, action, yaw):
+        simulation = simulation_at(FIELD, MIDDLE, yaw)
+        frames = trajectory(simulation, action, 12, STEPS_PER_FRAME)
         direction = np.array([np.cos(yaw + BEARINGS[action]), np.sin(yaw + BEARINGS[action])])
         along = frames[:, 3:5] @ direction
         for frame, expected in LAB_SPEEDS.items():
@@ -76,12 +77,7 @@ class TestDriving:
         # implicitfast leaves out that the drives' damping couples x and y: the velocity turns by up to 0.3 degrees.
         np.testing.assert_allclose(frames[:, 3:5] - along[:, None] * direction, 0, atol=0.005 * LAB_TOP_SPEED)
         np.testing.assert_allclose(frames[:, 2], yaw, atol=ROUNDING)
-
-    @pytest.mark.parametrize("action", DRIVES)
-    @pytest.mark.parametrize("yaw", YAWS)
-    def test_speed_when_cruising(self, action, yaw):
-        simulation = simulation_at(FIELD, MIDDLE, yaw)
-        trajectory(simulation, action, 150)
+        trajectory(simulation, action, 126)
         assert simulation.speed() == pytest.approx(LAB_TOP_SPEED, rel=0.001)
 
     @pytest.mark.parametrize("yaw", YAWS)
@@ -191,19 +187,3 @@ class TestWalls:
             assert not maze.walls[row, column].any()
             nearest = clearance(maze.walls, points).min()
             assert BODY_RADIUS - 0.01 <= nearest < BODY_RADIUS + 0.1  # walls were met
-
-
-class TestFixedFreedoms:
-    def test_height_roll_and_pitch_when_acting_at_random(self):
-        rng = np.random.default_rng(3)
-        maze = generate("dfs", 9, rng)
-        row, column = maze.free_cells[0]
-        simulation = simulation_at(maze, (column + 0.5, maze.size - row - 0.5), 0.7)
-        for _ in range(200):
-            simulation.set_controls(CONTROLS[rng.integers(len(ACTIONS))])
-            simulation.step(STEPS_PER_ACTION)
-            state = simulation.state()
-            np.testing.assert_allclose(state[2:5], (BODY_HEIGHT / 2, 0, 0), atol=1e-12)  # z, roll, pitch
-            np.testing.assert_allclose(state[[8, 9, 10]], 0, atol=1e-12)  # velocity up, roll and pitch rates
-            upright = simulation.data.body("agent").xmat.reshape(3, 3)[2]
-            np.testing.assert_allclose(upright, (0, 0, 1), atol=1e-12)
