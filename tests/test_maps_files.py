@@ -59,29 +59,17 @@ def test_a_maze_is_read_as_it_was_written_without_remarks(suffix, seed, kind, si
     assert (read, read.name) == (maze, "plan")
 
 
-def test_a_suffix_may_be_in_capitals(mazes, tmp_path):
-    write_picture(mazes[0], tmp_path / "a.PNG")
-    write_text_maze(mazes[1], tmp_path / "b.TXT")
-    assert read_maze(tmp_path / "a.PNG") == mazes[0]
-    assert [maze.name for maze in read_mazes(tmp_path)] == ["a", "b"]
-
-
-def test_a_folders_maps_are_read_by_name(mazes, tmp_path):
-    write_text_maze(mazes[2], tmp_path / "c.txt")
-    write_picture(mazes[1], tmp_path / "b.png")
+def test_a_folders_maps_are_read_by_name_and_each_once(mazes, tmp_path):
+    write_text_maze(mazes[2], tmp_path / "c.TXT")
+    write_picture(mazes[1], tmp_path / "b.PNG")
     write_text_maze(mazes[0], tmp_path / "a.map")
+    write_picture(mazes[3], tmp_path / "a.png")  # the text is the maze
     (tmp_path / "notes.md").write_text("no map")
     (tmp_path / "a.xml").write_text("no map either")
     found = read_mazes(tmp_path)
     assert found == (mazes[0], mazes[1], mazes[2])
     assert [maze.name for maze in found] == ["a", "b", "c"]
-
-
-def test_the_text_is_read_where_there_is_a_picture_too(mazes, tmp_path):
-    write_text_maze(mazes[0], tmp_path / "a.txt")
-    write_picture(mazes[1], tmp_path / "a.png")
-    write_picture(mazes[2], tmp_path / "a.bmp")
-    assert read_mazes(tmp_path) == (mazes[0],)
+    assert read_maze(tmp_path / "b.PNG") == mazes[1]
 
 
 def test_what_is_no_map_is_left_out_of_a_folder_with_a_line_and_all_remarks_are_shown(mazes, tmp_path, remarks):
