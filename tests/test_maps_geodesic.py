@@ -100,7 +100,8 @@ class TestGrid:
     def test_no_path_on_a_grid_is_shorter_and_the_shortest_is_little_longer(self, seed, radius):
         rng = np.random.default_rng(seed)
         maze = generate(("dfs", "obstacles", "rooms")[seed % 3], 7, rng)
-        cell, goal = map(tuple, maze.free_cells[rng.integers(len(maze.free_cells), size=2)].tolist())
+        cell = tuple(rng.choice(maze.free_cells).tolist())
+        goal = tuple(rng.choice(maze.cells_at(cell, maze.distances(cell).max() - 1)).tolist())
         start = maze.point(cell) + rng.uniform(radius - 0.5, 0.5 - radius, size=2)  # any point of a cell
         found, on_grid = DiscPaths(maze, radius).length(start, goal), grid_length(maze, radius, start, goal)
         assert found - 2e-3 <= on_grid <= 1.02 * found + 2 * STEP
