@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+import pytest
+
 from mazebench.commands import progress
 from mazebench.training.counters import Counters
 from mazebench.training.loop import Status
 
 COUNTERS = Counters(env_steps=90_112).after_update({"td_loss": 0.01}).after_update({"td_loss": 0.02})
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [
+        (Status(Counters(), 0.0, 0.0), "0 steps/s; collecting before learning begins"),
+        (Status(COUNTERS, 1.0, 9.0, (50, 1200)), "9 steps/s; evaluating: 50 of 1,200 held-out episodes"),
+    ],
+)
+def test_a_status_says_what_the_run_does(status: Status, words: str):
+    assert str(status).endswith(words)
 
 
 def test_where_nothing_is_a_terminal_there_is_a_line_now_and_then(capsys):
