@@ -202,7 +202,19 @@ class Replay:
         """
         row, steps, contexts = self._draw_groups(num_groups, num_steps, hindsight, rng)
         env, goal = row[:, None] // self._length, contexts.goal[:, None]
-        total, discount, last = self._returns(env, steps, goal, n)
+
+        # Returns. A step that ends in the goal ends its return with discount 0; a trajectory that ends earlier was cut
+        # short, so that its return bootstraps from its last state.
+        total = np.zeros(steps.shape, dtype=np.float32)
+        going, hit = np.ones(steps.shape, dtype=bool), np.zeros(steps.shape, dtype=bool)
+        last = steps.copy()
+        for _ in range(n):
+            going &= self._has_next(env, last)
+            last = np.where(going, (last + 1) % self._length, last)
+            hit |= going & (self._rows["cell"][env, last] == goal)
+            total += going * reward(hit)
+            going &= ~hit
+
         rows, priority = self._rows[env, steps], self._tree.priorities(row)
         return Sample(
             row=row,
@@ -212,7 +224,7 @@ class Replay:
             state=rows["state"],
             action=rows["action"].astype(np.int64),
             reward=total,
-            discount=discount,
+            discount=(~hit).astype(np.float32),
             next_state=self._rows["state"][env, last],
             valid=(rows["cell"] != goal) & (last != steps),
         )
@@ -261,9 +273,15 @@ class Replay:
         goal = np.where(relabelled, self._rows["cell"][env, reached], drawn["goal"]).astype(np.int64)
 
         # The steps: the drawn one, and others in a window before the goal is reached, or around the drawn one.
+        # The drawn row replaces each that would lie outside of its leg, or of its trajectory.
         end = np.where(relabelled, reached, self._forward(env, index, np.full_like(index, hindsight.window // 2)))
         part = self._rows["trajectory" if hindsight.relabel_start else "leg"]
-        steps = self._draw_steps(env, index, end, part, num_steps, hindsight.window, rng)
+        back = rng.integers(1, hindsight.window + 1, size=(num_groups, num_steps))
+        back[:, 0] = (end - index) % self._length
+        steps = (end[:, None] - back) % self._length
+        inside = part[env[:, None], steps] == part[env, index][:, None]
+        inside &= self._is_later(env[:, None], steps, end[:, None])
+        steps = np.where(inside, steps, index[:, None])
 
         # Where the context starts, and from where displacements are measured.
         start, origin = drawn["start"].astype(np.int64), drawn["origin"]
@@ -311,48 +329,7 @@ class Replay:
     def _is_later(self, env: np.ndarray, here: np.ndarray, there: np.ndarray) -> np.ndarray:
         """Returns whether the row at `there` was written after the one at `here`, or is the same."""
         newest = self._next[env] - 1
-        age_here, age_there = (newest - here) % self._length, (newest - there) % self._length
-        return age_there <= age_here
-
-    def _draw_steps(
-        self,
-        env: np.ndarray,
-        index: np.ndarray,
-        end: np.ndarray,
-        part: np.ndarray,
-        num_steps: int,
-        window: int,
-        rng: np.random.Generator,
-    ) -> np.ndarray:
-        """Returns indices `[G, K]`: the drawn row, then others of the same `part`, at most `window` rows before `end`.
-
-        A row that would lie outside of its part is replaced by the drawn row.
-        """
-        back = rng.integers(1, window + 1, size=(len(env), num_steps))
-        back[:, 0] = (end - index) % self._length
-        steps = (end[:, None] - back) % self._length
-        same = part[env[:, None], steps] == part[env, index][:, None]
-        inside = same & self._is_later(env[:, None], steps, end[:, None])
-        return np.where(inside, steps, index[:, None])
-
-    def _returns(
-        self, env: np.ndarray, steps: np.ndarray, goal: np.ndarray, n: int
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns reward sums, discounts and last indices `[G, K]` of returns of up to n steps towards `goal`.
-
-        A step that ends in the goal ends the return with discount 0.
-        A trajectory that ends earlier was cut short: its return bootstraps from its last state.
-        """
-        total = np.zeros(steps.shape, dtype=np.float32)
-        going, hit = np.ones(steps.shape, dtype=bool), np.zeros(steps.shape, dtype=bool)
-        last = steps.copy()
-        for _ in range(n):
-            going &= self._has_next(env, last)
-            last = np.where(going, (last + 1) % self._length, last)
-            hit |= going & (self._rows["cell"][env, last] == goal)
-            total += going * reward(hit)
-            going &= ~hit
-        return total, (~hit).astype(np.float32), last
+        return (newest - there) % self._length <= (newest - here) % self._length
 
     def _has_next(self, env: np.ndarray, index: np.ndarray) -> np.ndarray:
         """Returns whether the row after `index` belongs to the same trajectory."""

@@ -15,7 +15,6 @@ from .mmn_config import MMNConfig
 from .targets import Batch, Targets, n_step_returns
 
 _HIDDEN_GRADIENT = 0.5  # of an unrolled state at each step: MuZero's
-_OTHER_MAP = "model_error_other_map"
 _MOVED_WEIGHT = 2.0  # of an error of metres moved, beside one of the body's motion
 
 
@@ -30,8 +29,9 @@ class Means:
         """Adds `values` with `weight`, an array of the same shape."""
         weight = weight.to(values.dtype)
         total, weights = (values * weight).sum(), weight.sum()
-        self._sums[name] = self._sums[name] + total if name in self._sums else total
-        self._weights[name] = self._weights[name] + weights if name in self._weights else weights
+        if name in self._sums:
+            total, weights = self._sums[name] + total, self._weights[name] + weights
+        self._sums[name], self._weights[name] = total, weights
 
     def means(self) -> dict[str, torch.Tensor]:
         """Returns the means by name; 0 where all weights are 0."""
@@ -63,6 +63,8 @@ def unrolled_losses(
         exists = at(batch.exists, step) & alive if step else at(batch.exists, 0)
         at_goal, value = at(batch.at_goal, step), at(targets.value, step)
         share = 1 / config.unroll if step else 1.0
+
+        # The task losses.
         seen = network.look(latent, code)
         out = network.predict(latent, seen, code)
         going = exists & ~at_goal
@@ -71,21 +73,39 @@ def unrolled_losses(
         ends = functional.binary_cross_entropy_with_logits(out.goal_logit, at_goal.float(), reduction="none")
         losses.add("goal_loss", ends, exists * share)
         if step:
-            moved_error = _add_model(losses, config, network, latent, at(batch.features, step), exists * share)
+            # The model loss is the negative log-likelihood of the state: of pose and velocities with a Laplace
+            # distribution, since collisions are heavy-tailed, and of the whole latent state with a normal one.
+            features, decoded = at(batch.features, step), network.decode(latent)
+            with torch.no_grad():
+                encoded = network.encode(features)
+            moved_error = (decoded[..., :2] - features[..., :2]).abs().sum(dim=-1)
+            body_error = (decoded[..., 2:] - features[..., 2:7]).abs().sum(dim=-1)
+            latent_error = ((latent - encoded) ** 2).mean(dim=-1)
+            model_loss = config.model_weight * (_MOVED_WEIGHT * moved_error + body_error + latent_error)
+            losses.add("model_loss", model_loss, exists * share)
             if step in (1, config.unroll):
-                watched.add(f"model_error_{step}", moved_error, exists)
+                watched.add(f"model_error_{step}", moved_error.detach(), exists)
         else:
             error = (network.value(out.value_logits.detach()) - value) * going
             watched.add("value_error", error.abs(), going)
             watched.add("value", value, going)
-            after = at(batch.features, 1), at(batch.exists, 1) & alive
-            _watch_other_maps(watched, network, latent, at(batch.action, 0), *after, code, batch.maze)
+
+            # The model's error after one step with the weights of another maze of the batch.
+            with torch.no_grad():
+                other = Code(code.positions, *(part.roll(1, 0) for part in code[1:]))
+                first = network.first_layer(latent, network.look(latent, other), other)
+                moved = network.decode(network.step(latent, first, at(batch.action, 0), other))[..., :2]
+            is_other = (batch.maze != batch.maze.roll(1, 0))[:, None]
+            error = (moved - at(batch.features, 1)[..., :2]).abs().sum(dim=-1)
+            watched.add("model_error_other_map", error, at(batch.exists, 1) & alive & is_other)
+
+        # Unroll, with half of the gradient.
         if step < config.unroll:
-            action = at(batch.action, step)
-            latent = network.step(latent, network.first_layer(latent, seen, code), action, code)
+            first = network.first_layer(latent, seen, code)
+            latent = network.step(latent, first, at(batch.action, step), code)
             latent = latent * _HIDDEN_GRADIENT + latent.detach() * (1 - _HIDDEN_GRADIENT)
     metrics = watched.means()
-    metrics["map_ratio"] = metrics.pop(_OTHER_MAP) / metrics["model_error_1"].clamp(min=1e-6)
+    metrics["map_ratio"] = metrics.pop("model_error_other_map") / metrics["model_error_1"].clamp(min=1e-6)
     return losses.means(), metrics
 
 
@@ -122,49 +142,6 @@ def q_losses(
     watched.add("value_error", (taken.detach() - returns).abs(), going)
     watched.add("value", returns, going)
     return losses.means(), watched.means()
-
-
-def _add_model(
-    losses: Means,
-    config: MMNConfig,
-    network: MMNNetwork,
-    latent: torch.Tensor,
-    features: torch.Tensor,
-    weight: torch.Tensor,
-) -> torch.Tensor:
-    """Adds the paper's model loss, and returns the errors `[G, R]` of unrolled displacements in metres.
-
-    It is the negative log-likelihood of the next state: of pose and velocities with a Laplace distribution, since
-    collisions are heavy-tailed, and of the whole latent state with a normal distribution.
-    """
-    decoded = network.decode(latent)
-    with torch.no_grad():
-        encoded = network.encode(features)
-    moved_error = (decoded[..., :2] - features[..., :2]).abs().sum(dim=-1)
-    body_error = (decoded[..., 2:] - features[..., 2:7]).abs().sum(dim=-1)
-    latent_error = ((latent - encoded) ** 2).mean(dim=-1)
-    loss = config.model_weight * (_MOVED_WEIGHT * moved_error + body_error + latent_error)
-    losses.add("model_loss", loss, weight)
-    return moved_error.detach()
-
-
-@torch.no_grad()
-def _watch_other_maps(
-    watched: Means,
-    network: MMNNetwork,
-    latent: torch.Tensor,
-    action: torch.Tensor,
-    features: torch.Tensor,
-    exists: torch.Tensor,
-    code: Code,
-    maze: torch.Tensor,
-) -> None:
-    """Adds the model's error after one step with the weights of another maze of the batch."""
-    other = Code(code.positions, *(part.roll(1, 0) for part in code[1:]))
-    first = network.first_layer(latent, network.look(latent, other), other)
-    moved = network.decode(network.step(latent, first, action, other))[..., :2]
-    error = (moved - features[..., :2]).abs().sum(dim=-1)
-    watched.add(_OTHER_MAP, error, exists & (maze != maze.roll(1, 0))[:, None])
 
 
 def two_hot(value: torch.Tensor, num_bins: int) -> torch.Tensor:
