@@ -73,7 +73,7 @@ def test_a_policy_learns_from_them(task, reader, num_features):
 
 def test_ways_are_read_as_by_the_neural_planner():
     envs = MazeVecEnv(mazebench.make_vec("building", 3, distances=(3,)))
-    agent = NeuralPlanner(NeuralPlanner.default_config, envs.envs.task.interface)
+    agent = NeuralPlanner.build_learner(envs.envs.task).actor
     reader = WayFeatures(envs.observation_space)
     reader.planner.load_state_dict(agent.network.state_dict(), strict=False)
     envs.seed(0)

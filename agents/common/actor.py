@@ -96,7 +96,7 @@ class NetworkAgent(LearningAgent):
             raise UnplayableError(f"agent {cls.name!r}: {expected}; mah and mmn-paths read any size")
         agent = cls(config, trained_size, seed)
         load_into(path, agent.network, tensors)
-        return agent
+        return agent.for_interface(interface)
 
     @classmethod
     def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:
@@ -108,7 +108,7 @@ class NetworkAgent(LearningAgent):
         """Returns a learner for an agent of this class."""
         config = override(cls.default_config, overrides or {})
         device = "cuda" if cls.learns_on_gpu and torch.cuda.is_available() else "cpu"
-        return cls.learner_class(cls(config, task.context_size, seed, device), task, seed)
+        return cls.learner_class(cls(config, task.context_size, seed, device).for_interface(task.interface), task, seed)
 
     def explore_from(self, seed: int) -> None:
         """Begins a new stream of exploration.

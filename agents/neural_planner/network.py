@@ -30,9 +30,8 @@ _POINTS = torch.tensor(  # [P, 2], the body, then points ahead of it and to its 
         for angle in range(_ANGLES)
     ]
 )
-_NUM_POINTS = len(_POINTS)
 _NUM_MOTION = 3 + 2 * NUM_ACTIONS
-_NUM_FEATURES = 3 * _NUM_POINTS + NUM_RANGES + _NUM_MOTION + 2
+_NUM_FEATURES = 3 * len(_POINTS) + NUM_RANGES + _NUM_MOTION + 2
 
 _EVIDENCE = 120 / MOST_EVIDENCE  # levels a unit of log odds, in a picture's bytes
 _UNLIKELY = 32.0  # levels a unit of the log of a goal's likelihood

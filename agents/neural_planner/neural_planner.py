@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-import pathlib
 from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar, Self
 
@@ -16,11 +15,8 @@ import torch
 
 from mazebench.agent import Inputs, Interface
 from mazebench.constants import NUM_ACTIONS, YAW_RATE
-from mazebench.tasks.task import Task
 
 from ..common.actor import NetworkAgent, acting
-from ..common.checkpoint import load_agent, load_into
-from ..common.config_values import override
 from ..common.layers import in_batches
 from ..robot.motion import moved_in_the_open
 from ..robot.rays import ranges_to
@@ -61,17 +57,12 @@ class NeuralPlanner(NetworkAgent):
     name: ClassVar[str] = "neural-planner"
     shipped_size = 31
     default_config: ClassVar[NeuralPlannerConfig] = NeuralPlannerConfig()
+    learner_class: ClassVar[type[PlannerLearner]] = PlannerLearner
     learns_several_tasks = True
     config: NeuralPlannerConfig
     network: PlannerNetwork
-
-    def __init__(self, config: NeuralPlannerConfig, interface: Interface, seed: int = 0):
-        """Makes an agent with a new network, for the environments of an interface."""
-        super().__init__(config, interface.context_size, seed)
-        self._sense(interface)
-
-    def _sense(self, interface: Interface) -> None:
-        self._senses, self._cell_size = Senses(interface, self.name), interface.cell_size
+    _senses: Senses
+    _cell_size: float  # m
 
     @classmethod
     def make_network(cls, config: NeuralPlannerConfig, context_size: int) -> PlannerNetwork:
@@ -79,29 +70,14 @@ class NeuralPlanner(NetworkAgent):
         return PlannerNetwork(config.channels, config.hidden, config.ways)
 
     @classmethod
-    def build(cls, interface: Interface, *, seed: int = 0, checkpoint: pathlib.Path | None = None) -> Self:
-        """Returns the agent of a checkpoint, by default of the one that ships."""
-        path = cls.default_checkpoint() if checkpoint is None else checkpoint
-        tensors, config, _ = load_agent(path, cls.name, cls.default_config)
-        agent = cls(config, interface, seed)
-        load_into(path, agent.network, tensors)
-        return agent
-
-    @classmethod
     def task_options(cls, overrides: Mapping[str, str] | None = None) -> dict[str, Any]:
         """Returns one goal an episode."""
         return {"num_goals": 1}
 
-    @classmethod
-    def build_learner(cls, task: Task, *, seed: int = 0, overrides: Mapping[str, str] | None = None) -> PlannerLearner:
-        """Returns a learner for an agent of this class."""
-        config = override(cls.default_config, overrides or {})
-        return PlannerLearner(cls(config, task.interface, seed), task.mazes, seed)
-
     def for_interface(self, interface: Interface) -> Self:
-        """Returns an agent with the same network for other environments."""
+        """Returns an agent with the same network, whose senses are those in the environments of an interface."""
         agent = copy.copy(self)
-        agent._sense(interface)
+        agent._senses, agent._cell_size = Senses(interface, self.name), interface.cell_size
         return agent
 
     def explore_from(self, seed: int) -> None:
@@ -115,10 +91,20 @@ class NeuralPlanner(NetworkAgent):
     @acting
     def act(self, inputs: Inputs, state: ActorState, explore: bool = False) -> tuple[np.ndarray, ActorState]:
         """Returns actions `[B]`, drawn by the policy's probabilities at a low temperature."""
+        # What the robots observe; they plan in their first step of a leg, and every few steps after it.
         slots = list(range(len(state.robots))) if inputs.active is None else np.flatnonzero(inputs.active).tolist()
-        robots = [self._observe(inputs, slot, state) for slot in slots]
+        robots = []
+        for slot in slots:
+            robot = state.robots[slot]
+            memory = self._senses.observe(robot.memory if robot else None, inputs, slot)
+            if robot is None or robot.memory is not memory:  # an episode begins
+                robot = state.robots[slot] = Robot(memory, np.random.default_rng(int(inputs.seed[slot])))
+            if inputs.new_context[slot]:
+                robot.age = 0  # the next leg has another goal
+            robots.append(robot)
         self._plan([robot for robot in robots if robot.age % self.config.plan_steps == 0])
 
+        # Actions by the policy, at temperature 1 for PPO.
         situation = self._situation(robots, inputs.observation["state"][slots])
         logits, value = self._read(robots, situation)
         exploring = explore and self.config.teacher == "reward"
@@ -126,10 +112,16 @@ class NeuralPlanner(NetworkAgent):
         noise = [(self._rng if explore else robot.noise).gumbel(size=NUM_ACTIONS) for robot in robots]
         chosen = (logits + temperature * np.array(noise).reshape(logits.shape)).argmax(axis=1)
 
+        # The robots remember their actions, and where these should bring the body if no wall is in the way.
         actions = np.zeros(len(state.robots), dtype=np.int64)
         for robot, slot, action in zip(robots, slots, chosen.tolist(), strict=True):
+            body = robot.memory.body
+            vx, vy = (self._cell_size * speed for speed in body.velocity())
+            x, y, _, _ = moved_in_the_open(vx, vy, body.yaw, action)
+            robot.memory.command(action, (body.x + x / self._cell_size, body.y + y / self._cell_size))
+            robot.actions, robot.age = (action, robot.actions[0]), robot.age + 1
             actions[slot] = action
-            self._command(robot, action)
+
         if explore:
             log_probability = logits - np.log(np.exp(logits - logits.max(1, keepdims=True)).sum(1, keepdims=True))
             log_probability -= logits.max(1, keepdims=True)
@@ -140,16 +132,6 @@ class NeuralPlanner(NetworkAgent):
     def notes(self, state: ActorState) -> Choice | None:
         """Returns the last choice."""
         return state.choice
-
-    def _observe(self, inputs: Inputs, slot: int, state: ActorState) -> Robot:
-        """Returns the robot of environment `slot` after an observation; a new one where an episode begins."""
-        robot = state.robots[slot]
-        memory = self._senses.observe(robot.memory if robot else None, inputs, slot)
-        if robot is None or robot.memory is not memory:
-            robot = state.robots[slot] = Robot(memory, np.random.default_rng(int(inputs.seed[slot])))
-        if inputs.new_context[slot]:
-            robot.age = 0  # the next leg has another goal
-        return robot
 
     def _plan(self, robots: list[Robot]) -> None:
         """Plans for robots, those whose grids have one size at once."""
@@ -194,14 +176,6 @@ class NeuralPlanner(NetworkAgent):
         plan, situation = Plan(*inputs[:3]), Situation(*inputs[3:])
         logits, value = self.network(plan, torch.arange(len(plan.way)), situation)
         return torch.cat([logits, value[:, None]], dim=1)
-
-    def _command(self, robot: Robot, action: int) -> None:
-        """Remembers an action, and where it should bring the body if no wall is in the way."""
-        body, cell_size = robot.memory.body, self._cell_size
-        vx, vy = (cell_size * speed for speed in body.velocity())
-        x, y, _, _ = moved_in_the_open(vx, vy, body.yaw, action)
-        robot.memory.command(action, (body.x + x / cell_size, body.y + y / cell_size))
-        robot.actions, robot.age = (action, robot.actions[0]), robot.age + 1
 
 
 def _of_one_size(robots: list[Robot]) -> Iterable[list[int]]:

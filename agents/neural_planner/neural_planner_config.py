@@ -11,8 +11,6 @@ from mazebench.options import Options
 
 from ..common.config_values import Ahead, Count, Factor, Length, Rows, Share, Size
 
-Temperature = Annotated[float, Interval(ge=0.0, le=10.0)]
-
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class NeuralPlannerConfig(Options):
@@ -27,7 +25,8 @@ class NeuralPlannerConfig(Options):
     hidden: Size = 256  # units of the two layers of the policy
     ways: bool = True  # False, an ablation: all cells cost 1, so that the goal is seen as the crow flies
     plan_steps: Length = 4  # agent steps from one plan to the next
-    temperature: Temperature = 0.25  # of the policy in evaluations; at 0, some episodes end in standing still
+    # Of the policy in evaluations; at 0, some episodes end in standing still.
+    temperature: Annotated[float, Interval(ge=0.0, le=10.0)] = 0.25
 
     # Experience
     num_envs: Count = 80  # side by side

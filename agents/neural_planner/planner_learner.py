@@ -15,8 +15,8 @@ from torch.nn import functional
 
 from mazebench.constants import NUM_ACTIONS
 from mazebench.errors import InputError
-from mazebench.maps.drawn import Mazes
 from mazebench.storage.array_files import read_arrays
+from mazebench.tasks.task import Task
 from mazebench.training.experience import Experience
 
 from ..common.actor import NetworkAgent, one_torch_thread
@@ -59,8 +59,8 @@ class PlannerLearner(NetworkLearner):
 
     min_rows = 0
 
-    def __init__(self, actor: NetworkAgent, mazes: Mazes, seed: int):
-        """The steps are taken in the `mazes`."""
+    def __init__(self, actor: NetworkAgent, task: Task, seed: int):
+        """The steps are taken in the mazes of `task`."""
         config = self._config = actor.config
         self.steps_per_update: int = config.num_envs * config.rollout_steps
         num_gradients = max(1, config.total_steps // self.steps_per_update) * config.epochs * config.minibatches
@@ -73,7 +73,7 @@ class PlannerLearner(NetworkLearner):
         )
         super().__init__(actor, seed, descent)
         self._steps: list[_Step] = []  # of the rollout that is under way, oldest first
-        self._expert = Expert(mazes, config.num_envs)
+        self._expert = Expert(task.mazes, config.num_envs)
         self._kept: list[dict[int, Rows]] = []  # the last rollouts, by the size of grids
 
     @property
