@@ -14,7 +14,7 @@ from ..robot.body import PLAYED, WITHOUT_STRAFING, as_kind, observed_body
 from ..robot.cells import nearest_cell, start_cell
 from ..robot.dead_reckoning import DeadReckoning
 from ..robot.pilot import Pilot
-from .map_planner import MapPlanner, plan
+from .planner import MapPlanner, plan
 
 _POSITION_GAIN = 0.1  # weight of an observed position against the one predicted from velocities
 
