@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 import pytest
-from mazebench_agents.robot.body import BACKWARD, LOOK_LEFT, LOOK_RIGHT
-from mazebench_agents.robot.motion import moved, turned
+from mazebench_agents.robot.body import BACKWARD, LOOK_LEFT, LOOK_RIGHT, TURN_STEP
+from mazebench_agents.robot.motion import moved
 from mazebench_agents.robot.quickest import make_course, quickest_drive
 from simple_mazes import corridor, field
 
@@ -50,7 +50,7 @@ class TestMotion:
         for _ in range(1000):
             action = int(rng.integers(NUM_ACTIONS)) if rng.random() < 0.5 else action
             (x, y), yaw, (vx, vy) = simulation.position(), simulation.yaw(), simulation.data.qvel[:2]
-            heading = turned(yaw, (action == LOOK_LEFT) - (action == LOOK_RIGHT))
+            heading = yaw + TURN_STEP * ((action == LOOK_LEFT) - (action == LOOK_RIGHT))
             expected = moved(walls, maze.cell_size, x, y, vx, vy, heading, action)
             simulation.set_controls(controls_of_action("six", action))
             simulation.step(STEPS_PER_ACTION)

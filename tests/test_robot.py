@@ -12,7 +12,7 @@ from mazebench_agents.robot import rays
 from mazebench_agents.robot.body import Body
 from mazebench_agents.robot.cells import nearest_cell
 from mazebench_agents.robot.dead_reckoning import DeadReckoning
-from mazebench_agents.robot.shortest_paths import cheapest_ways
+from mazebench_agents.robot.planning import cheapest_ways
 
 from mazebench.constants import STEP_TIME
 

@@ -62,22 +62,20 @@ class Navigator(Agent):
                 memory = self._senses.observe(robot.memory if robot else None, inputs, slot)
                 if robot is None or robot.memory is not memory:
                     robot = state[slot] = _Robot(memory)
-                actions[slot] = self._command(robot)
+
+                # A path over walls and goal as they are estimated now.
+                body = memory.body
+                walls, goal = memory.estimate()
+                path = plan(walls, goal, memory.cell) if goal.any() else []
+
+                # It drives along the path, and waits where there is none.
+                action, point = LOOK_LEFT, body.rest()
+                if len(path) == 1:
+                    action = steer(body, tuple(cell_to_point(path[0], len(walls)).tolist()), self._strafes)
+                elif path:
+                    blocked = walls > _BLOCKED
+                    blocked[tuple(np.transpose(path))] = False
+                    action, point = robot.drive.next(blocked, path, body, self._cell_size, self._strafes)
+                memory.command(action, point)
+                actions[slot] = action
         return as_kind(self._kind, actions), state
-
-    def _command(self, robot: _Robot) -> int:
-        """Returns the next action, and remembers it."""
-        memory, body = robot.memory, robot.memory.body
-        walls, goal = memory.estimate()
-        path = plan(walls, goal, memory.cell) if goal.any() else []
-
-        # It drives along the path, and waits where there is none.
-        action, point = LOOK_LEFT, body.rest()
-        if len(path) == 1:
-            action = steer(body, tuple(cell_to_point(path[0], len(walls)).tolist()), self._strafes)
-        elif path:
-            blocked = walls > _BLOCKED
-            blocked[tuple(np.transpose(path))] = False
-            action, point = robot.drive.next(blocked, path, body, self._cell_size, self._strafes)
-        memory.command(action, point)
-        return action

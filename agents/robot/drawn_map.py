@@ -84,42 +84,33 @@ class Registration:
 
         A cell is marked by the pixel in which its centre lies, or if that is a wall, by the nearest free pixel.
         """
-        # Cells whose centres are drawn near the pixel.
-        mark = np.clip(np.subtract(pixel, self.corner), 0, np.subtract(self.picture.shape, 1))
-        centres, deviations = self._drawn_centres()
-        off = np.sqrt(((centres - mark) ** 2).sum(axis=-1))
-        near = off < _FARTHEST_MARK
-
-        # Where each of their centres may be drawn, and the share of that which the pixel would mark.
-        places = centres[near][:, None] + _QUANTILES * deviations[near][:, None]
-        marks = self._marks(places.reshape(-1, 2)).reshape(places.shape)
-        marked = _UNEXPLAINED_MARK * np.exp(-(off**2) / 2)
-        marked[near] += (marks == mark).all(axis=-1).mean(axis=-1)
-        return marked
-
-    def _drawn_centres(self) -> tuple[np.ndarray, np.ndarray]:
-        """Returns `[N, N, 2]` twice: where the cells' centres are drawn, and the deviations of that, in pixels.
-
-        Pixel (0, 0) has its centre at 0. The nearest pixel's point is corrected by the derivatives there.
-        """
+        # Where the cells' centres are drawn, and the deviations of that, in pixels; pixel (0, 0) has its centre at 0.
+        # The nearest pixel's point is corrected by the derivatives there.
         size, width = len(self.walls), self.points.shape[1]
         centres = np.moveaxis(np.indices((size, size)), 0, -1).reshape(-1, 2) + 0.5
         points = self.points.reshape(-1, 2)
         nearest = ((centres[:, None] - points) ** 2).sum(axis=-1).argmin(axis=1)
         jacobians = np.stack(np.gradient(self.points, axis=(0, 1)), axis=-1).reshape(-1, 2, 2)[nearest]
-        off = np.linalg.solve(jacobians, (centres - points[nearest])[:, :, None])[:, :, 0]
+        correction = np.linalg.solve(jacobians, (centres - points[nearest])[:, :, None])[:, :, 0]
+        drawn = np.column_stack(np.divmod(nearest, width)) + correction  # [N * N, 2]
         deviations = self.deviations.reshape(-1, 2)[nearest] / np.abs(np.diagonal(jacobians, axis1=1, axis2=2))
-        drawn = np.column_stack(np.divmod(nearest, width)) + off
-        return drawn.reshape(size, size, 2), np.maximum(deviations, _CENTRE).reshape(size, size, 2)
+        deviations = np.maximum(deviations, _CENTRE)
 
-    def _marks(self, places: np.ndarray) -> np.ndarray:
-        """Returns `[T, 2]` int: the pixels that mark points drawn at `places` `[T, 2]`, in pixels."""
+        # Places at which the centres near the pixel may be drawn, and the pixels that mark these.
+        mark = np.clip(np.subtract(pixel, self.corner), 0, np.subtract(self.picture.shape, 1))
+        off = np.sqrt(((drawn - mark) ** 2).sum(axis=-1))
+        near = off < _FARTHEST_MARK
+        places = drawn[near][:, None] + _QUANTILES * deviations[near][:, None]
         marks = np.clip(np.rint(places), 0, np.subtract(self.picture.shape, 1)).astype(np.intp)
-        in_wall = self.picture[marks[:, 0], marks[:, 1]] > 0.5
+        in_wall = self.picture[marks[..., 0], marks[..., 1]] > 0.5
         if in_wall.any():
             free = np.argwhere(self.picture <= max(0.5, self.picture.min()))
-            marks[in_wall] = free[((places[in_wall, None] - free) ** 2).sum(axis=-1).argmin(axis=1)]
-        return marks
+            marks[in_wall] = free[((places[in_wall][:, None] - free) ** 2).sum(axis=-1).argmin(axis=1)]
+
+        # The share of a cell's places that the pixel marks.
+        marked = _UNEXPLAINED_MARK * np.exp(-(off**2) / 2)
+        marked[near] += (marks == mark).all(axis=-1).mean(axis=-1)
+        return marked.reshape(size, size)
 
 
 def register(picture: np.ndarray, size: int) -> Registration:

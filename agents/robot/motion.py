@@ -13,8 +13,6 @@ import numpy as np
 from mazebench.constants import PHYSICS_TIMESTEP, STEPS_PER_ACTION, TOP_SPEED
 from mazebench.kernels import compiled, inlined
 
-from .body import TURN_STEP
-
 REACH = 0.18  # m from the body's centre at which walls begin to push: its radius and the margin of contacts
 _NO_WALLS = np.zeros((3, 3), dtype=bool)
 _DAMPING, _GAIN, _MAX_FORCE = 8.0, 60.0, 34.0
@@ -25,12 +23,6 @@ _BEARINGS = np.array([0.0, math.pi, math.pi / 2, -math.pi / 2])  # of the four d
 _IMPEDANCE = 0.95
 _CONTACT_DAMPING = 2 / (_IMPEDANCE * 2 * PHYSICS_TIMESTEP)
 _CONTACT_STIFFNESS = (_CONTACT_DAMPING / (2 * 3.0)) ** 2
-
-
-@compiled
-def turned(yaw: float, num_looks: int) -> float:
-    """Returns the heading (rad) after so many looks to the left, or to the right if they are negative."""
-    return yaw + TURN_STEP * num_looks
 
 
 @compiled

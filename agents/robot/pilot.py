@@ -50,29 +50,24 @@ class Pilot:
 
     def action(self, body: Body, strafes: bool) -> int:
         """Returns the drive or turn that brings the body, which strafes or not, towards the aim."""
-        return steer(body, self._aim(*body.rest()), strafes)
+        # The segment nearest to where the body comes to rest, this one or one of the next, and how far along it that
+        # is. Centres of neighbouring cells are 1 apart. Of equally near segments, the last one.
+        x, y = body.rest()
+        along, least = 0.0, math.inf
+        for index in range(self.segment, min(self.segment + _SEGMENTS_AHEAD, len(self.points) - 1)):
+            start, end = self.points[index : index + 2]
+            step_x, step_y = end[0] - start[0], end[1] - start[1]
+            share = min(max((x - start[0]) * step_x + (y - start[1]) * step_y, 0.0), 1.0)
+            distance = (x - start[0] - share * step_x) ** 2 + (y - start[1] - share * step_y) ** 2
+            if distance <= least:
+                least, along, self.segment = distance, share, index
 
-    def _aim(self, x: float, y: float) -> Point:
-        """Returns the point `lookahead` ahead of (x, y) on the path, or the path's end if that is nearer."""
-        along = self._advance(x, y) + self.lookahead
+        # The aim is the point `lookahead` ahead of it on the path, or the path's end if that is nearer.
+        along += self.lookahead
         for start, end in zip(self.points[self.segment :], self.points[self.segment + 1 :], strict=False):
-            if along <= 1:  # centres of neighbouring cells are 1 apart
-                return start[0] + along * (end[0] - start[0]), start[1] + along * (end[1] - start[1])
+            if along <= 1:
+                return steer(
+                    body, (start[0] + along * (end[0] - start[0]), start[1] + along * (end[1] - start[1])), strafes
+                )
             along -= 1
-        return self.points[-1]
-
-    def _advance(self, x: float, y: float) -> float:
-        """Moves on to the segment nearest to (x, y), this one or one of the next; returns how far along it that is."""
-        ahead = range(self.segment, min(self.segment + _SEGMENTS_AHEAD, len(self.points) - 1))
-        nearest = [(*_project(x, y, *self.points[segment : segment + 2]), segment) for segment in ahead]
-        if not nearest:
-            return 0.0
-        _, along, self.segment = min(nearest, key=lambda candidate: (candidate[0], -candidate[2]))
-        return along
-
-
-def _project(x: float, y: float, start: Point, end: Point) -> tuple[float, float]:
-    """Returns (x, y)'s squared distance from the segment between neighbouring centres, and how far along it that is."""
-    step_x, step_y = end[0] - start[0], end[1] - start[1]
-    along = min(max((x - start[0]) * step_x + (y - start[1]) * step_y, 0.0), 1.0)
-    return (x - start[0] - along * step_x) ** 2 + (y - start[1] - along * step_y) ** 2, along
+        return steer(body, self.points[-1], strafes)

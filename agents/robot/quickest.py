@@ -16,8 +16,8 @@ import numpy as np
 from mazebench.constants import NUM_ACTIONS, STEP_TIME, TOP_SPEED
 from mazebench.kernels import compiled
 
-from .body import COASTING_TIME, LOOK_LEFT, LOOK_RIGHT, STRAFE_LEFT, STRAFE_RIGHT, Point
-from .motion import REACH, moved, turned
+from .body import COASTING_TIME, LOOK_LEFT, LOOK_RIGHT, STRAFE_LEFT, STRAFE_RIGHT, TURN_STEP, Point
+from .motion import REACH, moved
 
 _NODES = 5  # a side of a cell
 _DETOUR = 3.0  # a metre of a way along which the body touches a wall counts as so many
@@ -122,7 +122,7 @@ def costs_of_actions(
     for body in range(len(pose)):
         course = Course(walls[body], cell_size, goal[body, 0], goal[body, 1], way_left[body])
         for action in range(NUM_ACTIONS):
-            yaw = turned(pose[body, 2], (action == LOOK_LEFT) - (action == LOOK_RIGHT))
+            yaw = pose[body, 2] + TURN_STEP * ((action == LOOK_LEFT) - (action == LOOK_RIGHT))
             first = beams[0, 0]
             first.x, first.y, first.vx, first.vy = moved(
                 course.walls, cell_size, pose[body, 0], pose[body, 1], velocity[body, 0], velocity[body, 1], yaw, action
@@ -164,7 +164,7 @@ def _search(course: Course, yaw: float, beams: Any, turns: int) -> int:
 def _drive(course: Course, yaw: float, state: Any, child: Any, turns: int) -> bool:
     """Makes `child` the state after an action from `state`; returns whether it turns no further than it may."""
     child.turns = state.turns + (child.action == LOOK_LEFT) - (child.action == LOOK_RIGHT)
-    heading = turned(yaw, child.turns)
+    heading = yaw + TURN_STEP * child.turns
     x, y, vx, vy = moved(course.walls, course.cell_size, state.x, state.y, state.vx, state.vy, heading, child.action)
     child.x, child.y, child.vx, child.vy = x, y, vx, vy
     child.driven = state.driven + math.hypot(x - state.x, y - state.y)
@@ -204,6 +204,7 @@ def _keep_best(children: Any, beam: Any, turns: int) -> int:
 def _way_left(walls: np.ndarray, cell_size: float, goal_x: int, goal_y: int) -> np.ndarray:
     """Returns `Course.way_left`."""
     spacing = cell_size / _NODES
+    reach = math.ceil(REACH / spacing)  # nodes, from the body's centre to where walls begin to push
     left = np.full((len(walls) * _NODES, len(walls) * _NODES), np.inf)
     is_done = np.zeros(left.shape, np.bool_)
     queue = [(0.0, goal_x * _NODES + i, goal_y * _NODES + j) for i in range(_NODES) for j in range(_NODES)]
@@ -218,8 +219,14 @@ def _way_left(walls: np.ndarray, cell_size: float, goal_x: int, goal_y: int) -> 
             is_inside = _NODES <= a < len(left) - _NODES and _NODES <= b < len(left) - _NODES
             if not is_inside or walls[a // _NODES, b // _NODES] or is_done[a, b]:
                 continue
+            # A step costs more where the body would touch a wall.
+            touches = False
+            for x in (a - reach, a, a + reach):
+                for y in (b - reach, b, b + reach):
+                    touches = touches or walls[x // _NODES, y // _NODES]
+            step = spacing * (_DETOUR if touches else 1.0)
+
             # The eikonal equation with the nearer neighbours along x and y.
-            step = spacing * (_DETOUR if _is_beside_wall(walls, spacing, a, b) else 1.0)
             by_x, by_y = min(left[a - 1, b], left[a + 1, b]), min(left[a, b - 1], left[a, b + 1])
             found = min(by_x, by_y) + step
             if abs(by_x - by_y) < step:
@@ -228,17 +235,6 @@ def _way_left(walls: np.ndarray, cell_size: float, goal_x: int, goal_y: int) -> 
                 left[a, b] = found
                 heapq.heappush(queue, (found, a, b))
     return left
-
-
-@compiled
-def _is_beside_wall(walls: np.ndarray, spacing: float, i: int, j: int) -> bool:
-    """Returns whether the body at a node would touch a wall."""
-    reach = math.ceil(REACH / spacing)
-    for a in (i - reach, i, i + reach):
-        for b in (j - reach, j, j + reach):
-            if walls[a // _NODES, b // _NODES]:
-                return True
-    return False
 
 
 @compiled

@@ -100,6 +100,7 @@ class Senses:
             metres = inputs.observation["lidar"][slot].astype(np.float64)
             ranges = np.minimum(metres / self._cell_size, self._beams.reach)
 
+        # The map, and where the body is on the grid.
         if memory is None or inputs.new_episode[slot]:
             memory = self._begin(context, observed, ranges)
         else:
@@ -110,7 +111,22 @@ class Senses:
                 memory.prior, memory.goal = memory.belief.mixture()
                 memory.searched[:] = False
             self._localize(memory, observed, ranges)
-        self._map(memory, ranges)
+
+        # What the scan tells of walls.
+        body, deviation = memory.body, memory.deviation
+        if ranges is not None:
+            add_scan(memory.evidence, body.x, body.y, body.yaw, ranges, self._beams, deviation)
+
+        # The episode would have ended in the goal. Near a cell's border, the body may be in another one.
+        off_x, off_y = (abs(coordinate % 1.0 - 0.5) for coordinate in (body.x, body.y))
+        if max(off_x, off_y) < 0.5 - 2 * deviation:
+            memory.searched[memory.cell] = True
+            if ranges is None:
+                memory.evidence[memory.cell] = max(memory.evidence[memory.cell] - _VISITED, -MOST_EVIDENCE)
+
+        # Where the map may lie, after all that.
+        if memory.belief.update(memory.evidence, memory.searched):
+            memory.prior, memory.goal = memory.belief.mixture()
         return memory
 
     def _begin(self, context: np.ndarray, observed: Body, ranges: np.ndarray | None) -> Memory:
@@ -158,20 +174,6 @@ class Senses:
             off, size = memory.deviation * self._cell_size, len(memory.searched)
             for cell, log_odds in felt_walls(before, memory.action, body, self._cell_size, off, size):
                 memory.evidence[cell] = min(memory.evidence[cell] + log_odds, MOST_EVIDENCE)
-
-    def _map(self, memory: Memory, ranges: np.ndarray | None) -> None:
-        """Takes in that the body is where it is, and a scan `[R]` if there is one; compares both with the map."""
-        body, deviation = memory.body, memory.deviation
-        if ranges is not None:
-            add_scan(memory.evidence, body.x, body.y, body.yaw, ranges, self._beams, deviation)
-        # The episode would have ended in the goal. Near a cell's border, the body may be in another one.
-        off_x, off_y = (abs(coordinate % 1.0 - 0.5) for coordinate in (body.x, body.y))
-        if max(off_x, off_y) < 0.5 - 2 * deviation:
-            memory.searched[memory.cell] = True
-            if ranges is None:
-                memory.evidence[memory.cell] = max(memory.evidence[memory.cell] - _VISITED, -MOST_EVIDENCE)
-        if memory.belief.update(memory.evidence, memory.searched):
-            memory.prior, memory.goal = memory.belief.mixture()
 
 
 def _pose(body: Body) -> np.ndarray:

@@ -126,13 +126,29 @@ def best_pose(
                 walls, start, predicted, deviation, turn_deviation, ranges, beams, _FIRST_STEP
             )
 
-    # From the best ones, uphill.
+    # From the best ones, uphill along one axis after the other, by steps of halving length.
     best, best_score = predicted.copy(), -np.inf
     for _ in range(min(_STARTS, len(scores))):
         k = int(np.argmax(scores))
         scores[k] = -np.inf
-        pose = starts[k].copy()
-        score = _climb(walls, pose, predicted, deviation, turn_deviation, ranges, beams)
+        pose, step, score = starts[k].copy(), _FIRST_STEP, -np.inf
+        while step > _LAST_STEP:
+            smooth = max(step, _DEVIATION)
+            score = _score(walls, pose, predicted, deviation, turn_deviation, ranges, beams, smooth)
+            for _ in range(_MOST_MOVES):
+                before = score
+                for axis in range(3):
+                    length = step * _TURN_PER_STEP if axis == 2 else step
+                    for sign in (-1, 1):
+                        pose[axis] += sign * length
+                        tried = _score(walls, pose, predicted, deviation, turn_deviation, ranges, beams, smooth)
+                        if tried > score:
+                            score = tried
+                            break
+                        pose[axis] -= sign * length
+                if score == before:
+                    break
+            step /= 2
         if score > best_score:
             best, best_score = pose, score
     return best
@@ -146,30 +162,3 @@ def _score(
     off = ((pose[0] - predicted[0]) ** 2 + (pose[1] - predicted[1]) ** 2) / deviation**2
     off += ((pose[2] - predicted[2]) / turn_deviation) ** 2
     return _TEMPER * log_likelihood(walls, pose[0], pose[1], pose[2], ranges, beams, smooth) - off / 2
-
-
-@compiled
-def _climb(
-    walls: np.ndarray, pose: np.ndarray, predicted: np.ndarray, deviation: float, turn_deviation: float,
-    ranges: np.ndarray, beams: Beams,
-) -> float:  # fmt: skip
-    """Moves `pose` `[3]` to a maximum nearby, in place; returns the score there."""
-    step, score = _FIRST_STEP, -np.inf
-    while step > _LAST_STEP:
-        smooth = max(step, _DEVIATION)
-        score = _score(walls, pose, predicted, deviation, turn_deviation, ranges, beams, smooth)
-        for _ in range(_MOST_MOVES):
-            before = score
-            for axis in range(3):
-                length = step * _TURN_PER_STEP if axis == 2 else step
-                for sign in (-1, 1):
-                    pose[axis] += sign * length
-                    tried = _score(walls, pose, predicted, deviation, turn_deviation, ranges, beams, smooth)
-                    if tried > score:
-                        score = tried
-                        break
-                    pose[axis] -= sign * length
-            if score == before:
-                break
-        step /= 2
-    return score
