@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import torch
 from acting import RandomActor, inputs_of
-from mazebench_agents.common.layers import NUM_PLACE, MapEncoder, marked_position
+from mazebench_agents.common.layers import FAR_DILATIONS, NUM_PLACE, MapEncoder, marked_position
 from mazebench_agents.mmn import MMN
-from mazebench_agents.mmn.hypermodel import _FAR, MMNNetwork, WayReader
+from mazebench_agents.mmn.hypermodel import MMNNetwork, WayReader
 from mazebench_agents.mmn.losses import unrolled_losses
 from mazebench_agents.mmn.mmn_config import MMNConfig
 from mazebench_agents.mmn.targets import Targets, make_batch
@@ -254,7 +254,7 @@ def test_ways_go_around_dear_cells_where_the_agent_does_not_explore():
     assert 25 < around < 31
 
 
-@pytest.mark.parametrize(("reader", "sees_far"), [(WayReader(8), True), (MapEncoder(8, _FAR), False)])
+@pytest.mark.parametrize(("reader", "sees_far"), [(WayReader(8), True), (MapEncoder(8, FAR_DILATIONS), False)])
 def test_only_ways_tell_a_cell_of_a_goal_that_is_far(reader, sees_far):
     """In a corridor of 61 cells, the goal is at the left or at the right end."""
     context = torch.zeros(2, 4, 61, 61)

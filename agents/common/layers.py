@@ -25,6 +25,9 @@ VALUE_UNIT = 10.0  # steps, of action values; outputs of order one then span the
 NUM_PLACE = 6 + 4 * len(PERIODS)
 WIDTHS = (0.5, 2.0, 8.0, 32.0)  # square cells, of the bells that code the distance to the goal
 NUM_TO_GOAL = 2 + len(WIDTHS)
+# Dilations after which a feature of `MapEncoder` sees 5 cells far, or 19, across a 13 x 13 map.
+NEAR_DILATIONS, FAR_DILATIONS = (1, 1, 1, 1), (1, 1, 2, 2, 4, 4, 2, 1, 1)
+SCALE_RATE = 5.0  # the map's scale is a parameter times it, so that the parameter is of the order of other weights
 
 
 class MapEncoder(nn.Module):

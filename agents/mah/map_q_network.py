@@ -12,9 +12,12 @@ import torch
 from torch import nn
 
 from ..common.layers import (
+    FAR_DILATIONS,
+    NEAR_DILATIONS,
     NUM_PLACE,
     NUM_TO_GOAL,
     NUM_WAVES,
+    SCALE_RATE,
     MapEncoder,
     goal_code,
     marked_position,
@@ -24,11 +27,7 @@ from ..common.layers import (
 )
 from ..dqn.q_network import QNetwork
 
-# Dilations of the 3 x 3 convolutions; together they see 19 cells far, across a 13 x 13 map.
-_FAR = (1, 1, 2, 2, 4, 4, 2, 1, 1)
-_NEAR = (1, 1, 1, 1)
 _CODE = 256  # numbers of a code of the whole context
-_SCALE_RATE = 5.0  # how much faster the scale is learned than weights of order one tenth are
 
 
 class ReadingQNetwork(QNetwork):
@@ -39,7 +38,7 @@ class ReadingQNetwork(QNetwork):
     def __init__(self, hidden: int, channels: int):
         super().__init__(hidden, channels + 2 + NUM_WAVES)
         self.channels = channels
-        self.encoder = MapEncoder(channels, _FAR)
+        self.encoder = MapEncoder(channels, FAR_DILATIONS)
         self.scale = nn.Parameter(torch.zeros(2, 2))
         self.sharpness = nn.Parameter(torch.tensor(0.0))
 
@@ -72,7 +71,7 @@ class JoinedQNetwork(QNetwork):
     def __init__(self, hidden: int, channels: int, context_size: int):
         super().__init__(hidden, _CODE + NUM_PLACE + NUM_TO_GOAL)
         self._size = context_size
-        self.encoder = MapEncoder(channels, _NEAR)
+        self.encoder = MapEncoder(channels, NEAR_DILATIONS)
         self.embedding = nn.Sequential(nn.Linear(channels * context_size**2, _CODE), nn.LayerNorm(_CODE))
         self.scale = nn.Parameter(torch.zeros(2, 2))
 
@@ -93,4 +92,4 @@ class JoinedQNetwork(QNetwork):
 
 def _moved_from(start: torch.Tensor, moved: torch.Tensor, scale: torch.Tensor) -> torch.Tensor:
     """Returns positions `[G, K, 2]`: `start` `[G, 2]` plus a linear map of displacements `moved` `[G, K, 2]` (m)."""
-    return start[:, None] + _SCALE_RATE * (moved @ scale)
+    return start[:, None] + SCALE_RATE * (moved @ scale)

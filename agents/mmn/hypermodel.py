@@ -19,9 +19,12 @@ from mazebench.tasks.context import GOAL
 
 from ..common.layers import (
     DISPLACEMENT_UNIT,
+    FAR_DILATIONS,
+    NEAR_DILATIONS,
     NUM_PLACE,
     NUM_PLANES,
     NUM_TO_GOAL,
+    SCALE_RATE,
     MapEncoder,
     dueling_values,
     goal_code,
@@ -41,10 +44,7 @@ NUM_CHANGES = NUM_FREE + NUM_STOPPED
 # Contexts and states are computed as many at once, always, since PyTorch rounds differently at another batch size.
 CONTEXTS_AT_ONCE = 16  # few are new in one step
 STATES_AT_ONCE = 64
-SCALE_RATE = 5.0  # the scale's parameters are multiplied by it, so that they are of the order of other weights
 _CHANNELS = 24  # of the map's convolutions
-_NEAR = (1, 1, 1, 1)  # dilations of the hypermodel's convolutions
-_FAR = (1, 1, 2, 2, 4, 4, 2, 1, 1)  # of the heads', which see 19 cells far, across a 13 x 13 map
 _NUM_WAY = 8 + 3  # features of a cell by the ways to the goal
 # Near goals teach that a wall costs some ten free cells. So that far ways go around walls, what costs more than this
 # costs this many times as much where the agent does not explore.
@@ -106,7 +106,18 @@ class MMNNetwork(nn.Module):
         )
 
         num_inputs = self.latent_size + NUM_PLACE
-        self._shapes = _weight_shapes(num_inputs, config.hidden, NUM_CHANGES + config.latent)
+        num_changes = NUM_CHANGES + config.latent
+        self._shapes = {  # rows and columns of the transition's weights; those of the first layer's bias come first
+            "bias": (1, config.hidden),
+            "inputs": (num_inputs, config.hidden),
+            "actions": (NUM_ACTIONS, config.hidden),
+            "ahead": (NUM_STOPPED, config.hidden),
+            "second": (config.hidden, num_changes),
+            "second_bias": (1, num_changes),
+            "free": (NUM_BODY - NUM_POSE, NUM_FREE),
+            "free_bias": (1, NUM_FREE),
+            "free_actions": (NUM_ACTIONS, NUM_FREE),
+        }
         self.hypermodel = Hypermodel(config, self._shapes, context_size)
         self.scale = nn.Parameter(torch.zeros(2, 2))
 
@@ -244,7 +255,7 @@ class Hypermodel(nn.Module):
 
     def __init__(self, config: MMNConfig, shapes: dict[str, tuple[int, int]], context_size: int):
         super().__init__()
-        self.encoder = MapEncoder(_CHANNELS, _NEAR)
+        self.encoder = MapEncoder(_CHANNELS, NEAR_DILATIONS)
         size = config.embedding
         self._is_pooled = config.any_size
         num_coded = 1 if config.any_size else context_size**2
@@ -264,7 +275,7 @@ class Hypermodel(nn.Module):
         self.rows = nn.Conv2d(num_encoded, config.hidden, 1) if config.rows else None
         self.reader: nn.Module | None = None
         if config.reading:
-            self.reader = WayReader(_CHANNELS) if config.far == "paths" else MapEncoder(_CHANNELS, _FAR)
+            self.reader = WayReader(_CHANNELS) if config.far == "paths" else MapEncoder(_CHANNELS, FAR_DILATIONS)
         self.num_features = num_encoded * config.reading
         self.sharpness = nn.Parameter(torch.tensor(0.0))
 
@@ -317,21 +328,6 @@ class WayReader(nn.Module):
         nearer = ((way[:, None] - torch.stack(around, dim=1)) / 2).clamp(-2, 2)
         scalars = torch.stack([torch.tanh(way / 5), torch.tanh(way / 40), torch.log(cost) / 3], dim=1)
         return functional.relu(self.features(torch.cat([nearer, scalars], dim=1)))
-
-
-def _weight_shapes(num_inputs: int, hidden: int, num_changes: int) -> dict[str, tuple[int, int]]:
-    """Returns the rows and columns of the transition's weights; those of the first layer's bias come first."""
-    return {
-        "bias": (1, hidden),
-        "inputs": (num_inputs, hidden),
-        "actions": (NUM_ACTIONS, hidden),
-        "ahead": (NUM_STOPPED, hidden),
-        "second": (hidden, num_changes),
-        "second_bias": (1, num_changes),
-        "free": (NUM_BODY - NUM_POSE, NUM_FREE),
-        "free_bias": (1, NUM_FREE),
-        "free_actions": (NUM_ACTIONS, NUM_FREE),
-    }
 
 
 def _ordinary(name: str, shapes: dict[str, tuple[int, int]]) -> torch.Tensor:

@@ -31,10 +31,9 @@ class Linear(NamedTuple):
     bias: np.ndarray  # [outputs] float32
 
 
-def linear_of(layer: nn.Module) -> Linear:
-    """Returns a copy of the weights of an `nn.Linear`."""
-    weights = {name: parameter.detach().numpy() for name, parameter in layer.named_parameters()}
-    return Linear(weights["weight"].T.copy(), weights["bias"].copy())
+def linear_of(layer: nn.Linear) -> Linear:
+    """Returns a copy of the weights of a layer."""
+    return Linear(layer.weight.detach().numpy().T.copy(), layer.bias.detach().numpy().copy())
 
 
 @kernel

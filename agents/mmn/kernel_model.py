@@ -17,10 +17,10 @@ import torch
 
 from mazebench.constants import NUM_ACTIONS
 
-from ..common.layers import DISPLACEMENT_UNIT, NUM_PLACE, NUM_TO_GOAL, PERIODS, WAY_UNIT, WIDTHS, steepness
+from ..common.layers import DISPLACEMENT_UNIT, NUM_PLACE, NUM_TO_GOAL, PERIODS, SCALE_RATE, WAY_UNIT, WIDTHS, steepness
 from ..muzero.search import KernelModel, Root, run_simulations
 from ..muzero.tree import ROOT, Evaluation, Settings, empty_evaluation
-from .hypermodel import NUM_BODY, NUM_CHANGES, NUM_FREE, NUM_POSE, SCALE_RATE, Code, MMNNetwork
+from .hypermodel import NUM_BODY, NUM_CHANGES, NUM_FREE, NUM_POSE, Code, MMNNetwork
 from .kernel_layers import ONE, ZERO, Linear, add_product, inlined, kernel, linear, linear_of, normalize, rectify
 from .map_reader import REACH
 
@@ -169,8 +169,19 @@ def step(
         change[0] = generated.second_bias[c, 0]
         add_product(hidden, generated.second[c], change)
 
-        # The body after the step, and the motion's code.
-        move(before, free, change[0], after)
+        # The body after the step, as `hypermodel._moved_by`.
+        changed, sine, cosine = change[0], before[SINE], before[COSINE]
+        x, y = rotated(free[FORWARD] + changed[FORWARD], free[LEFT] + changed[LEFT], sine, cosine)
+        after[X] = before[X] + x + changed[MAP_X]
+        after[Y] = before[Y] + y + changed[MAP_Y]
+        turn = free[TURN] + changed[TURN]
+        after[COSINE], after[SINE] = rotated(cosine, sine, math.sin(turn), math.cos(turn))
+        forward, left = rotated(changed[MAP_SPEED_X], changed[MAP_SPEED_Y], -sine, cosine)
+        after[SPEED_FORWARD] = free[NEXT_FORWARD] + changed[NEXT_FORWARD] + forward
+        after[SPEED_LEFT] = free[NEXT_LEFT] + changed[NEXT_LEFT] + left
+        after[SPEED_TURN] = free[NEXT_TURN] + changed[NEXT_TURN]
+
+        # The motion's code.
         for j in range(NUM_BODY, num_latent):
             after[j] = before[j] + change[0, NUM_CHANGES - NUM_BODY + j]
         normalize(after[NUM_BODY:num_latent])
@@ -190,11 +201,15 @@ def arrive(model: Model, first: int, states: np.ndarray, index: int, evaluation:
     for b in range(num_roots):
         latent, first_layer = states[b, index, :num_latent], states[b, index, num_latent:]
         c = (first + b) // model.num_roots
-        row, column = locate(weights.scale, model.positions[c], latent)
+        positions, scale = model.positions[c], weights.scale
+
+        # The estimated position, and the cells around it.
+        row = positions[0] + _SCALE_RATE * (latent[X] * scale[0, 0] + latent[Y] * scale[1, 0])
+        column = positions[1] + _SCALE_RATE * (latent[X] * scale[0, 1] + latent[Y] * scale[1, 1])
         first_row, first_column = weigh_cells(row, column, weights.steepness, size, near)
 
         # The inputs of all layers.
-        write_inputs(latent, row, column, model.positions[c], size, x[b])
+        write_inputs(latent, row, column, positions, size, x[b])
         for j in range(NUM_PLACE):
             x[b, num_latent + j] *= weights.places[j]
 
@@ -205,7 +220,11 @@ def arrive(model: Model, first: int, states: np.ndarray, index: int, evaluation:
 
         # What the heads get beside: the way to the goal, the context's code, and features that are read from the map.
         k = num_inputs
-        write_way(row, column, model.positions[c], x[b, k:])
+        rows_away, columns_away = positions[2] - row, positions[3] - column  # as `layers.goal_code`
+        x[b, k], x[b, k + 1] = rows_away / _WAY_UNIT, columns_away / _WAY_UNIT
+        for i in range(len(_WIDTHS)):
+            distance = rows_away * rows_away + columns_away * columns_away
+            x[b, k + 2 + i] = math.exp(-distance / _WIDTHS[i])
         k += NUM_TO_GOAL
         x[b, k : k + num_codes] = model.task[c]
         k += num_codes
@@ -221,15 +240,29 @@ def arrive(model: Model, first: int, states: np.ndarray, index: int, evaluation:
     linear(hidden_1, weights.body[1], hidden_2)
     rectify(hidden_2.reshape(-1))
     linear(hidden_2, weights.heads, outputs)
-    conclude(outputs, weights.num_bins, evaluation)
 
+    # Policies, values, rewards and discounts.
+    num_bins = weights.num_bins
+    for b in range(num_roots):
+        evaluation.prior_logits[b] = outputs[b, :NUM_ACTIONS]
 
-@inlined
-def locate(scale: np.ndarray, positions: np.ndarray, latent: np.ndarray) -> tuple[np.float32, np.float32]:
-    """Returns the estimated position (row, column)."""
-    row = positions[0] + _SCALE_RATE * (latent[X] * scale[0, 0] + latent[Y] * scale[1, 0])
-    column = positions[1] + _SCALE_RATE * (latent[X] * scale[0, 1] + latent[Y] * scale[1, 1])
-    return row, column
+        # The mean of a categorical value.
+        logits = outputs[b, NUM_ACTIONS : NUM_ACTIONS + num_bins]
+        highest = logits[0]
+        for j in range(1, num_bins):
+            highest = max(highest, logits[j])
+        total = weighted = ZERO
+        for j in range(num_bins):
+            logit = logits[j] - highest
+            if logit > _NEGLIGIBLE:
+                weight = np.float32(math.exp(logit))
+                total += weight
+                weighted += weight * np.float32(j + 1 - num_bins)
+        evaluation.value[b] = weighted / total
+
+        # Reward and discount of arriving there: a goal ends the episode, any other step costs 1.
+        discount = ONE / (ONE + np.float32(math.exp(outputs[b, NUM_ACTIONS + num_bins])))
+        evaluation.reward[b], evaluation.discount[b] = -discount, discount
 
 
 @kernel
@@ -292,55 +325,6 @@ def write_inputs(
 
 
 @inlined
-def write_way(row: np.float32, column: np.float32, positions: np.ndarray, out: np.ndarray) -> None:
-    """Writes the way to the goal by `layers.goal_code`."""
-    rows_away, columns_away = positions[2] - row, positions[3] - column
-    out[0], out[1] = rows_away / _WAY_UNIT, columns_away / _WAY_UNIT
-    for i in range(len(_WIDTHS)):
-        out[2 + i] = math.exp(-(rows_away * rows_away + columns_away * columns_away) / _WIDTHS[i])
-
-
-@inlined
-def move(before: np.ndarray, free: np.ndarray, change: np.ndarray, after: np.ndarray) -> None:
-    """Writes the body after a step; see `hypermodel._moved_by`."""
-    sine, cosine = before[SINE], before[COSINE]
-    x, y = rotated(free[FORWARD] + change[FORWARD], free[LEFT] + change[LEFT], sine, cosine)
-    after[X] = before[X] + x + change[MAP_X]
-    after[Y] = before[Y] + y + change[MAP_Y]
-    turn = free[TURN] + change[TURN]
-    after[COSINE], after[SINE] = rotated(cosine, sine, math.sin(turn), math.cos(turn))
-    forward, left = rotated(change[MAP_SPEED_X], change[MAP_SPEED_Y], -sine, cosine)
-    after[SPEED_FORWARD] = free[NEXT_FORWARD] + change[NEXT_FORWARD] + forward
-    after[SPEED_LEFT] = free[NEXT_LEFT] + change[NEXT_LEFT] + left
-    after[SPEED_TURN] = free[NEXT_TURN] + change[NEXT_TURN]
-
-
-@inlined
 def rotated(x: np.float32, y: np.float32, sine: np.float32, cosine: np.float32) -> tuple[np.float32, np.float32]:
     """Returns a vector, turned by an angle."""
     return cosine * x - sine * y, sine * x + cosine * y
-
-
-@inlined
-def conclude(outputs: np.ndarray, num_bins: int, evaluation: Evaluation) -> None:
-    """Writes rewards, discounts, logits of the policies and values, given the heads' outputs `[n, 6 + bins + 1]`."""
-    for b in range(len(outputs)):
-        evaluation.prior_logits[b] = outputs[b, :NUM_ACTIONS]
-
-        # The mean of a categorical value.
-        logits = outputs[b, NUM_ACTIONS : NUM_ACTIONS + num_bins]
-        highest = logits[0]
-        for j in range(1, num_bins):
-            highest = max(highest, logits[j])
-        total = weighted = ZERO
-        for j in range(num_bins):
-            logit = logits[j] - highest
-            if logit > _NEGLIGIBLE:
-                weight = np.float32(math.exp(logit))
-                total += weight
-                weighted += weight * np.float32(j + 1 - num_bins)
-        evaluation.value[b] = weighted / total
-
-        # Reward and discount of arriving there: a goal ends the episode, any other step costs 1.
-        discount = ONE / (ONE + np.float32(math.exp(outputs[b, NUM_ACTIONS + num_bins])))
-        evaluation.reward[b], evaluation.discount[b] = -discount, discount

@@ -79,7 +79,11 @@ class MMN(NetworkAgent):
 
         # The action that a tree search finds or, exploring, one that is less sure; without a model, the best by value.
         if not self.config.model:
-            values = in_batches(self._action_values, STATES_AT_ONCE, latent, *code)[:, 0]
+
+            def action_values(latent: torch.Tensor, *code: torch.Tensor) -> torch.Tensor:  # [B, 1, 6]
+                return self.network.predict_without_model(latent, Code(*code))[0]
+
+            values = in_batches(action_values, STATES_AT_ONCE, latent, *code)[:, 0]
             chosen = values.argmax(dim=-1).cpu().numpy()
             chosen = self._explored(chosen) if explore else chosen
         elif explore:
@@ -121,10 +125,6 @@ class MMN(NetworkAgent):
             state.code = Code(*(part.new_zeros(len(state.origin), *part.shape[1:]) for part in code))
         for whole, part in zip(state.code, code, strict=True):
             whole[rows] = part
-
-    def _action_values(self, latent: torch.Tensor, *code: torch.Tensor) -> torch.Tensor:
-        """Returns `[B, 1, 6]` of latent states `[B, 1, D]` and the parts of a `Code` of B contexts."""
-        return self.network.predict_without_model(latent, Code(*code))[0]
 
     @property
     def _device(self) -> torch.device:
