@@ -116,8 +116,12 @@ class PlannerLearner(NetworkLearner):
         # The steps of a plan stay together, so that each is planned once. Grids of one size are computed at once.
         batches = []
         for size, rows in newest.items():
-            all_rows = _joined([rollout[size] for rollout in self._kept if size in rollout])
-            batches.append(self._minibatches(all_rows, max(1, len(rows.grids) // config.minibatches)))
+            parts = [rollout[size] for rollout in self._kept if size in rollout]
+            offsets = np.cumsum([0, *(len(part.grids) for part in parts)]).tolist()
+            grid = torch.cat([part.grid + offset for part, offset in zip(parts, offsets, strict=False)])
+            rest = map(torch.cat, zip(*(part[2:] for part in parts), strict=True))
+            joined = Rows(torch.cat([part.grids for part in parts]), grid, *rest)
+            batches.append(self._minibatches(joined, max(1, len(rows.grids) // config.minibatches)))
         num_minibatches = config.epochs * config.minibatches if batches else 0
         for _ in range(num_minibatches):
             minibatch = [next(each) for each in batches]
@@ -136,7 +140,10 @@ class PlannerLearner(NetworkLearner):
         while True:
             order = self.rng.permutation(len(rows.grids))
             for begin in range(0, len(order) - num_grids + 1, num_grids):
-                yield _on_grids(rows, order[begin : begin + num_grids])
+                chosen, number = order[begin : begin + num_grids], torch.full((len(rows.grids),), -1)
+                number[torch.from_numpy(chosen)] = torch.arange(num_grids)
+                taken = number[rows.grid] >= 0
+                yield Rows(rows.grids[chosen], number[rows.grid[taken]], *(part[taken] for part in rows[2:]))
 
     def _losses(self, rows: Rows) -> dict[str, torch.Tensor]:
         """Returns the loss and its parts."""
@@ -248,19 +255,3 @@ def clipped_loss(log_ratio: torch.Tensor, advantage: torch.Tensor, clip: float) 
     scaled = (advantage - advantage.mean()) / (advantage.std(correction=0) + 1e-6)
     ratio = log_ratio.exp()
     return -torch.minimum(ratio * scaled, ratio.clamp(1 - clip, 1 + clip) * scaled).mean()
-
-
-def _joined(parts: list[Rows]) -> Rows:
-    """Returns the rows of all parts."""
-    offsets = np.cumsum([0, *(len(rows.grids) for rows in parts)]).tolist()
-    grid = torch.cat([rows.grid + offset for rows, offset in zip(parts, offsets, strict=False)])
-    rest = map(torch.cat, zip(*(rows[2:] for rows in parts), strict=True))
-    return Rows(torch.cat([rows.grids for rows in parts]), grid, *rest)
-
-
-def _on_grids(rows: Rows, grids: np.ndarray) -> Rows:
-    """Returns the steps on some of the grids (`[K]` int)."""
-    number = torch.full((len(rows.grids),), -1)
-    number[torch.from_numpy(grids)] = torch.arange(len(grids))
-    taken = number[rows.grid] >= 0
-    return Rows(rows.grids[grids], number[rows.grid[taken]], *(each[taken] for each in rows[2:]))

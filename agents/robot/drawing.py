@@ -43,14 +43,27 @@ def compare(
     """
     (height, width), size, thick = picture.shape, len(walls), thickening >= 0
     half, sign = abs(thickening) / 2, 0.5 if thick else -0.5
-    zones = _zones(walls, thick)
-    doubts, effects = np.sqrt(zones * (1 - zones)), _effects(walls, thick)
+
+    # The probability of each zone to be drawn as wall, and by how much a wall in each cell raises its 3 x 3 zones.
+    zones, effects = np.empty((2 * size + 1, 2 * size + 1)), np.empty((size, size, 3, 3))
+    for a in range(len(zones)):
+        for b in range(len(zones)):
+            meeting = _product(walls, thick, a, b, -1, -1)
+            zones[a, b] = 1 - meeting if thick else meeting
+    for i in range(size):
+        for j in range(size):
+            for a in range(3):
+                for b in range(3):
+                    effects[i, j, a, b] = _product(walls, thick, 2 * i + a, 2 * j + b, i, j)
+    doubts = np.sqrt(zones * (1 - zones))
+
     differences, deviations = np.empty((height, width)), np.empty((height, width))
     slopes, evidence = np.empty((height, width, 3)), np.zeros((size, size))
     down, down_slope = np.empty(_MOST_ZONES), np.empty(_MOST_ZONES)
     right, right_slope = np.empty(_MOST_ZONES), np.empty(_MOST_ZONES)
     for p in range(height):
         for q in range(width):
+            # What the box should show.
             box = widths[p, q]
             top, bottom = _overlaps(points[p, q, 0], box[0], half, 2 * size, down, down_slope)
             left, end = _overlaps(points[p, q, 1], box[1], half, 2 * size, right, right_slope)
@@ -69,6 +82,8 @@ def compare(
             differences[p, q] = picture[p, q] - expected
             deviations[p, q] = math.sqrt(noise**2 + doubt**2)
             slopes[p, q, 0], slopes[p, q, 1], slopes[p, q, 2] = by_row / box[0], by_column / box[1], by_half * sign
+
+            # What the pixel tells of cells.
             if box[0] * box[1] < _LARGEST_BOX:
                 for i in range(max(1, (top - 1) // 2), min(size - 2, bottom // 2) + 1):
                     for j in range(max(1, (left - 1) // 2), min(size - 2, end // 2) + 1):
@@ -86,18 +101,6 @@ def compare(
     return differences, slopes, deviations, evidence
 
 
-@compiled
-def _zones(walls: np.ndarray, thick: bool) -> np.ndarray:
-    """Returns `[2 N + 1, 2 N + 1]` float: the probability of each zone to be drawn as wall."""
-    count = 2 * len(walls) + 1
-    zones = np.empty((count, count))
-    for a in range(count):
-        for b in range(count):
-            others = _product(walls, thick, a, b, -1, -1)
-            zones[a, b] = 1 - others if thick else others
-    return zones
-
-
 @inlined
 def _product(walls: np.ndarray, thick: bool, a: int, b: int, row: int, column: int) -> float:
     """Returns the probability that the cells that meet zone (a, b) are all free (thick) or all walls.
@@ -111,19 +114,6 @@ def _product(walls: np.ndarray, thick: bool, a: int, b: int, row: int, column: i
                 wall = walls[i, j] if 0 <= i < size and 0 <= j < size else 1.0
                 product *= 1 - wall if thick else wall
     return product
-
-
-@compiled
-def _effects(walls: np.ndarray, thick: bool) -> np.ndarray:
-    """Returns `[N, N, 3, 3]` float: by how much a wall in each cell raises the 3 x 3 zones that it meets."""
-    size = len(walls)
-    effects = np.empty((size, size, 3, 3))
-    for i in range(size):
-        for j in range(size):
-            for a in range(3):
-                for b in range(3):
-                    effects[i, j, a, b] = _product(walls, thick, 2 * i + a, 2 * j + b, i, j)
-    return effects
 
 
 @inlined

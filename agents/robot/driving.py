@@ -42,42 +42,34 @@ class Drive:
 
         The drive keeps clear of `blocked` `[L, L]` bool; `cell_size` is in m, and `strafes` says whether the body can.
         """
+        # The drive ends where the body is not where it should be, or the path does not go on as it did.
         ahead = path[: _CELLS_AHEAD + 1]
         x, y = body.x * cell_size, body.y * cell_size
-        if not self.actions or math.dist(self.points[0], (x, y)) > _MOST_OFF or not _continues(self.path, ahead):
-            self._plan(blocked, ahead, body, cell_size, strafes)
+        rest = self.path[self.path.index(ahead[0]) :] if ahead[0] in self.path else []
+        continues = bool(rest) and ahead[: len(rest)] == rest[: len(ahead)]
+        if not continues or not self.actions or math.dist(self.points[0], (x, y)) > _MOST_OFF:
+            # The part of the grid around the path, with walls around it.
+            cells, size = np.array(ahead), len(blocked)
+            top, left = cells.min(axis=0) - 2
+            side = int(np.ptp(cells, axis=0).max()) + 5
+            walls = np.ones((side, side), dtype=bool)
+            rows, columns = (np.arange(max(first + 1, 0), min(first + side - 1, size)) for first in (top, left))
+            walls[np.ix_(rows - top, columns - left)] = blocked[np.ix_(rows, columns)]
+
+            # In metres from its lower left corner. The body is in the first cell, whatever is observed.
+            corner = np.array([left, size - top - side])
+            row, column = ahead[0]
+            first = np.array([column, size - 1 - row])
+            inside = np.clip((body.x, body.y), first + _INSIDE, first + 1 - _INSIDE)
+            x, y = ((inside - corner) * cell_size).tolist()
+            velocity = np.clip(np.array(body.velocity()) * cell_size, -_FASTEST, _FASTEST).tolist()
+            course = make_course(walls, cell_size, (int(ahead[-1][0] - top), int(ahead[-1][1] - left)))
+            steps = _STEPS_AHEAD if strafes else _STEPS_AHEAD_TURNING
+            actions, points = quickest_drive(course, (x, y), velocity, body.yaw, steps, _WIDTH, strafes)
+            self.actions, self.path = actions[:_STEPS_USED], ahead
+            shift = corner * cell_size
+            self.points = [(body.x * cell_size, body.y * cell_size), *(tuple(shift + each) for each in points)]
+
         before, after = self.points.pop(0), self.points[0]
         point = body.x + (after[0] - before[0]) / cell_size, body.y + (after[1] - before[1]) / cell_size
         return self.actions.pop(0), point
-
-    def _plan(self, blocked: np.ndarray, ahead: list[Cell], body: Body, cell_size: float, strafes: bool) -> None:
-        """Plans the drive to the last cell of `ahead` through the free cells around."""
-        # The part of the grid around the path, with walls around it.
-        cells, size = np.array(ahead), len(blocked)
-        top, left = cells.min(axis=0) - 2
-        side = int(np.ptp(cells, axis=0).max()) + 5
-        walls = np.ones((side, side), dtype=bool)
-        rows, columns = (np.arange(max(first + 1, 0), min(first + side - 1, size)) for first in (top, left))
-        walls[np.ix_(rows - top, columns - left)] = blocked[np.ix_(rows, columns)]
-
-        # In metres from its lower left corner. The body is in the first cell, whatever is observed.
-        corner = np.array([left, size - top - side])
-        row, column = ahead[0]
-        first = np.array([column, size - 1 - row])
-        point = np.clip((body.x, body.y), first + _INSIDE, first + 1 - _INSIDE)
-        x, y = ((point - corner) * cell_size).tolist()
-        velocity = np.clip(np.array(body.velocity()) * cell_size, -_FASTEST, _FASTEST).tolist()
-        course = make_course(walls, cell_size, (int(ahead[-1][0] - top), int(ahead[-1][1] - left)))
-        steps = _STEPS_AHEAD if strafes else _STEPS_AHEAD_TURNING
-        actions, points = quickest_drive(course, (x, y), velocity, body.yaw, steps, _WIDTH, strafes)
-        self.actions, self.path = actions[:_STEPS_USED], ahead
-        shift = corner * cell_size
-        self.points = [(body.x * cell_size, body.y * cell_size), *(tuple(shift + each) for each in points)]
-
-
-def _continues(before: list[Cell], ahead: list[Cell]) -> bool:
-    """Returns whether a path goes on as it did before, when the body was in one of its first cells."""
-    if ahead[0] not in before:
-        return False
-    rest = before[before.index(ahead[0]) :]
-    return ahead[: len(rest)] == rest[: len(ahead)]

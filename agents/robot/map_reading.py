@@ -44,10 +44,8 @@ def read_map(context: np.ndarray, size: int) -> MapReading:
         possible = (walls < 1).astype(np.float64)
         pixels = np.ix_(*[np.arange(size) * len(picture) // size] * 2)
         marks = [plane[pixels] if plane.any() else 1.0 for plane in planes]
-    return MapReading(walls, *(_normalised(mark * possible, walls) for mark in marks))
 
-
-def _normalised(weights: np.ndarray, walls: np.ndarray) -> np.ndarray:
-    """Returns `[N, N]` float that sum to 1; without any weights, free cells are equally likely."""
-    weights = weights if weights.any() else 1 - walls
-    return weights / weights.sum()
+    # Without any weights, free cells are equally likely.
+    weights = [mark * possible for mark in marks]
+    start, goal = (each if each.any() else 1 - walls for each in weights)
+    return MapReading(walls, start / start.sum(), goal / goal.sum())
