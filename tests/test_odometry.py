@@ -11,7 +11,7 @@ import mazebench
 from mazebench.constants import STEP_TIME
 from mazebench.envs.goal import GoalMazeEnv
 from mazebench.errors import InputError
-from mazebench.tasks.perturbations.odometry import Odometry, corrupted_odometry
+from mazebench.tasks.perturbations.odometry import LostPose, Odometry
 from mazebench.tasks.task import Task
 
 X, Y, YAW, FORWARD, LEFT, YAW_RATE = 0, 1, 5, 6, 7, 11  # indices in the state
@@ -86,6 +86,10 @@ class TestExactOdometry:
         np.testing.assert_allclose(np.diff(np.unwrap(yaws)), 0.36)
 
 
+def corrupted_odometry(seed: int) -> Odometry:
+    return LostPose(drifts=True).state_error(np.random.default_rng(seed))
+
+
 class TestCorruptedOdometry:
     def test_the_scale_is_that_of_translation_and_linear_velocity(self):
         states = np.array([state_at(3.5, 4.5, 0.0, 1.0, 2.0), state_at(5.5, 5.5, 0.0, 3.0, -1.0)])
@@ -93,7 +97,7 @@ class TestCorruptedOdometry:
         np.testing.assert_allclose(values, [[0, 0, 0, 1.1, 2.2], [2.2, 1.1, 0, 3.3, -1.1]], atol=1e-12)
 
     def test_the_scale_of_an_episode_is_uniform(self):
-        scales = np.array([corrupted_odometry(np.random.default_rng(seed)).scale for seed in range(2000)])
+        scales = np.array([corrupted_odometry(seed).scale for seed in range(2000)])
         assert scales.min() >= 0.9
         assert scales.max() <= 1.1
         # Of 2000 draws, with a standard deviation of 0.2 / sqrt(12).
@@ -102,13 +106,13 @@ class TestCorruptedOdometry:
 
     def test_the_heading_walks_by_2_degrees_per_root_second(self):
         still = np.tile(state_at(3.5, 4.5, 1.0), (101, 1))  # 16 s
-        yaws = np.array([observed(corrupted_odometry(np.random.default_rng(i)), still)[-1, YAW] for i in range(1000)])
+        yaws = np.array([observed(corrupted_odometry(i), still)[-1, YAW] for i in range(1000)])
         assert abs(yaws.mean()) < 4 * math.radians(8) / math.sqrt(1000)
         assert yaws.std() == pytest.approx(math.radians(8), rel=0.1)  # 2 degrees times the root of 16
 
     def test_the_yaw_rate_carries_the_walk_of_the_heading(self, drives):
         for seed, states in enumerate(drives):
-            values = observed(corrupted_odometry(np.random.default_rng(seed)), states)
+            values = observed(corrupted_odometry(seed), states)
             error = wrap(values[:, YAW] - relative_poses(states)[:, 2])
             rate_error = values[:, YAW_RATE] - states[:, YAW_RATE]
             np.testing.assert_allclose(wrap(error - STEP_TIME * np.cumsum(rate_error)), 0, atol=1e-10)

@@ -26,7 +26,7 @@ def test_the_map_is_the_one_that_the_agent_was_shown(tmp_path, level):
     num_changed = 0
     for trial in frozen_trials("hierarchical", 13)[:5]:
         found, shown = shown_of(task, trial.episode), show_map(spec, trial.episode)
-        np.testing.assert_array_equal(found.walls > 0, shown.seen_walls())
+        np.testing.assert_array_equal(found.walls > 0, shown.seen_walls)
         assert found.are_cells == ("map_flip" in level)
         assert (found.start, found.goal) == tuple(
             shown.seen_cell(cell) @ np.array((13, 1)) for cell in ((1, 11), (11, 1))

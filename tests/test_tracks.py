@@ -113,7 +113,7 @@ class TestBuilding:
         cell = tuple(maze.free_cells[seed].tolist())
         x, y = shown.seen_points(np.array([[cell[1] + 0.5, 21 - cell[0] - 0.5]]))[0]
         assert (int(21 - y), int(x)) == shown.seen_cell(cell)
-        assert not shown.seen_walls()[shown.seen_cell(cell)]
+        assert not shown.seen_walls[shown.seen_cell(cell)]
 
 
 class TestRebuilt:

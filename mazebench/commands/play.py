@@ -9,6 +9,7 @@ import typer
 from mazebench.commands.display import load_mujoco
 from mazebench.commands.option_parameters import takes_options, watched_task
 from mazebench.errors import InputError
+from mazebench.tasks.sensors import LIDAR
 from mazebench.tasks.task import NOT_IN_EVALUATIONS
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.world.backend import has_display
@@ -23,7 +24,7 @@ def play(
     task = watched_task(values)
     load_mujoco(renders=has_display())
     from mazebench.play import viewer
-    from mazebench.play.game import LIDAR, Game
+    from mazebench.play.game import Game
 
     for sensor in task.sensors:
         if sensor != LIDAR:

@@ -23,12 +23,13 @@ from mazebench.storage.files import make_folder, open_whole, writing_to
 from mazebench.tasks.context import resized_map
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.perturbations.perturbation import ShownMap
+from mazebench.tasks.sensors import LIDAR
 from mazebench.tasks.shown_map import show_map
 from mazebench.world.models import models_of
 from mazebench.world.ray_casting import ray_ends
 from mazebench.world.rendering import CAMERAS, Cameras
 
-MAP, LIDAR = "map", "lidar"
+MAP = "map"
 _CODEC = "vp09"  # VP9, which browsers play
 _FRAMES_PER_SECOND = 1 / STEP_TIME  # one an agent step: the film runs in real time
 
@@ -144,9 +145,8 @@ class _Scene:
     def _map(self) -> np.ndarray:
         """Returns a picture of the map that the agent is shown, some two times as large as a view."""
         shown, side = self.shown, self._task.context_size
-        seen = shown.seen_walls()
-        size = len(seen)
-        walls = resized_map(seen, side)
+        size = len(shown.seen_walls)
+        walls = resized_map(shown.seen_walls, side)
         pixels = (shown.seen_cell(cell) for cell in (self.episode.start, self.episode.goal))
         start, goal = ((row * side // size, column * side // size) for row, column in pixels)
         path = shown.seen_points(self._to_cells(self._path)) * (side / size)

@@ -9,12 +9,12 @@ import numpy as np
 from mazebench.envs.gym import MazeEnv
 from mazebench.maps.maze import Maze
 from mazebench.tasks.episode import Episode
+from mazebench.tasks.sensors import LIDAR
 from mazebench.tasks.task import Task
 from mazebench.world.ray_casting import ray_ends
 
 # The actions of letters and of arrow keys, as indices in `ACTIONS`.
 KEYS = {"w": 0, "s": 1, "a": 2, "d": 3, "q": 4, "e": 5, "up": 0, "down": 1, "left": 4, "right": 5}
-LIDAR = "lidar"  # the only sensor whose readings are shown
 HELP = "w s a d  drive   q e  turn   arrows too   r  again   n  next   Esc  quit"
 
 

@@ -33,7 +33,7 @@ def leg_context(task: Task, shown: ShownMap, start: Cell, goal: Cell) -> np.ndar
 
     On a track, the values of the maps have 8 bits.
     """
-    context = build_context(shown.seen_walls(), shown.seen_cell(start), shown.seen_cell(goal), task.context_size)
+    context = build_context(shown.seen_walls, shown.seen_cell(start), shown.seen_cell(goal), task.context_size)
     if task.track is not None:
         maps = context[[GLOBAL_MAP, LOCAL_MAP]]
         context[[GLOBAL_MAP, LOCAL_MAP]] = np.rint(maps * _GREY_LEVELS) / _GREY_LEVELS

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import Annotated
 
@@ -99,18 +100,11 @@ class PositionNoise(Perturbation):
     stream = Stream.POSITION_NOISE
 
     def state_error(self, rng: np.random.Generator) -> StateError:
-        return _NormalNoise(self.deviation, rng)
+        return functools.partial(_add_noise, self.deviation, rng)
 
 
-@dataclasses.dataclass
-class _NormalNoise:
-    """The noise of one episode."""
-
-    deviation: float  # m
-    rng: np.random.Generator
-
-    def __call__(self, state: np.ndarray) -> None:
-        state[:2] += self.rng.normal(0.0, self.deviation, size=2)
+def _add_noise(deviation: float, rng: np.random.Generator, state: np.ndarray) -> None:
+    state[:2] += rng.normal(0.0, deviation, size=2)
 
 
 # By the option that has the strength. They are applied in this order, and strength 0 switches one off.

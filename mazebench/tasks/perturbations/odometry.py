@@ -31,12 +31,7 @@ class LostPose(Perturbation):
     hides_pose = True
 
     def state_error(self, rng: np.random.Generator) -> StateError:
-        return corrupted_odometry(rng) if self.drifts else Odometry(rng)
-
-
-def corrupted_odometry(rng: np.random.Generator) -> Odometry:
-    """Returns the odometry of an episode, with a drawn scale and a heading that drifts."""
-    return Odometry(rng, float(rng.uniform(*_SCALES)), _HEADING_WALK)
+        return Odometry(rng, float(rng.uniform(*_SCALES)), _HEADING_WALK) if self.drifts else Odometry(rng)
 
 
 @dataclasses.dataclass

@@ -48,17 +48,14 @@ class ShownMap:
     hidden: tuple[int, ...] = ()  # planes of the context that the agent is not given: they are zero
     kind: str = ""  # of the true maze, `Maze.kind`
 
-    def seen_walls(self) -> np.ndarray:
-        """Returns `[P, P]` bool or float32: the walls as the agent sees them; P is N where the map is not drawn."""
-        return self._picture
-
     @functools.cached_property
-    def _picture(self) -> np.ndarray:
+    def seen_walls(self) -> np.ndarray:
+        """`[P, P]` bool or float32: the walls as the agent sees them; P is N where the map is not drawn."""
         return self.walls if self.drawing is None else self.drawing.picture(self.walls)
 
     def seen_cell(self, cell: Cell) -> Cell:
         """Returns the pixel of the seen map in which a free cell of the maze is marked."""
-        return cell if self.drawing is None else self.drawing.pixel(cell, self._picture)
+        return cell if self.drawing is None else self.drawing.pixel(cell, self.seen_walls)
 
     def seen_points(self, points: np.ndarray) -> np.ndarray:
         """Returns `[T, 2]` float: where points (x, y) of the maze, in cells, lie on the seen map, in pixels."""

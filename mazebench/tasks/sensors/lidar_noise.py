@@ -12,7 +12,7 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.world.ray_casting import NUM_RAYS, TURTLEBOT3, LidarModel
 
-_NAMED = {"turtlebot3": TURTLEBOT3}
+_TURTLEBOT3 = "turtlebot3"
 
 
 def noise_text(text: object) -> str | None:
@@ -21,7 +21,7 @@ def noise_text(text: object) -> str | None:
     Raises:
       InputError: if it is anything else.
     """
-    if text is None or (isinstance(text, str) and text in _NAMED):
+    if text is None or (isinstance(text, str) and text == _TURTLEBOT3):
         return text
     try:
         sigma, lost = map(float, str(text).split(","))
@@ -36,9 +36,9 @@ def noise_text(text: object) -> str | None:
 
 def model_of(text: str | None) -> LidarModel:
     """Returns what a lidar with the noise of `noise_text` measures; None stands for an exact one."""
-    if text is None or text in _NAMED:
-        return _NAMED[text] if text else LidarModel()
-    sigma, lost = map(float, text.split(","))
+    if text == _TURTLEBOT3:
+        return TURTLEBOT3
+    sigma, lost = map(float, (text or "0,0").split(","))
     return LidarModel(sigma=sigma, lost=lost)
 
 
