@@ -31,9 +31,10 @@ class Linear(NamedTuple):
     bias: np.ndarray  # [outputs] float32
 
 
-def linear_of(layer: nn.Linear) -> Linear:
-    """Returns a copy of the weights of a layer."""
-    return Linear(layer.weight.detach().numpy().T.copy(), layer.bias.detach().numpy().copy())
+def linear_of(layer: nn.Module) -> Linear:
+    """Returns a copy of the weights of an `nn.Linear`."""
+    weight, bias = (parameter.detach().numpy() for parameter in layer.parameters())
+    return Linear(weight.T.copy(), bias.copy())
 
 
 @kernel
