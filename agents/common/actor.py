@@ -44,6 +44,14 @@ def acting(act: _Act) -> _Act:
     return torch.no_grad()(one_torch_thread()(act))
 
 
+@dataclasses.dataclass
+class ActorState:
+    """The state of acting in B environments, whose contexts are encoded once."""
+
+    origin: np.ndarray  # [B, 2] float32, m, x and y observed at the point from which displacements are measured
+    code: Any  # of the B contexts, as the agent's network encodes them; None before the first step, or without context
+
+
 class NetworkAgent(LearningAgent):
     """An agent that acts by a network; by default it explores by random actions, in environment i at Ape-X's rate i."""
 
@@ -109,6 +117,10 @@ class NetworkAgent(LearningAgent):
         config = override(cls.default_config, overrides or {})
         device = "cuda" if cls.learns_on_gpu and torch.cuda.is_available() else "cpu"
         return cls.learner_class(cls(config, task.context_size, seed, device).for_interface(task.interface), task, seed)
+
+    def initial_state(self, batch_size: int) -> Any:
+        """Returns a state without codes: `act` encodes a context where it is new."""
+        return ActorState(np.zeros((batch_size, 2), dtype=np.float32), None)
 
     def explore_from(self, seed: int) -> None:
         """Begins a new stream of exploration.

@@ -5,7 +5,6 @@ docs/agents/dqn.md describes the training, and how it differs from the paper.
 
 from __future__ import annotations
 
-import dataclasses
 from typing import ClassVar
 
 import numpy as np
@@ -13,19 +12,11 @@ import torch
 
 from mazebench.agent import Inputs
 
-from ..common.actor import NetworkAgent, acting
+from ..common.actor import ActorState, NetworkAgent, acting
 from ..common.layers import in_batches, state_features
 from .dqn_config import DQNConfig
 from .q_learner import DQNLearner
 from .q_network import CONTEXTS_AT_ONCE, STATES_AT_ONCE, QNetwork
-
-
-@dataclasses.dataclass
-class ActorState:
-    """The state of acting in B environments."""
-
-    origin: np.ndarray  # [B, 2] float32, x and y observed where the context was new
-    code: torch.Tensor | None  # [B, ...], the encoded contexts; None before the first step, and without context
 
 
 class QAgent(NetworkAgent):
@@ -35,14 +26,10 @@ class QAgent(NetworkAgent):
     config: DQNConfig
     network: QNetwork
 
-    def initial_state(self, batch_size: int) -> ActorState:
-        """Returns a state without codes: `act` encodes a context where it is new."""
-        return ActorState(np.zeros((batch_size, 2), dtype=np.float32), None)
-
     @acting
     def act(self, inputs: Inputs, state: ActorState, explore: bool = False) -> tuple[np.ndarray, ActorState]:
         """Returns actions `[B]`."""
-        # A new leg begins where the body is now; its context is encoded once.
+        # A new leg begins where the body is now, from where displacements are measured; its context is encoded once.
         observed = inputs.observation["state"]
         new = np.flatnonzero(inputs.new_context)
         state.origin[new] = observed[new, :2]

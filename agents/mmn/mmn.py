@@ -5,7 +5,6 @@ docs/agents/mmn.md describes the training, and how it departs from the paper.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from typing import ClassVar
 
@@ -15,7 +14,7 @@ import torch
 from mazebench.agent import Inputs, Observation
 from mazebench.tasks.context import START
 
-from ..common.actor import NetworkAgent, acting
+from ..common.actor import ActorState, NetworkAgent, acting
 from ..common.layers import in_batches, marked_position, state_features
 from .hypermodel import CONTEXTS_AT_ONCE, STATES_AT_ONCE, Code, MMNNetwork
 from .mmn_config import MMNConfig
@@ -23,19 +22,11 @@ from .model_learner import MMNLearner
 from .search_policy import plan
 
 
-@dataclasses.dataclass
-class ActorState:
-    """The state of acting in B environments.
+class MMN(NetworkAgent):
+    """Acts by tree search in a latent model, whose weights a hypermodel generates from the context, once a leg.
 
     Displacements are measured from the anchor, the place where the episode began.
     """
-
-    origin: np.ndarray  # [B, 2] float32, m, the position that was observed at the anchor
-    code: Code | None  # of B contexts; None before the first step
-
-
-class MMN(NetworkAgent):
-    """Acts by tree search in a latent model, whose weights a hypermodel generates from the context, once a leg."""
 
     name: ClassVar[str] = "mmn"
     needs_shown: ClassVar[tuple[str, ...]] = ("map", "goal")
@@ -54,10 +45,6 @@ class MMN(NetworkAgent):
     def serves_any_size(cls, config: MMNConfig) -> bool:
         """Returns whether the cheapest ways are read: otherwise the code of a context has a fixed size."""
         return config.any_size
-
-    def initial_state(self, batch_size: int) -> ActorState:
-        """Returns a state without codes: `act` encodes a context where it is new."""
-        return ActorState(np.zeros((batch_size, 2), dtype=np.float32), None)
 
     @acting
     def act(self, inputs: Inputs, state: ActorState, explore: bool = False) -> tuple[np.ndarray, ActorState]:
