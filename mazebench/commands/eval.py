@@ -68,8 +68,7 @@ def evaluate(
     title = f"{agents[0]}, {task.task}" if suite is None else f"{suite}, {', '.join(agents)}"
     name = suite or f"{agents[0].replace(':', '-')}-{task.task}"
     # The process tells runs apart that start at the same time.
-    new_folder = pathlib.Path("results") / f"{name}-{datetime.datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}"
-    folder = out or new_folder
+    folder = out or pathlib.Path("results") / f"{name}-{datetime.datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}"
     if run.resume:
         begun = folder.is_dir() and any(folder.iterdir())
         print(f"resuming {folder}" if begun else f"nothing to resume in {folder}; starting a new run")

@@ -63,8 +63,7 @@ class Game:
 
     def title(self) -> str:
         """Returns a line that describes the episode."""
-        runner = self.env.runner
-        maze, episode = self.maze, runner.episode
+        maze, episode = self.maze, self.env.runner.episode
         distance = maze.distance(episode.start, episode.goal)
         scale = "" if maze.cell_size == 1 else f" of {maze.cell_size:g} m"
         return f"maze {maze.name}, {self.task.name}: the goal is {distance} cells{scale} away"
