@@ -21,10 +21,10 @@ from mazebench.report.figures import to_svg
 match sys.argv[1:]:
     case []:
         kept = read_kept(RECORDS)
-        files = {name: with_tables((ROOT / name).read_text(encoding="utf-8"), kept).encode() for name in PAGES}
-        files |= {f"docs/images/{drawn.name}.svg": to_svg(drawn.figure) for drawn in figures(kept)}
-        for name, content in files.items():
-            (ROOT / name).write_bytes(content)
+        for page in PAGES:
+            (ROOT / page).write_bytes(with_tables((ROOT / page).read_text("utf-8"), kept).encode())
+        for drawn in figures(kept):
+            (ROOT / f"docs/images/{drawn.name}.svg").write_bytes(to_svg(drawn.figure))
     case ["keep", *folders]:
         for folder in folders:
             path = keep(pathlib.Path(folder), RECORDS)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import pathlib
+import shutil
 import tarfile
 import tempfile
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import pandas as pd
@@ -13,15 +16,14 @@ from mazebench_agents.common.checkpoint import AGENT_FILE
 
 from mazebench.errors import InputError
 from mazebench.report.curves import SUCCESS
-from mazebench.report.episodes import join_episodes, read_results
+from mazebench.report.episodes import join_episodes, reported
 from mazebench.report.table import Table
 from mazebench.report.tables import build_tables
 from mazebench.results.intervals import Estimate, runs_interval
 from mazebench.results.metrics import scores
-from mazebench.results.reading import CONFIG, EPISODES, SUITE, SUMMARY, Result, load_result
-from mazebench.results.records import column
+from mazebench.results.reading import CONFIG, EPISODES, SUITE, SUMMARY, load_result
 from mazebench.storage.files import make_folder, open_whole
-from mazebench.tasks.tracks import LEVELS
+from mazebench.tasks.tracks import LEVELS, TRACKS
 from mazebench.training.run_folder import METRICS, checkpoints, read_metrics
 
 PAPER = "paper"  # the suite
@@ -29,6 +31,7 @@ LOCAL = "local-13"  # the part of `paper` on which training runs are evaluated
 _SUFFIX = ".tar.xz"
 _TRAINING = "training"  # the folder of archives of training runs
 _RUNS = "runs"  # the archive of evaluations of training runs on `LOCAL`, in folders AGENT-SEED
+_COLUMNS = ["episode", "maze", "distance", "success", "steps", "oracle_steps", "kind", "blocked"]  # of records
 # Archives whose agents have another name than their evaluations.
 _AGENTS = {
     "tracks-neural-planner-rewards": "neural-planner from rewards",
@@ -46,16 +49,15 @@ class Kept(NamedTuple):
 
     def of(self, agent: str, setting: str) -> pd.DataFrame:
         """Returns the episodes of an agent in a setting: those of its training runs where several are kept."""
-        if (agent, setting) not in self.episodes.index:
-            raise InputError(f"expected an evaluation of {agent} on {setting} among the records, found none")
         found = self.episodes.loc[agent, setting]
         runs = found[found.archive == _RUNS]
         return found if runs.empty else runs
 
-    def on_track(self, agent: str, track: str) -> dict[str, pd.DataFrame]:
-        """Returns an agent's episodes in each setting of a track in which it was evaluated, as "rebuilt-2"."""
-        settings = (f"{track}-{level}" for level in LEVELS)
-        return {each: self.of(agent, each) for each in settings if (agent, each) in self.episodes.index}
+    def on_tracks(self, agent: str) -> Iterator[tuple[str, int, pd.DataFrame]]:
+        """Yields the tracks and levels on which an agent was evaluated, with its episodes there."""
+        for track, level in itertools.product(TRACKS, LEVELS):
+            if (agent, f"{track}-{level}") in self.episodes.index:
+                yield track, level, self.of(agent, f"{track}-{level}")
 
     def milestones(self, archive: str) -> pd.DataFrame:
         """Returns what an archive's training runs logged at the milestones that all of them reached, a line each.
@@ -75,47 +77,39 @@ class Kept(NamedTuple):
         return self.milestones(archive)[f"{SUCCESS}{distance}"].groupby(level=0).agg(["mean", "min", "max"])
 
 
-def estimate(own: pd.DataFrame, metric: str, other: pd.DataFrame | None = None) -> Estimate:
-    """Returns the mean of a metric over the runs and mazes of some episodes, or its difference to that of others.
-
-    The others are of the same episodes by another agent.
-    """
-    values = own.pivot(index="run", columns="episode", values=metric)
-    others = None if other is None else other.pivot(index="run", columns="episode", values=metric).to_numpy()
-    mazes = own.drop_duplicates("episode").set_index("episode").maze[values.columns]
-    return runs_interval(values.to_numpy(), mazes.to_numpy(), others)
+def estimate(metric: str, *agents: pd.DataFrame) -> Estimate:
+    """Returns the mean of a metric over runs and mazes: of an agent's episodes, or of what it is above another's."""
+    runs = [own.pivot(index="run", columns="episode", values=metric).to_numpy() for own in agents]
+    mazes = agents[0].groupby("episode").maze.first().to_numpy()
+    return runs_interval(runs[0], mazes, *runs[1:])
 
 
 def read_kept(folder: pathlib.Path) -> Kept:
     """Returns what all archives of `folder` hold, and those of training runs in its folder `training`."""
     training: dict[str, list[pd.DataFrame]] = {}
+    paper, episodes = [], []
     with tempfile.TemporaryDirectory() as temporary:
         unpacked = pathlib.Path(temporary)
         for path in folder.rglob(f"*{_SUFFIX}"):
-            with tarfile.open(path) as archive:
-                archive.extractall(unpacked / path.relative_to(folder).parent, filter="data")
+            shutil.unpack_archive(path, unpacked / path.relative_to(folder).parent, filter="data")
         for log in sorted((unpacked / _TRAINING).rglob(METRICS)):
             training.setdefault(log.relative_to(unpacked).parts[1], []).append(pd.DataFrame(read_metrics(log.parent)))
-        results = [load_result(path.parent) for path in sorted(unpacked.rglob(SUMMARY))]
-        of_paper = {each.folder: each for each in results if each.summary.suite == PAPER}
-        paper = join_episodes(read_results(list(of_paper), of_paper.__getitem__))
-        lines = [_episodes(each, each.folder.relative_to(unpacked).parts[0]) for each in results]
-    episodes = pd.concat(lines).set_index(["agent", "setting"]).sort_index(kind="stable")
-    return Kept(episodes, {table.name: table for table in build_tables(paper)}, training)
 
-
-def _episodes(result: Result, archive: str) -> pd.DataFrame:
-    """Returns a line for each episode of an evaluation."""
-    summary, records = result.summary, result.records
-    agent, setting = _AGENTS.get(archive, summary.row), summary.part or result.folder.name
-    if archive == _RUNS:
-        agent, setting = result.folder.name.rpartition("-")[0], LOCAL
-    facts = {"kind", "blocked"} & {*(records[0].model_extra or {})}  # on tracks
-    columns = {name: column(records, name) for name in ("episode", "maze", "distance", "success", "steps", *facts)}
-    columns["oracle_steps"] = pd.array([record.oracle_steps for record in records], dtype="Int64")
-    run = (summary.provenance.checkpoint_sha256 or "")[:8]
-    origin = {"archive": archive, "agent": agent, "run": run, "setting": setting}
-    return pd.DataFrame(origin | columns | scores(records))
+        # Evaluations as the report reads them, those of the paper's protocol, and the episodes of all.
+        for path in sorted(unpacked.rglob(SUMMARY)):
+            result = load_result(path.parent)
+            summary, archive = result.summary, path.relative_to(unpacked).parts[0]
+            if summary.suite == PAPER:
+                paper.append(reported(result))
+            agent, setting = _AGENTS.get(archive, summary.row), summary.part or result.folder.name
+            if archive == _RUNS:
+                agent, setting = result.folder.name.rpartition("-")[0], LOCAL
+            lines = pd.DataFrame(list(map(dict, result.records)), columns=_COLUMNS).assign(**scores(result.records))
+            run = (summary.provenance.checkpoint_sha256 or "")[:8]
+            episodes.append(lines.assign(archive=archive, agent=agent, run=run, setting=setting))
+        tables = build_tables(join_episodes(sorted(paper, key=lambda each: each.setting)))
+    joined = pd.concat(episodes).astype({"oracle_steps": "Int64"}).set_index(["agent", "setting"])
+    return Kept(joined.sort_index(kind="stable"), {table.name: table for table in tables}, training)
 
 
 def keep(folder: pathlib.Path, records: pathlib.Path) -> pathlib.Path:

@@ -33,15 +33,37 @@ def figures(kept: Kept) -> list[Drawn]:
     local = kept.report[LOCAL]
     some = local.values.column.isin(["mmn", "mah", "mah-paper", "dqn", "random", "MMN (paper)"])  # miss some goals
     local = dataclasses.replace(local, values=local.values[some])
-    own = [each(kept) for each in (map_worth, budget, wrong_maps, what_fails, model_and_search)]
-    return [*own, draw_table(local, list(_LOOKS))]
-
-
-def map_worth(kept: Kept) -> Drawn:
-    """Returns the navigator on time with and without the map, by track and level."""
     agents = ("navigator", "navigator without map", "navigator with the true pose")
-    panels = [_on_time(track, {agent: kept.on_track(agent, track) for agent in agents}) for track in TRACKS]
-    return _figure("map-worth", "What the map is worth", panels, "on-time rate")
+    return [
+        on_time("map-worth", "What the map is worth", {agent: (agent, (False, True)) for agent in agents}, kept),
+        on_time(
+            "what-fails",
+            "Where the navigator is late",
+            {"open path": ("navigator", (False,)), "blocked path": ("navigator", (True,))},
+            kept,
+        ),
+        budget(kept),
+        wrong_maps(kept),
+        model_and_search(kept),
+        draw_table(local, _LOOKS),
+    ]
+
+
+def on_time(name: str, title: str, lines: Mapping[str, tuple[str, Sequence[bool]]], kept: Kept) -> Drawn:
+    """Returns on-time rates by track and level.
+
+    A line is of an agent where the shortest path on the map is open (False), blocked (True), or either.
+    """
+    points = [
+        {"panel": track, "column": label, "x": level - 1, "value": mean.value, "low95": mean.low, "high95": mean.high}
+        for label, (agent, is_blocked) in lines.items()
+        for track, level, own in kept.on_tracks(agent)
+        if len(chosen := own[own.blocked.isin(is_blocked)])
+        for mean in [estimate(ON_TIME_125, chosen)]
+    ]
+    by_track = pd.DataFrame(points).groupby("panel", sort=False)
+    panels = [Panel(track, "level", own, dict(enumerate(map(str, LEVELS)))) for track, own in by_track]
+    return _figure(name, title, panels, "on-time rate")
 
 
 def budget(kept: Kept) -> Drawn:
@@ -60,19 +82,6 @@ def budget(kept: Kept) -> Drawn:
     return _figure("budget", "Success over the budget of steps", panels)
 
 
-def what_fails(kept: Kept) -> Drawn:
-    """Returns the navigator on time where the shortest path on the map is open and where it is blocked."""
-    panels = []
-    for track in TRACKS:
-        levels = kept.on_track("navigator", track)
-        lines = {
-            name: {setting: own[own.blocked == is_blocked] for setting, own in levels.items()}
-            for name, is_blocked in (("open path", False), ("blocked path", True))
-        }
-        panels.append(_on_time(track, lines))
-    return _figure("what-fails", "Where the navigator is late", panels, "on-time rate")
-
-
 def wrong_maps(kept: Kept) -> Drawn:
     """Returns success rates on wrong maps of the paper's protocol, without a lidar."""
     panels = []
@@ -82,10 +91,9 @@ def wrong_maps(kept: Kept) -> Drawn:
     ):
         table = kept.report[name]
         values = table.values[table.values.metric == "success_rate"]
-        rows = list(table.x)
         points = values[values.column.isin(["planner-closed-loop", "mah", "mmn", "navigator"])]
-        points = points.assign(x=points.row.map(rows.index).astype(int))
-        panels.append(Panel(title, "", points, dict(enumerate(rows))))
+        points = points.assign(x=points.row.cat.codes)
+        panels.append(Panel(title, "", points, dict(enumerate(table.x))))
     return _figure("wrong-maps", "Wrong maps without a lidar", panels)
 
 
@@ -103,18 +111,6 @@ def model_and_search(kept: Kept) -> Drawn:
         panels.append(Panel(f"{distance} cells", "million agent steps", points, ticks))
     title = "Success rate on held-out mazes over training: mean, lowest and highest run"
     return _figure("model-and-search", title, panels)
-
-
-def _on_time(track: str, lines: Mapping[str, Mapping[str, pd.DataFrame]]) -> Panel:
-    """Returns the share on time at each level of a track."""
-    points = [
-        {"column": label, "x": x, "value": mean.value, "low95": mean.low, "high95": mean.high}
-        for label, levels in lines.items()
-        for x, own in enumerate(levels.values())
-        if len(own)
-        for mean in [estimate(own, ON_TIME_125)]
-    ]
-    return Panel(track, "level", pd.DataFrame(points), dict(enumerate(map(str, LEVELS))))
 
 
 def _figure(name: str, title: str, panels: Sequence[Panel], y_name: str = "success rate") -> Drawn:

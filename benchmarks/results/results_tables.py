@@ -6,11 +6,10 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 import pathlib
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -41,6 +40,7 @@ _BLOCK = re.compile(
 _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints success rates
 _MILESTONES = (0.2, 0.6, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.6)  # million agent steps
 _TRACKS = [f"`{track}`" for track in TRACKS]
+Measure = Callable[[pd.DataFrame], float]  # of an agent's episodes
 
 _TRAINED = {
     "mmn": "`mmn`",
@@ -67,6 +67,10 @@ _PAIRS = (
     ("mah-long", "dqn-long"),
     ("dqn", "random"),
 )
+# Settings and agents, by what a table calls them.
+_LOCAL_RUNS = {text: (LOCAL, name) for name, text in _TRAINED.items()}
+_LOCAL_RUNS |= {f"{_TRAINED[a]} - {_TRAINED[b]}": (LOCAL, a, b) for a, b in _PAIRS}
+_SIZES = {f"{size} x {size}": (f"local-{size}", "mmn-paths") for size in SIZES}
 # Archives of training runs of mmn.
 _INGREDIENTS = {
     "mmn": "`mmn`",
@@ -132,20 +136,21 @@ def report_table(kept: Kept, name: str, metric: str) -> str:
     highest = values.groupby("column", observed=True).filter(
         lambda own: len(own) == values.row.nunique() and own.value.eq(1).all() and own.low95.notna().all()
     )
-    labels = highest.column.unique()
+    labels, lowest = highest.column.unique(), highest.low95.min()
     text = to_markdown(table.wide(metric).drop(columns=labels))
     if len(labels):
-        lowest = _number(highest.low95.min())
-        text += f"\n{SATURATED}{lowest}, 1.00] in every row, and so not in the table: {', '.join(labels)}.\n"
+        text += f"\n{SATURATED}{lowest:.2f}, 1.00] in every row, and so not in the table: {', '.join(labels)}.\n"
     return text
 
 
-def paper_runs(metric: str, kept: Kept) -> str:
-    """Returns the mean of a metric over training runs by distance, and the differences of `_PAIRS`."""
-    found = {name: kept.of(name, LOCAL) for name in _TRAINED}
-    rows = [_by_distance(label, found[name], metric) for name, label in _TRAINED.items()]
-    rows += [_by_distance(f"{_TRAINED[a]} - {_TRAINED[b]}", found[a], metric, found[b]) for a, b in _PAIRS]
-    return format_table(["agent", "runs", *map(str, _PRINTED_DISTANCES)], rows)
+def by_distance(head: str, lines: Mapping[str, Sequence[str]], metric: str, at: Sequence[int], kept: Kept) -> str:
+    """Returns means over training runs at distances: of the agent of each line in a setting, or of two, subtracted."""
+    rows = []
+    for text, (setting, *names) in lines.items():
+        agents = [kept.of(name, setting) for name in names]
+        cells = [_interval(metric, *(own[own.distance == distance] for own in agents)) for distance in at]
+        rows.append([text, ", ".join(str(own.run.nunique()) for own in agents), *cells])
+    return format_table([head, "runs", *map(str, at)], rows)
 
 
 def mah_curve(kept: Kept) -> str:
@@ -160,7 +165,7 @@ def short_runs(archives: Mapping[str, str], metrics: Mapping[str, str], kept: Ke
     rows = []
     for name, description in archives.items():
         runs = kept.milestones(name).loc[[0.4]]
-        rates = [_over_values(runs[f"{SUCCESS}{distance}"]) for distance in _PRINTED_DISTANCES]
+        rates = [_over_runs(runs[f"{SUCCESS}{distance}"]) for distance in _PRINTED_DISTANCES]
         logged = runs.reindex(columns=list(metrics)).dropna().items()
         texts = [", ".join(format(value, metrics[metric]) for value in values) for metric, values in logged]
         rows.append([description, str(len(runs)), *rates, *texts])
@@ -168,141 +173,116 @@ def short_runs(archives: Mapping[str, str], metrics: Mapping[str, str], kept: Ke
     return format_table(["trained", "runs", *map(str, _PRINTED_DISTANCES), *logs], rows)
 
 
-def mmn_sizes(kept: Kept) -> str:
-    """Returns mean success rates of mmn-paths over its training runs, in the mazes of each size of the benchmark."""
-    at = (*_PRINTED_DISTANCES, 12, 15)
-    rows = [_by_distance(f"{size} x {size}", kept.of("mmn-paths", f"local-{size}"), at=at) for size in SIZES]
-    return format_table(["mazes", "runs", *map(str, at)], rows)
+def by_agent(agents: Mapping[str, str], measure: Measure, kept: Kept) -> str:
+    """Returns a row for each agent, with a measure at the levels of each track."""
+    rows = [[text, *_levels(kept, agent, measure)] for agent, text in agents.items()]
+    return format_table(["agent", *_TRACKS], rows)
 
 
-def tracks_table(metric: str, rows: Mapping[str, str], kept: Kept) -> str:
-    """Returns a metric of agents on the tracks."""
-    lines = [[text, *(_levels(kept, track, agent, metric) for track in TRACKS)] for agent, text in rows.items()]
-    return format_table(["agent", *_TRACKS], lines)
+def by_track(columns: Mapping[str, tuple[str, Measure]], kept: Kept, head: str = "track") -> str:
+    """Returns a row for each track, with measures of agents at its levels."""
+    cells = [_levels(kept, *chosen) for chosen in columns.values()]
+    return format_table([head, *columns], zip(_TRACKS, *cells, strict=True))
+
+
+def mean_of(metric: str, kinds: Sequence[str] = (*KNOWN, *NOVEL)) -> Measure:
+    """Returns the mean of a metric in mazes of some kinds as a measure."""
+    return lambda own: own[own.kind.isin(kinds)][metric].mean()
+
+
+def worst_tenth(own: pd.DataFrame) -> float:
+    """Returns the on-time rate in the tenth of the mazes in which an agent is late most often, after JaxNav."""
+    by_maze = own.groupby(["run", "maze"])[ON_TIME_125].mean()
+    return by_maze.groupby("run").apply(lambda of_run: of_run.nsmallest(-(-len(of_run) // 10)).mean()).mean()
 
 
 def tracks_learned(agent: str, kept: Kept) -> str:
     """Returns a learned agent's rates over its training runs, and the paired differences to the navigator."""
     rows = []
-    for name, setting, own in _settings(kept, agent):
-        others = (None, kept.of("navigator", setting))
-        pairs = itertools.product(others, ("success_rate", ON_TIME_125))
-        means = (format_interval(estimate(own, metric, other)) for other, metric in pairs)
-        rows.append([name, str(own.run.nunique()), *means])
-    header = ["setting", "runs", "success rate", "on-time rate"]
-    return format_table([*header, "success - `navigator`", "on-time rate - `navigator`"], rows)
-
-
-def tracks_worst_tenth(kept: Kept) -> str:
-    """Returns on-time rates in the tenth of the mazes in which an agent is late most often, after JaxNav."""
-
-    def worst(own: pd.DataFrame) -> float:
-        by_maze = own.groupby(["run", "maze"])[ON_TIME_125].mean()
-        return by_maze.groupby("run").apply(lambda of_run: of_run.nsmallest(-(-len(of_run) // 10)).mean()).mean()
-
-    agents = ("navigator", "neural-planner", "navigator without map")
-    rows = [
-        [_ROWS[agent], *(_joined(map(worst, kept.on_track(agent, track).values())) for track in TRACKS)]
-        for agent in agents
-    ]
-    return format_table(["agent", *_TRACKS], rows)
+    for track, level, own in kept.on_tracks(agent):
+        both = [own, kept.of("navigator", f"{track}-{level}")]
+        pairs = itertools.product(([own], both), ("success_rate", ON_TIME_125))
+        means = (_interval(metric, *agents) for agents, metric in pairs)
+        rows.append([f"`{track}` {level}", str(own.run.nunique()), *means])
+    header = ["setting", "runs", "success rate", "on-time rate", "success - `navigator`", "on-time rate - `navigator`"]
+    return format_table(header, rows)
 
 
 def tracks_map_worth(kept: Kept) -> str:
     """Returns the navigator's headline numbers with their intervals, and what the map is worth to it."""
     rows = []
-    for name, setting, own in _settings(kept, "navigator"):
-        without = kept.of("navigator without map", setting)
-        means = [estimate(own, metric) for metric in ("success_rate", ON_TIME_2, ON_TIME_125)]
-        means += [estimate(without, ON_TIME_125), estimate(own, ON_TIME_125, without)]
-        rows.append([name, *map(format_interval, means)])
-    names = [METRICS[metric] for metric in (ON_TIME_2, ON_TIME_125)]
-    return format_table(["part", "success", *names, f"without the map, {names[1]}", "map worth"], rows)
+    metrics = {"success_rate": "success", ON_TIME_2: METRICS[ON_TIME_2], ON_TIME_125: METRICS[ON_TIME_125]}
+    for track, level, own in kept.on_tracks("navigator"):
+        without = kept.of("navigator without map", f"{track}-{level}")
+        means = [_interval(metric, own) for metric in metrics]
+        means += [_interval(ON_TIME_125, without), _interval(ON_TIME_125, own, without)]
+        rows.append([f"`{track}` {level}", *means])
+    return format_table(["part", *metrics.values(), f"without the map, {METRICS[ON_TIME_125]}", "map worth"], rows)
 
 
 def tracks_blocked(kept: Kept) -> str:
     """Returns the navigator's share on time where the shortest path on the map is open, and where it is blocked."""
     rows = []
-    for name, setting, own in _settings(kept, "navigator"):
-        if not setting.startswith("building"):  # whose maps are right
+    for track, level, own in kept.on_tracks("navigator"):
+        if own.blocked.any():  # the maps of `building` are right
             groups = [own[own.blocked == is_blocked] for is_blocked in (False, True)]
-            cells = [[str(len(each)), format_interval(estimate(each, ON_TIME_125))] for each in groups]
-            rows.append([name, *cells[0], *cells[1]])
+            cells = [(str(len(each)), _interval(ON_TIME_125, each)) for each in groups]
+            rows.append([f"`{track}` {level}", *cells[0], *cells[1]])
     open_path, blocked = (f"episodes, path on the map {name}" for name in ("open", "blocked"))
     return format_table(["part", open_path, METRICS[ON_TIME_125], blocked, METRICS[ON_TIME_125]], rows)
 
 
-def by_track(head: str, columns: Mapping[str, tuple[str, str, Sequence[str]]], kept: Kept) -> str:
-    """Returns a row for each track; a column is of an agent and a metric in some kinds of mazes."""
-    rows = [[f"`{track}`", *(_levels(kept, track, *chosen) for chosen in columns.values())] for track in TRACKS]
-    return format_table([head, *columns], rows)
-
-
-_NOVEL_KINDS = {
-    f"`{agent}`, {name} layouts": (agent, ON_TIME_125, kinds)
-    for agent in ("navigator", "neural-planner")
-    for name, kinds in (("known", KNOWN), ("held-out", NOVEL))
-}
-_NAVIGATOR = {
-    METRICS[each]: ("navigator", each, (*KNOWN, *NOVEL)) for each in ("success_rate", *ON_TIME_METRICS, "spl")
-}
-_NAVIGATOR_KINDS = {f"`{kind}`": ("navigator", ON_TIME_125, (kind,)) for kind in (*KNOWN, *NOVEL)}
 # By the name that a page gives.
 TABLES: dict[str, Callable[[Kept], str]] = {
-    "paper-runs": functools.partial(paper_runs, "success_rate"),
-    "paper-runs-spl": functools.partial(paper_runs, "spl"),
-    "mmn-sizes": mmn_sizes,
+    "paper-runs": lambda kept: by_distance("agent", _LOCAL_RUNS, "success_rate", _PRINTED_DISTANCES, kept),
+    "paper-runs-spl": lambda kept: by_distance("agent", _LOCAL_RUNS, "spl", _PRINTED_DISTANCES, kept),
+    "mmn-sizes": lambda kept: by_distance("mazes", _SIZES, "success_rate", (*_PRINTED_DISTANCES, 12, 15), kept),
     "mah-curve": mah_curve,
-    "mmn-ingredients": functools.partial(short_runs, _INGREDIENTS, {"model_error_1": ".3f", "map_ratio": ".1f"}),
-    "mmn-regimes": functools.partial(short_runs, _REGIMES, {}),
-    "tracks-glance": functools.partial(tracks_table, ON_TIME_125, _GLANCE),
-    "tracks-success": functools.partial(tracks_table, "success_rate", _ROWS),
-    "tracks-on-time": functools.partial(tracks_table, ON_TIME_125, _ROWS),
-    "tracks-on-time-2": functools.partial(tracks_table, ON_TIME_2, _ROWS),
-    "tracks-learned": functools.partial(tracks_learned, "neural-planner"),
-    "tracks-rewarded": functools.partial(tracks_learned, "neural-planner from rewards"),
-    "tracks-rewarded-building": functools.partial(tracks_learned, "neural-planner from rewards on building"),
-    "tracks-ways": functools.partial(tracks_learned, "mmn-paths"),
-    "tracks-worst-tenth": tracks_worst_tenth,
+    "mmn-ingredients": lambda kept: short_runs(_INGREDIENTS, {"model_error_1": ".3f", "map_ratio": ".1f"}, kept),
+    "mmn-regimes": lambda kept: short_runs(_REGIMES, {}, kept),
+    "tracks-glance": lambda kept: by_agent(_GLANCE, mean_of(ON_TIME_125), kept),
+    "tracks-success": lambda kept: by_agent(_ROWS, mean_of("success_rate"), kept),
+    "tracks-on-time": lambda kept: by_agent(_ROWS, mean_of(ON_TIME_125), kept),
+    "tracks-on-time-2": lambda kept: by_agent(_ROWS, mean_of(ON_TIME_2), kept),
+    "tracks-learned": lambda kept: tracks_learned("neural-planner", kept),
+    "tracks-rewarded": lambda kept: tracks_learned("neural-planner from rewards", kept),
+    "tracks-rewarded-building": lambda kept: tracks_learned("neural-planner from rewards on building", kept),
+    "tracks-ways": lambda kept: tracks_learned("mmn-paths", kept),
+    "tracks-worst-tenth": lambda kept: by_agent(
+        {name: _ROWS[name] for name in ("navigator", "neural-planner", "navigator without map")}, worst_tenth, kept
+    ),
     "tracks-map-worth": tracks_map_worth,
-    "tracks-novel-kinds": functools.partial(by_track, "track", _NOVEL_KINDS),
     "tracks-blocked": tracks_blocked,
-    "tracks-navigator": functools.partial(by_track, "track", _NAVIGATOR),
-    "tracks-navigator-kinds": functools.partial(by_track, f"track, {METRICS[ON_TIME_125]}", _NAVIGATOR_KINDS),
+    "tracks-novel-kinds": lambda kept: by_track(
+        {
+            f"`{agent}`, {name} layouts": (agent, mean_of(ON_TIME_125, kinds))
+            for agent in ("navigator", "neural-planner")
+            for name, kinds in (("known", KNOWN), ("held-out", NOVEL))
+        },
+        kept,
+    ),
+    "tracks-navigator": lambda kept: by_track(
+        {text: ("navigator", mean_of(metric)) for metric, text in METRICS.items() if metric != "spl_grid"}, kept
+    ),
+    "tracks-navigator-kinds": lambda kept: by_track(
+        {f"`{kind}`": ("navigator", mean_of(ON_TIME_125, (kind,))) for kind in (*KNOWN, *NOVEL)},
+        kept,
+        f"track, {METRICS[ON_TIME_125]}",
+    ),
 }
 
 
-def _by_distance(
-    name: str,
-    own: pd.DataFrame,
-    metric: str = "success_rate",
-    other: pd.DataFrame | None = None,
-    at: Sequence[int] = _PRINTED_DISTANCES,
-) -> list[str]:
-    """Returns a row: a name, the number of runs, and at each distance the mean, or the difference to another."""
-    frames = [own] if other is None else [own, other]
-    groups = ([frame[frame.distance == distance] for frame in frames] for distance in at)
-    cells = [format_interval(estimate(group[0], metric, *group[1:])) for group in groups]
-    return [name, ", ".join(str(each.run.nunique()) for each in frames), *cells]
+def _levels(kept: Kept, agent: str, measure: Measure) -> list[str]:
+    """Returns a measure at the levels of each track, as "0.75 / 0.50 / 0.25"; "-" without evaluations."""
+    measured = [(track, _number(measure(own))) for track, _, own in kept.on_tracks(agent)]
+    return [" / ".join(value for of, value in measured if of == track) or "-" for track in TRACKS]
 
 
-def _settings(kept: Kept, agent: str) -> Iterator[tuple[str, str, pd.DataFrame]]:
-    """Yields the name in tables, the name, and the agent's episodes for each setting of the tracks that it played."""
-    for track in TRACKS:
-        for setting, own in kept.on_track(agent, track).items():
-            yield f"`{track}` {setting[-1]}", setting, own
+def _interval(metric: str, *agents: pd.DataFrame) -> str:
+    return format_interval(estimate(metric, *agents))
 
 
-def _levels(kept: Kept, track: str, agent: str, metric: str, kinds: Sequence[str] = (*KNOWN, *NOVEL)) -> str:
-    """Returns the means of a metric at the levels of a track, in mazes of some kinds; "-" without evaluations."""
-    return _joined(own[own.kind.isin(kinds)][metric].mean() for own in kept.on_track(agent, track).values())
-
-
-def _joined(values: Iterable[float]) -> str:
-    return " / ".join(map(_number, values)) or "-"
-
-
-def _over_values(rates: pd.Series) -> str:
+def _over_runs(rates: pd.Series) -> str:
     """Returns the mean of success rates of training runs, with Student's interval if they differ."""
     if rates.nunique() == 1:
         return _number(rates.iloc[0])

@@ -59,16 +59,13 @@ class ReportedResult:
         return {maze.name: maze.walls for maze in self.task.fixed_mazes} if self.task else {}
 
 
-def read_results(
-    paths: Sequence[pathlib.Path], load: Callable[[pathlib.Path], Result] = load_result
-) -> list[ReportedResult]:
+def read_results(paths: Sequence[pathlib.Path]) -> list[ReportedResult]:
     """Returns all results at or below `paths`, one for each setting and training run, sorted by setting; at least one.
 
     It warns with a `Remark` of each thing that is skipped.
 
     Args:
       paths: evaluation folders, or folders above them.
-      load: reads the result of an evaluation folder.
 
     Raises:
       InputError: if there is no result.
@@ -79,7 +76,7 @@ def read_results(
             remark(f"{path}: expected results of `mazebench eval`, found none; skipped")
     for folder in find_evaluations(paths):
         try:
-            results.append(_reported(load(folder)))
+            results.append(reported(load_result(folder)))
         except InputError as error:
             remark(f"{error}; skipped")
     if not results:
@@ -177,7 +174,14 @@ def find_evaluations(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
     return folders_below(paths, lambda names: not names.isdisjoint({SUMMARY, EPISODES, JOURNAL}))
 
 
-def _reported(result: Result) -> ReportedResult:
+def reported(result: Result) -> ReportedResult:
+    """Returns a finished evaluation as a report reads it.
+
+    It warns with a `Remark` of what the report has to do without.
+
+    Raises:
+      InputError: if the benchmark has other mazes than those that were played.
+    """
     folder, summary, records = result.folder, result.summary, result.records
     task: Task | None = None
     try:
