@@ -27,7 +27,6 @@ _EPISODE_SEED = 0
 
 def freeze(folder: pathlib.Path) -> None:
     """Writes mazes, eval episodes and their manifest into `folder`."""
-    folder.mkdir(parents=True, exist_ok=True)
     files = {}
     mazes = {size: draw_mazes(size) for size in SIZES}
     for size in SIZES:
@@ -39,9 +38,7 @@ def freeze(folder: pathlib.Path) -> None:
         spec = Task.of(task, mazes=mazes[size][MAZES_PER_SPLIT:], distances=distances)
         files[episodes_file(task, size)] = format_trials(spec, draw_trials(spec, seed=_EPISODE_SEED))
     generator = {"style": "dfs", "openings": DFS_OPENINGS, "seed": _MAZE_SEED, "episode_seed": _EPISODE_SEED}
-    files[MANIFEST] = format_manifest(PAPER_BENCHMARK, generator, files)
-    for name, text in files.items():
-        folder.joinpath(name).write_bytes(text.encode("ascii"))
+    write_benchmark(folder, PAPER_BENCHMARK, generator, files)
 
 
 def draw_mazes(size: int) -> list[Maze]:
@@ -67,15 +64,17 @@ def format_trials(task: Task, trials: list[Trial]) -> str:
     return text.getvalue()
 
 
-def format_manifest(benchmark: str, generator: dict[str, Any], files: dict[str, str]) -> str:
-    """Returns the text of a manifest."""
+def write_benchmark(folder: pathlib.Path, benchmark: str, generator: dict[str, Any], files: dict[str, str]) -> None:
+    """Writes texts by the names of their files, and their manifest."""
     content = {
         "benchmark": benchmark,
         "version": TASK_VERSION,
         "generator": generator,
         "files": {name: hashlib.sha256(text.encode("ascii")).hexdigest() for name, text in sorted(files.items())},
     }
-    return json.dumps(content, indent=1) + "\n"
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in (files | {MANIFEST: json.dumps(content, indent=1) + "\n"}).items():
+        folder.joinpath(name).write_bytes(text.encode("ascii"))
 
 
 if __name__ == "__main__":

@@ -17,8 +17,8 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from benchmarks.freeze import format_manifest, format_trials
-from mazebench.maps.benchmark import DEV, FROZEN_SPLITS, KINDS_SIZE, MANIFEST, TRACKS_BENCHMARK, mazes_file
+from benchmarks.freeze import format_trials, write_benchmark
+from mazebench.maps.benchmark import DEV, FROZEN_SPLITS, KINDS_SIZE, TRACKS_BENCHMARK, mazes_file
 from mazebench.maps.kinds import KNOWN, NOVEL, generate
 from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
@@ -39,7 +39,6 @@ def freeze_kinds(
     commit: Annotated[str, typer.Option(help="The hash of the commit from which the split eval is drawn.")],
 ) -> None:
     """Writes the splits train, dev and eval into `folder`; eval is drawn from the hash of a commit."""
-    folder.mkdir(parents=True, exist_ok=True)
     generator: dict[str, Any] = {"seed": _SEED, "kinds": {}, "contexts_sha256": {}, "eval_commit": commit}
     files: dict[str, str] = {}
     known: set[bytes] = set()
@@ -56,9 +55,7 @@ def freeze_kinds(
                 f"{track}-{level}": contexts_hash(track, level, mazes, trials)
                 for track, level in itertools.product(TRACKS, LEVELS)
             }
-    files[MANIFEST] = format_manifest(TRACKS_BENCHMARK, generator, files)
-    for name, text in files.items():
-        folder.joinpath(name).write_bytes(text.encode("ascii"))
+    write_benchmark(folder, TRACKS_BENCHMARK, generator, files)
 
 
 def draw_mazes(kind: str, split: str, known: set[bytes], rng: np.random.Generator) -> list[Maze]:

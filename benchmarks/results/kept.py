@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 import pathlib
 import shutil
@@ -69,8 +68,8 @@ class Kept(NamedTuple):
             lines = lines[lines.filter(like=SUCCESS).notna().any(axis=1)]
             lines = lines.set_index((lines.env_steps / 1e6).round(1))
             runs.append(lines[~lines.index.duplicated(keep="last")])
-        common = functools.reduce(pd.Index.intersection, (lines.index for lines in runs))
-        return pd.concat([lines.loc[common] for lines in runs])
+        lines = pd.concat(runs)
+        return lines[lines.groupby(level=0).env_steps.transform("size") == len(runs)]
 
     def success_rates(self, archive: str, distance: int) -> pd.DataFrame:
         """Returns the mean, lowest and highest success rate over training runs on watched mazes at each milestone."""

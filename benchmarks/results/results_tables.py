@@ -165,10 +165,16 @@ def short_runs(archives: Mapping[str, str], metrics: Mapping[str, str], kept: Ke
     rows = []
     for name, description in archives.items():
         runs = kept.milestones(name).loc[[0.4]]
-        rates = [_over_runs(runs[f"{SUCCESS}{distance}"]) for distance in _PRINTED_DISTANCES]
-        logged = runs.reindex(columns=list(metrics)).dropna().items()
-        texts = [", ".join(format(value, metrics[metric]) for value in values) for metric, values in logged]
-        rows.append([description, str(len(runs)), *rates, *texts])
+        cells = [description, str(len(runs))]
+        for distance in _PRINTED_DISTANCES:
+            # The mean, with Student's interval if the runs differ.
+            rates = runs[f"{SUCCESS}{distance}"]
+            low, high = np.clip(stats.t.interval(CONFIDENCE, len(runs) - 1, rates.mean(), rates.sem()), 0, 1)
+            mean = Estimate(rates.mean(), low, high)
+            cells.append(format_interval(mean) if rates.nunique() > 1 else _number(mean.value))
+        for metric, form in metrics.items():
+            cells.append(", ".join(format(value, form) for value in runs.reindex(columns=[metric])[metric].dropna()))
+        rows.append(cells)
     logs = (name.replace("_", " ") for name in metrics)
     return format_table(["trained", "runs", *map(str, _PRINTED_DISTANCES), *logs], rows)
 
@@ -280,14 +286,6 @@ def _levels(kept: Kept, agent: str, measure: Measure) -> list[str]:
 
 def _interval(metric: str, *agents: pd.DataFrame) -> str:
     return format_interval(estimate(metric, *agents))
-
-
-def _over_runs(rates: pd.Series) -> str:
-    """Returns the mean of success rates of training runs, with Student's interval if they differ."""
-    if rates.nunique() == 1:
-        return _number(rates.iloc[0])
-    low, high = np.clip(stats.t.interval(CONFIDENCE, len(rates) - 1, rates.mean(), rates.sem()), 0, 1)
-    return format_interval(Estimate(rates.mean(), low, high))
 
 
 def format_interval(mean: Estimate) -> str:

@@ -37,37 +37,30 @@ def write_learning_curves(folders: Sequence[pathlib.Path], out: pathlib.Path) ->
     whole = [folder.resolve() for folder in folders]
     common = os.path.commonpath(whole) if len(whole) > 1 else whole[0].parent
     logs = {}  # metrics by the name of the run, with their steps; success rates are in the lines of milestones only
-    origins = {}
+    rows = {}  # the origin of each run, and its last steps, updates and success rates
     for folder in whole:
         try:
-            config, lines = read_json(folder / CONFIG), read_metrics(folder)
+            config, lines = read_json(folder / CONFIG), pd.DataFrame(read_metrics(folder))
         except InputError as error:
             remark(f"{error}; skipped")
             continue
-        if not lines:
+        if lines.empty:
             remark(f"{folder}: expected a training run with metrics, found none yet; skipped")
             continue
-        name = str(folder.relative_to(common))
-        logs[name] = pd.DataFrame(lines)
-        origins[name] = {key: escape_markdown(str(config.get(key, ""))) for key in ("agent", "seed")}
+        name, last = str(folder.relative_to(common)), lines.ffill().iloc[-1]
+        logs[name] = lines
+        rows[name] = {key: escape_markdown(str(config.get(key, ""))) for key in ("agent", "seed")}
+        rows[name] |= {"agent steps": f"{last[_STEPS]:,.0f}", "updates": f"{last.get('updates', 0):,.0f}"}
+        rows[name] |= {rate: f"{value:.3f}" for rate, value in last.items() if str(rate).startswith(SUCCESS)}
     if not logs:
         raise InputError("expected training runs with metrics, found none to report")
-    metrics = dict.fromkeys(metric for lines in logs.values() for metric in lines)
+    metrics = list(dict.fromkeys(metric for lines in logs.values() for metric in lines))
     rates = sorted((metric for metric in metrics if metric.startswith(SUCCESS)), key=_track_and_distance)
     losses = [metric for metric in metrics if metric.endswith("_loss")]
 
-    # A row for each run: its origin, and its last steps, updates and success rates.
-    rows = {}
-    for name, lines in logs.items():
-        last = lines.ffill().iloc[-1]
-        rows[name] = origins[name] | {
-            "agent steps": f"{last[_STEPS]:,.0f}",
-            "updates": f"{last.get('updates', 0):,.0f}",
-        }
-        rows[name] |= {
-            f"success, {rate.removeprefix(SUCCESS)}": f"{last[rate]:.3f}" if rate in last else "" for rate in rates
-        }
-    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis(columns="run")
+    columns = ["agent", "seed", "agent steps", "updates", *rates]
+    table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=columns).fillna("")
+    table = table.rename(columns=lambda name: name.replace(SUCCESS, "success, ")).rename_axis(columns="run")
     document = ["# Learning curves", to_markdown(table).rstrip()]
     with new_report(out):
         for name, title, note, shown in (

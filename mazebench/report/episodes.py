@@ -175,9 +175,7 @@ def find_evaluations(paths: Iterable[pathlib.Path]) -> list[pathlib.Path]:
 
 
 def reported(result: Result) -> ReportedResult:
-    """Returns a finished evaluation as a report reads it.
-
-    It warns with a `Remark` of what the report has to do without.
+    """Returns an evaluation as a report reads it, and warns with a `Remark` of what can't be shown of it.
 
     Raises:
       InputError: if the benchmark has other mazes than those that were played.

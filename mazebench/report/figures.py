@@ -129,10 +129,10 @@ def draw_panels(
         _draw_panel(axes, panel, labels)
     figure.supylabel(y_name, fontsize=8)
     if names is not None:
-        num_columns = _num_columns(len(panels))
-        right = range(num_columns - 1, len(panels), num_columns)
-        last = max(right, key=lambda index: panels[index].points.column.nunique())
-        _name_lines(grid[last], panels[last], labels, names)
+        num_columns = grid[0].get_gridspec().ncols
+        right = zip(grid[num_columns - 1 :: num_columns], panels[num_columns - 1 :: num_columns], strict=True)
+        axes, panel = max(right, key=lambda each: each[1].points.column.nunique())
+        _name_lines(axes, panel, labels, names)
         return figure
     handles = {label: line for axes in grid for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     lines = [name.split("\n") for name in handles]
@@ -160,13 +160,9 @@ def to_svg(figure: Figure) -> bytes:
     return content.getvalue()
 
 
-def _num_columns(num_panels: int) -> int:
-    return 2 if num_panels == 4 else min(num_panels, 3)
-
-
 def _make_grid(title: str, titles: Sequence[str], height: float) -> tuple[Figure, list[Axes]]:
     """Returns a figure with axes that have these titles, as many as fit beside one another."""
-    num_columns = _num_columns(len(titles))
+    num_columns = 2 if len(titles) == 4 else min(len(titles), 3)
     num_rows = -(-len(titles) // num_columns)
     width = WIDTH if num_columns > 1 else WIDTH / 1.6
     titles = [textwrap.fill(text, int(13 * (width / num_columns - 0.5))) for text in titles]

@@ -25,7 +25,7 @@ from mazebench.report.episodes import ReportedResult
 from mazebench.report.figures import Drawn, to_svg
 from mazebench.report.table import Table
 from mazebench.report.trajectory_figures import TIME_COLORS
-from mazebench.results.paper import citation, reference
+from mazebench.results.paper import reference
 from mazebench.results.trajectories import Trajectory
 from mazebench.world.mjcf import BODY_RADIUS
 from mazebench.world.ray_casting import NUM_RAYS
@@ -62,7 +62,7 @@ def build_page(
         style_hash=_hash(style),
         subtitle=head,
         warnings=warnings,
-        citation=f"{citation()}. {reference()['note']}",
+        citation="{authors}, {title}. {note}".format_map(reference()),
         sections=[*drawn, *undrawn],
         provenance=provenance.to_html(index=False, border=0),
         data=_explorer_data(results, used),

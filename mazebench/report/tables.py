@@ -60,12 +60,12 @@ def make_table(
     episodes = pd.concat(rows, names=["row"]).reset_index("row")
     for (label, row), own in episodes.groupby(["label", "row"], observed=True):
         mark = "*" if own.is_untrained.iloc[0] else ""
-        for metric in _known(own):
+        for metric in METRICS:
             mean = mean_interval(own[metric].to_numpy(), own.maze_index.to_numpy())
             lines.append(_line(metric, row, label, mean, len(own)) | {"mark": mark})
     several = episodes[episodes.groupby("agent").run.transform("nunique") > 1]
     for (agent, row), own in several.groupby(["agent", "row"], sort=False):
-        for metric in _known(own):
+        for metric in METRICS:
             runs = own.pivot_table(values=metric, index="run", columns=["maze_index", "trial"])
             if len(runs) > 1 and not runs.isna().any(axis=None):  # runs of the same episodes
                 mean = runs_interval(runs.to_numpy(), runs.columns.get_level_values("maze_index").to_numpy())
@@ -166,11 +166,6 @@ def _printed(task: str, episodes: pd.DataFrame, is_warped: bool = False) -> dict
 def _rows_by(episodes: pd.DataFrame, column: str) -> Rows:
     """Returns a row for each value of a column, with the distances that all results have in common."""
     return {f"{value:g}": group for value, group in at_common_distances(episodes).groupby(column)}
-
-
-def _known(episodes: pd.DataFrame) -> list[str]:
-    """Returns the metrics that are known of all episodes: those on time need the oracle's steps."""
-    return [metric for metric in METRICS if not episodes[metric].isna().any()]
 
 
 def _line(metric: str, row: str, column: str, mean: Estimate, num_episodes: int) -> dict[str, Any]:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -37,10 +38,7 @@ def spl(success: np.ndarray, shortest: np.ndarray, driven: np.ndarray) -> np.nda
 def by_distance(records: Sequence[Record]) -> dict[int, list[Record]]:
     """Returns the records of each distance from start to goal, the shortest distance first."""
     distances = column(records, "distance")
-    return {
-        int(distance): [records[index] for index in np.flatnonzero(distances == distance).tolist()]
-        for distance in np.unique(distances)
-    }
+    return {int(each): list(itertools.compress(records, distances == each)) for each in np.unique(distances)}
 
 
 def is_on_time(records: Sequence[Record], factor: float) -> np.ndarray:
@@ -67,7 +65,7 @@ def summarize(records: Sequence[Record]) -> tuple[Figures, dict[str, Figures]]:
 def summarize_facts(records: Sequence[Record]) -> dict[str, Figures]:
     """Returns the figures of the records in which a fact holds, such as "blocked", and where it does not."""
     return {
-        name: _figures([records[index] for index in np.flatnonzero(holds).tolist()])
+        name: _figures(list(itertools.compress(records, holds)))
         for name, holds in by_fact(records).items()
         if holds.any()
     }

@@ -16,11 +16,6 @@ def reference() -> dict[str, Any]:
     return json.loads(resources.files("mazebench_assets").joinpath("paper", "reference.json").read_text("utf-8"))
 
 
-def citation() -> str:
-    """Returns authors and title in one line."""
-    return f"{reference()['authors']}, {reference()['title']}"
-
-
 def printed(task: str, size: int, warped: bool = False) -> dict[str, dict[str, dict[int, float]]]:
     """Returns the numbers printed for a task and size, by agent, metric and distance (or landmark distance)."""
     found: dict[str, dict[str, dict[int, float]]] = {}

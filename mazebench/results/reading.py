@@ -93,8 +93,7 @@ def find_parts(folder: pathlib.Path) -> dict[str, pathlib.Path]:
     else:
         # In the suite's order where the folder is an agent's in one.
         ordered = read_suite(folder.parent).parts if (folder.parent / SUITE).is_file() else ()
-        found = sorted(path.parent.name for path in folder.glob(f"*/{SUMMARY}"))
-        names = list(dict.fromkeys([*(name for name in ordered if name in found), *found]))
+        names = [*ordered, *sorted(path.parent.name for path in folder.glob(f"*/{SUMMARY}"))]
     parts = {name: folder / name for name in names if (folder / name / SUMMARY).exists()}
     if not parts:
         raise InputError(f"{folder}: expected a finished evaluation, found {_describe_content(folder)}")
