@@ -28,6 +28,7 @@ from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.maps.maze import Cell, Maze
 from mazebench.maps.pictures import draw_grid, write_image
 from mazebench.play.film import _run
+from mazebench.report.page import lay_on_first_pose
 from mazebench.results.played import Shown, shown_of
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
@@ -111,11 +112,8 @@ def draw_tracks() -> None:
                     marker = "x" if maze.walls[tuple(cell)] else "o"
                     row[level].plot(*(PIXELS * (cell[::-1] + 0.5)), marker, color=MOVED, markersize=5, fillstyle="none")
             if track == "adrift":
-                # The path by odometry, laid on the first true pose.
-                x, y, yaw = played.pose[0]
-                turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-                believed = [x, y] + played.observed[:, :2] @ turn.T
-                for path, look in ((played.pose, {"color": "#888888"}), (believed, {"color": DRIVEN, "ls": "--"})):
+                looks = ({"color": "#888888"}, {"color": DRIVEN, "ls": "--"})
+                for path, look in zip((played.pose, played.observed), looks, strict=True):
                     row[level].plot(PIXELS * path[:, 0], PIXELS * (maze.size - path[:, 1]), linewidth=1.2, **look)
                 row[level].set(xlim=(0, PIXELS * maze.size), ylim=(PIXELS * maze.size, 0))
         _show(row[0], _maze_and_path(maze, played), "the maze, and a path")
@@ -139,7 +137,7 @@ class Played(NamedTuple):
     start: Cell
     goal: Cell
     pose: np.ndarray  # [T, 3] float
-    observed: np.ndarray | None  # [T, 3] float, the pose by odometry where the track has it
+    observed: np.ndarray | None  # [T, 3] float, the pose by odometry where the track has it, laid on the first true one
     shown: Shown
 
 
@@ -150,7 +148,8 @@ def play(maze: Maze, **options: Any) -> Played:
         mazebench.evaluate("oracle", out=folder, record=True, episodes_per_distance=1, **options)
         result, trajectories = load_result(folder), load_trajectories(folder / TRAJECTORIES)
     number, record = next((record.episode, record) for record in result.records if record.maze == maze.name)
-    task, (pose, observed) = resolve(result.summary.task), trajectories[number]
+    task, pose = resolve(result.summary.task), trajectories[number].pose
+    observed = None if trajectories[number].observed is None else lay_on_first_pose(trajectories[number])
     index = [each.name for each in task.mazes].index(maze.name)
     shown = shown_of(task, Episode(index, record.start, record.goal, float(pose[0, 2]), record.seed))
     return Played(record.start, record.goal, pose.astype(float), observed, shown)

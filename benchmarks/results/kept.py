@@ -19,7 +19,7 @@ from mazebench.report.episodes import join_episodes, reported
 from mazebench.report.table import Table
 from mazebench.report.tables import build_tables
 from mazebench.results.intervals import Estimate, runs_interval
-from mazebench.results.metrics import scores
+from mazebench.results.metrics import ON_TIME_METRICS, scores
 from mazebench.results.reading import CONFIG, EPISODES, SUITE, SUMMARY, load_result
 from mazebench.storage.files import make_folder, open_whole
 from mazebench.tasks.tracks import LEVELS, TRACKS
@@ -27,6 +27,8 @@ from mazebench.training.run_folder import METRICS, checkpoints, read_metrics
 
 PAPER = "paper"  # the suite
 LOCAL = "local-13"  # the part of `paper` on which training runs are evaluated
+ON_TIME_125, ON_TIME_2 = ON_TIME_METRICS  # within 1.25 and 2 times the oracle's steps
+WORST_TENTH = "worst_tenth"  # on time in the tenth of the mazes with the lowest rates, after JaxNav; else missing
 _SUFFIX = ".tar.xz"
 _TRAINING = "training"  # the folder of archives of training runs
 _RUNS = "runs"  # the archive of evaluations of training runs on `LOCAL`, in folders AGENT-SEED
@@ -104,6 +106,8 @@ def read_kept(folder: pathlib.Path) -> Kept:
             if archive == _RUNS:
                 agent, setting = result.folder.name.rpartition("-")[0], LOCAL
             lines = pd.DataFrame(list(map(dict, result.records)), columns=_COLUMNS).assign(**scores(result.records))
+            rates = lines.groupby("maze")[ON_TIME_125].mean()
+            lines[WORST_TENTH] = lines[ON_TIME_125].where(lines.maze.isin(rates.nsmallest(-(-len(rates) // 10)).index))
             run = (summary.provenance.checkpoint_sha256 or "")[:8]
             episodes.append(lines.assign(archive=archive, agent=agent, run=run, setting=setting))
         tables = build_tables(join_episodes(sorted(paper, key=lambda each: each.setting)))

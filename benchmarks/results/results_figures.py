@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from benchmarks.results.kept import LOCAL, Kept, estimate
-from benchmarks.results.results_tables import ON_TIME_125
+from benchmarks.results.kept import LOCAL, ON_TIME_125, Kept, estimate
 from mazebench.report.figures import Drawn, Panel, draw_panels, draw_table
 from mazebench.tasks.tracks import LEVELS, TRACKS
 

@@ -11,17 +11,15 @@ import pathlib
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-import numpy as np
 import pandas as pd
 from scipy import stats
 
-from benchmarks.results.kept import LOCAL, PAPER, Kept, estimate
+from benchmarks.results.kept import LOCAL, ON_TIME_2, ON_TIME_125, PAPER, WORST_TENTH, Kept, estimate
 from mazebench.maps.benchmark import SIZES
 from mazebench.maps.kinds import KNOWN, NOVEL
 from mazebench.report.curves import SUCCESS
 from mazebench.report.table import METRICS, to_markdown
 from mazebench.results.intervals import CONFIDENCE, Estimate
-from mazebench.results.metrics import ON_TIME_METRICS
 from mazebench.tasks.tracks import TRACKS
 
 ROOT = pathlib.Path(__file__).parent.parent.parent
@@ -32,7 +30,6 @@ PAGES = (
     *(f"docs/agents/{name}.md" for name in ("mmn", "neural_planner")),
 )
 
-ON_TIME_125, ON_TIME_2 = ON_TIME_METRICS  # within 1.25 and 2 times the oracle's steps
 SATURATED = "At 1.00 ["  # begins the sentence below a table
 _BLOCK = re.compile(
     r"(<!-- table: ([^\n]+) -->\n)(?:\|[^\n]*\n)*(?:\n" + re.escape(SATURATED) + r"[^\n]*\n)?(<!-- end of table -->\n)"
@@ -40,7 +37,7 @@ _BLOCK = re.compile(
 _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints success rates
 _MILESTONES = (0.2, 0.6, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.6)  # million agent steps
 _TRACKS = [f"`{track}`" for track in TRACKS]
-Measure = Callable[[pd.DataFrame], float]  # of an agent's episodes
+_KINDS = (*KNOWN, *NOVEL)
 
 _TRAINED = {
     "mmn": "`mmn`",
@@ -165,13 +162,13 @@ def short_runs(archives: Mapping[str, str], metrics: Mapping[str, str], kept: Ke
     rows = []
     for name, description in archives.items():
         runs = kept.milestones(name).loc[[0.4]]
-        cells = [description, str(len(runs))]
+        cells, quantile = [description, str(len(runs))], stats.t.ppf((1 + CONFIDENCE) / 2, len(runs) - 1)
         for distance in _PRINTED_DISTANCES:
             # The mean, with Student's interval if the runs differ.
             rates = runs[f"{SUCCESS}{distance}"]
-            low, high = np.clip(stats.t.interval(CONFIDENCE, len(runs) - 1, rates.mean(), rates.sem()), 0, 1)
-            mean = Estimate(rates.mean(), low, high)
-            cells.append(format_interval(mean) if rates.nunique() > 1 else _number(mean.value))
+            mean, half_width = rates.mean(), quantile * rates.sem()
+            text = format_interval(Estimate(mean, max(mean - half_width, 0), min(mean + half_width, 1)))
+            cells.append(text if rates.nunique() > 1 else _number(mean))
         for metric, form in metrics.items():
             cells.append(", ".join(format(value, form) for value in runs.reindex(columns=[metric])[metric].dropna()))
         rows.append(cells)
@@ -179,27 +176,16 @@ def short_runs(archives: Mapping[str, str], metrics: Mapping[str, str], kept: Ke
     return format_table(["trained", "runs", *map(str, _PRINTED_DISTANCES), *logs], rows)
 
 
-def by_agent(agents: Mapping[str, str], measure: Measure, kept: Kept) -> str:
-    """Returns a row for each agent, with a measure at the levels of each track."""
-    rows = [[text, *_levels(kept, agent, measure)] for agent, text in agents.items()]
+def by_agent(agents: Mapping[str, str], metric: str, kept: Kept) -> str:
+    """Returns a row for each agent, with a metric at the levels of each track."""
+    rows = [[text, *_levels(kept, agent, metric)] for agent, text in agents.items()]
     return format_table(["agent", *_TRACKS], rows)
 
 
-def by_track(columns: Mapping[str, tuple[str, Measure]], kept: Kept, head: str = "track") -> str:
-    """Returns a row for each track, with measures of agents at its levels."""
+def by_track(columns: Mapping[str, tuple[str, str, Sequence[str]]], kept: Kept, head: str = "track") -> str:
+    """Returns a row for each track; a column is of an agent and a metric in some kinds of mazes."""
     cells = [_levels(kept, *chosen) for chosen in columns.values()]
     return format_table([head, *columns], zip(_TRACKS, *cells, strict=True))
-
-
-def mean_of(metric: str, kinds: Sequence[str] = (*KNOWN, *NOVEL)) -> Measure:
-    """Returns the mean of a metric in mazes of some kinds as a measure."""
-    return lambda own: own[own.kind.isin(kinds)][metric].mean()
-
-
-def worst_tenth(own: pd.DataFrame) -> float:
-    """Returns the on-time rate in the tenth of the mazes in which an agent is late most often, after JaxNav."""
-    by_maze = own.groupby(["run", "maze"])[ON_TIME_125].mean()
-    return by_maze.groupby("run").apply(lambda of_run: of_run.nsmallest(-(-len(of_run) // 10)).mean()).mean()
 
 
 def tracks_learned(agent: str, kept: Kept) -> str:
@@ -246,42 +232,44 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "mah-curve": mah_curve,
     "mmn-ingredients": lambda kept: short_runs(_INGREDIENTS, {"model_error_1": ".3f", "map_ratio": ".1f"}, kept),
     "mmn-regimes": lambda kept: short_runs(_REGIMES, {}, kept),
-    "tracks-glance": lambda kept: by_agent(_GLANCE, mean_of(ON_TIME_125), kept),
-    "tracks-success": lambda kept: by_agent(_ROWS, mean_of("success_rate"), kept),
-    "tracks-on-time": lambda kept: by_agent(_ROWS, mean_of(ON_TIME_125), kept),
-    "tracks-on-time-2": lambda kept: by_agent(_ROWS, mean_of(ON_TIME_2), kept),
+    "tracks-glance": lambda kept: by_agent(_GLANCE, ON_TIME_125, kept),
+    "tracks-success": lambda kept: by_agent(_ROWS, "success_rate", kept),
+    "tracks-on-time": lambda kept: by_agent(_ROWS, ON_TIME_125, kept),
+    "tracks-on-time-2": lambda kept: by_agent(_ROWS, ON_TIME_2, kept),
     "tracks-learned": lambda kept: tracks_learned("neural-planner", kept),
     "tracks-rewarded": lambda kept: tracks_learned("neural-planner from rewards", kept),
     "tracks-rewarded-building": lambda kept: tracks_learned("neural-planner from rewards on building", kept),
     "tracks-ways": lambda kept: tracks_learned("mmn-paths", kept),
     "tracks-worst-tenth": lambda kept: by_agent(
-        {name: _ROWS[name] for name in ("navigator", "neural-planner", "navigator without map")}, worst_tenth, kept
+        {name: _ROWS[name] for name in ("navigator", "neural-planner", "navigator without map")}, WORST_TENTH, kept
     ),
     "tracks-map-worth": tracks_map_worth,
     "tracks-blocked": tracks_blocked,
     "tracks-novel-kinds": lambda kept: by_track(
         {
-            f"`{agent}`, {name} layouts": (agent, mean_of(ON_TIME_125, kinds))
+            f"`{agent}`, {name} layouts": (agent, ON_TIME_125, kinds)
             for agent in ("navigator", "neural-planner")
             for name, kinds in (("known", KNOWN), ("held-out", NOVEL))
         },
         kept,
     ),
     "tracks-navigator": lambda kept: by_track(
-        {text: ("navigator", mean_of(metric)) for metric, text in METRICS.items() if metric != "spl_grid"}, kept
+        {text: ("navigator", metric, _KINDS) for metric, text in METRICS.items() if metric != "spl_grid"}, kept
     ),
     "tracks-navigator-kinds": lambda kept: by_track(
-        {f"`{kind}`": ("navigator", mean_of(ON_TIME_125, (kind,))) for kind in (*KNOWN, *NOVEL)},
+        {f"`{kind}`": ("navigator", ON_TIME_125, (kind,)) for kind in _KINDS},
         kept,
         f"track, {METRICS[ON_TIME_125]}",
     ),
 }
 
 
-def _levels(kept: Kept, agent: str, measure: Measure) -> list[str]:
-    """Returns a measure at the levels of each track, as "0.75 / 0.50 / 0.25"; "-" without evaluations."""
-    measured = [(track, _number(measure(own))) for track, _, own in kept.on_tracks(agent)]
-    return [" / ".join(value for of, value in measured if of == track) or "-" for track in TRACKS]
+def _levels(kept: Kept, agent: str, metric: str, kinds: Sequence[str] = _KINDS) -> list[str]:
+    """Returns a metric's means at the levels of each track, as "0.75 / 0.50 / 0.25"; "-" without evaluations."""
+    texts: dict[str, list[str]] = {track: [] for track in TRACKS}
+    for track, _, own in kept.on_tracks(agent):
+        texts[track].append(_number(own[own.kind.isin(kinds)][metric].mean()))
+    return [" / ".join(levels) or "-" for levels in texts.values()]
 
 
 def _interval(metric: str, *agents: pd.DataFrame) -> str:

@@ -10,7 +10,7 @@ import hashlib
 import json
 import math
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
@@ -49,10 +49,11 @@ def build_page(
     marks = f":root {{ --start: {colors.to_hex(colors.START)}; --goal: {colors.to_hex(colors.GOAL)}; }}\n"
     style, script = marks + _read("page.css"), _read("canvas.js") + _read("explorer.js")
     columns: dict[str, int] = {}  # JSON, deflated, in base64, with their numbers
-    used = [
-        [columns.setdefault(_pack(part), len(columns)) for part in (_trials(result), _outcomes(result))]
-        for result in results
-    ]
+    used = []
+    for result in results:
+        parts = (json.dumps(each, separators=(",", ":")) for each in (_trials(result), _outcomes(result)))
+        packed = (_base64(zlib.compress(part.encode("ascii"), 9)) for part in parts)
+        used.append([columns.setdefault(each, len(columns)) for each in packed])
     # Each figure with the table of its name, then the tables that have no figure.
     without = {table.name: table for table in tables}
     drawn = [(each, without.pop(each.name, None), _base64(to_svg(each.figure))) for each in figures]
@@ -180,7 +181,3 @@ def _changes(poses: np.ndarray) -> list[list[int]]:
     changes = np.diff(units, axis=0, prepend=0).astype(int)
     changes[:, 2] = (changes[:, 2] + _YAW_UNITS // 2) % _YAW_UNITS - _YAW_UNITS // 2  # the shorter way around
     return changes.T.tolist()
-
-
-def _pack(columns: Mapping[str, Any]) -> str:
-    return _base64(zlib.compress(json.dumps(columns, separators=(",", ":")).encode("ascii"), 9))

@@ -20,6 +20,7 @@ from mazebench.tasks.tracks import TRACKS
 
 DEFAULT_LANDMARK_DISTANCE = 5  # cells; the paper's choice wherever it varies something else
 Rows = dict[str, pd.DataFrame]  # named groups of the episodes of all agents
+Printed = Mapping[str, Mapping[str, Mapping[int, float]]]  # the paper's values by agent, metric and row
 
 _DISTANCES_NOTE = (
     "Means over all episodes. If results cover different distances, only the distances that all of them cover count."
@@ -44,18 +45,8 @@ def build_tables(episodes: pd.DataFrame) -> list[Table]:
     return [*tables, make_table("all", "All results", _DISTANCES_NOTE, "setting", rows)]
 
 
-def make_table(
-    name: str,
-    title: str,
-    note: str,
-    row_name: str,
-    rows: Rows,
-    paper: Mapping[str, Mapping[str, Mapping[int, float]]] | None = None,
-) -> Table:
-    """Returns a table with a column for each agent, then one for each mean over training runs, then the paper's.
-
-    `rows` has the episodes of each row, `paper` printed values by agent, metric and row.
-    """
+def make_table(name: str, title: str, note: str, row_name: str, rows: Rows, paper: Printed | None = None) -> Table:
+    """Returns a table with a column for each agent, then one for each mean over training runs, then the paper's."""
     lines: list[dict[str, Any]] = []
     episodes = pd.concat(rows, names=["row"]).reset_index("row")
     for (label, row), own in episodes.groupby(["label", "row"], observed=True):
@@ -158,7 +149,7 @@ def _by_distance(name: str, title: str, episodes: pd.DataFrame, is_warped: bool 
     return make_table(name, title, "Distance from start to goal in cells.", "distance", rows, paper)
 
 
-def _printed(task: str, episodes: pd.DataFrame, is_warped: bool = False) -> dict[str, Any]:
+def _printed(task: str, episodes: pd.DataFrame, is_warped: bool = False) -> Printed:
     """Returns the paper's values for the setting of some episodes; none for other mazes than the eval mazes."""
     return {} if episodes.mazes.iloc[0] else printed(task, int(episodes["size"].iloc[0]), is_warped)
 

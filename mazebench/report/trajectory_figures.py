@@ -35,9 +35,15 @@ def draw_trajectories(episodes: pd.DataFrame) -> list[Drawn]:
     episodes = episodes[has_paths & usual]
     episodes = episodes[episodes["size"] == episodes["size"].min()]
     labels = episodes.label.unique()[:_MAX_ROWS]
-    trials = _pick_trials(episodes[episodes.label.isin(labels)])
+
+    # Trials of all agents in which they differ most.
+    shown = episodes[episodes.label.isin(labels)]
+    found = shown.groupby("trial").agg(agents=("label", "nunique"), reached=("success", "mean"))
+    everyones = found[found.agents == found.agents.max()]
+    trials = sorted((everyones.reached - 0.5).abs().nsmallest(_MAX_COLUMNS).index)
     if not trials:
         return []
+
     title = f"Trajectories: {episodes.setting.iloc[0]}"
     width = max(len(trials), 3) * WIDTH / _MAX_COLUMNS
     figure = Figure(figsize=(width, 0.5 + len(labels) * (WIDTH / _MAX_COLUMNS + 0.2)), layout="constrained")
@@ -49,13 +55,6 @@ def draw_trajectories(episodes: pd.DataFrame) -> list[Drawn]:
         for trial, axes in zip(trials, row, strict=True):
             _draw_episode(axes, own.loc[trial])
     return [Drawn("trajectories-hierarchical", title, _NOTE, figure)]
-
-
-def _pick_trials(episodes: pd.DataFrame) -> list[int]:
-    """Returns some trials of all agents in which they differ most."""
-    found = episodes.groupby("trial").agg(agents=("label", "nunique"), reached=("success", "mean"))
-    everyones = found[found.agents == found.agents.max()]
-    return sorted((everyones.reached - 0.5).abs().nsmallest(_MAX_COLUMNS).index)
 
 
 def _draw_episode(axes: Axes, episode: pd.Series) -> None:
