@@ -79,7 +79,7 @@ class Kept(NamedTuple):
 
 
 def estimate(metric: str, *agents: pd.DataFrame) -> Estimate:
-    """Returns the mean of a metric over runs and mazes: of an agent's episodes, or of what it is above another's."""
+    """Returns the mean of a metric over an agent's runs and mazes, or its difference to that of a second agent."""
     runs = [own.pivot(index="run", columns="episode", values=metric).to_numpy() for own in agents]
     mazes = agents[0].groupby("episode").maze.first().to_numpy()
     return runs_interval(runs[0], mazes, *runs[1:])
@@ -96,7 +96,7 @@ def read_kept(folder: pathlib.Path) -> Kept:
         for log in sorted((unpacked / _TRAINING).rglob(METRICS)):
             training.setdefault(log.relative_to(unpacked).parts[1], []).append(pd.DataFrame(read_metrics(log.parent)))
 
-        # Evaluations as the report reads them, those of the paper's protocol, and the episodes of all.
+        # The evaluations of the paper's protocol as the report reads them, and the episodes of all evaluations.
         for path in sorted(unpacked.rglob(SUMMARY)):
             result = load_result(path.parent)
             summary, archive = result.summary, path.relative_to(unpacked).parts[0]

@@ -141,7 +141,10 @@ def report_table(kept: Kept, name: str, metric: str) -> str:
 
 
 def by_distance(head: str, lines: Mapping[str, Sequence[str]], metric: str, at: Sequence[int], kept: Kept) -> str:
-    """Returns means over training runs at distances: of the agent of each line in a setting, or of two, subtracted."""
+    """Returns the mean of a metric over training runs by distance.
+
+    A line names a setting and an agent, or two agents, of which it shows the difference.
+    """
     rows = []
     for text, (setting, *names) in lines.items():
         agents = [kept.of(name, setting) for name in names]

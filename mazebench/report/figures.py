@@ -99,7 +99,7 @@ def draw_violins(episodes: pd.DataFrame) -> list[Drawn]:
         agents = list(at_common_distances(group).groupby("label", observed=True))
         strength_name = perturbation.replace("_", " ")
         title = f"SPL by {strength_name}: {group.task.iloc[0]}"
-        figure, grid = _make_grid(title, [label for label, _ in agents], 2.1)
+        figure, grid, _ = _make_grid(title, [label for label, _ in agents], 2.1)
         for axes, (_, own) in zip(grid, agents, strict=True):
             levels, scores = zip(*own.groupby("strength").spl, strict=True)
             places = range(len(levels))
@@ -124,12 +124,11 @@ def draw_panels(
     The place in `labels` gives an agent its colour and marker, and those of the paper have theirs. With `names`, of
     some lines, lines are named where they end in one of the panels on the right, in the place of the legend.
     """
-    figure, grid = _make_grid(title, [panel.title for panel in panels], height)
+    figure, grid, num_columns = _make_grid(title, [panel.title for panel in panels], height)
     for axes, panel in zip(grid, panels, strict=True):
         _draw_panel(axes, panel, labels)
     figure.supylabel(y_name, fontsize=8)
     if names is not None:
-        num_columns = grid[0].get_gridspec().ncols
         right = zip(grid[num_columns - 1 :: num_columns], panels[num_columns - 1 :: num_columns], strict=True)
         axes, panel = max(right, key=lambda each: each[1].points.column.nunique())
         _name_lines(axes, panel, labels, names)
@@ -160,8 +159,8 @@ def to_svg(figure: Figure) -> bytes:
     return content.getvalue()
 
 
-def _make_grid(title: str, titles: Sequence[str], height: float) -> tuple[Figure, list[Axes]]:
-    """Returns a figure with axes that have these titles, as many as fit beside one another."""
+def _make_grid(title: str, titles: Sequence[str], height: float) -> tuple[Figure, list[Axes], int]:
+    """Returns a figure, axes in it with these titles, as many beside one another as fit, and how many that is."""
     num_columns = 2 if len(titles) == 4 else min(len(titles), 3)
     num_rows = -(-len(titles) // num_columns)
     width = WIDTH if num_columns > 1 else WIDTH / 1.6
@@ -171,7 +170,7 @@ def _make_grid(title: str, titles: Sequence[str], height: float) -> tuple[Figure
     figure = Figure(figsize=(width, 0.2 + height * num_rows + 0.16 * title.count("\n")), layout="constrained")
     figure.suptitle(title, fontsize=10, x=0.01, ha="left")
     grid = [figure.add_subplot(num_rows, num_columns, place, title=text) for place, text in enumerate(titles, 1)]
-    return figure, grid
+    return figure, grid, num_columns
 
 
 def _draw_panel(axes: Axes, panel: Panel, labels: Sequence[str]) -> None:
