@@ -5,20 +5,9 @@ from __future__ import annotations
 _PICTURE = "convert it to PNG"
 _DRAWING = "export it as PNG and give its scale by --pixel-size"
 _READ = "text, pictures such as PNG, arrays (.npy) and ROS maps (.yaml) are read"
-_ITSELF = "download the file itself"
 _TENSORS = "save its tensors as safetensors or its array as .npy"
-_PICTURES = (
-    b"\x89PNG",
-    b"\xff\xd8\xff",
-    b"BM",
-    b"GIF8",
-    b"II*\0",
-    b"MM\0*",
-    b"RIFF",
-    b"P2",
-    b"P5",
-    b"P6",
-)  # of all formats that are read
+# The first bytes of all pictures that are read.
+_PICTURES = (b"\x89PNG", b"\xff\xd8\xff", b"BM", b"GIF8", b"II*\0", b"MM\0*", b"RIFF", b"P2", b"P5", b"P6")
 # By the first bytes: the name, and what to do with a file that is not read.
 _KINDS = {
     **dict.fromkeys(_PICTURES, ("a picture", "")),
@@ -28,7 +17,9 @@ _KINDS = {
     b"<svg": ("an SVG drawing", _DRAWING),
     b"AC10": ("a DWG drawing", _DRAWING),
     b"version https://git-lfs": ("a Git LFS pointer", "run git lfs pull"),
-    **dict.fromkeys((b"<!DOCTYPE html", b"<!doctype html", b"<html", b"<HTML"), ("an HTML page", _ITSELF)),
+    **dict.fromkeys(
+        (b"<!DOCTYPE html", b"<!doctype html", b"<html", b"<HTML"), ("an HTML page", "download the file itself")
+    ),
     **dict.fromkeys((b"\x80\x02", b"\x80\x04", b"\x80\x05"), ("a pickle", _TENSORS)),
     b"PK\x03\x04": ("a ZIP archive", "unpack it"),
     b"\x1f\x8b": ("a gzip archive", "unpack it"),

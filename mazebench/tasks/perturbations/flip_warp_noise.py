@@ -11,7 +11,6 @@ import cv2
 import numpy as np
 from annotated_types import Interval
 
-from mazebench.maps.homography import warp_cell, warp_points, warp_walls
 from mazebench.maps.maze import Cell
 from mazebench.options import Doc
 from mazebench.tasks.perturbations.perturbation import Drawing, Perturbation, ShownMap, StateError
@@ -66,18 +65,32 @@ class MapWarp(Perturbation):
 
 @dataclasses.dataclass(frozen=True)
 class Perspective(Drawing):
-    """A map seen in a wrong perspective, at the resolution of its cells."""
+    """A map seen in a wrong perspective, at the resolution of its cells; what was outside of the map is wall."""
 
-    homography: np.ndarray  # [3, 3], from cells of the map to seen cells
+    homography: np.ndarray  # [3, 3], from (column, row) in cells, with the map's corners at 0 and N, to seen cells
 
     def picture(self, walls: np.ndarray) -> np.ndarray:
-        return warp_walls(walls, self.homography)
+        # OpenCV puts the centre of the first pixel at 0, this package at 0.5.
+        shift = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
+        warped = cv2.warpPerspective(
+            walls.astype(np.uint8),
+            np.linalg.inv(shift) @ self.homography @ shift,
+            walls.shape[::-1],
+            flags=cv2.INTER_NEAREST,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=1,
+        )
+        return warped.astype(bool)
 
     def pixel(self, cell: Cell, picture: np.ndarray) -> Cell:
-        return warp_cell(cell, self.homography, len(picture))
+        """Returns the cell in which the centre of `cell` lies, or the nearest one if it has left the map."""
+        column, row, scale = self.homography @ (cell[1] + 0.5, cell[0] + 0.5, 1.0)
+        row, column = np.clip(np.floor((row / scale, column / scale)), 0, len(picture) - 1).astype(int)
+        return (int(row), int(column))
 
     def points(self, points: np.ndarray, size: int) -> np.ndarray:
-        return warp_points(points, self.homography, size)
+        rows = np.column_stack([points[:, 0], size - points[:, 1], np.ones(len(points))]) @ self.homography.T
+        return np.column_stack([rows[:, 0] / rows[:, 2], size - rows[:, 1] / rows[:, 2]])
 
 
 def random_homography(size: int, share: float, rng: np.random.Generator) -> np.ndarray:
