@@ -14,7 +14,7 @@ from mazebench_agents.robot.tracking import Tracker, aligned
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze, cell_to_point
 from mazebench.tasks.perturbations.odometry import NoisyMotion, Odometry
-from mazebench.tasks.sensors.lidar_noise import read
+from mazebench.tasks.sensors.lidar import read
 from mazebench.world.angles import wrap_angle
 from mazebench.world.ray_casting import TURTLEBOT3, Lidar, LidarModel
 

@@ -28,7 +28,8 @@ from mazebench.results.reading import load_result
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.observation import state_errors
 from mazebench.tasks.perturbations.odometry import NoisyMotion
-from mazebench.tasks.sensors.lidar_noise import model_of, noise_text, read
+from mazebench.tasks.sensors.lidar import read
+from mazebench.tasks.sensors.sensor import SensorOptions
 from mazebench.tasks.task import Task
 from mazebench.world.angles import wrap_angle
 from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
@@ -72,8 +73,9 @@ class TestLidar:
         ],
     )
     def test_the_option_names_a_model(self, text, model):
-        assert model_of(noise_text(text)) == model
-        assert noise_text(noise_text(text)) == noise_text(text)
+        options = SensorOptions(lidar_noise=text)
+        assert options.lidar == model
+        assert SensorOptions(lidar_noise=options.lidar_noise) == options
 
     def test_the_sensor_sees_as_far_as_the_model(self):
         spec = Task.of(sensors="lidar", lidar_noise="turtlebot3")

@@ -27,7 +27,6 @@ MAX_SIZE = 1024
 MAX_CHOSEN_SIZE = 255  # of mazes whose cells a reader finds, or whose scale it chooses
 WALL_HEIGHT = 1.0  # metres; DeepMind Lab's 100 units
 MIN_CELL_SIZE = 0.4  # m, in which the body drives: it is 0.3 m wide, and contacts act 0.03 m before a wall
-UNREACHABLE = -1
 
 # (rows, columns) to each neighbour, in the order in which a shortest path prefers them.
 _NEIGHBOURS = ((-1, 0), (0, -1), (1, 0), (0, 1))
@@ -150,8 +149,12 @@ class Maze:
     def distances(self, source: Cell) -> np.ndarray:
         """Returns the length in cells of a shortest 4-connected path from `source`: `[N, N]` int, -1 at walls."""
         self.require_free(source)
-        result = np.full((self.size, self.size), UNREACHABLE, dtype=np.int32)
-        result[~self.walls] = self._distance_row(int(self._index[tuple(source)]))
+        result = np.full((self.size, self.size), -1, dtype=np.int32)
+        if self.keeps_distances:
+            result[~self.walls] = self._distance_row(source)
+        else:
+            cells, ends = self._search(source)
+            result.ravel()[cells] = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
         return result
 
     def distance(self, start: Cell, goal: Cell) -> int:
@@ -161,13 +164,13 @@ class Maze:
         if not self.keeps_distances:
             _, ends = self._search(start, goal[0] * self.size + goal[1])
             return len(ends) - 1
-        return int(self._distance_row(int(self._index[tuple(start)]))[self._index[tuple(goal)]])
+        return int(self._distance_row(start)[self._index[tuple(goal)]])
 
     def cells_at(self, source: Cell, distance: int) -> np.ndarray:
         """Returns the free cells at exactly `distance` from `source`, in reading order: `[K, 2]` int."""
         self.require_free(source)
         if self.keeps_distances:
-            return self.free_cells[self._distance_row(int(self._index[tuple(source)])) == distance]
+            return self.free_cells[self._distance_row(source) == distance]
         cells, ends = self._search(source, farthest=distance)
         at_distance = cells[ends[distance - 1] if distance else 0 :] if len(ends) > distance else cells[:0]
         return np.stack(np.divmod(np.sort(at_distance).astype(np.int64), self.size), axis=-1)
@@ -176,8 +179,9 @@ class Maze:
     def diameter(self) -> int:
         """The largest distance of two free cells; with over 2,048 free cells, a lower bound by a double sweep."""
         if self.keeps_distances:
-            return int(scipy.sparse.csgraph.dijkstra(self._graph, unweighted=True).max())
-        return int(self._distance_row(int(np.argmax(self._distance_row(0)))).max())
+            return int(scipy.sparse.csgraph.dijkstra(self.graph, unweighted=True).max())
+        farthest = int(self.distances(tuple(self.free_cells[0])).argmax())
+        return int(self.distances(divmod(farthest, self.size)).max())
 
     @functools.cached_property
     def boxes(self) -> list[Rectangle]:
@@ -191,23 +195,29 @@ class Maze:
         return index
 
     @functools.cached_property
-    def _graph(self) -> scipy.sparse.csr_array:
-        return grid_graph(self._index)
+    def graph(self) -> scipy.sparse.csr_array:
+        """The 4-connected graph of the `free_cells`: `[F, F]`, with an edge both ways between neighbours."""
+        # The pairs of neighbours: side by side, then one above the other.
+        first = np.concatenate([self._index[:, :-1].ravel(), self._index[:-1].ravel()])
+        second = np.concatenate([self._index[:, 1:].ravel(), self._index[1:].ravel()])
+        linked = (first >= 0) & (second >= 0)
+        first, second = first[linked], second[linked]
+
+        # Both ways.
+        ones = np.ones(2 * len(first))  # of the type that SciPy's searches take without a copy
+        row, column = np.concatenate([first, second]), np.concatenate([second, first])
+        return scipy.sparse.csr_array((ones, (row, column)), shape=(len(self.free_cells),) * 2)
 
     @functools.cached_property
     def _rows(self) -> dict[int, np.ndarray]:  # what `_distance_row` returned, by source
         return {}
 
-    def _distance_row(self, source: int) -> np.ndarray:  # [F] int: from free cell `source` to each free cell
-        if not self.keeps_distances:
-            distances = np.zeros(self.walls.size, dtype=np.int32)
-            cells, ends = self._search(self.free_cells[source])
-            distances[cells] = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
-            return distances[~self.walls.ravel()]
-        row = self._rows.get(source)
+    def _distance_row(self, source: Cell) -> np.ndarray:  # [F] int: from a free cell to each free cell
+        index = int(self._index[tuple(source)])
+        row = self._rows.get(index)
         if row is None:
-            row = scipy.sparse.csgraph.dijkstra(self._graph, unweighted=True, indices=source).astype(np.int32)
-            self._rows[source] = row
+            row = scipy.sparse.csgraph.dijkstra(self.graph, unweighted=True, indices=index).astype(np.int32)
+            self._rows[index] = row
         return row
 
     def _search(self, source: Cell | np.ndarray, goal: int = -1, farthest: int = MAX_SIZE**2) -> tuple[np.ndarray, ...]:
@@ -245,21 +255,6 @@ def require_one_size(mazes: Sequence[Maze]) -> None:
 def resized(maze: Maze, cell_size: float | None) -> Maze:
     """Returns `maze` with cells of `cell_size` m; itself if that is None."""
     return maze if not cell_size else dataclasses.replace(maze, cell_size=cell_size)
-
-
-def grid_graph(index: np.ndarray) -> scipy.sparse.csr_array:
-    """Returns the 4-connected graph of the cells whose `index` (`[N, N]` int, consecutive from 0) is not negative."""
-    # The pairs of neighbours: side by side, then one above the other.
-    first = np.concatenate([index[:, :-1].ravel(), index[:-1].ravel()])
-    second = np.concatenate([index[:, 1:].ravel(), index[1:].ravel()])
-    linked = (first >= 0) & (second >= 0)
-    first, second = first[linked], second[linked]
-
-    # Both ways.
-    num_nodes = int(index.max()) + 1
-    ones = np.ones(2 * len(first))  # of the type that SciPy's searches take without a copy
-    row, column = np.concatenate([first, second]), np.concatenate([second, first])
-    return scipy.sparse.csr_array((ones, (row, column)), shape=(num_nodes, num_nodes))
 
 
 def path_through_walls(walls: np.ndarray, start: Cell, goal: Cell) -> list[Cell]:

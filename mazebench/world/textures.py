@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 from scipy.sparse import csgraph
 
-from mazebench.maps.maze import WALL_HEIGHT, Maze, grid_graph
+from mazebench.maps.maze import WALL_HEIGHT, Maze
 
 _CELLS_PER_REGION = 7
 _OFFSET = 0.002  # m, from a wall to its face
@@ -111,10 +111,7 @@ def _surfaces(maze: Maze) -> np.ndarray:
     rng = np.random.default_rng(list(hashlib.sha256(np.packbits(maze.walls).tobytes()).digest()))
 
     # Regions: the cells nearest to each of some sites.
-    num_cells = len(maze.free_cells)
-    cells = np.full(maze.walls.shape, -1)
-    cells[~maze.walls] = np.arange(num_cells)
-    graph = grid_graph(cells)
+    num_cells, graph = len(maze.free_cells), maze.graph
     sites = np.sort(rng.choice(num_cells, max(1, num_cells // _CELLS_PER_REGION), replace=False))
     _, _, nearest = csgraph.dijkstra(graph, unweighted=True, indices=sites, min_only=True, return_predecessors=True)
     region = np.searchsorted(sites, nearest)  # of each free cell

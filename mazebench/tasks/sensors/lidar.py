@@ -1,12 +1,16 @@
-"""Distances to the walls of the true maze, from the true pose, as observations; noise may be on them."""
+"""Distances to the walls of the true maze, from the true pose, as observations; noise may be on them.
+
+`K` is the number of bodies.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from dm_env import specs
 
 from mazebench.maps.drawn import Mazes
-from mazebench.tasks.sensors.lidar_noise import read
 from mazebench.tasks.sensors.sensor import Sensor, SensorOptions, Worlds
 from mazebench.world.ray_casting import NUM_RAYS, Lidar, LidarModel
 
@@ -29,3 +33,27 @@ class LidarSensor(Sensor):
         """Returns `[K, 32]` float32 by name, m: the rays of `Lidar.ranges`, as the model measures them."""
         ranges = self._lidar.ranges(worlds.maze, worlds.pose)
         return {self._name: ranges if self._is_exact else read(ranges, self._model, worlds.noise)}
+
+
+def read(ranges: np.ndarray, model: LidarModel, rngs: Sequence[np.random.Generator | None]) -> np.ndarray:
+    """Returns what a lidar reads: `[K, 32]` float32, m.
+
+    A distance gets normal noise, is rounded to a multiple of the step, and is held between the least and the largest
+    that can be read. A ray that meets no wall in reach reads the largest, and so does one whose return is lost.
+
+    Args:
+      ranges: `[K, 32]` m, the true distances, at most `model.max_range`.
+      model: the lidar.
+      rngs: `[K]`, of each body's episode; each draws 32 normal and 32 uniform numbers. None draws no noise.
+    """
+    normal, uniform = np.zeros((len(rngs), NUM_RAYS)), np.ones((len(rngs), NUM_RAYS))
+    for rng, normals, uniforms in zip(rngs, normal, uniform, strict=True):
+        if rng is not None:
+            rng.standard_normal(out=normals)
+            rng.random(out=uniforms)
+    readings = ranges + model.sigma * normal
+    if model.step:
+        readings = model.step * np.rint(readings / model.step)
+    np.clip(readings, model.min_range, model.max_range, out=readings)
+    readings[(ranges >= model.max_range) | (uniform < model.lost)] = model.max_range
+    return readings.astype(np.float32)

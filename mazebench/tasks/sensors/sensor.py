@@ -12,10 +12,31 @@ from annotated_types import Interval
 from dm_env import specs
 
 from mazebench.constants import MAX_PIXELS
+from mazebench.errors import InputError
 from mazebench.maps.drawn import Mazes
 from mazebench.options import Doc, Options, ReadBy
-from mazebench.tasks.sensors.lidar_noise import model_of, noise_text
-from mazebench.world.ray_casting import LidarModel
+from mazebench.world.ray_casting import TURTLEBOT3, LidarModel
+
+_NAMED = {"turtlebot3": TURTLEBOT3}
+
+
+def noise_text(text: object) -> str | None:
+    """Returns the text of the option in one form for each meaning: "turtlebot3", or as "0.1,0.05".
+
+    Raises:
+      InputError: if it is anything else.
+    """
+    if text is None or (isinstance(text, str) and text in _NAMED):
+        return text
+    try:
+        sigma, lost = map(float, str(text).split(","))
+    except ValueError:
+        sigma = lost = np.nan
+    if not (0 <= sigma <= 1 and 0 <= lost <= 1):
+        raise InputError(
+            f"expected lidar_noise 'turtlebot3', or SIGMA,LOST from 0 to 1 as '.1,.1', found {str(text)[:80]!r}"
+        )
+    return f"{sigma:g},{lost:g}"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -36,7 +57,10 @@ class SensorOptions(Options):
     @property
     def lidar(self) -> LidarModel:
         """The model of the sensor `lidar`."""
-        return model_of(self.lidar_noise)
+        if self.lidar_noise is None or self.lidar_noise in _NAMED:
+            return _NAMED[self.lidar_noise] if self.lidar_noise else LidarModel()
+        sigma, lost = map(float, self.lidar_noise.split(","))
+        return LidarModel(sigma=sigma, lost=lost)
 
 
 class Worlds(NamedTuple):
