@@ -103,12 +103,7 @@ def make(
 
 
 def make_goal(
-    *,
-    seed: int | None = None,
-    render_mode: str | None = None,
-    camera: str = "top",
-    id_size: int = 0,
-    **options: Any,
+    *, seed: int | None = None, render_mode: str | None = None, camera: str = "top", id_size: int = 0, **options: Any
 ) -> GoalMazeEnv:
     """Returns a goal-conditioned environment of the local task; `options` are those of `mazebench.Task.of`."""
     load_mujoco()
@@ -166,11 +161,7 @@ for _entry_point in (make, make_goal, make_vec):
 
 
 def _task(task: str | Task | TaskOptions, options: dict[str, Any], arguments: Sequence[str], id_size: int = 0) -> Task:
-    """Returns the task of an environment that takes `arguments` besides `options`.
-
-    Raises:
-      InputError: as `mazebench.Task.of`.
-    """
+    """Returns the task of an environment that takes `arguments` besides `options`."""
     from mazebench.tasks.task import Task, as_options, resolve
 
     if isinstance(task, Task) and not options:

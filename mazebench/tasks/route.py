@@ -27,11 +27,7 @@ class Route:
     """
 
     def __init__(
-        self,
-        cells: list[Cell],
-        time_limit: int,
-        num_goals: int = 1,
-        next_goal: Callable[[Cell], Cell] | None = None,
+        self, cells: list[Cell], time_limit: int, num_goals: int = 1, next_goal: Callable[[Cell], Cell] | None = None
     ):
         self.cells = cells
         self.leg = 0  # counted from 0

@@ -302,11 +302,7 @@ def in_the_same_mazes(tasks: Sequence[Task], context_size: int | None = None) ->
 
 
 def _read(asked: TaskOptions) -> tuple[Mazes, Scenarios | None]:
-    """Returns the mazes, loaded or drawn, and the scenarios in a file of these.
-
-    Raises:
-      InputError: if there are no such mazes, or a map can't be read.
-    """
+    """Returns the mazes, loaded or drawn, and the scenarios in a file of these."""
     size = asked.size or (SIZES[0] if asked.track is None else KINDS_SIZE)
     if asked.fresh:
         return FreshMazes(asked.kinds or DRAWN_KINDS[:1], size), None
@@ -357,11 +353,7 @@ def _fitting_distances(
 
 
 def _context_size(asked: TaskOptions, size: int, context_size_of: Callable[[int], int]) -> int:
-    """Returns M for mazes of `size` cells a side.
-
-    Raises:
-      InputError: if a track shows another one, or has too many pixels.
-    """
+    """Returns M for mazes of `size` cells a side; an `InputError` if a track shows another one, or too many pixels."""
     if asked.track is None:
         return asked.context_size or context_size_of(size)
     pixels = TRACKS[asked.track].pixels_per_cell

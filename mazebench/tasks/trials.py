@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -21,7 +20,7 @@ COLUMNS = (
     "oracle_steps",  # empty where the oracle missed the goal
 )
 
-_MAX_DRAWS = 100  # for a pair not drawn before
+_MAX_DRAWS = 101  # of a pair, for one not drawn before
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,24 +43,18 @@ def frozen_trials(task: str, size: int, benchmark: str = PAPER_BENCHMARK, split:
 
     The paper's protocol has 1,500 of the local task and 20 of the hierarchical one; the tracks share 240.
     """
-    rows = csv.DictReader(read_asset(episodes_file(task, size, split), benchmark).splitlines())
-    return tuple(_trial_of_row(row) for row in rows)
-
-
-def _trial_of_row(row: dict[str, str]) -> Trial:
-    episode = Episode(
-        maze=int(row["maze"]),
-        start=(int(row["start_row"]), int(row["start_column"])),
-        goal=(int(row["goal_row"]), int(row["goal_column"])),
-        yaw=float(row["yaw"]),
-        seed=int(row["seed"]),
-    )
-    return Trial(
-        episode,
-        distance=int(row["distance"]),
-        shortest_path=float(row["shortest_path"]),
-        oracle_steps=int(row["oracle_steps"]) if row["oracle_steps"] else None,
-    )
+    trials = []
+    for row in csv.DictReader(read_asset(episodes_file(task, size, split), benchmark).splitlines()):
+        episode = Episode(
+            maze=int(row["maze"]),
+            start=(int(row["start_row"]), int(row["start_column"])),
+            goal=(int(row["goal_row"]), int(row["goal_column"])),
+            yaw=float(row["yaw"]),
+            seed=int(row["seed"]),
+        )
+        oracle_steps = int(row["oracle_steps"]) if row["oracle_steps"] else None
+        trials.append(Trial(episode, int(row["distance"]), float(row["shortest_path"]), oracle_steps))
+    return tuple(trials)
 
 
 def select_trials(task: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
@@ -98,7 +91,9 @@ def select_trials(task: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE
 def draw_trials(task: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
     """Draws episodes of a task, by maze and then by distance; of the hierarchical task, one in each maze.
 
-    Where start and goal are given, an episode draws its heading only. Of scenarios, each is one episode.
+    Where start and goal are given, an episode draws its heading only. Of scenarios, each is one episode. Elsewhere, the
+    episodes of a maze and a distance have different starts and goals if there are so many, and the first ones do not
+    depend on `episodes_per_distance`.
 
     Raises:
       InputError: if no two cells of a maze are a wanted distance apart.
@@ -120,24 +115,15 @@ def draw_trials(task: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, 
             distances = [maze.distance(start, goal)]
         for distance in distances:
             rng = np.random.default_rng([seed, maze.size, index, distance])
-            for pair in _draw_pairs(maze, distance, episodes_per_distance, rng, start, goal):
+            seen: set[tuple[Cell, Cell]] = set()
+            for _ in range(episodes_per_distance):
+                for _ in range(_MAX_DRAWS):
+                    pair = sample_pair(maze, distance, rng, start, goal)
+                    if pair not in seen:
+                        break
+                seen.add(pair)
                 trials.append(make_trial(maze, index, pair, rng))
     return trials
-
-
-def _draw_pairs(
-    maze: Maze, distance: int, count: int, rng: np.random.Generator, start: Cell | None, goal: Cell | None
-) -> Iterator[tuple[Cell, Cell]]:
-    """Yields `count` starts and goals, different ones if there are so many; the first ones do not depend on `count`."""
-    seen: set[tuple[Cell, Cell]] = set()
-    for _ in range(count):
-        pair = sample_pair(maze, distance, rng, start, goal)
-        for _ in range(_MAX_DRAWS):
-            if pair not in seen:
-                break
-            pair = sample_pair(maze, distance, rng, start, goal)
-        seen.add(pair)
-        yield pair
 
 
 def make_trial(maze: Maze, index: int, pair: tuple[Cell, Cell], rng: np.random.Generator) -> Trial:

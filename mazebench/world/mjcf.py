@@ -118,7 +118,11 @@ def boxes_spec(maze: Maze, middle: np.ndarray, half: np.ndarray, for_robot: bool
 
     _add_materials(spec, maze)
     _add_room(spec, maze.side, for_robot)
-    _add_walls(spec, middle, half, **({} if for_robot else _CONTACTS))
+    contacts = {} if for_robot else _CONTACTS
+    for index, (pos, size) in enumerate(zip(middle, half, strict=True)):
+        spec.worldbody.add_geom(
+            name=f"wall_{index}", type=mujoco.mjtGeom.mjGEOM_BOX, pos=pos, size=size, material="wall", **contacts
+        )
     if not for_robot:
         _add_goal(spec, maze.cell_size)
         _add_body(spec, maze)
@@ -208,18 +212,6 @@ def parked_boxes(count: int, cell_size: float) -> tuple[np.ndarray, np.ndarray]:
     middle[:, 0] = cell_size * (np.arange(count) + 0.5)
     middle[:, 2] = -_PARKED_DEPTH
     return middle, half
-
-
-def _add_walls(spec: mujoco.MjSpec, middle: np.ndarray, half: np.ndarray, **contacts: Any) -> None:
-    for index, (pos, size) in enumerate(zip(middle, half, strict=True)):
-        spec.worldbody.add_geom(
-            name=f"wall_{index}",
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=pos,
-            size=size,
-            material="wall",
-            **contacts,
-        )
 
 
 def _add_goal(spec: mujoco.MjSpec, cell_size: float) -> None:

@@ -74,8 +74,7 @@ def core_bounds(count: int, length: int) -> tuple[np.ndarray, np.ndarray]:
 def _axis_fits(edges: np.ndarray) -> tuple[np.ndarray, float]:
     """Returns the fit of each number of cells along an axis, `[256]` float, and the weight of the edges."""
     positions = np.arange(1, len(edges) + 1) / (len(edges) + 1)
-    edges = np.where(
-        np.minimum(positions, 1 - positions) < 0.5 / MAX_CHOSEN_SIZE, 0, edges
-    )  # without the frame's outline
+    is_outline = np.minimum(positions, 1 - positions) < 0.5 / MAX_CHOSEN_SIZE  # of the frame
+    edges = np.where(is_outline, 0, edges)
     weight = float(edges.sum())
     return np.cos(2 * np.pi * np.outer(np.arange(MAX_CHOSEN_SIZE + 1), positions)) @ edges / max(1e-9, weight), weight

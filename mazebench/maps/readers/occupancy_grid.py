@@ -17,13 +17,7 @@ import scipy
 from mazebench.errors import InputError, remark
 from mazebench.maps.maze import MAX_CHOSEN_SIZE, MAX_SIZE, MIN_CELL_SIZE, MIN_SIZE, Maze, MazeError
 from mazebench.maps.maze_options import ReadOptions
-from mazebench.maps.readers.areas import (
-    areas_of,
-    choose,
-    describe_areas,
-    enclose,
-    lay_cells,
-)
+from mazebench.maps.readers.areas import areas_of, choose, describe_areas, enclose, lay_cells
 
 Pose = tuple[float, float, float]  # x, y (m), yaw (rad)
 
@@ -158,9 +152,6 @@ def _cell_pixels(blocked: np.ndarray, resolution: float, options: ReadOptions, n
     """Returns the pixels on a side of a cell of `options.cell_size`.
 
     If none is given, it is the smallest of at least `MIN_CELL_SIZE` of which a maze has enough.
-
-    Raises:
-      InputError: if that is no whole number of them, or the body does not fit through such a cell.
     """
     fewest = _fewest_pixels(resolution)
     if options.cell_size:
