@@ -123,9 +123,7 @@ class TaskRunner:
         """Returns the observation of the present moment; each call draws new noise."""
         observed = self.rules.observe(simulation.state()[None], _INDEX)
         found = {"state": observed.pop("state")[0], "context": self.rules.context[0].copy()}
-        for name, values in observed.items():
-            found[name] = values[0]
-        return found
+        return found | {name: values[0] for name, values in observed.items()}
 
     def get_state(self, simulation: Simulation) -> EnvironmentState:
         """Returns all that the future of the task and its simulation depends on."""

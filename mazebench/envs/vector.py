@@ -153,7 +153,11 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         """
         self._require_open()
         chosen = reset_options(options, "reset_mask", "distances")
-        mask = self._checked_mask(chosen.get("reset_mask", np.ones(self.num_envs, dtype=bool)))
+        mask = chosen.get("reset_mask", np.ones(self.num_envs, dtype=bool))
+        if not (isinstance(mask, np.ndarray) and mask.dtype == bool and mask.shape == (self.num_envs,) and mask.any()):
+            raise InputError(
+                f"expected reset_mask, an array of {self.num_envs} bool, not all False, found {mask!r}"[:200]
+            )
         if not (self._was_reset or mask.all()):
             raise gymnasium.error.ResetNeeded("expected a call to reset() of all environments before this one of some")
         seeds = _seeds(seed, self.num_envs)
@@ -172,14 +176,6 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         self._begin_episodes(indices)
         self._observe(indices)
         return self._observations(), self._infos(mask.copy())
-
-    def _checked_mask(self, mask: Any) -> np.ndarray:
-        """Returns the option `reset_mask` if it is `[B]` bool."""
-        if not (isinstance(mask, np.ndarray) and mask.dtype == bool and mask.shape == (self.num_envs,) and mask.any()):
-            raise InputError(
-                f"expected reset_mask, an array of {self.num_envs} bool, not all False, found {mask!r}"[:200]
-            )
-        return mask
 
     def step(
         self, actions: np.ndarray

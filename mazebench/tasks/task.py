@@ -197,10 +197,6 @@ def resolve(
         is_new = asked.has_own or asked.is_drawn
         time_limit = default_time_limit(cells, track=None, cell_size=cell_size, is_new=is_new)
 
-    of_drawn: dict[str, Any] = {}
-    if asked.is_drawn:
-        num_mazes = None if asked.fresh else asked.num_mazes or NUM_DRAWN
-        of_drawn = {"kinds": asked.kinds or DRAWN_KINDS[:1], "num_mazes": num_mazes}
     filled = asked.replace(
         size=size,
         cell_size=cell_size,
@@ -210,7 +206,8 @@ def resolve(
         time_limit=time_limit,
         actions=actions,
         context_size=context_size,
-        **of_drawn,
+        kinds=asked.kinds or (DRAWN_KINDS[:1] if asked.is_drawn else ()),
+        num_mazes=asked.num_mazes or (NUM_DRAWN if asked.is_drawn and not asked.fresh else None),
     )
     _check_distances(filled, mazes, scenarios)
     return Task(

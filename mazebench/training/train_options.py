@@ -39,9 +39,7 @@ class TrainOptions(Options):
     env_steps: Annotated[int | None, Ge(1), Doc("Agent steps of the run, of all commands together.")] = None
     seed: Annotated[int, Interval(ge=0, le=2**63 - 1), Doc("Seed of everything that is drawn.")] = 0
     checkpoint_steps: Annotated[
-        int,
-        Ge(1),
-        Doc("Agent steps between milestones: checkpoints with an evaluation, to resume from exactly."),
+        int, Ge(1), Doc("Agent steps between milestones: checkpoints with an evaluation, to resume from exactly.")
     ] = 200_000
     checkpoint_minutes: Annotated[
         float,

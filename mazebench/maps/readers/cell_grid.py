@@ -18,14 +18,18 @@ CORE = 0.5  # share of a cell's side: the middle of a cell, which decides whethe
 def fit_grid(
     across: np.ndarray,
     down: np.ndarray,
-    *,
     pixels: tuple[int, ...],
+    *,
     shortest: int,
     longest: tuple[int, int],
     size: int | None,
     nearly_best: float,
 ) -> tuple[tuple[int, int], float]:
     """Returns the numbers of rows and columns that fit weights along the two axes best, and the worse fit.
+
+    The fit of a number n along one axis is the mean of `cos(2 pi n x)` over the positions `x`, in shares of its length;
+    1 is best. Cells are about square, so rows and columns are counted together. Multiples of the true numbers fit
+    nearly as well, so the true ones are the smallest that fit nearly best and stretch cells as the best ones do.
 
     Args:
       across: weight of each position from top to bottom; `down` from left to right.

@@ -25,7 +25,6 @@ from mazebench.maps.readers.pixel_map import (
 MIN_SIDE = 3  # cells on the shorter side of a plan: wall, floor, wall
 # In synthetic pictures of 13 and 21 cells the true N had a fit of 0.6 to 0.95, any other N at most 0.39.
 _MIN_FIT = 0.4
-_NEARLY_BEST = 0.97  # share of the best fit
 _MIN_INK = 0.25  # share of a plan with filled walls; line drawings have less
 _MIN_CONTRAST = 64  # between the shades of walls and floor, of 255
 _MIN_LINE = 0.22  # share of the contrast; the lines of squared paper are fainter
@@ -56,10 +55,13 @@ def read_plan(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
         )
     drawing, fine = enlarged(paper[crop]), enlarged(fine[crop])
 
-    # The grid of cells.
+    # The grid of cells on which the edges of the ink lie best.
     ink = ink_of(drawing)
     advice = _advice(ink, size)
-    shape, fit = _count_cells(ink, size)
+    across = cv2.reduce(cv2.absdiff(ink[1:], ink[:-1]), 1, cv2.REDUCE_SUM, dtype=cv2.CV_64F).ravel()
+    down = cv2.reduce(cv2.absdiff(ink[:, 1:], ink[:, :-1]), 0, cv2.REDUCE_SUM, dtype=cv2.CV_64F).ravel()
+    longest = (MIN_SIZE, MAX_CHOSEN_SIZE)
+    shape, fit = fit_grid(across, down, ink.shape, shortest=MIN_SIDE, longest=longest, size=size, nearly_best=0.97)
     if fit < _MIN_FIT:
         raise MazeError(f"{name}: expected walls along the lines of a grid of cells, found edges off it ({advice})")
 
@@ -125,24 +127,3 @@ def _lines_in_floor(fine: np.ndarray, walls: np.ndarray, contrast: float) -> np.
     found = np.zeros_like(walls)
     found[rows * walls.shape[0] // fine.shape[0], columns * walls.shape[1] // fine.shape[1]] = True
     return found
-
-
-def _count_cells(ink: np.ndarray, size: int | None) -> tuple[tuple[int, int], float]:
-    """Returns the numbers of rows and columns of the grid on which the edges of the ink lie best, and the worse fit.
-
-    The fit of a number n along one axis is the mean of `cos(2 pi n x)` over the positions `x` of edges across that
-    axis, in shares of its length; 1 is best. Cells are about square, so rows and columns are counted together.
-    Multiples of the true numbers fit nearly as well, so the true ones are the smallest that fit nearly best and stretch
-    cells as the best ones do.
-    """
-    across = cv2.reduce(cv2.absdiff(ink[1:], ink[:-1]), 1, cv2.REDUCE_SUM, dtype=cv2.CV_64F).ravel()
-    down = cv2.reduce(cv2.absdiff(ink[:, 1:], ink[:, :-1]), 0, cv2.REDUCE_SUM, dtype=cv2.CV_64F).ravel()
-    return fit_grid(
-        across,
-        down,
-        pixels=ink.shape,
-        shortest=MIN_SIDE,
-        longest=(MIN_SIZE, MAX_CHOSEN_SIZE),
-        size=size,
-        nearly_best=_NEARLY_BEST,
-    )

@@ -13,7 +13,6 @@ from mazebench.maps.maze_options import THIN_WALLS
 from mazebench.maps.readers.cell_grid import CORE, core_bounds, fit_grid
 from mazebench.maps.readers.pixel_map import STRAIGHTEN, WORKING_SIDE, enlarged, ink_of, on_white, outer_walls
 
-_NEARLY_BEST = 0.9  # share of the best fit
 _MIN_CLARITY = 0.2  # between the share of a boundary that is line, and a half
 
 
@@ -54,11 +53,11 @@ def read_lines(gray: np.ndarray, size: int | None, name: str) -> np.ndarray:
     shape, _ = fit_grid(
         lines.mean(axis=1),
         lines.mean(axis=0),
-        pixels=lines.shape,
+        lines.shape,
         shortest=2,
         longest=(2, (MAX_CHOSEN_SIZE - 1) // 2),
         size=None if size is None else (size - 1) // 2,
-        nearly_best=_NEARLY_BEST,
+        nearly_best=0.9,
     )
     right, below = _line_shares(lines, shape), _line_shares(lines.T, shape[::-1]).T
     shares = np.concatenate([right.ravel(), below.ravel()])

@@ -138,7 +138,7 @@ def _without_surroundings(states: np.ndarray) -> np.ndarray:
     return np.where((dark > 0) & ~walls, UNKNOWN, inside)
 
 
-def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
+def read_occupancy(path: pathlib.Path) -> OccupancyGrid:
     """Reads what map_server would publish of a map, with all that is between free and occupied as unknown.
 
     It departs from map_server in one case. In the mode trinary, map_saver writes the shade 205 for unknown, but many of
@@ -148,7 +148,6 @@ def read_occupancy(path: str | pathlib.Path) -> OccupancyGrid:
     Raises:
       InputError: if one of the two files can't be read.
     """
-    path = pathlib.Path(path)
     metadata = _read_metadata(path)
     if is_filter_mask(path):
         remark(f"{path}: read as a building, though by its name it is a mask of a costmap filter, as Nav2 has them")
@@ -191,13 +190,12 @@ def is_filter_mask(path: pathlib.Path) -> bool:
     return _MASK_NAME.search(path.stem.lower()) is not None
 
 
-def picture_of(path: str | pathlib.Path) -> pathlib.Path:
+def picture_of(path: pathlib.Path) -> pathlib.Path:
     """Returns the path of the picture that a YAML file names, or of one of that name beside it if there is none.
 
     Raises:
       InputError: if the file can't be read.
     """
-    path = pathlib.Path(path)
     name = _read_metadata(path).image
     named = path.parent / os.path.expanduser(name.removeprefix("file://"))
     beside = path.parent / re.split(r"[/\\]", name)[-1]
