@@ -94,13 +94,22 @@ class DiscPaths:
     def __init__(self, maze: Maze, radius: float):
         self._maze = maze
         self._radius = float(radius) / maze.cell_size
-        self._space = _FreeSpace(maze.walls, self._radius)
-        self._corners = _exposed_corners(self._space.walls, self._radius)
+        self._walls = maze.walls[::-1].T  # [x, y]
+        self._corners = _exposed_corners(self._walls, self._radius)
+
+        # [x, y]: whether one of the four cells at a lattice point is a wall.
+        padded = np.pad(self._walls, 1, constant_values=True)
+        left_or_right, upper_or_lower = padded[:-1] | padded[1:], padded[:, :-1] | padded[:, 1:]
+        self._is_near_wall = left_or_right[:, :-1] | left_or_right[:, 1:]
+        # [2, x, y], for flat and, with the axes exchanged, for steep segments: whether a wall is at the lattice point
+        # (x, y), and whether one is left or right of the line from there to (x, y + 1).
+        self._has_corner = np.stack([self._is_near_wall, self._is_near_wall.T])
+        self._has_edge = np.stack([left_or_right[:, 1:], upper_or_lower[1:].T])
 
         # The tangents that no wall cuts: of circles whose quadrants share a normal and, between two circles, of those
         # that have opposite normals.
         points, normals = (array.astype(np.int64) for array in self._corners[:2])
-        pairs = np.stack(taut_pairs(self._space.walls, points, normals))
+        pairs = np.stack(taut_pairs(self._walls, points, normals))
         num_batches = pairs.shape[1] // _PAIRS_AT_ONCE + 1
         agreement = (normals[pairs[0]] * normals[pairs[1]]).sum(axis=1)
         self._pieces = _concatenate(
@@ -131,8 +140,8 @@ class DiscPaths:
 
     def _clear(self, pieces: _Pieces) -> _Pieces:
         """Returns those of some pieces that no wall cuts."""
-        space, ends = self._space, pieces.end
-        keep = clear_segments(space.has_corner, space.has_edge, ends, self._radius, space.clearance)
+        clearance = self._radius - min(_TOLERANCE, self._radius / 2)
+        keep = clear_segments(self._has_corner, self._has_edge, pieces.end, self._radius, clearance)
         return _Pieces(*(array[keep] for array in pieces))
 
     def _query_pieces(self, start: np.ndarray, corner: np.ndarray) -> _Pieces:
@@ -143,11 +152,11 @@ class DiscPaths:
         """
         source = len(self._corners.radius)
         corners = corner + np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
-        in_open = corners[~self._space.is_near_wall[tuple(corners.T)]]  # those that touch no wall
+        in_open = corners[~self._is_near_wall[tuple(corners.T)]]  # those that touch no wall
         circles = _concatenate([self._corners, _points(start[None]), _points(in_open)])
 
         # From the circles and the start to a side of the goal cell, where each piece ends at a point of its own.
-        to_side = _concatenate([_perpendiculars(circles, source + 1, side) for side in self._space.sides(corner)])
+        to_side = _concatenate([_perpendiculars(circles, source + 1, side) for side in self._sides(corner)])
         to_side.circle[:, 1] += np.arange(len(to_side.circle))
 
         # From the start to the circles.
@@ -159,32 +168,14 @@ class DiscPaths:
         to_corner = _tangents(circles, first.ravel(), last.ravel(), side=1)
         return _concatenate([from_start, to_corner, to_side])
 
-
-class _FreeSpace:
-    """The points at least `radius` away from every wall."""
-
-    def __init__(self, walls: np.ndarray, radius: float):
-        self.walls = walls[::-1].T  # [x, y]
-        self._radius = radius
-        self.clearance = radius - min(_TOLERANCE, radius / 2)
-        padded = np.pad(self.walls, 1, constant_values=True)
-        left_or_right = padded[:-1] | padded[1:]
-        # [x, y]: whether one of the four cells at a lattice point is a wall.
-        self.is_near_wall = left_or_right[:, :-1] | left_or_right[:, 1:]
-        # [2, x, y], for flat and, with the axes exchanged, for steep segments: whether a wall is at the lattice point
-        # (x, y), and whether one is left or right of the line from there to (x, y + 1).
-        upper_or_lower = padded[:, :-1] | padded[:, 1:]
-        self.has_corner = np.stack([self.is_near_wall, self.is_near_wall.T])
-        self.has_edge = np.stack([left_or_right[:, 1:], upper_or_lower[1:].T])
-
-    def sides(self, corner: np.ndarray) -> Iterator[_Side]:
+    def _sides(self, corner: np.ndarray) -> Iterator[_Side]:
         """Yields the sides that a cell (lower left corner `[2]`) shares with a free cell, without what is too near."""
         for axis, step in np.ndindex(2, 2):
             across, along = np.eye(2, dtype=np.int64)[[axis, 1 - axis]]
             first = corner + step * across
-            if self.walls[tuple(corner + (2 * step - 1) * across)]:
+            if self._walls[tuple(corner + (2 * step - 1) * across)]:
                 continue
-            before, after = (self._radius * self.is_near_wall[tuple(point)] for point in (first, first + along))
+            before, after = (self._radius * self._is_near_wall[tuple(point)] for point in (first, first + along))
             low, high = first[1 - axis] + before, first[1 - axis] + 1 - after
             yield _Side(axis, level=first[axis], low=low, high=high)
 
