@@ -117,6 +117,7 @@ def draw_trials(task: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, 
             rng = np.random.default_rng([seed, maze.size, index, distance])
             seen: set[tuple[Cell, Cell]] = set()
             for _ in range(episodes_per_distance):
+                # A pair that was not drawn before, if one is found.
                 for _ in range(_MAX_DRAWS):
                     pair = sample_pair(maze, distance, rng, start, goal)
                     if pair not in seen:
