@@ -48,6 +48,13 @@ def test_a_finished_evaluation_is_read(run):
     assert "".join(record.to_line() for record in result.records) == (run / "episodes.jsonl").read_text()
 
 
+def test_what_commands_a_terminal_is_escaped_in_names(copy):
+    for file in ("summary.json", "episodes.jsonl"):
+        (copy / file).write_text((copy / file).read_text().replace('"planner"', r'"\u001b[31m\nplanner"'))
+    result = load_result(copy)
+    assert {result.summary.who, *(record.agent for record in result.records)} == {r"\x1b[31m\nplanner"}
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
