@@ -17,9 +17,7 @@ _KINDS = {
     b"<svg": ("an SVG drawing", _DRAWING),
     b"AC10": ("a DWG drawing", _DRAWING),
     b"version https://git-lfs": ("a Git LFS pointer", "run git lfs pull"),
-    **dict.fromkeys(
-        (b"<!DOCTYPE html", b"<!doctype html", b"<html", b"<HTML"), ("an HTML page", "download the file itself")
-    ),
+    **dict.fromkeys((b"<!DOCTYPE", b"<!doctype", b"<html", b"<HTML"), ("an HTML page", "download the file itself")),
     **dict.fromkeys((b"\x80\x02", b"\x80\x04", b"\x80\x05"), ("a pickle", _TENSORS)),
     b"PK\x03\x04": ("a ZIP archive", "unpack it"),
     b"\x1f\x8b": ("a gzip archive", "unpack it"),

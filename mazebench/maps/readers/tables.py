@@ -11,14 +11,17 @@ from mazebench.maps.maze import MazeError
 from mazebench.maps.readers.cells import WALL
 
 _SEPARATORS = "\t;,"  # a comma may be the decimal mark between the others
-_BOOLEANS = {"true": "1", "false": "0"}
-_ONLY_WALLS = {*WALL, "1.0", "100", "100.0"}  # marks beside which an empty field is free
+_BOOLEANS = {"true": 1.0, "false": 0.0}
+_ONLY_WALLS = {*WALL, "1.0", "100", "100.0", "true"}  # marks beside which an empty field is free
 
 
 def separator_of(lines: Sequence[str]) -> str | None:
-    """Returns the character between the fields of a table, which half of its rows have; None of other lines."""
+    """Returns the character between the fields of a table, which the first and half of all rows have, or None."""
     rows = [line.strip(" \"'")[:-1] for line in lines if line.strip()]  # strings in a program end with a comma
-    return next((mark for mark in _SEPARATORS if 2 * sum(mark in row for row in rows) >= max(1, len(rows))), None)
+    for mark in _SEPARATORS:
+        if 2 * sum(mark in row for row in rows) >= len(rows) > 0 and mark in rows[0].strip(mark):
+            return mark
+    return None
 
 
 def cells_in_table(lines: Sequence[str], separator: str, name: str) -> list[list[str]]:
@@ -42,11 +45,11 @@ def cells_in_table(lines: Sequence[str], separator: str, name: str) -> list[list
     for number, row in enumerate(table):
         if len(row) < width:
             raise MazeError(f"{name}: expected {width} fields in each row, found {len(row)} in row {number}")
-    point = "," if separator == "," else "."  # of a decimal comma
-    table = [[_BOOLEANS.get(field.lower(), field.replace(",", point)) for field in row[:width]] for row in table]
+    # A comma within a field is the decimal mark.
+    table = [[field.replace(",", ".") for field in row[:width]] for row in table]
     _require_no_labels(table, name)
 
-    marks = {field for row in table for field in row if field}
+    marks = {field.lower() for row in table for field in row if field}
     if marks <= _ONLY_WALLS:
         return [[field or "0" for field in row] for row in table]
     for number, row in enumerate(table):
@@ -65,7 +68,8 @@ def numbers_in_table(cells: Sequence[Sequence[str]], name: str) -> np.ndarray:
     for row, fields in enumerate(cells):
         for column, field in enumerate(fields):
             try:
-                numbers[row, column] = float(field)
+                value = _BOOLEANS.get(field.lower())
+                numbers[row, column] = float(field) if value is None else value
             except ValueError as error:
                 raise MazeError(
                     f"{name}: expected rows of as many numbers, or cells of one character, "
@@ -78,9 +82,11 @@ def _require_no_labels(table: Sequence[Sequence[str]], name: str) -> None:
     """Raises `MazeError` if the first row or column counts, or has different words or letters."""
     for kind, fields in (("row 0", list(table[0])), ("column 0", [row[0] for row in table])):
         labels = fields[1:] if fields[0] == "" else fields
-        counts = [list(map(str, range(first, first + len(labels)))) for first in (0, 1)]
+        is_count = [label.removesuffix(".0") for label in labels] in (
+            [str(first + number) for number in range(len(labels))] for first in (0, 1)
+        )
         are_words = len(set(labels)) == len(labels) and all(label[:1].isalpha() for label in labels)
-        if len(labels) > 2 and (labels in counts or are_words):
+        if len(labels) > 2 and (is_count or are_words):
             raise MazeError(
                 f"{name}: expected cells, found {', '.join(labels[:3])[:60]}, ... in {kind}, a header or an index; "
                 "leave it out, as to_csv(header=False, index=False) does"

@@ -60,7 +60,7 @@ def grid_of_text(text: str, name: str) -> OccupancyGrid:
     if text.lstrip().startswith("{"):
         return read_json_map(text, name)
     if "[" in text:  # a list of rows, as Python, JSON or NumPy write it
-        lines = [" ".join(row.strip("[, \n").split()) for row in text.split("]")]
+        lines = [" ".join(row.strip("[, \n").split()) for row in text[text.find("[") : text.rfind("]")].split("]")]
         lines = lines[0].split(",") if len(list(filter(None, lines))) == 1 else lines
     else:
         lines = re.sub(r"\\n|\\+", "\n", text).split("\n")  # D4RL ends a row with a backslash
