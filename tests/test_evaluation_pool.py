@@ -94,7 +94,7 @@ def test_a_chunk_that_fails_or_is_stopped_hands_over_what_ended(tmp_path):
     def stop() -> None:
         while not (tmp_path / "reached").exists():
             threading.Event().wait(0.01)
-        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGTERM)  # SIGINT is ignored in the background
 
     thread = threading.Thread(target=stop)
     thread.start()
