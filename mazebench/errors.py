@@ -83,7 +83,7 @@ def shortened(text: str, most: int = 300) -> str:
 def describe_error(error: BaseException) -> str:
     """Returns the kind and the text of an exception of other people's code, in one line."""
     text = ""
-    with contextlib.suppress(Exception):  # of a class whose text can't be made
+    with contextlib.suppress(Exception, SystemExit, GeneratorExit):  # of a class whose text can't be made
         text = str(error)
     return shortened(f"{type(error).__name__}: {text}").removesuffix(":")
 

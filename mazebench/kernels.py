@@ -26,7 +26,7 @@ from numba.extending import register_jitable
 from mazebench.errors import remark
 
 _CONFIG: Any = numba.config
-_IMPORT = re.compile(rb"^from .*\bkernels\b", re.MULTILINE)  # in the files of kernels
+_IMPORT = re.compile(rb"^(from|import) .*\bkernels\b", re.MULTILINE)  # in the files of kernels
 
 
 class _Announcement(Listener):
@@ -60,7 +60,7 @@ def compiled(
     package, file = sys.modules[function.__module__.partition(".")[0]], pathlib.Path(function.__code__.co_filename)
     if _CONFIG.DISABLE_JIT or not hasattr(package, "__path__") or not file.exists():
         return kernel  # Python, or of a script or an archive, of which nothing says what its kernels use
-    if (folder := cache_folder(file.parent / "__pycache__", _digest(*package.__path__))) is None:
+    if (folder := cache_folder(file.parent / "__pycache__", _digest(package.__name__))) is None:
         return kernel
     given, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(folder)
     with contextlib.suppress(RuntimeError):  # numba found no folder that it can write to
@@ -113,12 +113,14 @@ def compiled_by_callers(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @functools.cache
-def _digest(*package: str) -> str:
-    """Returns a hash of what the kernels of a package, whose folders are given, can use: all files beside kernels."""
+def _digest(package: str) -> str:
+    """Returns a hash of what the kernels of a package can use: of ours, the files beside kernels; of others, all."""
     ours = pathlib.Path(__file__).parent
     files = {pathlib.Path(__file__), ours / "constants.py"}
-    for top in (ours, *map(pathlib.Path, package)):
+    for top in (ours, *map(pathlib.Path, sys.modules[package].__path__)):
         for path in top.rglob("*.py"):
-            if _IMPORT.search(path.read_bytes()):
+            if top != ours and package != "mazebench_agents":
+                files.add(path)
+            elif _IMPORT.search(path.read_bytes()):
                 files |= set(path.parent.glob("*.py"))
     return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(files))).hexdigest()[:16]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 import json
 import struct
 import zipfile
@@ -12,6 +13,7 @@ from run_folders import FEW, IMPORTS, summary_of
 
 from mazebench import __version__
 from mazebench.agent_loading import load_agent_class
+from mazebench.evaluation import provenance
 from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.plan import make_plan
@@ -75,6 +77,12 @@ class Mine(SingleAgent):
     name = "provenance_at_hand:Mine"
     found = make_plan(eval_options(name)).provenance
     assert (found.agent_class, found.agent_package) == (name, None)
+    monkeypatch.setattr(provenance, "_STANDARD", tmp_path / "lib")  # as of Python in a folder below the agent's
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "lib" / "standard_at_hand.py").write_text("")
+    monkeypatch.syspath_prepend(tmp_path / "lib")
+    importlib.import_module("standard_at_hand")
+    assert make_plan(eval_options(name)).provenance.agent_code_sha256 == found.agent_code_sha256
     for changed in files:
         (tmp_path / changed).write_text(files[changed] + "# changed")
         is_other = make_plan(eval_options(name)).provenance.agent_code_sha256 != found.agent_code_sha256

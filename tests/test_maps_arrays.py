@@ -76,7 +76,10 @@ class TestOccupancy:
         distances = Maze(WALLS).distances(tuple(np.argwhere(~WALLS)[0]))
         mask[np.unravel_index(distances.argmax(), mask.shape)] = True  # a dead end, behind which nothing is cut off
         seen = np.ma.masked_array(form(WALLS), mask)
-        assert maze_from_array(seen) == Maze(WALLS | mask)
+        for array in (seen, list(seen), tuple(seen)):
+            assert (
+                maze_from_array(array) == mazebench.Task.of(mazes=array, distances=[1]).mazes[0] == Maze(WALLS | mask)
+            )
         assert maze_from_array(seen, unknown="free") == Maze(WALLS)
 
 
@@ -130,7 +133,17 @@ class TestTasks:
         for maps in ([WALLS, other], (Maze(WALLS), other), np.stack([WALLS, other]), [WALLS.tolist(), other.tolist()]):
             assert mazebench.Task.of(mazes=maps, distances=[2]).mazes == (Maze(WALLS), Maze(other))
 
-    @pytest.mark.parametrize("form", [pd.DataFrame, torch.tensor, np.ndarray.tolist, lambda w: tuple(map(tuple, w))])
+    @pytest.mark.parametrize(
+        "form",
+        [
+            pd.DataFrame,
+            lambda w: pd.DataFrame(w, dtype="boolean"),
+            torch.tensor,
+            list,
+            np.ndarray.tolist,
+            lambda w: tuple(map(tuple, w)),
+        ],
+    )
     def test_an_array_of_any_library_is_read_alike(self, form):
         assert maze_from_array(form(WALLS)) == Maze(WALLS)
         assert mazebench.Task.of(mazes=form(WALLS), distances=[2]).mazes == (Maze(WALLS),)

@@ -351,6 +351,7 @@ class TestRefusal:
             (yaml.safe_dump(METADATA | {"free_thresh": 0.9}), "(a number from 0 to occupied_thresh), found 0.9"),
             ("a: &a [x, x]\nb: [*a, *a]\n", "found an alias, which no such file needs"),
             ("[" * 3000, "expected the YAML file of a ROS map, found maximum recursion depth"),
+            (f"image: a.pgm\nresolution: 0x{'f' * 9000}\n", "found a number of too many digits"),
             (yaml.safe_dump(METADATA | {"image": "a\0b.pgm"}), "with image (the name of a picture), found 'a"),
             (yaml.safe_dump(METADATA | {"image": "~nobody-here/a.pgm"}), "~nobody-here/a.pgm: can't read the picture"),
             (yaml.safe_dump(METADATA), "map.yaml: {folder}/map.pgm: can't read the picture: No such file"),

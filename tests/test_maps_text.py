@@ -103,6 +103,7 @@ class TestReading:
             "+---+---+\n|...|...|\n|.#.|...|\n|.......|\n+---+---+\n",
             "+---+---+\n|...|...|\n|.......|\n+---+---+\n",
             "+-------+\n|  #    |\n|     - |\n+-------+\n",
+            "+-------+\n|  |    |\n+       +\n|    |  |\n+-------+\n",
             "+---+---+\n|...|...|\n+---+...+\n|...|...|\n+---+---+\n",
         ],
     )
@@ -114,11 +115,13 @@ class TestReading:
         assert maze.size == len(drawn[0])
 
     @pytest.mark.parametrize(
-        "rows", ["o---o---o\n|       |\no---o--o ", "+---+\n|   |\n+---+\n|   |", "o---o\n| # |\no---o"]
+        "rows",
+        ["o---o---o\n|       |\no---o--o ", "+---+\n|   |\n+---+\n|   |", "o---o\n| # |\no---o", "o---o\n|-- |\no-  o"],
     )
     def test_posts_that_are_missing_are_named(self, rows, tmp_path):
         with pytest.raises(
-            MazeError, match=r"expected rows of posts and of rooms in turns, found (none in row 2|4 rows|'#' in a room)"
+            MazeError,
+            match=r"expected rows of posts and of rooms in turns, found (none in row 2|4 rows|a wall in a room)",
         ):
             read(tmp_path, rows)
 
@@ -127,11 +130,17 @@ class TestReading:
         [
             "1,1,1,1,1\n1,,,1,1\n1,1,,1,1\n1,1,,,1\n1,1,1,1,1\n",
             "1;1;1;1;1;;\n1;;;1;1;;\n1;1;;1;1;;\n1;1;;;1;;\n1;1;1;1;1;;\n;;;;;;\n",
+            "1\t1\t1\t1\t1\t\n1\t\t\t1\t1\t\n1\t1\t\t1\t1\n1\t1\t\t\t1\n1\t1\t1\t1\t1\n\t\t\t\t\n",
             "#\t#\t#\t#\t#\n#\t\t\t#\t#\n#\t#\t\t#\t#\n#\t#\t\t\t#\n#\t#\t#\t#\t#\n",
         ],
     )
     def test_an_empty_field_is_free_where_walls_alone_are_marked(self, table, tmp_path):
         assert read(tmp_path, table, "plan.csv") == parse_maze(PLAN)
+
+    @pytest.mark.parametrize("separator", ["\t", ",", ";"])
+    def test_a_row_of_empty_fields_is_a_row(self, separator, tmp_path):
+        table = separator.join("11111") + "\n" + 4 * separator + "\n" + separator.join("11111")
+        assert (~read(tmp_path, table, "plan.csv").walls).sum() == 5
 
     @pytest.mark.parametrize(("wall", "free"), [("1,0", "0,0"), ("100,0", "0,0"), ("TRUE", "FALSE"), ("true", "false")])
     @pytest.mark.parametrize("separator", [";", "\t"])

@@ -46,6 +46,7 @@ class TestReading:
             (" 4 3 2 0", " 8 6 2 0", r"expected scenarios of .*m\.map, 4 x 3 cells, found 8 x 6$"),
             ("maps/m.map 4 3 2", "maps/n.map 4 3 2", r"expected scenarios of one map, found maps/m\.map, maps/n\.map$"),
             (" 1.4", "", r"expected 9 fields in a line, found 8 in scenario 2$"),
+            (" 4 3 2 0", f" 4 {10**30} 2 0", r"expected numbers from the third field on"),
             (" 4 3 2 0", " 4 x 2 0", r"expected numbers from the third field on, found invalid literal"),
             ("maps/m.map", "dao\\other.map", r"other\.map: can't read the text map: No such file or directory$"),
             (
@@ -59,6 +60,14 @@ class TestReading:
         path.write_text(SCENARIOS.replace(before, after))
         with pytest.raises(InputError, match=said):
             Task.of(mazes=path)
+
+    @pytest.mark.parametrize("between", ["\t", "\t \t", " \t"])
+    def test_a_maps_name_may_have_a_blank_between_tabs(self, path, between):
+        path.with_name("m y.map").write_text(MAP)
+        path.write_text(
+            SCENARIOS.replace(" ", between).replace("m.map", "m y.map").replace("version" + between, "version ")
+        )
+        assert len(read_scenarios(path, ReadOptions()).distances) == 3
 
 
 class TestPlaying:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import zipfile
 
 import numpy as np
 import pydantic
@@ -49,6 +50,14 @@ def test_an_archive_is_bounded_by_what_it_unpacks_to(tmp_path):
     assert (tmp_path / "x.npz").stat().st_size < 2**20
     with pytest.raises(InputError, match="expected at most 134217728 bytes when unpacked, found 2684"):
         read_array_file(tmp_path / "x.npz")
+
+
+def test_a_member_that_is_no_array_is_named(tmp_path):
+    np.savez(tmp_path / "x.npz", a=np.zeros(2))
+    with zipfile.ZipFile(tmp_path / "x.npz", "a") as archive:
+        archive.writestr("readme.txt", "hello")
+    with pytest.raises(InputError, match=r"expected arrays only, found 'readme\.txt'"):
+        read_arrays(tmp_path / "x.npz", "thing")
 
 
 def test_values_that_are_nested_too_deeply_are_named(tmp_path):

@@ -73,7 +73,8 @@ class _Processes:
         # A worker first runs the script that started it, which must not start workers of its own.
         if getattr(multiprocessing.current_process(), "_inheriting", False):
             os._exit(_NO_GUARD)
-        script = getattr(sys.modules["__main__"], "__file__", None)
+        main = sys.modules["__main__"]
+        script = None if main.__spec__ else getattr(main, "__file__", None)
         if script is not None and not os.path.exists(script):  # as of standard input
             raise InputError(f"expected the script in a file, since each worker runs it first, found {script}")
         # Not forked: threads of the simulation may be running in this process.

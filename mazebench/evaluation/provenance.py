@@ -31,6 +31,7 @@ _PACKAGES = (
     *("mazebench-mujoco", "mujoco", "dm-control", "dm-env", "gymnasium", "numpy", "scipy"),
     *("opencv-python-headless", "torch", "ray"),
 )
+_STANDARD, _INSTALLED = pathlib.Path(os.__file__).parent, {"site-packages", "dist-packages"}  # folders of libraries
 _OTHERS = {"__main__", "mazebench", "mazebench_agents"}  # of the modules next to an agent's file: no part of it
 # Of a checkpoint. What they hold must leave a summary that can be read again, where it takes up to ten times the bytes.
 _MAX_HEADER_BYTES = 2**18
@@ -99,7 +100,7 @@ def code_hash(agent: str, agent_class: type[Agent]) -> str | None:
         files = {path for path, package in loaded.items() if package == name}
     else:
         beside = {path for path, package in loaded.items() if file.parent in path.parents and package not in _OTHERS}
-        files = {path for path in beside if "site-packages" not in path.parts}
+        files = {path for path in beside if _STANDARD not in path.parents and not _INSTALLED & set(path.parts)}
     files = {path for path in files if path.is_file()} | {file}
     return _files_hash(sorted(files), folders[0].absolute() if folders else file.parent)
 

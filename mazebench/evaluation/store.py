@@ -48,11 +48,15 @@ def check_same_run(folder: pathlib.Path, identity: Mapping[str, Any]) -> None:
         raise InputError(f"{folder}: holds another run: its {key} is {str(found)[:200]}, this one's {value}")
 
 
+_Pose = tuple[pydantic.FiniteFloat, pydantic.FiniteFloat, pydantic.FiniteFloat]
+
+
 class _Line(pydantic.BaseModel):
     """A line of the journal."""
 
     record: Record
-    trajectory: list[list[tuple[float, float, float]] | None]  # as `Trajectory`; empty if none is kept
+    # As `Trajectory`; empty if none is kept.
+    trajectory: tuple[()] | tuple[list[_Pose], list[_Pose] | None]
 
 
 class Store:
@@ -117,10 +121,10 @@ class Store:
             raise InputError(f"{where}, found one of {number}")
         result = Result(number, record.success, record.steps, record.path_length, blocked, ())
         written, found = to_record(self._plan, result).model_dump(), record.model_dump()
-        if other := [name for name in written if found.get(name) != written[name]]:
+        if other := [name for name in written | found if found.get(name) != written.get(name)]:
             raise InputError(f"{where}, found {str(found.get(other[0]))[:80]!r} as {other[0]} of episode {number}")
         poses = [None if each is None else np.array(each, dtype=np.float32) for each in line.trajectory]
-        if not all(each is None or each.shape == (record.steps + 1, 3) for each in poses) or len(poses) not in (0, 2):
+        if not all(each is None or len(each) == record.steps + 1 for each in poses):
             raise InputError(f"{where}, found a trajectory of another length of episode {number}")
         return record, Trajectory(*poses) if poses else None  # type: ignore[arg-type]  # the true poses are there
 

@@ -60,11 +60,11 @@ def read_scenarios(path: str | pathlib.Path, options: ReadOptions) -> Scenarios:
     rows = _read_rows(path)
     try:
         numbers = np.array([row[2:8] for row in rows], dtype=int)
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise InputError(f"{path}: expected numbers from the third field on, found {error}") from error
 
     # The map.
-    map_path = path.with_name(re.split(r"[/\\]", rows[0][1])[-1])
+    map_path = path.parent / re.split(r"[/\\]", rows[0][1])[-1]
     grid = read_text(map_path)
     height, width = grid.states.shape
     if (other := (numbers[:, :2] != (width, height)).any(axis=1)).any():
@@ -101,7 +101,10 @@ def _read_rows(path: pathlib.Path) -> list[list[str]]:
     head, *lines = text.splitlines() or [""]
     if not head.startswith("version 1"):
         raise InputError(f"{path}: expected scenarios of MovingAI, which begin with 'version 1', found {head[:40]!r}")
-    rows = [line.split("\t" if line.count("\t") >= _NUM_FIELDS - 1 else None) for line in lines if line.strip()]
+    rows = []
+    for line in filter(str.strip, lines):
+        between_tabs = [field for field in map(str.strip, line.split("\t")) if field]  # a map's name may have blanks
+        rows.append(between_tabs if len(between_tabs) == _NUM_FIELDS else line.split())
     for number, row in enumerate(rows):
         if len(row) != _NUM_FIELDS:
             raise InputError(f"{path}: expected {_NUM_FIELDS} fields in a line, found {len(row)} in scenario {number}")

@@ -35,7 +35,7 @@ def own_mazes(mazes: Any, options: ReadOptions) -> tuple[Maze, ...]:
                 raise InputError(
                     f"expected a Maze or an array in mazes, found {str(item)[:80]!r}; read_maze reads a file"
                 )
-    if hasattr(mazes, "__array__") or not any(isinstance(item, Maze) or hasattr(item, "__array__") for item in mazes):
+    if hasattr(mazes, "__array__") or not any(isinstance(item, Maze) or getattr(item, "ndim", 0) > 1 for item in mazes):
         array = as_array(mazes, "mazes")  # lists of rows are an array, too
         if array.ndim != 3 or array.shape[2] in (1, 3, 4):  # a maze, or a picture, which is refused
             return (maze_from_array(array, "maze", **dataclasses.asdict(options)),)

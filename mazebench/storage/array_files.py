@@ -12,6 +12,8 @@ import numpy as np
 from mazebench.errors import InputError
 from mazebench.storage.files import open_file
 
+# What NumPy raises for an archive that is damaged, encrypted or packed in another way.
+UNREADABLE = (OSError, EOFError, ValueError, MemoryError, RuntimeError, zipfile.BadZipFile, zlib.error)
 _MAX_BYTES = 2**31  # that an archive may unpack to
 
 
@@ -23,7 +25,11 @@ def unpack(archive: Any, num_bytes: int = _MAX_BYTES) -> dict[str, np.ndarray]:
     """
     if (found := sum(entry.file_size for entry in archive.zip.infolist())) > num_bytes:
         raise ValueError(f"expected at most {num_bytes} bytes when unpacked, found {found}")
-    return dict(archive)
+    arrays = dict(archive)
+    for name, array in arrays.items():
+        if not isinstance(array, np.ndarray):
+            raise ValueError(f"expected arrays only, found {name!r}")
+    return arrays
 
 
 def read_arrays(path: pathlib.Path, kind: str) -> dict[str, np.ndarray]:
@@ -36,5 +42,5 @@ def read_arrays(path: pathlib.Path, kind: str) -> dict[str, np.ndarray]:
         try:
             with np.load(file, allow_pickle=False) as arrays:
                 return unpack(arrays)
-        except (OSError, EOFError, ValueError, zipfile.BadZipFile, zlib.error) as error:
+        except UNREADABLE as error:
             raise InputError(f"{path}: expected a {kind}, found a damaged file: {error}") from error

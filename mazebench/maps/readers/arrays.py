@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import io
 import pathlib
-import zipfile
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from mazebench.maps.maze import Maze, MazeError
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.readers.cells import grid_of_characters, grid_of_numbers
 from mazebench.maps.readers.occupancy_grid import UNKNOWN, OccupancyGrid, locate_maze
-from mazebench.storage.array_files import unpack
+from mazebench.storage.array_files import UNREADABLE, unpack
 from mazebench.storage.files import read_at_most
 
 _MAX_BYTES = 2**27  # of a file, and of what an archive unpacks to
@@ -50,7 +49,12 @@ def as_array(values: Any, name: str) -> np.ndarray:
       MazeError: if there is none.
     """
     try:
-        return values if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
+        if isinstance(values, np.ma.MaskedArray):
+            return values
+        if isinstance(values, list | tuple) and any(isinstance(row, np.ma.MaskedArray) for row in values):
+            return np.ma.array(values)
+        array = np.asarray(values)
+        return array if array.dtype != object else np.array(array.tolist())  # as tables of pandas hold other types
     except (TypeError, ValueError, RuntimeError) as error:  # of rows that differ in length, or a tensor on a GPU
         raise MazeError(f"{name}: expected an array, found {type(values).__name__}: {str(error)[:120]}") from error
 
@@ -67,7 +71,7 @@ def read_array_file(path: pathlib.Path) -> OccupancyGrid:
     try:
         loaded = np.load(io.BytesIO(content), allow_pickle=False)
         arrays = [loaded] if isinstance(loaded, np.ndarray) else list(unpack(loaded, _MAX_BYTES).values())
-    except (ValueError, MemoryError, OSError, EOFError, zipfile.BadZipFile) as error:  # of a header that lies, too
+    except UNREADABLE as error:  # of a header that lies, too
         found = kind_of(content) or "a file of another kind"
         raise InputError(f"{expected}, found {found} ({str(error)[:80]})") from error
     if len(arrays) != 1:

@@ -26,7 +26,9 @@ from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, UNKNOWN, Occup
 from mazebench.storage.files import open_whole, read_at_most
 
 ROS_SUFFIXES = (".yaml", ".yml")
-_MASK_NAME = re.compile(r"(^|[-_.])(keepout|speed|binary|filter)([-_.]|$)|[-_.]mask$")  # of costmap filters of Nav2
+_MASK_NAME = re.compile(
+    r"keep[-_]?out|(^|[-_.])speed([-_.]?(mask|limit|zone|filter)|[-_.]|$)|[-_.]mask$"
+)  # of Nav2's filters
 _MAX_BYTES = 2**16  # of a YAML file
 _FREE_SHADE, _UNKNOWN_SHADE, _OCCUPIED_SHADE = 254, 205, 0  # that map_saver writes
 _OCCUPIED_THRESH, _FREE_THRESH = 0.65, 0.196  # with which map_server reads them back
@@ -238,15 +240,22 @@ def write_ros_map(maze: Maze, path: str | pathlib.Path, origin: Pose = (0.0, 0.0
 def _read_metadata(path: pathlib.Path) -> _Metadata:
     content, expected = _load_yaml(path), f"{path}: expected the YAML file of a ROS map"
     if not isinstance(content, dict):
-        found = "an empty file" if content is None else f"no keys but {str(content)[:60]!r}"
+        found = "an empty file" if content is None else f"no keys but {_shown(content)}"
         raise InputError(f"{expected}, with keys such as image and resolution, found {found}")
     try:
         return _Metadata.model_validate(content)
     except pydantic.ValidationError as error:
         key = str(error.errors()[0]["loc"][0])
-        found = repr(content[key])[:60] if key in content else f"only {', '.join(map(str, content))}"[:120]
+        found = _shown(content[key]) if key in content else f"only {', '.join(map(str, content))}"[:120]
         meaning = _Metadata.model_fields[key].description
         raise InputError(f"{expected}, with {key} ({meaning}), found {found}") from error
+
+
+def _shown(value: Any) -> str:
+    try:
+        return repr(value)[:60]
+    except ValueError:  # Python writes no numbers of thousands of digits
+        return "a number of too many digits"
 
 
 def _states(picture: np.ndarray, metadata: _Metadata) -> np.ndarray:

@@ -19,7 +19,7 @@ def separator_of(lines: Sequence[str]) -> str | None:
     """Returns the character between the fields of a table, which the first and half of all rows have, or None."""
     rows = [line.strip(" \"'")[:-1] for line in lines if line.strip()]  # strings in a program end with a comma
     for mark in _SEPARATORS:
-        if 2 * sum(mark in row for row in rows) >= len(rows) > 0 and mark in rows[0].strip(mark):
+        if 2 * sum(mark in row for row in rows) >= len(rows) > 0 and mark in rows[0].lstrip("\t"):  # an indent is none
             return mark
     return None
 
@@ -31,7 +31,9 @@ def cells_in_table(lines: Sequence[str], separator: str, name: str) -> list[list
       MazeError: if rows differ in their number of fields, a field is empty, or there is a header or an index.
     """
     try:
-        rows = [next(csv.reader([line], delimiter=separator, skipinitialspace=True)) for line in lines if line.strip()]
+        rows = [
+            next(csv.reader([line], delimiter=separator, skipinitialspace=True)) for line in lines if line.strip(" ")
+        ]
     except csv.Error as error:
         raise MazeError(f"{name}: expected a table of cells, found {error}") from error
     table = [[field.strip(" \"'") for field in row] for row in rows]

@@ -96,7 +96,7 @@ def _moving_ai(text: str, name: str) -> OccupancyGrid:
 
 def _require_one_maze(lines: list[str], name: str) -> None:
     """Raises `MazeError` if blank lines separate blocks that each begin and end with a row of wall."""
-    blocks = [block.strip("\n").split("\n") for block in re.split(r"\n\s*\n", "\n".join(lines).strip())]
+    blocks = [block.strip("\n").split("\n") for block in re.split(r"\n *\n", "\n".join(lines).strip())]
     ends = {letter for block in blocks for line in (block[0], block[-1]) for letter in line}
     if len(blocks) > 1 and len(ends - set(" ,;\t\"'")) == 1 and all(len(block) > 2 for block in blocks):
         raise MazeError(f"{name}: expected one maze, found {len(blocks)} with blank lines between; give each a file")
@@ -114,11 +114,17 @@ def _grid_of_rows(rows: list[str], name: str) -> OccupancyGrid:
     indent, width = rows[0].index(post), len(posts[0])
     lines = [row[indent:].ljust(width) for row in rows]
     without = [number for number in range(0, len(lines), 2) if set(lines[number][:width:step]) != {post}]
-    rooms = "".join(lines[1::2])
-    if post == "+" and (without or "." in rooms or "#" in rooms):
+
+    # What is between two posts of a row, and in the rooms: a whole wall or none.
+    gaps, rooms = (
+        [row[at : at + step - 1] for row in some for at in range(1, width, step)] for some in (lines[::2], lines[1::2])
+    )
+    wall, blank = "-" * (step - 1), " " * (step - 1)
+    has_walls = not set(gaps) <= {wall, blank} or any(set("#-|") & set(room) for room in rooms if room != wall)
+    if post == "+" and (without or has_walls or "." in "".join(rooms)):
         return grid_of_characters(rows, name)  # a plan with walls of lines and their corners
-    if without or len(rows) % 2 == 0 or "#" in rooms:
-        found = f"none in row {without[0]}" if without else "'#' in a room" if "#" in rooms else f"{len(rows)} rows"
+    if without or len(rows) % 2 == 0 or has_walls:
+        found = f"none in row {without[0]}" if without else "a wall in a room" if has_walls else f"{len(rows)} rows"
         raise MazeError(f"{name}: expected rows of posts and of rooms in turns, found {found}")
 
     # A row for each row of posts and of rooms, and a column for each post and each room between two.
