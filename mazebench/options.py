@@ -187,7 +187,7 @@ def check_names(values: Iterable[str], *options_classes: type, arguments: Iterab
 
 def as_tuple(value: Any) -> tuple[Any, ...]:
     """Returns any iterable as a tuple, and a single value as a tuple of one; texts are split at their commas."""
-    is_single = isinstance(value, str) or not isinstance(value, Iterable)
+    is_single = isinstance(value, str) or not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0
     parts: list[Any] = []
     for item in (value,) if is_single else value:
         parts += [part.strip() for part in item.split(",")] if isinstance(item, str) else [_plain(item)]

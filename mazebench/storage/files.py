@@ -20,8 +20,7 @@ def open_file(path: str | pathlib.Path, kind: str) -> io.BufferedReader:
       InputError: if it can't be opened; the message calls it a `kind`.
     """
     try:
-        is_file = stat.S_ISREG(os.stat(path).st_mode) or os.path.isdir(path)  # of a folder, `open` says so
-        if is_file:
+        if stat.S_ISREG(os.stat(path).st_mode) or os.path.isdir(path):  # of a folder, `open` says so
             return open(path, "rb")
     except (OSError, ValueError) as error:  # ValueError: of a path with a null character
         reason = error.strerror if isinstance(error, OSError) else error

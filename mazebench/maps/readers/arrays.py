@@ -49,9 +49,8 @@ def as_array(values: Any, name: str) -> np.ndarray:
       MazeError: if there is none.
     """
     try:
-        if isinstance(values, np.ma.MaskedArray):
-            return values
-        if isinstance(values, list | tuple) and any(isinstance(row, np.ma.MaskedArray) for row in values):
+        rows = values if isinstance(values, list | tuple) else [values]
+        if any(isinstance(row, np.ma.MaskedArray) for row in rows):
             return np.ma.array(values)
         array = np.asarray(values)
         return array if array.dtype != object else np.array(array.tolist())  # as tables of pandas hold other types
