@@ -190,6 +190,7 @@ def reported(result: Result) -> ReportedResult:
         remark(f"{folder}: {error}; reported without mazes and paths")
     fields = ("maze", "start", "goal", "distance", "success", "steps", "path_length", "shortest_path", "seed")
     episodes = pd.DataFrame([[getattr(record, name) for name in fields] for record in records], columns=fields)
+    episodes["distance"] = [record.asked_distance for record in records]
     facts = by_fact(records)
     episodes = episodes.assign(**scores(records), **facts)
     setting = summary.task.setting

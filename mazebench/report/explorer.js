@@ -13,7 +13,7 @@ function element(tag, attributes = {}, ...children) {
 }
 
 const byId = (id) => document.getElementById(id);
-const inCells = (count) => `${count} ${count === 1 ? "cell" : "cells"}`;
+const inUnit = (distance) => `${distance} ${data.results[view.result].unit}`.replace(/^1 cells$/, "1 cell");
 const unpacked = new Map(); // promises by the number of a result
 const view = { result: -1, episode: -1, time: 0, timer: 0, packed: null };
 
@@ -116,7 +116,7 @@ async function openResult(number, episode = null) {
   const { columns } = packed;
   fill(byId("maze"), [["", "all"], ...result.mazes.map((maze, index) => [index, data.mazes[maze].name])], byId("maze").value);
   const distances = [...new Set(columns.distance)].sort((a, b) => a - b);
-  fill(byId("distance"), [["", "all"], ...distances.map((distance) => [distance, inCells(distance)])], byId("distance").value);
+  fill(byId("distance"), [["", "all"], ...distances.map((distance) => [distance, inUnit(distance)])], byId("distance").value);
   fill(byId("group"), [["", "all"], ...result.groups.map((group) => [group, group])], byId("group").value);
   byId("group-label").hidden = !result.groups.length;
   if (episode !== null && !listed().includes(episode)) {
@@ -142,7 +142,7 @@ function listEpisodes(episode) {
   const { columns } = view.packed;
   const result = data.results[view.result];
   const text = (index) =>
-    `${columns.success[index] ? "✓" : "✗"} ${index} · ${data.mazes[result.mazes[columns.maze[index]]].name} · ${inCells(columns.distance[index])} · ${columns.steps[index]} steps`;
+    `${columns.success[index] ? "✓" : "✗"} ${index} · ${data.mazes[result.mazes[columns.maze[index]]].name} · ${inUnit(columns.distance[index])} · ${columns.steps[index]} steps`;
   const shown = found.slice(0, MAX_LISTED);
   const total = columns.success.length;
   const more = found.length > shown.length ? `, the first ${shown.length} listed` : "";
@@ -194,7 +194,7 @@ function writeNumbers() {
     ["episode", String(view.episode)],
     ["from", cell(current.start)],
     ["to", cell(current.goal)],
-    ["distance", inCells(current.distance)],
+    ["distance", inUnit(current.distance)],
     ["shortest path", `${current.shortest.toFixed(2)} m`],
     ["driven", `${current.driven.toFixed(2)} m`],
     ["time", `${current.steps} steps, ${(current.steps * data.units.step).toFixed(1)} s`],

@@ -101,6 +101,7 @@ def _explorer_data(results: Sequence[ReportedResult], columns: Sequence[list[int
                 "columns": used,
                 "mazes": [mazes.setdefault(each, len(mazes)) for each in own],
                 "size": setting.size,
+                "unit": "cells" if setting.track is None else "m",  # of distances
                 "cellSize": setting.cell_size or 1.0,
                 "episodes": len(result.episodes),
                 "exact": setting.is_exact,

@@ -49,7 +49,7 @@ class PairedResults:
     """Two evaluations on the same episodes."""
 
     overall: Row
-    by_distance: dict[int, Row]  # by distance from start to goal in cells
+    by_distance: dict[int, Row]  # by distance from start to goal: in cells, on tracks in metres
 
 
 @dataclasses.dataclass(frozen=True)

@@ -36,8 +36,8 @@ def spl(success: np.ndarray, shortest: np.ndarray, driven: np.ndarray) -> np.nda
 
 
 def by_distance(records: Sequence[Record]) -> dict[int, list[Record]]:
-    """Returns the records of each distance from start to goal, the shortest distance first."""
-    distances = column(records, "distance")
+    """Returns the records of each distance from start to goal, on tracks in metres, the shortest distance first."""
+    distances = column(records, "asked_distance")
     return {int(each): list(itertools.compress(records, distances == each)) for each in np.unique(distances)}
 
 

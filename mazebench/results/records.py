@@ -12,6 +12,7 @@ from mazebench.errors import one_line
 from mazebench.maps.maze import MAX_SIZE, MIN_SIZE
 from mazebench.storage.json_files import to_line
 from mazebench.tasks.task_options import TaskOptions
+from mazebench.tasks.tracks import TRACKS, distance_of
 
 _LARGEST = 2**53  # from here on, not every whole number is a float
 
@@ -61,6 +62,12 @@ class Record(_Stored):
     seed: Count  # of the episode: flips, warp, noise
     leg: Annotated[int, pydantic.Field(ge=1, lt=_LARGEST)]  # of the episode's goals, counted from 1
     oracle_steps: Annotated[int, pydantic.Field(ge=1, lt=_LARGEST)] | None  # None where the oracle missed the goal
+
+    @property
+    def asked_distance(self) -> int:
+        """The distance as the option `distances` counts it: in metres on a track, else in cells."""
+        cell_size = (self.model_extra or {}).get("cell_size", 1.0)
+        return distance_of(self.distance, cell_size, self.task if self.task in TRACKS else None)
 
     def to_line(self) -> str:
         """Returns the record as a line of `episodes.jsonl`."""

@@ -81,7 +81,7 @@ def plan_route(task: Task, episode: Episode, shown: ShownMap) -> Route:
     maze, options = task.mazes[episode.maze], task.options
     if not options.is_hierarchical:
         time_limit = options.time_limit or default_time_limit(
-            maze.distance(episode.start, episode.goal), track=task.track
+            maze.distance(episode.start, episode.goal), task.cell_size, track=task.track
         )
         next_goal = None
         if options.num_goals > 1:

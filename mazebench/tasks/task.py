@@ -20,7 +20,7 @@ from mazebench.tasks.interface import Interface
 from mazebench.tasks.sensors import LIDAR
 from mazebench.tasks.task_options import DRAWN_KINDS, ENDS, HIERARCHICAL, LOCAL, NUM_DRAWN, TaskOptions
 from mazebench.tasks.time_limit import default_time_limit
-from mazebench.tasks.tracks import DISTANCES, LEVELS, TRACKS
+from mazebench.tasks.tracks import DISTANCES, LEVELS, MAX_CELL_SIZE, TRACKS, cells_of, distance_of
 
 TRAIN_DISTANCES = tuple(range(1, 6))
 EVAL_DISTANCES = tuple(range(1, 16))
@@ -89,7 +89,7 @@ class Task:
         return dataclasses.replace(task, context_size=self.context_size) if "context_size" not in changes else task
 
     def at_distances(self, distances: Sequence[int]) -> Task:
-        """Returns the task with goals at other distances (cells); a time limit that the options have stays as it is.
+        """Returns the task with goals at other distances (cells, on a track metres); a given time limit stays.
 
         Raises:
           InputError: if there are no distances, a maze has no cells so far apart, or the task does not draw goals.
@@ -134,7 +134,7 @@ class Task:
         """The agent steps that an episode may take; None where they depend on its landmarks."""
         if self.options.is_hierarchical:
             return None
-        time_limit = self.options.time_limit or default_time_limit(max(self.distances), track=self.track)
+        time_limit = self.options.time_limit or default_time_limit(max(self.distances), self.cell_size, track=self.track)
         return self.options.num_goals * time_limit
 
     def odometry_noise_at(self, level: int) -> float:
@@ -195,7 +195,7 @@ def resolve(
     if asked.track is None and time_limit is None:
         cells = asked.landmark_distance if asked.is_hierarchical else max(chosen)
         is_new = asked.has_own or asked.is_drawn
-        time_limit = default_time_limit(cells, track=None, cell_size=cell_size, is_new=is_new)
+        time_limit = default_time_limit(cells, cell_size, track=None, is_new=is_new)
 
     filled = asked.replace(
         size=size,
@@ -217,7 +217,7 @@ def resolve(
         scenarios=scenarios,
         size=size,
         cell_size=cell_size,
-        distances=chosen,
+        distances=tuple(cells_of(each, cell_size, asked.track) for each in chosen),
         levels=level,
         context_size=context_size,
         actions=actions,
@@ -326,7 +326,7 @@ def _read(asked: TaskOptions) -> tuple[Mazes, Scenarios | None]:
 def _fitting_distances(
     asked: TaskOptions, mazes: Mazes, scenarios: Scenarios | None, by_default: tuple[int, ...]
 ) -> tuple[int, ...]:
-    """Returns the distances in cells of options that name none."""
+    """Returns the distances of options that name none: on a track in metres, else in cells."""
     of_track = DISTANCES if asked.track is not None else ()
     if not asked.has_own or isinstance(mazes, FreshMazes):
         return of_track or by_default
@@ -340,7 +340,8 @@ def _fitting_distances(
     # Of a track, those that all mazes have; all of its own, if none has any.
     farthest, count = min(map(asked.farthest, mazes)), len(EVAL_DISTANCES)
     if of_track:
-        return tuple(distance for distance in of_track if distance <= farthest) or of_track
+        cell_size = mazes[0].cell_size
+        return tuple(each for each in of_track if cells_of(each, cell_size, asked.track) <= farthest) or of_track
 
     # Else at most 15, evenly spaced up to what all mazes have.
     if farthest > count:
@@ -387,8 +388,10 @@ def _check_maze(asked: TaskOptions, maze: Maze) -> None:
             f"found {maze.cell_size} m; {THIN_WALLS}"
         )
     if asked.track is not None:
-        if maze.cell_size != 1:
-            raise InputError(f"track {asked.track!r}: expected cells of 1 m, found {maze.cell_size} m")
+        if maze.cell_size > MAX_CELL_SIZE:
+            raise InputError(
+                f"track {asked.track!r}: expected cells of at most {MAX_CELL_SIZE:g} m, found {maze.cell_size:g} m"
+            )
         TRACKS[asked.track].require(maze, asked.level or LEVELS[:1])
     if len(maze.free_cells) < 2:
         raise InputError(f"{maze.name}: expected two free cells for a start and a goal, found one")
@@ -414,7 +417,7 @@ def _without_unplayable(asked: TaskOptions, mazes: tuple[Maze, ...]) -> tuple[Ma
 
 def _check_distances(options: TaskOptions, mazes: Mazes, scenarios: Scenarios | None) -> None:
     """Raises `InputError` if no goal of the local task is as far away in a maze as wanted."""
-    wanted = options.distances or ()
+    wanted, cell_size = options.distances or (), mazes[0].cell_size
     if scenarios is not None:
         if not len(scenarios.numbers(wanted)):
             found = scenarios.distances
@@ -427,12 +430,13 @@ def _check_distances(options: TaskOptions, mazes: Mazes, scenarios: Scenarios | 
         return
     if isinstance(mazes, FreshMazes):  # an episode whose maze is too small takes another one
         mazes = (max((mazes[number] for number in range(_NUM_CHECKED)), key=options.farthest),)
+    longest, unit = cells_of(max(wanted), cell_size, options.track), "cells" if options.track is None else "m"
     for maze in mazes:
         # Most mazes are found to be large enough from one cell, without the distances of all pairs.
-        if not options.num_ends and max(wanted) <= maze.distances(tuple(maze.free_cells[0])).max():
+        if not options.num_ends and longest <= maze.distances(tuple(maze.free_cells[0])).max():
             continue
-        if max(wanted) > (farthest := options.farthest(maze)):
+        if longest > (farthest := options.farthest(maze)):
             raise InputError(
-                f"{maze.name}: expected distances of at most {farthest} cells, as far as the maze reaches, "
-                f"found {max(wanted)}; choose others (--distances)"
+                f"{maze.name}: expected distances of at most {distance_of(farthest, cell_size, options.track)} {unit}, "
+                f"as far as the maze reaches, found {max(wanted)}; choose others (--distances)"
             )

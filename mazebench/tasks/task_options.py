@@ -109,8 +109,9 @@ class TaskOptions(SensorOptions, ReadOptions):
     distances: Annotated[
         tuple[Annotated[int, Ge(1)], ...] | None,
         Doc(
-            "Cells from start to goal, as 1-5,8,10 (not of the hierarchical task); if not given, 1-15 in evaluations "
-            "and in the benchmark's eval mazes, else 1-5; those of the track; or as far as mazes of your own reach."
+            "Cells from start to goal, on a track metres, as 1-5,8,10 (not of the hierarchical task); if not given, "
+            "1-15 in evaluations and in the benchmark's eval mazes, else 1-5; those of the track; or as far as mazes "
+            "of your own reach."
         ),
     ] = None
     start: Annotated[

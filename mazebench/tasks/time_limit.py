@@ -11,15 +11,16 @@ from mazebench.tasks.tracks import TRACKS
 
 TIME_LIMIT = 100  # in the mazes of the paper's protocol
 
-# A metre takes 2 steps at the top speed, and a quarter turn in each cell 4.
+# A metre takes 2 steps at the top speed, and a quarter turn in each cell 4. On tracks, a turn comes at every metre.
 _STEPS_PER_METRE, _STEPS_PER_CELL = 2, 4
 _SPARE_STEPS = 50
 _LOST_SPARE_STEPS = 150  # so that a lost robot can look for its pose
 
 
-def default_time_limit(num_cells: int, *, track: str | None, cell_size: float = 1.0, is_new: bool = False) -> int:
+def default_time_limit(num_cells: int, cell_size: float, *, track: str | None, is_new: bool = False) -> int:
     """Returns the limit for a goal `num_cells` away; `is_new` says that the maze or an end is the user's, or drawn."""
-    steps = math.ceil((_STEPS_PER_METRE * cell_size + _STEPS_PER_CELL) * num_cells)
     if track is not None:
+        steps = math.ceil((_STEPS_PER_METRE + _STEPS_PER_CELL) * cell_size * num_cells)
         return steps + (_LOST_SPARE_STEPS if TRACKS[track].hides_pose else _SPARE_STEPS)
+    steps = math.ceil((_STEPS_PER_METRE * cell_size + _STEPS_PER_CELL) * num_cells)
     return max(TIME_LIMIT, steps + _SPARE_STEPS) if is_new else TIME_LIMIT

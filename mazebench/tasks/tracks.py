@@ -13,7 +13,18 @@ from mazebench.tasks.perturbations.perturbation import Perturbation
 from mazebench.tasks.perturbations.turned_map import HiddenStart, TurnedMap
 
 LEVELS = (1, 2, 3)
-DISTANCES = tuple(range(15, 41))  # cells between start and goal
+DISTANCES = tuple(range(15, 41))  # m between start and goal
+MAX_CELL_SIZE = 1.0  # m; doors of 0.9 m would vanish in larger cells
+
+
+def cells_of(distance: int, cell_size: float, track: str | None) -> int:
+    """Returns a distance of the option `distances` in cells of `cell_size` m; on a track, it is in metres."""
+    return distance if track is None else round(distance / cell_size)
+
+
+def distance_of(cells: int, cell_size: float, track: str | None) -> int:
+    """Returns a number of cells as the option `distances` counts it: in metres on a track, else in cells."""
+    return cells if track is None else round(cells * cell_size)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,9 +40,9 @@ class Level:
 class Track:
     """A named way in which the map or the senses are imperfect.
 
-    A track is played as the local task with one goal, in mazes of 31 x 31 cells of several kinds. It offers the sensor
-    `lidar`, that of a TurtleBot3. Its mazes, distances, context size and time limit are fixed, so that results of one
-    track and level can be compared.
+    A track is played as the local task with one goal, in mazes of 31 x 31 cells of several kinds, or in buildings of
+    one's own. It offers the sensor `lidar`, that of a TurtleBot3. Its mazes, distances, context size and time limit are
+    fixed, so that results of one track and level can be compared. Lengths are in metres.
     """
 
     help: str  # in one line

@@ -24,8 +24,8 @@ class Collector:
         self._task = self._envs.task
 
     def limit_distances(self, longest: int) -> None:
-        """Sends the agent to goals at most so many cells away from now on, or to the nearest of the task's."""
-        distances = self._task.distances
+        """Sends the agent to goals at most so far away from now on, in the unit of the task's option `distances`."""
+        distances = self._task.options.distances or ()
         self._envs.draw_distances([each for each in distances if each <= longest] or [min(distances)])
 
     def collect(self, actor: LearningAgent, seed: int) -> Iterator[Experience]:

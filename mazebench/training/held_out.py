@@ -14,6 +14,7 @@ from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.tasks.task import Task
 from mazebench.tasks.task_options import SPARSE
+from mazebench.tasks.tracks import distance_of
 from mazebench.tasks.trials import draw_trials
 
 _SEED = 20_000  # of mazes that are drawn like the benchmark's, and in none of its splits
@@ -34,7 +35,7 @@ class HeldOutEvaluation:
         all_kinds = mazes.kinds if isinstance(mazes, FreshMazes) else (maze.kind for maze in mazes if maze.kind)
         kinds = tuple(dict.fromkeys(all_kinds))  # each once; mazes of one's own have none
         if not distances:
-            distances = _DISTANCES if task.track is None and kinds else task.distances
+            distances = _DISTANCES if task.track is None and kinds else task.options.distances or ()
         spread = np.linspace(min(distances), max(distances), len(_DISTANCES)).round().astype(int).tolist()
         self._distances = tuple(sorted({min(distances, key=lambda each: abs(each - wanted)) for wanted in spread}))
         plain = task.replace(distances=self._distances, num_goals=1, pairs="random", reward=SPARSE)
@@ -47,7 +48,7 @@ class HeldOutEvaluation:
         self.trials = draw_trials(self.task, _EPISODES)
 
     def success_rates(self, agent: Agent, progress: Callable[[int, int], None]) -> dict[int, float]:
-        """Returns the success rate of the agent, which acts greedily, by distance in cells.
+        """Returns the success rate of the agent, which acts greedily, by distance: in cells, on a track in metres.
 
         `progress` is called with how many episodes have ended, and of how many.
         """
@@ -55,7 +56,8 @@ class HeldOutEvaluation:
         num_ended = 0
         for results in run_trials(agent, self.task, dict(enumerate(self.trials)), len(self.trials)):
             for result in results:
-                reached[self.trials[result.number].distance].append(result.success)
+                cells = self.trials[result.number].distance
+                reached[distance_of(cells, self.task.cell_size, self.task.track)].append(result.success)
             num_ended += len(results)
             progress(num_ended, len(self.trials))
         return {distance: float(np.mean(successes)) for distance, successes in reached.items()}

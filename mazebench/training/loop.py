@@ -296,13 +296,16 @@ def _check_together(options: TrainOptions, tasks: Sequence[Task]) -> None:
     given = [task.options for task in tasks if task.scenarios is not None or task.options.num_ends]
     if given or any(task.options.pairs == "fixed" or task.options.is_hierarchical for task in tasks):
         raise InputError("--first-distance: expected starts and goals that are drawn, found given ones")
-    if options.first_distance > (farthest := max(max(task.distances) for task in tasks)):
+    if options.first_distance > (farthest := max(max(task.options.distances or ()) for task in tasks)):
         raise InputError(f"expected --first-distance of at most {farthest}, the farthest goals, found more")
 
 
 def longest_distance(options: TrainOptions, tasks: Sequence[Task], env_steps: int) -> int:
-    """Returns how many cells goals are away at most after `env_steps` agent steps, where that grows with them."""
-    first, last = options.first_distance or 1, max(max(task.distances) for task in tasks)
+    """Returns how far goals are away at most after `env_steps` agent steps, where that grows with them.
+
+    It is counted as the option `distances` is: on a track in metres, else in cells.
+    """
+    first, last = options.first_distance or 1, max(max(task.options.distances or ()) for task in tasks)
     return max(first, min(last, first + int((last - first) * env_steps / options.widen_steps)))
 
 

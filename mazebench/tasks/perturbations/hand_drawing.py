@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -20,12 +21,12 @@ from mazebench.tasks.perturbations.perturbation import Drawing, Perturbation, Sh
 from mazebench.tasks.streams import Stream
 
 PIXELS = 2  # pixels of the picture per cell of the maze, along each axis
-LARGEST_BEND = 1.5  # cells
+LARGEST_BEND = 1.5  # m
 LARGEST_STRETCH = 0.15  # each axis is scaled by 1 - this to 1 + this
 LARGEST_THICKENING = 0.5  # cells, one pixel where a cell is PIXELS of them; negative for thin walls
-SIGMA = 3.0  # cells; the displacement is white noise on cells that is smoothed by a Gaussian of this deviation
+SIGMA = 3.0  # m; the displacement is white noise on squares of 1 m, smoothed by a Gaussian of this deviation
 
-_REACH = 3 * SIGMA  # cells outside of the maze whose noise is still smoothed into it
+_REACH = 3 * SIGMA  # m outside of the maze whose noise is still smoothed into it
 _SAMPLES = 12  # sample points per cell along each axis that are drawn; more than 5 a pixel at any stretch
 _NODES = 4  # points per cell along each axis where the displacement's size and folds are looked at
 _ROWS_AT_A_TIME = 8  # of a product of matrices
@@ -36,18 +37,19 @@ _WHITE = 255  # the largest of the grey values, which are multiples of 1 / 255
 class HandDrawnMap(Perturbation):
     """Draws the map by hand; the draws are the same for all bends."""
 
-    bend: float  # cells, the largest displacement; at most LARGEST_BEND
+    bend: float  # m, the largest displacement; at most LARGEST_BEND
 
     stream = Stream.DRAWN_SHEET
     pixels_per_cell = PIXELS
 
     def show(self, shown: ShownMap, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
-        size = len(shown.walls)
-        displacement = draw_displacement(size, rng).scaled(self.bend)
+        size, cell_size = len(shown.walls), shown.cell_size
+        displacement = draw_displacement(size, rng, cell_size).scaled(self.bend)
         stretch = rng.uniform(1 - LARGEST_STRETCH, 1 + LARGEST_STRETCH, size=2)
         margin = rng.uniform(size=2)
         thickening = float(rng.uniform(-LARGEST_THICKENING, LARGEST_THICKENING))
-        drawing = fitted_drawing(size, displacement, stretch / (1 + LARGEST_STRETCH), margin, thickening)
+        share = stretch / (1 + LARGEST_STRETCH)
+        drawing = fitted_drawing(size, displacement, share, margin, thickening, cell_size)
         return dataclasses.replace(shown, drawing=drawing)
 
 
@@ -57,21 +59,23 @@ class Line(NamedTuple):
     number: int
     per_cell: int
     offset: float = 0.0  # of the first one, in distances between points
+    cell_size: float = 1.0  # m
 
     def coordinates(self) -> np.ndarray:
-        """Returns `[T]` float64, in cells; T is `number`."""
-        return (np.arange(self.number) + self.offset) / self.per_cell
+        """Returns `[T]` float64, in metres; T is `number`."""
+        return (np.arange(self.number) + self.offset) / self.per_cell * self.cell_size
 
 
 @dataclasses.dataclass(frozen=True)
 class Displacement:
     """A smooth displacement of the points of an N x N maze: Gaussian-smoothed white noise (Simard et al. 2003).
 
-    Points here are (row, column) in cells, with the maze's corners at 0 and N; `K` is N + 18, the cells with noise.
+    Points here are (down, right) in metres from the maze's upper left corner. `K` is 18 more than the metres on the
+    maze's side: the squares of 1 m with noise.
     """
 
-    noise: np.ndarray  # [2, K, K] float64: along rows and columns; cell (i, j) has its centre at i - 8.5, j - 8.5
-    mean: np.ndarray  # [2] float64, over the maze, in cells; subtracted, for a shift of the whole is no distortion
+    noise: np.ndarray  # [2, K, K] float64: down and right; square (i, j) has its centre at i - 8.5, j - 8.5
+    mean: np.ndarray  # [2] float64, over the maze, in metres; subtracted, for a shift of the whole is no distortion
 
     def on_grid(self, line: Line) -> np.ndarray:
         """Returns `[2, T, T]` float64: the displacements at all points of `line` x `line`."""
@@ -89,9 +93,9 @@ class Displacement:
         """Returns the displacement times `factor`."""
         return Displacement(factor * self.noise, factor * self.mean)
 
-    def folds(self, size: int) -> bool:
+    def folds(self, nodes: Line) -> bool:
         """Returns whether the displaced picture lies over itself somewhere, or one of its axes runs backwards."""
-        nodes, count = _nodes(size), self.noise.shape[-1]
+        count = self.noise.shape[-1]
         smooth = _gaussians_on(nodes, count)
         slope = -(nodes.coordinates()[:, None] - _noise_centres(count)) / SIGMA**2 * smooth
 
@@ -102,19 +106,19 @@ class Displacement:
         return bool(min(jacobian.min(), 1 + row_row.min(), 1 + column_column.min()) <= 0)
 
 
-def draw_displacement(size: int, rng: np.random.Generator) -> Displacement:
-    """Draws a displacement whose largest value in a maze of `size` cells is 1 cell.
+def draw_displacement(size: int, rng: np.random.Generator, cell_size: float = 1.0) -> Displacement:
+    """Draws a displacement whose largest value in a maze of `size` cells of `cell_size` m is 1 m.
 
     It does not fold at the largest bend, so that `rng` gives the same one for all bends. Of 20,000 draws, none folded.
     """
-    count = size + 2 * int(_REACH)
+    nodes, count = _nodes(size, cell_size), math.ceil(size * cell_size) + 2 * int(_REACH)
     while True:
         noise = Displacement(rng.standard_normal((2, count, count)), np.zeros(2))
-        moved = noise.on_grid(_nodes(size))
+        moved = noise.on_grid(nodes)
         mean = moved.mean(axis=(1, 2))
         largest = np.sqrt(((moved - mean[:, None, None]) ** 2).sum(axis=0)).max()
         displacement = dataclasses.replace(noise, mean=mean).scaled(1 / float(largest))
-        if not displacement.scaled(LARGEST_BEND).folds(size):
+        if not displacement.scaled(LARGEST_BEND).folds(nodes):
             return displacement
 
 
@@ -122,21 +126,22 @@ def draw_displacement(size: int, rng: np.random.Generator) -> Displacement:
 class HandDrawing(Drawing):
     """A hand drawing of a maze of N x N cells in a picture of P x P pixels, P = 2 N.
 
-    A point (row, column) of the maze, in cells, is displaced, and is then drawn at `origin + scale * point`, in pixels.
+    A point (down, right) of the maze, in metres, is displaced, and is then drawn at `origin + scale * point`, in pixels.
     """
 
     pixels_per_cell = PIXELS
 
     displacement: Displacement
-    scale: np.ndarray  # [2] float64, pixels per cell along rows and columns
+    scale: np.ndarray  # [2] float64, pixels per metre along rows and columns
     origin: np.ndarray  # [2] float64, pixels
     thickening: float  # cells; how much thicker walls are drawn, half of it on each side
+    cell_size: float = 1.0  # m
 
     def picture(self, walls: np.ndarray) -> np.ndarray:
         """Returns `[P, P]` float32: the share of wall in each pixel, a multiple of 1 / 255; bare paper is wall."""
         size, pixels = len(walls), PIXELS * len(walls)
         # How many samples of the maze, and how many of its walls, fall into each pixel.
-        samples = Line(_SAMPLES * size, _SAMPLES, 0.5)
+        samples = Line(_SAMPLES * size, _SAMPLES, 0.5, self.cell_size)
         drawn_at = _moved(samples, self.displacement)
         drawn_at *= self.scale[:, None, None]
         drawn_at += self.origin[:, None, None]
@@ -144,7 +149,7 @@ class HandDrawing(Drawing):
         row *= pixels
         place += row
         place *= 2
-        place += self._thick_walls(walls, samples.coordinates())
+        place += self._thick_walls(walls, samples.coordinates() / self.cell_size)
         free, wall = np.bincount(place.ravel(), minlength=2 * pixels**2).reshape(-1, 2).T
         drawn = free + wall
 
@@ -168,11 +173,12 @@ class HandDrawing(Drawing):
         drawn = self._drawn(np.column_stack([size - points[:, 1], points[:, 0]]))
         return np.column_stack([drawn[:, 1], PIXELS * size - drawn[:, 0]])
 
-    def _drawn(self, points: np.ndarray) -> np.ndarray:  # [T, 2] to [T, 2]: points of the maze to pixels
+    def _drawn(self, points: np.ndarray) -> np.ndarray:  # [T, 2] to [T, 2]: points of the maze in cells to pixels
+        points = points * self.cell_size
         return self.origin + self.scale * (points + self.displacement.at(points))
 
     def _thick_walls(self, walls: np.ndarray, samples: np.ndarray) -> np.ndarray:
-        """Returns `[T, T]` bool: which points of `samples` x `samples` (`[T]`) are drawn as wall.
+        """Returns `[T, T]` bool: which points of `samples` x `samples` (`[T]`, in cells) are drawn as wall.
 
         A square around the point, as wide as the change, meets a wall (thickened) or nothing but walls (thinned). The
         square is smaller than a cell, so that its corners meet all that it meets.
@@ -187,17 +193,22 @@ class HandDrawing(Drawing):
 
 
 def fitted_drawing(
-    size: int, displacement: Displacement, share: np.ndarray, margin: np.ndarray, thickening: float
+    size: int,
+    displacement: Displacement,
+    share: np.ndarray,
+    margin: np.ndarray,
+    thickening: float,
+    cell_size: float = 1.0,
 ) -> HandDrawing:
     """Returns a drawing that takes `share` `[2]` of the picture along rows and columns.
 
     Of the paper that it leaves bare, the share `margin` `[2]` lies above the drawing, and on its left.
     """
-    points, pixels = _moved(_nodes(size), displacement), PIXELS * size
+    points, pixels = _moved(_nodes(size, cell_size), displacement), PIXELS * size
     first, last = points.min(axis=(1, 2)), points.max(axis=(1, 2))
     scale = share * pixels / (last - first)
     origin = margin * (1 - share) * pixels - scale * first
-    return HandDrawing(displacement=displacement, scale=scale, origin=origin, thickening=thickening)
+    return HandDrawing(displacement, scale, origin, thickening, cell_size)
 
 
 def _moved(line: Line, displacement: Displacement) -> np.ndarray:
@@ -208,8 +219,8 @@ def _moved(line: Line, displacement: Displacement) -> np.ndarray:
     return moved
 
 
-def _nodes(size: int) -> Line:
-    return Line(_NODES * size + 1, _NODES)
+def _nodes(size: int, cell_size: float) -> Line:
+    return Line(_NODES * size + 1, _NODES, cell_size=cell_size)
 
 
 @functools.lru_cache(maxsize=8)  # two for mazes of one size
@@ -218,7 +229,7 @@ def _gaussians_on(line: Line, count: int) -> np.ndarray:
 
 
 def _gaussians(coordinates: np.ndarray, count: int) -> np.ndarray:
-    """Returns `[T, count]` float64: the weight of each cell's noise at `coordinates` `[T]` along one axis."""
+    """Returns `[T, count]` float64: the weight of each square's noise at `coordinates` `[T]` along one axis."""
     return np.exp(-(((coordinates[:, None] - _noise_centres(count)) / SIGMA) ** 2) / 2)
 
 

@@ -47,6 +47,7 @@ class ShownMap:
     drawing: Drawing | None = None  # None: a pixel for each cell
     hidden: tuple[int, ...] = ()  # planes of the context that the agent is not given: they are zero
     kind: str = ""  # of the true maze, `Maze.kind`
+    cell_size: float = 1.0  # m, of the true maze
 
     @functools.cached_property
     def seen_walls(self) -> np.ndarray:
