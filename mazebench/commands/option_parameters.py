@@ -91,7 +91,7 @@ def _parameter(name: str, option: Option) -> inspect.Parameter:
     elif option.choices:
         choice: Any = enum.StrEnum(name, {each: each for each in option.choices})  # type: ignore[misc]  # as typer wants
         kind, default = (choice | None, None) if default is None else (choice, choice(default))
-    elif name == "mazes":  # in Python also values, on the command line a path
+    elif name in ("mazes", "shown"):  # in Python also values, on the command line a path
         kind = str | None
     flags = ("--task", "--track") if name == "task" else ()
     annotation = Annotated[kind, typer.Option(*flags, help=option.help, metavar=metavar)]

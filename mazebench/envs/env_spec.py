@@ -12,7 +12,6 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
 from mazebench.constants import BENCHMARK_SIZES, TASK_VERSION
-from mazebench.maps.selection import described_maze
 from mazebench.tasks.task import Task
 
 
@@ -35,8 +34,9 @@ class JsonSpec:
         """Takes over `spec` in plain values."""
         if spec is not None:
             kwargs = {name: _plain(value) for name, value in spec.kwargs.items()}
-            if not isinstance(kwargs.get("mazes"), str | None):  # else a path, or none
-                kwargs["mazes"] = [described_maze(maze) for maze in self.task.fixed_mazes]
+            for name in ("mazes", "shown"):
+                if not isinstance(kwargs.get(name), str | None):  # else a path, or none
+                    kwargs[name] = self.task.to_json()[name]
             spec = dataclasses.replace(spec, kwargs=kwargs)
         self._spec = spec
 

@@ -305,7 +305,7 @@ class MazeVectorEnv(JsonSpec, gymnasium.vector.VectorEnv):
         return infos | {f"_{key}": mask for key in infos}
 
     def draw_distances(self, distances: Sequence[int]) -> None:
-        """Draws episodes with goals at these distances (cells, on a track metres) from now on; see `mazebench.Task.at_distances`."""
+        """Draws episodes with goals at these distances from now on, see `mazebench.Task.at_distances`."""
         self._tasks = tuple(task.at_distances(distances) for task in self._tasks)
         self.task = self._tasks[0]
 

@@ -26,8 +26,13 @@ class EvalOptions(Options):
     agent: str
     task: TaskOptions
     episodes_per_distance: Annotated[
-        int, Ge(1), Doc("Episodes for each maze and distance (local task); the frozen ones of a track are all played.")
-    ] = EPISODES_PER_DISTANCE
+        int | None,
+        Ge(1),
+        Doc(
+            f"Episodes for each maze and distance (local task); {EPISODES_PER_DISTANCE} if not given. The frozen ones "
+            "of a track are all played; in mazes of your own, a track has 48 episodes a maze if not given."
+        ),
+    ] = None
     checkpoint: Annotated[
         str | None, Doc("A learned agent's checkpoint or run folder; the shipped one if not given.")
     ] = None

@@ -12,6 +12,7 @@ from typing import Any
 
 from mazebench.agent import Agent
 from mazebench.agent_loading import load_agent_class
+from mazebench.constants import EPISODES_PER_DISTANCE
 from mazebench.errors import InputError, RunError, UnplayableError
 from mazebench.evaluation.checked_agent import AgentError, CheckedAgent, calling, context_size_of
 from mazebench.evaluation.eval_options import EvalOptions
@@ -143,6 +144,8 @@ def make_plan(
     agent_class = agent_class or load_agent_class(options.agent)
     task = task_as_played(options.agent, agent_class, options.task, resolver)
     options = _with_checkpoint(options, agent_class)
+    if task.track is None or task.options.mazes is None:
+        options = options.replace(episodes_per_distance=options.episodes_per_distance or EPISODES_PER_DISTANCE)
     if ":" in options.agent:  # modules that it imports when it is built are part of its code
         with contextlib.suppress(InputError, RunError):  # which it raises again when it is run
             build_agent(options, task, agent_class)
@@ -153,7 +156,8 @@ def make_plan(
     identity = {
         "agent": options.agent,
         **task.to_json(),
-        "mazes": None if task.options.mazes is None else "own",  # which the hash tells apart
+        "mazes": None if task.options.mazes is None else "own",  # which the hash tells apart, as it does older maps
+        **({} if task.options.shown is None else {"shown": "own"}),
         "episodes_per_distance": options.episodes_per_distance,
         "seed": options.seed,
         **{name: getattr(origin, name) for name in _IDENTIFYING},

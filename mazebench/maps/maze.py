@@ -226,9 +226,12 @@ class Maze:
         return search(self.walls, source[0] * self.size + source[1], goal, farthest)
 
 
-def corner_cells(maze: Maze) -> tuple[Cell, Cell]:
-    """Returns the free cells nearest the top-right and the bottom-left corner, the paper's global start and goal."""
-    rows, columns = maze.free_cells.T
+def corner_cells(maze: Maze, cells: np.ndarray | None = None) -> tuple[Cell, Cell]:
+    """Returns the free cells nearest the top-right and the bottom-left corner, the paper's global start and goal.
+
+    They are chosen among some `cells` (`[F, 2]`), by default all free ones.
+    """
+    rows, columns = (maze.free_cells if cells is None else cells).T
     top_right = np.argmin(rows + (maze.size - 1 - columns))
     bottom_left = np.argmin((maze.size - 1 - rows) + columns)
     return (int(rows[top_right]), int(columns[top_right])), (int(rows[bottom_left]), int(columns[bottom_left]))

@@ -10,6 +10,7 @@ import numpy as np
 from mazebench.errors import InputError, remark
 from mazebench.maps.maze import Maze
 from mazebench.maps.maze_options import ReadOptions
+from mazebench.maps.older_map import OlderMap, lay_on, one_for_each
 from mazebench.maps.readers.arrays import read_array_file
 from mazebench.maps.readers.image import grid_of_image, read_picture
 from mazebench.maps.readers.occupancy_grid import FREE, LocatedMaze, OccupancyGrid, locate_maze
@@ -64,9 +65,25 @@ def read_mazes(path: str | pathlib.Path, **options: Any) -> tuple[Maze, ...]:
     Raises:
       InputError: if there is no map or one can't be read.
     """
-    path = pathlib.Path(path).expanduser()
-    files = _map_files(path) if path.is_dir() else [path]
-    return tuple(read_maze(file, **options) for file in files)
+    return tuple(read_maze(file, **options) for file in _files(pathlib.Path(path).expanduser()))
+
+
+def read_with_older(
+    path: str | pathlib.Path, shown: str | pathlib.Path, options: ReadOptions
+) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...]]:
+    """Reads the maze in a file or those in a folder, and their older maps: likewise, or one that is that of all.
+
+    Raises:
+      InputError: as `read_mazes`, and if there are other numbers of older maps, or one is no older map of its maze.
+    """
+    files, older_files = (_files(pathlib.Path(each).expanduser()) for each in (path, shown))
+    mazes, older = [], []
+    for file, older_file in zip(files, one_for_each(older_files, len(files)), strict=True):
+        newer = _read_grid(file, None, options)
+        located = locate_maze(newer, options, file.stem)
+        mazes.append(located.maze)
+        older.append(lay_on(_read_grid(older_file, None, options), newer, located, options, f"shown {older_file}"))
+    return tuple(mazes), tuple(older)
 
 
 def read_located(path: str | pathlib.Path, size: int | None = None, **options: Any) -> LocatedMaze:
@@ -106,6 +123,11 @@ def _read_grid(path: pathlib.Path, size: int | None, options: ReadOptions) -> Oc
             "if it is a floor plan, --pixel-size sets its scale"
         )
     return grid
+
+
+def _files(path: pathlib.Path) -> list[pathlib.Path]:
+    """Returns a file, or one of each map in a folder."""
+    return _map_files(path) if path.is_dir() else [path]
 
 
 def _map_files(folder: pathlib.Path) -> list[pathlib.Path]:

@@ -53,7 +53,7 @@ def played_task(summary: Summary) -> Task:
 
 
 def mazes_hash(task: Task) -> str:
-    """Returns a SHA-256 of the mazes, of fresh ones of the first, and of the scenarios.
+    """Returns a SHA-256 of the mazes, of fresh ones of the first, of older maps of them, and of the scenarios.
 
     1 m, the width of the benchmark's cells, is left out.
     """
@@ -61,7 +61,8 @@ def mazes_hash(task: Task) -> str:
     mazes = (task.mazes[0],) if task.options.fresh else task.fixed_mazes
     walls = b"".join(maze.walls.tobytes() for maze in mazes)
     ends = b"" if task.scenarios is None else np.stack([task.scenarios.starts, task.scenarios.goals]).tobytes()
-    return hashlib.sha256(walls + scale.encode("ascii") + ends).hexdigest()
+    older = b"".join(each.walls.tobytes() for each in task.shown or ())
+    return hashlib.sha256(walls + scale.encode("ascii") + ends + older).hexdigest()
 
 
 def shown_of(task: Task, episode: Episode) -> Shown:

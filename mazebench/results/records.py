@@ -92,7 +92,7 @@ class Provenance(_Stored):
     """The provenance of a result: versions, checkpoint, seed, command, machine."""
 
     seed: Count
-    episodes_per_distance: Count
+    episodes_per_distance: Count | None  # None: 48 in each maze
     task_version: int
     benchmark_manifest_sha256: str
     mazes_sha256: str

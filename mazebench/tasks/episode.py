@@ -11,6 +11,7 @@ from mazebench.errors import InputError
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.maze import Cell, Maze
 from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS
+from mazebench.tasks.perturbations.moved_doors import MovedDoors
 from mazebench.tasks.perturbations.perturbation import Perturbation
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
@@ -56,7 +57,9 @@ def perturbations_of(task: Task, episode: Episode) -> list[tuple[Perturbation, n
     """Returns the perturbations of `episode`, in the order in which they apply, each with a generator of its stream."""
     perturbations = [PERTURBATIONS[name](strength) for name, strength in task.options.active_perturbations]
     if task.track is not None:
-        perturbations += TRACKS[task.track].levels[episode_level(task, episode) - 1].perturbations
+        of_level = TRACKS[task.track].levels[episode_level(task, episode) - 1].perturbations
+        # An older map of the building tells what has changed instead of doors that are drawn.
+        perturbations += [each for each in of_level if task.shown is None or not isinstance(each, MovedDoors)]
     return [(perturbation, episode.stream(perturbation.stream)) for perturbation in perturbations]
 
 
@@ -79,11 +82,11 @@ def _sample_episode(task: Task, rng: np.random.Generator) -> Episode:
         TRACKS[task.track].require(maze, task.levels)
     if task.scenarios is not None:
         return make_episode(index, *task.scenarios.ends(rng.choice(task.scenarios.numbers(task.distances))), rng)
-    start, goal = task.options.ends(maze)
+    start, goal = task.ends(index)
     if start is None or goal is None:
         pair_rng = np.random.default_rng([_FIXED_PAIR_SEED, index]) if task.options.pairs == "fixed" else rng
         distance = task.distances[pair_rng.integers(len(task.distances))]
-        start, goal = sample_pair(maze, distance, pair_rng, start, goal)
+        start, goal = sample_pair(maze, distance, pair_rng, start, goal, task.joined(index))
     return make_episode(index, start, goal, rng)
 
 
@@ -94,9 +97,14 @@ def make_episode(maze: int, start: Cell, goal: Cell, rng: np.random.Generator) -
 
 
 def sample_pair(
-    maze: Maze, distance: int, rng: np.random.Generator, start: Cell | None = None, goal: Cell | None = None
+    maze: Maze,
+    distance: int,
+    rng: np.random.Generator,
+    start: Cell | None = None,
+    goal: Cell | None = None,
+    joined: np.ndarray | None = None,
 ) -> tuple[Cell, Cell]:
-    """Draws a start and a goal `distance` cells apart.
+    """Draws a start and a goal `distance` cells apart, both among the cells `joined` (`[N, N]` bool) if it is given.
 
     The start is uniform among the cells that have such a goal, then the goal is uniform among those of the start. If
     one of the two is given, the other is uniform among the cells that far from it; if both are, nothing is drawn.
@@ -107,18 +115,23 @@ def sample_pair(
     if start is not None and goal is not None:
         return start, goal
 
+    def at(cell: Cell) -> np.ndarray:  # [K, 2]
+        cells = maze.cells_at(cell, distance)
+        return cells if joined is None else cells[joined[tuple(cells.T)]]
+
     # One is given: draw the other.
     if (given := start or goal) is not None:
-        others = maze.cells_at(given, distance)
+        others = at(given)
         if not len(others):
             raise InputError(f"{maze.name}: found no cell {distance} cells from {given}; choose others (--distances)")
         row, column = others[rng.integers(len(others))].tolist()
         return (given, (row, column)) if given is start else ((row, column), given)
 
     # Draw starts until one has goals.
-    for _ in range(_MAX_TRIES):
-        row, column = maze.free_cells[rng.integers(len(maze.free_cells))].tolist()
-        goals = maze.cells_at((row, column), distance)
+    starts = maze.free_cells if joined is None else np.argwhere(joined)
+    for _ in range(_MAX_TRIES if len(starts) else 0):
+        row, column = starts[rng.integers(len(starts))].tolist()
+        goals = at((row, column))
         if len(goals):
             goal_row, goal_column = goals[rng.integers(len(goals))].tolist()
             return (row, column), (goal_row, goal_column)
@@ -129,12 +142,15 @@ def check_episode(task: Task, episode: Episode) -> Episode:
     """Returns `episode` if it can be played in a task.
 
     Raises:
-      InputError: if there is no such maze, start or goal is not free in it, or they are one cell.
+      InputError: if there is no such maze, start or goal is not free in it, or not joined with the other on an older
+        map that is shown, or they are one cell.
     """
     if not 0 <= episode.maze < len(task.mazes):
         raise InputError(f"expected a maze from 0 to {len(task.mazes) - 1}, found {episode.maze}")
     for cell in (episode.start, episode.goal):
         task.mazes[episode.maze].require_free(cell)
+        if (joined := task.joined(episode.maze)) is not None and not joined[cell]:
+            raise InputError(f"expected start and goal that are free and joined on the older map, found {cell}")
     if episode.start == episode.goal:
         raise InputError(f"expected a goal in another cell than the start, found both in {episode.goal}")
     return episode

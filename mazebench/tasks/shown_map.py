@@ -17,7 +17,8 @@ _PLANES = {"map": (GLOBAL_MAP, LOCAL_MAP), "goal": (GOAL,)}  # of the context, b
 def show_map(task: Task, episode: Episode) -> ShownMap:
     """Returns the map that the agent is shown in `episode`."""
     maze = task.mazes[episode.maze]
-    shown = ShownMap(maze.walls, kind=maze.kind, cell_size=maze.cell_size)
+    walls = maze.walls if task.shown is None else task.shown[episode.maze].walls
+    shown = ShownMap(walls, kind=maze.kind, cell_size=maze.cell_size)
     for perturbation, rng in perturbations_of(task, episode):
         shown = perturbation.show(shown, (episode.start, episode.goal), rng)
     return shown

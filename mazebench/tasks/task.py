@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mazebench.errors import InputError, remark
 from mazebench.maps.benchmark import KINDS_SIZE, SIZES, load_kind_mazes, load_mazes
 from mazebench.maps.drawn import FreshMazes, Mazes, draw_mazes
-from mazebench.maps.maze import MIN_CELL_SIZE, Maze, require_one_size
+from mazebench.maps.maze import MIN_CELL_SIZE, Cell, Maze, require_one_size
 from mazebench.maps.maze_options import THIN_WALLS, ReadOptions
+from mazebench.maps.older_map import OlderMap
 from mazebench.maps.scenarios import Scenarios, are_scenarios, read_scenarios
+from mazebench.maps.selection import maps_in_texts
 from mazebench.options import check_names, fields_of
 from mazebench.tasks.context import MAX_CONTEXT_SIZE, default_context_size
 from mazebench.tasks.interface import Interface
@@ -26,9 +29,19 @@ TRAIN_DISTANCES = tuple(range(1, 6))
 EVAL_DISTANCES = tuple(range(1, 16))
 NOT_IN_EVALUATIONS = ("fresh", "pairs", "num_goals", "reward", "context_size")  # options that they do not vary
 
+NUM_CHANGED = 4  # buildings in which things have changed since a plan of one's own was drawn
+
 _NUM_CHECKED = 10  # of fresh mazes, one of which must have the distances
 _FARTHEST_SHARE = 0.9  # of the diameter of a large maze; few pairs of cells are farther apart
-_OF_MAZES = ("task", "size", "split", "mazes", "kinds", "num_mazes", "fresh", *fields_of(ReadOptions))
+_OF_MAZES = ("task", "size", "split", "mazes", "shown", "kinds", "num_mazes", "fresh", *fields_of(ReadOptions))
+
+
+class World(NamedTuple):
+    """What a task is played in."""
+
+    mazes: Mazes
+    shown: tuple[OlderMap, ...] | None = None  # older maps of the mazes
+    scenarios: Scenarios | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,6 +59,7 @@ class Task:
     options: TaskOptions  # with what was open filled; what they have is not repeated below
     asked: TaskOptions = dataclasses.field(compare=False, repr=False)
     mazes: Mazes = dataclasses.field(compare=False, repr=False)  # `Episode.maze` is an index into them
+    shown: tuple[OlderMap, ...] | None = dataclasses.field(compare=False, repr=False)  # instead of the mazes' own maps
     scenarios: Scenarios | None = dataclasses.field(compare=False, repr=False)  # of a file of starts and goals
     size: int = dataclasses.field(compare=False)  # N, cells a side of all mazes
     cell_size: float = dataclasses.field(compare=False)  # m, of all mazes
@@ -84,7 +98,8 @@ class Task:
 
     def replace(self, **changes: Any) -> Task:
         """Returns the task with other values of some options; the mazes are not read again unless they change."""
-        read = None if set(changes) & set(_OF_MAZES) else (self.mazes, self.scenarios)
+        of_mazes = {*_OF_MAZES, "level"} if self.changes_buildings else {*_OF_MAZES}
+        read = None if of_mazes & set(changes) else World(self.mazes, self.shown, self.scenarios)
         task = resolve(self.options.replace(**changes), read=read)
         return dataclasses.replace(task, context_size=self.context_size) if "context_size" not in changes else task
 
@@ -125,6 +140,19 @@ class Task:
         return self.mazes
 
     @property
+    def changes_buildings(self) -> bool:
+        """True if the mazes are buildings in which things have changed, made of mazes of one's own."""
+        return self.shown is not None and self.options.shown is None
+
+    def joined(self, maze: int) -> np.ndarray | None:
+        """Returns `[N, N]` bool: the cells in maze number `maze` that may be start or goal; None for all free ones."""
+        return None if self.shown is None else self.shown[maze].joined
+
+    def ends(self, maze: int) -> tuple[Cell | None, Cell | None]:
+        """Returns the start and the goal of all episodes in maze number `maze`; None for one that is drawn."""
+        return self.options.ends(self.mazes[maze], None if self.shown is None else self.shown[maze])
+
+    @property
     def has_legs(self) -> bool:
         """True if the context may change within an episode: at landmarks, or where one goal follows another."""
         return self.options.is_hierarchical or self.options.num_goals > 1
@@ -134,7 +162,9 @@ class Task:
         """The agent steps that an episode may take; None where they depend on its landmarks."""
         if self.options.is_hierarchical:
             return None
-        time_limit = self.options.time_limit or default_time_limit(max(self.distances), self.cell_size, track=self.track)
+        time_limit = self.options.time_limit or default_time_limit(
+            max(self.distances), self.cell_size, track=self.track
+        )
         return self.options.num_goals * time_limit
 
     def odometry_noise_at(self, level: int) -> float:
@@ -165,7 +195,7 @@ def resolve(
     *,
     distances: tuple[int, ...] | None = None,
     context_size_of: Callable[[int], int] = default_context_size,
-    read: tuple[Mazes, Scenarios | None] | None = None,
+    read: World | None = None,
 ) -> Task:
     """Returns the task that options name: reads or draws the mazes, fills what is open, and checks all of it.
 
@@ -173,13 +203,13 @@ def resolve(
       asked: the options.
       distances: those in the benchmark's mazes if none are asked for; by default 1 to 5, in eval mazes 1 to 15.
       context_size_of: returns M for mazes of N cells a side, where neither the options nor a track say it.
-      read: the mazes and the scenarios, if they have been read already.
+      read: what it is played in, if that has been read already.
 
     Raises:
       InputError: if a map can't be read, or the task can't be played in a maze.
     """
-    mazes, scenarios = read or _read(asked)
-    _check_mazes(asked, mazes)
+    mazes, shown, scenarios = world = read or _read(asked)
+    _check_mazes(asked, world)
     size, cell_size = mazes[0].size, mazes[0].cell_size
     split, actions = asked.split or "train", asked.actions or "six"
     level = asked.level or (() if asked.track is None else LEVELS[:1])
@@ -214,6 +244,7 @@ def resolve(
         options=filled,
         asked=asked,
         mazes=mazes,
+        shown=shown,
         scenarios=scenarios,
         size=size,
         cell_size=cell_size,
@@ -290,37 +321,97 @@ def tasks_of_tracks(tracks: Sequence[str], **options: Any) -> tuple[Task, ...]:
 
 
 def in_the_same_mazes(tasks: Sequence[Task], context_size: int | None = None) -> tuple[Task, ...]:
-    """Returns tasks in the mazes of the first one, with contexts of one size, by default the largest one of theirs."""
+    """Returns tasks in the mazes of the first one, with contexts of one size, by default the largest one of theirs.
+
+    Raises:
+      InputError: if one is played in buildings that have changed, and another one is not, or in others.
+    """
+    if any(task.changes_buildings for task in tasks) and any(task.mazes != tasks[0].mazes for task in tasks):
+        names = ", ".join(task.name for task in tasks)
+        raise InputError(
+            f"tracks {names}: expected tracks of one strength in mazes of your own, whose changes depend on it, or an "
+            "older map of them (--shown)"
+        )
     context_size = context_size or max(task.context_size for task in tasks)
     return tuple(
-        dataclasses.replace(task, context_size=context_size, mazes=tasks[0].mazes, scenarios=tasks[0].scenarios)
+        dataclasses.replace(
+            task, context_size=context_size, mazes=tasks[0].mazes, shown=tasks[0].shown, scenarios=tasks[0].scenarios
+        )
         for task in tasks
     )
 
 
-def _read(asked: TaskOptions) -> tuple[Mazes, Scenarios | None]:
-    """Returns the mazes, loaded or drawn, and the scenarios in a file of these."""
+def _read(asked: TaskOptions) -> World:
+    """Returns the mazes, loaded or drawn, with their older maps, and the scenarios in a file of these."""
     size = asked.size or (SIZES[0] if asked.track is None else KINDS_SIZE)
     if asked.fresh:
-        return FreshMazes(asked.kinds or DRAWN_KINDS[:1], size), None
+        return World(FreshMazes(asked.kinds or DRAWN_KINDS[:1], size))
     if asked.is_drawn:
         split = "train" if asked.split in (None, "train") else "dev"
-        return draw_mazes(asked.kinds or DRAWN_KINDS[:1], size, split, asked.num_mazes or NUM_DRAWN), None
+        return World(draw_mazes(asked.kinds or DRAWN_KINDS[:1], size, split, asked.num_mazes or NUM_DRAWN))
     if asked.mazes is None:
         split = asked.split or "train"
-        return load_mazes(size, split) if asked.track is None else load_kind_mazes(split), None
-    mazes, scenarios = asked.mazes, None
-    if are_scenarios(mazes):
-        scenarios = read_scenarios(mazes, asked.reading)
-        mazes = (scenarios.maze,)
-    elif isinstance(mazes, str):
-        from mazebench.maps.maze_files import read_mazes  # with all readers, which few commands need
-
-        mazes = _without_unplayable(asked, read_mazes(mazes, **dataclasses.asdict(asked.reading)))
-    for maze in mazes:
+        return World(load_mazes(size, split) if asked.track is None else load_kind_mazes(split))
+    world = _read_own(asked)
+    for maze in world.mazes:
         if asked.size not in (None, maze.size):
             raise InputError(f"expected mazes of size {asked.size}, found size {maze.size}")
-    return mazes, scenarios
+    if world.shown is None and asked.track is not None:
+        return _with_changes(asked, world.mazes)
+    return world
+
+
+def _read_own(asked: TaskOptions) -> World:
+    """Returns the mazes of one's own in which the task can be played, with the older maps that are given."""
+    mazes, shown, scenarios = asked.mazes, None, None
+    if are_scenarios(mazes):
+        scenarios = read_scenarios(mazes, asked.reading)
+        return World((scenarios.maze,), None, scenarios)
+    if not isinstance(mazes, str):
+        return World(mazes, None if asked.shown is None else maps_in_texts(asked.shown, mazes))
+    from mazebench.maps.maze_files import read_mazes, read_with_older  # with all readers, which few commands need
+
+    if asked.shown is None:
+        mazes = read_mazes(mazes, **dataclasses.asdict(asked.reading))
+    else:
+        mazes, shown = read_with_older(mazes, asked.shown, asked.reading)
+    kept = _playable(mazes, functools.partial(_check_maze, asked))
+    return World(tuple(mazes[each] for each in kept), None if shown is None else tuple(shown[each] for each in kept))
+
+
+def _with_changes(asked: TaskOptions, plans: Mazes) -> World:
+    """Returns buildings in which things have changed since their plans were drawn, if doors have moved on the track.
+
+    Raises:
+      InputError: if none of the plans can carry the strength of the level, or levels differ in it.
+    """
+    strengths = {TRACKS[asked.task].levels[level - 1].strength for level in asked.level or LEVELS[:1]}
+    if len(strengths) > 1:
+        found = ", ".join(map(str, asked.level or ()))
+        raise InputError(
+            f"track {asked.task!r}: expected one level in mazes of your own, whose changes depend on it, found {found}"
+        )
+    [strength] = strengths
+    if strength is None:
+        return World(plans)
+
+    # What takes a moment is checked first.
+    _context_size(asked, plans[0].size, default_context_size)
+    kept = _playable(plans, functools.partial(_check_maze, asked))
+    plans = tuple(plans[number] for number in kept)
+    kept = _playable(plans, lambda plan: _changed(plan, plan.name, strength))
+    shown = [
+        OlderMap(plans[each].walls, maze) for each in kept for maze in _changed(plans[each], plans[each].name, strength)
+    ]
+    return World(tuple(each.maze for each in shown), tuple(shown))
+
+
+@functools.lru_cache(maxsize=32)
+def _changed(plan: Maze, name: str, strength: int) -> tuple[Maze, ...]:
+    """Returns the changed buildings of a plan; `name` is its own, for plans of equal walls are equal."""
+    from mazebench.maps.changes import changed_buildings  # which needs numba
+
+    return changed_buildings(plan, strength, NUM_CHANGED, seed=0)
 
 
 def _fitting_distances(
@@ -366,8 +457,9 @@ def _context_size(asked: TaskOptions, size: int, context_size_of: Callable[[int]
     return context_size
 
 
-def _check_mazes(asked: TaskOptions, mazes: Mazes) -> None:
+def _check_mazes(asked: TaskOptions, world: World) -> None:
     """Raises `InputError` if mazes are not of one size and scale, or the task can't be played in one of them."""
+    mazes = world.mazes
     if isinstance(mazes, FreshMazes):
         if asked.textures:
             raise InputError("fresh mazes: expected no textures, which take long to make, found textures")
@@ -376,43 +468,47 @@ def _check_mazes(asked: TaskOptions, mazes: Mazes) -> None:
                 raise InputError(f"fresh mazes: expected no {name}, which may be a wall in one of them, found {end!r}")
         return
     require_one_size(mazes)
-    for maze in mazes:
-        _check_maze(asked, maze)
+    for number, maze in enumerate(mazes):
+        _check_maze(asked, maze, None if world.shown is None else world.shown[number])
+        if asked.track is not None and world.shown is None:
+            TRACKS[asked.track].require(maze, asked.level or LEVELS[:1])
 
 
-def _check_maze(asked: TaskOptions, maze: Maze) -> None:
+def _check_maze(asked: TaskOptions, maze: Maze, older: OlderMap | None = None) -> None:
     """Raises `InputError` if the task can't be played in a maze."""
     if maze.cell_size < MIN_CELL_SIZE:
         raise InputError(
             f"{maze.name}: expected cells of at least {MIN_CELL_SIZE} m, through which the body passes, "
             f"found {maze.cell_size} m; {THIN_WALLS}"
         )
-    if asked.track is not None:
-        if maze.cell_size > MAX_CELL_SIZE:
-            raise InputError(
-                f"track {asked.track!r}: expected cells of at most {MAX_CELL_SIZE:g} m, found {maze.cell_size:g} m"
-            )
-        TRACKS[asked.track].require(maze, asked.level or LEVELS[:1])
+    if asked.track is not None and maze.cell_size > MAX_CELL_SIZE:
+        raise InputError(
+            f"track {asked.track!r}: expected cells of at most {MAX_CELL_SIZE:g} m, found {maze.cell_size:g} m"
+        )
     if len(maze.free_cells) < 2:
         raise InputError(f"{maze.name}: expected two free cells for a start and a goal, found one")
-    start, goal = asked.ends(maze)
+    start, goal = asked.ends(maze, older)
     if start is not None and start == goal:
         raise InputError(f"{maze.name}: expected start and goal in different cells, found both in {start}")
 
 
-def _without_unplayable(asked: TaskOptions, mazes: tuple[Maze, ...]) -> tuple[Maze, ...]:
-    """Returns the mazes of a folder in which the task can be played, and warns of each other one; all if none can."""
-    faults: dict[int, str] = {}
+def _playable(mazes: Mazes, check: Callable[[Maze], Any]) -> list[int]:
+    """Returns the numbers of the mazes that `check` lets pass, and warns of each other one.
+
+    Raises:
+      InputError: if it is none.
+    """
+    faults: dict[int, InputError] = {}
     for number, maze in enumerate(mazes):
         try:
-            _check_maze(asked, maze)
+            check(maze)
         except InputError as error:
-            faults[number] = str(error)
+            faults[number] = error
     if len(faults) == len(mazes):
-        return mazes
+        raise faults[0]
     for number, fault in faults.items():
         remark(f"maze {mazes[number].name!r} left out: {fault}")
-    return tuple(maze for number, maze in enumerate(mazes) if number not in faults)
+    return [number for number in range(len(mazes)) if number not in faults]
 
 
 def _check_distances(options: TaskOptions, mazes: Mazes, scenarios: Scenarios | None) -> None:

@@ -8,6 +8,7 @@ import pathlib
 from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
+import numpy as np
 from annotated_types import Ge, Interval
 
 from mazebench.constants import DISCRETE, VELOCITIES
@@ -16,9 +17,10 @@ from mazebench.maps.benchmark import ALL_SPLITS, FROZEN_SPLITS, KINDS_SIZE, PAPE
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.maps.maze import Cell, Maze, corner_cells
 from mazebench.maps.maze_options import ReadOptions
+from mazebench.maps.older_map import OlderMap
 from mazebench.maps.places import free_cell_of_place, place_text
 from mazebench.maps.scenarios import are_scenarios
-from mazebench.maps.selection import described_maze, maze_as_described, own_mazes
+from mazebench.maps.selection import described_maze, maze_as_described, own_mazes, texts_of
 from mazebench.options import Doc, OneOf, ReadBy, as_tuple, fields_of, options_in
 from mazebench.tasks.context import MAX_CONTEXT_SIZE
 from mazebench.tasks.perturbations.flip_warp_noise import PERTURBATIONS, FlipShare, PositionDeviation, WarpShare
@@ -91,6 +93,14 @@ class TaskOptions(SensorOptions, ReadOptions):
         Doc(
             "Mazes of your own: a text, picture, array or ROS map, or a folder of them; or scenarios of MovingAI "
             "(.scen), whose starts and goals are played on the map next to them."
+        ),
+    ] = None
+    shown: Annotated[
+        Any,
+        ReadBy(_as_mazes),
+        Doc(
+            "An older map of your own mazes, which is shown instead of them: what mazes takes, one for all or as many. "
+            "ROS maps are laid on each other by their origins; others must have one size."
         ),
     ] = None
     kinds: Annotated[
@@ -212,6 +222,8 @@ class TaskOptions(SensorOptions, ReadOptions):
                 raise InputError(f"kind {kind!r}: only the eval split has it; kinds: {', '.join(DRAWN_KINDS)}")
         super().__post_init__()
         if self.mazes is not None and not isinstance(self.mazes, str):
+            if self.shown is not None:
+                object.__setattr__(self, "shown", texts_of(self.shown, self.mazes, self.reading))
             object.__setattr__(self, "mazes", own_mazes(self.mazes, self.reading))
         object.__setattr__(self, "hide", tuple(sorted(self.hide, key=HIDEABLE.index)))
         if self.track is not None and LIDAR not in self.sensors:
@@ -226,6 +238,8 @@ class TaskOptions(SensorOptions, ReadOptions):
         if self.mazes is not None:  # a path may have bytes that JSON has not
             own = self.mazes
             values["mazes"] = one_line(own) if isinstance(own, str) else [described_maze(maze) for maze in own]
+        if isinstance(self.shown, str):
+            values["shown"] = one_line(self.shown)
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
     # What they mean.
@@ -301,15 +315,21 @@ class TaskOptions(SensorOptions, ReadOptions):
         """The model of the sensor `lidar`: as the option says, or the track."""
         return TURTLEBOT3 if self.lidar_noise is None and self.track is not None else super().lidar
 
-    def ends(self, maze: Maze) -> tuple[Cell | None, Cell | None]:
+    def ends(self, maze: Maze, older: OlderMap | None = None) -> tuple[Cell | None, Cell | None]:
         """Returns the start and the goal of all episodes in a maze; None for one that each episode draws.
 
         Raises:
-          InputError: if one is not free.
+          InputError: if one is not free, or not joined with the rest of an `older` map that is shown.
         """
         given = {name: end for name in ENDS if (end := getattr(self, name)) is not None}
         cells = {name: free_cell_of_place(name, end, maze) for name, end in given.items()}
-        corners = dict(zip(ENDS, corner_cells(maze), strict=True)) if self.is_hierarchical else {}
+        for name, cell in cells.items():
+            if older is not None and not older.joined[cell]:
+                raise InputError(
+                    f"{name} {given[name]!r}: expected a cell that is free on the older map, too, found none"
+                )
+        joined = None if older is None else np.argwhere(older.joined)
+        corners = dict(zip(ENDS, corner_cells(maze, joined), strict=True)) if self.is_hierarchical else {}
         start, goal = ((corners | cells).get(name) for name in ENDS)
         return start, goal
 
@@ -353,6 +373,7 @@ class TaskOptions(SensorOptions, ReadOptions):
     def own_in_words(self) -> tuple[str, ...]:
         """The choices of a user besides the mazes: the size of a cell, start and goal, noise on the senses."""
         scale = () if self.cell_size in (None, 1) else (f"cells of {self.cell_size:g} m",)
+        scale += () if self.shown is None else ("an older map shown",)
         ends = (f"{name} {end}" for name in ENDS if (end := getattr(self, name)) is not None)
         return (*scale, *ends, *self.noise_in_words)
 
@@ -381,7 +402,14 @@ class TaskOptions(SensorOptions, ReadOptions):
             *(self.track is not None, self.is_hierarchical, self.size or 0, self.split_in_results),
             self.landmark_distance if self.is_hierarchical else 0,
             self.active_perturbations,
-            *(str(self.mazes or ""), self.kinds, self.num_mazes or 0, self.track or "", self.level or ()),
+            *(
+                str(self.mazes or ""),
+                str(self.shown or ""),
+                self.kinds,
+                self.num_mazes or 0,
+                self.track or "",
+                self.level or (),
+            ),
             self.own_in_words,
         )
 
@@ -402,6 +430,11 @@ class TaskOptions(SensorOptions, ReadOptions):
             raise InputError(f"expected no num_mazes beside fresh, found {self.num_mazes}")
         if self.is_drawn and self.mazes is not None:
             raise InputError("expected mazes of your own or mazes that are drawn, found both")
+        if self.shown is not None and (self.mazes is None or are_scenarios(self.mazes)):
+            found = "none" if self.mazes is None else "scenarios"
+            raise InputError(f"shown, an older map: expected mazes of your own beside it, found {found}")
+        if self.shown is not None and isinstance(self.shown, str) != isinstance(self.mazes, str):
+            raise InputError("shown, an older map: expected a path beside the path of mazes, else values, as mazes are")
         if self.is_drawn and self.split == "eval":
             raise InputError("mazes that are drawn: expected split 'train' or 'dev', found 'eval'")
         for name, found in options_in(self.changed(), ReadOptions).items():
@@ -458,6 +491,11 @@ class TaskOptions(SensorOptions, ReadOptions):
         track, beside = TRACKS[self.task], f"track {self.task!r}"
         if self.mazes is None and not self.is_drawn and self.size not in (None, KINDS_SIZE):
             raise InputError(f"{beside}: expected size {KINDS_SIZE}, found {self.size}")
+        if self.shown is not None and self.task == "rebuilt" and self.level not in (None, LEVELS[:1]):
+            raise InputError(
+                f"{beside}: expected level 1 beside shown, an older map, for the other levels differ in doors only, "
+                f"found {self._levels}"
+            )
         if self.time_limit is not None:
             raise InputError(f"{beside}: has its own time limit, found time_limit {self.time_limit}")
         self._require(beside, start=None, goal=None, pairs="random", num_goals=1, **dict.fromkeys(PERTURBATIONS, 0.0))

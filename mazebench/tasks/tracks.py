@@ -35,6 +35,11 @@ class Level:
     perturbations: tuple[Perturbation, ...] = ()  # in the order in which they apply
     odometry_noise: float = 0.0  # alpha of `NoisyMotion`, unless the option is given
 
+    @property
+    def strength(self) -> int | None:
+        """The strength of the changes in a building of one's own, see `mazebench.maps.changes`; None without any."""
+        return next((each.strength for each in self.perturbations if isinstance(each, MovedDoors)), None)
+
 
 @dataclasses.dataclass(frozen=True)
 class Track:

@@ -20,6 +20,7 @@ COLUMNS = (
     "oracle_steps",  # empty where the oracle missed the goal
 )
 
+_PER_MAZE = 48  # episodes of a track in a maze of one's own, unless another number for each distance is asked for
 _MAX_DRAWS = 101  # of a pair, for one not drawn before
 
 
@@ -57,7 +58,7 @@ def frozen_trials(task: str, size: int, benchmark: str = PAPER_BENCHMARK, split:
     return tuple(trials)
 
 
-def select_trials(task: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
+def select_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
     """Returns the episodes to evaluate, by maze and then by distance.
 
     In the benchmark's mazes its frozen episodes are taken as far as they go: of a track all of the task's distances,
@@ -65,7 +66,7 @@ def select_trials(task: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE
 
     Args:
       task: the task; its distances are those of the pairs.
-      episodes_per_distance: for each maze and distance.
+      episodes_per_distance: for each maze and distance; None for 48 in each maze, spread over the distances.
       seed: of what is drawn.
 
     Raises:
@@ -77,8 +78,8 @@ def select_trials(task: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE
         return [trial for trial in trials if trial.distance in task.distances]
     if frozen_split is not None and task.options.is_hierarchical:
         return list(frozen_trials(task.name, task.size))
-    has_all = set(task.distances) <= set(EVAL_DISTANCES) and episodes_per_distance <= EPISODES_PER_DISTANCE
-    if frozen_split is not None and has_all:
+    has_all = set(task.distances) <= set(EVAL_DISTANCES)
+    if frozen_split is not None and has_all and (episodes_per_distance or _PER_MAZE) <= EPISODES_PER_DISTANCE:
         # The frozen episodes of a maze and a distance follow each other, EPISODES_PER_DISTANCE of them.
         return [
             trial
@@ -88,7 +89,7 @@ def select_trials(task: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE
     return draw_trials(task, episodes_per_distance, seed)
 
 
-def draw_trials(task: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
+def draw_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
     """Draws episodes of a task, by maze and then by distance; of the hierarchical task, one in each maze.
 
     Where start and goal are given, an episode draws its heading only. Of scenarios, each is one episode. Elsewhere, the
@@ -105,21 +106,22 @@ def draw_trials(task: Task, episodes_per_distance: int = EPISODES_PER_DISTANCE, 
         ]
     trials = []
     for index, maze in enumerate(task.fixed_mazes):
-        start, goal = task.options.ends(maze)
+        (start, goal), joined = task.ends(index), task.joined(index)
         if task.options.is_hierarchical:
             rng = np.random.default_rng([seed, maze.size, index])
-            trials.append(make_trial(maze, index, sample_pair(maze, 0, rng, start, goal), rng))
+            trials.append(make_trial(maze, index, sample_pair(maze, 0, rng, start, goal, joined), rng))
             continue
         distances = sorted(set(task.distances))
         if start is not None and goal is not None:
             distances = [maze.distance(start, goal)]
-        for distance in distances:
+        whole, rest = divmod(_PER_MAZE, len(distances))
+        for number, distance in enumerate(distances):
             rng = np.random.default_rng([seed, maze.size, index, distance])
             seen: set[tuple[Cell, Cell]] = set()
-            for _ in range(episodes_per_distance):
+            for _ in range(episodes_per_distance or whole + (number < rest)):
                 # A pair that was not drawn before, if one is found.
                 for _ in range(_MAX_DRAWS):
-                    pair = sample_pair(maze, distance, rng, start, goal)
+                    pair = sample_pair(maze, distance, rng, start, goal, joined)
                     if pair not in seen:
                         break
                 seen.add(pair)

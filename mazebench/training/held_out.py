@@ -12,7 +12,7 @@ from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
-from mazebench.tasks.task import Task
+from mazebench.tasks.task import Task, World, resolve
 from mazebench.tasks.task_options import SPARSE
 from mazebench.tasks.tracks import distance_of
 from mazebench.tasks.trials import draw_trials
@@ -33,7 +33,7 @@ class HeldOutEvaluation:
         """Draws the mazes; the goals are at five of the `distances`, or of those of the task's track."""
         mazes = task.mazes
         all_kinds = mazes.kinds if isinstance(mazes, FreshMazes) else (maze.kind for maze in mazes if maze.kind)
-        kinds = tuple(dict.fromkeys(all_kinds))  # each once; mazes of one's own have none
+        kinds = tuple(dict.fromkeys(all_kinds)) if task.shown is None else ()  # each once; own mazes have none
         if not distances:
             distances = _DISTANCES if task.track is None and kinds else task.options.distances or ()
         spread = np.linspace(min(distances), max(distances), len(_DISTANCES)).round().astype(int).tolist()
@@ -79,5 +79,6 @@ def _draw_maze(task: Task, kind: str, name: str, stream: np.random.SeedSequence)
 
 
 def _in_mazes(task: Task, *mazes: Maze) -> Task:
-    """Returns the same task in some mazes; an `InputError` if it can't be played in one of them."""
-    return task.replace(mazes=mazes, kinds=(), num_mazes=None, fresh=False, split=None)
+    """Returns the same task in some mazes that were drawn; an `InputError` if it can't be played in one of them."""
+    drawn = task.options.replace(mazes=None, kinds=(), num_mazes=len(mazes), fresh=False, split=None)
+    return resolve(drawn, read=World(mazes))

@@ -48,7 +48,9 @@ class TrainOptions(Options):
     ] = 5.0
     eval_mazes: Annotated[int, Ge(1), Doc("Held-out mazes of an evaluation, with 10 episodes in each.")] = 20
     first_distance: Annotated[
-        int | None, Ge(1), Doc("Cells, on a track metres, that goals are away at most in the beginning; all distances if not given.")
+        int | None,
+        Ge(1),
+        Doc("Cells, on a track metres, that goals are away at most in the beginning; all distances if not given."),
     ] = None
     widen_steps: Annotated[
         int, Ge(1), Doc("Agent steps over which that grows to the farthest distance of the task.")

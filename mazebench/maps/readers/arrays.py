@@ -39,7 +39,7 @@ def maze_from_array(array: Any, name: str = "maze", **options: Any) -> Maze:
       InputError: if an option is not allowed.
       MazeError: if the array holds something else, or no legal maze.
     """
-    return locate_maze(_grid_of_array(as_array(array, name), name), ReadOptions.of(options), name).maze
+    return locate_maze(grid_of_array(as_array(array, name), name), ReadOptions.of(options), name).maze
 
 
 def as_array(values: Any, name: str) -> np.ndarray:
@@ -75,13 +75,18 @@ def read_array_file(path: pathlib.Path) -> OccupancyGrid:
         raise InputError(f"{expected}, found {found} ({str(error)[:80]})") from error
     if len(arrays) != 1:
         raise InputError(f"{expected} with one array, found {len(arrays)}: {', '.join(loaded.files)}; save one as .npy")
-    return _grid_of_array(arrays[0], path.stem)
+    return grid_of_array(arrays[0], path.stem)
 
 
-def _grid_of_array(array: np.ndarray, name: str) -> OccupancyGrid:
+def grid_of_array(array: np.ndarray, name: str) -> OccupancyGrid:
+    """Returns the cells in an array, as `maze_from_array` takes it.
+
+    Raises:
+      MazeError: if the array holds something else.
+    """
     if isinstance(array, np.ma.MaskedArray):
         mask, known = np.ma.getmaskarray(array), array.compressed()
-        grid = _grid_of_array(array.filled(known[0] if len(known) else 0), name)
+        grid = grid_of_array(array.filled(known[0] if len(known) else 0), name)
         return dataclasses.replace(grid, states=np.where(mask, np.int8(UNKNOWN), grid.states))
     if array.dtype.kind == "U" and array.ndim == 2 and np.char.str_len(array).max(initial=0) == 1:
         return grid_of_characters(["".join(row) for row in array], name)

@@ -51,7 +51,7 @@ def _house(verts: Any, name: str) -> OccupancyGrid:
     states = np.full((height, width), OCCUPIED, np.uint8)
     pixels = np.floor((corners - low) / _RESOLUTION).astype(np.int32)
     cv2.fillPoly(states, [pixels], FREE)
-    return OccupancyGrid(states[::-1].astype(np.int8), _RESOLUTION, (float(low[0]), float(low[1]), 0.0))
+    return OccupancyGrid(states[::-1].astype(np.int8), _RESOLUTION, (float(low[0]), float(low[1]), 0.0), frame="map")
 
 
 def _array(value: Any) -> np.ndarray | None:

@@ -37,6 +37,8 @@ class OccupancyGrid:
     changes: tuple[str, ...] = ()  # how the states differ from the file's, in words
     shades: str = ""  # of the picture, and what they mean, in words
     is_cells: bool = False  # whether each pixel is a cell, of the size that the options say
+    # What the origin counts from: "map" is the frame of a map, which others share; else a picture's height and width.
+    frame: str | tuple[int, int] | None = None  # None: H and W
     is_defined: bool = False  # whether the format says what is wall, so that free and wall can't be mixed up
 
 
@@ -69,7 +71,7 @@ def locate_maze(grid: OccupancyGrid, options: ReadOptions, name: str) -> Located
     rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
     top, left = (int(rows[0]), int(columns[0])) if len(rows) else (0, 0)
     states = grid.states[top : rows[-1] + 1, left : columns[-1] + 1] if len(rows) else grid.states
-    blocked = _inflate(_walls(states, options.unknown), options.inflate / grid.resolution)
+    blocked = blocked_pixels(states, options, grid.resolution)
     pixels = 1 if grid.is_cells else _cell_pixels(blocked, grid.resolution, options, name)
     cell_size = options.cell_size or round(pixels * grid.resolution, 9)
     cells = lay_cells(blocked, pixels)
@@ -175,14 +177,17 @@ def _fewest_pixels(resolution: float) -> int:
     return max(1, math.ceil(MIN_CELL_SIZE / resolution - _TOLERANCE))
 
 
-def _walls(states: np.ndarray, unknown: str) -> np.ndarray:
-    """Returns `[H, W]` bool; unknown areas that reach the edge lie outside of the building and are always wall."""
+def blocked_pixels(states: np.ndarray, options: ReadOptions, resolution: float) -> np.ndarray:
+    """Returns which pixels of `states`, `resolution` m wide, can't be driven on: `[H, W]` bool.
+
+    Unknown areas that reach the edge lie outside of the building and are always wall.
+    """
     is_unknown = states == UNKNOWN
-    if unknown == "free":
+    if options.unknown == "free":
         areas, _ = scipy.ndimage.label(is_unknown)
         edges = np.concatenate([areas[0], areas[-1], areas[:, 0], areas[:, -1]])
         is_unknown &= np.isin(areas, edges)
-    return (states == OCCUPIED) | is_unknown
+    return _inflate((states == OCCUPIED) | is_unknown, options.inflate / resolution)
 
 
 def _inflate(walls: np.ndarray, num_pixels: float) -> np.ndarray:

@@ -118,7 +118,7 @@ def read_floor_plan(path: pathlib.Path, pixel_size: float) -> OccupancyGrid:
     states = _without_surroundings(states)
     rows, columns = _box_of_walls(states)
     x, y = columns.start * pixel_size, (len(states) - rows.stop) * pixel_size
-    return OccupancyGrid(states[rows, columns], pixel_size, origin=(x, y, 0.0), shades=shades)
+    return OccupancyGrid(states[rows, columns], pixel_size, (x, y, 0.0), shades=shades, frame=states.shape)
 
 
 def _box_of_walls(states: np.ndarray) -> tuple[slice, slice]:
@@ -175,7 +175,7 @@ def read_occupancy(path: pathlib.Path) -> OccupancyGrid:
         changes.append(f"yaw {yaw:g} read as 0")
         yaw = 0.0
     shades = f"its shades are {picture.min()} to {picture.max()}"
-    return OccupancyGrid(states, metadata.resolution, (x, y, yaw), tuple(changes), shades)
+    return OccupancyGrid(states, metadata.resolution, (x, y, yaw), tuple(changes), shades, frame="map")
 
 
 def is_map(path: pathlib.Path) -> bool:

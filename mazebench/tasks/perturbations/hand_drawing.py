@@ -126,7 +126,7 @@ def draw_displacement(size: int, rng: np.random.Generator, cell_size: float = 1.
 class HandDrawing(Drawing):
     """A hand drawing of a maze of N x N cells in a picture of P x P pixels, P = 2 N.
 
-    A point (down, right) of the maze, in metres, is displaced, and is then drawn at `origin + scale * point`, in pixels.
+    A point (down, right) of the maze, in metres, is displaced, and then drawn at `origin + scale * point`, in pixels.
     """
 
     pixels_per_cell = PIXELS

@@ -14,7 +14,7 @@ from mazebench.tasks.perturbations.perturbation import Perturbation, ShownMap
 from mazebench.tasks.streams import Stream
 
 # How many doors of a maze of 31 x 31 cells move, by kind, so that so many per cent of the shortest paths on the map are
-# blocked in the maze (`python -m benchmarks.tracks_checks swaps`). Mazes of no kind are taken for houses.
+# blocked in the maze (`python -m benchmarks.tracks_checks swaps`).
 SWAPS_BY_PERCENT = {
     "dfs": {45: 9, 70: 18, 85: 29},
     "house": {45: 3, 70: 7, 85: 12},
@@ -23,7 +23,7 @@ SWAPS_BY_PERCENT = {
     "hospital": {45: 5, 70: 10, 85: 17},
     "museum": {45: 3, 70: 6, 85: 10},
 }
-_DEFAULT_KIND = "house"
+_STRENGTHS = {45: 1, 70: 2, 85: 3}  # by per cent, see `mazebench.maps.changes`
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,7 +34,15 @@ class MovedDoors(Perturbation):
 
     stream = Stream.MOVED_DOORS
 
+    @property
+    def strength(self) -> int:
+        """The strength of the changes in a building of one's own that stand for these doors."""
+        return _STRENGTHS[self.percent]
+
     def require(self, maze: Maze) -> None:
+        if maze.kind not in SWAPS_BY_PERCENT:
+            found = f"kind {maze.kind!r}" if maze.kind else "none"
+            raise InputError(f"{maze.name}: expected a kind of {', '.join(SWAPS_BY_PERCENT)}, found {found}")
         needed, movable = self.num_swaps(maze), num_swappable(maze) - 2  # start and goal may be doors
         if movable < needed:
             raise InputError(f"{maze.name}: expected {needed} doors that can move, found {max(0, movable)}")
@@ -45,5 +53,5 @@ class MovedDoors(Perturbation):
 
     def num_swaps(self, maze: Maze | ShownMap) -> int:
         """Returns how many doors of a maze move; in mazes of other sizes, as many for each cell."""
-        swaps = SWAPS_BY_PERCENT.get(maze.kind, SWAPS_BY_PERCENT[_DEFAULT_KIND])[self.percent]
+        swaps = SWAPS_BY_PERCENT[maze.kind][self.percent]
         return max(1, round(swaps * (len(maze.walls) / KINDS_SIZE) ** 2))
