@@ -24,7 +24,8 @@ from mazebench.maps.maze import Maze, canonical_bytes
 from mazebench.maps.text import format_maze
 from mazebench.tasks.episode import sample_pair
 from mazebench.tasks.shown_map import leg_context, show_map
-from mazebench.tasks.task import Task
+from mazebench.tasks.task import Task, resolve_in
+from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import DISTANCES, LEVELS, TRACKS
 from mazebench.tasks.trials import Trial, episodes_file, make_trial
 
@@ -96,7 +97,7 @@ def contexts_hash(track: str, level: int, mazes: Sequence[Maze], trials: Sequenc
 
 
 def _task(track: str, level: int, mazes: Sequence[Maze]) -> Task:
-    return Task.of(track, mazes=list(mazes), level=level, distances=DISTANCES)
+    return resolve_in(mazes, TaskOptions(task=track, level=(level,), distances=DISTANCES))
 
 
 if __name__ == "__main__":

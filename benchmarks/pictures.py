@@ -33,7 +33,8 @@ from mazebench.results.played import Shown, shown_of
 from mazebench.results.reading import load_result
 from mazebench.results.trajectories import TRAJECTORIES, load_trajectories
 from mazebench.tasks.episode import Episode
-from mazebench.tasks.task import Task, resolve
+from mazebench.tasks.task import resolve, resolve_in
+from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import LEVELS, TRACKS
 
 FOLDER = pathlib.Path(__file__).parent.parent / "docs" / "images"
@@ -157,7 +158,8 @@ def play(maze: Maze, **options: Any) -> Played:
 
 def draw_planner() -> None:
     """Draws what the neural planner knows, pays and plans in the middle of an episode."""
-    task = Task.of("rebuilt", level=2, mazes=[load_kind_mazes("train")[HOUSE]], distances=35)
+    asked = TaskOptions(task="rebuilt", level=(2,), distances=(35,))
+    task = resolve_in([load_kind_mazes("train")[HOUSE]], asked)
     agent, envs = NeuralPlanner.build(task.interface), MazeVectorEnv(task, 1)
     state, new, steps = agent.initial_state(1), np.ones(1, dtype=bool), []
     observation, info = envs.reset(seed=4)

@@ -255,6 +255,16 @@ def resolve(
     )
 
 
+def resolve_in(mazes: Sequence[Maze], asked: TaskOptions) -> Task:
+    """Returns the task that options name in mazes of some kinds that were drawn already, whose doors move on tracks.
+
+    Raises:
+      InputError: as `resolve`.
+    """
+    drawn = asked.replace(mazes=None, kinds=(), num_mazes=len(mazes), fresh=False, split=None)
+    return resolve(drawn, read=World(tuple(mazes)))
+
+
 def resolve_for_evaluation(asked: TaskOptions, context_size_of: Callable[[int], int] = default_context_size) -> Task:
     """Returns the task of an evaluation: in eval mazes at distances of 1 to 15 if the options leave them open.
 
@@ -352,23 +362,23 @@ def _read(asked: TaskOptions) -> World:
     if asked.mazes is None:
         split = asked.split or "train"
         return World(load_mazes(size, split) if asked.track is None else load_kind_mazes(split))
-    world = _read_own(asked)
-    for maze in world.mazes:
+    mazes, shown, scenarios = _read_own(asked)
+    for maze in mazes:
         if asked.size not in (None, maze.size):
             raise InputError(f"expected mazes of size {asked.size}, found size {maze.size}")
-    if world.shown is None and asked.track is not None:
-        return _with_changes(asked, world.mazes)
-    return world
+    if shown is None and asked.track is not None:
+        return _with_changes(asked, mazes)
+    return World(mazes, shown, scenarios)
 
 
-def _read_own(asked: TaskOptions) -> World:
-    """Returns the mazes of one's own in which the task can be played, with the older maps that are given."""
-    mazes, shown, scenarios = asked.mazes, None, None
+def _read_own(asked: TaskOptions) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...] | None, Scenarios | None]:
+    """Returns the mazes of one's own in which the task can be played, with the older maps and scenarios of these."""
+    mazes, shown = asked.mazes, None
     if are_scenarios(mazes):
         scenarios = read_scenarios(mazes, asked.reading)
-        return World((scenarios.maze,), None, scenarios)
+        return (scenarios.maze,), None, scenarios
     if not isinstance(mazes, str):
-        return World(mazes, None if asked.shown is None else maps_in_texts(asked.shown, mazes))
+        return mazes, None if asked.shown is None else maps_in_texts(asked.shown, mazes), None
     from mazebench.maps.maze_files import read_mazes, read_with_older  # with all readers, which few commands need
 
     if asked.shown is None:
@@ -376,10 +386,10 @@ def _read_own(asked: TaskOptions) -> World:
     else:
         mazes, shown = read_with_older(mazes, asked.shown, asked.reading)
     kept = _playable(mazes, functools.partial(_check_maze, asked))
-    return World(tuple(mazes[each] for each in kept), None if shown is None else tuple(shown[each] for each in kept))
+    return tuple(mazes[each] for each in kept), None if shown is None else tuple(shown[each] for each in kept), None
 
 
-def _with_changes(asked: TaskOptions, plans: Mazes) -> World:
+def _with_changes(asked: TaskOptions, plans: tuple[Maze, ...]) -> World:
     """Returns buildings in which things have changed since their plans were drawn, if doors have moved on the track.
 
     Raises:
@@ -492,7 +502,7 @@ def _check_maze(asked: TaskOptions, maze: Maze, older: OlderMap | None = None) -
         raise InputError(f"{maze.name}: expected start and goal in different cells, found both in {start}")
 
 
-def _playable(mazes: Mazes, check: Callable[[Maze], Any]) -> list[int]:
+def _playable(mazes: Sequence[Maze], check: Callable[[Maze], Any]) -> list[int]:
     """Returns the numbers of the mazes that `check` lets pass, and warns of each other one.
 
     Raises:

@@ -221,8 +221,11 @@ class TaskOptions(SensorOptions, ReadOptions):
             if kind in NOVEL:
                 raise InputError(f"kind {kind!r}: only the eval split has it; kinds: {', '.join(DRAWN_KINDS)}")
         super().__post_init__()
+        has_both = self.mazes is not None and self.shown is not None
+        if has_both and isinstance(self.shown, str) != isinstance(self.mazes, str):
+            raise InputError("shown, an older map: expected a path beside the path of mazes, else values, as mazes are")
         if self.mazes is not None and not isinstance(self.mazes, str):
-            if self.shown is not None:
+            if has_both:
                 object.__setattr__(self, "shown", texts_of(self.shown, self.mazes, self.reading))
             object.__setattr__(self, "mazes", own_mazes(self.mazes, self.reading))
         object.__setattr__(self, "hide", tuple(sorted(self.hide, key=HIDEABLE.index)))
@@ -373,9 +376,9 @@ class TaskOptions(SensorOptions, ReadOptions):
     def own_in_words(self) -> tuple[str, ...]:
         """The choices of a user besides the mazes: the size of a cell, start and goal, noise on the senses."""
         scale = () if self.cell_size in (None, 1) else (f"cells of {self.cell_size:g} m",)
-        scale += () if self.shown is None else ("an older map shown",)
+        shown = () if self.shown is None else ("an older map shown",)
         ends = (f"{name} {end}" for name in ENDS if (end := getattr(self, name)) is not None)
-        return (*scale, *ends, *self.noise_in_words)
+        return (*scale, *shown, *ends, *self.noise_in_words)
 
     @property
     def _levels(self) -> str:
@@ -433,8 +436,6 @@ class TaskOptions(SensorOptions, ReadOptions):
         if self.shown is not None and (self.mazes is None or are_scenarios(self.mazes)):
             found = "none" if self.mazes is None else "scenarios"
             raise InputError(f"shown, an older map: expected mazes of your own beside it, found {found}")
-        if self.shown is not None and isinstance(self.shown, str) != isinstance(self.mazes, str):
-            raise InputError("shown, an older map: expected a path beside the path of mazes, else values, as mazes are")
         if self.is_drawn and self.split == "eval":
             raise InputError("mazes that are drawn: expected split 'train' or 'dev', found 'eval'")
         for name, found in options_in(self.changed(), ReadOptions).items():

@@ -78,13 +78,13 @@ def select_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_D
         return [trial for trial in trials if trial.distance in task.distances]
     if frozen_split is not None and task.options.is_hierarchical:
         return list(frozen_trials(task.name, task.size))
-    has_all = set(task.distances) <= set(EVAL_DISTANCES)
-    if frozen_split is not None and has_all and (episodes_per_distance or _PER_MAZE) <= EPISODES_PER_DISTANCE:
+    wanted = episodes_per_distance or _PER_MAZE
+    if frozen_split is not None and set(task.distances) <= set(EVAL_DISTANCES) and wanted <= EPISODES_PER_DISTANCE:
         # The frozen episodes of a maze and a distance follow each other, EPISODES_PER_DISTANCE of them.
         return [
             trial
             for index, trial in enumerate(frozen_trials(task.name, task.size))
-            if index % EPISODES_PER_DISTANCE < episodes_per_distance and trial.distance in task.distances
+            if index % EPISODES_PER_DISTANCE < wanted and trial.distance in task.distances
         ]
     return draw_trials(task, episodes_per_distance, seed)
 

@@ -12,7 +12,7 @@ from mazebench.evaluation.chunk import run_trials
 from mazebench.maps.drawn import FreshMazes
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
-from mazebench.tasks.task import Task, World, resolve
+from mazebench.tasks.task import Task, resolve_in
 from mazebench.tasks.task_options import SPARSE
 from mazebench.tasks.tracks import distance_of
 from mazebench.tasks.trials import draw_trials
@@ -80,5 +80,4 @@ def _draw_maze(task: Task, kind: str, name: str, stream: np.random.SeedSequence)
 
 def _in_mazes(task: Task, *mazes: Maze) -> Task:
     """Returns the same task in some mazes that were drawn; an `InputError` if it can't be played in one of them."""
-    drawn = task.options.replace(mazes=None, kinds=(), num_mazes=len(mazes), fresh=False, split=None)
-    return resolve(drawn, read=World(mazes))
+    return resolve_in(mazes, task.options)

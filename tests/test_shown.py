@@ -1,0 +1,182 @@
+"""An older map of one's own mazes, which is shown instead of them, and the tracks in cells that are not 1 m wide."""
+
+from __future__ import annotations
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+import mazebench
+from mazebench.errors import InputError
+from mazebench.maps.kinds import generate
+from mazebench.maps.maze import Maze
+from mazebench.maps.readers.ros import write_ros_map
+from mazebench.tasks.episode import Episode, sample_episode
+from mazebench.tasks.shown_map import show_map
+from mazebench.tasks.task import Task
+from mazebench.tasks.trials import draw_trials
+
+TASKS = [("local", 1), ("building", 1), ("building", 3), ("rebuilt", 1), ("adrift", 3), ("rough", 2)]
+
+
+def house(seed: int = 0, cell_size: float = 1.0) -> Maze:
+    return Maze(generate("house", 31, np.random.default_rng(seed)).walls, f"house-{seed}", cell_size)
+
+
+def with_door(maze: Maze) -> np.ndarray:
+    """The walls of an older map: a wall between two rooms is open, and a free cell is closed."""
+    walls = maze.walls.copy()
+    wall = next(cell for cell in np.argwhere(walls[1:-1, 1:-1]) + 1 if not walls[cell[0], cell[1] + [-1, 1]].any())
+    walls[tuple(wall)] = False
+    walls[tuple(maze.free_cells[0])] = True
+    return walls
+
+
+def options_of(task: str, level: int) -> dict:
+    return {"task": task} if task == "local" else {"task": task, "level": level}
+
+
+@pytest.mark.parametrize(("task", "level"), TASKS)
+def test_an_older_map_is_shown_and_start_and_goal_are_free_on_both(task, level):
+    maze = house()
+    older = with_door(maze)
+    spec = Task.of(**options_of(task, level), mazes=maze, shown=older)
+    for seed in range(20):
+        episode = sample_episode(spec, np.random.default_rng(seed))
+        assert (show_map(spec, episode).walls == older).all()
+        assert not older[episode.start]
+        assert not older[episode.goal]
+
+
+@pytest.mark.parametrize("task", ["local", "building"])
+def test_the_maze_as_its_own_older_map_changes_no_byte(task, tmp_path):
+    options = options_of(task, 1) | {"mazes": house(), "distances": (15, 20), "episodes_per_distance": 2}
+    for name, shown in (("without", {}), ("with", {"shown": house()})):
+        mazebench.evaluate("navigator", out=tmp_path / name, sensors=("lidar",), **options, **shown)
+    without, with_older = ((tmp_path / name / "episodes.jsonl").read_bytes() for name in ("without", "with"))
+    assert without == with_older
+
+
+def test_areas_that_are_apart_on_the_older_map_hold_no_start_and_goal():
+    walls = np.ones((9, 9), bool)
+    walls[1:-1, 1:-1] = False
+    older = walls.copy()
+    older[:, 6] = True  # the right side is cut off
+    spec = Task.of(mazes=Maze(walls), shown=older, distances=(1, 2, 3))
+    episodes = [sample_episode(spec, np.random.default_rng(seed)) for seed in range(30)]
+    assert all(cell[1] < 6 for episode in episodes for cell in (episode.start, episode.goal))
+    with pytest.raises(InputError, match="free and joined on the older map"):
+        mazebench.make(spec).reset(options={"episode": Episode(0, (1, 1), (1, 7), 0.0, 0)})
+
+
+def test_options_with_an_older_map_go_to_json_and_back():
+    spec = Task.of("rebuilt", mazes=[house(0), house(1)], shown=[with_door(house(0)), house(1).walls])
+    again = Task.from_json(json.loads(json.dumps(spec.to_json())))
+    assert again == spec
+    for first, second in zip(spec.shown, again.shown, strict=True):
+        assert (first.walls == second.walls).all()
+
+
+class TestRosMaps:
+    """Maps of ROS are laid on each other by their origins."""
+
+    def write(self, folder, name, maze, pixels, origin, crop=0, free_below=0):
+        """Writes a map with so many pixels a cell, rows and columns cut off around it or free ones added below."""
+        walls = np.pad(maze.walls, ((0, free_below), (0, 0)))
+        walls = walls[crop : len(walls) - crop, crop : walls.shape[1] - crop]
+        shades = np.where(walls, 0, 254).astype(np.uint8).repeat(pixels, 0).repeat(pixels, 1)
+        cv2.imwrite(str(folder / f"{name}.pgm"), shades)
+        x, y, yaw = origin
+        metadata = {"image": f"{name}.pgm", "resolution": maze.cell_size / pixels, "origin": [x, y, yaw], "negate": 0}
+        (folder / f"{name}.yaml").write_text(
+            yaml.safe_dump(metadata | {"occupied_thresh": 0.65, "free_thresh": 0.25})
+        )
+        return folder / f"{name}.yaml"
+
+    @pytest.mark.parametrize("yaw", [0.0, 0.5])
+    def test_a_part_in_other_pixels_lies_where_it_lay(self, tmp_path, yaw):
+        maze = house(cell_size=0.5)
+        new = self.write(tmp_path, "new", maze, 5, (3.0, -2.0, yaw))
+        right, up = 0.5 * np.array([np.cos(yaw) - np.sin(yaw), np.sin(yaw) + np.cos(yaw)])  # by a cell along both axes
+        old = self.write(tmp_path, "old", Maze(maze.walls, "old", 0.5), 10, (3.0 + float(right), -2.0 + float(up), yaw), crop=1)
+        spec = Task.of("building", mazes=new, shown=old, cell_size=0.5)
+        assert (spec.shown[0].walls == spec.mazes[0].walls).all()
+
+    def test_written_mazes_of_a_frame_register(self, tmp_path):
+        maze, origin = house(cell_size=0.5), (3.0, -2.0, 0.0)
+        old = self.write(tmp_path, "old", maze, 5, origin)
+        older = Maze(with_door(maze), "new", 0.5)
+        write_ros_map(older, tmp_path / "new.yaml", origin)
+        spec = Task.of("building", mazes=tmp_path / "new.yaml", shown=old)
+        assert (spec.mazes[0].walls == older.walls).all()
+        assert (spec.shown[0].walls == maze.walls).all()
+
+    def test_another_yaw_or_place_is_refused_with_the_number(self, tmp_path):
+        new = self.write(tmp_path, "new", house(cell_size=0.5), 5, (0.0, 0.0, 0.0))
+        turned = self.write(tmp_path, "turned", house(cell_size=0.5), 5, (0.0, 0.0, 0.1))
+        moved = self.write(tmp_path, "moved", house(cell_size=0.5), 5, (7.0, 0.0, 0.0))
+        with pytest.raises(InputError, match=r"turned by 0 rad, as new is, found 0\.1"):
+            Task.of("building", mazes=new, shown=turned)
+        with pytest.raises(InputError, match=r"at least 0\.5 of the free space .* found 0\.\d\d"):
+            Task.of("building", mazes=new, shown=moved)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"shown": np.zeros((31, 31))}, "expected mazes of your own beside it, found none"),
+        ({"kinds": ("house",), "shown": np.zeros((31, 31))}, "expected mazes of your own beside it, found none"),
+        ({"mazes": house(), "shown": house(1).walls[:-1]}, "expected an older map of 31 x 31, .* found 31 x 30"),
+        ({"mazes": [house(0), house(1), house(2)], "shown": [house(0), house(1)]}, "each of 3 mazes, .* found 2"),
+        ({"task": "rebuilt", "level": 2, "mazes": house(), "shown": house()}, "level 1 beside shown, .* found 2"),
+        ({"mazes": house(), "shown": "plan.yaml"}, "a path beside the path of mazes, else values"),
+        ({"mazes": house(), "shown": house(), "start": "0,0"}, "a wall or outside"),
+    ],
+)
+def test_what_does_not_go_together_is_refused_in_a_line(options, message):
+    with pytest.raises(InputError, match=message):
+        Task.of(**options)
+
+
+class TestMetres:
+    """On a track, lengths are in metres, however wide a cell is."""
+
+    def test_distances_and_limits_are_metres(self):
+        maze = house()
+        half = Maze(maze.walls.repeat(2, axis=0).repeat(2, axis=1), "half", 0.5)
+        whole, fine = (Task.of("building", mazes=each, distances=(15, 20)) for each in (maze, half))
+        assert (whole.distances, fine.distances) == ((15, 20), (30, 40))
+        assert whole.longest_episode == fine.longest_episode == 170
+        assert fine.options.distances == (15, 20)
+
+    def test_records_keep_cells_and_summaries_have_metres(self, tmp_path):
+        half = Maze(house().walls.repeat(2, axis=0).repeat(2, axis=1), "half", 0.5)
+        options = {"mazes": half, "distances": (15, 16), "episodes_per_distance": 1}
+        summary = mazebench.evaluate("random", "building", out=tmp_path / "run", **options)
+        assert list(summary.by_distance) == ["15", "16"]
+        record = json.loads((tmp_path / "run" / "episodes.jsonl").read_text().splitlines()[0])
+        assert (record["distance"], record["cell_size"]) == (30, 0.5)
+
+    def test_a_building_has_48_episodes(self):
+        trials = draw_trials(Task.of("building", mazes=house()), None)
+        assert len(trials) == 48
+        assert {trial.distance for trial in trials} == set(range(15, 41))
+
+    def test_larger_cells_are_refused_with_the_number(self):
+        with pytest.raises(InputError, match="expected cells of at most 1 m, found 1.2 m"):
+            Task.of("building", mazes=house(cell_size=1.2))
+
+    def test_a_map_that_a_hand_can_not_draw_is_refused_with_the_number(self):
+        large = Maze(np.pad(np.zeros((128, 128), bool), 1, constant_values=True), "hall", 0.5)
+        with pytest.raises(InputError, match="at most 127 cells a side.* found 130"):
+            Task.of("rough", mazes=large, shown=large)
+
+    def test_a_hand_bends_the_map_by_metres(self):
+        maze = house(cell_size=0.5)
+        spec = Task.of("rough", level=2, mazes=maze, shown=maze, distances=(8,))
+        drawing = show_map(spec, sample_episode(spec, np.random.default_rng(0))).drawing
+        moved = np.linalg.norm(drawing.displacement.at(maze.cell_size * (maze.free_cells + 0.5)), axis=1)
+        assert 0.5 < moved.max() < 1.01
