@@ -1,0 +1,191 @@
+"""A robot on the grid that believes its map: the shortest ways on the map, and what it drives in the building.
+
+It goes from cell to cell by a shortest 4-connected way on its map, sees the cells around it, corrects the map and plans
+again where the map was wrong.
+
+`P` is the number of pairs of a start and a goal, `K` of cells in sight and `W` of cells on ways. Cells are numbers,
+row * N + column.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mazebench.kernels import compiled
+
+_TOLERANCE = 1e-6  # cells
+
+
+def sight_lines(reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the cells that are at most `reach` cells away, the nearest first, and the cell before each.
+
+    A cell is in sight if all before it on its line are free.
+
+    Returns:
+      offsets: `[K, 2]` int, rows and columns from the robot's cell, which is the first.
+      before: `[K]` int, the index of the next cell of the line back to the robot.
+    """
+    side = np.arange(-math.floor(reach + _TOLERANCE), math.floor(reach + _TOLERANCE) + 1)
+    offsets = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
+    squares = (offsets**2).sum(axis=1)
+    near = np.argsort(squares, kind="stable")[: (squares <= (reach + _TOLERANCE) ** 2).sum()]
+    offsets = offsets[near]
+
+    # One step back along the longer axis, and on the other axis to the nearest cell, of two the nearer one.
+    steps = np.maximum(np.abs(offsets).max(axis=1, keepdims=True), 1)
+    sizes = (2 * np.abs(offsets) * (steps - 1) + steps - 1) // (2 * steps)
+    index = {tuple(offset): number for number, offset in enumerate(offsets.tolist())}
+    before = [index[tuple(offset)] for offset in (np.sign(offsets) * sizes).tolist()]
+    return offsets, np.array(before)
+
+
+@compiled
+def plan(
+    walls: np.ndarray, start: int, goal: int, cost: np.ndarray, came: np.ndarray, now: np.ndarray, later: np.ndarray
+) -> int:
+    """Returns the length of a shortest way in cells, -1 if there is none; `came` leads back from the goal.
+
+    It is an A* search with the Manhattan distance, in which a step costs nothing if it leads nearer to the goal, else
+    one detour.
+
+    Args:
+      walls: `[N, N]` bool, with a closed border.
+      cost: `[N * N]` int32, where the search keeps the detours to each cell.
+      came: `[N * N]` int32, where it keeps the cell before each.
+      now: `[4 * N * N]` int32, for the cells to search by this number of detours.
+      later: likewise, by one more.
+    """
+    size, flat = len(walls), walls.ravel()
+    goal_row, goal_column = goal // size, goal % size
+    cost[:] = 2**30
+    cost[start], came[start], now[0] = 0, start, start
+    detours, num_now, num_later = 0, 1, 0
+    while True:
+        if num_now == 0:
+            if num_later == 0:
+                return -1
+            now, later, num_now, num_later = later, now, num_later, 0
+            detours += 1
+        num_now -= 1
+        cell = now[num_now]
+        if cost[cell] != detours:
+            continue  # it was reached with fewer
+        row, column = cell // size, cell % size
+        if cell == goal:
+            return abs(start // size - goal_row) + abs(start % size - goal_column) + 2 * detours
+        for step in (1, size, -1, -size):
+            other = cell + step
+            if flat[other]:
+                continue
+            if step == 1:
+                nearer = column < goal_column
+            elif step == -1:
+                nearer = column > goal_column
+            elif step == size:
+                nearer = row < goal_row
+            else:
+                nearer = row > goal_row
+            if nearer and detours < cost[other]:
+                cost[other], came[other], now[num_now] = detours, cell, other
+                num_now += 1
+            elif not nearer and detours + 1 < cost[other]:
+                cost[other], came[other], later[num_later] = detours + 1, cell, other
+                num_later += 1
+
+
+@compiled
+def shortest_ways(walls: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the shortest ways that a robot plans on a map.
+
+    Args:
+      walls: `[N, N]` bool, of the map.
+      pairs: `[P, 2]` int, start and goal, which are joined.
+
+    Returns:
+      cells: `[W]` int, of one way after the other, each from its goal to its start.
+      lengths: `[P]` int, the number of steps of each way, one less than its cells.
+    """
+    cost, came = np.empty(walls.size, np.int32), np.empty(walls.size, np.int32)
+    now, later = np.empty(4 * walls.size, np.int32), np.empty(4 * walls.size, np.int32)
+    cells = [0 for _ in range(0)]
+    lengths = np.empty(len(pairs), np.int64)
+    for number in range(len(pairs)):
+        start, cell = pairs[number]
+        lengths[number] = plan(walls, start, cell, cost, came, now, later)
+        while cell != start:
+            cells.append(cell)
+            cell = came[cell]
+        cells.append(cell)
+    return np.array(cells), lengths
+
+
+@compiled
+def follow(
+    walls: np.ndarray, shown: np.ndarray, pairs: np.ndarray, offsets: np.ndarray, before: np.ndarray, most: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns how far a robot drives that follows its map.
+
+    Where the map shows no way, the robot forgets the walls on it that it has not seen.
+
+    Args:
+      walls: `[N, N]` bool, of the building, with a closed border.
+      shown: `[N, N]` bool, of the robot's map, with a closed border.
+      pairs: `[P, 2]` int, start and goal, which are free and joined in the building.
+      offsets: of `sight_lines`.
+      before: of `sight_lines`.
+      most: times the shortest way, where the robot ends its drive if it can't reach the goal within that.
+
+    Returns:
+      driven: `[P]` int, cells; where the drive has ended, what it would have been at least.
+      shortest: `[P]` int, cells of a shortest way in the building.
+    """
+    size = len(walls)
+    true, cost, came = walls.ravel(), np.empty(walls.size, np.int32), np.empty(walls.size, np.int32)
+    now, later = np.empty(4 * walls.size, np.int32), np.empty(4 * walls.size, np.int32)
+    ahead = np.empty(walls.size, np.int32)  # of each cell of the way, the next one
+    on_way, is_seen = np.empty(walls.size, np.int32), np.empty(walls.size, np.bool_)
+    in_sight = np.empty(len(offsets), np.bool_)
+    driven, shortest = np.zeros(len(pairs), np.int64), np.empty(len(pairs), np.int64)
+    for number in range(len(pairs)):
+        here, goal = pairs[number]
+        shortest[number] = plan(walls, here, goal, cost, came, now, later)
+        limit = most * shortest[number]
+        belief = shown.copy()
+        belief_of = belief.ravel()
+        is_seen[:], on_way[:] = False, 0
+        num_plans, is_wrong = 0, True
+        while here != goal:
+            # See, and correct the map.
+            for index in range(len(offsets)):
+                in_sight[index] = index == 0 or in_sight[before[index]]
+                if not in_sight[index]:
+                    continue
+                cell = here + offsets[index, 0] * size + offsets[index, 1]
+                in_sight[index] = not true[cell]
+                if not is_seen[cell]:
+                    is_seen[cell] = True
+                    if belief_of[cell] != true[cell]:
+                        belief_of[cell] = true[cell]
+                        is_wrong |= not true[cell] or on_way[cell] == num_plans
+
+            # Plan again if the way is blocked, or may not be the shortest any more.
+            if is_wrong:
+                if plan(belief, here, goal, cost, came, now, later) < 0:
+                    belief_of &= ~shown.ravel() | is_seen
+                    plan(belief, here, goal, cost, came, now, later)
+                num_plans, is_wrong = num_plans + 1, False
+                cell = goal
+                while cell != here:
+                    on_way[cell], ahead[came[cell]] = num_plans, cell
+                    cell = came[cell]
+
+            # Drive on.
+            here = ahead[here]
+            driven[number] += 1
+            left = abs(here // size - goal // size) + abs(here % size - goal % size)
+            if driven[number] + left > limit:
+                driven[number] += left
+                break
+    return driven, shortest
