@@ -19,26 +19,32 @@ _TOLERANCE = 1e-6  # cells
 
 
 def sight_lines(reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the cells that are at most `reach` cells away, the nearest first, and the cell before each.
+    """Returns the cells at most `reach` cells away, in an order in which those behind a cell follow it.
 
-    A cell is in sight if all before it on its line are free.
+    Lines of sight lead from cell to cell, so that they form a tree. A wall hides all cells behind it.
 
     Returns:
       offsets: `[K, 2]` int, rows and columns from the robot's cell, which is the first.
-      before: `[K]` int, the index of the next cell of the line back to the robot.
+      after: `[K]` int, the index of the first cell that is not behind the cell.
     """
-    side = np.arange(-math.floor(reach + _TOLERANCE), math.floor(reach + _TOLERANCE) + 1)
-    offsets = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(-1, 2)
-    squares = (offsets**2).sum(axis=1)
-    near = np.argsort(squares, kind="stable")[: (squares <= (reach + _TOLERANCE) ** 2).sum()]
-    offsets = offsets[near]
+    longest = math.floor(reach + _TOLERANCE)
+    behind: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for row, column in np.ndindex(2 * longest + 1, 2 * longest + 1):
+        row, column = row - longest, column - longest
+        if 0 < row**2 + column**2 <= (reach + _TOLERANCE) ** 2:
+            # One step back along the longer axis, and to the nearest cell of the line along the other one.
+            steps = max(abs(row), abs(column))
+            before = round(row * (steps - 1) / steps), round(column * (steps - 1) / steps)
+            behind.setdefault(before, []).append((row, column))
 
-    # One step back along the longer axis, and on the other axis to the nearest cell, of two the nearer one.
-    steps = np.maximum(np.abs(offsets).max(axis=1, keepdims=True), 1)
-    sizes = (2 * np.abs(offsets) * (steps - 1) + steps - 1) // (2 * steps)
-    index = {tuple(offset): number for number, offset in enumerate(offsets.tolist())}
-    before = [index[tuple(offset)] for offset in (np.sign(offsets) * sizes).tolist()]
-    return offsets, np.array(before)
+    # Each cell, then those behind it; a cell's number of cells on and behind it is known once they are.
+    offsets, left, num_from = [], [(0, 0)], {}
+    while left:
+        offsets.append(left.pop())
+        left += behind.get(offsets[-1], [])
+    for cell in reversed(offsets):
+        num_from[cell] = 1 + sum(num_from[each] for each in behind.get(cell, []))
+    return np.array(offsets), np.arange(len(offsets)) + [num_from[cell] for cell in offsets]
 
 
 @compiled
@@ -109,7 +115,7 @@ def shortest_ways(walls: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.
     """
     cost, came = np.empty(walls.size, np.int32), np.empty(walls.size, np.int32)
     now, later = np.empty(4 * walls.size, np.int32), np.empty(4 * walls.size, np.int32)
-    cells = [0 for _ in range(0)]
+    cells = [0]  # numba takes the type from an element
     lengths = np.empty(len(pairs), np.int64)
     for number in range(len(pairs)):
         start, cell = pairs[number]
@@ -118,13 +124,13 @@ def shortest_ways(walls: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.
             cells.append(cell)
             cell = came[cell]
         cells.append(cell)
-    return np.array(cells), lengths
+    return np.array(cells[1:]), lengths
 
 
 @compiled
 def follow(
-    walls: np.ndarray, shown: np.ndarray, pairs: np.ndarray, offsets: np.ndarray, before: np.ndarray, most: float
-) -> tuple[np.ndarray, np.ndarray]:
+    walls: np.ndarray, shown: np.ndarray, pairs: np.ndarray, offsets: np.ndarray, after: np.ndarray, most: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns how far a robot drives that follows its map.
 
     Where the map shows no way, the robot forgets the walls on it that it has not seen.
@@ -134,20 +140,22 @@ def follow(
       shown: `[N, N]` bool, of the robot's map, with a closed border.
       pairs: `[P, 2]` int, start and goal, which are free and joined in the building.
       offsets: of `sight_lines`.
-      before: of `sight_lines`.
+      after: of `sight_lines`.
       most: times the shortest way, where the robot ends its drive if it can't reach the goal within that.
 
     Returns:
       driven: `[P]` int, cells; where the drive has ended, what it would have been at least.
       shortest: `[P]` int, cells of a shortest way in the building.
+      boxes: `[P, 4]` int, the first and the last row and column, in turn, of the cells from which it looked.
     """
     size = len(walls)
     true, cost, came = walls.ravel(), np.empty(walls.size, np.int32), np.empty(walls.size, np.int32)
     now, later = np.empty(4 * walls.size, np.int32), np.empty(4 * walls.size, np.int32)
     ahead = np.empty(walls.size, np.int32)  # of each cell of the way, the next one
     on_way, is_seen = np.empty(walls.size, np.int32), np.empty(walls.size, np.bool_)
-    in_sight = np.empty(len(offsets), np.bool_)
+    steps = offsets[:, 0] * size + offsets[:, 1]
     driven, shortest = np.zeros(len(pairs), np.int64), np.empty(len(pairs), np.int64)
+    boxes = np.empty((len(pairs), 4), np.int64)
     for number in range(len(pairs)):
         here, goal = pairs[number]
         shortest[number] = plan(walls, here, goal, cost, came, now, later)
@@ -156,24 +164,23 @@ def follow(
         belief_of = belief.ravel()
         is_seen[:], on_way[:] = False, 0
         num_plans, is_wrong = 0, True
+        first_row, first_column, last_row, last_column = size, size, 0, 0
         while here != goal:
             # See, and correct the map.
-            for index in range(len(offsets)):
-                in_sight[index] = index == 0 or in_sight[before[index]]
-                if not in_sight[index]:
-                    continue
-                cell = here + offsets[index, 0] * size + offsets[index, 1]
-                in_sight[index] = not true[cell]
+            index = 0
+            while index < len(steps):
+                cell = here + steps[index]
                 if not is_seen[cell]:
                     is_seen[cell] = True
                     if belief_of[cell] != true[cell]:
                         belief_of[cell] = true[cell]
                         is_wrong |= not true[cell] or on_way[cell] == num_plans
+                index = after[index] if true[cell] else index + 1
 
             # Plan again if the way is blocked, or may not be the shortest any more.
             if is_wrong:
                 if plan(belief, here, goal, cost, came, now, later) < 0:
-                    belief_of &= ~shown.ravel() | is_seen
+                    belief[1:-1, 1:-1] &= ~shown[1:-1, 1:-1] | is_seen.reshape(walls.shape)[1:-1, 1:-1]
                     plan(belief, here, goal, cost, came, now, later)
                 num_plans, is_wrong = num_plans + 1, False
                 cell = goal
@@ -182,10 +189,14 @@ def follow(
                     cell = came[cell]
 
             # Drive on.
+            row, column = here // size, here % size
+            first_row, last_row = min(first_row, row), max(last_row, row)
+            first_column, last_column = min(first_column, column), max(last_column, column)
             here = ahead[here]
             driven[number] += 1
             left = abs(here // size - goal // size) + abs(here % size - goal % size)
             if driven[number] + left > limit:
                 driven[number] += left
                 break
-    return driven, shortest
+        boxes[number] = first_row, first_column, last_row, last_column
+    return driven, shortest, boxes

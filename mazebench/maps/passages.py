@@ -30,6 +30,11 @@ class Passages(NamedTuple):
     sides: np.ndarray  # [D, 2, 2] int: a free cell on each side of the strip
     is_open: np.ndarray  # [D] bool
 
+    def box(self, index: int) -> tuple[slice, slice]:
+        """Returns the rows and columns of a passage."""
+        top, left, bottom, right = self.boxes[index].tolist()
+        return slice(top, bottom), slice(left, right)
+
 
 def find_passages(walls: np.ndarray, cell_size: float) -> Passages:
     """Returns the passages of a building.

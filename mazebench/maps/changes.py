@@ -1,0 +1,332 @@
+"""Buildings in which things have changed since their map was drawn.
+
+The maze that is given is the old map, here called the plan. In a changed building, open passages are closed, walled
+ones are opened, and furniture has come and gone. The strength of the changes is their cost to a robot on the grid that
+believes the plan: an episode is late if the robot drives over 1.25 times the shortest way. All draws and decisions are
+made in whole numbers, so that one seed gives one building on every machine.
+
+`P` is the number of pairs of a start and a goal, `W` of cells on ways, `D` of passages, and `N` of rows and columns.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+import scipy
+
+from mazebench.constants import ON_TIME
+from mazebench.errors import InputError
+from mazebench.maps.follower import follow, shortest_ways, sight_lines
+from mazebench.maps.maze import Maze
+from mazebench.maps.passages import Passages, find_passages
+from mazebench.maps.search import search
+
+LATE = (0.15, 0.3, 0.4)  # share of late episodes at strengths 1, 2, 3; on the track `rebuilt` .16, .31 and .38
+LATE_WITHOUT_MAP = 0.2  # the least in a changed building; with less, no map is worth much there
+LATE_IN_PLAN = 0.1  # the least in the plan, without a map; with less, the changes alone would make up the building
+WORTH = 0.05  # at strength 1, the least by which lateness without a map is above lateness with the plan
+SIGHT = 3.5  # m, how far the robot sees
+NEAREST, FARTHEST = 15.0, 40.0  # m from start to goal, as on the tracks
+FURNITURE = 0.5, 2.0  # m, the sides of pieces of furniture
+CLEAR = 0.6  # m, that stay free around furniture
+_NUM_PAIRS = 1000  # on which lateness is measured, with a standard error below .016
+_TOLERANCE = 0.02  # of lateness on these pairs
+_NUM_TRIES, _NUM_STEPS = 6, 40  # of a strength, and of changes in a try
+_CELL = 1e-6  # cells, a tolerance
+
+
+@dataclasses.dataclass(frozen=True)
+class Change:
+    """A changed building, what has changed in it, and the shares of episodes that are late in it."""
+
+    maze: Maze
+    strength: int
+    closed: int  # passages that were open
+    opened: int  # passages that were walled
+    added: int  # pieces of furniture
+    removed: int  # pieces of furniture
+    late: float  # of a robot that believes the plan
+    late_without_map: float  # of a robot that takes for free what it has not seen
+    blocked: float  # share of episodes in which the shortest way on the plan is blocked
+
+
+def changed(maze: Maze, strength: int, rng: np.random.Generator) -> Maze:
+    """Returns a building in which things have changed since `maze` was drawn, its old map.
+
+        >>> plan = mazebench.generate("house", 31, np.random.default_rng(0))
+        >>> building = mazebench.changed(plan, 1, np.random.default_rng(0))
+        >>> building.name, building.size, building == plan
+        ('house-31-changed', 31, False)
+
+    Passages of up to 2.4 m are closed, doors are opened in walls, and furniture comes and goes. The building has the
+    cells of the old map, their size and its kind. The changes of a larger strength begin with those of a smaller one.
+
+    Args:
+      maze: the old map.
+      strength: 1, 2 or 3. A robot that drives by the old map takes over 1.25 times the shortest way in .15, .3 and .4
+        of episodes.
+      rng: the random stream, of which one number is drawn.
+
+    Raises:
+      InputError: if the building can't carry the strength, with the share of late episodes that was found.
+    """
+    return change(maze, strength, rng, f"{maze.name}-changed").maze
+
+
+def changed_buildings(maze: Maze, strength: int, count: int, seed: int) -> tuple[Maze, ...]:
+    """Returns `count` changed buildings of one old map, named after it with `-changed-1` and so on; see `changed`.
+
+    The first ones do not depend on `count`.
+
+    Raises:
+      InputError: if a building can't carry the strength.
+    """
+    return tuple(each.maze for each in changes(maze, strength, count, seed))
+
+
+def changes(maze: Maze, strength: int, count: int, seed: int) -> Iterator[Change]:
+    """Yields the changed buildings that `changed_buildings` returns, with what has changed in them."""
+    for index in range(count):
+        yield change(maze, strength, np.random.default_rng([seed, index]), f"{maze.name}-changed-{index + 1}")
+
+
+def change(maze: Maze, strength: int, rng: np.random.Generator, name: str) -> Change:
+    """Returns what `changed` does, with that name and with what has changed.
+
+    Raises:
+      InputError: as `changed` does.
+    """
+    if strength not in (1, 2, 3):
+        raise InputError(f"expected a strength of 1 to 3, found {strength!r}")
+    if not isinstance(rng, np.random.Generator):
+        raise InputError(f"expected rng as a numpy.random.Generator, found {type(rng).__name__}")
+    plan = _Plan(maze, seed=int(rng.integers(2**63)))
+    late = plan.late_without_map(maze.walls)
+    if late < LATE_IN_PLAN:
+        raise InputError(
+            f"{maze.name}: expected a building in which a robot without a map is late in at least {LATE_WITHOUT_MAP} "
+            f"of the episodes, and before it has changed in at least {LATE_IN_PLAN}; found {late:.2f}"
+        )
+    draft = plan.unchanged()
+    for each in range(1, strength + 1):
+        draft, late = _changed_more(plan, draft, each)
+    return Change(
+        dataclasses.replace(maze, walls=draft.walls, name=name),
+        strength,
+        *(draft.closed, draft.opened, draft.added, draft.removed),
+        late=draft.late,
+        late_without_map=late,
+        blocked=float(plan.is_blocked(draft.walls).mean()),
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class _Draft:
+    """A building while things change in it, with the drives of a robot that believes the plan."""
+
+    walls: np.ndarray  # [N, N] bool
+    can_change: np.ndarray  # [D] bool, the passages that may still change
+    things: tuple[int, ...]  # the plan's pieces of furniture that are left
+    driven: np.ndarray  # [P] int, as `follow` returns it
+    shortest: np.ndarray  # [P] int
+    seen: np.ndarray  # [P, 4] int, boxes with all that was seen: first row and column, last row and column
+    late: float = 0.0
+    closed: int = 0
+    opened: int = 0
+    added: int = 0
+    removed: int = 0
+
+
+class _Plan:
+    """The old map with what can change, and the pairs of a start and a goal on which lateness is measured."""
+
+    def __init__(self, maze: Maze, seed: int):
+        self.walls, self.cell_size, self.name, self.seed = maze.walls, maze.cell_size, maze.name, seed
+        self.pairs = _draw_pairs(maze, np.random.default_rng([seed, 0]))  # [P, 2] int
+        self.way_cells, lengths = shortest_ways(maze.walls, self.pairs)  # [W] int
+        self.way_pairs = np.repeat(np.arange(len(lengths)), lengths + 1)  # [W] int, the pair of each cell
+        self.passages: Passages = find_passages(maze.walls, maze.cell_size)
+        self.sight = max(1.0, SIGHT / maze.cell_size)  # cells
+        self._lines = sight_lines(self.sight)
+
+        # Furniture: walls that touch no others, not even at a corner.
+        areas, _ = scipy.ndimage.label(maze.walls, np.ones((3, 3)))
+        boxes = enumerate(scipy.ndimage.find_objects(areas), start=1)
+        most = FURNITURE[1] / maze.cell_size + _CELL
+        self.things = [
+            (box, areas[box] == number) for number, box in boxes if max(side.stop - side.start for side in box) <= most
+        ]
+
+    def unchanged(self) -> _Draft:
+        """Returns the building in which nothing has changed."""
+        nothing = np.zeros(len(self.pairs), dtype=np.int64)
+        draft = _Draft(
+            walls=self.walls,
+            can_change=np.ones(len(self.passages.is_open), dtype=bool),
+            things=tuple(range(len(self.things))),
+            driven=nothing,
+            shortest=nothing,
+            seen=np.zeros((len(self.pairs), 4), dtype=np.int64),
+        )
+        return self.measured(draft, is_affected=np.ones(len(self.pairs), dtype=bool))
+
+    def measured(self, draft: _Draft, is_affected: np.ndarray) -> _Draft:
+        """Returns a draft with the drives of the affected pairs (`[P]` bool) and with its lateness."""
+        is_free = ~draft.walls.ravel()[self.pairs].any(axis=1)
+        stale = np.flatnonzero(is_affected & is_free)
+        driven, shortest, seen = draft.driven.copy(), draft.shortest.copy(), draft.seen.copy()
+        driven[stale], shortest[stale], boxes = follow(
+            draft.walls, self.walls, self.pairs[stale], *self._lines, ON_TIME[0]
+        )
+        reach = math.floor(self.sight + _CELL)
+        seen[stale] = boxes + (-reach, -reach, reach, reach)
+        late = float((driven > ON_TIME[0] * shortest)[is_free].mean()) if is_free.any() else 0.0
+        return dataclasses.replace(draft, driven=driven, shortest=shortest, seen=seen, late=late)
+
+    def affected(self, before: _Draft, walls: np.ndarray) -> np.ndarray:
+        """Returns the pairs whose drive or shortest way may be another one in `walls`: `[P]` bool."""
+        row, column = np.nonzero(before.walls != walls)
+        first_row, first_column, last_row, last_column = before.seen.T[..., None]
+        is_seen = (first_row <= row) & (row <= last_row) & (first_column <= column) & (column <= last_column)
+        rows, columns = np.divmod(self.pairs[..., None], len(walls))  # [P, 2, 1]
+        is_near = (np.abs(rows - row) + np.abs(columns - column)).sum(axis=1) <= before.shortest[:, None]
+        return (is_seen | is_near).any(axis=1)
+
+    def late_without_map(self, walls: np.ndarray) -> float:
+        """Returns the share of late episodes of a robot that takes for free what it has not seen."""
+        shown = np.ones_like(walls)
+        shown[1:-1, 1:-1] = False
+        pairs = self.pairs[~walls.ravel()[self.pairs].any(axis=1)]
+        driven, shortest, _ = follow(walls, shown, pairs, *self._lines, ON_TIME[0])
+        return float((driven > ON_TIME[0] * shortest).mean()) if len(pairs) else 0.0
+
+    def is_blocked(self, walls: np.ndarray) -> np.ndarray:
+        """Returns the pairs whose shortest way on the plan is blocked: `[P]` bool."""
+        return np.bincount(self.way_pairs, walls.ravel()[self.way_cells]) > 0
+
+
+def _changed_more(plan: _Plan, draft: _Draft, strength: int) -> tuple[_Draft, float]:
+    """Returns a draft of the next smaller strength, changed until it has this one, and its lateness without a map.
+
+    Raises:
+      InputError: if no such draft was found.
+    """
+    target = LATE[strength - 1]
+    most_late, most_without = 0.0, None
+    for number in range(_NUM_TRIES):
+        rng, now = np.random.default_rng([plan.seed, strength, number]), draft
+        for _ in range(_NUM_STEPS):
+            if now.late >= target - _TOLERANCE or (new := _step(plan, now, rng)) is None:
+                break
+            if new.walls is not now.walls:
+                new = plan.measured(new, plan.affected(now, new.walls))
+            if now.late <= new.late <= target + _TOLERANCE:
+                now = new
+        most_late = max(most_late, now.late)
+        if now.late >= target - _TOLERANCE:
+            without_map = plan.late_without_map(now.walls)
+            if without_map >= LATE_WITHOUT_MAP and (strength > 1 or without_map >= now.late + WORTH):
+                return now, without_map
+            most_without = max(most_without or 0.0, without_map)
+    if most_without is None:
+        raise InputError(
+            f"{plan.name}: expected changes of strength {strength}, by which a robot with the old map is late in "
+            f"{target} of the episodes, found {most_late:.2f}"
+        )
+    raise InputError(
+        f"{plan.name}: expected a building in which a robot without a map is late in at least {LATE_WITHOUT_MAP} of the "
+        f"episodes, and at strength 1 in {WORTH} more than with the old map, found {most_without:.2f}"
+    )
+
+
+def _step(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft | None:
+    """Returns a draft in which one passage more has changed, or only can't change any more; None if none can change.
+
+    With a passage, a piece of furniture comes or goes in half of the steps.
+    """
+    # The passages to close, by how many ways pass that nothing blocks yet; those to open, one like the other.
+    passages = plan.passages
+    cells = plan.way_cells[~plan.is_blocked(draft.walls)[plan.way_pairs]]
+    num_ways = np.bincount(cells, minlength=draft.walls.size).reshape(draft.walls.shape)
+    weights = np.zeros(len(passages.is_open), dtype=np.int64)
+    for index in np.flatnonzero(draft.can_change & passages.is_open):
+        weights[index] = num_ways[passages.box(index)].max()
+    walled = draft.can_change & ~passages.is_open
+    if not weights.any() or (rng.integers(4) == 0 and walled.any()):
+        weights = walled.astype(np.int64)
+    if not weights.any():
+        return None
+
+    # One of them. If that parts the building, a door is opened between the two parts.
+    index = int(weights.cumsum().searchsorted(rng.integers(weights.sum()), side="right"))
+    new = _turned(plan, draft, index)
+    areas, num_areas = scipy.ndimage.label(~new.walls)
+    if num_areas == 2 and passages.is_open[index]:
+        first, second = areas[tuple(passages.sides.T)]
+        doors = np.flatnonzero(walled & new.can_change & (first > 0) & (second > 0) & (first != second))
+        if len(doors):
+            new = _turned(plan, new, int(rng.choice(doors)))
+            num_areas = 1
+    if num_areas != 1:
+        return dataclasses.replace(draft, can_change=draft.can_change & (np.arange(len(weights)) != index))
+    return _furnished(plan, new, rng) if rng.integers(2) else new
+
+
+def _turned(plan: _Plan, draft: _Draft, index: int) -> _Draft:
+    """Returns a draft in which a passage is closed that is open on the plan, or opened; those that touch it stay."""
+    is_open = bool(plan.passages.is_open[index])
+    walls = draft.walls.copy()
+    walls[plan.passages.box(index)] = is_open
+    top, left, bottom, right = plan.passages.boxes.T
+    touches = (top <= bottom[index]) & (bottom >= top[index]) & (left <= right[index]) & (right >= left[index])
+    can_change = draft.can_change & ~touches
+    if is_open:
+        return dataclasses.replace(draft, walls=walls, can_change=can_change, closed=draft.closed + 1)
+    return dataclasses.replace(draft, walls=walls, can_change=can_change, opened=draft.opened + 1)
+
+
+def _furnished(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft:
+    """Returns a draft in which a piece of furniture has gone or come; neither can part the building."""
+    walls = draft.walls.copy()
+    if draft.things and rng.integers(2):
+        index = int(rng.choice(draft.things))
+        box, shape = plan.things[index]
+        walls[box] &= ~shape
+        things = tuple(each for each in draft.things if each != index)
+        return dataclasses.replace(draft, walls=walls, things=things, removed=draft.removed + 1)
+
+    # Of a size in whole cells, where it and its surroundings are free.
+    least, most = (round(FURNITURE[0] / plan.cell_size + 0.49), int(FURNITURE[1] / plan.cell_size + _CELL))
+    height, width = rng.integers(least, max(least, most) + 1, 2)
+    clear = math.ceil(CLEAR / plan.cell_size - _CELL)
+    need = np.ones((height + 2 * clear, width + 2 * clear), dtype=np.uint8)
+    fits = cv2.erode((~walls).astype(np.uint8), need, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0)
+    places = np.argwhere(fits)
+    if not len(places):
+        return draft
+    row, column = rng.choice(places) + clear
+    walls[row : row + height, column : column + width] = True
+    return dataclasses.replace(draft, walls=walls, added=draft.added + 1)
+
+
+def _draw_pairs(maze: Maze, rng: np.random.Generator) -> np.ndarray:
+    """Returns pairs of a start and a goal, as cell numbers: `[P, 2]` int; their distances are all equally frequent.
+
+    They are 15 to 40 m, or the longer half of what there is.
+    """
+    free = np.flatnonzero(~maze.walls)
+    farthest, _ = search(maze.walls, free[0], -1, maze.walls.size)
+    _, ends = search(maze.walls, farthest[-1], -1, maze.walls.size)
+    most = min(FARTHEST / maze.cell_size + _CELL, len(ends) - 1)
+    least = math.ceil(min(NEAREST / maze.cell_size - _CELL, most / 2))
+    pairs: list[tuple[int, int]] = []
+    while len(pairs) < _NUM_PAIRS:
+        distance, start = int(rng.integers(least, int(most) + 1)), rng.choice(free)
+        cells, ends = search(maze.walls, start, -1, distance)
+        if len(ends) > distance:
+            pairs.append((start, rng.choice(cells[ends[distance - 1] if distance else 0 :])))
+    return np.array(pairs)
