@@ -11,9 +11,13 @@ import yaml
 
 import mazebench
 from mazebench.errors import InputError
+from mazebench.evaluation.eval_options import eval_options
+from mazebench.evaluation.plan import make_plan
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.readers.ros import write_ros_map
+from mazebench.results.played import played_task
+from mazebench.results.reading import load_result
 from mazebench.tasks.episode import Episode, sample_episode
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.task import Task
@@ -91,9 +95,7 @@ class TestRosMaps:
         cv2.imwrite(str(folder / f"{name}.pgm"), shades)
         x, y, yaw = origin
         metadata = {"image": f"{name}.pgm", "resolution": maze.cell_size / pixels, "origin": [x, y, yaw], "negate": 0}
-        (folder / f"{name}.yaml").write_text(
-            yaml.safe_dump(metadata | {"occupied_thresh": 0.65, "free_thresh": 0.25})
-        )
+        (folder / f"{name}.yaml").write_text(yaml.safe_dump(metadata | {"occupied_thresh": 0.65, "free_thresh": 0.25}))
         return folder / f"{name}.yaml"
 
     @pytest.mark.parametrize("yaw", [0.0, 0.5])
@@ -101,7 +103,9 @@ class TestRosMaps:
         maze = house(cell_size=0.5)
         new = self.write(tmp_path, "new", maze, 5, (3.0, -2.0, yaw))
         right, up = 0.5 * np.array([np.cos(yaw) - np.sin(yaw), np.sin(yaw) + np.cos(yaw)])  # by a cell along both axes
-        old = self.write(tmp_path, "old", Maze(maze.walls, "old", 0.5), 10, (3.0 + float(right), -2.0 + float(up), yaw), crop=1)
+        old = self.write(
+            tmp_path, "old", Maze(maze.walls, "old", 0.5), 10, (3.0 + float(right), -2.0 + float(up), yaw), crop=1
+        )
         spec = Task.of("building", mazes=new, shown=old, cell_size=0.5)
         assert (spec.shown[0].walls == spec.mazes[0].walls).all()
 
@@ -166,12 +170,12 @@ class TestMetres:
         assert {trial.distance for trial in trials} == set(range(15, 41))
 
     def test_larger_cells_are_refused_with_the_number(self):
-        with pytest.raises(InputError, match="expected cells of at most 1 m, found 1.2 m"):
+        with pytest.raises(InputError, match=r"expected cells of at most 1 m, found 1.2 m"):
             Task.of("building", mazes=house(cell_size=1.2))
 
     def test_a_map_that_a_hand_can_not_draw_is_refused_with_the_number(self):
         large = Maze(np.pad(np.zeros((128, 128), bool), 1, constant_values=True), "hall", 0.5)
-        with pytest.raises(InputError, match="at most 127 cells a side.* found 130"):
+        with pytest.raises(InputError, match=r"at most 127 cells a side.* found 130"):
             Task.of("rough", mazes=large, shown=large)
 
     def test_a_hand_bends_the_map_by_metres(self):
@@ -180,3 +184,34 @@ class TestMetres:
         drawing = show_map(spec, sample_episode(spec, np.random.default_rng(0))).drawing
         moved = np.linalg.norm(drawing.displacement.at(maze.cell_size * (maze.free_cells + 0.5)), axis=1)
         assert 0.5 < moved.max() < 1.01
+
+
+class TestChangedBuildings:
+    """On tracks whose doors have moved, mazes of one's own are plans of buildings that have changed since."""
+
+    def test_a_plan_stands_for_four_buildings_whose_older_map_it_is(self):
+        plan = house()
+        spec = Task.of("rebuilt", mazes=plan)
+        assert [maze.name for maze in spec.mazes] == [f"house-0-changed-{number}" for number in (1, 2, 3, 4)]
+        assert all((older.walls == plan.walls).all() for older in spec.shown)
+        assert all(maze != plan for maze in spec.mazes)
+        assert not any(spec.joined(index)[maze.walls].any() for index, maze in enumerate(spec.mazes))
+        assert Task.of("adrift", level=2, mazes=plan).mazes == Task.of("rebuilt", level=2, mazes=plan).mazes
+        assert spec.replace(level=2).mazes != spec.mazes
+        assert Task.of("building", mazes=plan).mazes == (plan,)
+
+    def test_the_same_buildings_are_played_again(self, tmp_path):
+        options = {"mazes": house(), "distances": (15,)}
+        assert len(make_plan(eval_options("random", "rebuilt", **options)).trials) == 4 * 48
+        mazebench.evaluate("random", "rebuilt", out=tmp_path / "run", episodes_per_distance=1, **options)
+        result = load_result(tmp_path / "run")
+        assert played_task(result.summary).mazes == Task.of("rebuilt", mazes=house()).mazes
+
+    def test_levels_and_tracks_of_other_changes_do_not_go_together(self):
+        with pytest.raises(InputError, match=r"expected one level in mazes of your own, .* found 1, 2"):
+            Task.of("rebuilt", level=(1, 2), mazes=house())
+        with pytest.raises(InputError, match="tracks building, rebuilt: expected tracks of one strength"):
+            mazebench.make_vec(("building", "rebuilt"), 2, mazes=house())
+        assert (
+            mazebench.make_vec(("building", "rebuilt"), 2, mazes=house(), shown=house(), distances=(15,)).num_envs == 2
+        )

@@ -167,7 +167,7 @@ class TestInfosOfTheTask:
             blocked = is_blocked(maze.walls, show_map(task, episode).walls, (episode.start, episode.goal))
             level, distance = episode_level(task, episode), maze.distance(episode.start, episode.goal)
             expected = {"track": track, "level": level, "kind": maze.kind, "distance": distance, "blocked": blocked}
-            expected |= {"way_left": distance, "time_limit": default_time_limit(distance, track=track)}
+            expected |= {"way_left": distance, "time_limit": default_time_limit(distance, 1.0, track=track)}
             assert {name: info[name] for name in expected} == expected
             seen.add((level, blocked))
         assert len({level for level, _ in seen}) == 3

@@ -180,7 +180,7 @@ class TestOptions:
             (
                 "building",
                 {"mazes": CORRIDOR},
-                "corridor: expected distances of at most 6 cells, as far as the maze reaches, found 40; choose others",
+                "corridor: expected distances of at most 6 m, as far as the maze reaches, found 40; choose others",
             ),
         ],
     )

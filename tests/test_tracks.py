@@ -83,7 +83,7 @@ def test_the_task_of_a_level(track, level):
     assert spec.context_size == (62 if track == "rough" else 31)
     is_lost = track in ("adrift", "rough")
     assert spec.odometry_noise_at(level) == ((0.01, 0.05, 0.2)[level - 1] if is_lost else 0.0)
-    assert default_time_limit(20, track=track) == (270 if is_lost else 170)
+    assert default_time_limit(20, 1.0, track=track) == (270 if is_lost else 170)
     env = mazebench.load(track, level=level, seed=0)
     state = env.reset().observation["state"]
     assert (state[[0, 1, 5]] == 0).all() == is_lost
@@ -141,9 +141,9 @@ class TestRebuilt:
             assert all(map(earlier.is_free, (episode.start, episode.goal)))
             assert (shown != spec.mazes[episode.maze].walls).any()
 
-    def test_a_maze_with_too_few_doors_is_refused_in_a_line(self):
-        with pytest.raises(InputError, match=r"expected \d doors that can move, found 0"):
-            Task.of("rebuilt", mazes=field(9), distances=(2,))
+    def test_drawn_mazes_without_doors_are_refused_in_a_line(self):
+        with pytest.raises(InputError, match=r"expected a kind of dfs, house, .*, found kind 'cave'"):
+            Task.of("rebuilt", kinds=("cave",), size=31, distances=(2,))
 
 
 def ends(trial) -> tuple:
