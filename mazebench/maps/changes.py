@@ -183,7 +183,7 @@ class _Plan:
             draft.walls, self.walls, self.pairs[stale], *self._lines, ON_TIME[0]
         )
         reach = math.floor(self.sight + _CELL)
-        seen[stale] = (*boxes, -reach, -reach, reach, reach)
+        seen[stale] = boxes + np.array([-reach, -reach, reach, reach])
         late = float((driven > ON_TIME[0] * shortest)[is_free].mean()) if is_free.any() else 0.0
         return dataclasses.replace(draft, driven=driven, shortest=shortest, seen=seen, late=late)
 
