@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 
 from mazebench.kernels import compiled
@@ -127,9 +128,8 @@ def shortest_ways(walls: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.
     return np.array(cells[1:]), lengths
 
 
-@compiled
 def follow(
-    walls: np.ndarray, shown: np.ndarray, pairs: np.ndarray, offsets: np.ndarray, after: np.ndarray, most: float
+    walls: np.ndarray, shown: np.ndarray, pairs: np.ndarray, sight: float, most: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns how far a robot drives that follows its map.
 
@@ -139,23 +139,44 @@ def follow(
       walls: `[N, N]` bool, of the building, with a closed border.
       shown: `[N, N]` bool, of the robot's map, with a closed border.
       pairs: `[P, 2]` int, start and goal, which are free and joined in the building.
-      offsets: of `sight_lines`.
-      after: of `sight_lines`.
+      sight: cells, how far the robot sees; at least 1.
       most: times the shortest way, where the robot ends its drive if it can't reach the goal within that.
 
     Returns:
       driven: `[P]` int, cells; where the drive has ended, what it would have been at least.
       shortest: `[P]` int, cells of a shortest way in the building.
-      boxes: `[P, 4]` int, the first and the last row and column, in turn, of the cells from which it looked.
+      boxes: `[P, 4]` int, the first row and column and the last row and column of the cells in which it looked around.
+    """
+    offsets, after = sight_lines(sight)
+    window = np.ones((2 * offsets.max() + 1,) * 2, dtype=np.uint8)
+    can_be_wrong = cv2.dilate((walls != shown).astype(np.uint8), window).astype(bool)
+    return _follow(walls, shown, pairs, offsets @ (len(walls), 1), after, can_be_wrong, most)
+
+
+@compiled
+def _follow(
+    walls: np.ndarray,
+    shown: np.ndarray,
+    pairs: np.ndarray,
+    steps: np.ndarray,
+    after: np.ndarray,
+    can_be_wrong: np.ndarray,
+    most: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Does the work of `follow`.
+
+    Args:
+      steps: `[K]` int, from a cell's number to those of the cells of `sight_lines`.
+      after: of `sight_lines`.
+      can_be_wrong: `[N, N]` bool, the cells from which the map may look wrong.
     """
     size = len(walls)
     true, cost, came = walls.ravel(), np.empty(walls.size, np.int32), np.empty(walls.size, np.int32)
     now, later = np.empty(4 * walls.size, np.int32), np.empty(4 * walls.size, np.int32)
     ahead = np.empty(walls.size, np.int32)  # of each cell of the way, the next one
     on_way, is_seen = np.empty(walls.size, np.int32), np.empty(walls.size, np.bool_)
-    steps = offsets[:, 0] * size + offsets[:, 1]
     driven, shortest = np.zeros(len(pairs), np.int64), np.empty(len(pairs), np.int64)
-    boxes = np.empty((len(pairs), 4), np.int64)
+    boxes, track = np.empty((len(pairs), 4), np.int64), np.empty(int(most * walls.size) + 2, np.int64)
     for number in range(len(pairs)):
         here, goal = pairs[number]
         shortest[number] = plan(walls, here, goal, cost, came, now, later)
@@ -163,35 +184,33 @@ def follow(
         belief = shown.copy()
         belief_of = belief.ravel()
         is_seen[:], on_way[:] = False, 0
-        num_plans, is_wrong = 0, True
+        num_plans, is_wrong, has_forgotten = 0, True, False
         first_row, first_column, last_row, last_column = size, size, 0, 0
         while here != goal:
             # See, and correct the map.
-            index = 0
-            while index < len(steps):
-                cell = here + steps[index]
-                if not is_seen[cell]:
-                    is_seen[cell] = True
-                    if belief_of[cell] != true[cell]:
-                        belief_of[cell] = true[cell]
-                        is_wrong |= not true[cell] or on_way[cell] == num_plans
-                index = after[index] if true[cell] else index + 1
+            track[driven[number]] = here
+            row, column = here // size, here % size
+            first_row, last_row = min(first_row, row), max(last_row, row)
+            first_column, last_column = min(first_column, column), max(last_column, column)
+            if has_forgotten or can_be_wrong[row, column]:
+                is_wrong |= look(here, true, belief_of, is_seen, on_way, num_plans, steps, after)
 
             # Plan again if the way is blocked, or may not be the shortest any more.
+            if is_wrong and plan(belief, here, goal, cost, came, now, later) < 0:
+                for index in range(driven[number] + 1):
+                    look(track[index], true, belief_of, is_seen, on_way, num_plans, steps, after)
+                has_forgotten = True
+                for cell in range(size, walls.size - size):
+                    if not is_seen[cell] and 0 < cell % size < size - 1:
+                        belief_of[cell] = False
+                plan(belief, here, goal, cost, came, now, later)
             if is_wrong:
-                if plan(belief, here, goal, cost, came, now, later) < 0:
-                    belief[1:-1, 1:-1] &= ~shown[1:-1, 1:-1] | is_seen.reshape(walls.shape)[1:-1, 1:-1]
-                    plan(belief, here, goal, cost, came, now, later)
-                num_plans, is_wrong = num_plans + 1, False
-                cell = goal
+                num_plans, is_wrong, cell = num_plans + 1, False, goal
                 while cell != here:
                     on_way[cell], ahead[came[cell]] = num_plans, cell
                     cell = came[cell]
 
             # Drive on.
-            row, column = here // size, here % size
-            first_row, last_row = min(first_row, row), max(last_row, row)
-            first_column, last_column = min(first_column, column), max(last_column, column)
             here = ahead[here]
             driven[number] += 1
             left = abs(here // size - goal // size) + abs(here % size - goal % size)
@@ -200,3 +219,34 @@ def follow(
                 break
         boxes[number] = first_row, first_column, last_row, last_column
     return driven, shortest, boxes
+
+
+@compiled
+def look(
+    here: int,
+    true: np.ndarray,
+    belief: np.ndarray,
+    is_seen: np.ndarray,
+    on_way: np.ndarray,
+    way: int,
+    steps: np.ndarray,
+    after: np.ndarray,
+) -> bool:
+    """Corrects a map by what is in sight; returns whether the way is blocked or there may be a shorter one.
+
+    Cells are in lists of all rows.
+
+    Args:
+      belief: `[N * N]` bool, which is corrected, like `is_seen`.
+      on_way: `[N * N]` int, the number of the last way of each cell.
+      way: the number of the way that the robot drives.
+    """
+    is_wrong, index = False, 0
+    while index < len(steps):
+        cell = here + steps[index]
+        is_seen[cell] = True
+        if belief[cell] != true[cell]:
+            belief[cell] = true[cell]
+            is_wrong |= not true[cell] or on_way[cell] == way
+        index = after[index] if true[cell] else index + 1
+    return is_wrong
