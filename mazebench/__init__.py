@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from mazebench.errors import InputError as InputError
     from mazebench.errors import UnplayableError as UnplayableError
     from mazebench.evaluation.evaluate import evaluate as evaluate
+    from mazebench.maps.changes import changed as changed
     from mazebench.maps.kinds import generate as generate
     from mazebench.maps.maze import Maze as Maze
     from mazebench.maps.maze import MazeError as MazeError
@@ -49,6 +50,7 @@ _HOMES = {
     "Task": "mazebench.tasks.task",
     "TaskOptions": "mazebench.tasks.task_options",
     "UnplayableError": "mazebench.errors",
+    "changed": "mazebench.maps.changes",
     "evaluate": "mazebench.evaluation.evaluate",
     "generate": "mazebench.maps.kinds",
     "load": "mazebench.envs.registration",

@@ -53,6 +53,13 @@ class Change:
     late_without_map: float  # of a robot that takes for free what it has not seen
     blocked: float  # share of episodes in which the shortest way on the plan is blocked
 
+    def __str__(self) -> str:
+        return (
+            f"{self.maze.name}: {self.closed} passages closed, {self.opened} opened, {self.added} pieces of furniture "
+            f"added, {self.removed} removed; late {self.late:.2f} with the old map and {self.late_without_map:.2f} "
+            f"without, shortest way blocked {self.blocked:.2f}"
+        )
+
 
 def changed(maze: Maze, strength: int, rng: np.random.Generator) -> Maze:
     """Returns a building in which things have changed since `maze` was drawn, its old map.
@@ -303,11 +310,11 @@ def _furnished(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft:
         return dataclasses.replace(draft, walls=walls, things=things, removed=draft.removed + 1)
 
     # Of a size in whole cells, where it and its surroundings are free.
-    least, most = (round(FURNITURE[0] / plan.cell_size + 0.49), int(FURNITURE[1] / plan.cell_size + _CELL))
-    height, width = rng.integers(least, max(least, most) + 1, 2)
+    least, most = (metres / plan.cell_size for metres in FURNITURE)
+    height, width = rng.integers(math.ceil(least - _CELL), max(math.ceil(least - _CELL), int(most + _CELL)) + 1, 2)
     clear = math.ceil(CLEAR / plan.cell_size - _CELL)
     need = np.ones((height + 2 * clear, width + 2 * clear), dtype=np.uint8)
-    fits = cv2.erode((~walls).astype(np.uint8), need, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0)
+    fits = cv2.erode((~(walls | plan.walls)).astype(np.uint8), need, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0)
     places = np.argwhere(fits)
     if not len(places):
         return draft
