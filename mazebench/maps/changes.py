@@ -153,10 +153,10 @@ class _Plan:
 
     def __init__(self, maze: Maze, seed: int):
         self.walls, self.cell_size, self.name, self.seed = maze.walls, maze.cell_size, maze.name, seed
-        self.pairs = _draw_pairs(maze, np.random.default_rng([seed, 0, 0]))  # [P, 2] int
+        self.pairs = draw_pairs(maze, _NUM_PAIRS, np.random.default_rng([seed, 0, 0]))  # [P, 2] int
 
         # The ways on the plan by which changes are drawn; of other pairs, else these would be more late than any.
-        ways = shortest_ways(maze.walls, _draw_pairs(maze, np.random.default_rng([seed, 0, 1])))
+        ways = shortest_ways(maze.walls, draw_pairs(maze, _NUM_PAIRS, np.random.default_rng([seed, 0, 1])))
         self.way_cells, lengths = ways  # [W] int
         self.way_pairs = np.repeat(np.arange(len(lengths)), lengths + 1)  # [W] int, the pair of each cell
         self.passages: Passages = find_passages(maze.walls, maze.cell_size)
@@ -188,9 +188,10 @@ class _Plan:
         is_free = ~draft.walls.ravel()[self.pairs].any(axis=1)
         stale = np.flatnonzero(is_affected & is_free)
         driven, shortest, seen = draft.driven.copy(), draft.shortest.copy(), draft.seen.copy()
-        driven[stale], shortest[stale], boxes = follow(draft.walls, self.walls, self.pairs[stale], self.sight, ON_TIME[0])
-        reach = math.floor(self.sight + _CELL)
-        seen[stale] = boxes + np.array([-reach, -reach, reach, reach])
+        driven[stale], shortest[stale], boxes = follow(
+            draft.walls, self.walls, self.pairs[stale], self.sight, ON_TIME[0]
+        )
+        seen[stale] = boxes + math.floor(self.sight + _CELL) * np.array([-1, -1, 1, 1])
         late = float((driven > ON_TIME[0] * shortest)[is_free].mean()) if is_free.any() else 0.0
         return dataclasses.replace(draft, driven=driven, shortest=shortest, seen=seen, late=late)
 
@@ -314,7 +315,9 @@ def _furnished(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft:
     height, width = rng.integers(math.ceil(least - _CELL), max(math.ceil(least - _CELL), int(most + _CELL)) + 1, 2)
     clear = math.ceil(CLEAR / plan.cell_size - _CELL)
     need = np.ones((height + 2 * clear, width + 2 * clear), dtype=np.uint8)
-    fits = cv2.erode((~(walls | plan.walls)).astype(np.uint8), need, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0)
+    fits = cv2.erode(
+        (~(walls | plan.walls)).astype(np.uint8), need, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0
+    )
     places = np.argwhere(fits)
     if not len(places):
         return draft
@@ -323,7 +326,7 @@ def _furnished(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft:
     return dataclasses.replace(draft, walls=walls, added=draft.added + 1)
 
 
-def _draw_pairs(maze: Maze, rng: np.random.Generator) -> np.ndarray:
+def draw_pairs(maze: Maze, count: int, rng: np.random.Generator) -> np.ndarray:
     """Returns pairs of a start and a goal, as cell numbers: `[P, 2]` int; their distances are all equally frequent.
 
     They are 15 to 40 m, or the longer half of what there is.
@@ -334,7 +337,7 @@ def _draw_pairs(maze: Maze, rng: np.random.Generator) -> np.ndarray:
     most = min(FARTHEST / maze.cell_size + _CELL, len(ends) - 1)
     least = math.ceil(min(NEAREST / maze.cell_size - _CELL, most / 2))
     pairs: list[tuple[int, int]] = []
-    while len(pairs) < _NUM_PAIRS:
+    while len(pairs) < count:
         distance, start = int(rng.integers(least, int(most) + 1)), rng.choice(free)
         cells, ends = search(maze.walls, start, -1, distance)
         if len(ends) > distance:

@@ -147,6 +147,7 @@ def follow(
       shortest: `[P]` int, cells of a shortest way in the building.
       boxes: `[P, 4]` int, the first row and column and the last row and column of the cells in which it looked around.
     """
+    walls, shown = (np.array(grid, order="C") for grid in (walls, shown))  # for kernels, of one type in all calls
     offsets, after = sight_lines(sight)
     window = np.ones((2 * offsets.max() + 1,) * 2, dtype=np.uint8)
     can_be_wrong = cv2.dilate((walls != shown).astype(np.uint8), window).astype(bool)

@@ -47,7 +47,7 @@ def find_passages(walls: np.ndarray, cell_size: float) -> Passages:
     door, length, detour = (math.ceil(metres / cell_size - _TOLERANCE) for metres in (DOOR, THICKEST, DETOUR))
     parts = []
     for turned in (False, True):  # through strips from above to below, and, with the axes exchanged, from left to right
-        grid = np.ascontiguousarray(walls.T) if turned else walls
+        grid = np.array(walls.T if turned else walls, order="C")
 
         # Free from wall to wall.
         openings = _blocks(~grid)
