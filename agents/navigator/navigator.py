@@ -66,7 +66,7 @@ class Navigator(Agent):
                 # A path over walls and goal as they are estimated now.
                 body = memory.body
                 walls, goal = memory.estimate()
-                path = plan(walls, goal, memory.cell) if goal.any() else []
+                path = plan(walls, goal, memory.cell, self._cell_size) if goal.any() else []
 
                 # It drives along the path, and waits where there is none.
                 action, point = LOOK_LEFT, body.rest()

@@ -22,9 +22,11 @@ from . import rays
 
 # Floors of what the sensor declares, for errors of the model.
 _LOST = 0.01  # share of rays that are lost
-_SIGMA = 0.005  # cells
+_SIGMA = 0.005  # m
 _RANDOM = 0.04  # share of rays that read anything
 
+_MARGIN = 0.02  # m from the edge of a cell, where what is seen could as well lie in the next cell
+_BEHIND = 1.0  # m behind a reading, up to which cells are looked at
 _WIDE = 4.0  # standard deviations, beyond which a hit is as good as impossible
 _LEAST_PASSED = 1e-3  # probability of getting so far, below which a ray is not followed
 _GRAZING = 0.15  # sine of the angle between a ray and a wall; at a smaller one, a hit is not used
@@ -40,12 +42,14 @@ class Beams(NamedTuple):
     sigma: float  # standard deviation of a range
     lost: float  # probability that a ray reads `reach` though it meets a wall
     random: float  # probability of any reading
+    metre: float = 1.0  # cells per metre
 
 
 def beams_of(model: LidarModel, cells_per_metre: float) -> Beams:
     """Returns the beam model of a sensor."""
     sigma = math.hypot(model.sigma, model.step / math.sqrt(12)) * cells_per_metre  # rounding is uniform
-    return Beams(model.max_range * cells_per_metre, max(sigma, _SIGMA), max(model.lost, _LOST), _RANDOM)
+    sigma = max(sigma, _SIGMA * cells_per_metre)
+    return Beams(model.max_range * cells_per_metre, sigma, max(model.lost, _LOST), _RANDOM, cells_per_metre)
 
 
 @inlined
@@ -129,7 +133,7 @@ def add_scan(
     most = int(2 * beams.reach) + 4
     rows, columns = np.empty(most, np.int64), np.empty(most, np.int64)
     hits, walls, may_free, may_mark = np.empty(most), np.empty(most), np.empty(most, np.bool_), np.empty(most, np.bool_)
-    margin = 0.02 + 2 * deviation  # of what could as well lie in a neighbouring cell
+    margin, behind = _MARGIN * beams.metre + 2 * deviation, _BEHIND * beams.metre
     for i in range(len(ranges)):
         angle, reading = yaw + 2 * math.pi * i / len(ranges), ranges[i]
         along_x, along_y = math.cos(angle), math.sin(angle)
@@ -139,7 +143,7 @@ def add_scan(
         while count < most:
             distance, sideways = rays.leaves_at(ray), rays.leaves_sideways(ray)
             ray = rays.in_next_cell(ray)
-            if distance >= beams.reach or distance > reading + 1 or not rays.is_on(ray, evidence):
+            if distance >= beams.reach or distance > reading + behind or not rays.is_on(ray, evidence):
                 break
             rows[count], columns[count] = size - 1 - ray.level, ray.column
             across = abs(along_x) if sideways else abs(along_y)

@@ -13,7 +13,7 @@ from .motion import REACH, moved_in_the_open
 _STOPPED = 0.25  # m/s along an axis that the body is slower than it would be in the open, if a wall stopped it
 _SLACK = 0.04  # m from which a wall pushes more than the model says, for errors of both
 _GIVE = 0.06  # m that a wall lets the body come into its reach, at most; a body that is deeper was stopped by a corner
-_CLEAR = 0.36  # cells aside from the middle of a cell, at most, where the body touches no corner of a wall
+_CLEAR = 0.14  # m from the edge of a cell, at least, where the body touches no corner of a wall beside it
 _SURELY, _PERHAPS = 4.0, 1.0  # log odds of a wall: where no other one can have stopped the body, and where one can
 
 
@@ -42,5 +42,5 @@ def felt_walls(
             row = size - 1 - level - (sign if axis == 1 else 0)
             cell = row, column + (sign if axis == 0 else 0)
             if min(cell) >= 0 and max(cell) < size:
-                found.append((cell, _SURELY if off_aside < _CLEAR else _PERHAPS))
+                found.append((cell, _SURELY if off_aside < 0.5 - _CLEAR / cell_size else _PERHAPS))
     return found

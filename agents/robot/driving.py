@@ -17,12 +17,12 @@ from mazebench.maps.maze import Cell
 from .body import Body, Point
 from .quickest import make_course, quickest_drive
 
-_CELLS_AHEAD = 7  # of the path
+_WAY_AHEAD = 7.0  # m of the path
 _STEPS_AHEAD = 7  # that are planned
 _STEPS_AHEAD_TURNING = 11  # if the body can't strafe: a quarter turn takes 4 or 5
 _STEPS_USED = 4  # of them
 _WIDTH = 4  # of the beam, for each heading
-_INSIDE = 0.05  # cells, from the edges of the cell that the body is in
+_INSIDE = 0.05  # share of a cell, from the edges of the one that the body is in
 _FASTEST = 1.1 * TOP_SPEED  # m/s; more is an error of the observation
 _MOST_OFF = 0.08  # m from where the body should be, before the drive is planned anew
 
@@ -43,7 +43,7 @@ class Drive:
         The drive keeps clear of `blocked` `[L, L]` bool; `cell_size` is in m, and `strafes` says whether the body can.
         """
         # The drive ends where the body is not where it should be, or the path does not go on as it did.
-        ahead = path[: _CELLS_AHEAD + 1]
+        ahead = path[: round(_WAY_AHEAD / cell_size) + 1]
         x, y = body.x * cell_size, body.y * cell_size
         rest = self.path[self.path.index(ahead[0]) :] if ahead[0] in self.path else []
         continues = bool(rest) and ahead[: len(rest)] == rest[: len(ahead)]

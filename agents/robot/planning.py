@@ -13,22 +13,23 @@ import numpy as np
 from mazebench.kernels import compiled
 from mazebench.maps.maze import Cell
 
-# What a cell that may be a wall costs beside its length, in cells: the larger one of two answers to the Canadian
+# What a cell that may be a wall costs beside its length, in metres: the larger one of two answers to the Canadian
 # traveller's problem (Papadimitriou & Yannakakis 1991), which were chosen on train mazes.
 _RISK = 3.0  # times minus the log that it is free: by so much, a path may be longer to be open e times as probably
 _DETOUR = 1.0  # times the odds that it is a wall: what a failed try costs. It keeps the robot from trying shown walls
-_GOAL_DETOUR = 3.0  # cells by which a goal that is half as likely as another must be nearer to be searched before it
-_CLOSED = 1e4  # cells; what a certain wall costs, longer than any way around
+_GOAL_DETOUR = 3.0  # m by which a goal that is half as likely as another must be nearer to be searched before it
+_CLOSED = 1e4  # m; what a certain wall costs, longer than any way around
 _UNLIKELY = 1e-9  # of the likeliest goal's probability, up to which a goal is too far to be searched on any map
 
 
-def plan(walls: np.ndarray, goal: np.ndarray, start: Cell) -> list[Cell]:
+def plan(walls: np.ndarray, goal: np.ndarray, start: Cell, cell_size: float = 1.0) -> list[Cell]:
     """Returns the cells of a cheapest path from `start` to one of the goals.
 
     Args:
       walls: `[N, N]` float, the probability of a wall; 1 for walls that are never tried.
       goal: `[N, N]` float, how likely a cell is the goal, not zero everywhere.
       start: the cell of the body.
+      cell_size: m.
     """
     # Outside of the box around what may be free, there is no way.
     is_open = walls < 1
@@ -40,7 +41,7 @@ def plan(walls: np.ndarray, goal: np.ndarray, start: Cell) -> list[Cell]:
 
     # Entering a cell costs more the likelier it is a wall.
     free = np.maximum(1 - walls, 1e-9)
-    entering = np.where(walls < 1, 1 + np.maximum(-_RISK * np.log(free), _DETOUR * walls / free), _CLOSED)
+    entering = np.where(walls < 1, cell_size + np.maximum(-_RISK * np.log(free), _DETOUR * walls / free), _CLOSED)
 
     # Ending in a cell costs more the likelier the goal is elsewhere.
     end = np.full(goal.shape, np.inf)

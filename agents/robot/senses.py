@@ -27,8 +27,8 @@ from .map_reading import read_map
 from .occupancy import SURE, posterior, seen_walls
 from .tracking import Tracker, aligned
 
-_MARK_OFF = 1.0  # cells, standard deviation of the goal from its marker, once it was not there
-# Cells, which are taken for 1 m wide: standard deviations of a position.
+_MARK_OFF = 1.0  # m, standard deviation of the goal from its marker, once it was not there
+# Standard deviations (m) of a position.
 _EXACT, _TRACKED, _RECKONED = 0.01, 0.03, 0.15  # that is observed, tracked by a lidar, or reckoned from noisy ones
 _VISITED = 4.0  # log odds that a cell is free in which the body was
 _GAIN = 0.03  # weight of a noisy position against the one that velocities tell
@@ -41,7 +41,8 @@ class Memory:
 
     belief: MapBelief  # of how the map lies on the grid
     body: Body
-    deviation: float  # standard deviation of the body's position
+    deviation: float  # standard deviation of the body's position, m
+    cell_size: float  # m
     tracker: Tracker | None = None  # where a lidar is needed to know the pose
     dead_reckoning: DeadReckoning | None = None  # where observed positions are noisy
     evidence: np.ndarray = dataclasses.field(init=False)  # [L, L] float, log odds of a wall by what was seen or felt
@@ -66,12 +67,12 @@ class Memory:
 
         The map counts as much as it has proved right. The goal is in no cell that was searched, nor in a seen wall.
         """
-        walls = posterior(self.prior, self.evidence)
+        walls = posterior(self.prior, self.evidence, self.cell_size)
         is_closed = (np.abs(self.evidence) >= SURE) & (walls > 0.5)
         is_possible = ~(self.searched | is_closed)
         goal = self.goal * is_possible
         if not goal.any():
-            goal = ndimage.gaussian_filter(self.goal, _MARK_OFF, mode="constant") * is_possible
+            goal = ndimage.gaussian_filter(self.goal, _MARK_OFF / self.cell_size, mode="constant") * is_possible
         return np.where(is_closed, 1.0, walls), goal
 
     def command(self, action: int, point: Point) -> None:
@@ -106,14 +107,14 @@ class Senses:
         else:
             if inputs.new_context[slot]:
                 # Another map and goal, on a map that lies as the one before.
-                reading = read_map(context, self._size)
+                reading = read_map(context, self._size, self._cell_size)
                 memory.belief.begin_leg(reading.walls, reading.goal)
                 memory.prior, memory.goal = memory.belief.mixture()
                 memory.searched[:] = False
             self._localize(memory, observed, ranges)
 
         # What the scan tells of walls.
-        body, deviation = memory.body, memory.deviation
+        body, deviation = memory.body, memory.deviation / self._cell_size
         if ranges is not None:
             add_scan(memory.evidence, body.x, body.y, body.yaw, ranges, self._beams, deviation)
 
@@ -133,20 +134,21 @@ class Senses:
         """Returns the memory at an episode's first observation, before the walls that are sensed are added."""
         # An episode begins in the centre of a cell. Zero is odometry; any other position is a noisy one.
         off_centre = max(abs(coordinate % 1.0 - 0.5) for coordinate in (observed.x, observed.y))
-        reading, odometry = read_map(context, self._size), _pose(observed)
+        reading, odometry = read_map(context, self._size, self._cell_size), _pose(observed)
         if off_centre < _ROUNDING:
             # The grid is the maze. A start that is known but not marked says that the map may lie in any way.
             num_turns = 1 if context[START].any() else 8
             belief = MapBelief(reading.walls, reading.goal, num_turns, None, self._size)
             if ranges is None or self._odometry_noise == 0:
-                return Memory(belief, observed, _EXACT)
-            return Memory(belief, observed, _TRACKED, Tracker(odometry, odometry, self._odometry_noise))
+                return Memory(belief, observed, _EXACT, self._cell_size)
+            tracker = Tracker(odometry, odometry, self._odometry_noise)
+            return Memory(belief, observed, _TRACKED, self._cell_size, tracker)
         if ranges is None:
             # The grid is the maze, and the start is where it is marked.
             x, y = cell_to_point(marked_cell(reading.start), self._size).tolist()
             belief = MapBelief(reading.walls, reading.goal, 1, None, self._size)
             dead_reckoning = DeadReckoning((x, y), observed.velocity(), _GAIN)
-            return Memory(belief, observed._replace(x=x, y=y), _RECKONED, None, dead_reckoning)
+            return Memory(belief, observed._replace(x=x, y=y), _RECKONED, self._cell_size, None, dead_reckoning)
 
         # The grid has the start in its middle, and the axes of the maze or of the first scan.
         size, reckoning = 2 * self._size - 1, None
@@ -158,7 +160,7 @@ class Senses:
         belief = MapBelief(reading.walls, reading.goal, num_turns, reading.start, size)
         x, y, yaw = pose.tolist()
         tracker = Tracker(pose, odometry, self._odometry_noise)
-        return Memory(belief, observed._replace(x=x, y=y, yaw=yaw), _TRACKED, tracker, reckoning)
+        return Memory(belief, observed._replace(x=x, y=y, yaw=yaw), _TRACKED, self._cell_size, tracker, reckoning)
 
     def _localize(self, memory: Memory, observed: Body, ranges: np.ndarray | None) -> None:
         """Takes in the body as it is observed one step on; without a lidar, a wall has stopped it if it is slow."""
@@ -171,7 +173,7 @@ class Senses:
             body = memory.tracker.body(observed)
         memory.body = body
         if ranges is None:
-            off, size = memory.deviation * self._cell_size, len(memory.searched)
+            off, size = memory.deviation, len(memory.searched)
             for cell, log_odds in felt_walls(before, memory.action, body, self._cell_size, off, size):
                 memory.evidence[cell] = min(memory.evidence[cell] + log_odds, MOST_EVIDENCE)
 

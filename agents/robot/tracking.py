@@ -4,7 +4,7 @@ The grid holds what was seen before, so this needs no map: it is the localizatio
 Fox 2005, Probabilistic Robotics, chapters 5 and 6). Walls end at lines of the grid's cells. So even a grid on which
 nothing was seen tells the heading up to quarter turns and the position within a cell.
 
-Lengths are in cells, which constants take for 1 m wide. A pose is x, y and yaw (rad) in the grid's frame.
+Lengths are in cells, but constants in metres. A pose is x, y and yaw (rad) in the grid's frame.
 """
 
 from __future__ import annotations
@@ -22,23 +22,24 @@ from .beams import Beams, log_likelihood, log_likelihoods
 from .body import Body
 from .occupancy import seen_walls
 
-_DEVIATION = 0.03  # cells, of a position that was matched
+_DEVIATION = 0.03  # m, of a position that was matched
 _TEMPER = 0.5  # weight of a scan against the odometry: rays share errors
 
 # Standard deviations of a step, beside what the odometry's noise makes: what its scale and its heading may be off.
 _SCALE_ERROR = 0.07  # share of the way
-_SHIFT = 0.03  # cells
+_SHIFT = 0.03  # m
 _TURN = 0.025  # rad
-_OFF = 0.1  # cells, of a position from the commanded one; contacts with walls that were not seen make more
-_LARGEST_WAY = 1.0  # cells in a step; more is no motion
-# The scale is uniform in .9 to 1.1, and corrected steps are 0.02 off. The ratio of these variances is what a scale of 1
+_OFF = 0.1  # m, of a position from the commanded one; contacts with walls that were not seen make more
+_LARGEST_WAY = 1.0  # m in a step; more is no motion
+# The scale is uniform in .9 to 1.1, and corrected steps are 0.02 m off. The ratio of these variances is what a scale of 1
 # weighs against squared steps.
 _SCALE_PRIOR = 0.02**2 / (0.2**2 / 12)
 
 _NUM_HEADINGS = 90  # that are tried in a quarter turn
 _STARTS = 3  # from which the best pose is searched
-_FIRST_STEP, _LAST_STEP = 0.08, 0.006  # cells, of the search
-_TURN_PER_STEP = 0.5  # rad a cell
+_SHIFTED = 0.06  # m; of a larger deviation, the search also begins beside the predicted pose
+_FIRST_STEP, _LAST_STEP = 0.08, 0.006  # m, of the search
+_TURN_PER_STEP = 0.5  # rad a metre
 _MOST_MOVES = 8  # with steps of one length
 
 
@@ -49,7 +50,7 @@ class Tracker:
     pose: np.ndarray  # [3] float
     odometry: np.ndarray  # [3] float, x, y and yaw as they were observed last
     noise: float = 0.0  # alpha of the odometry (AMCL's model)
-    driven: float = _SCALE_PRIOR  # the sum of the odometry's squared steps and of the prior
+    driven: float = _SCALE_PRIOR  # the sum of the odometry's squared steps (m) and of the prior
     moved: float = _SCALE_PRIOR  # the sum of these steps' products with the corrected ones and of the prior
     error: complex = 0j  # of the odometry's last step, forward + left j in the body's frame, cells
 
@@ -65,16 +66,16 @@ class Tracker:
         self.odometry = odometry
         turned = math.remainder(turned, math.tau)
         measured = complex(step_x, step_y) * cmath.rect(1, -(odometry[2] - turned))
-        way = abs(measured)
-        if way > _LARGEST_WAY:
-            measured, way = measured * _LARGEST_WAY / way, _LARGEST_WAY
+        way, metre = abs(measured), beams.metre
+        if way > _LARGEST_WAY * metre:
+            measured, way = measured * (_LARGEST_WAY * metre) / way, _LARGEST_WAY * metre
         step = measured * cmath.rect(self.moved / self.driven, yaw)
-        variance = self.noise * (way**2 + turned**2)
-        variance += (_SCALE_ERROR * way) ** 2 + _SHIFT**2
-        turn_variance = self.noise * (way**2 + turned**2) + _TURN**2
+        variance = self.noise * (way**2 + (turned * metre) ** 2)
+        variance += (_SCALE_ERROR * way) ** 2 + (_SHIFT * metre) ** 2
+        turn_variance = self.noise * ((way / metre) ** 2 + turned**2) + _TURN**2
 
         # Odometry and command, weighted by their variances.
-        share, turn_share = variance / (variance + _OFF**2), turn_variance / (turn_variance + _TURN**2)
+        share, turn_share = variance / (variance + (_OFF * metre) ** 2), turn_variance / (turn_variance + _TURN**2)
         off = commanded - (x + step.real, y + step.imag, yaw + turned)
         off[2] = math.remainder(off[2], math.tau)
         predicted = commanded - (1 - np.array([share, share, turn_share])) * off
@@ -83,8 +84,8 @@ class Tracker:
 
         corrected = complex(self.pose[0] - x, self.pose[1] - y) * cmath.rect(1, -yaw)
         self.error = measured - corrected
-        self.driven += way**2
-        self.moved += (measured.conjugate() * corrected).real
+        self.driven += (way / metre) ** 2
+        self.moved += (measured.conjugate() * corrected).real / metre**2
         self.pose[:2] = np.clip(self.pose[:2], 0.01, len(walls) - 0.01)
 
     def body(self, observed: Body) -> Body:
@@ -102,8 +103,8 @@ def aligned(size: int, ranges: np.ndarray, beams: Beams) -> np.ndarray:
     walls, poses = seen_walls(np.zeros((size, size))), np.empty((_NUM_HEADINGS, 3))
     poses[:, :2] = size / 2
     poses[:, 2] = np.arange(_NUM_HEADINGS) * (math.pi / 2 / _NUM_HEADINGS)
-    best = poses[log_likelihoods(walls, poses, ranges, beams, _DEVIATION).argmax()]
-    return best_pose(walls, best, _SHIFT, math.pi / 2 / _NUM_HEADINGS, ranges, beams)
+    best = poses[log_likelihoods(walls, poses, ranges, beams, _DEVIATION * beams.metre).argmax()]
+    return best_pose(walls, best, _SHIFT * beams.metre, math.pi / 2 / _NUM_HEADINGS, ranges, beams)
 
 
 @compiled
@@ -113,7 +114,7 @@ def best_pose(
     """Returns the likeliest pose `[3]` of a scan, given a predicted one and its standard deviations (cells, rad)."""
     # Poses around the predicted one, on a smooth likelihood.
     num_turns = 1 + 2 * min(int(2.5 * turn_deviation / 0.07), 6)
-    num_shifts = 5 if deviation > 0.06 else 1
+    num_shifts = 5 if deviation > _SHIFTED * beams.metre else 1
     starts, scores = np.empty((num_turns * num_shifts, 3)), np.empty(num_turns * num_shifts)
     for t in range(num_turns):
         for s in range(num_shifts):
@@ -123,7 +124,7 @@ def best_pose(
             if s > 0:
                 start[s % 2] += 1.3 * deviation * (1 if s > 2 else -1)
             scores[t * num_shifts + s] = _score(
-                walls, start, predicted, deviation, turn_deviation, ranges, beams, _FIRST_STEP
+                walls, start, predicted, deviation, turn_deviation, ranges, beams, _FIRST_STEP * beams.metre
             )
 
     # From the best ones, uphill along one axis after the other, by steps of halving length.
@@ -131,14 +132,14 @@ def best_pose(
     for _ in range(min(_STARTS, len(scores))):
         k = int(np.argmax(scores))
         scores[k] = -np.inf
-        pose, step, score = starts[k].copy(), _FIRST_STEP, -np.inf
-        while step > _LAST_STEP:
-            smooth = max(step, _DEVIATION)
+        pose, step, score = starts[k].copy(), _FIRST_STEP * beams.metre, -np.inf
+        while step > _LAST_STEP * beams.metre:
+            smooth = max(step, _DEVIATION * beams.metre)
             score = _score(walls, pose, predicted, deviation, turn_deviation, ranges, beams, smooth)
             for _ in range(_MOST_MOVES):
                 before = score
                 for axis in range(3):
-                    length = step * _TURN_PER_STEP if axis == 2 else step
+                    length = step / beams.metre * _TURN_PER_STEP if axis == 2 else step
                     for sign in (-1, 1):
                         pose[axis] += sign * length
                         tried = _score(walls, pose, predicted, deviation, turn_deviation, ranges, beams, smooth)
