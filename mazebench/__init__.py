@@ -14,6 +14,7 @@ from mazebench.envs.registration import register_environments
 if TYPE_CHECKING:
     from mazebench.agent import Agent as Agent
     from mazebench.agent import Inputs as Inputs
+    from mazebench.agent import Report as Report
     from mazebench.agent import SingleAgent as SingleAgent
     from mazebench.envs.registration import load as load
     from mazebench.envs.registration import make as make
@@ -46,6 +47,7 @@ _HOMES = {
     "Inputs": "mazebench.agent",
     "Maze": "mazebench.maps.maze",
     "MazeError": "mazebench.maps.maze",
+    "Report": "mazebench.agent",
     "SingleAgent": "mazebench.agent",
     "Task": "mazebench.tasks.task",
     "TaskOptions": "mazebench.tasks.task_options",

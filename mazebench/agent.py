@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import functools
 import pathlib
+from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -43,6 +44,21 @@ class Inputs(NamedTuple):
     truth: Truth | None = None  # only for agents that declare `needs_truth`
     # [B] bool, False where an environment rests because no episode is left; None if all of them run
     active: np.ndarray | None = None
+
+
+class Report(NamedTuple):
+    """What an agent says of itself after it has acted; None where it says nothing.
+
+        >>> mazebench.Report(pose=np.array([[2.5, 3.5, 0.0]])).notes is None
+        True
+
+    From `SingleAgent.report`, both are without the axis B.
+    """
+
+    # [B, 3] float: x, y (m) and yaw (rad) of the body on the map that is shown, whose lower left corner is (0, 0) and
+    # whose cells are as wide as the maze's; NaN where it is not known.
+    pose: np.ndarray | None = None
+    notes: Sequence[Any] | None = None  # B values that JSON can hold, each of them perhaps None
 
 
 class _Declarations:
@@ -111,6 +127,17 @@ class Agent(_Declarations):
         """
         raise NotImplementedError
 
+    def report(self, state: Any) -> Report:
+        """Returns where the body was at the observation that `act` was given last, and notes; by default nothing.
+
+        An evaluation calls it after each `act` if the class overrides it. It changes nothing. The poses give the recall
+        of localization in the results, and an episode's last notes go into its record.
+
+        Args:
+          state: what `act` returned.
+        """
+        return Report()
+
 
 class SingleAgent(_Declarations):
     """Acts in one environment; an evaluation runs a copy of the agent in each of B environments.
@@ -145,6 +172,10 @@ class SingleAgent(_Declarations):
             to be changed.
         """
         raise NotImplementedError
+
+    def report(self) -> Report:
+        """Returns where the body was at the last observation, `pose` `[3]`, and `notes`; see `Agent.report`."""
+        return Report()
 
 
 class _SingleAgents(Agent):
@@ -181,6 +212,16 @@ class _SingleAgents(Agent):
         return agent.act(observation)
 
 
+class _ReportingSingleAgents(_SingleAgents):
+    """The same for a class that reports."""
+
+    def report(self, state: list[SingleAgent]) -> Report:
+        poses, notes = zip(*(agent.report() for agent in state), strict=True)
+        unknown = np.full(3, np.nan)
+        are_known = any(pose is not None for pose in poses)
+        return Report(np.array([unknown if pose is None else pose for pose in poses]) if are_known else None, notes)
+
+
 @functools.cache  # so that a class and its import by name give one and the same
 def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
     """Returns `declared` itself if it is an `Agent`, else an `Agent` that runs the `SingleAgent` in B environments."""
@@ -190,4 +231,5 @@ def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
     declarations = ("needs_truth", "needs_sensors", "needs_shown", "plays_actions", "learns")
     names = ("__module__", "__qualname__", "__doc__", *declarations, "context_size", "default_checkpoint")
     attributes = {name: getattr(declared, name) for name in names}
-    return type(declared.__name__, (_SingleAgents,), attributes | {"single_class": declared})
+    base = _SingleAgents if declared.report is SingleAgent.report else _ReportingSingleAgents
+    return type(declared.__name__, (base,), attributes | {"single_class": declared})

@@ -93,8 +93,8 @@ def _check_acting(name: str, agent_class: type[Agent], task: Task, checkpoint: p
             batches = [
                 stack.enter_context(contextlib.closing(_ShortEpisodes(task, episodes, order))) for order in orders
             ]
-            truth = agent_class.needs_truth
-            rollouts = [rollout(agent, envs, envs.reset(), envs.seeds, needs_truth=truth) for envs in batches]
+            asked = {"needs_truth": agent_class.needs_truth, "reports": agent_class.report is not Agent.report}
+            rollouts = [rollout(agent, envs, envs.reset(), envs.seeds, **asked) for envs in batches]
             for _ in itertools.zip_longest(*rollouts):
                 pass
         return batches[0].actions

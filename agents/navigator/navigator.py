@@ -8,14 +8,14 @@ from typing import Self
 
 import numpy as np
 
-from mazebench.agent import Agent, Inputs, Interface
+from mazebench.agent import Agent, Inputs, Interface, Report
 from mazebench.maps.maze import cell_to_point
 
 from ..robot.body import LOOK_LEFT, PLAYED, WITHOUT_STRAFING, as_kind
 from ..robot.driving import Drive
 from ..robot.pilot import steer
 from ..robot.planning import plan
-from ..robot.senses import Memory, Senses
+from ..robot.senses import Memory, Senses, report
 
 _BLOCKED = 0.35  # probability of a wall from which driving keeps clear of a cell off the path
 
@@ -79,3 +79,7 @@ class Navigator(Agent):
                 memory.command(action, point)
                 actions[slot] = action
         return as_kind(self._kind, actions), state
+
+    def report(self, state: list[_Robot | None]) -> Report:
+        """Returns where the robots are on the maps, by the likeliest way in which these may lie."""
+        return report(robot and robot.memory for robot in state)

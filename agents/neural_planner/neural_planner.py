@@ -13,14 +13,14 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import torch
 
-from mazebench.agent import Inputs, Interface
+from mazebench.agent import Inputs, Interface, Report
 from mazebench.constants import NUM_ACTIONS, YAW_RATE
 
 from ..common.actor import NetworkAgent, acting
 from ..common.layers import in_batches
 from ..robot.motion import moved_in_the_open
 from ..robot.rays import ranges_to
-from ..robot.senses import Memory, Senses
+from ..robot.senses import Memory, Senses, report
 from .network import NUM_RANGES, REACH, Choice, Plan, PlannerNetwork, Situation, grid_bytes, motion_features
 from .neural_planner_config import NeuralPlannerConfig
 from .planner_learner import PlannerLearner
@@ -128,6 +128,10 @@ class NeuralPlanner(NetworkAgent):
             taken = np.take_along_axis(log_probability, chosen[:, None], axis=1)[:, 0]
             state.choice = Choice(self._stream, [robot.grid for robot in robots], situation, taken, value)
         return actions, state
+
+    def report(self, state: ActorState) -> Report:
+        """Returns where the robots are on the maps, by the likeliest way in which these may lie."""
+        return report(robot and robot.memory for robot in state.robots)
 
     def notes(self, state: ActorState) -> Choice | None:
         """Returns the last choice."""

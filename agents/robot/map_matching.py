@@ -11,6 +11,8 @@ differ. This is a Rao-Blackwellised filter (Doucet et al. 2000) whose discrete p
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy import special
 
@@ -90,6 +92,17 @@ class MapBelief:
             here = self.goals[orientation[inside], row[inside], column[inside]]
             self.log_weights[inside] += np.log(np.maximum(1 - here, _UNTOLD))
         return changed
+
+    def on_map(self, x: float, y: float, yaw: float) -> tuple[float, float, float]:
+        """Returns a pose on the grid (cells, rad) as one on the map that is shown, by the likeliest hypothesis."""
+        orientation, row, column = self.placements[self.log_weights.argmax()].tolist()
+        size = self.walls.shape[-1]
+        x, y = x + column, y + size - len(self.weighed) - row
+        if orientation >= 4:
+            x, yaw = size - x, math.pi - yaw
+        for _ in range(orientation % 4):
+            x, y, yaw = y, size - x, yaw - math.pi / 2
+        return x, y, yaw
 
     def mixture(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns `[L, L]` float twice: the probabilities of a wall and of the goal by all hypotheses."""

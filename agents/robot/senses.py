@@ -7,11 +7,12 @@ on a side of its grid: the maze where the position is known, else a grid around 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 
 import numpy as np
 from scipy import ndimage
 
-from mazebench.agent import Inputs, Interface
+from mazebench.agent import Inputs, Interface, Report
 from mazebench.errors import UnplayableError
 from mazebench.maps.maze import Cell, cell_to_point
 from mazebench.tasks.context import START
@@ -62,6 +63,12 @@ class Memory:
         """The cell of the body."""
         return nearest_cell(self.body.x, self.body.y, len(self.searched))
 
+    @property
+    def pose_on_map(self) -> tuple[float, float, float]:
+        """The body's x, y (m) and yaw (rad) on the map as it is shown, by the likeliest way in which it may lie."""
+        x, y, yaw = self.belief.on_map(self.body.x, self.body.y, self.body.yaw)
+        return x * self.cell_size, y * self.cell_size, yaw
+
     def estimate(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns `[L, L]` float twice: the probability of a wall, and weights of the goal, perhaps all 0.
 
@@ -79,6 +86,11 @@ class Memory:
         """Remembers the action that follows, and the point (x, y) that it should bring the body to."""
         turn = TURN_STEP * ((action == LOOK_LEFT) - (action == LOOK_RIGHT))
         self.commanded, self.action = np.array([*point, self.body.yaw + turn]), action
+
+
+def report(memories: Iterable[Memory | None]) -> Report:
+    """Returns the poses of robots on the maps that they are shown; that of one that has not begun is unknown."""
+    return Report(np.array([(np.nan,) * 3 if each is None else each.pose_on_map for each in memories]))
 
 
 class Senses:

@@ -31,8 +31,8 @@ _SHIFT = 0.03  # m
 _TURN = 0.025  # rad
 _OFF = 0.1  # m, of a position from the commanded one; contacts with walls that were not seen make more
 _LARGEST_WAY = 1.0  # m in a step; more is no motion
-# The scale is uniform in .9 to 1.1, and corrected steps are 0.02 m off. The ratio of these variances is what a scale of 1
-# weighs against squared steps.
+# The scale is uniform in .9 to 1.1, and corrected steps are 0.02 m off. The ratio of these variances is what a scale of
+# 1 weighs against squared steps.
 _SCALE_PRIOR = 0.02**2 / (0.2**2 / 12)
 
 _NUM_HEADINGS = 90  # that are tried in a quarter turn

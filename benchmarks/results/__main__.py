@@ -3,6 +3,8 @@
     python -m benchmarks.results                  writes all tables and figures
     python -m benchmarks.results keep FOLDER...   keeps folders of results in records/
     python -m benchmarks.results episodes CSV     writes every episode as a line, for rliable and other tools
+    python -m benchmarks.results recall FOLDER    evaluates the agents of the table of recall, or goes on with that;
+                                                  FOLDER is to be kept
 
 `records/` holds finished evaluations, an archive for each folder of results: `tar xf records/tracks.tar.xz` gives a
 folder that `mazebench report` and `mazebench compare` read.
@@ -10,12 +12,14 @@ folder that `mazebench report` and `mazebench compare` read.
 
 from __future__ import annotations
 
+import itertools
 import pathlib
 import sys
 
-from benchmarks.results.kept import keep, read_kept
+from benchmarks.results.kept import RECALL, RECALL_AGENTS, RECALL_SETTINGS, keep, read_kept
 from benchmarks.results.results_figures import figures
 from benchmarks.results.results_tables import PAGES, RECORDS, ROOT, with_tables
+from mazebench.evaluation.evaluate import evaluate
 from mazebench.report.figures import to_svg
 
 match sys.argv[1:]:
@@ -32,5 +36,9 @@ match sys.argv[1:]:
     case ["episodes", out]:
         columns = ["agent", "run", "setting", "episode", "maze", "success", "steps", "oracle_steps"]
         read_kept(RECORDS).episodes.reset_index()[columns].to_csv(out, index=False)
+    case ["recall", out]:
+        for agent, (track, level) in itertools.product(RECALL_AGENTS, RECALL_SETTINGS):
+            folder = pathlib.Path(out, RECALL, agent, f"{track}-{level}")
+            evaluate(agent, track, folder, level=level, resume=True)
     case _:
         sys.exit(__doc__)

@@ -29,6 +29,10 @@ PAPER = "paper"  # the suite
 LOCAL = "local-13"  # the part of `paper` on which training runs are evaluated
 ON_TIME_125, ON_TIME_2 = ON_TIME_METRICS  # within 1.25 and 2 times the oracle's steps
 WORST_TENTH = "worst_tenth"  # on time in the tenth of the mazes with the lowest rates, after JaxNav; else missing
+# The archive of evaluations whose records have the recall of poses, in folders AGENT/TRACK-LEVEL.
+RECALL = "recall"
+RECALL_AGENTS = ("navigator", "neural-planner")
+RECALL_SETTINGS = (("building", 2), ("building", 3), ("adrift", 1), ("adrift", 2), ("adrift", 3))
 _SUFFIX = ".tar.xz"
 _TRAINING = "training"  # the folder of archives of training runs
 _RUNS = "runs"  # the archive of evaluations of training runs on `LOCAL`, in folders AGENT-SEED
@@ -85,6 +89,11 @@ def estimate(metric: str, *agents: pd.DataFrame) -> Estimate:
     return runs_interval(runs[0], mazes, *runs[1:])
 
 
+def recall_of(agent: str) -> str:
+    """Returns the name of an agent's evaluations in the archive of recall."""
+    return f"{agent}, {RECALL}"
+
+
 def read_kept(folder: pathlib.Path) -> Kept:
     """Returns what all archives of `folder` hold, and those of training runs in its folder `training`."""
     training: dict[str, list[pd.DataFrame]] = {}
@@ -103,6 +112,8 @@ def read_kept(folder: pathlib.Path) -> Kept:
             if summary.suite == PAPER:
                 paper.append(reported(result))
             agent, setting = _AGENTS.get(archive, summary.row), summary.part or result.folder.name
+            if archive == RECALL:  # whose agents are in other archives, too
+                agent = recall_of(agent)
             if archive == _RUNS:
                 agent, setting = result.folder.name.rpartition("-")[0], LOCAL
             lines = pd.DataFrame(list(map(dict, result.records)), columns=_COLUMNS).assign(**scores(result.records))

@@ -17,6 +17,8 @@ from mazebench.results.records import Figures, Summary
 _ANY_WIDTH = 10_000  # characters
 _MOST_DISTANCES = 20  # of a table; scenarios may have hundreds
 _HEAD = ("n", "success rate", "on time", "SPL", "SPL by grid")
+_RECALL_HEAD = ("pose 1 m", "pose 1 m, 30 deg")  # of agents that report poses
+_RECALL_NOTE = "pose: share of steps whose reported pose is within it, then that of episodes at their end"
 _NOTE = f"on time: within {' and '.join(f'{k:g}' for k in ON_TIME)} times the oracle's steps"
 _ON_TIME, _NAME_OF_ON_TIME = next((metric, f"on time {k:g}") for metric, k in ON_TIME_METRICS.items())
 
@@ -33,6 +35,8 @@ def print_summary(summary: Summary) -> None:
     perturbed = ", ".join([*perturbations, *task.noise_in_words])
     paper = printed_mmn(summary)
     head = ["n", "success rate", *["paper"] * bool(paper), *_HEAD[2:]]
+    if summary.overall.recall:
+        head += _RECALL_HEAD
     totals = []
     if not task.is_hierarchical:
         by_distance = summary.by_distance if len(summary.by_distance) <= _MOST_DISTANCES else {}
@@ -44,7 +48,7 @@ def print_summary(summary: Summary) -> None:
     else:
         rows = [_with_paper(summary.overall, paper, task.landmark_distance)]
     print_table(f"{title}{', ' + perturbed if perturbed else ''}", head, rows, totals)
-    print(_NOTE)
+    _print_notes(summary)
     if paper:
         print("paper: success rate of the paper's MMN, in DeepMind Lab")
 
@@ -52,9 +56,11 @@ def print_summary(summary: Summary) -> None:
 def print_suite(summaries: Sequence[Summary]) -> None:
     """Prints the overall figures of a suite's parts, one table an agent."""
     for agent in dict.fromkeys(summary.who for summary in summaries):
-        rows = [[str(summary.part), *_cells(summary.overall)] for summary in summaries if summary.who == agent]
-        print_table(f"{agent}: suite {summaries[0].suite}", ("part", *_HEAD), rows)
-    print(_NOTE)
+        own = [summary for summary in summaries if summary.who == agent]
+        head = ("part", *_HEAD, *(_RECALL_HEAD if any(summary.overall.recall for summary in own) else ()))
+        rows = [[str(summary.part), *_cells(summary.overall)] for summary in own]
+        print_table(f"{agent}: suite {summaries[0].suite}", head, [[*row, "", ""][: len(head)] for row in rows])
+    _print_notes(*summaries)
 
 
 def print_comparison(title: str, name: str, rows: Mapping[str, Row]) -> None:
@@ -103,4 +109,12 @@ def _cells(row: Figures) -> list[str]:
         for value, (low, high) in ((row.success_rate, row.success_rate_ci95), (row.spl, row.spl_ci95))
     )
     on_time = ", ".join(f"{share:.2f}" for share in row.on_time.values())
-    return [str(row.n), success_rate, on_time, spl, f"{row.spl_grid:.2f}"]
+    recalls = [f"{value:.2f}" for value in row.recall.values()]
+    pairs = zip(recalls[:2], recalls[2:], strict=True)  # over episodes, and at their ends
+    return [str(row.n), success_rate, on_time, spl, f"{row.spl_grid:.2f}", *map(", ".join, pairs)]
+
+
+def _print_notes(*summaries: Summary) -> None:
+    print(_NOTE)
+    if any(summary.overall.recall for summary in summaries):
+        print(_RECALL_NOTE)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 from typing import Any
 
 import numpy as np
 
-from mazebench.agent import Agent, Inputs
+from mazebench.agent import Agent, Inputs, Report
 from mazebench.agent_loading import source_line
 from mazebench.constants import DISCRETE, VELOCITIES
 from mazebench.errors import InputError, RunError, describe_error
@@ -56,6 +57,7 @@ class CheckedAgent(Agent):
     def __init__(self, name: str, agent: Agent, kind: str):
         """Expects actions of a kind: "six", "four", "velocity" or "diff"."""
         self.name, self._agent, self._kind = name, agent, kind
+        self._batch = 0  # B of the last step
 
     def initial_state(self, batch_size: int) -> Any:
         """Returns the agent's state before the first step."""
@@ -67,7 +69,8 @@ class CheckedAgent(Agent):
         with calling(self.name, "act"):
             actions, state = self._agent.act(inputs, state, explore)
             actions = np.asarray(actions)
-        shape: tuple[int, ...] = (len(inputs.new_episode),)
+        self._batch = len(inputs.new_episode)
+        shape: tuple[int, ...] = (self._batch,)
         names = VELOCITIES.get(self._kind, ())
         if names:
             shape += (len(names),)
@@ -83,3 +86,26 @@ class CheckedAgent(Agent):
         if len(illegal):
             raise AgentError(f"agent {self.name!r}: expected {legal} from act(), found {illegal[0]}")
         return actions, state
+
+    def report(self, state: Any) -> Report:
+        """Returns the agent's report after its last step: poses of the right shape, and notes that JSON can hold."""
+        with calling(self.name, "report"):
+            pose, notes = self._agent.report(state)
+            pose = None if pose is None else np.asarray(pose)
+            notes = None if notes is None else list(notes)
+        expected = f"agent {self.name!r}: expected %s from report(), found %s"
+        if pose is not None:
+            shape = (self._batch, 3)
+            if pose.shape != shape or pose.dtype.kind not in "fiu":
+                found = f"{pose.dtype} of shape {pose.shape}"
+                raise AgentError(expected % (f"poses (x, y, yaw) of shape {shape}", found))
+            if np.isinf(pose).any():
+                raise AgentError(expected % ("poses in metres and rad, NaN where unknown", "an infinite one"))
+        if notes is not None:
+            if len(notes) != self._batch:
+                raise AgentError(expected % (f"{self._batch} notes", len(notes)))
+            try:
+                notes = json.loads(json.dumps(notes, allow_nan=False))
+            except (TypeError, ValueError, RecursionError) as error:
+                raise AgentError(expected % ("notes that JSON can hold", error)) from error
+        return Report(pose, notes)

@@ -22,6 +22,7 @@ from mazebench.errors import InputError, RunError, UnplayableError
 from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.plan import Plan, build_agent
+from mazebench.evaluation.reports import EpisodeReports
 from mazebench.results.metrics import spl
 from mazebench.results.records import Record
 from mazebench.results.trajectories import Trajectory
@@ -47,6 +48,7 @@ class Result(NamedTuple):
     path_length: float  # m
     blocked: bool  # whether a wall stands in the shortest path on the shown map
     kept: Sequence[Any] | np.ndarray  # of each moment, the last one included; empty if nothing is kept
+    reported: Mapping[str, Any] = {}  # further keys of the record, of what the agent reported
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -87,6 +89,7 @@ def run_chunk(chunk: Chunk) -> Iterator[list[Result]]:
         seed=chunk.options.seed,
         needs_truth=chunk.agent_class.needs_truth,
         keep=_poses if chunk.record else None,
+        reports=chunk.agent_class.report is not Agent.report,
     ):
         yield [result._replace(kept=np.array(result.kept)) for result in results] if chunk.record else results
 
@@ -121,6 +124,7 @@ def run_trials(
     seed: int = 0,
     needs_truth: bool = False,
     keep: Keep | None = None,
+    reports: bool = False,
 ) -> Iterator[list[Result]]:
     """Yields the results of the trials that ended, after each step; each once, in no fixed order.
 
@@ -133,6 +137,7 @@ def run_trials(
       seed: of what the agent draws; with a trial's number it gives the seed of the episode's draws.
       needs_truth: whether the agent is given the true maze and pose.
       keep: what to keep of each moment of the episodes.
+      reports: whether the agent is asked for reports.
     """
     if not trials:
         return
@@ -153,7 +158,13 @@ def run_trials(
     env = MazeVectorEnv(task, num_envs, num_threads=num_threads, episode_source=next_episode)
     with contextlib.closing(env):
         first, numbers = env.reset(), list(running)
-        for step in rollout(agent, env, first, seeds, needs_truth=needs_truth):
+        reported = [EpisodeReports(shown, task.cell_size) for shown in env.rules.shown if shown]
+        for step in rollout(agent, env, first, seeds, needs_truth=needs_truth, reports=reports):
+            if reports:
+                true_poses, (poses, notes) = np.column_stack([step.info["position"], step.info["yaw"]]), step.report
+                for slot in np.flatnonzero(np.array(numbers) >= 0).tolist():
+                    pose, note = (None if each is None else each[slot] for each in (poses, notes))
+                    reported[slot].add(true_poses[slot], pose, note)
             if keep:
                 moments = keep(step.inputs.observation, step.info, step.actions)
                 for slot, number in enumerate(numbers):
@@ -173,9 +184,12 @@ def run_trials(
                         path_length=final["path_length"].item(),
                         blocked=final["blocked"].item(),
                         kept=kept[slot],
+                        reported=reported[slot].result() if reports else {},
                     )
                 )
                 kept[slot] = []
+                if reports and (shown := env.rules.shown[slot]):
+                    reported[slot] = EpisodeReports(shown, task.cell_size)
             yield results
             numbers = list(running)
 
@@ -234,4 +248,5 @@ def to_record(plan: Plan, result: Result) -> Record:
         "blocked": result.blocked if is_track else None,
         "kind": (maze.kind or None) if is_track else None,
     }
-    return Record.model_validate(values | {name: value for name, value in optional.items() if value is not None})
+    told = {name: value for name, value in optional.items() if value is not None}
+    return Record.model_validate(values | told | dict(result.reported))

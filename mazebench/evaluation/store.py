@@ -21,7 +21,7 @@ from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.chunk import Result, to_record, to_trajectory
 from mazebench.evaluation.plan import Plan
 from mazebench.results.reading import CONFIG, EPISODES, JOURNAL, SUMMARY
-from mazebench.results.records import Record, Summary
+from mazebench.results.records import REPORTED, Record, Summary
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, save_trajectories
 from mazebench.storage.files import make_folder, open_whole, writing_to
 from mazebench.storage.json_files import read_json, read_lines, to_line, write_json
@@ -116,10 +116,12 @@ class Store:
           InputError: if it is of no episode of the plan, or was not written of one.
         """
         record, where = line.record, f"{self.folder / JOURNAL}: expected records of the run's episodes"
-        number, blocked = record.episode, (record.model_extra or {}).get("blocked") is True
+        number, told = record.episode, record.model_extra or {}
+        reported = {name: told[name] for name in REPORTED if name in told}
         if number >= len(self._plan.trials):
             raise InputError(f"{where}, found one of {number}")
-        result = Result(number, record.success, record.steps, record.path_length, blocked, ())
+        is_blocked = told.get("blocked") is True
+        result = Result(number, record.success, record.steps, record.path_length, is_blocked, (), reported)
         written, found = to_record(self._plan, result).model_dump(), record.model_dump()
         if other := [name for name in written | found if found.get(name) != written.get(name)]:
             raise InputError(f"{where}, found {str(found.get(other[0]))[:80]!r} as {other[0]} of episode {number}")

@@ -151,6 +151,7 @@ def _compare(a: Sequence[Record], b: Sequence[Record]) -> Row:
             difference=difference_interval(ours[metric] - theirs[metric], mazes),
         )
         for metric in ours
+        if metric in theirs
     }
     # Won is 1, lost is -1 and a tie 0: the share of wins is half of their mean, and a half.
     outcome = difference_interval(np.sign(ours["spl"] - theirs["spl"]), mazes)

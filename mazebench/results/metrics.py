@@ -14,7 +14,7 @@ import numpy as np
 
 from mazebench.constants import ON_TIME
 from mazebench.results.intervals import mean_interval
-from mazebench.results.records import Figures, Record, column
+from mazebench.results.records import RECALLS, REPORTED, Figures, Record, column
 
 # What a summary calls a metric, and the field of a record that it is the mean of.
 METRICS = {"success_rate": "success", "spl": "spl", "spl_grid": "spl_grid"}
@@ -51,8 +51,10 @@ def is_on_time(records: Sequence[Record], factor: float) -> np.ndarray:
 
 
 def scores(records: Sequence[Record]) -> dict[str, np.ndarray]:
-    """Returns `[E]` float by metric, of `METRICS` and `ON_TIME_METRICS`."""
-    found = {metric: column(records, name).astype(float) for metric, name in METRICS.items()}
+    """Returns `[E]` float by metric, of `METRICS`, `ON_TIME_METRICS` and, where all records have them, `RECALLS`."""
+    are_told = all(RECALLS.keys() <= (record.model_extra or {}).keys() for record in records)
+    names = METRICS | {name: name for name in RECALLS if are_told}
+    found = {metric: column(records, name).astype(float) for metric, name in names.items()}
     return found | {name: is_on_time(records, k).astype(float) for name, k in ON_TIME_METRICS.items()}
 
 
@@ -77,7 +79,7 @@ def by_fact(records: Sequence[Record]) -> dict[str, np.ndarray]:
     The groups of a fact ("blocked") are named after it and its contrary ("not blocked"), those of mazes after the kind.
     """
     told = records[0].model_extra or {}
-    facts = [name for name, value in told.items() if isinstance(value, bool)]
+    facts = [name for name, value in told.items() if isinstance(value, bool) and name not in REPORTED]
     groups = {
         f"{'' if holds else 'not '}{fact}": column(records, fact) == holds for fact in facts for holds in (True, False)
     }
@@ -94,4 +96,7 @@ def _figures(records: Sequence[Record]) -> Figures:
     on_time = {f"{k:g}": means[metric] for metric, k in ON_TIME_METRICS.items()}
     values["on_time"] = {k: mean.value for k, mean in on_time.items()}
     values["on_time_ci95"] = {k: (mean.low, mean.high) for k, mean in on_time.items()}
+    recalls = {name: means[name] for name in RECALLS if name in means}
+    values["recall"] = {name: mean.value for name, mean in recalls.items()}
+    values["recall_ci95"] = {name: (mean.low, mean.high) for name, mean in recalls.items()}
     return Figures.model_validate(values)

@@ -14,6 +14,15 @@ from mazebench.storage.json_files import to_line
 from mazebench.tasks.task_options import TaskOptions
 from mazebench.tasks.tracks import TRACKS, distance_of
 
+# Of the poses that an agent reports, over an episode and at its end; and all that a record has of reports.
+RECALLS = {
+    "recall_1m": "pose within 1 m",
+    "recall_1m_30deg": "pose within 1 m and 30 degrees",
+    "final_recall_1m": "pose at the end within 1 m",
+    "final_recall_1m_30deg": "pose at the end within 1 m and 30 degrees",
+}
+REPORTED = (*RECALLS, "notes")
+
 _LARGEST = 2**53  # from here on, not every whole number is a float
 
 Count = Annotated[int, pydantic.Field(ge=0, lt=_LARGEST)]
@@ -41,7 +50,7 @@ class Record(_Stored):
 
     The strengths of the perturbations follow as further keys; on a track also `level` and its facts, such as
     `blocked`; in mazes whose cells are not 1 m wide also `cell_size`, in metres; where a user set them, `lidar_noise`
-    and `odometry_noise`.
+    and `odometry_noise`; of an agent that reports also `RECALLS` and `notes`.
     """
 
     agent: Name
@@ -86,6 +95,12 @@ class Figures(_Stored):
     spl_grid_ci95: tuple[Share, Share]
     on_time: dict[str, Share]  # by the factor of the oracle's steps as text: "1.25", "2"
     on_time_ci95: dict[str, tuple[Share, Share]]
+    recall: dict[str, Share] = {}  # by the names in `RECALLS`; left out where no poses were reported
+    recall_ci95: dict[str, tuple[Share, Share]] = {}
+
+    @pydantic.model_serializer(mode="wrap")
+    def _without_empty(self, handler: pydantic.SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {name: value for name, value in handler(self).items() if value != {}}
 
 
 class Provenance(_Stored):

@@ -23,6 +23,11 @@ class Drawing(abc.ABC):
 
     pixels_per_cell: ClassVar[int] = 1  # P / N
 
+    @property
+    def is_rigid(self) -> bool:
+        """True if the map is only turned or mirrored, with a pixel for each cell."""
+        return False
+
     @abc.abstractmethod
     def picture(self, walls: np.ndarray) -> np.ndarray:
         """Returns `[P, P]`: the picture of `walls` (`[N, N]` bool); bool, or the share of wall in [0, 1] as float32."""

@@ -38,6 +38,10 @@ class _TurnedDrawing(Drawing):
     quarters: int  # turns by a quarter
     is_mirrored: bool
 
+    @property
+    def is_rigid(self) -> bool:
+        return self.inner is None or self.inner.is_rigid
+
     def picture(self, walls: np.ndarray) -> np.ndarray:
         """Returns `[P, P]`: the inner picture, mirrored and turned."""
         picture = walls if self.inner is None else self.inner.picture(walls)
