@@ -10,7 +10,10 @@ from mazebench_agents.robot.driving import Drive
 
 from mazebench.agent_loading import load_agent_class
 from mazebench.evaluation.chunk import Result, run_trials
+from mazebench.evaluation.measured_oracle import measure_oracle_steps
 from mazebench.maps.benchmark import load_kind_mazes, load_mazes
+from mazebench.maps.kinds import generate
+from mazebench.maps.maze import Maze
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
 
@@ -94,6 +97,13 @@ class TestNavigator:
         mazes = load_kind_mazes("train")
         spec = Task.of(track, mazes=mazes[:: len(mazes) // 6], level=level, distances=(15, 25), **options)
         assert success_rate(play(spec, draw_trials(spec, 2))) >= least
+
+    def test_smaller_cells_cost_no_time(self):
+        walls = np.kron(generate("house", 15, np.random.default_rng(0)).walls, np.ones((2, 2), dtype=bool))
+        spec = Task.of(mazes=(Maze(walls, cell_size=0.5),), distances=(20, 24, 28), sensors=("lidar",))
+        trials = draw_trials(spec, 4)
+        steps = sum(result.steps for result in play(spec, trials))
+        assert steps <= 1.04 * sum(measure_oracle_steps(spec, trials))
 
     def test_near_goals_are_found_without_a_map_and_a_mark(self):
         mazes, hide = load_mazes(13, "train")[::2], ("map", "goal")

@@ -133,31 +133,34 @@ class TestTracking:
             assert abs(math.remainder(found[2] - pose[2], math.pi / 2)) < math.radians(2)
 
     @pytest.mark.parametrize("kind", ["dfs", "house"])
-    @pytest.mark.parametrize(("noise", "scale"), [(0.0, 1.0), (0.2, 1.1)])
-    def test_a_pose_is_followed_without_a_map(self, kind, noise, scale):
+    @pytest.mark.parametrize(("noise", "scale", "cells"), [(0.0, 1.0, 1), (0.2, 1.1, 1), (0.2, 1.1, 2)])
+    def test_a_pose_is_followed_without_a_map(self, kind, noise, scale, cells):
+        # A metre is so many cells, in which the tracker counts.
         rng = np.random.default_rng(0)
-        maze, model = Maze(generate(kind, 31, rng).walls), beams.beams_of(TURTLEBOT3, 1.0)
+        maze, model = Maze(generate(kind, 31, rng).walls), beams.beams_of(TURTLEBOT3, cells)
+        fine = Maze(np.kron(maze.walls, np.ones((cells, cells), dtype=bool)), cell_size=1 / cells)
+        size, unit = 61 * cells, np.array([cells, cells, 1.0])
         errors = [NoisyMotion(noise, rng)] * (noise > 0) + [Odometry(rng, scale)]
         poses = tour(maze, 60, rng)
-        evidence, tracker = np.zeros((61, 61)), None
+        evidence, tracker = np.zeros((size, size)), None
         for before, pose in zip([poses[0], *poses], poses, strict=False):
             state = np.zeros(12)
             state[[0, 1, 5]] = pose
             for error in errors:
                 error(state)
-            odometry, ranges = state[[0, 1, 5]], scan(maze, pose, TURTLEBOT3, rng)
+            odometry, ranges = unit * state[[0, 1, 5]], cells * scan(fine, pose, TURTLEBOT3, rng)
             if tracker is None:
-                tracker = Tracker(aligned(61, ranges, model), odometry, noise)
+                tracker = Tracker(aligned(size, ranges, model), odometry, noise)
                 turned = round((tracker.pose[2] - pose[2]) / (math.pi / 2)) * math.pi / 2
             else:
                 # The command is followed up to an error, in the grid's frame.
                 step = (complex(*pose[:2]) - complex(*before[:2])) * np.exp(1j * turned)
-                x, y = tracker.pose[:2] + np.array([step.real, step.imag]) + rng.normal(0, 0.07, 2)
+                x, y = tracker.pose[:2] + cells * (np.array([step.real, step.imag]) + rng.normal(0, 0.07, 2))
                 commanded = np.array([x, y, tracker.pose[2] + pose[2] - before[2]])
                 tracker.update(seen_walls(evidence), odometry, commanded, ranges, model)
-            beams.add_scan(evidence, *tracker.pose, ranges, model, 0.03)
+            beams.add_scan(evidence, *tracker.pose, ranges, model, 0.03 * cells)
         way = (complex(*poses[-1][:2]) - complex(*poses[0][:2])) * np.exp(1j * turned)
-        assert abs(complex(*tracker.pose[:2]) - complex(30.5, 30.5) - way) < 0.15
+        assert abs(complex(*tracker.pose[:2]) / cells - complex(30.5, 30.5) - way) < 0.15
         assert abs(wrap_angle(tracker.pose[2] - poses[-1][2] - turned)) < math.radians(5)
 
 

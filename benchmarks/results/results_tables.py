@@ -14,12 +14,24 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import pandas as pd
 from scipy import stats
 
-from benchmarks.results.kept import LOCAL, ON_TIME_2, ON_TIME_125, PAPER, WORST_TENTH, Kept, estimate
+from benchmarks.results.kept import (
+    LOCAL,
+    ON_TIME_2,
+    ON_TIME_125,
+    PAPER,
+    RECALL_AGENTS,
+    RECALL_SETTINGS,
+    WORST_TENTH,
+    Kept,
+    estimate,
+    recall_of,
+)
 from mazebench.maps.benchmark import SIZES
 from mazebench.maps.kinds import KNOWN, NOVEL
 from mazebench.report.curves import SUCCESS
 from mazebench.report.table import METRICS, to_markdown
 from mazebench.results.intervals import CONFIDENCE, Estimate
+from mazebench.results.records import RECALLS
 from mazebench.tasks.tracks import TRACKS
 
 ROOT = pathlib.Path(__file__).parent.parent.parent
@@ -227,6 +239,15 @@ def tracks_blocked(kept: Kept) -> str:
     return format_table(["part", open_path, METRICS[ON_TIME_125], blocked, METRICS[ON_TIME_125]], rows)
 
 
+def tracks_recall(kept: Kept) -> str:
+    """Returns the recall of the poses that agents report, over episodes and at their ends."""
+    rows = []
+    for agent, (track, level) in itertools.product(RECALL_AGENTS, RECALL_SETTINGS):
+        own = kept.of(recall_of(agent), f"{track}-{level}")
+        rows.append([f"`{agent}`", f"`{track}` {level}", *(_interval(metric, own) for metric in RECALLS)])
+    return format_table(["agent", "setting", *RECALLS.values()], rows)
+
+
 # By the name that a page gives.
 TABLES: dict[str, Callable[[Kept], str]] = {
     "paper-runs": lambda kept: by_distance("agent", _LOCAL_RUNS, "success_rate", _PRINTED_DISTANCES, kept),
@@ -248,6 +269,7 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     ),
     "tracks-map-worth": tracks_map_worth,
     "tracks-blocked": tracks_blocked,
+    "tracks-recall": tracks_recall,
     "tracks-novel-kinds": lambda kept: by_track(
         {
             f"`{agent}`, {name} layouts": (agent, ON_TIME_125, kinds)
