@@ -53,7 +53,7 @@ class Truthful(Agent):
         return np.array(actions), state
 
     def report(self, state):
-        return Report(state + (self.shift, 0.0, self.turn))
+        return Report(state + np.array([self.shift, 0.0, self.turn]))
 
 
 class Shifted(Truthful):
@@ -123,7 +123,8 @@ def test_a_report_that_breaks_the_contract_is_named_in_one_line(reported, said):
 
     with pytest.raises(AgentError) as caught:
         mazebench.evaluate(Wrong, mazes=field(7), distances=(3,), episodes_per_distance=1)
-    assert said in str(caught.value) and "\n" not in str(caught.value)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_reports_of_the_navigator_are_right_and_change_no_result(tmp_path):
@@ -158,6 +159,7 @@ def test_recall_is_printed_and_reported(command, tmp_path):
     options = ("--kinds", "house", "--num-mazes", 1, "--size", 13, "--distances", 3, "--sensors", "lidar")
     status, output, errors = command("eval", "--agent", "navigator", *options, "--out", tmp_path / "run")
     assert status == 0, errors
-    assert "pose 1 m, 30 deg" in output and "1.00, 1.00" in output.splitlines()[-4]
+    assert "pose 1 m, 30 deg" in output
+    assert "1.00, 1.00" in output.splitlines()[-4]
     tables = build_tables(join_episodes(read_results([tmp_path / "run"])))
     assert set(RECALLS) <= set(tables[0].metrics)

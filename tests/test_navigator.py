@@ -100,7 +100,7 @@ class TestNavigator:
 
     def test_smaller_cells_cost_no_time(self):
         walls = np.kron(generate("house", 15, np.random.default_rng(0)).walls, np.ones((2, 2), dtype=bool))
-        spec = Task.of(mazes=(Maze(walls, cell_size=0.5),), distances=(20, 24, 28), sensors=("lidar",))
+        spec = Task.of(mazes=(Maze(walls, cell_size=0.5),), distances=(20, 24, 28), sensors=("lidar",), context_size=30)
         trials = draw_trials(spec, 4)
         steps = sum(result.steps for result in play(spec, trials))
         assert steps <= 1.04 * sum(measure_oracle_steps(spec, trials))

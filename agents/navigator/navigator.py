@@ -82,4 +82,4 @@ class Navigator(Agent):
 
     def report(self, state: list[_Robot | None]) -> Report:
         """Returns where the robots are on the maps, by the likeliest way in which these may lie."""
-        return report(robot and robot.memory for robot in state)
+        return report(robot.memory if robot else None for robot in state)

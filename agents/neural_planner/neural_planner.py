@@ -131,7 +131,7 @@ class NeuralPlanner(NetworkAgent):
 
     def report(self, state: ActorState) -> Report:
         """Returns where the robots are on the maps, by the likeliest way in which these may lie."""
-        return report(robot and robot.memory for robot in state.robots)
+        return report(robot.memory if robot else None for robot in state.robots)
 
     def notes(self, state: ActorState) -> Choice | None:
         """Returns the last choice."""
