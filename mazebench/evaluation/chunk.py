@@ -158,7 +158,7 @@ def run_trials(
     env = MazeVectorEnv(task, num_envs, num_threads=num_threads, episode_source=next_episode)
     with contextlib.closing(env):
         first, numbers = env.reset(), list(running)
-        reported = [EpisodeReports(shown, task.cell_size) for shown in env.rules.shown if shown]
+        reported = [EpisodeReports(shown) for shown in env.rules.shown if shown]
         for step in rollout(agent, env, first, seeds, needs_truth=needs_truth, reports=reports):
             if reports:
                 true_poses, (poses, notes) = np.column_stack([step.info["position"], step.info["yaw"]]), step.report
@@ -189,7 +189,7 @@ def run_trials(
                 )
                 kept[slot] = []
                 if reports and (shown := env.rules.shown[slot]):
-                    reported[slot] = EpisodeReports(shown, task.cell_size)
+                    reported[slot] = EpisodeReports(shown)
             yield results
             numbers = list(running)
 

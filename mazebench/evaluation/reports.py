@@ -18,9 +18,9 @@ _ALIGNED = math.radians(30)
 class EpisodeReports:
     """What an agent reports in one episode."""
 
-    def __init__(self, shown: ShownMap, cell_size: float):
-        """Begins an episode with the map that the agent is shown; `cell_size` is in m."""
-        self._shown, self._cell_size = shown, cell_size
+    def __init__(self, shown: ShownMap):
+        """Begins an episode with the map that the agent is shown."""
+        self._shown = shown
         self._has_poses = False
         self._num_steps, self._num_hits = 0, np.zeros(2)  # hits: near, and also aligned
         self._last, self._notes = np.zeros(2), None
@@ -34,7 +34,7 @@ class EpisodeReports:
           notes: of the step, a value that JSON can hold.
         """
         self._num_steps, self._last, self._notes = self._num_steps + 1, np.zeros(2), notes
-        expected = pose_on_map(self._shown, self._cell_size, true_pose)
+        expected = pose_on_map(self._shown, true_pose)
         if pose is None or expected is None:
             return
         self._has_poses = True
@@ -50,12 +50,12 @@ class EpisodeReports:
         return found if self._notes is None else found | {"notes": self._notes}
 
 
-def pose_on_map(shown: ShownMap, cell_size: float, pose: np.ndarray) -> np.ndarray | None:
+def pose_on_map(shown: ShownMap, pose: np.ndarray) -> np.ndarray | None:
     """Returns a pose `[3]` of the maze in the frame of the shown map; None on a map that is bent and has no frame."""
     if shown.drawing is not None and not shown.drawing.is_rigid:
         return None
     x, y, yaw = pose.tolist()
     # The body, and a point ahead of it, whose direction is turned and mirrored as the map is.
-    points = np.array([(x, y), (x + math.cos(yaw), y + math.sin(yaw))]) / cell_size
-    (x, y), (ahead_x, ahead_y) = (shown.seen_points(points) * cell_size).tolist()
+    points = np.array([(x, y), (x + math.cos(yaw), y + math.sin(yaw))]) / shown.cell_size
+    (x, y), (ahead_x, ahead_y) = (shown.seen_points(points) * shown.cell_size).tolist()
     return np.array([x, y, math.atan2(ahead_y - y, ahead_x - x)])
