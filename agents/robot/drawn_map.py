@@ -27,10 +27,10 @@ from mazebench.maps.maze import Cell
 from .drawing import compare, widths_of_pixels
 from .gauss_newton import normal_equations, variances
 
-_SMOOTHNESS = 4.2  # m, deviation of the Gaussian by which displacements of two points are correlated
-_DISPLACEMENT = 0.6  # m, deviation
+_SMOOTHNESS = 4.2  # cells, deviation of the Gaussian by which displacements of two points are correlated
+_DISPLACEMENT = 0.6  # cells, deviation
 _NUM_MODES = 24
-_AFFINE = 1.0  # m, deviation of what is off at first in the middle, and at the edges for the wrong scale
+_AFFINE = 1.0  # cells, deviation of what is off at first in the middle, and at the edges for the wrong scale
 _THICKENING = 0.3  # cells, deviation
 _LARGEST_THICKENING = 0.6  # cells
 
@@ -40,7 +40,6 @@ _DAMPING = 0.5  # share of the new log odds in an update; all at once, neighbour
 
 _LARGEST_STEP = 0.5  # cells that a point is moved at once
 _WIDTHS = (0.2, 3.0)  # cells, the smallest and the largest side of a box
-_OUTSIDE = 1.5  # m from the maze, from where on displacements are constant
 _NODES = 4  # per cell, at which modes are computed
 _MODES_PER_AXIS = 9
 
@@ -114,15 +113,12 @@ class Registration:
         return marked.reshape(size, size)
 
 
-def register(picture: np.ndarray, size: int, cell_size: float = 1.0) -> Registration:
-    """Returns the registration of `picture`, `[M, M]` shares of wall, with a maze of `size` cells a side.
-
-    `cell_size` is in m.
-    """
+def register(picture: np.ndarray, size: int) -> Registration:
+    """Returns the registration of `picture`, `[M, M]` shares of wall, with a maze of `size` cells a side."""
     picture = picture.astype(np.float64)
     found: list[Registration] = []
     for schedule in _SCHEDULES:
-        found.append(_Fit(picture, size, cell_size).run(schedule))
+        found.append(_Fit(picture, size).run(schedule))
         if found[-1].residual < _SHARP:
             break
     return min(found, key=lambda registration: registration.residual)
@@ -131,7 +127,7 @@ def register(picture: np.ndarray, size: int, cell_size: float = 1.0) -> Registra
 class _Fit:
     """A registration under way."""
 
-    def __init__(self, picture: np.ndarray, size: int, cell_size: float):
+    def __init__(self, picture: np.ndarray, size: int):
         """Lays the maze's inner cells on the box around what is free in the picture."""
         # Log odds of walls, by the prior and now.
         self.prior = np.minimum(special.logit(with_border(np.full((size, size), _WALL))), _LARGEST_LOG_ODDS)  # [N, N]
@@ -150,7 +146,7 @@ class _Fit:
         self.nominal = np.stack(np.meshgrid(*coordinates, indexing="ij"), axis=-1)  # [P, Q, 2], at parameters of 0
 
         # Parameters: of rows, of columns, thickening.
-        self.basis = _basis(coordinates[0], coordinates[1], size, cell_size)
+        self.basis = _basis(coordinates[0], coordinates[1], size)
         self.precision = np.ones(2 * self.basis.shape[-1] + 1)  # [2 D + 1], by the prior
         self.precision[-1] = 1 / _THICKENING**2
         self.parameters = np.zeros(len(self.precision))
@@ -220,35 +216,33 @@ def with_border(walls: np.ndarray) -> np.ndarray:
     return walls
 
 
-def _basis(rows: np.ndarray, columns: np.ndarray, size: int, cell_size: float) -> np.ndarray:
+def _basis(rows: np.ndarray, columns: np.ndarray, size: int) -> np.ndarray:
     """Returns `[2, P Q, D]`: by how much each parameter moves the points at `rows` `[P]` x `columns` `[Q]`, in cells.
 
     The first two parameters of an axis are a shift and a scale, the others weigh the modes of the field.
     """
-    along_rows, along_columns = _modes_at(rows, size, cell_size), _modes_at(columns, size, cell_size)
-    *_, first, second = _modes(size, cell_size)
+    along_rows, along_columns = _modes_at(rows, size), _modes_at(columns, size)
+    *_, first, second = _modes(size)
     modes = along_rows[:, None, first] * along_columns[None, :, second]
     basis = np.empty((2, len(rows) * len(columns), 2 + _NUM_MODES))
-    affine = _AFFINE / cell_size
-    basis[:, :, 0] = affine
-    basis[0, :, 1] = affine * np.repeat(2 * rows / size - 1, len(columns))
-    basis[1, :, 1] = affine * np.tile(2 * columns / size - 1, len(rows))
-    basis[:, :, 2:] = _DISPLACEMENT / cell_size * modes.reshape(-1, _NUM_MODES)
+    basis[:, :, 0] = _AFFINE
+    basis[0, :, 1] = _AFFINE * np.repeat(2 * rows / size - 1, len(columns))
+    basis[1, :, 1] = _AFFINE * np.tile(2 * columns / size - 1, len(rows))
+    basis[:, :, 2:] = _DISPLACEMENT * modes.reshape(-1, _NUM_MODES)
     return basis
 
 
-def _modes_at(coordinates: np.ndarray, size: int, cell_size: float) -> np.ndarray:
+def _modes_at(coordinates: np.ndarray, size: int) -> np.ndarray:
     """Returns `[T, 9]`: the modes of a Gaussian process on [0, N], times their deviations, at `coordinates` `[T]`.
 
-    By the method of Nystroem from the modes at nodes; constant from `_OUTSIDE` on.
+    By the method of Nystroem from the modes at nodes; constant from 1.5 cells outside on.
     """
-    nodes, weights, _, _ = _modes(size, cell_size)
-    outside = _OUTSIDE / cell_size
-    return _correlation(np.clip(coordinates, -outside, size + outside), nodes, cell_size) @ weights
+    nodes, weights, _, _ = _modes(size)
+    return _correlation(np.clip(coordinates, -1.5, size + 1.5), nodes) @ weights
 
 
 @functools.lru_cache
-def _modes(size: int, cell_size: float) -> tuple[np.ndarray, ...]:
+def _modes(size: int) -> tuple[np.ndarray, ...]:
     """Returns nodes `[T]` on [0, N], and the modes' weights at them `[T, 9]`.
 
     Then follow the modes along rows and along columns whose products have the largest variances, `[24]` each.
@@ -257,12 +251,12 @@ def _modes(size: int, cell_size: float) -> tuple[np.ndarray, ...]:
     lengths = np.full(len(nodes), 1 / _NODES)
     lengths[[0, -1]] /= 2
     root = np.sqrt(lengths)
-    variances, vectors = np.linalg.eigh(root[:, None] * _correlation(nodes, nodes, cell_size) * root)
+    variances, vectors = np.linalg.eigh(root[:, None] * _correlation(nodes, nodes) * root)
     variances, vectors = variances[::-1][:_MODES_PER_AXIS], vectors[:, ::-1][:, :_MODES_PER_AXIS]
     products = np.outer(variances, variances)
     main = np.unravel_index(np.argsort(-products, axis=None)[:_NUM_MODES], products.shape)
     return nodes, root[:, None] * vectors / np.sqrt(variances), *main
 
 
-def _correlation(points: np.ndarray, others: np.ndarray, cell_size: float) -> np.ndarray:
-    return np.exp(-(((points[:, None] - others) / (_SMOOTHNESS / cell_size)) ** 2) / 2)
+def _correlation(points: np.ndarray, others: np.ndarray) -> np.ndarray:
+    return np.exp(-(((points[:, None] - others) / _SMOOTHNESS) ** 2) / 2)

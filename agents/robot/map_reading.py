@@ -27,11 +27,11 @@ class MapReading(NamedTuple):
     goal: np.ndarray  # [N, N] float, the probability that a cell is the goal; sums to 1
 
 
-def read_map(context: np.ndarray, size: int, cell_size: float = 1.0) -> MapReading:
-    """Returns what a context `[4, M, M]` tells of a maze of `size` cells of `cell_size` m a side, at most M."""
+def read_map(context: np.ndarray, size: int) -> MapReading:
+    """Returns what a context `[4, M, M]` tells of a maze of `size` cells a side, at most M."""
     picture, planes = context[GLOBAL_MAP], context[[START, GOAL]].astype(np.float64)
     if len(picture) > size and picture.any():
-        registration = register(picture, size, cell_size)
+        registration = register(picture, size)
         walls = registration.walls
         possible = 1 - walls
         marks = [registration.marked(marked_cell(plane)) if plane.any() else 1.0 for plane in planes]

@@ -119,7 +119,7 @@ class Senses:
         else:
             if inputs.new_context[slot]:
                 # Another map and goal, on a map that lies as the one before.
-                reading = read_map(context, self._size, self._cell_size)
+                reading = read_map(context, self._size)
                 memory.belief.begin_leg(reading.walls, reading.goal)
                 memory.prior, memory.goal = memory.belief.mixture()
                 memory.searched[:] = False
@@ -146,7 +146,7 @@ class Senses:
         """Returns the memory at an episode's first observation, before the walls that are sensed are added."""
         # An episode begins in the centre of a cell. Zero is odometry; any other position is a noisy one.
         off_centre = max(abs(coordinate % 1.0 - 0.5) for coordinate in (observed.x, observed.y))
-        reading, odometry = read_map(context, self._size, self._cell_size), _pose(observed)
+        reading, odometry = read_map(context, self._size), _pose(observed)
         if off_centre < _ROUNDING:
             # The grid is the maze. A start that is known but not marked says that the map may lie in any way.
             num_turns = 1 if context[START].any() else 8
