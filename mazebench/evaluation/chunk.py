@@ -158,12 +158,12 @@ def run_trials(
     env = MazeVectorEnv(task, num_envs, num_threads=num_threads, episode_source=next_episode)
     with contextlib.closing(env):
         first, numbers = env.reset(), list(running)
+        true_poses = env.rules.pose.copy()  # as they are observed next
         reported = [EpisodeReports(shown) for shown in env.rules.shown if shown]
         for step in rollout(agent, env, first, seeds, needs_truth=needs_truth, reports=reports):
             if reports:
-                true_poses, (poses, notes) = np.column_stack([step.info["position"], step.info["yaw"]]), step.report
                 for slot in np.flatnonzero(np.array(numbers) >= 0).tolist():
-                    pose, note = (None if each is None else each[slot] for each in (poses, notes))
+                    pose, note = (None if each is None else each[slot] for each in step.report)
                     reported[slot].add(true_poses[slot], pose, note)
             if keep:
                 moments = keep(step.inputs.observation, step.info, step.actions)
@@ -191,7 +191,7 @@ def run_trials(
                 if reports and (shown := env.rules.shown[slot]):
                     reported[slot] = EpisodeReports(shown)
             yield results
-            numbers = list(running)
+            numbers, true_poses = list(running), env.rules.pose.copy()
 
 
 def _poses(observation: Observation, info: dict[str, Any], actions: np.ndarray | None) -> Sequence[Any]:
