@@ -187,6 +187,35 @@ def draw_planner() -> None:
     figure.savefig(FOLDER / "neural-planner.png", dpi=150, metadata={"Software": None})
 
 
+def draw_changes() -> None:
+    """Draws a plan, a building in which things have changed since it was drawn, and the navigator's path in that."""
+    plan = mazebench.generate("hospital", 41, np.random.default_rng(7))
+    with tempfile.TemporaryDirectory() as folder:
+        options = {"mazes": plan, "distances": DISTANCE, "episodes_per_distance": 4}
+        mazebench.evaluate("navigator", "rebuilt", out=folder, record=True, level=2, **options)
+        result = load_result(pathlib.Path(folder))
+        paths = load_trajectories(pathlib.Path(folder) / TRAJECTORIES)
+    number = next(record.episode for record in result.records if record.blocked)
+    record, path = result.records[number], paths[number].pose
+    building = next(maze for maze in resolve(result.summary.task).mazes if maze.name == record.maze)
+
+    pixels = 31 * PIXELS // plan.size
+    both = draw_grid(building.walls | plan.walls, pixels)
+    for changed, shade in ((building.walls & ~plan.walls, DRIVEN), (plan.walls & ~building.walls, "#2a9d3a")):
+        both[np.kron(changed, np.ones((pixels, pixels), dtype=bool))] = tuple(bytes.fromhex(shade[1:]))
+    pictures = {
+        "the plan, which the robot is shown": draw_grid(plan.walls, pixels, record.start, record.goal),
+        "what has changed: closed (red), opened (green)": both,
+        "the building, and the navigator's path": draw_grid(
+            building.walls, pixels, record.start, record.goal, path[:, :2]
+        ),
+    }
+    figure = Figure(figsize=(9.6, 3.4), layout="constrained")
+    for axes, (title, picture) in zip(figure.subplots(1, 3), pictures.items(), strict=True):
+        _show(axes, picture, title)
+    figure.savefig(FOLDER / "your-map.png", dpi=110, metadata={"Software": None})
+
+
 def _shown_map(shown: Shown) -> np.ndarray:
     pixels = shown.walls if shown.are_cells else shown.walls / 255
     start, goal = (None if mark < 0 else divmod(mark, len(pixels)) for mark in (shown.start, shown.goal))
@@ -204,5 +233,5 @@ def _show(axes: Axes, picture: np.ndarray, title: str, **look: str) -> None:
 
 
 if __name__ == "__main__":
-    for draw in (film, draw_environments, draw_tracks, draw_kinds, draw_planner):
+    for draw in (film, draw_environments, draw_tracks, draw_kinds, draw_planner, draw_changes):
         draw()
