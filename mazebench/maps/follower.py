@@ -39,7 +39,8 @@ def sight_lines(reach: float) -> tuple[np.ndarray, np.ndarray]:
             behind.setdefault(before, []).append((row, column))
 
     # Each cell, then those behind it; a cell's number of cells on and behind it is known once they are.
-    offsets, left, num_from = [], [(0, 0)], {}
+    offsets, left = [], [(0, 0)]
+    num_from: dict[tuple[int, int], int] = {}
     while left:
         offsets.append(left.pop())
         left += behind.get(offsets[-1], [])
@@ -130,7 +131,7 @@ def shortest_ways(walls: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.
 
 def follow(
     walls: np.ndarray, shown: np.ndarray, pairs: np.ndarray, sight: float, most: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Returns how far a robot drives that follows its map.
 
     Where the map shows no way, the robot forgets the walls on it that it has not seen.
@@ -145,12 +146,11 @@ def follow(
     Returns:
       driven: `[P]` int, cells; where the drive has ended, what it would have been at least.
       shortest: `[P]` int, cells of a shortest way in the building.
-      boxes: `[P, 4]` int, the first row and column and the last row and column of the cells in which it looked around.
     """
     walls, shown = (np.array(grid, order="C") for grid in (walls, shown))  # for kernels, of one type in all calls
     offsets, after = sight_lines(sight)
     window = np.ones((2 * offsets.max() + 1,) * 2, dtype=np.uint8)
-    can_be_wrong = cv2.dilate((walls != shown).astype(np.uint8), window).astype(bool)
+    can_be_wrong = cv2.dilate((walls != shown).astype(np.uint8), window).astype(bool).ravel()
     return _follow(walls, shown, pairs, offsets @ (len(walls), 1), after, can_be_wrong, most)
 
 
@@ -163,13 +163,13 @@ def _follow(
     after: np.ndarray,
     can_be_wrong: np.ndarray,
     most: float,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Does the work of `follow`.
 
     Args:
       steps: `[K]` int, from a cell's number to those of the cells of `sight_lines`.
       after: of `sight_lines`.
-      can_be_wrong: `[N, N]` bool, the cells from which the map may look wrong.
+      can_be_wrong: `[N * N]` bool, the cells from which the map may look wrong.
     """
     size = len(walls)
     true, cost, came = walls.ravel(), np.empty(walls.size, np.int32), np.empty(walls.size, np.int32)
@@ -177,7 +177,7 @@ def _follow(
     ahead = np.empty(walls.size, np.int32)  # of each cell of the way, the next one
     on_way, is_seen = np.empty(walls.size, np.int32), np.empty(walls.size, np.bool_)
     driven, shortest = np.zeros(len(pairs), np.int64), np.empty(len(pairs), np.int64)
-    boxes, track = np.empty((len(pairs), 4), np.int64), np.empty(int(most * walls.size) + 2, np.int64)
+    track = np.empty(int(most * walls.size) + 2, np.int64)  # the cells of a drive
     for number in range(len(pairs)):
         here, goal = pairs[number]
         shortest[number] = plan(walls, here, goal, cost, came, now, later)
@@ -186,14 +186,10 @@ def _follow(
         belief_of = belief.ravel()
         is_seen[:], on_way[:] = False, 0
         num_plans, is_wrong, has_forgotten = 0, True, False
-        first_row, first_column, last_row, last_column = size, size, 0, 0
         while here != goal:
             # See, and correct the map.
             track[driven[number]] = here
-            row, column = here // size, here % size
-            first_row, last_row = min(first_row, row), max(last_row, row)
-            first_column, last_column = min(first_column, column), max(last_column, column)
-            if has_forgotten or can_be_wrong[row, column]:
+            if has_forgotten or can_be_wrong[here]:
                 is_wrong |= look(here, true, belief_of, is_seen, on_way, num_plans, steps, after)
 
             # Plan again if the way is blocked, or may not be the shortest any more.
@@ -218,8 +214,7 @@ def _follow(
             if driven[number] + left > limit:
                 driven[number] += left
                 break
-        boxes[number] = first_row, first_column, last_row, last_column
-    return driven, shortest, boxes
+    return driven, shortest
 
 
 @compiled

@@ -27,13 +27,12 @@ class Passages(NamedTuple):
     """Passages of a building."""
 
     boxes: np.ndarray  # [D, 4] int: of the strip's cells, the first row and column, and the end of rows and of columns
-    sides: np.ndarray  # [D, 2, 2] int: a free cell on each side of the strip
     is_open: np.ndarray  # [D] bool
 
-    def box(self, index: int) -> tuple[slice, slice]:
-        """Returns the rows and columns of a passage."""
+    def box(self, index: int, margin: int = 0) -> tuple[slice, slice]:
+        """Returns the rows and columns of a passage with a margin of some cells."""
         top, left, bottom, right = self.boxes[index].tolist()
-        return slice(top, bottom), slice(left, right)
+        return slice(top - margin, bottom + margin), slice(left - margin, right + margin)
 
 
 def find_passages(walls: np.ndarray, cell_size: float) -> Passages:
@@ -63,11 +62,10 @@ def find_passages(walls: np.ndarray, cell_size: float) -> Passages:
 
         # Those whose sides are far by any other way.
         boxes = np.concatenate([openings, doors])
-        sides = _far_sides(grid, boxes, detour)
-        is_far = sides[:, 0, 0] >= 0
+        is_far = _is_far(grid, boxes, detour)
         is_open = np.arange(len(boxes)) < len(openings)
-        boxes, sides = (boxes[:, [1, 0, 3, 2]], sides[..., ::-1]) if turned else (boxes, sides)
-        parts.append((boxes[is_far], sides[is_far], is_open[is_far]))
+        boxes = boxes[:, [1, 0, 3, 2]] if turned else boxes
+        parts.append((boxes[is_far], is_open[is_far]))
     return Passages(*map(np.concatenate, zip(*parts, strict=True)))
 
 
@@ -86,23 +84,15 @@ def _blocks(cells: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def _far_sides(walls: np.ndarray, boxes: np.ndarray, detour: int) -> np.ndarray:
-    """Returns a free cell above and one below each strip whose sides are `detour` cells apart by any other way.
+def _is_far(walls: np.ndarray, boxes: np.ndarray, detour: int) -> np.ndarray:
+    """Returns the strips with free cells above and below that are `detour` cells apart by any other way: `[D]` bool.
 
-    It is a search from the lattice points between the strip and the free cells above to those below. Ways run along
+    It searches from the lattice points between the strip and the free cells above to those below. Ways run along the
     sides of free cells, but not through a point at which two free cells touch diagonally.
-
-    Args:
-      walls: `[N, N]` bool, with a closed border.
-      boxes: `[D, 4]` int.
-      detour: cells.
-
-    Returns:
-      sides: `[D, 2, 2]` int; -1 where the sides are near, or one is not free.
     """
     size = len(walls) + 1  # of the lattice
     closed = walls.copy()
-    sides = np.full((len(boxes), 2, 2), -1)
+    is_far = np.zeros(len(boxes), dtype=np.bool_)
     seen, goals = np.full(size * size, -1), np.full(size * size, -1)
     queue = np.empty(size * size, dtype=np.int64)
     for number in range(len(boxes)):
@@ -111,21 +101,19 @@ def _far_sides(walls: np.ndarray, boxes: np.ndarray, detour: int) -> np.ndarray:
         closed[top:bottom, left:right] = True
 
         # The points at both sides.
-        count, above, below = 0, -1, -1
-        for column in range(right - 1, left - 1, -1):
+        count, has_goal = 0, False
+        for column in range(left, right):
             for point in (column, column + 1):
-                if not closed[top - 1, column]:
-                    above = column
-                    if seen[top * size + point] != number:
-                        seen[top * size + point] = number
-                        queue[count] = top * size + point
-                        count += 1
+                if not closed[top - 1, column] and seen[top * size + point] != number:
+                    seen[top * size + point] = number
+                    queue[count] = top * size + point
+                    count += 1
                 if not closed[bottom, column]:
-                    below = column
                     goals[bottom * size + point] = number
+                    has_goal = True
 
         # Away from those above, point by point.
-        is_far, begin = above >= 0 and below >= 0, 0
+        is_far[number], begin = count > 0 and has_goal, 0
         for _ in range(detour - 1):
             end = count
             for index in range(begin, end):
@@ -133,7 +121,7 @@ def _far_sides(walls: np.ndarray, boxes: np.ndarray, detour: int) -> np.ndarray:
                 upper_left, upper_right = not closed[row - 1, column - 1], not closed[row - 1, column]
                 lower_left, lower_right = not closed[row, column - 1], not closed[row, column]
                 if upper_left == lower_right and upper_right == lower_left and upper_left != upper_right:
-                    is_far &= begin > 0
+                    is_far[number] &= begin > 0  # at the strip, it would depend on the raster
                     continue
                 for step, is_free in (
                     (-size, upper_left or upper_right),
@@ -146,12 +134,9 @@ def _far_sides(walls: np.ndarray, boxes: np.ndarray, detour: int) -> np.ndarray:
                         seen[point] = number
                         queue[count] = point
                         count += 1
-                        is_far &= goals[point] != number
+                        is_far[number] &= goals[point] != number
             begin = end
-            if not is_far or begin == count:
+            if not is_far[number]:
                 break
         closed[top:bottom, left:right] = before
-        if is_far:
-            sides[number, 0, 0], sides[number, 0, 1] = top - 1, above
-            sides[number, 1, 0], sides[number, 1, 1] = bottom, below
-    return sides
+    return is_far
