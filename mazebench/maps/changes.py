@@ -2,8 +2,8 @@
 
 The maze that is given is the old map, here called the plan. In a changed building, open passages are closed, walled
 ones are opened, and furniture has come and gone. The strength of the changes is their cost to a robot on the grid that
-believes the plan: an episode is late if the robot drives over 1.25 times the shortest way. All draws and decisions are
-made in whole numbers, so that one seed gives one building on every machine.
+believes the plan: an episode is late if the robot drives over 1.25 times the shortest way. All that is drawn and
+compared are whole numbers and their ratios, so that one seed gives one building on every machine.
 
 `P` is the number of pairs of a start and a goal, `W` of cells on ways, `D` of passages, and `N` of rows and columns.
 """
@@ -27,7 +27,7 @@ from mazebench.maps.search import search
 
 LATE = (0.15, 0.3, 0.4)  # share of late episodes at strengths 1, 2, 3; on the track `rebuilt` .16, .31 and .38
 LATE_WITHOUT_MAP = 0.2  # the least in a changed building; with less, no map is worth much there
-LATE_IN_PLAN = 0.1  # the least in the plan, without a map; with less, the changes alone would make up the building
+LATE_IN_PLAN = 0.1  # the least in the plan; with less, only what has changed could make a robot late
 WORTH = 0.05  # at strength 1, the least by which lateness without a map is above lateness with the plan
 SIGHT = 3.5  # m, how far the robot sees
 NEAREST, FARTHEST = 15.0, 40.0  # m from start to goal, as on the tracks
@@ -35,7 +35,7 @@ FURNITURE = 0.5, 2.0  # m, the sides of pieces of furniture
 CLEAR = 0.6  # m, that stay free around furniture
 _NUM_PAIRS = 600  # on which lateness is measured, with a standard error of at most .02
 _MISS = 0.03  # by which lateness on these pairs may miss that of a strength
-_NUM_TRIES, _NUM_MISSES = 6, 10  # of a strength, and of changes in a row that a try does not keep
+_NUM_TRIES, _NUM_MISSES = 10, 10  # of a strength, and of changes in a row that a try does not keep
 _CELL = 1e-6  # cells, a tolerance
 
 
@@ -277,13 +277,13 @@ def _furnished(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft:
         return dataclasses.replace(draft, walls=walls, things=things, removed=draft.removed + 1)
 
     # Of a size in whole cells, where it and its surroundings are free.
-    least, most = (metres / plan.cell_size for metres in FURNITURE)
-    height, width = rng.integers(math.ceil(least - _CELL), max(math.ceil(least - _CELL), int(most + _CELL)) + 1, 2)
+    least = math.ceil(FURNITURE[0] / plan.cell_size - _CELL)
+    most = max(least, math.floor(FURNITURE[1] / plan.cell_size + _CELL))
+    height, width = rng.integers(least, most + 1, 2)
     clear = math.ceil(CLEAR / plan.cell_size - _CELL)
     need = np.ones((height + 2 * clear, width + 2 * clear), dtype=np.uint8)
-    fits = cv2.erode(
-        (~(walls | plan.walls)).astype(np.uint8), need, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0
-    )
+    is_free = (~(walls | plan.walls)).astype(np.uint8)
+    fits = cv2.erode(is_free, need, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0)
     places = np.argwhere(fits)
     if not len(places):
         return draft
@@ -293,9 +293,9 @@ def _furnished(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft:
 
 
 def draw_pairs(maze: Maze, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Returns pairs of a start and a goal, as cell numbers: `[P, 2]` int; their distances are all equally frequent.
+    """Returns pairs of a start and a goal, as numbers of cells: `[P, 2]` int.
 
-    They are 15 to 40 m, or the longer half of what there is.
+    They are 15 to 40 m apart, or the longer half of what the maze has.
     """
     free = np.flatnonzero(~maze.walls)
     farthest, _ = search(maze.walls, free[0], -1, maze.walls.size)
