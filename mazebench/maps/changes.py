@@ -35,7 +35,7 @@ FURNITURE = 0.5, 2.0  # m, the sides of pieces of furniture
 CLEAR = 0.6  # m, that stay free around furniture
 _NUM_PAIRS = 600  # on which lateness is measured, with a standard error of at most .02
 _MISS = 0.03  # by which lateness on these pairs may miss that of a strength
-_NUM_TRIES, _NUM_MISSES = 10, 10  # of a strength, and of changes in a row that a try does not keep
+_NUM_TRIES, _NUM_MISSES = 8, 7  # of a strength, and of changes in a row that a try does not keep
 _CELL = 1e-6  # cells, a tolerance
 
 
