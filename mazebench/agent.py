@@ -25,7 +25,7 @@ class Truth(NamedTuple):
 
     walls: np.ndarray  # [B, N, N] bool, the true maze
     pose: np.ndarray  # [B, 3] float64, x and y (m) and yaw (rad)
-    goal: np.ndarray  # [B, 2] int, the goal's cell (row, column)
+    goal: np.ndarray  # [B, 2] int, the present goal's cell (row, column)
 
 
 class Inputs(NamedTuple):
@@ -39,7 +39,7 @@ class Inputs(NamedTuple):
 
     observation: Observation
     new_episode: np.ndarray  # [B] bool, whether an episode begins with this step
-    new_context: np.ndarray  # [B] bool, whether the context is new: an episode, or the leg to a landmark, begins
+    new_context: np.ndarray  # [B] bool, whether the context is new: an episode, or the leg to another goal, begins
     seed: np.ndarray  # [B] int64, of the running episode, for the agent's own random draws
     truth: Truth | None = None  # only for agents that declare `needs_truth`
     # [B] bool, False where an environment rests because no episode is left; None if all of them run
@@ -156,7 +156,7 @@ class SingleAgent(_Declarations):
     truth: Truth | None = None  # without the axis B; only for agents that declare `needs_truth`
 
     def reset(self, observation: Observation) -> None:
-        """Takes in a new context: an episode or, in the hierarchical task, the leg to a landmark begins.
+        """Takes in a new context: an episode, or the leg to the next landmark or goal, begins.
 
         `act` follows with the same observation.
         """

@@ -63,7 +63,8 @@ def rollout(
         if needs_truth:  # where an environment rests, it is a maze without a goal
             walls = np.stack([envs.task.mazes[episode.maze if episode else 0].walls for episode in envs.episodes])
             pose = np.column_stack([info["position"], info["yaw"]]).astype(np.float64)
-            goals = [episode.goal if episode else (0, 0) for episode in envs.episodes]
+            routes = zip(envs.episodes, envs.rules.routes, strict=True)
+            goals = [route.goal if episode and route else (0, 0) for episode, route in routes]
             truth = Truth(walls, pose, np.array(goals, dtype=np.int64))
         inputs = Inputs(observation, new_episode, info["is_first"], seed, truth, active)
 

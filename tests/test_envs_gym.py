@@ -157,7 +157,7 @@ class TestSteps:
         env = corridor_env()
         _, info = env.reset(options={"episode": Episode(0, (1, 1), (1, 4), 0.0, 0)})
         assert info.keys() == {
-            *("is_first", "success", "steps", "path_length", "position", "yaw", "maze", "landmark"),
+            *("is_first", "success", "goal_reached", "steps", "path_length", "position", "yaw", "maze", "landmark"),
             *("time_limit", "steps_left", "way_left", "distance", "blocked", "kind", "track", "level"),
         }
         assert (info["is_first"], info["steps"], info["path_length"], info["landmark"]) == (True, 0, 0.0, 0)

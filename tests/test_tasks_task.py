@@ -169,7 +169,8 @@ class TestOptions:
             ("building", {"size": 51}, "track 'building': expected size 31, found 51"),
             ("rough", {"context_size": 31}, "track 'rough': expected context_size 62, found 31"),
             ("building", {"time_limit": 50}, "track 'building': has its own time limit, found time_limit 50"),
-            ("building", {"num_goals": 2}, "num_goals 2: expected task 'local', found 'building'"),
+            ("building", {"num_goals": 6}, "track 'building': expected num_goals of at most 5, found 6"),
+            ("adrift", {"num_goals": 2}, "track 'adrift': expected num_goals of at most 1, found 2"),
             ("building", {"pairs": "fixed"}, "track 'building': expected pairs 'random', found 'fixed'"),
             ("building", {"map_warp": 0.1}, "track 'building': expected map_warp 0.0, found 0.1"),
             (

@@ -22,6 +22,7 @@ _MAX_OFF = 0.1  # m from where the drive should be, before it is planned anew
 class _Drive:
     """The rest of a drive in one environment."""
 
+    goal: tuple[int, int]  # row, column
     course: Course
     actions: list[int] = dataclasses.field(default_factory=list)
     velocity: Point = (0.0, 0.0)  # x, y (m/s); an episode begins at rest
@@ -55,10 +56,12 @@ class Oracle(Agent):
         running = np.ones(len(state), dtype=bool) if inputs.active is None else inputs.active
         for slot in np.flatnonzero(running).tolist():
             x, y, yaw = truth.pose[slot].tolist()
-            drive = state[slot]
-            if drive is None or inputs.new_episode[slot]:
-                row, column = truth.goal[slot].tolist()
-                drive = state[slot] = _Drive(make_course(truth.walls[slot], self._cell_size, (row, column)))
+            drive, goal = state[slot], tuple(truth.goal[slot].tolist())
+            if drive is None or inputs.new_episode[slot] or goal != drive.goal:
+                # To a goal that follows another one, the drive goes on at the speed that it has.
+                velocity = (0.0, 0.0) if drive is None or inputs.new_episode[slot] else drive.velocity
+                course = make_course(truth.walls[slot], self._cell_size, goal)
+                drive = state[slot] = _Drive(goal, course, velocity=velocity)
             if not drive.actions or math.dist(drive.points[0], (x, y)) > _MAX_OFF:
                 drive.actions, points = quickest_drive(drive.course, (x, y), drive.velocity, yaw)
                 drive.points = [(x, y), *points]

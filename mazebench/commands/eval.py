@@ -35,7 +35,8 @@ def evaluate(
         typer.Option(
             help="Evaluations by name instead: paper, the paper's protocol; quick, minutes of it; tracks, every track "
             "at all levels; tracks-dev, in the mazes to choose agents by; tracks-no-map, with the map hidden; "
-            "tracks-no-goal, with map and goal hidden; tracks-true-pose, with the true pose where it is lost."
+            "tracks-no-goal, with map and goal hidden; tracks-true-pose, with the true pose where it is lost; "
+            "tracks-goals and tracks-goals-dev, three goals in a row where doors have moved."
         ),
     ] = None,
     out: Annotated[

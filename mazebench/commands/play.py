@@ -15,7 +15,7 @@ from mazebench.tasks.task_options import TaskOptions
 from mazebench.world.backend import has_display
 
 
-@takes_options(TaskOptions, without=[*NOT_IN_EVALUATIONS, "actions", "camera_size", "textures"])
+@takes_options(TaskOptions, without=[*NOT_IN_EVALUATIONS, "num_goals", "actions", "camera_size", "textures"])
 def play(
     values: dict[str, Any],
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode and those after it.")] = 0,

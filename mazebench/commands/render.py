@@ -17,7 +17,7 @@ from mazebench.tasks.task_options import TaskOptions
 _DRAWN = ("map", "lidar")  # views that need no rendering
 
 
-@takes_options(TaskOptions, EvalOptions, without=[*NOT_IN_EVALUATIONS, "episodes_per_distance"])
+@takes_options(TaskOptions, EvalOptions, without=[*NOT_IN_EVALUATIONS, "num_goals", "episodes_per_distance"])
 def render(
     out: Annotated[pathlib.Path, typer.Option(help="FILE.mp4 or .gif of an episode, FILE.png of its last moment.")],
     values: dict[str, Any],

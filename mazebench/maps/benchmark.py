@@ -1,7 +1,7 @@
 """The frozen mazes of the benchmark: read from the package's assets and checked against their manifests.
 
-There are two: `paper` is the paper's protocol. `tracks` has mazes of 31 x 31 cells of several kinds, in the splits
-train, dev and eval.
+There are three: `paper` is the paper's protocol. `tracks` has mazes of 31 x 31 cells of several kinds, in the splits
+train, dev and eval. `tracks-goals` has later goals of the episodes of `tracks`.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from mazebench.errors import InputError, unknown
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import parse_maze
 
-PAPER_BENCHMARK, TRACKS_BENCHMARK = "paper", "tracks"
-_FOLDERS = {PAPER_BENCHMARK: "paper_mazes", TRACKS_BENCHMARK: "tracks"}  # of mazebench_assets
+PAPER_BENCHMARK, TRACKS_BENCHMARK, GOALS_BENCHMARK = "paper", "tracks", "tracks-goals"
+FOLDERS = {PAPER_BENCHMARK: "paper_mazes", TRACKS_BENCHMARK: "tracks", GOALS_BENCHMARK: "tracks_goals"}  # of the assets
 SIZES = BENCHMARK_SIZES
 KINDS_SIZE = 31
 SPLITS = ("train", "eval")
@@ -95,6 +95,6 @@ def manifest_hash(benchmark: str = PAPER_BENCHMARK) -> str:
 
 
 def _folder(benchmark: str) -> resources.abc.Traversable:
-    if benchmark not in _FOLDERS:  # as a damaged result names it
-        raise unknown("benchmark", benchmark, _FOLDERS)
-    return resources.files("mazebench_assets").joinpath(_FOLDERS[benchmark])
+    if benchmark not in FOLDERS:  # as a damaged result names it
+        raise unknown("benchmark", benchmark, FOLDERS)
+    return resources.files("mazebench_assets").joinpath(FOLDERS[benchmark])

@@ -63,6 +63,34 @@ def perturbations_of(task: Task, episode: Episode) -> list[tuple[Perturbation, n
     return [(perturbation, episode.stream(perturbation.stream)) for perturbation in perturbations]
 
 
+def goals_of(task: Task, episode: Episode) -> tuple[Cell, ...]:
+    """Returns the goals of an episode that are known before it begins: on a track all of them, else the first one.
+
+    On a track, each goal after the first one is drawn from the goal before it, so that the shown map can keep all free.
+    """
+    goals, rng = [episode.goal], episode.stream(Stream.LATER_GOALS)
+    while task.track is not None and len(goals) < task.options.num_goals:
+        maze, joined = task.mazes[episode.maze], task.joined(episode.maze)
+        goals.append(draw_goal(maze, task.distances, goals[-1], rng, joined))
+    return tuple(goals)
+
+
+def draw_goal(
+    maze: Maze, distances: tuple[int, ...], start: Cell, rng: np.random.Generator, joined: np.ndarray | None
+) -> Cell:
+    """Draws a goal at one of some distances (cells) from `start`, or as near to it as there is one.
+
+    It is among the cells `joined` (`[N, N]` bool) unless that is None.
+    """
+    away = maze.distances(start)
+    away = away if joined is None else np.where(joined, away, -1)
+    there = np.unique(away[away > 0])
+    distance = there[np.abs(there - distances[rng.integers(len(distances))]).argmin()]
+    goals = np.argwhere(away == distance)  # in reading order
+    row, column = goals[rng.integers(len(goals))]
+    return int(row), int(column)
+
+
 def sample_episode(task: Task, rng: np.random.Generator) -> Episode:
     """Draws an episode of a task; of fresh mazes, in one in which the task can be played.
 

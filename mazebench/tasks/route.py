@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-from collections.abc import Callable
 
 import numpy as np
 
 from mazebench.maps.maze import Cell, Maze, path_through_walls
-from mazebench.tasks.episode import Episode
+from mazebench.tasks.episode import Episode, draw_goal, goals_of
 from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.streams import Stream
 from mazebench.tasks.task import Task
@@ -22,20 +21,17 @@ Event = enum.Enum("Event", ["NONE", "LANDMARK", "REACHED", "TIMEOUT"])
 class Route:
     """The start, the landmarks (none in a local episode) and the goal of an episode, and the leg that is under way.
 
-    Leg i goes from cell i to cell i + 1. With `next_goal`, the route has `num_goals` goals: when one is reached or
-    times out, the next leg starts in the body's cell and leads to the cell that `next_goal` draws for it.
+    Leg i goes from cell i to cell i + 1. With `later`, other goals follow: when one is reached or times out, the next
+    leg starts in the body's cell.
     """
 
-    def __init__(
-        self, cells: list[Cell], time_limit: int, num_goals: int = 1, next_goal: Callable[[Cell], Cell] | None = None
-    ):
+    def __init__(self, cells: list[Cell], time_limit: int, later: _LaterLegs | None = None):
         self.cells = cells
         self.leg = 0  # counted from 0
         self._first = 0  # index in `cells` of the current leg's start
-        self._goals_left = num_goals - 1
-        self._next_goal = next_goal
+        self._later = later
         self.deadline = time_limit  # the episode's step after which the current leg has timed out
-        self.time_limit = time_limit  # agent steps of a leg
+        self.time_limit = time_limit  # agent steps of the current leg
 
     @property
     def start(self) -> Cell:
@@ -59,9 +55,9 @@ class Route:
         """
         if cell != self.target and cell != self.goal and step < self.deadline:
             return Event.NONE
-        if self._goals_left and self._next_goal is not None:
-            self._goals_left -= 1
-            self.cells = [cell, self._next_goal(cell)]
+        if self._later is not None and self._later.num_left:
+            goal, self.time_limit = self._later.next(cell)
+            self.cells = [cell, goal]
         elif cell == self.goal:
             return Event.REACHED
         elif self.target == self.goal:
@@ -80,30 +76,37 @@ def plan_route(task: Task, episode: Episode, shown: ShownMap) -> Route:
     """
     maze, options = task.mazes[episode.maze], task.options
     if not options.is_hierarchical:
-        time_limit = options.time_limit or default_time_limit(
-            maze.distance(episode.start, episode.goal), task.cell_size, track=task.track
-        )
-        next_goal = None
-        if options.num_goals > 1:
-            next_goal = _LaterGoals(maze, task.distances, episode.stream(Stream.LATER_GOALS))
-        return Route([episode.start, episode.goal], time_limit, options.num_goals, next_goal)
+        _, *later = goals_of(task, episode)
+        rng, joined = episode.stream(Stream.LATER_GOALS), task.joined(episode.maze)
+        num_left = options.num_goals - 1
+        legs = _LaterLegs(num_left, maze, task.track, options.time_limit, later, task.distances, joined, rng)
+        return Route([episode.start, episode.goal], legs.limit(episode.start, episode.goal), legs)
     path = path_through_walls(shown.walls, episode.start, episode.goal)
     assert options.time_limit is not None  # a task that is no track has one
     return Route([*path[: -1 : options.landmark_distance], path[-1]], options.time_limit)
 
 
 @dataclasses.dataclass
-class _LaterGoals:
-    """Draws the goals of one episode after the first one."""
+class _LaterLegs:
+    """The goals of one episode after the first one, with the time limits of their legs."""
 
+    num_left: int
     maze: Maze
+    track: str | None
+    time_limit: int | None  # agent steps of all legs; None on a track, whose limits follow from the distances
+    goals: list[Cell]  # those that were drawn before the episode; others are drawn where their legs start
     distances: tuple[int, ...]  # in cells, one of which is drawn for each goal
+    joined: np.ndarray | None  # [N, N] bool, cells that an older map joins; None without one
     rng: np.random.Generator
 
-    def __call__(self, start: Cell) -> Cell:
-        """Draws a goal at one of the distances from `start`, or as near to it as the maze has one."""
-        farthest = int(self.maze.distances(start).max())
-        distance = min(self.distances[self.rng.integers(len(self.distances))], farthest)
-        goals = self.maze.cells_at(start, distance)
-        row, column = goals[self.rng.integers(len(goals))]
-        return int(row), int(column)
+    def next(self, start: Cell) -> tuple[Cell, int]:
+        """Returns the goal and the time limit of the next leg, which begins in cell `start`."""
+        self.num_left -= 1
+        goal = self.goals.pop(0) if self.goals else draw_goal(self.maze, self.distances, start, self.rng, self.joined)
+        return goal, self.limit(start, goal)
+
+    def limit(self, start: Cell, goal: Cell) -> int:
+        """Returns the time limit of a leg."""
+        return self.time_limit or default_time_limit(
+            self.maze.distance(start, goal), self.maze.cell_size, track=self.track
+        )

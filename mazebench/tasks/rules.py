@@ -97,6 +97,7 @@ class Rules:
         self.path_length = np.zeros(num_envs)  # m
         self.steps = np.zeros(num_envs, dtype=np.int64)
         self.is_first, self.reached, self.timed_out = np.zeros((3, num_envs), dtype=bool)
+        self.goal_reached = np.zeros(num_envs, dtype=bool)  # also a goal that another one follows
 
     def begin(self, i: int, episode: Episode | None, task: Task | None = None) -> None:
         """Begins an episode in environment i, whose body must then be moved to `pose[i]`; None takes its episode.
@@ -104,7 +105,7 @@ class Rules:
         `task` is its task, another of `tasks_of_tracks`; by default that of these rules.
         """
         self.episodes[i], self.active[i] = episode, episode is not None
-        self.is_first[i] = self.reached[i] = self.timed_out[i] = False
+        self.is_first[i] = self.reached[i] = self.timed_out[i] = self.goal_reached[i] = False
         self._state_errors[i], self._lidar_noise[i] = [], None
         if episode is None:
             return
@@ -158,7 +159,7 @@ class Rules:
             self._move_one(poses[0])
             return
 
-        for happened in (self.is_first, self.reached, self.timed_out, self.progress):
+        for happened in (self.is_first, self.reached, self.timed_out, self.goal_reached, self.progress):
             happened.fill(0)
         moved = poses[:, :2] - self.pose[:, :2]
         moved *= moved
@@ -179,7 +180,7 @@ class Rules:
 
     def _move_one(self, pose: np.ndarray) -> None:
         """Does what `advance` does, for a single environment."""
-        self.is_first[0] = self.reached[0] = self.timed_out[0] = False
+        self.is_first[0] = self.reached[0] = self.timed_out[0] = self.goal_reached[0] = False
         self.progress[0] = 0.0
         (last_x, last_y, _), (x, y, _) = self.pose[0].tolist(), pose.tolist()
         moved_x, moved_y = x - last_x, y - last_y
@@ -207,6 +208,7 @@ class Rules:
         route, shown = self.routes[i], self.shown[i]
         assert route is not None
         assert shown is not None
+        self.goal_reached[i] = cell == route.goal
         event = route.advance(cell, self.steps.item(i))
         if event is Event.NONE:
             return
@@ -247,8 +249,10 @@ class Rules:
         It is for training and for records. Agents must not use it in an evaluation, which does not give it to them.
 
         - is_first: bool, whether the context is new: an episode or the leg to the next landmark began.
-        - success: bool. steps: since the episode began. path_length: m. landmark: the leg's index.
-        - time_limit: the agent steps of the leg; on a track they depend on the distance. steps_left: of them.
+        - success: bool, whether the last goal is reached. goal_reached: whether the step reached a goal, which
+          another one may follow.
+        - steps: since the episode began. path_length: m. landmark: the leg's index.
+        - time_limit: the agent steps of the leg; on a track they depend on its distance. steps_left: of them.
         - position: `[B, 2]` m, and yaw: rad, both the true ones.
         - distance: the cells of a shortest path from start to goal in the true maze. way_left: from the body to the
           goal. They are -1 in a maze of more than 2,048 free cells, where they take long, unless progress is rewarded.
@@ -260,6 +264,7 @@ class Rules:
         return {
             "is_first": self.is_first.copy(),
             "success": self.reached.copy(),
+            "goal_reached": self.goal_reached.copy(),
             "steps": self.steps.copy(),
             "path_length": self.path_length.copy(),
             "position": self.pose[:, :2].copy(),
@@ -282,6 +287,7 @@ class Rules:
         return {
             "is_first": self.is_first.item(i),
             "success": self.reached.item(i),
+            "goal_reached": self.goal_reached.item(i),
             "steps": steps,
             "path_length": self.path_length.item(i),
             "position": self.pose[i, :2].copy(),

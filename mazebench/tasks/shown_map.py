@@ -6,7 +6,7 @@ import numpy as np
 
 from mazebench.maps.maze import Cell, path_through_walls
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, LOCAL_MAP, build_context
-from mazebench.tasks.episode import Episode, perturbations_of
+from mazebench.tasks.episode import Episode, goals_of, perturbations_of
 from mazebench.tasks.perturbations.perturbation import ShownMap
 from mazebench.tasks.task import Task
 
@@ -19,8 +19,9 @@ def show_map(task: Task, episode: Episode) -> ShownMap:
     maze = task.mazes[episode.maze]
     walls = maze.walls if task.shown is None else task.shown[episode.maze].walls
     shown = ShownMap(walls, kind=maze.kind, cell_size=maze.cell_size)
+    ends = (episode.start, *goals_of(task, episode))
     for perturbation, rng in perturbations_of(task, episode):
-        shown = perturbation.show(shown, (episode.start, episode.goal), rng)
+        shown = perturbation.show(shown, ends, rng)
     return shown
 
 

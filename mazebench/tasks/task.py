@@ -27,7 +27,7 @@ from mazebench.tasks.tracks import DISTANCES, LEVELS, MAX_CELL_SIZE, TRACKS, cel
 
 TRAIN_DISTANCES = tuple(range(1, 6))
 EVAL_DISTANCES = tuple(range(1, 16))
-NOT_IN_EVALUATIONS = ("fresh", "pairs", "num_goals", "reward", "context_size")  # options that they do not vary
+NOT_IN_EVALUATIONS = ("fresh", "pairs", "reward", "context_size")  # options that they do not vary
 
 NUM_CHANGED = 4  # buildings in which things have changed since a plan of one's own was drawn
 
@@ -159,8 +159,8 @@ class Task:
 
     @property
     def longest_episode(self) -> int | None:
-        """The agent steps that an episode may take; None where they depend on its landmarks."""
-        if self.options.is_hierarchical:
+        """The agent steps that an episode may take; None where they depend on where its legs begin."""
+        if self.options.is_hierarchical or (self.track is not None and self.has_legs):
             return None
         time_limit = self.options.time_limit or default_time_limit(
             max(self.distances), self.cell_size, track=self.track
@@ -275,7 +275,7 @@ def resolve_for_evaluation(asked: TaskOptions, context_size_of: Callable[[int], 
     """
     if asked.fresh:
         raise InputError("expected no fresh mazes in an evaluation; num_mazes says how many of each kind are drawn")
-    for name in NOT_IN_EVALUATIONS:
+    for name in (*NOT_IN_EVALUATIONS, *["num_goals"] * (asked.track is None)):
         if (found := getattr(asked, name)) != (wanted := fields_of(TaskOptions)[name].default):
             raise InputError(f"expected {name} {wanted!r} in an evaluation, found {found!r}")
     if asked.level is not None and len(asked.level) > 1:

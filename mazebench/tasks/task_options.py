@@ -13,7 +13,14 @@ from annotated_types import Ge, Interval
 
 from mazebench.constants import DISCRETE, VELOCITIES
 from mazebench.errors import InputError, one_line
-from mazebench.maps.benchmark import ALL_SPLITS, FROZEN_SPLITS, KINDS_SIZE, PAPER_BENCHMARK, TRACKS_BENCHMARK
+from mazebench.maps.benchmark import (
+    ALL_SPLITS,
+    FROZEN_SPLITS,
+    GOALS_BENCHMARK,
+    KINDS_SIZE,
+    PAPER_BENCHMARK,
+    TRACKS_BENCHMARK,
+)
 from mazebench.maps.kinds import CHECK, KNOWN, NOVEL
 from mazebench.maps.maze import Cell, Maze, corner_cells
 from mazebench.maps.maze_options import ReadOptions
@@ -36,6 +43,7 @@ HIDEABLE = ("map", "goal")
 REWARDS = SPARSE, PROGRESS = "sparse", "progress"
 ENDS = ("start", "goal")
 CUSTOM = "custom"  # the split in results of mazes, a start or a goal that are not the benchmark's
+MOST_GOALS = 5  # of an episode on a track, all of which its shown map keeps free
 NUM_DRAWN = 20  # mazes of a kind, unless another number is asked for
 MIN_CONTEXT_SIZE = 3
 
@@ -161,8 +169,8 @@ class TaskOptions(SensorOptions, ReadOptions):
         int,
         Ge(1),
         Doc(
-            "Goals of an episode, one after the other without a reset (local task, random pairs); rewards and success "
-            "are those of the last one."
+            "Goals of an episode, one after the other without a reset (local task, random pairs; on building and "
+            f"rebuilt, at most {MOST_GOALS}); rewards and success are those of the last one."
         ),
     ] = 1
     reward: Annotated[
@@ -296,7 +304,9 @@ class TaskOptions(SensorOptions, ReadOptions):
     @property
     def benchmark(self) -> str:
         """The benchmark that the task belongs to."""
-        return PAPER_BENCHMARK if self.track is None else TRACKS_BENCHMARK
+        if self.track is None:
+            return PAPER_BENCHMARK
+        return TRACKS_BENCHMARK if self.num_goals == 1 else GOALS_BENCHMARK
 
     @property
     def perturbations(self) -> dict[str, float]:
@@ -357,8 +367,9 @@ class TaskOptions(SensorOptions, ReadOptions):
 
     @property
     def title(self) -> str:
-        """The task and, of a track, its level: "rebuilt 2", "local"."""
-        return self.task if self.track is None else f"{self.task} {self._levels}"
+        """The task, of a track its level, and of several goals their number: "rebuilt 2", "rebuilt 2, 3 goals"."""
+        goals = f", {self.num_goals} goals" if self.num_goals > 1 else ""
+        return (self.task if self.track is None else f"{self.task} {self._levels}") + goals
 
     @property
     def slug(self) -> str:
@@ -386,6 +397,7 @@ class TaskOptions(SensorOptions, ReadOptions):
 
     def __str__(self) -> str:
         parts = [self.task] if self.track is None else [self.task, f"level {self._levels}"]
+        parts += [f"{self.num_goals} goals"] * (self.num_goals > 1)
         parts.append(f"{self.size} × {self.size}")
         if self.split_in_results != "eval":
             parts.append(f"{self.split_in_results} mazes")
@@ -412,6 +424,7 @@ class TaskOptions(SensorOptions, ReadOptions):
                 self.num_mazes or 0,
                 self.track or "",
                 self.level or (),
+                self.num_goals,
             ),
             self.own_in_words,
         )
@@ -444,7 +457,8 @@ class TaskOptions(SensorOptions, ReadOptions):
 
         # Episodes.
         if self.num_goals > 1:
-            self._require(f"num_goals {self.num_goals}", task=LOCAL, pairs="random", goal=None, reward=SPARSE)
+            task = LOCAL if self.is_hierarchical else self.task  # or a track
+            self._require(f"num_goals {self.num_goals}", task=task, pairs="random", goal=None, reward=SPARSE)
         if self.num_ends:
             self._require("a start or a goal", pairs="random")
         if are_scenarios(self.mazes):
@@ -499,7 +513,9 @@ class TaskOptions(SensorOptions, ReadOptions):
             )
         if self.time_limit is not None:
             raise InputError(f"{beside}: has its own time limit, found time_limit {self.time_limit}")
-        self._require(beside, start=None, goal=None, pairs="random", num_goals=1, **dict.fromkeys(PERTURBATIONS, 0.0))
+        self._require(beside, start=None, goal=None, pairs="random", **dict.fromkeys(PERTURBATIONS, 0.0))
+        if self.num_goals > (most := 1 if track.hides_pose else MOST_GOALS):
+            raise InputError(f"{beside}: expected num_goals of at most {most}, found {self.num_goals}")
         if self.exact_pose and not track.hides_pose:
             raise InputError(f"{beside}: expected no exact_pose, for the pose is exact; it belongs to lost poses")
         for sensor in _SHOWING_POSE if track.hides_pose else ():

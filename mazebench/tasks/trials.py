@@ -4,14 +4,25 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import itertools
+from collections.abc import Sequence
 
 import numpy as np
 
 from mazebench.constants import EPISODES_PER_DISTANCE
-from mazebench.maps.benchmark import MAZES_PER_SPLIT, PAPER_BENCHMARK, SIZES, TRACKS_BENCHMARK, read_asset
+from mazebench.maps.benchmark import (
+    GOALS_BENCHMARK,
+    KINDS_SIZE,
+    MAZES_PER_SPLIT,
+    PAPER_BENCHMARK,
+    SIZES,
+    TRACKS_BENCHMARK,
+    read_asset,
+)
 from mazebench.maps.maze import Cell, Maze
-from mazebench.tasks.episode import Episode, make_episode, sample_pair
+from mazebench.tasks.episode import Episode, goals_of, make_episode, sample_pair
 from mazebench.tasks.task import EVAL_DISTANCES, Task
+from mazebench.tasks.tracks import DISTANCES
 from mazebench.world.mjcf import BODY_RADIUS
 
 # Of a file of frozen episodes.
@@ -19,9 +30,21 @@ COLUMNS = (
     *("maze", "start_row", "start_column", "goal_row", "goal_column", "distance", "yaw", "seed", "shortest_path"),
     "oracle_steps",  # empty where the oracle missed the goal
 )
+GOAL_COLUMNS = ("episode", "leg", "goal_row", "goal_column", "distance", "shortest_path", "oracle_steps")  # later goals
 
 _PER_MAZE = 48  # episodes of a track in a maze of one's own, unless another number for each distance is asked for
 _MAX_DRAWS = 101  # of a pair, for one not drawn before
+
+
+@dataclasses.dataclass(frozen=True)
+class Leg:
+    """The way to one goal of an episode, with what its metrics need."""
+
+    start: Cell
+    goal: Cell
+    distance: int  # cells, of start and goal on the true map
+    shortest_path: float  # m, of the body as a disc from the start cell's centre to the goal cell
+    oracle_steps: int | None = None  # of the agent `oracle`; None where they are not frozen, or it missed the goal
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,9 +52,16 @@ class Trial:
     """One episode of an evaluation, with what its metrics need."""
 
     episode: Episode
-    distance: int  # cells, of start and goal on the true map
-    shortest_path: float  # m, of the body as a disc from the start point to the goal cell
-    oracle_steps: int | None = None  # of the agent `oracle`; None where they are not frozen, or it missed the goal
+    distance: int  # as in `Leg`, of the first goal; likewise the other two
+    shortest_path: float
+    oracle_steps: int | None = None
+    later_legs: tuple[Leg, ...] = ()  # to the goals after the first one, each from the goal before
+
+    @property
+    def legs(self) -> tuple[Leg, ...]:
+        """All legs of the episode, from goal to goal."""
+        first = Leg(self.episode.start, self.episode.goal, self.distance, self.shortest_path, self.oracle_steps)
+        return first, *self.later_legs
 
 
 def episodes_file(task: str, size: int, split: str = "eval") -> str:
@@ -62,7 +92,7 @@ def select_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_D
     """Returns the episodes to evaluate, by maze and then by distance.
 
     In the benchmark's mazes its frozen episodes are taken as far as they go: of a track all of the task's distances,
-    else at most five for each maze and distance. Elsewhere episodes are drawn.
+    else at most five for each maze and distance. Elsewhere episodes are drawn. Later goals follow from the episodes.
 
     Args:
       task: the task; its distances are those of the pairs.
@@ -75,7 +105,13 @@ def select_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_D
     frozen_split = task.options.frozen_split
     if frozen_split is not None and task.track is not None:
         trials = frozen_trials("local", task.size, TRACKS_BENCHMARK, frozen_split)
-        return [trial for trial in trials if trial.distance in task.distances]
+        are_frozen = task.options.num_goals > 1 and task.distances == DISTANCES
+        later = frozen_legs(frozen_split, trials) if are_frozen else [()] * len(trials)
+        return [
+            with_later_legs(task, trial, legs)
+            for trial, legs in zip(trials, later, strict=True)
+            if trial.distance in task.distances
+        ]
     if frozen_split is not None and task.options.is_hierarchical:
         return list(frozen_trials(task.name, task.size))
     wanted = episodes_per_distance or _PER_MAZE
@@ -86,7 +122,30 @@ def select_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_D
             for index, trial in enumerate(frozen_trials(task.name, task.size))
             if index % EPISODES_PER_DISTANCE < wanted and trial.distance in task.distances
         ]
-    return draw_trials(task, episodes_per_distance, seed)
+    return [with_later_legs(task, trial) for trial in draw_trials(task, episodes_per_distance, seed)]
+
+
+def goals_file(split: str) -> str:
+    """Returns the name of the file with the later goals of the tracks' frozen episodes of one split."""
+    return f"goals-local-{KINDS_SIZE}-{split}.csv"
+
+
+def frozen_legs(split: str, trials: Sequence[Trial]) -> list[tuple[Leg, ...]]:
+    """Returns the frozen legs after the first one of each of the tracks' frozen `trials` of one split."""
+    legs = [[trial.legs[0]] for trial in trials]
+    for row in csv.DictReader(read_asset(goals_file(split), GOALS_BENCHMARK).splitlines()):
+        own, goal = legs[int(row["episode"])], (int(row["goal_row"]), int(row["goal_column"]))
+        own.append(Leg(own[-1].goal, goal, int(row["distance"]), float(row["shortest_path"]), int(row["oracle_steps"])))
+    return [tuple(own[1:]) for own in legs]
+
+
+def with_later_legs(task: Task, trial: Trial, frozen: Sequence[Leg] = ()) -> Trial:
+    """Returns a trial with the legs to all of its goals, of which the first ones after the first may be frozen."""
+    goals, maze = goals_of(task, trial.episode), task.mazes[trial.episode.maze]
+    legs = [*frozen[: len(goals) - 1]]
+    for start, goal in itertools.pairwise(goals[len(legs) :]):
+        legs.append(Leg(start, goal, maze.distance(start, goal), shortest_path(maze, start, goal)))
+    return dataclasses.replace(trial, later_legs=tuple(legs))
 
 
 def draw_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_DISTANCE, seed: int = 0) -> list[Trial]:
@@ -131,12 +190,16 @@ def draw_trials(task: Task, episodes_per_distance: int | None = EPISODES_PER_DIS
 
 def make_trial(maze: Maze, index: int, pair: tuple[Cell, Cell], rng: np.random.Generator) -> Trial:
     """Returns the trial of a start and a goal in maze number `index`; draws the first heading and the seed."""
-    from mazebench.maps.geodesic import length_between  # loads numba, which frozen trials do without
-
     start, goal = pair
     episode = make_episode(index, start, goal, rng)
-    shortest = length_between(maze, BODY_RADIUS, start, goal)
-    return Trial(episode, maze.distance(start, goal), shortest)
+    return Trial(episode, maze.distance(start, goal), shortest_path(maze, start, goal))
+
+
+def shortest_path(maze: Maze, start: Cell, goal: Cell) -> float:
+    """Returns the metres of a shortest path of the body as a disc from a cell's centre to a goal cell."""
+    from mazebench.maps.geodesic import length_between  # loads numba, which frozen trials do without
+
+    return length_between(maze, BODY_RADIUS, start, goal)
 
 
 def benchmark_task_sizes() -> list[tuple[str, int, int]]:

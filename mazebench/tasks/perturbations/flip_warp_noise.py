@@ -43,7 +43,7 @@ class MapFlip(Perturbation):
 
     stream = Stream.MAP_FLIP
 
-    def show(self, shown: ShownMap, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
+    def show(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
         flipped = rng.random(shown.walls.shape) < self.probability
         flipped[[0, -1]] = flipped[:, [0, -1]] = False
         for cell in ends:
@@ -59,7 +59,7 @@ class MapWarp(Perturbation):
 
     stream = Stream.MAP_WARP
 
-    def show(self, shown: ShownMap, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
+    def show(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
         return dataclasses.replace(shown, drawing=Perspective(random_homography(len(shown.walls), self.share, rng)))
 
 

@@ -47,7 +47,7 @@ class MovedDoors(Perturbation):
         if movable < needed:
             raise InputError(f"{maze.name}: expected {needed} doors that can move, found {max(0, movable)}")
 
-    def show(self, shown: ShownMap, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
+    def show(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
         walls = swap_doors(shown.walls, shown.kind, self.num_swaps(shown), ends, rng)
         return dataclasses.replace(shown, walls=walls)
 

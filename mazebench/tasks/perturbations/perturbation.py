@@ -79,8 +79,8 @@ class Perturbation:
     hides_pose: ClassVar[bool] = False  # whether the observed pose does not tell where the body is
     pixels_per_cell: ClassVar[int] = 1  # of the shown map, along each axis
 
-    def show(self, shown: ShownMap, ends: tuple[Cell, Cell], rng: np.random.Generator) -> ShownMap:
-        """Returns the map that the agent is shown instead of `shown`; `ends` are the episode's start and goal."""
+    def show(self, shown: ShownMap, ends: tuple[Cell, ...], rng: np.random.Generator) -> ShownMap:
+        """Returns the map that the agent is shown instead of `shown`; `ends` are the episode's start and goals."""
         return shown
 
     def require(self, maze: Maze) -> None:
