@@ -23,6 +23,7 @@ from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.plan import Plan, build_agent
 from mazebench.evaluation.reports import EpisodeReports
+from mazebench.maps.maze import Cell
 from mazebench.results.metrics import spl
 from mazebench.results.records import Record
 from mazebench.results.trajectories import Trajectory
@@ -30,7 +31,7 @@ from mazebench.rollout import agent_seed, rollout
 from mazebench.tasks.episode import Episode
 from mazebench.tasks.observation import state_errors
 from mazebench.tasks.task import Task
-from mazebench.tasks.trials import Trial
+from mazebench.tasks.trials import Leg, Trial, shortest_path
 
 PATIENCE = 0.5  # seconds that a pool waits for a chunk to end before it lets the caller look for signals
 
@@ -40,7 +41,7 @@ Keep = Callable[[Observation, dict[str, Any], np.ndarray | None], Sequence[Any]]
 
 
 class Result(NamedTuple):
-    """The result of an episode."""
+    """The result of an episode, or of one leg of an episode with several goals."""
 
     number: int  # of the trial
     success: bool
@@ -49,6 +50,8 @@ class Result(NamedTuple):
     blocked: bool  # whether a wall stands in the shortest path on the shown map
     kept: Sequence[Any] | np.ndarray  # of each moment, the last one included; empty if nothing is kept
     reported: Mapping[str, Any] = {}  # further keys of the record, of what the agent reported
+    leg: int = 1  # of the episode's goals, counted from 1
+    after_miss: Cell | None = None  # where the leg began if the goal before was missed
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -128,6 +131,8 @@ def run_trials(
 ) -> Iterator[list[Result]]:
     """Yields the results of the trials that ended, after each step; each once, in no fixed order.
 
+    The results of an episode's legs follow each other.
+
     Args:
       agent: acts without exploring.
       task: the task, with the mazes that the trials index.
@@ -155,9 +160,10 @@ def run_trials(
         return [agent_seed(seed, running[slot]) for slot in slots]
 
     kept: list[list[Any]] = [[] for _ in range(num_envs)]
+    legs: list[list[Result]] = [[] for _ in range(num_envs)]  # that have ended, of the running episodes
     env = MazeVectorEnv(task, num_envs, num_threads=num_threads, episode_source=next_episode)
     with contextlib.closing(env):
-        first, numbers = env.reset(), list(running)
+        first, numbers, starts = env.reset(), list(running), env.rules.start.copy()
         true_poses = env.rules.pose.copy()  # as they are observed next
         reported = [EpisodeReports(shown) for shown in env.rules.shown if shown]
         for step in rollout(agent, env, first, seeds, needs_truth=needs_truth, reports=reports):
@@ -170,28 +176,40 @@ def run_trials(
                 for slot, number in enumerate(numbers):
                     if number >= 0:
                         kept[slot].append(moments[slot])
-            results = []
-            for slot in np.flatnonzero(step.ended).tolist():
-                final = {name: values[slot : slot + 1] for name, values in step.next_info["final_info"].items()}
+            results: list[Result] = []
+            leg_ended = step.ended | (step.next_info["is_first"] & (task.options.num_goals > 1))
+            for slot in np.flatnonzero(leg_ended).tolist():
+                # The last moment of the leg, where the next one begins unless the episode has ended.
+                if step.ended[slot]:
+                    observation, infos = step.next_info["final_obs"][slot], step.next_info["final_info"]
+                else:
+                    observation = {name: values[slot] for name, values in step.next_observation.items()}
+                    infos = env.rules.infos()
+                final = {name: values[slot : slot + 1] for name, values in infos.items()}
                 if keep:
-                    observation = step.next_info["final_obs"][slot]
                     kept[slot].extend(keep({name: value[None] for name, value in observation.items()}, final, None))
-                results.append(
-                    Result(
-                        number=numbers[slot],
-                        success=final["success"].item(),
-                        steps=final["steps"].item(),
-                        path_length=final["path_length"].item(),
-                        blocked=final["blocked"].item(),
-                        kept=kept[slot],
-                        reported=reported[slot].result() if reports else {},
-                    )
+
+                before = legs[slot]
+                has_missed = bool(before) and not before[-1].success
+                result = Result(
+                    number=numbers[slot],
+                    success=final["goal_reached"].item(),
+                    steps=final["steps"].item() - sum(leg.steps for leg in before),
+                    path_length=final["path_length"].item() - sum(leg.path_length for leg in before),
+                    blocked=step.info["blocked"].item(slot),
+                    kept=kept[slot],
+                    reported=reported[slot].result() if reports else {},
+                    leg=len(before) + 1,
+                    after_miss=divmod(starts.item(slot), task.size) if has_missed else None,
                 )
-                kept[slot] = []
+                kept[slot], legs[slot] = [], [*before, result]
                 if reports and (shown := env.rules.shown[slot]):
                     reported[slot] = EpisodeReports(shown)
+                if step.ended[slot]:
+                    results += legs[slot]
+                    legs[slot] = []
             yield results
-            numbers, true_poses = list(running), env.rules.pose.copy()
+            numbers, starts, true_poses = list(running), env.rules.start.copy(), env.rules.pose.copy()
 
 
 def _poses(observation: Observation, info: dict[str, Any], actions: np.ndarray | None) -> Sequence[Any]:
@@ -201,7 +219,7 @@ def _poses(observation: Observation, info: dict[str, Any], actions: np.ndarray |
 
 
 def to_trajectory(plan: Plan, result: Result) -> Trajectory | None:
-    """Returns the trajectory of an episode of a plan; None if it was not kept."""
+    """Returns the trajectory of an episode of a plan, or of a leg of it; None if it was not kept."""
     if not len(result.kept):
         return None
     task, poses = plan.task, np.asarray(result.kept)
@@ -210,12 +228,14 @@ def to_trajectory(plan: Plan, result: Result) -> Trajectory | None:
 
 
 def to_record(plan: Plan, result: Result) -> Record:
-    """Returns the record of an episode of a plan."""
+    """Returns the record of an episode of a plan, or of a leg of it."""
     task, trial = plan.task, plan.trials[result.number]
-    episode = trial.episode
+    episode, leg = trial.episode, trial.legs[result.leg - 1]
     maze = task.mazes[episode.maze]
+    if (start := result.after_miss) is not None:
+        leg = Leg(start, leg.goal, maze.distance(start, leg.goal), shortest_path(maze, start, leg.goal))
     # Of the body as a disc, and from cell to cell; both in metres.
-    shortest = np.array([trial.shortest_path, trial.distance * task.cell_size])
+    shortest = np.array([leg.shortest_path, leg.distance * task.cell_size])
     spl_of_disc, spl_grid = spl(np.array([result.success]), shortest, np.array([result.path_length])).tolist()
     values = {
         "agent": plan.options.agent,
@@ -224,18 +244,18 @@ def to_record(plan: Plan, result: Result) -> Record:
         "split": task.options.split_in_results,
         "episode": result.number,
         "maze": maze.name,
-        "start": episode.start,
-        "goal": episode.goal,
-        "distance": trial.distance,
+        "start": leg.start,
+        "goal": leg.goal,
+        "distance": leg.distance,
         "success": result.success,
         "steps": result.steps,
         "path_length": result.path_length,
-        "shortest_path": trial.shortest_path,
+        "shortest_path": leg.shortest_path,
         "spl": spl_of_disc,
         "spl_grid": spl_grid,
         "seed": episode.seed,
-        "leg": 1,
-        "oracle_steps": trial.oracle_steps,
+        "leg": result.leg,
+        "oracle_steps": leg.oracle_steps,
     }
     is_track = task.track is not None
     optional = {
@@ -246,6 +266,7 @@ def to_record(plan: Plan, result: Result) -> Record:
         **task.options.perturbations,
         # Summaries report the episodes of each of these groups apart.
         "blocked": result.blocked if is_track else None,
+        "after_miss": result.after_miss is not None if len(trial.legs) > 1 else None,
         "kind": (maze.kind or None) if is_track else None,
     }
     told = {name: value for name, value in optional.items() if value is not None}

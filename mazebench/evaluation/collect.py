@@ -67,6 +67,8 @@ def collect_demonstrations(
     """
     if options.task.split == "eval":
         raise InputError("expected split 'train' or 'dev' to collect from, found 'eval', whose mazes are for results")
+    if options.task.num_goals > 1:
+        raise InputError(f"expected episodes of one goal to collect, found num_goals {options.task.num_goals}")
     folder = folder.absolute()  # Minari can't make one at a relative path
     temporary = folder.with_name(folder.name + ".tmp")
     with writing_to(folder):

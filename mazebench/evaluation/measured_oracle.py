@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 from collections.abc import Sequence
 
 from mazebench import stopping
@@ -17,24 +19,42 @@ _ORACLE = "oracle"
 
 
 def with_oracle_steps(plan: Plan, records: Sequence[Record], num_envs: int) -> list[Record]:
-    """Returns the records of all of a plan's episodes with the oracle's steps."""
-    if all(trial.oracle_steps is not None for trial in plan.trials):
-        return list(records)
-    if plan.options.agent == _ORACLE:
+    """Returns the records of all of a plan's episodes with the oracle's steps.
+
+    Those of a leg after a missed goal are of a drive of its own, which begins at rest in the middle of the leg's start.
+    """
+    if all(leg.oracle_steps is not None for trial in plan.trials for leg in trial.legs):
+        steps = [record.oracle_steps for record in records]
+    elif plan.options.agent == _ORACLE:
         steps = [record.steps if record.success else None for record in records]
     else:
-        steps = measure_oracle_steps(plan.task, plan.trials, num_envs)
+        steps = list(itertools.chain.from_iterable(measure_steps_of_legs(plan.task, plan.trials, num_envs)))
+
+    if missed := [number for number, record in enumerate(records) if record.after_missed_goal]:
+        trials = []
+        for record in (records[number] for number in missed):
+            episode = dataclasses.replace(plan.trials[record.episode].episode, start=record.start, goal=record.goal)
+            trials.append(Trial(episode, record.distance, record.shortest_path))
+        alone = measure_oracle_steps(plan.task.replace(num_goals=1), trials, num_envs)
+        for number, each in zip(missed, alone, strict=True):
+            steps[number] = each
     return [record.model_copy(update={"oracle_steps": each}) for record, each in zip(records, steps, strict=True)]
 
 
 def measure_oracle_steps(task: Task, trials: Sequence[Trial], num_envs: int = NUM_ENVS) -> list[int | None]:
-    """Returns the oracle's steps in each trial; None where it does not reach the goal."""
+    """Returns the oracle's steps to the first goal of each trial; None where it does not reach it."""
+    return [steps for steps, *_ in measure_steps_of_legs(task, trials, num_envs)]
+
+
+def measure_steps_of_legs(task: Task, trials: Sequence[Trial], num_envs: int = NUM_ENVS) -> list[list[int | None]]:
+    """Returns the oracle's steps to each goal of each trial, in one drive; None where it does not reach the goal."""
     # The oracle has the six actions and observes nothing; tracks have the lidar all the same.
     task = task.replace(actions="six", sensors=(), lidar_noise=None)
     agent = load_agent_class(_ORACLE).build(task.interface)
-    steps: list[int | None] = [None] * len(trials)
+    steps: list[list[int | None]] = [[] for _ in trials]
     for results in run_trials(agent, task, dict(enumerate(trials)), num_envs, needs_truth=True):
         stopping.check()
         for result in results:
-            steps[result.number] = result.steps if result.success else None
+            is_measured = result.success and result.after_miss is None
+            steps[result.number].append(result.steps if is_measured else None)
     return steps

@@ -1,8 +1,8 @@
 """The folder of an evaluation while it runs. What has ended survives a kill at any moment.
 
 An episode that ends becomes a line of `journal.jsonl`, in any order, without the oracle's steps where they are not
-frozen. When all have ended, `episodes.jsonl`, `trajectories.npz` and last `summary.json` are written, and the journal
-is removed.
+frozen. One with several goals becomes a line for each leg. When all have ended, `episodes.jsonl`, `trajectories.npz`
+and last `summary.json` are written, and the journal is removed.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Store:
         Raises:
           InputError: if the folder can't be written, or holds another run or anything else.
         """
-        self.folder, self._plan = folder, plan
+        self.folder, self._plan, self._num_legs = folder, plan, plan.task.options.num_goals
         make_folder(folder)
         found = {path.name for path in folder.iterdir() if path.suffix != ".tmp"}
         if found & {CONFIG, JOURNAL} and not resume:  # a kill may have left the journal alone
@@ -86,7 +86,13 @@ class Store:
             raise InputError(f"{folder}: expected {CONFIG} of the run in {JOURNAL}, found none; name another folder")
         ended = [self._checked(line) for line in lines]
         self.record = record or any(trajectory for _, trajectory in ended)
-        self._ended = {each.episode: (each, trajectory) for each, trajectory in ended if trajectory or not self.record}
+        # By episode and leg; an episode whose last legs a kill cut off is run again.
+        whole = {each.episode for each, _ in ended if each.leg == self._num_legs}
+        self._ended = {
+            (each.episode, each.leg): (each, trajectory)
+            for each, trajectory in ended
+            if each.episode in whole and (trajectory or not self.record)
+        }
         with writing_to(folder):
             # Of two processes that begin a run, the second one fails here.
             self._journal = (folder / JOURNAL).open("a" if resume else "x", encoding="utf-8")
@@ -97,17 +103,17 @@ class Store:
     @property
     def num_ended(self) -> int:
         """The number of episodes that have ended."""
-        return len(self._ended)
+        return len(self._ended) // self._num_legs
 
     @property
     def missing(self) -> list[int]:
         """The indices of the episodes that are left to run."""
-        return [index for index in range(len(self._plan.trials)) if index not in self._ended]
+        return [index for index in range(len(self._plan.trials)) if (index, 1) not in self._ended]
 
     @property
     def records(self) -> list[Record]:
         """The records of the episodes that have ended, in protocol order."""
-        return [self._ended[index][0] for index in sorted(self._ended)]
+        return [self._ended[key][0] for key in sorted(self._ended)]
 
     def _checked(self, line: _Line) -> tuple[Record, Trajectory | None]:
         """Returns what a line of the journal holds.
@@ -118,10 +124,11 @@ class Store:
         record, where = line.record, f"{self.folder / JOURNAL}: expected records of the run's episodes"
         number, told = record.episode, record.model_extra or {}
         reported = {name: told[name] for name in REPORTED if name in told}
-        if number >= len(self._plan.trials):
-            raise InputError(f"{where}, found one of {number}")
-        is_blocked = told.get("blocked") is True
-        result = Result(number, record.success, record.steps, record.path_length, is_blocked, (), reported)
+        if number >= len(self._plan.trials) or record.leg > self._num_legs:
+            raise InputError(f"{where}, found one of {number}, leg {record.leg}")
+        is_blocked, after_miss = told.get("blocked") is True, record.start if record.after_missed_goal else None
+        driven = record.success, record.steps, record.path_length
+        result = Result(number, *driven, is_blocked, (), reported, record.leg, after_miss)
         written, found = to_record(self._plan, result).model_dump(), record.model_dump()
         if other := [name for name in written | found if found.get(name) != written.get(name)]:
             raise InputError(f"{where}, found {str(found.get(other[0]))[:80]!r} as {other[0]} of episode {number}")
@@ -136,7 +143,8 @@ class Store:
         Raises:
           RunError: if the disk is full or can't be written any more.
         """
-        ended = {each.number: (to_record(self._plan, each), to_trajectory(self._plan, each)) for each in results}
+        plan = self._plan
+        ended = {(each.number, each.leg): (to_record(plan, each), to_trajectory(plan, each)) for each in results}
         with self._keeping_what_is_written():
             self._journal.write("".join(_to_line(*each) for each in ended.values()))
             self._journal.flush()
@@ -144,7 +152,7 @@ class Store:
 
     def finish(self, records: Sequence[Record], summary: Summary) -> None:
         """Writes the results; `records` are those of all episodes in protocol order, with the oracle's steps."""
-        trajectories = [self._ended[index][1] for index in range(len(self._plan.trials))]
+        trajectories = [self._ended[key][1] for key in sorted(self._ended)]
         with self._keeping_what_is_written():
             with open_whole(self.folder / EPISODES) as file:
                 file.write("".join(each.to_line() for each in records).encode("utf-8"))

@@ -55,6 +55,11 @@ def _each_level(tracks: Iterable[str] = TRACKS, **options: Any) -> tuple[Part, .
     )
 
 
+def _several_goals(**options: Any) -> tuple[Part, ...]:
+    parts = _each_level(("rebuilt",), num_goals=3, **options)
+    return tuple(dataclasses.replace(part, name=f"{part.name}-goals") for part in parts)
+
+
 # A map flipped with probability 0 is hierarchical-13-k5; no warp and no noise are local-13: they are not run again.
 SUITES: dict[str, tuple[Part, ...]] = {
     "paper": (
@@ -79,6 +84,9 @@ SUITES: dict[str, tuple[Part, ...]] = {
     "tracks-no-map": _each_level(hide=("map",)),
     "tracks-no-goal": _each_level(hide=("map", "goal")),
     "tracks-true-pose": _each_level((name for name, track in TRACKS.items() if track.hides_pose), exact_pose=True),
+    # Goals in a row on one wrong map; parts have names of their own, since their first goals are played on the tracks.
+    "tracks-goals": _several_goals(),
+    "tracks-goals-dev": _several_goals(split=DEV),
 }
 
 

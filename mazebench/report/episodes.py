@@ -30,7 +30,7 @@ class ReportedResult:
     summary: Summary
     label: str  # the agent's name, with the training run if results are of several
     setting: TaskOptions  # of which results are compared, see `TaskOptions.setting`
-    episodes: pd.DataFrame  # a row for each episode in protocol order; the metrics are columns
+    episodes: pd.DataFrame  # a row for each record in protocol order; the metrics are columns
     facts: tuple[str, ...]  # columns of bools: what a track says of episodes, as "blocked" and "not blocked"
     task: Task | None  # None if its mazes are gone
     trajectories: list[Trajectory] | None  # None if none were recorded, or the task is not known
@@ -47,11 +47,12 @@ class ReportedResult:
         if self.task is None or not (self.trajectories or self.setting.active_perturbations):
             return []
         indices = {maze.name: index for index, maze in enumerate(self.task.fixed_mazes)}
-        columns = (self.episodes[name] for name in ("maze", "start", "goal", "seed"))
-        return [
-            shown_of(self.task, Episode(indices[maze], start, goal, 0.0, seed))
-            for maze, start, goal, seed in zip(*columns, strict=True)
-        ]
+        legs = list(zip(*(self.episodes[name] for name in ("maze", "start", "goal", "seed")), strict=True))
+        shown = []
+        for number, (maze, *ends, seed) in enumerate(legs):
+            _, start, goal, _ = legs[number - number % self.setting.num_goals]  # of the episode
+            shown.append(shown_of(self.task, Episode(indices[maze], start, goal, 0.0, seed), ends))
+        return shown
 
     @functools.cached_property
     def walls(self) -> dict[str, np.ndarray]:
@@ -126,6 +127,7 @@ def join_episodes(results: Sequence[ReportedResult]) -> pd.DataFrame:
                 landmark_distance=result.setting.landmark_distance if result.setting.is_hierarchical else 0,
                 track=result.setting.track or "",
                 level=result.setting.track_level,
+                num_goals=result.setting.num_goals,
                 **result.setting.perturbations,
             )
             for result in results

@@ -123,22 +123,25 @@ def _tables_of(episodes: pd.DataFrame) -> Iterator[Table]:
                 title = f"Local navigation, {size} × {size}, on maps warped by up to {level:g} of their side"
                 yield _by_distance(f"warp-{level:g}-local-{size}", title, warped, is_warped=True)
 
-    # A table of all tracks, with a row for each track and level, and a table of each track.
-    groups = {name: group for name in TRACKS if len(group := episodes[episodes.track == name])}
+    # A table of all tracks, with a row for each track and level, and a table of each track and number of goals.
+    groups = {
+        (name, f", {goals} goals" if goals > 1 else ""): group
+        for name in TRACKS
+        for goals, group in episodes[episodes.track == name].groupby("num_goals")
+    }
     levels = {
-        name: {str(level): at_common_distances(own) for level, own in group.groupby("level")}
-        for name, group in groups.items()
+        key: {str(level): at_common_distances(own) for level, own in group.groupby("level")}
+        for key, group in groups.items()
     }
     if groups:
-        rows = {f"{name} {level}": row for name in groups for level, row in levels[name].items()}
+        rows = {f"{name} {level}{goals}": row for (name, goals), of in levels.items() for level, row in of.items()}
         yield make_table("tracks", "Tracks", _DISTANCES_NOTE, "track and level", rows)
-    for name, group in groups.items():
-        meanings = "; ".join(f"{level}: {TRACKS[name].levels[int(level) - 1].meaning}" for level in levels[name])
-        of_facts = {
-            f"{level}, {fact}": row[row[fact]] for level, row in levels[name].items() for fact in facts_of(group)
-        }
-        note = f"{TRACKS[name].help} {meanings}."
-        yield make_table(f"track-{name}", f"Track {name}", note, "level", levels[name] | of_facts)
+    for (name, goals), group in groups.items():
+        own = levels[name, goals]
+        meanings = "; ".join(f"{level}: {TRACKS[name].levels[int(level) - 1].meaning}" for level in own)
+        of_facts = {f"{level}, {fact}": row[row[fact]] for level, row in own.items() for fact in facts_of(group)}
+        note, file = f"{TRACKS[name].help} {meanings}.", f"track-{name}{goals.replace(', ', '-').replace(' ', '-')}"
+        yield make_table(file, f"Track {name}{goals}", note, "level", own | of_facts)
 
 
 def _by_distance(name: str, title: str, episodes: pd.DataFrame, is_warped: bool = False) -> Table:

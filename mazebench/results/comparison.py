@@ -21,7 +21,7 @@ from mazebench.results.reading import Result, find_parts, load_result
 from mazebench.results.records import Record, Summary, column
 
 # What must be equal, of tasks, of their provenance and of records: what was played, whatever was shown.
-_SAME_TASK = ("benchmark", "task", "size", "cell_size", "split_in_results")
+_SAME_TASK = ("benchmark", "task", "size", "cell_size", "split_in_results", "num_goals")
 _SAME_PROVENANCE = ("benchmark_manifest_sha256", "mazes_sha256")
 _SAME_EPISODE = ("maze", "start", "goal", "seed", "distance")
 
@@ -39,7 +39,7 @@ class Paired:
 class Row:
     """Two evaluations on the same episodes."""
 
-    num_episodes: int
+    num_episodes: int  # of several goals, the legs
     metrics: dict[str, Paired]  # by the names of `metrics.scores`
     win_share: Estimate  # of episodes in which A's SPL is higher than B's; a tie counts half
 
@@ -94,6 +94,8 @@ def compare_folders(a: pathlib.Path, b: pathlib.Path) -> Comparison:
 def compare_results(a: Result, b: Result) -> PairedResults:
     """Compares two evaluations over all episodes and by distance.
 
+    Of several goals, each leg is a pair. Legs that one of the two began elsewhere, after a missed goal, are left out.
+
     Raises:
       InputError: if the two are not of the same episodes of one version of the benchmark.
     """
@@ -110,15 +112,20 @@ def compare_results(a: Result, b: Result) -> PairedResults:
     same = f"expected the same episodes in {a.folder} and {b.folder}, found"
     if len(a.records) != len(b.records):
         raise InputError(f"{same} {len(a.records)} and {len(b.records)} of them")
+    both = zip(a.records, b.records, strict=True)
+    pairs = [pair for pair in both if not any(record.after_missed_goal for record in pair)]
+    of_ours, of_theirs = zip(*pairs, strict=True)
     for name in _SAME_EPISODE:
-        of_a, of_b = column(a.records, name), column(b.records, name)
+        of_a, of_b = column(of_ours, name), column(of_theirs, name)
         differs = (of_a != of_b).reshape(len(of_a), -1).any(axis=1)
         if differs.any():
             first = int(differs.argmax())
-            raise InputError(f"{same} episode {first} with {name} {of_a[first].tolist()} and {of_b[first].tolist()}")
-    ours, theirs = by_distance(a.records), by_distance(b.records)
+            raise InputError(
+                f"{same} episode {of_ours[first].episode} with {name} {of_a[first].tolist()} and {of_b[first].tolist()}"
+            )
+    ours, theirs = by_distance(of_ours), by_distance(of_theirs)
     return PairedResults(
-        overall=_compare(a.records, b.records),
+        overall=_compare(of_ours, of_theirs),
         by_distance={distance: _compare(ours[distance], theirs[distance]) for distance in ours},
     )
 
@@ -175,5 +182,5 @@ def _who(summary: Summary, parts: list[str]) -> str:
     task = summary.task
     wrong = [*(f"{key} {value}" for key, value in task.perturbations.items() if value), *task.noise_in_words]
     if task.track is not None:
-        wrong.insert(0, f"track {task.title.replace(' ', ', level ')}")
+        wrong.insert(0, f"track {task.title.replace(' ', ', level ', 1)}")
     return summary.row + (f" ({', '.join(wrong)})" if wrong and parts == [""] else "")

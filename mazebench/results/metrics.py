@@ -76,7 +76,8 @@ def summarize_facts(records: Sequence[Record]) -> dict[str, Figures]:
 def by_fact(records: Sequence[Record]) -> dict[str, np.ndarray]:
     """Returns `[E]` bool for each group of records that a track tells apart: who is in it.
 
-    The groups of a fact ("blocked") are named after it and its contrary ("not blocked"), those of mazes after the kind.
+    The groups of a fact ("blocked") are named after it and its contrary ("not blocked"), those of mazes after the kind,
+    and those of several goals after their number ("goal 1").
     """
     told = records[0].model_extra or {}
     facts = [name for name, value in told.items() if isinstance(value, bool) and name not in REPORTED]
@@ -84,7 +85,9 @@ def by_fact(records: Sequence[Record]) -> dict[str, np.ndarray]:
         f"{'' if holds else 'not '}{fact}": column(records, fact) == holds for fact in facts for holds in (True, False)
     }
     kinds = column(records, "kind") if "kind" in told else np.empty(0)
-    return groups | {kind: kinds == kind for kind in dict.fromkeys(kinds.tolist())}
+    groups |= {kind: kinds == kind for kind in dict.fromkeys(kinds.tolist())}
+    legs = column(records, "leg")
+    return groups | {f"goal {leg}": legs == leg for leg in range(1, legs.max() + 1) if legs.max() > 1}
 
 
 def _figures(records: Sequence[Record]) -> Figures:

@@ -6,12 +6,14 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from mazebench.errors import InputError
 from mazebench.maps.benchmark import manifest_hash
+from mazebench.maps.maze import Cell
 from mazebench.results.records import Summary
 from mazebench.tasks.context import GLOBAL_MAP, GOAL, START
 from mazebench.tasks.episode import Episode
@@ -65,12 +67,12 @@ def mazes_hash(task: Task) -> str:
     return hashlib.sha256(walls + scale.encode("ascii") + ends + older).hexdigest()
 
 
-def shown_of(task: Task, episode: Episode) -> Shown:
-    """Returns what the agent was shown in an episode."""
+def shown_of(task: Task, episode: Episode, ends: Sequence[Cell] | None = None) -> Shown:
+    """Returns what the agent was shown in an episode, or in the leg between two `ends` of it."""
     shown = show_map(task, episode)
     cells = plan_route(task, episode, shown).cells[1:-1]
     landmarks = [row * task.size + column for row, column in cells]
-    context = leg_context(task, shown, episode.start, episode.goal)
+    context = leg_context(task, shown, *(ends or (episode.start, episode.goal)))
     are_cells = shown.drawing is None and task.context_size == task.size
     walls = shown.walls if are_cells else np.rint(context[GLOBAL_MAP] * 255).astype(np.uint8)
     start, goal = (int(plane.argmax()) if plane.any() else -1 for plane in context[[START, GOAL]])

@@ -27,7 +27,7 @@ class Result:
 
     folder: pathlib.Path
     summary: Summary
-    records: tuple[Record, ...]  # in protocol order
+    records: tuple[Record, ...]  # in protocol order, of several goals one of each
 
 
 FolderName = Annotated[str, pydantic.Field(pattern=r"^[\w-][\w.-]*$")]
@@ -62,8 +62,8 @@ def load_result(folder: pathlib.Path) -> Result:
         _validate(line, Record, f"{folder / EPISODES}: line {number}", "a record")
         for number, line in enumerate(lines, 1)
     )
-    if len(records) != summary.episodes:
-        raise InputError(f"{folder / EPISODES}: expected {summary.episodes} records, found {len(records)}")
+    if len(records) != (expected := summary.episodes * summary.task.num_goals):
+        raise InputError(f"{folder / EPISODES}: expected {expected} records, found {len(records)}")
     return Result(folder, summary, records)
 
 

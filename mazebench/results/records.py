@@ -46,11 +46,12 @@ class _Stored(pydantic.BaseModel):
 
 
 class Record(_Stored):
-    """The result of one episode.
+    """The result of one episode, or of one leg of an episode with several goals.
 
     The strengths of the perturbations follow as further keys; on a track also `level` and its facts, such as
     `blocked`; in mazes whose cells are not 1 m wide also `cell_size`, in metres; where a user set them, `lidar_noise`
-    and `odometry_noise`; of an agent that reports also `RECALLS` and `notes`.
+    and `odometry_noise`; of an agent that reports also `RECALLS` and `notes`. With several goals, `after_miss` says
+    whether the goal before was missed: then the leg began where the body was.
     """
 
     agent: Name
@@ -77,6 +78,11 @@ class Record(_Stored):
         """The distance as the option `distances` counts it: in metres on a track, else in cells."""
         cell_size = (self.model_extra or {}).get("cell_size", 1.0)
         return distance_of(self.distance, cell_size, self.task if self.task in TRACKS else None)
+
+    @property
+    def after_missed_goal(self) -> bool:
+        """True of a leg that begins where the body was when the time to the goal before was up."""
+        return (self.model_extra or {}).get("after_miss") is True
 
     def to_line(self) -> str:
         """Returns the record as a line of `episodes.jsonl`."""
