@@ -1,7 +1,7 @@
 """Describes the frozen mazes and episodes as a Croissant data set: `python -m benchmarks.croissant`.
 
 It brings assets/croissant.json (Croissant 1.1 with the fields of its RAI vocabulary) up to date with the manifests of
-the two benchmarks, with CITATION.cff and with `Source` of `[project.urls]` in pyproject.toml. The file itself has the
+the three benchmarks, with CITATION.cff and with `Source` of `[project.urls]` in pyproject.toml. The file itself has the
 texts and the records of each file (`recordSet`). It has no address and no date of publication as long as the other
 files have none.
 """
@@ -17,12 +17,11 @@ from typing import Any
 import yaml
 
 from mazebench.errors import InputError
-from mazebench.maps.benchmark import MANIFEST, PAPER_BENCHMARK, TRACKS_BENCHMARK, manifest
+from mazebench.maps.benchmark import FOLDERS, MANIFEST, TRACKS_BENCHMARK, manifest
 
 ROOT = pathlib.Path(__file__).parent.parent
 ASSETS = ROOT / "assets"
 OUT = ASSETS / "croissant.json"
-FOLDERS = {PAPER_BENCHMARK: "paper_mazes", TRACKS_BENCHMARK: "tracks"}
 
 
 def describe() -> dict[str, Any]:

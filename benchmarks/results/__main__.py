@@ -34,7 +34,7 @@ match sys.argv[1:]:
             path = keep(pathlib.Path(folder), RECORDS)
             print(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
     case ["episodes", out]:
-        columns = ["agent", "run", "setting", "episode", "maze", "success", "steps", "oracle_steps"]
+        columns = ["agent", "run", "setting", "episode", "leg", "maze", "success", "steps", "oracle_steps"]
         read_kept(RECORDS).episodes.reset_index()[columns].to_csv(out, index=False)
     case ["recall", out]:
         for agent, (track, level) in itertools.product(RECALL_AGENTS, RECALL_SETTINGS):

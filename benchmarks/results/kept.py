@@ -36,7 +36,8 @@ RECALL_SETTINGS = (("building", 2), ("building", 3), ("adrift", 1), ("adrift", 2
 _SUFFIX = ".tar.xz"
 _TRAINING = "training"  # the folder of archives of training runs
 _RUNS = "runs"  # the archive of evaluations of training runs on `LOCAL`, in folders AGENT-SEED
-_COLUMNS = ["episode", "maze", "distance", "success", "steps", "oracle_steps", "kind", "blocked"]  # of records
+# Of records.
+_COLUMNS = ["episode", "maze", "distance", "success", "steps", "oracle_steps", "kind", "blocked", "leg", "after_miss"]
 # Archives whose agents have another name than their evaluations.
 _AGENTS = {
     "tracks-neural-planner-rewards": "neural-planner from rewards",

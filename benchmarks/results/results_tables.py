@@ -32,7 +32,7 @@ from mazebench.report.curves import SUCCESS
 from mazebench.report.table import METRICS, to_markdown
 from mazebench.results.intervals import CONFIDENCE, Estimate
 from mazebench.results.records import RECALLS
-from mazebench.tasks.tracks import TRACKS
+from mazebench.tasks.tracks import LEVELS, TRACKS
 
 ROOT = pathlib.Path(__file__).parent.parent.parent
 RECORDS = ROOT / "records"
@@ -50,6 +50,7 @@ _PRINTED_DISTANCES = (2, 4, 6, 8, 10)  # those for which the paper prints succes
 _MILESTONES = (0.2, 0.6, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.6)  # million agent steps
 _TRACKS = [f"`{track}`" for track in TRACKS]
 _KINDS = (*KNOWN, *NOVEL)
+_WITHOUT_MEMORY = "benchmarks.no_memory:NavigatorWithoutMemory"
 
 _TRAINED = {
     "mmn": "`mmn`",
@@ -227,6 +228,23 @@ def tracks_map_worth(kept: Kept) -> str:
     return format_table(["part", *metrics.values(), f"without the map, {METRICS[ON_TIME_125]}", "map worth"], rows)
 
 
+def tracks_memory(kept: Kept) -> str:
+    """Returns the navigator's share on time at each goal of several, with and without memory, and their difference.
+
+    Only legs count that begin in the goal before in both.
+    """
+    rows = []
+    for level, goal in itertools.product(LEVELS, (1, 2, 3)):
+        both = [kept.of(agent, f"rebuilt-{level}-goals") for agent in ("navigator", _WITHOUT_MEMORY)]
+        legs = [own[own.leg.eq(goal) & ~own.after_miss.astype(bool)] for own in both]
+        episodes = set(legs[0].episode) & set(legs[1].episode)
+        legs = [own[own.episode.isin(episodes)] for own in legs]
+        means = [_interval(ON_TIME_125, *agents) for agents in ((legs[0],), (legs[1],), legs)]
+        rows.append([f"`rebuilt` {level}", str(goal), str(len(episodes)), *means])
+    header = ["part", "goal", "legs", f"in a row, {METRICS[ON_TIME_125]}", "without memory", "memory worth"]
+    return format_table(header, rows)
+
+
 def tracks_blocked(kept: Kept) -> str:
     """Returns the navigator's share on time where the shortest path on the map is open, and where it is blocked."""
     rows = []
@@ -270,6 +288,7 @@ TABLES: dict[str, Callable[[Kept], str]] = {
     "tracks-map-worth": tracks_map_worth,
     "tracks-blocked": tracks_blocked,
     "tracks-recall": tracks_recall,
+    "tracks-memory": tracks_memory,
     "tracks-novel-kinds": lambda kept: by_track(
         {
             f"`{agent}`, {name} layouts": (agent, ON_TIME_125, kinds)
