@@ -166,10 +166,8 @@ def _follow(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Does the work of `follow`.
 
-    Args:
-      steps: `[K]` int, from a cell's number to those of the cells of `sight_lines`.
-      after: of `sight_lines`.
-      can_be_wrong: `[N * N]` bool, the cells from which the map may look wrong.
+    `steps` (`[K]` int) lead from a cell to those of `sight_lines`, to which `after` belongs. Only from the cells of
+    `can_be_wrong` (`[N * N]` bool) may the map look wrong.
     """
     size = len(walls)
     true, cost, came = walls.ravel(), np.empty(walls.size, np.int32), np.empty(walls.size, np.int32)
@@ -230,12 +228,8 @@ def look(
 ) -> bool:
     """Corrects a map by what is in sight; returns whether the way is blocked or there may be a shorter one.
 
-    Cells are in lists of all rows.
-
-    Args:
-      belief: `[N * N]` bool, which is corrected, like `is_seen`.
-      on_way: `[N * N]` int, the number of the last way of each cell.
-      way: the number of the way that the robot drives.
+    `belief` and `is_seen` are changed. `on_way` has the number of the last way of each cell, `way` that of the way that
+    the robot drives. All are lists of the cells.
     """
     is_wrong, index = False, 0
     while index < len(steps):
