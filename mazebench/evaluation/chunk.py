@@ -161,6 +161,7 @@ def run_trials(
 
     kept: list[list[Any]] = [[] for _ in range(num_envs)]
     legs: list[list[Result]] = [[] for _ in range(num_envs)]  # that have ended, of the running episodes
+    begun = np.zeros(num_envs)  # m driven in the episode when the running leg began
     env = MazeVectorEnv(task, num_envs, num_threads=num_threads, episode_source=next_episode)
     with contextlib.closing(env):
         first, numbers, starts = env.reset(), list(running), env.rules.start.copy()
@@ -195,7 +196,7 @@ def run_trials(
                     number=numbers[slot],
                     success=final["goal_reached"].item(),
                     steps=final["steps"].item() - sum(leg.steps for leg in before),
-                    path_length=final["path_length"].item() - sum(leg.path_length for leg in before),
+                    path_length=final["path_length"].item() - begun.item(slot),
                     blocked=step.info["blocked"].item(slot),
                     kept=kept[slot],
                     reported=reported[slot].result() if reports else {},
@@ -203,6 +204,7 @@ def run_trials(
                     after_miss=divmod(starts.item(slot), task.size) if has_missed else None,
                 )
                 kept[slot], legs[slot] = [], [*before, result]
+                begun[slot] = 0 if step.ended[slot] else final["path_length"].item()
                 if reports and (shown := env.rules.shown[slot]):
                     reported[slot] = EpisodeReports(shown)
                 if step.ended[slot]:
