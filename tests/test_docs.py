@@ -90,6 +90,7 @@ def reader(tmp_path, monkeypatch, capsys):
     pathlib.Path("plans").mkdir()
     write_text_maze(maze, "plans/plan.txt")
     write_ros_map(maze, "map.yaml")
+    write_ros_map(generate("house", 31, np.random.default_rng(0)), "plan.yaml")
     known = set(sys.modules)
     yield Reader(monkeypatch, capsys)
     for name in set(sys.modules) - known:
