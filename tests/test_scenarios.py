@@ -101,7 +101,8 @@ class TestPlaying:
         assert drawn == {scenarios.ends(number) for number in range(3)}
 
     @pytest.mark.parametrize(
-        ("option", "value"), [("start", (1, 1)), ("pairs", "fixed"), ("num_goals", 2), ("task", "building")]
+        ("option", "value"),
+        [("start", (1, 1)), ("pairs", "fixed"), ("num_goals", 2), ("task", "building"), ("shown", "m.map")],
     )
     def test_options_that_choose_other_ends_are_refused(self, path, option, value):
         with pytest.raises(InputError, match=r"scenarios|num_goals 2|a start or a goal"):

@@ -203,7 +203,8 @@ class TestChangedBuildings:
     def test_the_same_buildings_are_played_again(self, tmp_path):
         options = {"mazes": house(), "distances": (15,)}
         assert len(make_plan(eval_options("random", "rebuilt", **options)).trials) == 4 * 48
-        mazebench.evaluate("random", "rebuilt", out=tmp_path / "run", episodes_per_distance=1, **options)
+        summary = mazebench.evaluate("oracle", "rebuilt", out=tmp_path / "run", episodes_per_distance=1, **options)
+        assert summary.overall.on_time["1.25"] == 1
         result = load_result(tmp_path / "run")
         assert played_task(result.summary).mazes == Task.of("rebuilt", mazes=house()).mazes
 
