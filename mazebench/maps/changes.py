@@ -5,7 +5,7 @@ ones are opened, and furniture has come and gone. The strength of the changes is
 believes the plan: an episode is late if the robot drives over 1.25 times the shortest way. All that is drawn and
 compared are whole numbers and their ratios, so that one seed gives one building on every machine.
 
-`P` is the number of pairs of a start and a goal, `W` of cells on ways, `D` of passages, and `N` of rows and columns.
+`P` is the number of pairs of a start and a goal, and `N` of rows and columns.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -20,9 +21,9 @@ import scipy
 
 from mazebench.constants import ON_TIME
 from mazebench.errors import InputError
-from mazebench.maps.follower import follow, shortest_ways
+from mazebench.maps.follower import follow
 from mazebench.maps.maze import Maze
-from mazebench.maps.passages import Passages, find_passages
+from mazebench.maps.passages import Passage, find_passages
 from mazebench.maps.search import search
 
 LATE = (0.15, 0.3, 0.4)  # share of late episodes at strengths 1, 2, 3; on the track `rebuilt` .16, .31 and .38
@@ -118,108 +119,100 @@ def change(maze: Maze, strength: int, rng: np.random.Generator, name: str) -> Ch
             f"{maze.name}: expected a building in which a robot without a map is late in at least {LATE_WITHOUT_MAP} "
             f"of the episodes, and before it has changed in at least {LATE_IN_PLAN}; found {late:.2f}"
         )
-    can_change = np.ones(len(plan.passages.is_open), dtype=bool)
-    draft = _Draft(maze.walls, can_change, tuple(range(len(plan.things))))
+    draft = plan.draft()
     for each in range(1, strength + 1):
-        draft, late = _changed_more(plan, draft, each)
+        draft = _changed_more(plan, draft, each)
     return Change(
         dataclasses.replace(maze, walls=draft.walls, name=name),
         strength,
-        *(draft.closed, draft.opened, draft.added, draft.removed),
+        *map(draft.done.count, ("closed", "opened", "added", "removed")),
         late=draft.late,
-        late_without_map=late,
+        late_without_map=draft.late_without_map,
         blocked=float(plan.is_blocked(draft.walls).mean()),
     )
 
 
-@dataclasses.dataclass(frozen=True)
-class _Draft:
+class _Draft(NamedTuple):
     """A building while things change in it."""
 
     walls: np.ndarray  # [N, N] bool
-    can_change: np.ndarray  # [D] bool, the passages that may still change
-    things: tuple[int, ...]  # the plan's pieces of furniture that are left
-    late: float = 0.0  # as that of `Change`
-    closed: int = 0
-    opened: int = 0
-    added: int = 0
-    removed: int = 0
+    passages: tuple[Passage, ...]  # that may still change
+    things: tuple[tuple[tuple[slice, ...], np.ndarray], ...]  # furniture of the plan that is left: its box and shape
+    done: tuple[str, ...] = ()  # "closed", "opened", "added" or "removed" for each change
+    late: float = 0.0  # as those of `Change`
+    late_without_map: float = 0.0
 
 
 class _Plan:
-    """The old map with what can change, and the pairs of a start and a goal on which lateness is measured."""
+    """The old map, and the pairs of a start and a goal on which lateness is measured."""
 
     def __init__(self, maze: Maze, seed: int):
         self.walls, self.cell_size, self.name, self.seed = maze.walls, maze.cell_size, maze.name, seed
+        self.sight = max(1.0, SIGHT / maze.cell_size)  # cells
         self.pairs = draw_pairs(maze, _NUM_PAIRS, np.random.default_rng([seed, 0, 0]))  # [P, 2] int
 
         # The ways on the plan by which changes are drawn; of other pairs, else these would be more late than any.
-        ways = shortest_ways(maze.walls, draw_pairs(maze, _NUM_PAIRS, np.random.default_rng([seed, 0, 1])))
-        self.way_cells, lengths = ways  # [W] int
-        self.way_pairs = np.repeat(np.arange(len(lengths)), lengths + 1)  # [W] int, the pair of each cell
-        self.passages: Passages = find_passages(maze.walls, maze.cell_size)
-        self.sight = max(1.0, SIGHT / maze.cell_size)  # cells
+        pairs = draw_pairs(maze, _NUM_PAIRS, np.random.default_rng([seed, 0, 1]))
+        cells, lengths, _ = follow(maze.walls, maze.walls, pairs, 1.0, 1.0)
+        ends = np.cumsum(lengths + 1)
+        ways = np.ones(len(cells), dtype=np.int64), cells, np.append(0, ends)
+        self.ways = scipy.sparse.csr_array(ways, shape=(len(pairs), maze.walls.size))  # 1 at the cells of each way
 
+    def draft(self) -> _Draft:
+        """Returns the plan as a building that can change."""
         # Furniture: walls that touch no others, not even at a corner.
-        areas, _ = scipy.ndimage.label(maze.walls, np.ones((3, 3)))
+        areas, _ = scipy.ndimage.label(self.walls, np.ones((3, 3)))
         boxes = enumerate(scipy.ndimage.find_objects(areas), start=1)
-        most = FURNITURE[1] / maze.cell_size + _CELL
-        self.things = [
-            (box, areas[box] == number) for number, box in boxes if max(side.stop - side.start for side in box) <= most
-        ]
+        most = FURNITURE[1] / self.cell_size + _CELL
+        things = [(box, areas[box] == area) for area, box in boxes if max(areas[box].shape) <= most]
+        return _Draft(self.walls, find_passages(self.walls, self.cell_size), tuple(things))
 
     def late(self, walls: np.ndarray, shown: np.ndarray) -> float:
         """Returns the share of late episodes in a building of a robot that is shown a map of it."""
         pairs = self.pairs[~walls.ravel()[self.pairs].any(axis=1)]
-        driven, shortest = follow(walls, shown, pairs, self.sight, ON_TIME[0])
+        _, driven, shortest = follow(walls, shown, pairs, self.sight, ON_TIME[0])
         return float((driven > ON_TIME[0] * shortest).mean()) if len(pairs) else 0.0
 
     def late_without_map(self, walls: np.ndarray) -> float:
         """Returns the same of a robot that takes for free what it has not seen."""
-        shown = np.ones_like(walls)
-        shown[1:-1, 1:-1] = False
-        return self.late(walls, shown)
+        return self.late(walls, np.zeros_like(walls))
 
     def is_blocked(self, walls: np.ndarray) -> np.ndarray:
-        """Returns the pairs whose shortest way on the plan is blocked: `[P]` bool."""
-        return np.bincount(self.way_pairs, walls.ravel()[self.way_cells]) > 0
+        """Returns the ways on the plan that are blocked in a building: `[P]` bool."""
+        return self.ways @ walls.ravel() > 0
 
 
-def _changed_more(plan: _Plan, draft: _Draft, strength: int) -> tuple[_Draft, float]:
-    """Returns a draft of the next smaller strength, changed until it has this one, and its lateness without a map.
+def _changed_more(plan: _Plan, draft: _Draft, strength: int) -> _Draft:
+    """Returns a draft of the next smaller strength, changed until it has this one.
 
     Raises:
       InputError: if no such draft was found.
     """
     target = LATE[strength - 1]
-    best, best_without, best_carries = draft, 0.0, False
+    tries: list[tuple[bool, float, int, _Draft]] = []
     for number in range(_NUM_TRIES):
         # A change is kept if as many episodes are late as before, or more, but not too many.
         rng, now, num_misses = np.random.default_rng([plan.seed, strength, number]), draft, 0
         while now.late < target and num_misses < _NUM_MISSES and (new := _step(plan, now, rng)) is not None:
             if new.walls is not now.walls:
-                new = dataclasses.replace(new, late=plan.late(new.walls, plan.walls))
+                new = new._replace(late=plan.late(new.walls, plan.walls))
             is_kept = now.late <= new.late <= target + _MISS
             now, num_misses = (new, 0) if is_kept else (now, num_misses + 1)
 
         # The first try that is late enough counts, or the latest of all.
-        without = plan.late_without_map(now.walls)
-        carries = without >= LATE_WITHOUT_MAP and (strength > 1 or without >= now.late + WORTH)
-        if (carries, now.late) > (best_carries, best.late):
-            best, best_without, best_carries = now, without, carries
-        if carries and now.late >= target:
+        now = now._replace(late_without_map=plan.late_without_map(now.walls))
+        least = max(LATE_WITHOUT_MAP, now.late + WORTH if strength == 1 else 0.0)
+        tries.append((now.late_without_map >= least, now.late, -number, now))
+        if tries[-1] >= (True, target):
             break
-    if best.late < target - _MISS:
+    can_carry, late, _, best = max(tries)
+    if late < target - _MISS or not can_carry:
         raise InputError(
-            f"{plan.name}: expected changes of strength {strength}, by which a robot with the old map is late in "
-            f"{target} of the episodes; found {best.late:.2f}"
+            f"{plan.name}: expected changes of strength {strength}, by which a robot is late in {target} of the "
+            f"episodes with the old map, and without a map in at least {LATE_WITHOUT_MAP} and at strength 1 in {WORTH} "
+            f"more than with it; found {late:.2f} with it and {best.late_without_map:.2f} without"
         )
-    if not best_carries:
-        raise InputError(
-            f"{plan.name}: expected a building in which a robot without a map is late in at least {LATE_WITHOUT_MAP} "
-            f"of the episodes, and at strength 1 in {WORTH} more than with the old map; found {best_without:.2f}"
-        )
-    return best, best_without
+    return best
 
 
 def _step(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft | None:
@@ -228,53 +221,44 @@ def _step(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft | None
     With a passage, a piece of furniture comes or goes in half of the steps.
     """
     # The passages to close, by how many ways pass that nothing blocks yet; those to open, one like the other.
-    passages = plan.passages
-    cells = plan.way_cells[~plan.is_blocked(draft.walls)[plan.way_pairs]]
-    num_ways = np.bincount(cells, minlength=draft.walls.size).reshape(draft.walls.shape)
-    weights = np.zeros(len(passages.is_open), dtype=np.int64)
-    for each in np.flatnonzero(draft.can_change & passages.is_open).tolist():
-        weights[each] = num_ways[passages.box(each)].max()
-    walled = draft.can_change & ~passages.is_open
-    if not weights.any() or (rng.integers(4) == 0 and walled.any()):
-        weights = walled.astype(np.int64)
-    if not weights.any():
+    num_ways = (~plan.is_blocked(draft.walls) @ plan.ways).reshape(draft.walls.shape)
+    weights = [int(num_ways[each.cells()].max()) if each.is_open else 0 for each in draft.passages]
+    is_walled = [int(not each.is_open) for each in draft.passages]
+    if not any(weights) or (rng.integers(4) == 0 and any(is_walled)):
+        weights = is_walled
+    if not any(weights):
         return None
 
     # One of them. If that parts the building, a door is opened between the two parts.
-    index = int(weights.cumsum().searchsorted(rng.integers(weights.sum()), side="right"))
-    new = _turned(plan, draft, index)
+    passage = draft.passages[np.cumsum(weights).searchsorted(rng.integers(sum(weights)), side="right")]
+    new = _turned(draft, passage)
     areas, num_areas = scipy.ndimage.label(~new.walls)
-    if num_areas == 2 and passages.is_open[index]:
-        walled &= new.can_change
-        doors = [each for each in np.flatnonzero(walled).tolist() if {1, 2} <= set(areas[passages.box(each, 1)].flat)]
+    if num_areas == 2 and passage.is_open:
+        doors = [each for each in new.passages if not each.is_open and {1, 2} <= set(areas[each.cells(1)].flat)]
         if doors:
-            new, num_areas = _turned(plan, new, int(rng.choice(doors))), 1
+            new, num_areas = _turned(new, doors[rng.integers(len(doors))]), 1
     if num_areas != 1:
-        return dataclasses.replace(draft, can_change=draft.can_change & (np.arange(len(weights)) != index))
+        return draft._replace(passages=tuple(each for each in draft.passages if each != passage))
     return _furnished(plan, new, rng) if rng.integers(2) else new
 
 
-def _turned(plan: _Plan, draft: _Draft, index: int) -> _Draft:
+def _turned(draft: _Draft, passage: Passage) -> _Draft:
     """Returns a draft in which a passage is closed that is open on the plan, or opened; those that touch it stay."""
-    is_open = bool(plan.passages.is_open[index])
     walls = draft.walls.copy()
-    walls[plan.passages.box(index)] = is_open
-    top, left, bottom, right = plan.passages.boxes.T
-    touches = (top <= bottom[index]) & (bottom >= top[index]) & (left <= right[index]) & (right >= left[index])
-    can_change = draft.can_change & ~touches
-    closed, opened = draft.closed + is_open, draft.opened + (not is_open)
-    return dataclasses.replace(draft, walls=walls, can_change=can_change, closed=closed, opened=opened)
+    walls[passage.cells()] = passage.is_open
+    passages = tuple(each for each in draft.passages if not each.touches(passage))
+    return draft._replace(walls=walls, passages=passages, done=(*draft.done, "closed" if passage.is_open else "opened"))
 
 
 def _furnished(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft:
     """Returns a draft in which a piece of furniture has gone or come; neither can part the building."""
     walls = draft.walls.copy()
     if draft.things and rng.integers(2):
-        index = int(rng.choice(draft.things))
-        box, shape = plan.things[index]
+        index = rng.integers(len(draft.things))
+        box, shape = draft.things[index]
         walls[box] &= ~shape
-        things = tuple(each for each in draft.things if each != index)
-        return dataclasses.replace(draft, walls=walls, things=things, removed=draft.removed + 1)
+        things = draft.things[:index] + draft.things[index + 1 :]
+        return draft._replace(walls=walls, things=things, done=(*draft.done, "removed"))
 
     # Of a size in whole cells, where it and its surroundings are free.
     least = math.ceil(FURNITURE[0] / plan.cell_size - _CELL)
@@ -289,7 +273,7 @@ def _furnished(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft:
         return draft
     row, column = rng.choice(places) + clear
     walls[row : row + height, column : column + width] = True
-    return dataclasses.replace(draft, walls=walls, added=draft.added + 1)
+    return draft._replace(walls=walls, done=(*draft.done, "added"))
 
 
 def draw_pairs(maze: Maze, count: int, rng: np.random.Generator) -> np.ndarray:

@@ -3,8 +3,6 @@
 A passage is a straight strip of cells, all free (open) or all wall (walled), whose two sides are near each other
 through it and far by any other way. Lengths are compared in metres, and ways run along the sides of cells, so that a
 building has the same passages whether it is drawn with cells of 1 m or with four of 0.5 m for each.
-
-`D` is the number of passages and `N` of rows and columns of a building.
 """
 
 from __future__ import annotations
@@ -13,8 +11,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-
-from mazebench.kernels import compiled
+from scipy import ndimage
 
 WIDEST = 2.4  # m, of an open passage
 THICKEST = 1.0  # m, of a wall in which a door can be opened; of a longer open passage, so much is closed
@@ -23,30 +20,32 @@ DETOUR = 6.0  # m, the least length of any other way between the two sides
 _TOLERANCE = 1e-6  # cells
 
 
-class Passages(NamedTuple):
-    """Passages of a building."""
+class Passage(NamedTuple):
+    """A strip of cells: its first row and column, and the end of its rows and columns."""
 
-    boxes: np.ndarray  # [D, 4] int: of the strip's cells, the first row and column, and the end of rows and of columns
-    is_open: np.ndarray  # [D] bool
+    top: int
+    left: int
+    bottom: int
+    right: int
+    is_open: bool
 
-    def box(self, index: int, margin: int = 0) -> tuple[slice, slice]:
-        """Returns the rows and columns of a passage with a margin of some cells."""
-        top, left, bottom, right = self.boxes[index].tolist()
-        return slice(top - margin, bottom + margin), slice(left - margin, right + margin)
+    def cells(self, margin: int = 0) -> tuple[slice, slice]:
+        """Returns the rows and columns, with a margin of some cells."""
+        return slice(self.top - margin, self.bottom + margin), slice(self.left - margin, self.right + margin)
+
+    def touches(self, other: Passage) -> bool:
+        """Returns whether the two share a cell, a side or a corner."""
+        rows = self.top <= other.bottom and other.top <= self.bottom
+        return rows and self.left <= other.right and other.left <= self.right
 
 
-def find_passages(walls: np.ndarray, cell_size: float) -> Passages:
-    """Returns the passages of a building.
-
-    Args:
-      walls: `[N, N]` bool, with a closed border.
-      cell_size: in metres.
-    """
+def find_passages(walls: np.ndarray, cell_size: float) -> tuple[Passage, ...]:
+    """Returns the passages of a building: `walls` is `[N, N]` bool, with a closed border, `cell_size` in metres."""
     widest, thickest = (metres / cell_size + _TOLERANCE for metres in (WIDEST, THICKEST))
     door, length, detour = (math.ceil(metres / cell_size - _TOLERANCE) for metres in (DOOR, THICKEST, DETOUR))
-    parts = []
+    passages = []
     for turned in (False, True):  # through strips from above to below, and, with the axes exchanged, from left to right
-        grid = np.array(walls.T if turned else walls, order="C")
+        grid = walls.T if turned else walls
 
         # Free from wall to wall.
         openings = _blocks(~grid)
@@ -61,12 +60,12 @@ def find_passages(walls: np.ndarray, cell_size: float) -> Passages:
         doors[:, 3] = doors[:, 1] + door
 
         # Those whose sides are far by any other way.
-        boxes = np.concatenate([openings, doors])
-        is_far = _is_far(grid, boxes, detour)
-        is_open = np.arange(len(boxes)) < len(openings)
-        boxes = boxes[:, [1, 0, 3, 2]] if turned else boxes
-        parts.append((boxes[is_far], is_open[is_far]))
-    return Passages(*map(np.concatenate, zip(*parts, strict=True)))
+        padded = np.pad(grid, detour, constant_values=True)
+        for number, (top, left, bottom, right) in enumerate(np.concatenate([openings, doors]).tolist()):
+            if _is_far(padded[top : bottom + 2 * detour, left : right + 2 * detour], detour):
+                box = (left, top, right, bottom) if turned else (top, left, bottom, right)
+                passages.append(Passage(*box, is_open=number < len(openings)))
+    return tuple(passages)
 
 
 def _blocks(cells: np.ndarray) -> np.ndarray:
@@ -83,60 +82,31 @@ def _blocks(cells: np.ndarray) -> np.ndarray:
     return np.stack([top, left, bottom, right], axis=1)
 
 
-@compiled
-def _is_far(walls: np.ndarray, boxes: np.ndarray, detour: int) -> np.ndarray:
-    """Returns the strips with free cells above and below that are `detour` cells apart by any other way: `[D]` bool.
+def _is_far(walls: np.ndarray, detour: int) -> bool:
+    """Returns whether free cells above and below a strip are `detour` cells apart by any other way.
 
-    It searches from the lattice points between the strip and the free cells above to those below. Ways run along the
-    sides of free cells, but not through a point at which two free cells touch diagonally.
+    `walls` is of the strip and so many cells around it. Ways do not lead through points where two free cells touch
+    diagonally.
     """
-    size = len(walls) + 1  # of the lattice
-    closed = walls.copy()
-    is_far = np.zeros(len(boxes), dtype=np.bool_)
-    seen, goals = np.full(size * size, -1), np.full(size * size, -1)
-    queue = np.empty(size * size, dtype=np.int64)
-    for number in range(len(boxes)):
-        top, left, bottom, right = boxes[number]
-        before = closed[top, left]
-        closed[top:bottom, left:right] = True
+    free = ~walls
+    free[detour:-detour, detour:-detour] = False
 
-        # The points at both sides.
-        count, has_goal = 0, False
-        for column in range(left, right):
-            for point in (column, column + 1):
-                if not closed[top - 1, column] and seen[top * size + point] != number:
-                    seen[top * size + point] = number
-                    queue[count] = top * size + point
-                    count += 1
-                if not closed[bottom, column]:
-                    goals[bottom * size + point] = number
-                    has_goal = True
+    # A raster of half cells, with the sides and the corners of cells between their middles.
+    halves = np.zeros(2 * np.array(free.shape) + 1, dtype=bool)
+    halves[1::2, 1::2] = free
+    strip = slice(2 * detour, -2 * detour)
+    starts, goals = np.zeros((2, *halves.shape), dtype=bool)
+    starts[2 * detour, strip] = ndimage.binary_dilation(halves[2 * detour - 1, strip])
+    goals[-2 * detour - 1, strip] = ndimage.binary_dilation(halves[-2 * detour, strip])
+    if not starts.any() or not goals.any():
+        return False
 
-        # Away from those above, point by point.
-        is_far[number], begin = count > 0 and has_goal, 0
-        for _ in range(detour - 1):
-            end = count
-            for index in range(begin, end):
-                row, column = queue[index] // size, queue[index] % size
-                upper_left, upper_right = not closed[row - 1, column - 1], not closed[row - 1, column]
-                lower_left, lower_right = not closed[row, column - 1], not closed[row, column]
-                if upper_left == lower_right and upper_right == lower_left and upper_left != upper_right:
-                    is_far[number] &= begin > 0  # at the strip, it would depend on the raster
-                    continue
-                for step, is_free in (
-                    (-size, upper_left or upper_right),
-                    (-1, upper_left or lower_left),
-                    (1, upper_right or lower_right),
-                    (size, lower_left or lower_right),
-                ):
-                    point = queue[index] + step
-                    if is_free and seen[point] != number:
-                        seen[point] = number
-                        queue[count] = point
-                        count += 1
-                        is_far[number] &= goals[point] != number
-            begin = end
-            if not is_far[number]:
-                break
-        closed[top:bottom, left:right] = before
-    return is_far
+    # Where ways can lead.
+    can_pass = ndimage.binary_dilation(halves, np.ones((3, 3)))
+    upper_left, upper_right, lower_left, lower_right = free[:-1, :-1], free[:-1, 1:], free[1:, :-1], free[1:, 1:]
+    is_diagonal = (upper_left == lower_right) & (upper_right == lower_left) & (upper_left != upper_right)
+    can_pass[2:-2:2, 2:-2:2] &= ~is_diagonal
+    if (starts & ~can_pass).any():
+        return False  # it would depend on the raster
+    reached = ndimage.binary_dilation(starts, iterations=2 * (detour - 1), mask=can_pass | goals)
+    return not (reached & goals).any()
