@@ -59,48 +59,42 @@ def follow(
       shortest: `[P]` int, cells of a shortest way in the building.
     """
     offsets, before = sight_lines(sight)
-    shown = np.pad(shown[1:-1, 1:-1], 1, constant_values=True)
+    lines = np.stack([offsets @ (len(walls), 1), before], axis=1)
     window = np.ones((2 * offsets.max() + 1,) * 2)
+    shown = np.pad(shown[1:-1, 1:-1], 1, constant_values=True)
     can_be_wrong = cv2.dilate((walls != shown).astype(np.uint8), window).astype(bool).ravel()
-    return _follow(np.array(walls, order="C"), shown, can_be_wrong, pairs, offsets @ (len(walls), 1), before, most)
+    return _follow(np.array(walls, order="C"), shown, can_be_wrong, pairs, lines, most)
 
 
 @compiled
 def _follow(
-    walls: np.ndarray,
-    shown: np.ndarray,
-    can_be_wrong: np.ndarray,
-    pairs: np.ndarray,
-    steps: np.ndarray,
-    before: np.ndarray,
-    most: float,
+    walls: np.ndarray, shown: np.ndarray, can_be_wrong: np.ndarray, pairs: np.ndarray, lines: np.ndarray, most: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Does the work of `follow`.
 
-    `steps` (`[K]` int) lead from a cell to those of `sight_lines`. Only from the cells of `can_be_wrong` (`[N * N]`
-    bool) may the map look wrong.
+    Only from the cells of `can_be_wrong` (`[N * N]` bool) may the map look wrong. `lines` (`[K, 2]` int) are the steps
+    to the cells of `sight_lines`, and the indices of those before.
     """
     size, true = len(walls), walls.ravel()
-    driven, shortest = np.zeros(len(pairs), np.int64), np.empty(len(pairs), np.int64)
-    is_clear = np.ones(len(steps), np.bool_)
+    driven, shortest = np.empty(len(pairs), np.int64), np.empty(len(pairs), np.int64)
+    is_clear = np.ones(len(lines), np.bool_)
     cells = [0]  # numba takes the type from an element
     for number in range(len(pairs)):
         here, goal = pairs[number]
         way = _shortest_way(walls, here, goal)
-        shortest[number] = len(way) - 1
+        driven[number] = shortest[number] = len(way) - 1
         first = looked = len(cells)
         cells.append(here)
         belief = shown.copy()
-        believed, has_map = belief.ravel(), True
-        is_wrong, at = True, 0
-        while here != goal:
+        believed, has_map, is_wrong, at = belief.ravel(), True, True, 0
+        while here != goal and driven[number] <= most * shortest[number]:
             # See what no wall hides, and correct the map: the way may be blocked, or there may be a shorter one.
             for visit in range(looked, len(cells)):
                 if has_map and not can_be_wrong[cells[visit]]:
                     continue
-                for index in range(len(steps)):
-                    cell = cells[visit] + steps[index]
-                    is_clear[index] = is_clear[before[index]]
+                for index in range(len(lines)):
+                    cell = cells[visit] + lines[index, 0]
+                    is_clear[index] = is_clear[lines[index, 1]]
                     if is_clear[index]:
                         is_clear[index] = not true[cell]
                         if believed[cell] != true[cell]:
@@ -121,17 +115,14 @@ def _follow(
             at += 1
             here = way[at]
             cells.append(here)
-            driven[number] += 1
             left = abs(here // size - goal // size) + abs(here % size - goal % size)
-            if driven[number] + left > most * shortest[number]:
-                driven[number] += left
-                break
+            driven[number] = len(cells) - 1 - first + left
     return np.array(cells[1:]), driven, shortest
 
 
 @compiled
 def _shortest_way(walls: np.ndarray, start: int, goal: int) -> np.ndarray:
-    """Returns the cells of a shortest way: `[L]` int, none if there is no way.
+    """Returns the cells of a shortest way, none if there is no way: `[L]` int.
 
     It is an A* search with the Manhattan distance, in which a step costs nothing if it leads nearer to the goal, else
     one detour. `walls` is `[N, N]` bool, with a closed border.
@@ -139,40 +130,32 @@ def _shortest_way(walls: np.ndarray, start: int, goal: int) -> np.ndarray:
     size, flat = len(walls), walls.ravel()
     goal_row, goal_column = goal // size, goal % size
     cost, came = np.full(flat.size, 2**30, np.int32), np.empty(flat.size, np.int32)  # of each cell, and the one before
-    now, later = np.empty(4 * flat.size, np.int32), np.empty(4 * flat.size, np.int32)  # by so many detours, and one more
-    cost[start], now[0] = 0, start
-    detours, num_now, num_later = 0, 1, 0
-    cell = start
+    stacks, counts = np.empty((2, 4 * flat.size), np.int32), np.array([1, 0])  # of even and odd numbers of detours
+    cost[start], stacks[0, 0] = 0, start
+    cell, detours = start, 0
     while cell != goal:
-        if num_now == 0:
-            if num_later == 0:
-                return np.empty(0, np.int64)
-            now, later, num_now, num_later = later, now, num_later, 0
+        if counts[detours & 1] == 0:
             detours += 1
-        num_now -= 1
-        cell = now[num_now]
+            if counts[detours & 1] == 0:
+                return np.empty(0, np.int64)
+        counts[detours & 1] -= 1
+        cell = stacks[detours & 1, counts[detours & 1]]
         if cost[cell] != detours:
             continue  # it was reached with fewer
         row, column = cell // size, cell % size
-        for step, nearer in (
+        for step, is_nearer in (
             (1, column < goal_column),
             (size, row < goal_row),
             (-1, column > goal_column),
             (-size, row > goal_row),
         ):
-            near = cell + step
-            if not flat[near] and detours + (not nearer) < cost[near]:
-                cost[near], came[near] = detours + (not nearer), cell
-                if nearer:
-                    now[num_now] = near
-                    num_now += 1
-                else:
-                    later[num_later] = near
-                    num_later += 1
+            near, needed = cell + step, detours + (not is_nearer)
+            if not flat[near] and needed < cost[near]:
+                cost[near], came[near] = needed, cell
+                stacks[needed & 1, counts[needed & 1]] = near
+                counts[needed & 1] += 1
 
-    length = abs(start // size - goal_row) + abs(start % size - goal_column) + 2 * detours
-    way = np.empty(length + 1, np.int64)
-    for index in range(length, -1, -1):
-        way[index] = cell
-        cell = came[cell]
-    return way
+    way = [goal]
+    while way[-1] != start:
+        way.append(came[way[-1]])
+    return np.array(way[::-1])
