@@ -52,22 +52,22 @@ def generate(
 ) -> None:
     """Make mazes: MJCF for MuJoCo, text, picture, ROS map, mesh."""
     load_mujoco(renders=False)
-    from mazebench.maps.changes import changes
+    from mazebench.maps.changes import Change, changes
     from mazebench.maps.readers.occupancy_grid import LocatedMaze
     from mazebench.maps.text import format_maze
     from mazebench.world.formats import make_mazes, parse_formats, write_maze
 
     num_drawn = count if strength is None else 1
     mazes = make_mazes(size, num_drawn, seed, kind, mazes_file, ReadOptions(**values))
-    made: Iterator[tuple[LocatedMaze, str]] = ((placed, "") for placed in mazes)
+    made: Iterator[tuple[LocatedMaze, Change | None]] = ((placed, None) for placed in mazes)
     if strength is not None:
         plan = next(mazes)
-        made = ((plan._replace(maze=each.maze), str(each)) for each in changes(plan.maze, strength, count, seed))
+        made = ((plan._replace(maze=maze), change) for maze, change in changes(plan.maze, strength, count, seed))
     chosen = parse_formats(formats)
-    for index, (placed, description) in enumerate(made):
+    for index, (placed, change) in enumerate(made):
         for path in write_maze(placed, out, chosen, mazes_file):
             print(path)
-        if description:
-            print(description)
+        if change:
+            print(f"{placed.maze.name}: {change}")
         if index == 0 and 2 * placed.maze.size <= shutil.get_terminal_size().columns:  # the first is shown
             print(format_maze(placed.maze), end="")

@@ -15,9 +15,9 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 import scipy
+from numpy.lib.stride_tricks import sliding_window_view
 
 from mazebench.constants import ON_TIME
 from mazebench.errors import InputError
@@ -40,25 +40,25 @@ _NUM_TRIES, _NUM_MISSES = 8, 7  # of a strength, and of changes in a row that a 
 _CELL = 1e-6  # cells, a tolerance
 
 
-@dataclasses.dataclass(frozen=True)
-class Change:
-    """A changed building, what has changed in it, and the shares of episodes that are late in it."""
+class Change(NamedTuple):
+    """What has changed in a building since its plan was drawn, and the shares of episodes that are late in it."""
 
-    maze: Maze
-    strength: int
-    closed: int  # passages that were open
-    opened: int  # passages that were walled
-    added: int  # pieces of furniture
-    removed: int  # pieces of furniture
-    late: float  # of a robot that believes the plan
-    late_without_map: float  # of a robot that takes for free what it has not seen
-    blocked: float  # share of episodes in which the shortest way on the plan is blocked
+    walls: np.ndarray  # [N, N] bool
+    passages: tuple[Passage, ...]  # that may still change
+    things: tuple[tuple[tuple[slice, ...], np.ndarray], ...]  # furniture of the plan that is left: its box and shape
+    done: tuple[
+        str, ...
+    ] = ()  # "closed" or "opened" for each passage, "added" or "removed" for each piece of furniture
+    late: float = 0.0  # of a robot that believes the plan
+    late_without_map: float = 0.0  # of a robot that takes for free what it has not seen
+    blocked: float = 0.0  # share of episodes in which the shortest way on the plan is blocked
 
     def __str__(self) -> str:
+        closed, opened, added, removed = map(self.done.count, ("closed", "opened", "added", "removed"))
         return (
-            f"{self.maze.name}: {self.closed} passages closed, {self.opened} opened, {self.added} pieces of furniture "
-            f"added, {self.removed} removed; late {self.late:.2f} with the old map and {self.late_without_map:.2f} "
-            f"without, shortest way blocked {self.blocked:.2f}"
+            f"{closed} passages closed, {opened} opened, {added} pieces of furniture added, {removed} removed; "
+            f"late {self.late:.2f} with the old map and {self.late_without_map:.2f} without, "
+            f"shortest way blocked {self.blocked:.2f}"
         )
 
 
@@ -82,7 +82,7 @@ def changed(maze: Maze, strength: int, rng: np.random.Generator) -> Maze:
     Raises:
       InputError: if the building can't carry the strength, with the share of late episodes that was found.
     """
-    return change(maze, strength, rng, f"{maze.name}-changed").maze
+    return change(maze, strength, rng, f"{maze.name}-changed")[0]
 
 
 def changed_buildings(maze: Maze, strength: int, count: int, seed: int) -> tuple[Maze, ...]:
@@ -93,21 +93,17 @@ def changed_buildings(maze: Maze, strength: int, count: int, seed: int) -> tuple
     Raises:
       InputError: if a building can't carry the strength.
     """
-    return tuple(each.maze for each in changes(maze, strength, count, seed))
+    return tuple(building for building, _ in changes(maze, strength, count, seed))
 
 
-def changes(maze: Maze, strength: int, count: int, seed: int) -> Iterator[Change]:
+def changes(maze: Maze, strength: int, count: int, seed: int) -> Iterator[tuple[Maze, Change]]:
     """Yields the changed buildings that `changed_buildings` returns, with what has changed in them."""
     for index in range(count):
         yield change(maze, strength, np.random.default_rng([seed, index]), f"{maze.name}-changed-{index + 1}")
 
 
-def change(maze: Maze, strength: int, rng: np.random.Generator, name: str) -> Change:
-    """Returns what `changed` does, with that name and with what has changed.
-
-    Raises:
-      InputError: as `changed` does.
-    """
+def change(maze: Maze, strength: int, rng: np.random.Generator, name: str) -> tuple[Maze, Change]:
+    """Returns what `changed` does, with that name and with what has changed."""
     if strength not in (1, 2, 3):
         raise InputError(f"expected a strength of 1 to 3, found {strength!r}")
     if not isinstance(rng, np.random.Generator):
@@ -119,28 +115,11 @@ def change(maze: Maze, strength: int, rng: np.random.Generator, name: str) -> Ch
             f"{maze.name}: expected a building in which a robot without a map is late in at least {LATE_WITHOUT_MAP} "
             f"of the episodes, and before it has changed in at least {LATE_IN_PLAN}; found {late:.2f}"
         )
-    draft = plan.draft()
+    found = plan.unchanged()
     for each in range(1, strength + 1):
-        draft = _changed_more(plan, draft, each)
-    return Change(
-        dataclasses.replace(maze, walls=draft.walls, name=name),
-        strength,
-        *map(draft.done.count, ("closed", "opened", "added", "removed")),
-        late=draft.late,
-        late_without_map=draft.late_without_map,
-        blocked=float(plan.is_blocked(draft.walls).mean()),
-    )
-
-
-class _Draft(NamedTuple):
-    """A building while things change in it."""
-
-    walls: np.ndarray  # [N, N] bool
-    passages: tuple[Passage, ...]  # that may still change
-    things: tuple[tuple[tuple[slice, ...], np.ndarray], ...]  # furniture of the plan that is left: its box and shape
-    done: tuple[str, ...] = ()  # "closed", "opened", "added" or "removed" for each change
-    late: float = 0.0  # as those of `Change`
-    late_without_map: float = 0.0
+        found = _changed_more(plan, found, each)
+    found = found._replace(blocked=float(plan.is_blocked(found.walls).mean()))
+    return dataclasses.replace(maze, walls=found.walls, name=name), found
 
 
 class _Plan:
@@ -158,14 +137,14 @@ class _Plan:
         ways = np.ones(len(cells), dtype=np.int64), cells, np.append(0, ends)
         self.ways = scipy.sparse.csr_array(ways, shape=(len(pairs), maze.walls.size))  # 1 at the cells of each way
 
-    def draft(self) -> _Draft:
-        """Returns the plan as a building that can change."""
+    def unchanged(self) -> Change:
+        """Returns the plan as a building in which nothing has changed."""
         # Furniture: walls that touch no others, not even at a corner.
         areas, _ = scipy.ndimage.label(self.walls, np.ones((3, 3)))
         boxes = enumerate(scipy.ndimage.find_objects(areas), start=1)
         most = FURNITURE[1] / self.cell_size + _CELL
         things = [(box, areas[box] == area) for area, box in boxes if max(areas[box].shape) <= most]
-        return _Draft(self.walls, find_passages(self.walls, self.cell_size), tuple(things))
+        return Change(self.walls, find_passages(self.walls, self.cell_size), tuple(things))
 
     def late(self, walls: np.ndarray, shown: np.ndarray) -> float:
         """Returns the share of late episodes in a building of a robot that is shown a map of it."""
@@ -182,14 +161,10 @@ class _Plan:
         return self.ways @ walls.ravel() > 0
 
 
-def _changed_more(plan: _Plan, draft: _Draft, strength: int) -> _Draft:
-    """Returns a draft of the next smaller strength, changed until it has this one.
-
-    Raises:
-      InputError: if no such draft was found.
-    """
+def _changed_more(plan: _Plan, draft: Change, strength: int) -> Change:
+    """Returns a change of the next smaller strength, changed until it has this one."""
     target = LATE[strength - 1]
-    tries: list[tuple[bool, float, int, _Draft]] = []
+    tries: list[tuple[bool, float, int, Change]] = []
     for number in range(_NUM_TRIES):
         # A change is kept if as many episodes are late as before, or more, but not too many.
         rng, now, num_misses = np.random.default_rng([plan.seed, strength, number]), draft, 0
@@ -203,7 +178,7 @@ def _changed_more(plan: _Plan, draft: _Draft, strength: int) -> _Draft:
         now = now._replace(late_without_map=plan.late_without_map(now.walls))
         least = max(LATE_WITHOUT_MAP, now.late + WORTH if strength == 1 else 0.0)
         tries.append((now.late_without_map >= least, now.late, -number, now))
-        if tries[-1] >= (True, target):
+        if tries[-1][:2] >= (True, target):
             break
     can_carry, late, _, best = max(tries)
     if late < target - _MISS or not can_carry:
@@ -215,8 +190,8 @@ def _changed_more(plan: _Plan, draft: _Draft, strength: int) -> _Draft:
     return best
 
 
-def _step(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft | None:
-    """Returns a draft in which one passage more has changed, or only can't change any more; None if none can change.
+def _step(plan: _Plan, draft: Change, rng: np.random.Generator) -> Change | None:
+    """Returns a change in which one passage more has changed, or only can't change any more; None if none can change.
 
     With a passage, a piece of furniture comes or goes in half of the steps.
     """
@@ -234,7 +209,7 @@ def _step(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft | None
     new = _turned(draft, passage)
     areas, num_areas = scipy.ndimage.label(~new.walls)
     if num_areas == 2 and passage.is_open:
-        doors = [each for each in new.passages if not each.is_open and {1, 2} <= set(areas[each.cells(1)].flat)]
+        doors = [each for each in new.passages if not each.is_open and {1, 2} <= set(areas[each.cells(margin=1)].flat)]
         if doors:
             new, num_areas = _turned(new, doors[rng.integers(len(doors))]), 1
     if num_areas != 1:
@@ -242,16 +217,17 @@ def _step(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft | None
     return _furnished(plan, new, rng) if rng.integers(2) else new
 
 
-def _turned(draft: _Draft, passage: Passage) -> _Draft:
-    """Returns a draft in which a passage is closed that is open on the plan, or opened; those that touch it stay."""
+def _turned(draft: Change, passage: Passage) -> Change:
+    """Returns a change in which a passage is closed that is open on the plan, or opened; those that touch it stay."""
     walls = draft.walls.copy()
     walls[passage.cells()] = passage.is_open
-    passages = tuple(each for each in draft.passages if not each.touches(passage))
+    has_changed = walls != draft.walls
+    passages = tuple(each for each in draft.passages if not has_changed[each.cells(margin=1)].any())
     return draft._replace(walls=walls, passages=passages, done=(*draft.done, "closed" if passage.is_open else "opened"))
 
 
-def _furnished(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft:
-    """Returns a draft in which a piece of furniture has gone or come; neither can part the building."""
+def _furnished(plan: _Plan, draft: Change, rng: np.random.Generator) -> Change:
+    """Returns a change in which a piece of furniture has gone or come; neither can part the building."""
     walls = draft.walls.copy()
     if draft.things and rng.integers(2):
         index = rng.integers(len(draft.things))
@@ -265,10 +241,9 @@ def _furnished(plan: _Plan, draft: _Draft, rng: np.random.Generator) -> _Draft:
     most = max(least, math.floor(FURNITURE[1] / plan.cell_size + _CELL))
     height, width = rng.integers(least, most + 1, 2)
     clear = math.ceil(CLEAR / plan.cell_size - _CELL)
-    need = np.ones((height + 2 * clear, width + 2 * clear), dtype=np.uint8)
-    is_free = (~(walls | plan.walls)).astype(np.uint8)
-    fits = cv2.erode(is_free, need, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT, borderValue=0)
-    places = np.argwhere(fits)
+    taken = np.pad(walls | plan.walls, (0, most + 2 * clear), constant_values=True)
+    spaces = sliding_window_view(taken, (height + 2 * clear, width + 2 * clear))
+    places = np.argwhere(~spaces.any(axis=(2, 3)))
     if not len(places):
         return draft
     row, column = rng.choice(places) + clear

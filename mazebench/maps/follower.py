@@ -128,7 +128,6 @@ def _shortest_way(walls: np.ndarray, start: int, goal: int) -> np.ndarray:
     one detour. `walls` is `[N, N]` bool, with a closed border.
     """
     size, flat = len(walls), walls.ravel()
-    goal_row, goal_column = goal // size, goal % size
     cost, came = np.full(flat.size, 2**30, np.int32), np.empty(flat.size, np.int32)  # of each cell, and the one before
     stacks, counts = np.empty((2, 4 * flat.size), np.int32), np.array([1, 0])  # of even and odd numbers of detours
     cost[start], stacks[0, 0] = 0, start
@@ -142,14 +141,9 @@ def _shortest_way(walls: np.ndarray, start: int, goal: int) -> np.ndarray:
         cell = stacks[detours & 1, counts[detours & 1]]
         if cost[cell] != detours:
             continue  # it was reached with fewer
-        row, column = cell // size, cell % size
-        for step, is_nearer in (
-            (1, column < goal_column),
-            (size, row < goal_row),
-            (-1, column > goal_column),
-            (-size, row > goal_row),
-        ):
-            near, needed = cell + step, detours + (not is_nearer)
+        down, right = np.sign(goal // size - cell // size) * size, np.sign(goal % size - cell % size)
+        for step in (1, size, -1, -size):
+            near, needed = cell + step, detours + (step != down and step != right)  # sign 0 is no step
             if not flat[near] and needed < cost[near]:
                 cost[near], came[near] = needed, cell
                 stacks[needed & 1, counts[needed & 1]] = near

@@ -33,11 +33,6 @@ class Passage(NamedTuple):
         """Returns the rows and columns, with a margin of some cells."""
         return slice(self.top - margin, self.bottom + margin), slice(self.left - margin, self.right + margin)
 
-    def touches(self, other: Passage) -> bool:
-        """Returns whether the two share a cell, a side or a corner."""
-        rows = self.top <= other.bottom and other.top <= self.bottom
-        return rows and self.left <= other.right and other.left <= self.right
-
 
 def find_passages(walls: np.ndarray, cell_size: float) -> tuple[Passage, ...]:
     """Returns the passages of a building: `walls` is `[N, N]` bool, with a closed border, `cell_size` in metres."""
@@ -98,15 +93,12 @@ def _is_far(walls: np.ndarray, detour: int) -> bool:
     starts, goals = np.zeros((2, *halves.shape), dtype=bool)
     starts[2 * detour, strip] = ndimage.binary_dilation(halves[2 * detour - 1, strip])
     goals[-2 * detour - 1, strip] = ndimage.binary_dilation(halves[-2 * detour, strip])
-    if not starts.any() or not goals.any():
-        return False
 
     # Where ways can lead.
     can_pass = ndimage.binary_dilation(halves, np.ones((3, 3)))
     upper_left, upper_right, lower_left, lower_right = free[:-1, :-1], free[:-1, 1:], free[1:, :-1], free[1:, 1:]
     is_diagonal = (upper_left == lower_right) & (upper_right == lower_left) & (upper_left != upper_right)
     can_pass[2:-2:2, 2:-2:2] &= ~is_diagonal
-    if (starts & ~can_pass).any():
-        return False  # it would depend on the raster
     reached = ndimage.binary_dilation(starts, iterations=2 * (detour - 1), mask=can_pass | goals)
-    return not (reached & goals).any()
+    can_tell = not (starts & ~can_pass).any()  # else it would depend on the raster
+    return bool(starts.any() and goals.any() and can_tell and not (reached & goals).any())
