@@ -23,19 +23,6 @@ from mazebench.maps.readers.ros import write_ros_map
 from mazebench.maps.text import parse_maze
 
 KINDS_WITH_ROOMS = ("dfs", "house", "rooms", "office", "hospital", "museum")
-FOUR_ROOMS = """\
-###########
-#....#....#
-#....#....#
-#.........#
-#....#....#
-#....#....#
-####.####.#
-#....#....#
-#.........#
-#....#....#
-###########
-"""
 # A way through the middle, and one around it.
 DEAD_END = """\
 #########
@@ -73,9 +60,9 @@ def cell_numbers(maze: Maze, *cells: tuple[int, int]) -> np.ndarray:
 
 
 class TestPassages:
-    def test_open_passages_worked_by_hand(self):
-        passages = {(3, 5, 4, 6), (6, 4, 7, 5), (6, 9, 7, 10), (8, 5, 9, 6)}
-        assert set(find_passages(parse_maze(FOUR_ROOMS).walls, 1.0)) == {(*box, True) for box in passages}
+    def test_passages_lead_from_above_to_below_and_from_left_to_right(self):
+        assert find_passages(wall_with_openings(5), 1.0) == ((20, 5, 21, 6, True), (20, 22, 21, 23, False))
+        assert find_passages(wall_with_openings(5).T, 1.0) == ((5, 20, 6, 21, True), (22, 20, 23, 21, False))
 
     @pytest.mark.parametrize(("thickness", "doors"), [(1, [(20, 20, 21, 21, False)]), (2, [])])
     def test_a_door_can_be_opened_in_the_middle_of_a_wall_of_up_to_1_m(self, thickness, doors):
@@ -121,10 +108,10 @@ class TestFollower:
         assert (driven, shortest) == ([turned_after + turned_after + 16], [16])
 
     def test_where_the_map_shows_no_way_the_robot_finds_one(self):
-        plan = parse_maze(FOUR_ROOMS)
+        plan = parse_maze(DEAD_END)
         shown = plan.walls.copy()
-        shown[6] = True  # no door between the upper and the lower rooms
-        _, driven, shortest = follow(plan.walls, shown, cell_numbers(plan, (1, 1), (9, 1)), SIGHT, most=9)
+        shown[:, 4] = True
+        _, driven, shortest = follow(plan.walls, shown, cell_numbers(plan, (6, 1), (6, 7)), SIGHT, most=9)
         assert shortest <= driven < 9 * shortest
 
 
@@ -181,10 +168,8 @@ class TestCommand:
     def test_changed_buildings_lie_in_the_frame_of_the_plan(self, command, tmp_path):
         plan = dataclasses.replace(plan_of("house", 31), cell_size=0.5)
         write_ros_map(plan, tmp_path / "plan.yaml", (-3.25, 7.5, 0.4))
-        status, output, _ = command(
-            *("generate", "--mazes", "plan.yaml", "--changed", "1", "--count", "2", "--seed", "5"),
-            *("--format", "ros,txt", "--out", "new"),
-        )
+        asked = "generate --mazes plan.yaml --changed 1 --count 2 --seed 5 --format ros,txt --out new"
+        status, output, _ = command(*asked.split())
         assert status == 0
         for number, building in enumerate(changed_buildings(plan, 1, 2, seed=5), start=1):
             located = read_located(tmp_path / "new" / f"plan-changed-{number}.yaml")
@@ -192,12 +177,11 @@ class TestCommand:
             assert f"\nplan-changed-{number}: " in output
 
     def test_drawn_mazes_change_too_and_a_refusal_is_one_line(self, command, tmp_path):
-        status, output, errors = command(
-            "generate", "--kind", "house", "--size", "21", "--changed", "2", "--format", "txt"
-        )
+        asked = "generate --changed 2 --format txt --kind"
+        status, output, errors = command(*asked.split(), "house", "--size", "21")
         assert (status, errors) == (0, "")
-        assert [path.name for path in (tmp_path / "mazes").iterdir()] == ["house-21-0-000-changed-1.txt"]
+        assert (tmp_path / "mazes" / "house-21-0-000-changed-1.txt").exists()
         assert "passages closed" in output
-        status, output, errors = command("generate", "--kind", "cave", "--changed", "1", "--size", "31")
+        status, output, errors = command(*asked.split(), "cave", "--size", "31")
         assert status == 2
         assert errors.startswith("mazebench: cave-31-0-000: expected a building in which ")

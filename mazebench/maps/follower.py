@@ -19,26 +19,6 @@ from mazebench.kernels import compiled
 _TOLERANCE = 1e-6  # cells
 
 
-def sight_lines(reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the cells at most `reach` cells away, and of each the cell before it on the line of sight.
-
-    Returns:
-      offsets: `[K, 2]` int, rows and columns from the robot's cell, which is the first; the nearer ones come first.
-      before: `[K]` int, the index of the cell before.
-    """
-    longest = math.floor(reach + _TOLERANCE)
-    offsets = np.stack(np.indices((2 * longest + 1,) * 2), axis=-1).reshape(-1, 2) - longest
-    offsets = offsets[(offsets**2).sum(axis=1) <= (reach + _TOLERANCE) ** 2]
-    offsets = offsets[np.argsort(abs(offsets).max(axis=1), kind="stable")]
-
-    # One step back along the longer axis, and to the nearest cell of the line along the other one.
-    steps = np.maximum(abs(offsets).max(axis=1, keepdims=True), 1)
-    before = np.rint(offsets * (steps - 1) / steps).astype(int)
-    index = np.zeros((2 * longest + 1,) * 2, dtype=int)  # by offset, of which negative ones count from the end
-    index[tuple(offsets.T)] = np.arange(len(offsets))
-    return offsets, index[tuple(before.T)]
-
-
 def follow(
     walls: np.ndarray, shown: np.ndarray, pairs: np.ndarray, sight: float, most: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -58,12 +38,30 @@ def follow(
       driven: `[P]` int, cells; where the drive has ended, what it would have been at least.
       shortest: `[P]` int, cells of a shortest way in the building.
     """
-    offsets, before = sight_lines(sight)
+    offsets, before = _sight_lines(sight)
     lines = np.stack([offsets @ (len(walls), 1), before], axis=1)
     window = np.ones((2 * offsets.max() + 1,) * 2)
     shown = np.pad(shown[1:-1, 1:-1], 1, constant_values=True)
     can_be_wrong = cv2.dilate((walls != shown).astype(np.uint8), window).astype(bool).ravel()
     return _follow(np.array(walls, order="C"), shown, can_be_wrong, pairs, lines, most)
+
+
+def _sight_lines(reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the cells that are at most `reach` cells away, and the indices of those before them on lines of sight.
+
+    The cells are rows and columns from the robot's cell (`[K, 2]` int), in an order in which those before come first.
+    """
+    longest = math.floor(reach + _TOLERANCE)
+    offsets = np.stack(np.indices((2 * longest + 1,) * 2), axis=-1).reshape(-1, 2) - longest
+    offsets = offsets[(offsets**2).sum(axis=1) <= (reach + _TOLERANCE) ** 2]
+    offsets = offsets[np.argsort(abs(offsets).max(axis=1), kind="stable")]
+
+    # One step back along the longer axis, and to the nearest cell of the line along the other one.
+    steps = np.maximum(abs(offsets).max(axis=1, keepdims=True), 1)
+    before = np.rint(offsets * (steps - 1) / steps).astype(int)
+    index = np.zeros((2 * longest + 1,) * 2, dtype=int)  # by offset, of which negative ones count from the end
+    index[tuple(offsets.T)] = np.arange(len(offsets))
+    return offsets, index[tuple(before.T)]
 
 
 @compiled
@@ -73,7 +71,7 @@ def _follow(
     """Does the work of `follow`.
 
     Only from the cells of `can_be_wrong` (`[N * N]` bool) may the map look wrong. `lines` (`[K, 2]` int) are the steps
-    to the cells of `sight_lines`, and the indices of those before.
+    to the cells of `_sight_lines`, and the indices of those before.
     """
     size, true = len(walls), walls.ravel()
     driven, shortest = np.empty(len(pairs), np.int64), np.empty(len(pairs), np.int64)

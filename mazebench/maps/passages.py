@@ -68,13 +68,13 @@ def _blocks(cells: np.ndarray) -> np.ndarray:
     edges = np.diff(np.pad(cells, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     rows, starts = np.nonzero(edges == 1)
     ends = np.nonzero(edges == -1)[1]
-    order = np.lexsort((rows, ends, starts))
-    runs = np.stack([rows, starts, ends], axis=1)[order]
-    is_first = np.ones(len(runs), dtype=bool)
-    is_first[1:] = (np.diff(runs, axis=0) != (1, 0, 0)).any(axis=1)
-    is_last = np.append(is_first[1:], True)
-    (top, left, right), bottom = runs[is_first].T, runs[is_last, 0] + 1
-    return np.stack([top, left, bottom, right], axis=1)
+    blocks: list[list[int]] = []
+    for left, right, row in sorted(zip(starts.tolist(), ends.tolist(), rows.tolist(), strict=True)):
+        if blocks and blocks[-1][1:] == [left, row, right]:
+            blocks[-1][2] = row + 1
+        else:
+            blocks.append([row, left, row + 1, right])
+    return np.array(blocks)
 
 
 def _is_far(walls: np.ndarray, detour: int) -> bool:
