@@ -100,7 +100,7 @@ def lay_on(
             f"{name}: expected an older map that is turned by {yaw:g} rad, as {maze.name} is, found {older_yaw:g}"
         )
 
-    # The first and the last pixel of each cell, from the left and from the top of the older map.
+    # Where cells begin, in pixels from the left and from the top of the older map, and where the last ones end.
     cosine, sine = math.cos(yaw), math.sin(yaw)
     right = cosine * (x - older_x) + sine * (y - older_y)
     up = cosine * (y - older_y) - sine * (x - older_x)
@@ -108,21 +108,12 @@ def lay_on(
     height, width = older.states.shape
     columns = np.rint((right + edges) / older.resolution).astype(int)
     rows = height - np.rint((up + edges[::-1]) / older.resolution).astype(int)
-    lefts, tops = columns[:-1], rows[:-1]
-    rights, bottoms = np.maximum(columns[1:], lefts + 1), np.maximum(rows[1:], tops + 1)
 
-    # How many pixels of each cell are on the map and free, from sums over all pixels above and on the left.
-    free = ~blocked_pixels(older.states, options, older.resolution)
-    sums = np.pad(free.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
-    (above, below), (before, behind) = (
-        (np.clip(first, 0, length), np.clip(last, 0, length))
-        for first, last, length in ((tops, bottoms, height), (lefts, rights, width))
-    )
-    num_free = sum(
-        sign * sums[np.ix_(down, along)]
-        for sign, down, along in ((1, below, behind), (-1, above, behind), (-1, below, before), (1, above, before))
-    )
-    return older_map(num_free < np.outer(bottoms - tops, rights - lefts), maze, name)
+    # Whether one of their pixels is wall; with wall around the map, so much that cells beyond its end reach into it.
+    walls = np.pad(blocked_pixels(older.states, options, older.resolution), (1, 2), constant_values=True)
+    walls = np.logical_or.reduceat(walls, np.clip(rows, -1, height + 1) + 1, axis=0)[:-1]
+    walls = np.logical_or.reduceat(walls, np.clip(columns, -1, width + 1) + 1, axis=1)[:, :-1]
+    return older_map(walls, maze, name)
 
 
 def _largest_area(walls: np.ndarray, maze: Maze) -> np.ndarray:
