@@ -52,7 +52,7 @@ def _sight_lines(reach: float) -> tuple[np.ndarray, np.ndarray]:
     The cells are rows and columns from the robot's cell (`[K, 2]` int), in an order in which those before come first.
     """
     longest = math.floor(reach + _TOLERANCE)
-    offsets = np.stack(np.indices((2 * longest + 1,) * 2), axis=-1).reshape(-1, 2) - longest
+    offsets = np.argwhere(np.ones((2 * longest + 1,) * 2)) - longest
     offsets = offsets[(offsets**2).sum(axis=1) <= (reach + _TOLERANCE) ** 2]
     offsets = offsets[np.argsort(abs(offsets).max(axis=1), kind="stable")]
 
