@@ -139,9 +139,10 @@ def _shortest_way(walls: np.ndarray, start: int, goal: int) -> np.ndarray:
         cell = stacks[detours & 1, counts[detours & 1]]
         if cost[cell] != detours:
             continue  # it was reached with fewer
-        down, right = np.sign(goal // size - cell // size) * size, np.sign(goal % size - cell % size)
-        for step in (1, size, -1, -size):
-            near, needed = cell + step, detours + (step != down and step != right)  # sign 0 is no step
+        down, right = goal // size - cell // size, goal % size - cell % size
+        is_nearer = right > 0, down > 0, right < 0, down < 0
+        for index, step in enumerate((1, size, -1, -size)):
+            near, needed = cell + step, detours + (not is_nearer[index])
             if not flat[near] and needed < cost[near]:
                 cost[near], came[near] = needed, cell
                 stacks[needed & 1, counts[needed & 1]] = near
