@@ -41,7 +41,7 @@ _CELL = 1e-6  # cells, a tolerance
 
 
 class Change(NamedTuple):
-    """What has changed in a building since its plan was drawn, and the shares of episodes that are late in it."""
+    """What has changed in a building since its plan was drawn, or a draft of that, and its cost."""
 
     walls: np.ndarray  # [N, N] bool
     passages: tuple[Passage, ...]  # that may still change
@@ -49,9 +49,9 @@ class Change(NamedTuple):
     done: tuple[
         str, ...
     ] = ()  # "closed" or "opened" for each passage, "added" or "removed" for each piece of furniture
-    late: float = 0.0  # of a robot that believes the plan
-    late_without_map: float = 0.0  # of a robot that takes for free what it has not seen
-    blocked: float = 0.0  # share of episodes in which the shortest way on the plan is blocked
+    late: float = 0.0  # share of late episodes of a robot that believes the plan
+    late_without_map: float = 0.0  # of one that takes for free what it has not seen
+    blocked: float = 0.0  # share of those in which the shortest way on the plan is blocked
 
     def __str__(self) -> str:
         closed, opened, added, removed = map(self.done.count, ("closed", "opened", "added", "removed"))
@@ -138,7 +138,7 @@ class _Plan:
         self.ways = scipy.sparse.csr_array(ways, shape=(len(pairs), maze.walls.size))  # 1 at the cells of each way
 
     def unchanged(self) -> Change:
-        """Returns the plan as a building in which nothing has changed."""
+        """Returns a draft in which nothing has changed."""
         # Furniture: walls that touch no others, not even at a corner.
         areas, _ = scipy.ndimage.label(self.walls, np.ones((3, 3)))
         boxes = enumerate(scipy.ndimage.find_objects(areas), start=1)
@@ -162,7 +162,7 @@ class _Plan:
 
 
 def _changed_more(plan: _Plan, draft: Change, strength: int) -> Change:
-    """Returns a change of the next smaller strength, changed until it has this one."""
+    """Returns a draft of the next smaller strength, changed until it has this one."""
     target = LATE[strength - 1]
     tries: list[tuple[bool, float, int, Change]] = []
     for number in range(_NUM_TRIES):
@@ -191,7 +191,7 @@ def _changed_more(plan: _Plan, draft: Change, strength: int) -> Change:
 
 
 def _step(plan: _Plan, draft: Change, rng: np.random.Generator) -> Change | None:
-    """Returns a change in which one passage more has changed, or only can't change any more; None if none can change.
+    """Returns a draft in which one passage more has changed, or only can't change any more; None if none can change.
 
     With a passage, a piece of furniture comes or goes in half of the steps.
     """
@@ -218,7 +218,7 @@ def _step(plan: _Plan, draft: Change, rng: np.random.Generator) -> Change | None
 
 
 def _turned(draft: Change, passage: Passage) -> Change:
-    """Returns a change in which a passage is closed that is open on the plan, or opened; those that touch it stay."""
+    """Returns a draft in which a passage is closed that is open on the plan, or opened; those that touch it stay."""
     walls = draft.walls.copy()
     walls[passage.cells()] = passage.is_open
     has_changed = walls != draft.walls
@@ -227,7 +227,7 @@ def _turned(draft: Change, passage: Passage) -> Change:
 
 
 def _furnished(plan: _Plan, draft: Change, rng: np.random.Generator) -> Change:
-    """Returns a change in which a piece of furniture has gone or come; neither can part the building."""
+    """Returns a draft in which a piece of furniture has gone or come; neither can part the building."""
     walls = draft.walls.copy()
     if draft.things and rng.integers(2):
         index = rng.integers(len(draft.things))

@@ -8,14 +8,12 @@ import pathlib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze, resized
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.older_map import OlderMap, lay_on, older_map, one_for_each
 from mazebench.maps.readers.arrays import as_array, grid_of_array
-from mazebench.maps.readers.occupancy_grid import FREE, OCCUPIED, LocatedMaze, OccupancyGrid, locate_maze
+from mazebench.maps.readers.occupancy_grid import LocatedMaze, OccupancyGrid, locate_maze
 from mazebench.maps.text import format_maze, format_walls, parse_maze, parse_walls
 
 
@@ -66,9 +64,7 @@ def maps_in_texts(texts: Sequence[str], mazes: Sequence[Maze]) -> tuple[OlderMap
 
 def _grid(item: Any, name: str) -> OccupancyGrid:
     """Returns the cells of a maze or an array."""
-    if not isinstance(item, Maze):
-        return grid_of_array(as_array(item, name), name)
-    return OccupancyGrid(np.where(item.walls, OCCUPIED, FREE).astype(np.int8), is_cells=True)
+    return grid_of_array(item.walls if isinstance(item, Maze) else as_array(item, name), name)
 
 
 def _located(item: Any, name: str, options: ReadOptions) -> LocatedMaze:
