@@ -130,8 +130,8 @@ class Agent(_Declarations):
     def report(self, state: Any) -> Report:
         """Returns where the body was at the observation that `act` was given last, and notes; by default nothing.
 
-        An evaluation calls it after each `act` if the class overrides it. It changes nothing. The poses give the recall
-        of localization in the results, and an episode's last notes go into its record.
+        An evaluation calls it after each `act`. It changes nothing. The poses give the recall of localization in the
+        results, and an episode's last notes go into its record.
 
         Args:
           state: what `act` returned.
@@ -211,10 +211,6 @@ class _SingleAgents(Agent):
             agent.reset(observation)
         return agent.act(observation)
 
-
-class _ReportingSingleAgents(_SingleAgents):
-    """The same for a class that reports."""
-
     def report(self, state: list[SingleAgent]) -> Report:
         poses, notes = zip(*(agent.report() for agent in state), strict=True)
         unknown = np.full(3, np.nan)
@@ -231,5 +227,4 @@ def as_agent_class(declared: type[Agent] | type[SingleAgent]) -> type[Agent]:
     declarations = ("needs_truth", "needs_sensors", "needs_shown", "plays_actions", "learns")
     names = ("__module__", "__qualname__", "__doc__", *declarations, "context_size", "default_checkpoint")
     attributes = {name: getattr(declared, name) for name in names}
-    base = _SingleAgents if declared.report is SingleAgent.report else _ReportingSingleAgents
-    return type(declared.__name__, (base,), attributes | {"single_class": declared})
+    return type(declared.__name__, (_SingleAgents,), attributes | {"single_class": declared})

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mazebench.agent import Agent, Inputs, Observation, Report, Truth
+from mazebench.agent import Agent, Inputs, Observation, Truth
 from mazebench.envs.vector import MazeVectorEnv
 
 
@@ -26,7 +26,6 @@ class Step(NamedTuple):
     ended: np.ndarray  # [B] bool, whether the episode ended with the step
     next_observation: Observation
     next_info: dict[str, Any]
-    report: Report = Report()  # of the agent, after it chose the actions; empty if it is not asked
 
 
 def rollout(
@@ -37,7 +36,6 @@ def rollout(
     *,
     needs_truth: bool = False,
     explore: bool = False,
-    reports: bool = False,
 ) -> Iterator[Step]:
     """Lets an agent act in environments, and yields each step once it is taken, until no episode is left.
 
@@ -48,7 +46,6 @@ def rollout(
       seeds: returns the seeds `[K]` of the agent's own draws in the episodes that begin in the environments `[K]` int.
       needs_truth: whether the agent is given the true maze and pose.
       explore: whether the agent acts as in training.
-      reports: whether the agent is asked for reports.
     """
     observation, info = first
     state = agent.initial_state(envs.num_envs)
@@ -70,12 +67,11 @@ def rollout(
 
         # A step. An environment whose episode ends in it takes the next one; without one, it is no longer active.
         actions, state = agent.act(inputs, state, explore)
-        report = agent.report(state) if reports else Report()
         next_observation, reward, terminated, truncated, next_info = envs.step(actions)
         ended = terminated | truncated
         active = envs.rules.active.copy()
         new_episode = ended & active
-        yield Step(inputs, info, actions, state, reward, terminated, ended, next_observation, next_info, report)
+        yield Step(inputs, info, actions, state, reward, terminated, ended, next_observation, next_info)
         observation, info = next_observation, next_info
 
 

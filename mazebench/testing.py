@@ -93,10 +93,11 @@ def _check_acting(name: str, agent_class: type[Agent], task: Task, checkpoint: p
             batches = [
                 stack.enter_context(contextlib.closing(_ShortEpisodes(task, episodes, order))) for order in orders
             ]
-            asked = {"needs_truth": agent_class.needs_truth, "reports": agent_class.report is not Agent.report}
-            rollouts = [rollout(agent, envs, envs.reset(), envs.seeds, **asked) for envs in batches]
-            for _ in itertools.zip_longest(*rollouts):
-                pass
+            truth = agent_class.needs_truth
+            rollouts = [rollout(agent, envs, envs.reset(), envs.seeds, needs_truth=truth) for envs in batches]
+            for steps in itertools.zip_longest(*rollouts):
+                for step in filter(None, steps):
+                    agent.report(step.state)
         return batches[0].actions
 
     expected = play(build(), _ORDER)

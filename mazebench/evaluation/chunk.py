@@ -22,7 +22,7 @@ from mazebench.errors import InputError, RunError, UnplayableError
 from mazebench.evaluation.checked_agent import AgentError
 from mazebench.evaluation.eval_options import EvalOptions
 from mazebench.evaluation.plan import Plan, build_agent
-from mazebench.evaluation.reports import EpisodeReports
+from mazebench.evaluation.reports import Hit, hit, recalls
 from mazebench.maps.maze import Cell
 from mazebench.results.metrics import spl
 from mazebench.results.records import Record
@@ -92,7 +92,6 @@ def run_chunk(chunk: Chunk) -> Iterator[list[Result]]:
         seed=chunk.options.seed,
         needs_truth=chunk.agent_class.needs_truth,
         keep=_poses if chunk.record else None,
-        reports=chunk.agent_class.report is not Agent.report,
     ):
         yield [result._replace(kept=np.array(result.kept)) for result in results] if chunk.record else results
 
@@ -127,7 +126,6 @@ def run_trials(
     seed: int = 0,
     needs_truth: bool = False,
     keep: Keep | None = None,
-    reports: bool = False,
 ) -> Iterator[list[Result]]:
     """Yields the results of the trials that ended, after each step; each once, in no fixed order.
 
@@ -142,7 +140,6 @@ def run_trials(
       seed: of what the agent draws; with a trial's number it gives the seed of the episode's draws.
       needs_truth: whether the agent is given the true maze and pose.
       keep: what to keep of each moment of the episodes.
-      reports: whether the agent is asked for reports.
     """
     if not trials:
         return
@@ -159,24 +156,24 @@ def run_trials(
     def seeds(slots: np.ndarray) -> list[int]:
         return [agent_seed(seed, running[slot]) for slot in slots]
 
-    kept: list[list[Any]] = [[] for _ in range(num_envs)]
+    kept: list[list[Any]] = [[] for _ in range(num_envs)]  # of the running legs, as `Result` has it
+    hits: list[list[Hit | None]] = [[] for _ in range(num_envs)]  # of their steps
     legs: list[list[Result]] = [[] for _ in range(num_envs)]  # that have ended, of the running episodes
     begun = np.zeros(num_envs)  # m driven in the episode when the running leg began
     env = MazeVectorEnv(task, num_envs, num_threads=num_threads, episode_source=next_episode)
     with contextlib.closing(env):
-        first, numbers, starts = env.reset(), list(running), env.rules.start.copy()
-        true_poses = env.rules.pose.copy()  # as they are observed next
-        reported = [EpisodeReports(shown) for shown in env.rules.shown if shown]
-        for step in rollout(agent, env, first, seeds, needs_truth=needs_truth, reports=reports):
-            if reports:
-                for slot in np.flatnonzero(np.array(numbers) >= 0).tolist():
-                    pose, note = (None if each is None else each[slot] for each in step.report)
-                    reported[slot].add(true_poses[slot], pose, note)
-            if keep:
-                moments = keep(step.inputs.observation, step.info, step.actions)
-                for slot, number in enumerate(numbers):
-                    if number >= 0:
-                        kept[slot].append(moments[slot])
+        rules, first = env.rules, env.reset()
+        before = list(running), list(rules.shown), rules.pose.copy(), rules.start.copy()
+        for step in rollout(agent, env, first, seeds, needs_truth=needs_truth):
+            numbers, shown, poses, starts = before
+            report = agent.report(step.state)
+            moments = keep(step.inputs.observation, step.info, step.actions) if keep else None
+            for slot in [slot for slot, number in enumerate(numbers) if number >= 0]:
+                pose = None if report.pose is None else report.pose[slot]
+                hits[slot].append(hit(shown[slot], poses[slot], pose))  # type: ignore[arg-type]  # a map is shown
+                if moments is not None:
+                    kept[slot].append(moments[slot])
+
             results: list[Result] = []
             leg_ended = step.ended | (step.next_info["is_first"] & (task.options.num_goals > 1))
             for slot in np.flatnonzero(leg_ended).tolist():
@@ -185,33 +182,31 @@ def run_trials(
                     observation, infos = step.next_info["final_obs"][slot], step.next_info["final_info"]
                 else:
                     observation = {name: values[slot] for name, values in step.next_observation.items()}
-                    infos = env.rules.infos()
+                    infos = rules.infos()
                 final = {name: values[slot : slot + 1] for name, values in infos.items()}
                 if keep:
                     kept[slot].extend(keep({name: value[None] for name, value in observation.items()}, final, None))
 
-                before = legs[slot]
-                has_missed = bool(before) and not before[-1].success
+                ended, note = legs[slot], None if report.notes is None else report.notes[slot]
+                has_missed = bool(ended) and not ended[-1].success
                 result = Result(
                     number=numbers[slot],
                     success=final["goal_reached"].item(),
-                    steps=final["steps"].item() - sum(leg.steps for leg in before),
+                    steps=final["steps"].item() - sum(leg.steps for leg in ended),
                     path_length=final["path_length"].item() - begun.item(slot),
                     blocked=step.info["blocked"].item(slot),
                     kept=kept[slot],
-                    reported=reported[slot].result() if reports else {},
-                    leg=len(before) + 1,
+                    reported=recalls(hits[slot]) | ({} if note is None else {"notes": note}),
+                    leg=len(ended) + 1,
                     after_miss=divmod(starts.item(slot), task.size) if has_missed else None,
                 )
-                kept[slot], legs[slot] = [], [*before, result]
+                kept[slot], hits[slot], legs[slot] = [], [], [*ended, result]
                 begun[slot] = 0 if step.ended[slot] else final["path_length"].item()
-                if reports and (shown := env.rules.shown[slot]):
-                    reported[slot] = EpisodeReports(shown)
                 if step.ended[slot]:
                     results += legs[slot]
                     legs[slot] = []
             yield results
-            numbers, starts, true_poses = list(running), env.rules.start.copy(), env.rules.pose.copy()
+            before = list(running), list(rules.shown), rules.pose.copy(), rules.start.copy()
 
 
 def _poses(observation: Observation, info: dict[str, Any], actions: np.ndarray | None) -> Sequence[Any]:

@@ -1,9 +1,9 @@
-"""The reports of an agent in an episode, and the recall of the poses in them (docs/metrics.md)."""
+"""The recall of the poses that an agent reports (docs/metrics.md)."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,40 +14,30 @@ from mazebench.world.angles import wrap_angle
 _NEAR = 1.0  # m
 _ALIGNED = math.radians(30)
 
+Hit = tuple[bool, bool]  # whether a reported pose is near the true one, and whether it is aligned, too
 
-class EpisodeReports:
-    """What an agent reports in one episode."""
 
-    def __init__(self, shown: ShownMap):
-        """Begins an episode with the map that the agent is shown."""
-        self._shown = shown
-        self._has_poses = False
-        self._num_steps, self._num_hits = 0, np.zeros(2)  # hits: near, and also aligned
-        self._last, self._notes = np.zeros(2), None
+def hit(shown: ShownMap, true_pose: np.ndarray, pose: np.ndarray | None) -> Hit | None:
+    """Returns how near a reported pose is; None if none is reported, or the map has no frame.
 
-    def add(self, true_pose: np.ndarray, pose: np.ndarray | None, notes: Any) -> None:
-        """Takes in the report of a step.
+    Args:
+      shown: the map that the agent is shown.
+      true_pose: `[3]`, x and y (m) and yaw (rad) in the maze.
+      pose: `[3]`, the reported one on the shown map.
+    """
+    expected = None if pose is None else pose_on_map(shown, true_pose)
+    if pose is None or expected is None:
+        return None
+    is_near = math.dist(pose[:2], expected[:2]) <= _NEAR  # not where it is NaN
+    return is_near, is_near and abs(wrap_angle(float(pose[2] - expected[2]))) <= _ALIGNED
 
-        Args:
-          true_pose: `[3]`, x and y (m) and yaw (rad) in the maze, before the step.
-          pose: `[3]`, the reported one on the shown map; None if none is reported.
-          notes: of the step, a value that JSON can hold.
-        """
-        self._num_steps, self._last, self._notes = self._num_steps + 1, np.zeros(2), notes
-        expected = pose_on_map(self._shown, true_pose)
-        if pose is None or expected is None:
-            return
-        self._has_poses = True
-        is_near = math.dist(pose[:2], expected[:2]) <= _NEAR  # not where it is NaN
-        is_aligned = abs(wrap_angle(float(pose[2] - expected[2]))) <= _ALIGNED
-        self._last = np.array([is_near, is_near and is_aligned], dtype=float)
-        self._num_hits += self._last
 
-    def result(self) -> dict[str, Any]:
-        """Returns further keys of the episode's record: `RECALLS` if poses were reported, and the last notes."""
-        recalls = np.concatenate([self._num_hits / self._num_steps, self._last]).tolist()
-        found: dict[str, Any] = dict(zip(RECALLS, recalls, strict=True)) if self._has_poses else {}
-        return found if self._notes is None else found | {"notes": self._notes}
+def recalls(hits: Sequence[Hit | None]) -> dict[str, float]:
+    """Returns `RECALLS` by the hits of an episode's steps, of which None is a miss; nothing if there are no others."""
+    if all(each is None for each in hits):
+        return {}
+    found = np.array([each or (False, False) for each in hits], dtype=float)
+    return dict(zip(RECALLS, [*found.mean(axis=0).tolist(), *found[-1].tolist()], strict=True))
 
 
 def pose_on_map(shown: ShownMap, pose: np.ndarray) -> np.ndarray | None:
