@@ -93,7 +93,7 @@ def draw_environments() -> None:
     for name, options in (tracks | tasks).items():
         maze = load_kind_mazes("train")[HOUSE] if name in TRACKS else load_mazes(13, "train")[0]
         played = play(maze, split="train", **options)
-        pictures = (_shown_map(played.shown), _maze_and_path(maze, played))
+        pictures = (_shown_map(played.shown), _maze_and_path(played))
         shown, driven = (cv2.resize(each, (THUMBNAIL, THUMBNAIL), interpolation=cv2.INTER_AREA) for each in pictures)
         gap = np.full((THUMBNAIL, GAP, 3), 255, np.uint8)
         write_image(np.concatenate([shown, gap, driven], axis=1), FOLDER / "environments" / f"{name}.png")
@@ -117,7 +117,7 @@ def draw_tracks() -> None:
                 for path, look in zip((played.pose, played.observed), looks, strict=True):
                     row[level].plot(PIXELS * path[:, 0], PIXELS * (maze.size - path[:, 1]), linewidth=1.2, **look)
                 row[level].set(xlim=(0, PIXELS * maze.size), ylim=(PIXELS * maze.size, 0))
-        _show(row[0], _maze_and_path(maze, played), "the maze, and a path")
+        _show(row[0], _maze_and_path(played), "the maze, and a path")
     figure.savefig(FOLDER / "tracks.png", dpi=110, metadata={"Software": None})
 
 
@@ -128,13 +128,14 @@ def draw_kinds() -> None:
     figure = Figure(figsize=(9.6, 10.2), layout="constrained")
     for axes, kind in zip(figure.subplots(3, 3).flat, titles, strict=True):
         maze = mazebench.generate(kind, 31, np.random.default_rng(3))
-        _show(axes, _maze_and_path(maze, play(maze, mazes=maze, distances=DISTANCE)), titles[kind])
+        _show(axes, _maze_and_path(play(maze, mazes=maze, distances=DISTANCE)), titles[kind])
     figure.savefig(FOLDER / "kinds.png", dpi=110, metadata={"Software": None})
 
 
 class Played(NamedTuple):
-    """An episode of the oracle."""
+    """An episode that was played."""
 
+    maze: Maze
     start: Cell
     goal: Cell
     pose: np.ndarray  # [T, 3] float
@@ -142,18 +143,18 @@ class Played(NamedTuple):
     shown: Shown
 
 
-def play(maze: Maze, **options: Any) -> Played:
-    """Returns the oracle's first episode in one of the mazes that the options name."""
+def play(maze: Maze | None, agent: str = "oracle", **options: Any) -> Played:
+    """Returns an agent's first episode in a maze; without one, the first whose shortest path on the map is blocked."""
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        mazebench.evaluate("oracle", out=folder, record=True, episodes_per_distance=1, **options)
+        mazebench.evaluate(agent, out=folder, record=True, **{"episodes_per_distance": 1} | options)
         result, trajectories = load_result(folder), load_trajectories(folder / TRAJECTORIES)
-    number, record = next((record.episode, record) for record in result.records if record.maze == maze.name)
-    task, pose = resolve(result.summary.task), trajectories[number].pose
-    observed = None if trajectories[number].observed is None else lay_on_first_pose(trajectories[number])
-    index = [each.name for each in task.mazes].index(maze.name)
-    shown = shown_of(task, Episode(index, record.start, record.goal, float(pose[0, 2]), record.seed))
-    return Played(record.start, record.goal, pose.astype(float), observed, shown)
+    record = next(each for each in result.records if (each.blocked if maze is None else each.maze == maze.name))
+    task, trajectory = resolve(result.summary.task), trajectories[record.episode]
+    observed = None if trajectory.observed is None else lay_on_first_pose(trajectory)
+    index = [each.name for each in task.mazes].index(record.maze)
+    shown = shown_of(task, Episode(index, record.start, record.goal, float(trajectory.pose[0, 2]), record.seed))
+    return Played(task.mazes[index], record.start, record.goal, trajectory.pose.astype(float), observed, shown)
 
 
 def draw_planner() -> None:
@@ -190,25 +191,16 @@ def draw_planner() -> None:
 def draw_changes() -> None:
     """Draws a plan, a building in which things have changed since it was drawn, and the navigator's path in that."""
     plan = mazebench.generate("hospital", 41, np.random.default_rng(7))
-    with tempfile.TemporaryDirectory() as folder:
-        options = {"mazes": plan, "distances": DISTANCE, "episodes_per_distance": 4}
-        mazebench.evaluate("navigator", "rebuilt", out=folder, record=True, level=2, **options)
-        result = load_result(pathlib.Path(folder))
-        paths = load_trajectories(pathlib.Path(folder) / TRAJECTORIES)
-    number = next(record.episode for record in result.records if record.blocked)
-    record, path = result.records[number], paths[number].pose
-    building = next(maze for maze in resolve(result.summary.task).mazes if maze.name == record.maze)
-
-    pixels = 31 * PIXELS // plan.size
-    both = draw_grid(building.walls | plan.walls, pixels)
-    for changed, shade in ((building.walls & ~plan.walls, DRIVEN), (plan.walls & ~building.walls, "#2a9d3a")):
+    options = {"task": "rebuilt", "level": 2, "distances": DISTANCE, "episodes_per_distance": 4}
+    played = play(None, "navigator", mazes=plan, **options)
+    pixels, walls = 31 * PIXELS // plan.size, played.maze.walls
+    both = draw_grid(walls | plan.walls, pixels)
+    for changed, shade in ((walls & ~plan.walls, DRIVEN), (plan.walls & ~walls, "#2a9d3a")):
         both[np.kron(changed, np.ones((pixels, pixels), dtype=bool))] = tuple(bytes.fromhex(shade[1:]))
     pictures = {
-        "the plan, which the robot is shown": draw_grid(plan.walls, pixels, record.start, record.goal),
+        "the plan, which the robot is shown": _shown_map(played.shown),
         "what has changed: closed (red), opened (green)": both,
-        "the building, and the navigator's path": draw_grid(
-            building.walls, pixels, record.start, record.goal, path[:, :2]
-        ),
+        "the building, and the navigator's path": _maze_and_path(played),
     }
     figure = Figure(figsize=(9.6, 3.4), layout="constrained")
     for axes, (title, picture) in zip(figure.subplots(1, 3), pictures.items(), strict=True):
@@ -222,7 +214,8 @@ def _shown_map(shown: Shown) -> np.ndarray:
     return draw_grid(pixels, 31 * PIXELS // len(pixels), start, goal)
 
 
-def _maze_and_path(maze: Maze, played: Played) -> np.ndarray:
+def _maze_and_path(played: Played) -> np.ndarray:
+    maze = played.maze
     return draw_grid(maze.walls, 31 * PIXELS // maze.size, played.start, played.goal, played.pose[:, :2])
 
 

@@ -8,16 +8,17 @@ import types
 from typing import Any
 
 import numpy as np
+import pydantic
 
 from mazebench.evaluation.chunk import Result, to_record
 from mazebench.evaluation.eval_options import eval_options
 from mazebench.evaluation.plan import make_plan
 from mazebench.maps.benchmark import load_mazes, manifest_hash
 from mazebench.maps.maze import cell_to_point, path_through_walls
-from mazebench.results.metrics import summarize, summarize_facts
+from mazebench.results.metrics import summarize
 from mazebench.results.played import mazes_hash
 from mazebench.results.reading import EPISODES, SUMMARY
-from mazebench.results.records import Record
+from mazebench.results.records import Figures, Record
 from mazebench.results.trajectories import TRAJECTORIES, Trajectory, save_trajectories
 from mazebench.storage.json_files import write_json
 from mazebench.tasks.observation import state_errors
@@ -161,10 +162,8 @@ def of_own_mazes(folder: pathlib.Path, name: str) -> pathlib.Path:
 
 
 def _set_means(folder: pathlib.Path, records: list[Record]) -> pathlib.Path:
-    overall, by_distance = summarize(records)
-    means = {distance: figures.model_dump() for distance, figures in by_distance.items()}
-    by_fact = {fact: figures.model_dump() for fact, figures in summarize_facts(records).items()}
-    return edit_summary(folder, overall=overall.model_dump(), by_distance=means, by_fact=by_fact)
+    figures = pydantic.TypeAdapter(dict[str, Figures | dict[str, Figures]])
+    return edit_summary(folder, **figures.dump_python(summarize(records)))
 
 
 def _drive(spec: Task, trial: Trial, success: bool, rng: np.random.Generator) -> Trajectory:

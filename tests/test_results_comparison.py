@@ -21,7 +21,6 @@ def record(index: int, maze: str, distance: int, success: bool, spl: float) -> R
 
 
 def result(folder, records: list[Record], **changes) -> Result:
-    overall, by_distance = summarize(records)
     provenance = PROVENANCE | {"benchmark_manifest_sha256": changes.pop("manifest", "0f")}
     content = {
         "agent": "x",
@@ -30,8 +29,7 @@ def result(folder, records: list[Record], **changes) -> Result:
         "benchmark": "paper",
         "episodes": len(records),
         "provenance": Provenance.model_validate(provenance),
-        "overall": overall,
-        "by_distance": by_distance,
+        **summarize(records),
     }
     return Result(folder, Summary.model_validate(content | changes), tuple(records))
 

@@ -40,7 +40,7 @@ RECORDS = [
 
 
 def test_figures_worked_by_hand():
-    overall, by_distance = summarize(RECORDS)
+    overall, by_distance, _ = summarize(RECORDS).values()
     assert list(by_distance) == ["2", "10"]  # by number, not by text
     assert (overall.n, overall.success_rate) == (4, 0.75)
     assert overall.spl == pytest.approx(1.9 / 4)
@@ -66,7 +66,7 @@ class TestOnTime:
 
     def test_figures_tell_it_by_factor(self):
         records = [*RECORDS[:3], RECORDS[3].model_copy(update={"oracle_steps": 2})]  # the others have 4
-        overall, by_distance = summarize(records)  # of records of 5 steps, the third a failure
+        overall, by_distance, _ = summarize(records).values()  # of records of 5 steps, the third a failure
         assert overall.on_time == {"1.25": 0.5, "2": 0.5}
         assert by_distance["10"].on_time == {"1.25": 1.0, "2": 1.0}
         assert by_distance["2"].on_time == {"1.25": pytest.approx(1 / 3), "2": pytest.approx(1 / 3)}

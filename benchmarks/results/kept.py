@@ -90,11 +90,6 @@ def estimate(metric: str, *agents: pd.DataFrame) -> Estimate:
     return runs_interval(runs[0], mazes, *runs[1:])
 
 
-def recall_of(agent: str) -> str:
-    """Returns the name of an agent's evaluations in the archive of recall."""
-    return f"{agent}, {RECALL}"
-
-
 def read_kept(folder: pathlib.Path) -> Kept:
     """Returns what all archives of `folder` hold, and those of training runs in its folder `training`."""
     training: dict[str, list[pd.DataFrame]] = {}
@@ -114,7 +109,7 @@ def read_kept(folder: pathlib.Path) -> Kept:
                 paper.append(reported(result))
             agent, setting = _AGENTS.get(archive, summary.row), summary.part or result.folder.name
             if archive == RECALL:  # whose agents are in other archives, too
-                agent = recall_of(agent)
+                setting = f"{setting}-{RECALL}"
             if archive == _RUNS:
                 agent, setting = result.folder.name.rpartition("-")[0], LOCAL
             lines = pd.DataFrame(list(map(dict, result.records)), columns=_COLUMNS).assign(**scores(result.records))

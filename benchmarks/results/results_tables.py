@@ -19,12 +19,12 @@ from benchmarks.results.kept import (
     ON_TIME_2,
     ON_TIME_125,
     PAPER,
+    RECALL,
     RECALL_AGENTS,
     RECALL_SETTINGS,
     WORST_TENTH,
     Kept,
     estimate,
-    recall_of,
 )
 from mazebench.maps.benchmark import SIZES
 from mazebench.maps.kinds import KNOWN, NOVEL
@@ -261,7 +261,7 @@ def tracks_recall(kept: Kept) -> str:
     """Returns the recall of the poses that agents report, over episodes and at their ends."""
     rows = []
     for agent, (track, level) in itertools.product(RECALL_AGENTS, RECALL_SETTINGS):
-        own = kept.of(recall_of(agent), f"{track}-{level}")
+        own = kept.of(agent, f"{track}-{level}-{RECALL}")
         rows.append([f"`{agent}`", f"`{track}` {level}", *(_interval(metric, own) for metric in RECALLS)])
     return format_table(["agent", "setting", *RECALLS.values()], rows)
 

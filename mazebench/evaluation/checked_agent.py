@@ -93,19 +93,15 @@ class CheckedAgent(Agent):
             pose, notes = self._agent.report(state)
             pose = None if pose is None else np.asarray(pose)
             notes = None if notes is None else list(notes)
-        expected = f"agent {self.name!r}: expected %s from report(), found %s"
-        if pose is not None:
-            shape = (self._batch, 3)
-            if pose.shape != shape or pose.dtype.kind not in "fiu":
-                found = f"{pose.dtype} of shape {pose.shape}"
-                raise AgentError(expected % (f"poses (x, y, yaw) of shape {shape}", found))
-            if np.isinf(pose).any():
-                raise AgentError(expected % ("poses in metres and rad, NaN where unknown", "an infinite one"))
-        if notes is not None:
-            if len(notes) != self._batch:
-                raise AgentError(expected % (f"{self._batch} notes", len(notes)))
-            try:
-                notes = json.loads(json.dumps(notes, allow_nan=False))
-            except (TypeError, ValueError, RecursionError) as error:
-                raise AgentError(expected % ("notes that JSON can hold", error)) from error
-        return Report(pose, notes)
+        expected, shape = f"agent {self.name!r}: expected %s from report(), found %s", (self._batch, 3)
+        if pose is not None and (pose.shape != shape or pose.dtype.kind not in "fiu"):
+            found = f"{pose.dtype} of shape {pose.shape}"
+            raise AgentError(expected % (f"poses (x, y, yaw) of shape {shape}", found))
+        if pose is not None and np.isinf(pose).any():
+            raise AgentError(expected % ("poses in metres and rad, NaN where unknown", "an infinite one"))
+        if notes is not None and len(notes) != self._batch:
+            raise AgentError(expected % (f"{self._batch} notes", len(notes)))
+        try:
+            return Report(pose, json.loads(json.dumps(notes, allow_nan=False)))
+        except (TypeError, ValueError, RecursionError) as error:
+            raise AgentError(expected % ("notes that JSON can hold", error)) from error

@@ -127,7 +127,6 @@ def run_plan(
                 progress(store.num_ended, num_trials)
             stopping.check()
         records = with_oracle_steps(plan, store.records, run.num_envs)
-        overall, by_distance = metrics.summarize(records)
         summary = Summary(
             agent=plan.options.agent,
             task=plan.task.options,
@@ -138,9 +137,7 @@ def run_plan(
             benchmark=plan.task.options.benchmark,
             episodes=num_trials,
             provenance=plan.provenance,
-            overall=overall,
-            by_distance=by_distance,
-            by_fact=metrics.summarize_facts(records),
+            **metrics.summarize(records),
         )
         store.finish(records, summary)
     return summary

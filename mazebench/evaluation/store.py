@@ -146,7 +146,9 @@ class Store:
         plan = self._plan
         ended = {(each.number, each.leg): (to_record(plan, each), to_trajectory(plan, each)) for each in results}
         with self._keeping_what_is_written():
-            self._journal.write("".join(_to_line(*each) for each in ended.values()))
+            for record, trajectory in ended.values():
+                poses = [None if each is None else each.tolist() for each in trajectory or ()]
+                self._journal.write(to_line({"record": record.model_dump(), "trajectory": poses}))
             self._journal.flush()
         self._ended |= ended
 
@@ -182,8 +184,3 @@ class Store:
                 for name in (JOURNAL, CONFIG):
                     (self.folder / name).unlink(missing_ok=True)
                 self.folder.rmdir()
-
-
-def _to_line(record: Record, trajectory: Trajectory | None) -> str:
-    poses = [None if each is None else each.tolist() for each in trajectory or ()]
-    return to_line({"record": record.model_dump(), "trajectory": poses})

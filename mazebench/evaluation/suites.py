@@ -47,17 +47,12 @@ def _local(name: str, distances: tuple[int, ...] = _TABLE_DISTANCES, episodes: i
     return Part(name, TaskOptions(distances=distances, **options), episodes)
 
 
-def _each_level(tracks: Iterable[str] = TRACKS, **options: Any) -> tuple[Part, ...]:
+def _each_level(tracks: Iterable[str] = TRACKS, suffix: str = "", **options: Any) -> tuple[Part, ...]:
     return tuple(
-        Part(f"{track}-{level}", TaskOptions(task=track, level=(level,), **options))
+        Part(f"{track}-{level}{suffix}", TaskOptions(task=track, level=(level,), **options))
         for track in tracks
         for level in LEVELS
     )
-
-
-def _several_goals(**options: Any) -> tuple[Part, ...]:
-    parts = _each_level(("rebuilt",), num_goals=3, **options)
-    return tuple(dataclasses.replace(part, name=f"{part.name}-goals") for part in parts)
 
 
 # A map flipped with probability 0 is hierarchical-13-k5; no warp and no noise are local-13: they are not run again.
@@ -85,8 +80,8 @@ SUITES: dict[str, tuple[Part, ...]] = {
     "tracks-no-goal": _each_level(hide=("map", "goal")),
     "tracks-true-pose": _each_level((name for name, track in TRACKS.items() if track.hides_pose), exact_pose=True),
     # Goals in a row on one wrong map; parts have names of their own, since their first goals are played on the tracks.
-    "tracks-goals": _several_goals(),
-    "tracks-goals-dev": _several_goals(split=DEV),
+    "tracks-goals": _each_level(("rebuilt",), "-goals", num_goals=3),
+    "tracks-goals-dev": _each_level(("rebuilt",), "-goals", num_goals=3, split=DEV),
 }
 
 

@@ -58,18 +58,13 @@ def scores(records: Sequence[Record]) -> dict[str, np.ndarray]:
     return found | {name: is_on_time(records, k).astype(float) for name, k in ON_TIME_METRICS.items()}
 
 
-def summarize(records: Sequence[Record]) -> tuple[Figures, dict[str, Figures]]:
-    """Returns the figures of some records, at least one, and those of each distance from start to goal."""
-    groups = {str(distance): _figures(group) for distance, group in by_distance(records).items()}
-    return _figures(records), groups
-
-
-def summarize_facts(records: Sequence[Record]) -> dict[str, Figures]:
-    """Returns the figures of the records in which a fact holds, such as "blocked", and where it does not."""
+def summarize(records: Sequence[Record]) -> dict[str, Any]:
+    """Returns the figures of some records, at least one, by the names of the fields of `Summary` that have them."""
+    facts = {name: list(itertools.compress(records, holds)) for name, holds in by_fact(records).items() if holds.any()}
     return {
-        name: _figures(list(itertools.compress(records, holds)))
-        for name, holds in by_fact(records).items()
-        if holds.any()
+        "overall": _figures(records),
+        "by_distance": {str(distance): _figures(group) for distance, group in by_distance(records).items()},
+        "by_fact": {name: _figures(group) for name, group in facts.items()},
     }
 
 

@@ -104,10 +104,6 @@ class Figures(_Stored):
     recall: dict[str, Share] = {}  # by the names in `RECALLS`; left out where no poses were reported
     recall_ci95: dict[str, tuple[Share, Share]] = {}
 
-    @pydantic.model_serializer(mode="wrap")
-    def _without_empty(self, handler: pydantic.SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {name: value for name, value in handler(self).items() if value != {}}
-
 
 class Provenance(_Stored):
     """The provenance of a result: versions, checkpoint, seed, command, machine."""
@@ -157,9 +153,8 @@ class Summary(_Stored):
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the content of `summary.json`."""
-        optional = ("untrained_scale", "suite", "part", "by_fact")
-        left_out = {name for name in optional if getattr(self, name) == type(self).model_fields[name].default}
-        return {"agent": self.agent, "task": self.task.to_json(), **self.model_dump(exclude={"task", *left_out})}
+        values = self.model_dump(exclude={"task"}, exclude_defaults=True)
+        return {"agent": self.agent, "task": self.task.to_json(), **values}
 
 
 def column(records: Sequence[Record], name: str) -> np.ndarray:

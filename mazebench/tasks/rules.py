@@ -21,6 +21,10 @@ from mazebench.tasks.task_options import PROGRESS
 from mazebench.world.angles import wrap_angle
 
 _UNKNOWN = -1  # a way that would take long to measure
+_INFOS = (  # what `Rules.infos` describes, in this order
+    *("is_first", "success", "goal_reached", "steps", "path_length", "position", "yaw", "maze", "landmark"),
+    *("time_limit", "steps_left", "way_left", "distance", "blocked", "kind", "track", "level"),
+)
 
 
 @overload
@@ -261,48 +265,24 @@ class Rules:
         - maze: index among the task's mazes. kind: of the maze's layout, "" for one of your own.
         - track: "" without one. level: of the track, 0 without one.
         """
-        return {
-            "is_first": self.is_first.copy(),
-            "success": self.reached.copy(),
-            "goal_reached": self.goal_reached.copy(),
-            "steps": self.steps.copy(),
-            "path_length": self.path_length.copy(),
-            "position": self.pose[:, :2].copy(),
+        values = vars(self) | {
+            "success": self.reached,
+            "position": self.pose[:, :2],
             "yaw": wrap_angle(self.pose[:, 2]),
-            "maze": self.maze.copy(),
-            "landmark": self.landmark.copy(),
-            "time_limit": self.time_limit.copy(),
             "steps_left": self._deadline - self.steps,
-            "way_left": self.way_left.copy(),
-            "distance": self.distance.copy(),
-            "blocked": self.blocked.copy(),
-            "kind": self.kind.copy(),
-            "track": self.track.copy(),
-            "level": self.level.copy(),
         }
+        return {name: values[name].copy() for name in _INFOS}
 
     def info(self, i: int) -> dict[str, Any]:
         """Returns the `infos` of environment i as plain values, in a fraction of the time."""
-        steps = self.steps.item(i)
-        return {
-            "is_first": self.is_first.item(i),
+        arrays = vars(self)
+        values = {
             "success": self.reached.item(i),
-            "goal_reached": self.goal_reached.item(i),
-            "steps": steps,
-            "path_length": self.path_length.item(i),
             "position": self.pose[i, :2].copy(),
             "yaw": wrap_angle(self.pose.item(i, 2)),
-            "maze": self.maze.item(i),
-            "landmark": self.landmark.item(i),
-            "time_limit": self.time_limit.item(i),
-            "steps_left": self._deadline.item(i) - steps,
-            "way_left": self.way_left.item(i),
-            "distance": self.distance.item(i),
-            "blocked": self.blocked.item(i),
-            "kind": self.kind[i],
-            "track": self.track[i],
-            "level": self.level.item(i),
+            "steps_left": self._deadline.item(i) - self.steps.item(i),
         }
+        return {name: values[name] if name in values else arrays[name].item(i) for name in _INFOS}
 
     def close(self) -> None:
         """Closes the sensors."""

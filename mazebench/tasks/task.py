@@ -362,23 +362,21 @@ def _read(asked: TaskOptions) -> World:
     if asked.mazes is None:
         split = asked.split or "train"
         return World(load_mazes(size, split) if asked.track is None else load_kind_mazes(split))
-    mazes, shown, scenarios = _read_own(asked)
-    for maze in mazes:
+    world = _read_own(asked)
+    for maze in world.mazes:
         if asked.size not in (None, maze.size):
             raise InputError(f"expected mazes of size {asked.size}, found size {maze.size}")
-    if shown is None and asked.track is not None:
-        return _with_changes(asked, mazes)
-    return World(mazes, shown, scenarios)
+    return _with_changes(asked, world.mazes) if world.shown is None and asked.track is not None else world
 
 
-def _read_own(asked: TaskOptions) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...] | None, Scenarios | None]:
+def _read_own(asked: TaskOptions) -> World:
     """Returns the mazes of one's own in which the task can be played, with the older maps and scenarios of these."""
     mazes, shown = asked.mazes, None
     if are_scenarios(mazes):
         scenarios = read_scenarios(mazes, asked.reading)
-        return (scenarios.maze,), None, scenarios
+        return World((scenarios.maze,), scenarios=scenarios)
     if not isinstance(mazes, str):
-        return mazes, None if asked.shown is None else maps_in_texts(asked.shown, mazes), None
+        return World(mazes, None if asked.shown is None else maps_in_texts(asked.shown, mazes))
     from mazebench.maps.maze_files import read_mazes, read_with_older  # with all readers, which few commands need
 
     if asked.shown is None:
@@ -386,7 +384,7 @@ def _read_own(asked: TaskOptions) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...
     else:
         mazes, shown = read_with_older(mazes, asked.shown, asked.reading)
     kept = _playable(mazes, functools.partial(_check_maze, asked))
-    return tuple(mazes[each] for each in kept), None if shown is None else tuple(shown[each] for each in kept), None
+    return World(tuple(mazes[each] for each in kept), shown and tuple(shown[each] for each in kept))
 
 
 def _with_changes(asked: TaskOptions, plans: tuple[Maze, ...]) -> World:
@@ -405,14 +403,15 @@ def _with_changes(asked: TaskOptions, plans: tuple[Maze, ...]) -> World:
     if strength is None:
         return World(plans)
 
+    shown: list[OlderMap] = []
+
+    def change(plan: Maze) -> None:
+        _check_maze(asked, plan)
+        shown.extend(OlderMap(plan.walls, maze) for maze in _changed(plan, plan.name, strength))
+
     # What takes a moment is checked first.
     _context_size(asked, plans[0].size, default_context_size)
-    kept = _playable(plans, functools.partial(_check_maze, asked))
-    plans = tuple(plans[number] for number in kept)
-    kept = _playable(plans, lambda plan: _changed(plan, plan.name, strength))
-    shown = [
-        OlderMap(plans[each].walls, maze) for each in kept for maze in _changed(plans[each], plans[each].name, strength)
-    ]
+    _playable(plans, change)
     return World(tuple(each.maze for each in shown), tuple(shown))
 
 

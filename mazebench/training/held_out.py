@@ -44,7 +44,7 @@ class HeldOutEvaluation:
             _draw_maze(plain, kinds[index % len(kinds)], f"held-out-{index}", stream)
             for index, stream in enumerate(streams if kinds else ())
         ]
-        self.task = _in_mazes(plain, *drawn) if drawn else plain
+        self.task = resolve_in(drawn, plain.options) if drawn else plain
         self.trials = draw_trials(self.task, _EPISODES)
 
     def success_rates(self, agent: Agent, progress: Callable[[int, int], None]) -> dict[int, float]:
@@ -69,15 +69,10 @@ def _draw_maze(task: Task, kind: str, name: str, stream: np.random.SeedSequence)
     for draw in range(_MAX_DRAWS):
         maze = generate(kind, task.size, rng, name)
         try:
-            _in_mazes(task, maze)
+            resolve_in([maze], task.options)
         except InputError:
             if draw == _MAX_DRAWS - 1:
                 raise
         else:
             break
     return maze
-
-
-def _in_mazes(task: Task, *mazes: Maze) -> Task:
-    """Returns the same task in some mazes that were drawn; an `InputError` if it can't be played in one of them."""
-    return resolve_in(mazes, task.options)
