@@ -22,7 +22,6 @@ from mazebench.errors import InputError, UnknownOptionError
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.text import write_text_maze
-from mazebench.tasks.episode import Episode
 from mazebench.tasks.task import Task
 from mazebench.tasks.tracks import TRACKS
 
@@ -134,37 +133,12 @@ class TestSteps:
         env.reset()
         env.step(LOOK_LEFT)
 
-    @pytest.mark.parametrize(
-        ("time_limit", "expected"), [(5, (-1.0, False, True)), (6, (0.0, True, False)), (7, (0.0, True, False))]
-    )
-    def test_a_goal_reached_at_the_limit_terminates_the_episode(self, time_limit, expected):
-        # On the very limit it is a termination, not a truncation.
-        env = corridor_env(time_limit=time_limit)
-        env.reset(options={"episode": Episode(0, (1, 1), (1, 4), 0.0, 0)})
-        for _ in range(min(time_limit, 6) - 1):
-            assert env.step(FORWARD)[1:4] == (-1.0, False, False)
-        assert env.step(FORWARD)[1:4] == expected
-
-    def test_progress_is_rewarded(self):
-        env = corridor_env(reward="progress")
-        _, info = env.reset(options={"episode": Episode(0, (1, 1), (1, 4), 0.0, 0)})
-        for reached in (*[False] * 5, True):
-            way_left = info["way_left"]
-            _, reward, terminated, _, info = env.step(FORWARD)
-            assert (reward, terminated) == (reached - 1 + way_left - info["way_left"], reached)
-
-    def test_the_info_tells_what_was_driven(self):
-        env = corridor_env()
-        _, info = env.reset(options={"episode": Episode(0, (1, 1), (1, 4), 0.0, 0)})
+    def test_the_info_has_what_records_and_training_need(self):
+        _, info = corridor_env().reset()
         assert info.keys() == {
             *("is_first", "success", "goal_reached", "steps", "path_length", "position", "yaw", "maze", "landmark"),
             *("time_limit", "steps_left", "way_left", "distance", "blocked", "kind", "track", "level"),
         }
-        assert (info["is_first"], info["steps"], info["path_length"], info["landmark"]) == (True, 0, 0.0, 0)
-        np.testing.assert_allclose(info["position"], (1.5, 7.5))
-        _, _, _, _, info = env.step(FORWARD)
-        assert (info["is_first"], info["success"], info["steps"]) == (False, False, 1)
-        assert info["path_length"] == pytest.approx(info["position"][0] - 1.5, abs=1e-9)
 
 
 class TestRendering:

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 import yaml
+from simple_mazes import field
 
 import mazebench
 from mazebench.errors import InputError
@@ -18,7 +19,7 @@ from mazebench.maps.maze import Maze
 from mazebench.maps.readers.ros import write_ros_map
 from mazebench.results.played import played_task
 from mazebench.results.reading import load_result
-from mazebench.tasks.episode import Episode, sample_episode
+from mazebench.tasks.episode import Episode, goals_of, sample_episode
 from mazebench.tasks.shown_map import show_map
 from mazebench.tasks.task import Task
 from mazebench.tasks.trials import draw_trials
@@ -64,14 +65,14 @@ def test_the_maze_as_its_own_older_map_changes_no_byte(task, tmp_path):
     assert without == with_older
 
 
-def test_areas_that_are_apart_on_the_older_map_hold_no_start_and_goal():
-    walls = np.ones((9, 9), bool)
-    walls[1:-1, 1:-1] = False
-    older = walls.copy()
+@pytest.mark.parametrize("options", [{}, {"task": "building", "num_goals": 5}, {"task": "rebuilt", "num_goals": 5}])
+def test_areas_that_are_apart_on_the_older_map_hold_no_start_and_goal(options):
+    older = field(9).walls.copy()
     older[:, 6] = True  # the right side is cut off
-    spec = Task.of(mazes=Maze(walls), shown=older, distances=(1, 2, 3))
-    episodes = [sample_episode(spec, np.random.default_rng(seed)) for seed in range(30)]
-    assert all(cell[1] < 6 for episode in episodes for cell in (episode.start, episode.goal))
+    spec = Task.of(mazes=field(9), shown=older, distances=(2, 8, 9), **options)
+    for seed in range(30):
+        episode = sample_episode(spec, np.random.default_rng(seed))
+        assert all(column < 6 for _, column in (episode.start, *goals_of(spec, episode)))
     with pytest.raises(InputError, match="free and joined on the older map"):
         mazebench.make(spec).reset(options={"episode": Episode(0, (1, 1), (1, 7), 0.0, 0)})
 

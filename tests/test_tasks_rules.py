@@ -147,15 +147,6 @@ class TestHierarchical:
 
 
 class TestInfosOfTheTask:
-    def test_each_goal_of_several_has_its_distance(self):
-        rules = begin(1, along(1, 3), num_goals=2, distances=[4], time_limit=9)
-        drive(rules, (ROW, 3))
-        (row, column) = rules.routes[0].goal
-        assert (row, abs(column - 3)) == (ROW, 4)
-        info = rules.info(0)
-        assert (info["distance"], info["way_left"], info["steps_left"], info["landmark"]) == (4, 4, 9, 1)
-        assert [drive(rules, (ROW, 3)) for _ in range(9)][-1] == (False, False, True)
-
     @pytest.mark.parametrize("track", ["building", "rebuilt", "rough"])
     def test_a_track_tells_its_level_and_what_records_have(self, track):
         task = Task.of(track, level=(1, 2, 3))

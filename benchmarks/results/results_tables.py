@@ -208,10 +208,9 @@ def tracks_learned(agent: str, kept: Kept) -> str:
     """Returns a learned agent's rates over its training runs, and the paired differences to the navigator."""
     rows = []
     for track, level, own in kept.on_tracks(agent):
-        both = [own, kept.of("navigator", f"{track}-{level}")]
-        pairs = itertools.product(([own], both), ("success_rate", ON_TIME_125))
-        means = (_interval(metric, *agents) for agents, metric in pairs)
-        rows.append([f"`{track}` {level}", str(own.run.nunique()), *means])
+        both = own, kept.of("navigator", f"{track}-{level}")
+        columns = [(metric, *agents) for agents in ((own,), both) for metric in ("success_rate", ON_TIME_125)]
+        rows.append([f"`{track}` {level}", str(own.run.nunique()), *itertools.starmap(_interval, columns)])
     header = ["setting", "runs", "success rate", "on-time rate", "success - `navigator`", "on-time rate - `navigator`"]
     return format_table(header, rows)
 
@@ -221,10 +220,8 @@ def tracks_map_worth(kept: Kept) -> str:
     rows = []
     metrics = {"success_rate": "success", ON_TIME_2: METRICS[ON_TIME_2], ON_TIME_125: METRICS[ON_TIME_125]}
     for track, level, own in kept.on_tracks("navigator"):
-        without = kept.of("navigator without map", f"{track}-{level}")
-        means = [_interval(metric, own) for metric in metrics]
-        means += [_interval(ON_TIME_125, without), _interval(ON_TIME_125, own, without)]
-        rows.append([f"`{track}` {level}", *means])
+        both = own, kept.of("navigator without map", f"{track}-{level}")
+        rows.append([f"`{track}` {level}", *(_interval(metric, own) for metric in metrics), *_compared(both)[1:]])
     return format_table(["part", *metrics.values(), f"without the map, {METRICS[ON_TIME_125]}", "map worth"], rows)
 
 
@@ -237,10 +234,9 @@ def tracks_memory(kept: Kept) -> str:
     for level, goal in itertools.product(LEVELS, (1, 2, 3)):
         both = [kept.of(agent, f"rebuilt-{level}-goals") for agent in ("navigator", _WITHOUT_MEMORY)]
         legs = [own[own.leg.eq(goal) & ~own.after_miss.astype(bool)] for own in both]
-        episodes = set(legs[0].episode) & set(legs[1].episode)
-        legs = [own[own.episode.isin(episodes)] for own in legs]
-        means = [_interval(ON_TIME_125, *agents) for agents in ((legs[0],), (legs[1],), legs)]
-        rows.append([f"`rebuilt` {level}", str(goal), str(len(episodes)), *means])
+        episodes = set.intersection(*(set(own.episode) for own in legs))
+        cells = _compared([own[own.episode.isin(episodes)] for own in legs])
+        rows.append([f"`rebuilt` {level}", str(goal), str(len(episodes)), *cells])
     header = ["part", "goal", "legs", f"in a row, {METRICS[ON_TIME_125]}", "without memory", "memory worth"]
     return format_table(header, rows)
 
@@ -314,6 +310,11 @@ def _levels(kept: Kept, agent: str, metric: str, kinds: Sequence[str] = _KINDS) 
     for track, _, own in kept.on_tracks(agent):
         texts[track].append(_number(own[own.kind.isin(kinds)][metric].mean()))
     return [" / ".join(levels) or "-" for levels in texts.values()]
+
+
+def _compared(both: Sequence[pd.DataFrame]) -> list[str]:
+    """Returns the on-time rates of two agents, and their difference."""
+    return [_interval(ON_TIME_125, *agents) for agents in (both[:1], both[1:], both)]
 
 
 def _interval(metric: str, *agents: pd.DataFrame) -> str:

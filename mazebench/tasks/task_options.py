@@ -413,21 +413,11 @@ class TaskOptions(SensorOptions, ReadOptions):
 
     @property
     def _order(self) -> tuple[Any, ...]:
-        return (
-            *(self.track is not None, self.is_hierarchical, self.size or 0, self.split_in_results),
-            self.landmark_distance if self.is_hierarchical else 0,
-            self.active_perturbations,
-            *(
-                str(self.mazes or ""),
-                str(self.shown or ""),
-                self.kinds,
-                self.num_mazes or 0,
-                self.track or "",
-                self.level or (),
-                self.num_goals,
-            ),
-            self.own_in_words,
-        )
+        landmarks = self.landmark_distance if self.is_hierarchical else 0
+        of_mazes = str(self.mazes or ""), str(self.shown or ""), self.kinds, self.num_mazes or 0
+        of_track = self.track or "", self.level or (), self.num_goals
+        kind = self.track is not None, self.is_hierarchical, self.size or 0, self.split_in_results
+        return *kind, landmarks, self.active_perturbations, *of_mazes, *of_track, self.own_in_words
 
     # Which options go together.
 
