@@ -6,12 +6,15 @@ memory is worth.
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 from mazebench_agents.navigator.navigator import Navigator
 from mazebench_agents.robot.map_matching import MapBelief
 from mazebench_agents.robot.map_reading import read_map
-from mazebench_agents.robot.senses import Memory, Senses
+from mazebench_agents.robot.senses import Memory
 
-from mazebench.agent import Inputs, Interface
+from mazebench.agent import Inputs
 
 
 class NavigatorWithoutMemory(Navigator):
@@ -20,17 +23,10 @@ class NavigatorWithoutMemory(Navigator):
     It keeps what is observed: the exact pose and the velocity.
     """
 
-    def __init__(self, interface: Interface):
-        super().__init__(interface)
-        self._senses = _ForgetfulSenses(interface, "navigator without memory")
-
-
-class _ForgetfulSenses(Senses):
-    """Senses that forget walls, searched cells and the drive at each new context of an episode."""
-
-    def observe(self, memory: Memory | None, inputs: Inputs, slot: int) -> Memory:
-        if memory is not None and inputs.new_context[slot] and not inputs.new_episode[slot]:
-            reading = read_map(inputs.observation["context"][slot], self._size)
-            belief = MapBelief(reading.walls, reading.goal, 1, None, self._size)
-            memory = Memory(belief, memory.body, memory.deviation)  # of an exact pose, on a map that lies as the maze
-        return super().observe(memory, inputs, slot)
+    def act(self, inputs: Inputs, state: list[Any], explore: bool = False) -> tuple[np.ndarray, list[Any]]:
+        for slot in np.flatnonzero(inputs.new_context & ~inputs.new_episode).tolist():
+            memory, size = state[slot].memory, len(state[slot].memory.searched)
+            reading = read_map(inputs.observation["context"][slot], size)
+            belief = MapBelief(reading.walls, reading.goal, 1, None, size)  # of a map that lies as the maze
+            state[slot] = type(state[slot])(Memory(belief, memory.body, memory.deviation, memory.cell_size))
+        return super().act(inputs, state, explore)

@@ -12,6 +12,7 @@ from simple_mazes import field
 
 import mazebench
 from benchmarks.freeze_goals import freeze_goals
+from benchmarks.no_memory import NavigatorWithoutMemory
 from mazebench.agent import SingleAgent
 from mazebench.evaluation.evaluate import evaluate
 from mazebench.evaluation.measured_oracle import measure_steps_of_legs
@@ -136,6 +137,9 @@ class TestRecords:
 
 
 class TestSuites:
+    def test_a_navigator_that_forgets_reaches_all_goals(self):
+        assert evaluate(NavigatorWithoutMemory, **NEAR).overall.success_rate == 1.0
+
     @pytest.mark.slow
     def test_one_command_makes_the_files_byte_for_byte(self, tmp_path):
         freeze_goals(tmp_path)
