@@ -130,7 +130,7 @@ class Agent(_Declarations):
     def report(self, state: Any) -> Report:
         """Returns where the body was at the observation that `act` was given last, and notes; by default nothing.
 
-        An evaluation calls it after each `act`. It changes nothing. The poses give the recall of localization in the
+        An evaluation calls it after each step. It changes nothing. The poses give the recall of localization in the
         results, and an episode's last notes go into its record.
 
         Args:

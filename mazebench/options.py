@@ -153,14 +153,15 @@ def _fields_of(options_class: Any) -> Mapping[str, Option]:
     hints = typing.get_type_hints(options_class, include_extras=True)
     kinds = typing.get_type_hints(options_class)
     for field in dataclasses.fields(options_class):
-        metadata = list(_metadata(hints[field.name]))
+        metadata, kind = list(_metadata(hints[field.name])), kinds[field.name]
+        literals = typing.get_args(kind) if typing.get_origin(kind) is typing.Literal else ()
         described[field.name] = Option(
             help=next((item.documentation for item in metadata if isinstance(item, Doc)), ""),
             default=field.default,
-            kind=kinds[field.name],
+            kind=kind,
             lowest=next((item.ge for item in metadata if isinstance(item, Ge)), None),
             highest=next((item.le for item in metadata if isinstance(item, Le)), None),
-            choices=next((item.choices for item in metadata if isinstance(item, OneOf)), _literals(kinds[field.name])),
+            choices=next((item.choices for item in metadata if isinstance(item, OneOf)), literals or None),
             read=next((item.read for item in metadata if isinstance(item, ReadBy)), None),
         )
     return types.MappingProxyType(described)
@@ -197,11 +198,6 @@ def as_tuple(value: Any) -> tuple[Any, ...]:
 def _members(kind: Any) -> tuple[Any, ...]:
     """Returns the members of a union, or the type itself."""
     return typing.get_args(kind) if typing.get_origin(kind) in (typing.Union, types.UnionType) else (kind,)
-
-
-def _literals(kind: Any) -> tuple[str, ...] | None:
-    """Returns the values of a `Literal`; None for another type."""
-    return typing.get_args(kind) if typing.get_origin(kind) is typing.Literal else None
 
 
 def _metadata(kind: Any) -> Iterable[Any]:

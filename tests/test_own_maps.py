@@ -95,7 +95,8 @@ class TestTask:
 
 class TestAgents:
     @pytest.mark.parametrize(
-        ("name", "cell_size"), [("planner-closed-loop", 0.5), ("oracle", 2.0), ("navigator", 0.5), ("navigator", 2.0)]
+        ("name", "cell_size"),
+        [("planner-closed-loop", 0.5), ("oracle", 0.4), ("oracle", 2.0), ("navigator", 0.5), ("navigator", 2.0)],
     )
     def test_agents_that_plan_drive_at_any_scale(self, name, cell_size):
         agent_class, maze = load_agent_class(name), dfs(9, cell_size)

@@ -50,12 +50,6 @@ class TestSkipped:
         assert expected in warning
         assert warning.endswith("; skipped")
 
-    def test_paths_without_results_are_named(self, run, tmp_path):
-        (tmp_path / "empty").mkdir()
-        labels, warnings = read(tmp_path / "empty", tmp_path / "none", run)
-        assert labels == ["mah"]
-        assert [line.partition("found ")[2] for line in warnings] == ["none; skipped"] * 2
-
     def test_a_copied_result_is_reported_once(self, run):
         shutil.copytree(run / "good", run / "later")
         labels, [warning] = read(run)

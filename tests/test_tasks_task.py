@@ -50,6 +50,7 @@ class TestValue:
             {"start": (1, 1), "goal": "3.5m,1.5m", "position_noise": 0.2},
             {"lidar_noise": ".1,.2", "sensors": "lidar", "num_goals": 3, "actions": "velocity"},
             {"reward": "progress"},
+            {"task": "building", "mazes": field(31), "shown": field(31)},
         ],
         ids=lambda options: next(iter(options)),
     )
@@ -58,6 +59,9 @@ class TestValue:
         again = Task.from_json(json.loads(json.dumps(task.to_json())))
         assert again == task
         assert again.mazes == task.mazes
+        assert [each.walls.tobytes() for each in again.shown or ()] == [
+            each.walls.tobytes() for each in task.shown or ()
+        ]
 
     def test_results_do_not_name_the_reward_which_is_that_of_all_evaluations(self):
         assert "reward" not in resolve_for_evaluation(TaskOptions()).to_json()

@@ -19,8 +19,7 @@ from simple_mazes import field
 from mazebench import stopping
 from mazebench.envs.vector import MazeVectorEnv
 from mazebench.errors import InputError
-from mazebench.tasks.context import GLOBAL_MAP
-from mazebench.tasks.task import Task, tasks_of_tracks
+from mazebench.tasks.task import Task
 from mazebench.training import loop
 from mazebench.training.collector import Collector
 from mazebench.training.loop import TrainingError, train
@@ -276,10 +275,3 @@ def test_collector_gives_every_episode_a_seed_of_its_own_that_is_not_the_episode
     assert not set(seeds) & {episode.seed for episode in env.episodes}
     for before, after in itertools.pairwise(steps):
         np.testing.assert_array_equal(before.notes != after.notes, after.new_episode)
-
-
-def test_of_several_tracks_each_episode_draws_one():
-    tasks = tasks_of_tracks(("building", "rough"), kinds=("dfs",), fresh=True, size=13, distances=(3,))
-    first = next(Collector(tasks, 16).collect(RandomActor(), seed=0))
-    drawn_by_hand = ((first.context[:, GLOBAL_MAP] % 1) > 0).any(axis=(1, 2))
-    assert 0 < drawn_by_hand.sum() < 16

@@ -67,12 +67,6 @@ def test_a_run_on_a_track_names_it_and_is_evaluated_on_it(tmp_path):
     assert [name for name in last if "success" in name] == [f"success_rate_{each}" for each in (15, 21, 28, 34, 40)]
 
 
-def test_a_run_is_not_resumed_in_another_task(tmp_path):
-    train(**tiny_options(env_steps=8), out=tmp_path)
-    with pytest.raises(InputError, match="holds another run, differing in 'task'"):
-        train(**tiny_options(map_flip=0.1), out=tmp_path, resume=True)
-
-
 def test_the_user_chooses_before_the_learner_does(tmp_path):
     train(**tiny_options(agent=f"{__name__}:Near", distances=(3, 4)), out=tmp_path)
     task = task_in(tmp_path)

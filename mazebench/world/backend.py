@@ -45,7 +45,9 @@ def rendering_error(error: Exception) -> RenderingError:
     chosen, device = os.environ.get("MUJOCO_GL"), os.environ.get("MUJOCO_EGL_DEVICE_ID", "0")
     backend, platform = (chosen or "").strip().lower(), os.environ.get("PYOPENGL_PLATFORM", "")
     setting = "MUJOCO_GL is not set" if chosen is None else f"MUJOCO_GL={chosen}"
-    others = [f"MUJOCO_GL={name}" for name in installed_backends() if name != chosen]
+    # GLFW always is installed, but it needs a display.
+    installed = ["glfw"] * has_display() + [name for name in _LIBRARIES if ctypes.util.find_library(_LIBRARIES[name])]
+    others = [f"MUJOCO_GL={name}" for name in installed if name != chosen]
     advice = f"set {' or '.join(others)} before Python starts" if others else "no other backend is installed here"
     reason = str(error).splitlines()[0] if str(error) else repr(error)
     # Other variables that keep a backend from loading, after which MuJoCo lacks its renderer.
@@ -54,12 +56,6 @@ def rendering_error(error: Exception) -> RenderingError:
     elif backend == "egl" and not device.strip().isdecimal():
         reason, advice = f"expected MUJOCO_EGL_DEVICE_ID as a number, found {device!r}", "set it before Python starts"
     return RenderingError(f"can't open a rendering context, {setting}: {reason}; {advice}")
-
-
-def installed_backends() -> list[str]:
-    """Returns the values of MUJOCO_GL whose libraries are installed. GLFW always is, but it needs a display."""
-    backends = [name for name, library in _LIBRARIES.items() if ctypes.util.find_library(library)]
-    return ["glfw", *backends] if has_display() else backends
 
 
 def has_display() -> bool:
