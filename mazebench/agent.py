@@ -212,7 +212,10 @@ class _SingleAgents(Agent):
         return agent.act(observation)
 
     def report(self, state: list[SingleAgent]) -> Report:
-        poses, notes = zip(*(agent.report() for agent in state), strict=True)
+        reports = [agent.report() for agent in state]
+        if not all(isinstance(each, Report) for each in reports):
+            return next(each for each in reports if not isinstance(each, Report))  # which an evaluation refuses
+        poses, notes = zip(*reports, strict=True)
         unknown = np.full(3, np.nan)
         are_known = any(pose is not None for pose in poses)
         return Report(np.array([unknown if pose is None else pose for pose in poses]) if are_known else None, notes)

@@ -114,7 +114,8 @@ def test_a_bent_map_has_no_recall():
         (Report(np.array([[0, math.inf, 0]])), "expected poses in metres and rad, NaN where unknown from report(),"),
         (Report(notes=[1, 2]), "expected 1 notes from report(), found 2"),
         (Report(notes=[{1, 2}]), "expected notes that JSON can hold from report(), found Object of type set"),
-        (None, "report() raised TypeError"),
+        (None, "expected a Report from report(), found NoneType"),
+        (Report(notes=["\ud800"]), "expected notes that JSON can hold from report(), found"),
     ],
 )
 def test_a_report_that_breaks_the_contract_is_named_in_one_line(reported, said):

@@ -18,6 +18,7 @@ from mazebench.evaluation.plan import make_plan
 from mazebench.maps.kinds import generate
 from mazebench.maps.maze import Maze
 from mazebench.maps.readers.ros import write_ros_map
+from mazebench.report.episodes import read_results
 from mazebench.results.played import played_task
 from mazebench.results.reading import load_result
 from mazebench.tasks.episode import Episode, goals_of, sample_episode
@@ -79,6 +80,32 @@ def test_areas_that_are_apart_on_the_older_map_hold_no_start_and_goal(options):
         mazebench.make(spec).reset(options={"episode": Episode(0, (1, 1), (1, 7), 0.0, 0)})
 
 
+def test_distances_are_those_of_cells_that_are_joined_on_both_maps(remarks):
+    ring = np.ones((9, 9), bool)
+    ring[[1, 7], 1:8] = ring[1:8, [1, 7]] = False
+    older = ring.copy()
+    older[[1, 7], 4] = True  # what is left of it and what is right of it are apart
+    spec = Task.of(mazes=Maze(ring), shown=older)
+    assert max(spec.distances) == 10
+    assert draw_trials(spec, 1)
+    assert "0.92 of the free space is common with maze; 0 cells are wall now, 2 are free now" in remarks()[-1]
+    with pytest.raises(InputError, match="at most 10 cells"):
+        Task.of(mazes=Maze(ring), shown=older, distances=(11,))
+
+
+def test_a_map_that_fits_better_elsewhere_is_told_of(remarks):
+    maze = house()
+    Task.of(mazes=maze, shown=np.roll(maze.walls, 1, axis=1))
+    assert "; moved by (-1, 0) m it would be " in remarks()[-1]
+
+
+def test_a_report_has_results_with_an_older_map(tmp_path):
+    options = {"mazes": house(), "shown": with_door(house()), "distances": (15,), "episodes_per_distance": 1}
+    mazebench.evaluate("oracle", out=tmp_path / "run", **options)
+    [result] = read_results([tmp_path / "run"])
+    assert result.setting.shown == "an older map"
+
+
 class TestRosMaps:
     """Maps of ROS are laid on each other by their origins."""
 
@@ -128,7 +155,10 @@ class TestRosMaps:
     [
         ({"shown": np.zeros((31, 31))}, "expected mazes of your own beside it, found none"),
         ({"kinds": ("house",), "shown": np.zeros((31, 31))}, "expected mazes of your own beside it, found none"),
-        ({"mazes": house(), "shown": house(1).walls[:-1]}, "expected an older map of 31 x 31, .* found 31 x 30"),
+        (
+            {"mazes": house(), "shown": house(1).walls[:-1]},
+            "expected an older map of 31 x 31 cells, .* found 31 x 30 cells",
+        ),
         ({"mazes": [house(0), house(1), house(2)], "shown": [house(0), house(1)]}, "each of 3 mazes, .* found 2"),
         ({"task": "rebuilt", "level": 2, "mazes": house(), "shown": house()}, "level 1 beside shown, .* found 2"),
         ({"mazes": house(), "shown": "plan.yaml"}, "a path beside the path of mazes, else values"),

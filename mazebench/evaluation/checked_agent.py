@@ -7,6 +7,7 @@ import os
 from typing import Any
 
 import numpy as np
+import pydantic_core
 
 from mazebench.agent import Agent, Inputs, Report
 from mazebench.agent_loading import source_line
@@ -90,7 +91,11 @@ class CheckedAgent(Agent):
     def report(self, state: Any) -> Report:
         """Returns the agent's report after its last step: poses of the right shape, and notes that JSON can hold."""
         with calling(self.name, "report"):
-            pose, notes = self._agent.report(state)
+            answer = self._agent.report(state)
+        if not isinstance(answer, Report):
+            raise AgentError(f"agent {self.name!r}: expected a Report from report(), found {type(answer).__name__}")
+        with calling(self.name, "report"):
+            pose, notes = answer
             pose = None if pose is None else np.asarray(pose)
             notes = None if notes is None else list(notes)
         expected, shape = f"agent {self.name!r}: expected %s from report(), found %s", (self._batch, 3)
@@ -102,6 +107,6 @@ class CheckedAgent(Agent):
         if notes is not None and len(notes) != self._batch:
             raise AgentError(expected % (f"{self._batch} notes", len(notes)))
         try:
-            return Report(pose, json.loads(json.dumps(notes, allow_nan=False)))
+            return Report(pose, pydantic_core.from_json(json.dumps(notes, allow_nan=False)))  # as records are read
         except (TypeError, ValueError, RecursionError) as error:
             raise AgentError(expected % ("notes that JSON can hold", error)) from error

@@ -46,9 +46,7 @@ class Change(NamedTuple):
     walls: np.ndarray  # [N, N] bool
     passages: tuple[Passage, ...]  # that may still change
     things: tuple[tuple[tuple[slice, ...], np.ndarray], ...]  # furniture of the plan that is left: its box and shape
-    done: tuple[
-        str, ...
-    ] = ()  # "closed" or "opened" for each passage, "added" or "removed" for each piece of furniture
+    done: tuple[str, ...] = ()  # a passage was "closed" or "opened", a piece of furniture "added" or "removed"
     late: float = 0.0  # share of late episodes of a robot that believes the plan
     late_without_map: float = 0.0  # of one that takes for free what it has not seen
     blocked: float = 0.0  # share of those in which the shortest way on the plan is blocked
@@ -104,7 +102,9 @@ def changes(maze: Maze, strength: int, count: int, seed: int) -> Iterator[tuple[
 
 def change(maze: Maze, strength: int, rng: np.random.Generator, name: str) -> tuple[Maze, Change]:
     """Returns what `changed` does, with that name and with what has changed."""
-    if strength not in (1, 2, 3):
+    if not isinstance(maze, Maze):
+        raise InputError(f"expected a Maze, found {type(maze).__name__}")
+    if isinstance(strength, bool | float) or strength not in (1, 2, 3):
         raise InputError(f"expected a strength of 1 to 3, found {strength!r}")
     if not isinstance(rng, np.random.Generator):
         raise InputError(f"expected rng as a numpy.random.Generator, found {type(rng).__name__}")

@@ -7,18 +7,21 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 from typing import Any
 
 import numpy as np
 import scipy
 
-from mazebench.errors import InputError
+from mazebench.errors import InputError, remark
 from mazebench.maps.maze import Maze
 from mazebench.maps.maze_options import ReadOptions
 from mazebench.maps.readers.occupancy_grid import LocatedMaze, OccupancyGrid, blocked_pixels
 
 _LEAST_SHARED = 0.5  # of the free space of both maps together: less is another building, or another frame
+_MOVED = 2.0  # m, by which a map is tried elsewhere
+_BETTER = 0.05  # of the free space, by which it must fit better there for a user to be told
 _TURN = 1e-3  # rad
 
 
@@ -46,14 +49,29 @@ def older_map(walls: np.ndarray, maze: Maze, name: str) -> OlderMap:
     walls = walls | (maze.walls & ~_largest_area(walls, maze))
     walls[[0, -1]] = walls[:, [0, -1]] = True
     walls.flags.writeable = False
-    found, older = OlderMap(walls, maze), ~walls
-    shared = np.sum(older & ~maze.walls) / np.sum(older | ~maze.walls)
+    shared = _shared(walls, maze.walls)
     if shared < _LEAST_SHARED:
         raise InputError(
             f"{name}: expected an older map of {maze.name}, with at least {_LEAST_SHARED:g} of the free space of both "
-            f"in common, found {shared:.2f}; both must lie in one frame"
+            f"in common, found {shared:.2f}; both must lie in one frame, in pixels finer than the cells"
         )
-    return found
+
+    # What a user should know: how much has changed, and whether the map fits better elsewhere.
+    most = round(_MOVED / maze.cell_size)
+    shifts = list(itertools.product(range(-most, most + 1), repeat=2))
+    fits = [_shared(np.roll(walls, shift, axis=(0, 1)), maze.walls) for shift in shifts]
+    down, right = shifts[int(np.argmax(fits))]
+    better = f"; moved by ({right * maze.cell_size:g}, {-down * maze.cell_size:g}) m it would be {max(fits):.2f}"
+    remark(
+        f"{name}: {shared:.2f} of the free space is common with {maze.name}; {np.sum(maze.walls & ~walls)} cells are "
+        f"wall now, {np.sum(walls & ~maze.walls)} are free now{better * (max(fits) > shared + _BETTER)}"
+    )
+    return OlderMap(walls, maze)
+
+
+def _shared(walls: np.ndarray, others: np.ndarray) -> float:
+    """Returns the intersection over union of what is free on two maps `[N, N]` bool."""
+    return float(np.sum(~(walls | others)) / max(1, np.sum(~(walls & others))))
 
 
 def one_for_each(shown: list[Any], num_mazes: int) -> list[Any]:
@@ -90,8 +108,10 @@ def lay_on(
         older = dataclasses.replace(older, resolution=maze.cell_size)
     wanted, found = (grid.frame or grid.states.shape for grid in (newer, older))
     if found != wanted:
+        units = ("cells" if grid.is_cells else "pixels" for grid in (newer, older))
         wanted, found = (
-            "a map with an origin" if each == "map" else "{1} x {0}".format(*each) for each in (wanted, found)
+            "a map with an origin" if each == "map" else "{1} x {0} {2}".format(*each, unit)
+            for each, unit in zip((wanted, found), units, strict=True)
         )
         raise InputError(f"{name}: expected an older map of {wanted}, as {maze.name} is, found {found}")
     older_x, older_y, older_yaw = older.origin

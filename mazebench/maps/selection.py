@@ -11,7 +11,7 @@ from typing import Any
 from mazebench.errors import InputError
 from mazebench.maps.maze import Maze, resized
 from mazebench.maps.maze_options import ReadOptions
-from mazebench.maps.older_map import OlderMap, lay_on, older_map, one_for_each
+from mazebench.maps.older_map import OlderMap, lay_on, one_for_each
 from mazebench.maps.readers.arrays import as_array, grid_of_array
 from mazebench.maps.readers.occupancy_grid import LocatedMaze, OccupancyGrid, locate_maze
 from mazebench.maps.text import format_maze, format_walls, parse_maze, parse_walls
@@ -59,7 +59,7 @@ def maps_in_texts(texts: Sequence[str], mazes: Sequence[Maze]) -> tuple[OlderMap
     walls = [parse_walls(text, "shown") for text in texts]
     if [each.shape for each in walls] != [maze.walls.shape for maze in mazes]:
         raise InputError("expected an older map in the cells of each maze, found others")
-    return tuple(older_map(each, maze, f"shown {maze.name}") for each, maze in zip(walls, mazes, strict=True))
+    return tuple(OlderMap(each, maze) for each, maze in zip(walls, mazes, strict=True))
 
 
 def _grid(item: Any, name: str) -> OccupancyGrid:

@@ -197,7 +197,8 @@ def reported(result: Result) -> ReportedResult:
     episodes = episodes.assign(**scores(records), **facts)
     setting = summary.task.setting
     if setting.mazes is not None:  # by their names, wherever the files were
-        setting = setting.replace(mazes=", ".join(sorted(episodes.maze.unique())))
+        shown = None if setting.shown is None else "an older map"
+        setting = setting.replace(mazes=", ".join(sorted(episodes.maze.unique())), shown=shown)
 
     trajectories: list[Trajectory] | None = None
     path = folder / TRAJECTORIES

@@ -163,7 +163,8 @@ def sample_pair(
         if len(goals):
             goal_row, goal_column = goals[rng.integers(len(goals))].tolist()
             return (row, column), (goal_row, goal_column)
-    raise InputError(f"{maze.name}: found no two cells {distance} cells apart; the farthest are {maze.diameter}")
+    what = "cells" if joined is None else "cells that are joined on the older map"
+    raise InputError(f"{maze.name}: found no two {what} {distance} cells apart; the farthest are {maze.diameter}")
 
 
 def check_episode(task: Task, episode: Episode) -> Episode:

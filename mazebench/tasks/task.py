@@ -217,7 +217,7 @@ def resolve(
 
     # The distances that fit the mazes, and a time limit in which goals of one's own are reached.
     by_default = distances or (EVAL_DISTANCES if split == "eval" else TRAIN_DISTANCES)
-    fitting = _fitting_distances(asked, mazes, scenarios, by_default)
+    fitting = _fitting_distances(asked, world, by_default)
     if asked.num_ends == 2 and asked.distances not in (None, fitting):
         raise InputError(f"start and goal are given; found distances {asked.distances}, which would be ignored")
     chosen = asked.distances or fitting
@@ -239,7 +239,7 @@ def resolve(
         kinds=asked.kinds or (DRAWN_KINDS[:1] if asked.is_drawn else ()),
         num_mazes=asked.num_mazes or (NUM_DRAWN if asked.is_drawn and not asked.fresh else None),
     )
-    _check_distances(filled, mazes, scenarios)
+    _check_distances(filled, world)
     return Task(
         options=filled,
         asked=asked,
@@ -362,21 +362,23 @@ def _read(asked: TaskOptions) -> World:
     if asked.mazes is None:
         split = asked.split or "train"
         return World(load_mazes(size, split) if asked.track is None else load_kind_mazes(split))
-    world = _read_own(asked)
-    for maze in world.mazes:
+    mazes, shown, scenarios = _read_own(asked)
+    for maze in mazes:
         if asked.size not in (None, maze.size):
             raise InputError(f"expected mazes of size {asked.size}, found size {maze.size}")
-    return _with_changes(asked, world.mazes) if world.shown is None and asked.track is not None else world
+    if shown is None and asked.track is not None:
+        return _with_changes(asked, mazes)
+    return World(mazes, shown, scenarios)
 
 
-def _read_own(asked: TaskOptions) -> World:
+def _read_own(asked: TaskOptions) -> tuple[tuple[Maze, ...], tuple[OlderMap, ...] | None, Scenarios | None]:
     """Returns the mazes of one's own in which the task can be played, with the older maps and scenarios of these."""
     mazes, shown = asked.mazes, None
     if are_scenarios(mazes):
         scenarios = read_scenarios(mazes, asked.reading)
-        return World((scenarios.maze,), scenarios=scenarios)
+        return (scenarios.maze,), None, scenarios
     if not isinstance(mazes, str):
-        return World(mazes, None if asked.shown is None else maps_in_texts(asked.shown, mazes))
+        return mazes, None if asked.shown is None else maps_in_texts(asked.shown, mazes), None
     from mazebench.maps.maze_files import read_mazes, read_with_older  # with all readers, which few commands need
 
     if asked.shown is None:
@@ -384,7 +386,7 @@ def _read_own(asked: TaskOptions) -> World:
     else:
         mazes, shown = read_with_older(mazes, asked.shown, asked.reading)
     kept = _playable(mazes, functools.partial(_check_maze, asked))
-    return World(tuple(mazes[each] for each in kept), shown and tuple(shown[each] for each in kept))
+    return tuple(mazes[each] for each in kept), shown and tuple(shown[each] for each in kept), None
 
 
 def _with_changes(asked: TaskOptions, plans: tuple[Maze, ...]) -> World:
@@ -407,7 +409,7 @@ def _with_changes(asked: TaskOptions, plans: tuple[Maze, ...]) -> World:
 
     def change(plan: Maze) -> None:
         _check_maze(asked, plan)
-        shown.extend(OlderMap(plan.walls, maze) for maze in _changed(plan, plan.name, strength))
+        shown.extend(OlderMap(plan.walls, maze) for maze in _changed(plan, plan.name, plan.kind, strength))
 
     # What takes a moment is checked first.
     _context_size(asked, plans[0].size, default_context_size)
@@ -416,17 +418,16 @@ def _with_changes(asked: TaskOptions, plans: tuple[Maze, ...]) -> World:
 
 
 @functools.lru_cache(maxsize=32)
-def _changed(plan: Maze, name: str, strength: int) -> tuple[Maze, ...]:
-    """Returns the changed buildings of a plan; `name` is its own, for plans of equal walls are equal."""
+def _changed(plan: Maze, name: str, kind: str, strength: int) -> tuple[Maze, ...]:
+    """Returns the changed buildings of a plan; name and kind are its own, for plans of equal walls are equal."""
     from mazebench.maps.changes import changed_buildings  # which needs numba
 
     return changed_buildings(plan, strength, NUM_CHANGED, seed=0)
 
 
-def _fitting_distances(
-    asked: TaskOptions, mazes: Mazes, scenarios: Scenarios | None, by_default: tuple[int, ...]
-) -> tuple[int, ...]:
+def _fitting_distances(asked: TaskOptions, world: World, by_default: tuple[int, ...]) -> tuple[int, ...]:
     """Returns the distances of options that name none: on a track in metres, else in cells."""
+    mazes, shown, scenarios = world
     of_track = DISTANCES if asked.track is not None else ()
     if not asked.has_own or isinstance(mazes, FreshMazes):
         return of_track or by_default
@@ -435,10 +436,10 @@ def _fitting_distances(
     if scenarios is not None:
         return tuple(np.unique(scenarios.distances).tolist())
     if asked.is_hierarchical or asked.num_ends == 2:
-        return tuple(sorted({asked.farthest(maze) for maze in mazes}))
+        return tuple(sorted(set(map(asked.farthest, mazes, shown or [None] * len(mazes)))))
 
     # Of a track, those that all mazes have; all of its own, if none has any.
-    farthest, count = min(map(asked.farthest, mazes)), len(EVAL_DISTANCES)
+    farthest, count = min(map(asked.farthest, mazes, shown or [None] * len(mazes))), len(EVAL_DISTANCES)
     if of_track:
         cell_size = mazes[0].cell_size
         return tuple(each for each in of_track if cells_of(each, cell_size, asked.track) <= farthest) or of_track
@@ -520,8 +521,9 @@ def _playable(mazes: Sequence[Maze], check: Callable[[Maze], Any]) -> list[int]:
     return [number for number in range(len(mazes)) if number not in faults]
 
 
-def _check_distances(options: TaskOptions, mazes: Mazes, scenarios: Scenarios | None) -> None:
+def _check_distances(options: TaskOptions, world: World) -> None:
     """Raises `InputError` if no goal of the local task is as far away in a maze as wanted."""
+    mazes, shown, scenarios = world
     wanted, cell_size = options.distances or (), mazes[0].cell_size
     if scenarios is not None:
         if not len(scenarios.numbers(wanted)):
@@ -536,11 +538,11 @@ def _check_distances(options: TaskOptions, mazes: Mazes, scenarios: Scenarios | 
     if isinstance(mazes, FreshMazes):  # an episode whose maze is too small takes another one
         mazes = (max((mazes[number] for number in range(_NUM_CHECKED)), key=options.farthest),)
     longest, unit = cells_of(max(wanted), cell_size, options.track), "cells" if options.track is None else "m"
-    for maze in mazes:
+    for maze, older in zip(mazes, shown or [None] * len(mazes), strict=True):
         # Most mazes are found to be large enough from one cell, without the distances of all pairs.
-        if not options.num_ends and longest <= maze.distances(tuple(maze.free_cells[0])).max():
+        if shown is None and not options.num_ends and longest <= maze.distances(tuple(maze.free_cells[0])).max():
             continue
-        if longest > (farthest := options.farthest(maze)):
+        if longest > (farthest := options.farthest(maze, older)):
             raise InputError(
                 f"{maze.name}: expected distances of at most {distance_of(farthest, cell_size, options.track)} {unit}, "
                 f"as far as the maze reaches, found {max(wanted)}; choose others (--distances)"

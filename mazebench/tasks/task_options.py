@@ -346,13 +346,23 @@ class TaskOptions(SensorOptions, ReadOptions):
         start, goal = ((corners | cells).get(name) for name in ENDS)
         return start, goal
 
-    def farthest(self, maze: Maze) -> int:
-        """Returns the largest distance in cells that start and goal can have in a maze."""
-        start, goal = self.ends(maze)
+    def farthest(self, maze: Maze, older: OlderMap | None = None) -> int:
+        """Returns the largest distance in cells that start and goal can have in a maze, and on an `older` map of it."""
+        start, goal = self.ends(maze, older)
         if start is not None and goal is not None:
             return maze.distance(start, goal)
         given = start or goal
-        return maze.diameter if given is None else int(maze.distances(given).max())
+        if older is None:
+            return maze.diameter if given is None else int(maze.distances(given).max())
+
+        # Among the cells that are joined on the older map; a lower bound by a double sweep if no end is given.
+        cells = np.argwhere(older.joined)
+        if not len(cells):
+            return 0
+        if given is None:
+            near = maze.distances(tuple(cells[0]))[older.joined]
+            given = tuple(cells[near.argmax()])
+        return int(maze.distances(given)[older.joined].max())
 
     # Their names in results.
 
