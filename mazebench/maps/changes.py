@@ -175,17 +175,19 @@ def _changed_more(plan: _Plan, draft: Change, strength: int) -> Change:
             now, num_misses = (new, 0) if is_kept else (now, num_misses + 1)
 
         # The first try that is late enough counts, or the latest of all.
-        now = now._replace(late_without_map=plan.late_without_map(now.walls))
-        least = max(LATE_WITHOUT_MAP, now.late + WORTH if strength == 1 else 0.0)
-        tries.append((now.late_without_map >= least, now.late, -number, now))
-        if tries[-1][:2] >= (True, target):
+        can_carry = now.late >= target - _MISS
+        if can_carry:
+            now = now._replace(late_without_map=plan.late_without_map(now.walls))
+            can_carry = now.late_without_map >= max(LATE_WITHOUT_MAP, now.late + WORTH if strength == 1 else 0.0)
+        tries.append((can_carry, now.late, -number, now))
+        if can_carry and now.late >= target:
             break
     can_carry, late, _, best = max(tries)
-    if late < target - _MISS or not can_carry:
+    if not can_carry:
         raise InputError(
             f"{plan.name}: expected changes of strength {strength}, by which a robot is late in {target} of the "
             f"episodes with the old map, and without a map in at least {LATE_WITHOUT_MAP} and at strength 1 in {WORTH} "
-            f"more than with it; found {late:.2f} with it and {best.late_without_map:.2f} without"
+            f"more than with it; found {late:.2f} with it and {plan.late_without_map(best.walls):.2f} without"
         )
     return best
 
